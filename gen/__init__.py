@@ -1,0 +1,1 @@
+"""From the specification to files: design, word lengths, Verilog, C model, manifest, reports."""

@@ -1,0 +1,167 @@
+"""Makes the certificate of a design: the datapath, what it stands for, and what is proven about it.
+
+Whoever reads it can prove the bound again and needs nothing else; `sosmith.gen.verification` does.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from itertools import accumulate
+
+from sosmith.gen.certificate_file import (
+    FORMAT,
+    Certificate,
+    ClaimsEntry,
+    GainEntry,
+    IdealEntry,
+    NodeEntry,
+    PortEntry,
+    SectionEntry,
+    StageEntry,
+    on_grid,
+)
+from sosmith.gen.linear_model import LinearModel, linear_model
+from sosmith.gen.peak_gain import Drive, Horizon, Response, horizon, impulse
+from sosmith.gen.proof import Section, ideal_gain
+from sosmith.gen.quantize import Quantized, ideal_sections
+from sosmith.model.datapath import Stage
+from sosmith.model.graph import Node
+from sosmith.model.horner import HornerStep
+from sosmith.model.output import OutputStage
+from sosmith.model.port import Port
+
+_FINER_BITS = 88
+"""By so many bits a claim is computed more closely than the search for word lengths needs, so that two ways of
+computing it fall into the same step of the grid."""
+
+
+def certificate(quantized: Quantized, max_error: Fraction) -> Certificate:
+    """Certify a design; `max_error` is what was asked for, in the unit of the output.
+
+    Raises
+    ------
+    ShortfallError
+        If a section is unstable or its response does not end in time.
+    """
+    datapath = quantized.datapath
+    sections = ideal_sections(quantized.filter) if quantized.filter is not None else []
+    return Certificate(
+        format=FORMAT,
+        name=datapath.name,
+        inputs=tuple(_port(port) for port in datapath.inputs),
+        output=_port(datapath.output),
+        max_error=max_error,
+        ideal=IdealEntry(
+            polynomial=None if quantized.polynomial is None else quantized.polynomial.coefficients,
+            sections=tuple(SectionEntry(numerator=b, denominator=a) for b, a in sections),
+        ),
+        stages=tuple(_stage(stage) for stage in datapath.stages),
+        claims=_claims(quantized, sections),
+    )
+
+
+def _port(port: Port) -> PortEntry:
+    return PortEntry(name=port.name, bits=port.bits, signed=port.signed, lsb=port.lsb, zero=port.zero, unit=port.unit)
+
+
+def _stage(stage: Stage) -> StageEntry:
+    graph = stage.graph
+    role = "polynomial" if isinstance(stage, HornerStep) else "output" if isinstance(stage, OutputStage) else "section"
+    return StageEntry.model_validate(
+        {"name": stage.name, "role": role, "nodes": tuple(map(_node, graph.nodes)), "outputs": graph.outputs}
+    )
+
+
+def _node(node: Node) -> NodeEntry:
+    return NodeEntry(
+        op=node.op,
+        operands=node.operands,
+        frac=node.frac,
+        low=node.low,
+        high=node.high,
+        parameter=node.parameter,
+        parameter_frac=node.parameter_frac,
+        name=node.name,
+    )
+
+
+def _claims(quantized: Quantized, ideal: Sequence[Section]) -> ClaimsEntry:
+    budget = dict(quantized.budget)
+    gain: Fraction | None = None
+    sections: tuple[GainEntry, ...] = ()
+    if quantized.sections:
+        models = [linear_model(section.graph) for section in quantized.sections]
+        entry = quantized.sections[0].graph
+        node = entry.nodes[entry.inputs[0]]
+        unit = Fraction(2) ** -node.frac
+        closer = _closer(models, ideal, node.low * unit, node.high * unit)
+        gain = closer.gain
+        budget["filter coefficients"], budget["filter rounding"] = closer.coefficients, closer.rounding
+        for part in budget.keys() & {"calibration", "input scaling"}:  # an exact error times the filter's gain
+            budget[part] *= gain / ideal_gain(ideal)
+        sections = tuple(_gains(s.name, m) for s, m in zip(quantized.sections, models, strict=True))
+    return ClaimsEntry(budget=budget, bound=sum(budget.values(), Fraction(0)), peak_gain=gain, sections=sections)
+
+
+@dataclass(frozen=True)
+class _Closer:
+    """Figures of a `CascadeProof` on the grid."""
+
+    rounding: Fraction
+    coefficients: Fraction
+    gain: Fraction
+
+
+def _closer(models: Sequence[LinearModel], ideal: Sequence[Section], low: Fraction, high: Fraction) -> _Closer:
+    at = _finer(horizon([[model.denominator for model in models], [denominator for _, denominator in ideal]]))
+    made = impulse(at)
+    errors: list[Drive] = []
+    for model in models:
+        own = impulse(at).all_pole(model.denominator)
+        errors = [Drive(_through(d.response, model), d.low, d.high) for d in errors]
+        errors += [Drive(own.taps(s.numerators[model.output]), s.low, s.high) for s in model.sources[1:]]
+        made = _through(made, model)
+    exact = impulse(at)
+    for numerator, denominator in ideal:
+        exact = exact.all_pole(denominator).taps(numerator)
+    return _Closer(
+        rounding=on_grid(_magnitude(errors)),
+        coefficients=on_grid(_magnitude([Drive(made.minus(exact), low, high)])),
+        gain=_gain(exact),
+    )
+
+
+def _through(response: Response, model: LinearModel) -> Response:
+    return response.all_pole(model.denominator).taps(model.transfer)
+
+
+def _gains(name: str, model: LinearModel) -> GainEntry:
+    recursion = impulse(_finer(horizon([[model.denominator]]))).all_pole(model.denominator)
+    return GainEntry(section=name, peak_gain=_gain(recursion.taps(model.transfer)), recursion_gain=_gain(recursion))
+
+
+def _gain(response: Response) -> Fraction:
+    return on_grid(_magnitude([Drive(response, Fraction(-1), Fraction(1))]))
+
+
+def _magnitude(drives: Sequence[Drive]) -> Fraction:
+    """Largest size of the sum of `drives`, as `sosmith.gen.peak_gain.extent` has it, without any rounding."""
+    scale = math.lcm(*(end.denominator for drive in drives for end in (drive.low, drive.high)))
+    length = max((len(drive.response.samples) for drive in drives), default=0)
+    tops, bottoms = [0] * length, [0] * length
+    for drive in drives:
+        low, high = int(drive.low * scale), int(drive.high * scale)
+        tops = [t + h * (high if h > 0 else low) for t, h in zip(tops, drive.response.samples, strict=True)]
+        bottoms = [b + h * (low if h > 0 else high) for b, h in zip(bottoms, drive.response.samples, strict=True)]
+    largest = max(max(accumulate(tops), default=0), -min(accumulate(bottoms), default=0))
+    slack = sum((max(abs(d.low), abs(d.high)) * d.response.uncertainty for d in drives), Fraction(0))
+    unit = Fraction(1, scale << drives[0].response.horizon.bits) if drives else Fraction(0)
+    return largest * unit + slack
+
+
+def _finer(at: Horizon) -> Horizon:
+    longer = math.ceil(_FINER_BITS / math.log2(at.rho))
+    return replace(at, length=at.length + longer, bits=at.bits + _FINER_BITS + 8)

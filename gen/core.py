@@ -1,0 +1,193 @@
+"""From a specification to a core: filter, calibration, realization and architecture chosen, formats fixed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from sosmith.gen.cost import cost_of
+from sosmith.gen.design import Filter, design
+from sosmith.gen.quantize import Quantized, quantize, with_realization
+from sosmith.gen.realizations import ERROR_FEEDBACK, REALIZATIONS
+from sosmith.gen.specification import Specification
+from sosmith.model.calibration import Fit, fit, read_measurements
+from sosmith.model.datapath import Datapath
+from sosmith.model.errors import ShortfallError, SpecificationError
+from sosmith.model.polynomial import Polynomial
+from sosmith.model.port import Port
+
+CORES = ("instrument", "filter", "calibration")
+"""What can be generated of a specification: all of it, or one part."""
+
+AUTO = "auto"
+"""Realization that stands for the cheapest proven one."""
+
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True, kw_only=True)
+class CoreDesign:
+    """A core and how it came about.
+
+    Attributes
+    ----------
+    spec : Specification
+        What was asked for.
+    core : str
+        One of `CORES`.
+    quantized : Quantized
+        The datapath, with the ideal filter and polynomial it stands for.
+    architecture : str
+        How the datapath becomes hardware.
+    reasons : dict of str to str
+        Why this realization and this architecture, one sentence each.
+    fit : Fit or None
+        The fit, where the calibration came from measurements.
+    """
+
+    spec: Specification
+    core: str
+    quantized: Quantized
+    architecture: str
+    reasons: dict[str, str]
+    fit: Fit | None
+
+    @property
+    def datapath(self) -> Datapath:
+        """The frozen datapath."""
+        return self.quantized.datapath
+
+
+def design_core(
+    spec: Specification,
+    *,
+    core: str | None = None,
+    realization: str | None = None,
+    widths_of: str | None = None,
+    progress: Progress = lambda step: None,
+) -> CoreDesign:
+    """Design a core of a specification.
+
+    Parameters
+    ----------
+    spec : Specification
+        What is asked for.
+    core : str or None
+        One of `CORES`; None takes all that the specification has.
+    realization : str or None
+        Overrides the specification's.
+    widths_of : str or None
+        Choose fraction bits and coefficients for this realization, then use `realization` at these widths; the
+        error may then exceed what the specification allows.
+    progress : callable
+        Told the name of each step.
+
+    Raises
+    ------
+    SpecificationError
+        If the core does not exist in the specification, or its measurements are unfit.
+    ShortfallError
+        If no formats meet the specification.
+    """
+    chosen = _chosen_core(spec, core)
+    wanted = _known(realization or spec.hardware.realization)
+    if chosen != "filter":
+        progress("calibration")
+    polynomial, fitted = _polynomial(spec) if chosen != "filter" else (None, None)
+    progress("filter design")
+    ideal = _filter(spec) if chosen != "calibration" else None
+
+    def attempt(name: str) -> Quantized:
+        progress(f"word lengths, {name}" if ideal is not None else "word lengths")
+        return quantize(
+            name=spec.name,
+            inputs=_inputs(spec, chosen),
+            output=spec.output,
+            max_error=spec.max_error,
+            ideal=ideal,
+            polynomial=polynomial,
+            realization=name,
+        )
+
+    if ideal is None:
+        quantized, reason = attempt(next(iter(REALIZATIONS))), "none: a calibration has no filter sections"
+    elif widths_of is not None:
+        if wanted not in ERROR_FEEDBACK:
+            raise SpecificationError(
+                f"the realization at the widths of {widths_of} must be {', '.join(ERROR_FEEDBACK)}, not {wanted}"
+            )
+        quantized = with_realization(attempt(widths_of), wanted)
+        reason = f"{wanted} at the word lengths chosen for {widths_of}, as asked"
+    elif wanted == AUTO:
+        quantized, reason = _cheapest(attempt)
+    else:
+        source = "on the command line" if realization is not None else "in the specification"
+        quantized, reason = attempt(wanted), f"{wanted}: asked for {source}"
+    reasons = {
+        "realization": reason,
+        "architecture": "parallel: the architecture available now, one sample per clock",
+    }
+    return CoreDesign(spec=spec, core=chosen, quantized=quantized, architecture="parallel", reasons=reasons, fit=fitted)
+
+
+def _cheapest(attempt: Callable[[str], Quantized]) -> tuple[Quantized, str]:
+    """Try every realization; return the proven one of the smallest estimated area, and why.
+
+    Raises
+    ------
+    ShortfallError
+        If none meets the specification; says what stands in the way of the last one tried.
+    """
+    proven: list[tuple[int, str, Quantized]] = []
+    failure: ShortfallError | None = None
+    for name in REALIZATIONS:
+        try:
+            quantized = attempt(name)
+        except ShortfallError as error:
+            failure = failure or error
+            continue
+        proven.append((cost_of(quantized.datapath).area, name, quantized))
+    if not proven:
+        assert failure is not None
+        raise failure
+    proven.sort(key=lambda entry: entry[0])
+    area, name, best = proven[0]
+    rest = "".join(f", {other} {size:,}" for size, other, _ in proven[1:3])
+    reason = f"{name}: the smallest estimated area of {len(proven)} proven, {area:,} LUT4 in all"
+    return best, f"{reason} (then{rest[1:]})" if rest else reason
+
+
+def _chosen_core(spec: Specification, core: str | None) -> str:
+    if spec.calibration is None:
+        if core not in {None, "filter"}:
+            raise SpecificationError(
+                f"{spec.path}: the core must be filter, not {core}: the specification has no [calibration]"
+            )
+        return "filter"
+    return core or "instrument"
+
+
+def _known(wanted: str) -> str:
+    if wanted not in {AUTO, *REALIZATIONS}:
+        raise SpecificationError(f"the realization must be {AUTO}, {', '.join(REALIZATIONS)}, not {wanted}")
+    return wanted
+
+
+def _inputs(spec: Specification, core: str) -> tuple[Port, ...]:
+    if core == "filter" and spec.calibration is not None:
+        # Alone, the filter takes what the calibration would hand it, in the output's format.
+        return (replace(spec.output, name=f"{spec.output.name}_in"),)
+    return spec.inputs
+
+
+def _polynomial(spec: Specification) -> tuple[Polynomial, Fit | None]:
+    assert spec.calibration is not None
+    if spec.calibration.data is not None:
+        fitted = fit(read_measurements(spec.calibration.data))
+        return fitted.polynomial, fitted
+    assert spec.calibration.coefficients is not None
+    return Polynomial(spec.calibration.coefficients), None
+
+
+def _filter(spec: Specification) -> Filter:
+    return design(spec.filter, float(spec.sample_rate))

@@ -1,0 +1,84 @@
+"""What a datapath costs, counted on its dataflow graphs: multipliers, adder bits, register bits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from sosmith.model.datapath import Datapath
+from sosmith.model.graph import Node, Op
+
+_BLOCK = 18
+_LUTS_PER_ADDER_BIT, _LUTS_PER_SPLIT, _LUTS_AROUND = 0.87, 77.0, -51.0
+"""Fitted by benchmarks/cost_model.py to synthesis of the examples for ECP5, to within a fifth."""
+
+_LUTS_WORTH_OF_A_BLOCK = 864
+"""24,192 LUT4 and 28 multiplier blocks are on an ECP5-25 (Lattice FPGA-DS-02012, family table)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cost:
+    """Counts of a datapath in the parallel architecture, before synthesis.
+
+    Attributes
+    ----------
+    multipliers : tuple of tuple of int
+        Operand widths in bits of each multiplication, data first, in the order of the datapath.
+    adder_bits : int
+        Result bits of all additions and subtractions.
+    register_bits : int
+        State bits and pipeline registers.
+    """
+
+    multipliers: tuple[tuple[int, int], ...]
+    adder_bits: int
+    register_bits: int
+
+    @property
+    def multiplier_blocks(self) -> int:
+        """Hardware multipliers of 18 x 18 bits, signed, that the multiplications take."""
+        return sum(-(-a // _BLOCK) * -(-b // _BLOCK) for a, b in self.multipliers)
+
+    @property
+    def splits(self) -> int:
+        """Blocks beyond the first of each multiplication: so many partial products have to be added."""
+        return self.multiplier_blocks - len(self.multipliers)
+
+    @property
+    def luts(self) -> int:
+        """Estimate of the LUT4 on an ECP5, a carry cell counting as two."""
+        return round(_LUTS_PER_ADDER_BIT * self.adder_bits + _LUTS_PER_SPLIT * self.splits + _LUTS_AROUND)
+
+    @property
+    def area(self) -> int:
+        """One number to compare designs by: LUT4, with a multiplier block as much as its share of an ECP5-25."""
+        return self.luts + _LUTS_WORTH_OF_A_BLOCK * self.multiplier_blocks
+
+    @property
+    def multiplier_sizes(self) -> str:
+        """The multiplications for people, such as ``2 of 23 x 18, 1 of 16 x 19``."""
+        distinct = sorted(set(self.multipliers), reverse=True)
+        return ", ".join(f"{self.multipliers.count(size)} of {size[0]} x {size[1]}" for size in distinct) or "none"
+
+
+def cost_of(datapath: Datapath) -> Cost:
+    """Count the operators of `datapath`."""
+    multipliers: list[tuple[int, int]] = []
+    adders = registers = 0
+    for stage in datapath.stages:
+        nodes = stage.graph.nodes
+        for node in nodes:
+            if node.op is Op.SCALE:
+                multipliers.append((nodes[node.operands[0]].width, constant_width(node)))
+            elif node.op is Op.MULTIPLY:
+                multipliers.append((nodes[node.operands[0]].width, nodes[node.operands[1]].width))
+            elif node.op in {Op.ADD, Op.SUBTRACT}:
+                adders += node.width
+            elif node.op is Op.DELAY:
+                registers += node.width
+        registers += sum(nodes[i].width for i in stage.graph.outputs)
+    return Cost(multipliers=tuple(multipliers), adder_bits=adders, register_bits=registers)
+
+
+def constant_width(node: Node) -> int:
+    """Bits of a SCALE node's constant, with a sign bit if it is negative."""
+    return abs(node.parameter).bit_length() + (node.parameter < 0)

@@ -1,0 +1,47 @@
+"""Writes a core's files: SystemVerilog, RTLIL, manifest, certificate and the bit-true C model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from sosmith.gen.certificate import certificate
+from sosmith.gen.certificate_file import certificate_text
+from sosmith.gen.core import CoreDesign
+from sosmith.gen.manifest import manifest
+from sosmith.gen.verilog import to_rtlil, to_verilog
+from sosmith.hdl.core import Core
+from sosmith.model.c_model import c_header, c_source
+from sosmith.model.text_files import to_json, write_files
+
+
+def generate(design: CoreDesign, directory: Path, progress: Callable[[str], None] = lambda step: None) -> list[Path]:
+    """Write SystemVerilog, RTLIL, manifest, certificate and C model into `directory`; return the files' paths.
+
+    Two runs on the same specification write the same bytes.
+
+    Raises
+    ------
+    ToolError
+        If Yosys fails.
+    SpecificationError
+        If the folder cannot be written.
+    """
+    name, datapath = design.spec.name, design.datapath
+    progress("RTLIL")
+    rtlil_text = to_rtlil(Core(datapath))
+    progress("SystemVerilog")
+    verilog_text = to_verilog(rtlil_text)
+    progress("certificate")
+    proven = certificate(design.quantized, design.spec.max_error)
+    return write_files(
+        directory,
+        {
+            f"{name}.sv": verilog_text,
+            f"{name}.il": rtlil_text,
+            f"{name}.json": to_json(manifest(design)),
+            f"{name}.certificate.json": certificate_text(proven),
+            f"{name}.c": c_source(datapath),
+            f"{name}.h": c_header(datapath),
+        },
+    )

@@ -1,0 +1,136 @@
+"""The manifest: everything about a generated core that a program around it needs to know."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import sosmith
+from sosmith.gen.core import CoreDesign
+from sosmith.gen.cost import cost_of
+from sosmith.gen.limit_cycles import limit_cycles
+from sosmith.gen.linear_model import linear_model
+from sosmith.hdl.axi_stream import fields, width
+from sosmith.hdl.core import latency_cycles
+from sosmith.model.datapath import Datapath, Stage
+from sosmith.model.direct_form import DirectForm1
+from sosmith.model.graph import Op
+from sosmith.model.horner import HornerStep
+from sosmith.model.port import Port
+
+
+def manifest(design: CoreDesign) -> dict[str, Any]:
+    """Return the manifest as a tree of JSON values; lengths in bits, errors in the output's unit."""
+    quantized, datapath = design.quantized, design.datapath
+    output = datapath.output
+    return {
+        "name": datapath.name,
+        "core": design.core,
+        "sosmith_version": sosmith.__version__,
+        "spec": design.spec.source,
+        "streams": {"s_axis": _stream(datapath.inputs), "m_axis": _stream((datapath.output,))},
+        "latency_cycles": latency_cycles(datapath),
+        "cycles_per_sample": 1,
+        "realization": quantized.realization if quantized.sections else None,
+        "architecture": design.architecture,
+        "reasons": design.reasons,
+        "sections": [section_entry(section) for section in quantized.sections],
+        "formats": [row for stage in datapath.stages for row in _formats(stage, datapath)],
+        "error_bound": float(quantized.bound * output.lsb),
+        "error_bound_proven": True,
+        "error_parts": {part: float(value * output.lsb) for part, value in quantized.budget.items()},
+        "error_unit": datapath.output.unit,
+        "limit_cycles": [_limit_cycles(section, output) for section in quantized.sections],
+        "aliasing": _aliasing(design),
+        "cost": _cost(design),
+    }
+
+
+def section_entry(section: Stage) -> dict[str, Any]:
+    """One section: its integer coefficients, and the transfer function they make exactly."""
+    nodes = section.graph.nodes
+    model = linear_model(section.graph)
+    b, a = ([*map(float, values), 0.0, 0.0][:3] for values in (model.transfer, model.denominator))
+    entry = {
+        "name": section.name,
+        "coefficients": [
+            {
+                "name": node.name.removeprefix("product_"),
+                "integer": node.parameter,
+                "frac": node.parameter_frac,
+                "value": node.parameter / 2**node.parameter_frac,
+            }
+            for node in nodes
+            if node.op is Op.SCALE
+        ],
+        "states": {nodes[i].name: nodes[i].format for i in section.graph.delays},
+        "b": b,
+        "a": a,
+        "input": nodes[section.graph.inputs[0]].format,
+        "output": nodes[section.graph.outputs[0]].format,
+    }
+    if isinstance(section, DirectForm1):
+        entry["error_feedback"] = list(section.feedback)
+    return entry
+
+
+def _limit_cycles(section: Stage, output: Port) -> dict[str, Any]:
+    """Tell what a section's quantizers can sustain at its own output, in the output's unit."""
+    found = limit_cycles(section.graph)
+    return {
+        "section": section.name,
+        "largest": float(found.largest * output.lsb),
+        "dead_band": float(found.dead_band * output.lsb),
+        "none": found.none,
+        "lyapunov": None if found.lyapunov is None else [str(weight) for weight in found.lyapunov],
+    }
+
+
+def _aliasing(design: CoreDesign) -> dict[str, float] | None:
+    ideal = design.quantized.filter
+    if ideal is None or ideal.aliasing is None:
+        return None
+    return {"max_deviation": ideal.aliasing.max_deviation, "dc_error": ideal.aliasing.dc_error}
+
+
+def _stream(ports: tuple[Port, ...]) -> dict[str, Any]:
+    return {
+        "width": width(ports),
+        "fields": [
+            {
+                "name": field.port.name,
+                "offset": field.offset,
+                "width": field.port.bits,
+                "signed": field.port.signed,
+                "lsb": float(field.port.lsb),
+                "zero": float(field.port.zero),
+                "unit": field.port.unit,
+            }
+            for field in fields(ports)
+        ],
+    }
+
+
+def _formats(stage: Stage, datapath: Datapath) -> list[dict[str, Any]]:
+    """Name, Q format and physical range of every named node of a stage.
+
+    Values inside are output LSBs, except the polynomial's variables, which are fractions of their range.
+    """
+    variables = {port.name for port in datapath.inputs}
+    rows = []
+    for node in stage.graph.nodes:
+        if node.name:
+            plain = isinstance(stage, HornerStep) and node.name in variables
+            scale = (1.0 if plain else float(datapath.output.lsb)) * 2.0**-node.frac
+            unit = "" if plain else datapath.output.unit
+            row = {"stage": stage.name, "node": node.name, "format": node.format}
+            rows.append(row | {"low": node.low * scale, "high": node.high * scale, "unit": unit})
+    return rows
+
+
+def _cost(design: CoreDesign) -> dict[str, Any]:
+    cost = cost_of(design.datapath)
+    return {
+        "multipliers": [list(size) for size in cost.multipliers],
+        "adder_bits": cost.adder_bits,
+        "register_bits": cost.register_bits,
+    }

@@ -1,0 +1,141 @@
+"""The registry of realizations: how a section of the ideal filter becomes a stage of integers.
+
+A realization is named here once. Word lengths, proof, C model, hardware, report and test matrix take it from here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from sosmith.gen.direct_form_design import direct_form
+from sosmith.gen.state_space_design import StateDesign, minimum_noise, normal, state_space
+from sosmith.gen.transposed_design import transposed_form
+from sosmith.model.datapath import Stage
+
+Row = Sequence[float]
+"""b0, b1, b2, 1, a1, a2 of an ideal section."""
+
+WIDE = 1 << 256
+"""Limit of a code whose range is not known yet; it never meets hardware."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SectionFormat:
+    """Everything about a section's words.
+
+    Attributes
+    ----------
+    x_frac, x_low, x_high : int
+        Fraction bits and range of the input's code.
+    coefficient_bits : int
+        Significant bits of each coefficient.
+    fracs : mapping of str to int
+        Fraction bits kept by each quantizer, by the name of the node that it quantizes.
+    ranges : mapping of str to tuple of int
+        Range of the code of every node whose range is stated, by its name; `WIDE` where missing.
+    """
+
+    x_frac: int = 0
+    x_low: int = -WIDE
+    x_high: int = WIDE
+    coefficient_bits: int
+    fracs: Mapping[str, int] = field(default_factory=dict)
+    ranges: Mapping[str, tuple[int, int]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Realization:
+    """One way to compute a section.
+
+    Attributes
+    ----------
+    name : str
+        As in the specification.
+    title : str
+        A few words for people.
+    build : callable
+        Makes the stage of a row in given formats, with a given name.
+    """
+
+    name: str
+    title: str
+    build: Callable[[Row, SectionFormat, str], Stage]
+
+
+def _direct_form(order: int) -> Callable[[Row, SectionFormat, str], Stage]:
+    def build(row: Row, words: SectionFormat, name: str) -> Stage:
+        return direct_form(
+            row,
+            name=name,
+            feedback_order=order,
+            coefficient_bits=words.coefficient_bits,
+            x=(words.x_frac, words.x_low, words.x_high),
+            y_frac=words.fracs.get("v", 0),
+            v_range=words.ranges.get("v", (-WIDE, WIDE)),
+        )
+
+    return build
+
+
+def _transposed_form(*, delta: bool) -> Callable[[Row, SectionFormat, str], Stage]:
+    def build(row: Row, words: SectionFormat, name: str) -> Stage:
+        return transposed_form(
+            row,
+            name=name,
+            delta=delta,
+            coefficient_bits=words.coefficient_bits,
+            x=(words.x_frac, words.x_low, words.x_high),
+            fracs=words.fracs,
+            ranges=words.ranges,
+            wide=(-WIDE, WIDE),
+        )
+
+    return build
+
+
+def _state_space(
+    design: Callable[[Row], StateDesign], *, truncating: bool
+) -> Callable[[Row, SectionFormat, str], Stage]:
+    def build(row: Row, words: SectionFormat, name: str) -> Stage:
+        return state_space(
+            row,
+            name=name,
+            design=design,
+            truncating=truncating,
+            coefficient_bits=words.coefficient_bits,
+            u=(words.x_frac, words.x_low, words.x_high),
+            fracs=words.fracs,
+            ranges=words.ranges,
+            wide=(-WIDE, WIDE),
+        )
+
+    return build
+
+
+REALIZATIONS: dict[str, Realization] = {
+    realization.name: realization
+    for realization in (
+        Realization(name="df1", title="direct form I", build=_direct_form(0)),
+        Realization(name="df1_ef1", title="direct form I, first-order error feedback", build=_direct_form(1)),
+        Realization(name="df1_ef2", title="direct form I, second-order error feedback", build=_direct_form(2)),
+        Realization(name="df2t", title="transposed direct form II", build=_transposed_form(delta=False)),
+        Realization(
+            name="delta", title="transposed direct form II, delta operator", build=_transposed_form(delta=True)
+        ),
+        Realization(
+            name="state_space",
+            title="state space with minimum roundoff noise",
+            build=_state_space(minimum_noise, truncating=False),
+        ),
+        Realization(
+            name="normal",
+            title="normal form with truncated magnitudes, free of limit cycles",
+            build=_state_space(normal, truncating=True),
+        ),
+    )
+}
+"""All realizations, by name, in the order in which lists show them."""
+
+ERROR_FEEDBACK = ("df1", "df1_ef1", "df1_ef2")
+"""Realizations that differ in nothing but the error feedback, and so can be set side by side at the same widths."""

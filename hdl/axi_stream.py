@@ -1,0 +1,92 @@
+"""AXI4-Stream: where fields lie on the bus, and the output buffer that cuts back-pressure off the inputs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from amaranth.hdl import Module, Signal
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
+
+from sosmith.model.port import Port
+
+
+@dataclass(frozen=True)
+class Field:
+    """A port's place on a stream: `offset` of its lowest bit; it is extended to whole bytes."""
+
+    port: Port
+    offset: int
+
+    @property
+    def padded(self) -> int:
+        """Bits it takes on the bus."""
+        return 8 * self.port.bytes
+
+
+def fields(ports: Sequence[Port]) -> tuple[Field, ...]:
+    """Lay `ports` out on a stream, the first one lowest."""
+    placed: list[Field] = []
+    offset = 0
+    for port in ports:
+        placed.append(Field(port, offset))
+        offset += placed[-1].padded
+    return tuple(placed)
+
+
+def width(ports: Sequence[Port]) -> int:
+    """Width of ``tdata`` for `ports`, in bits."""
+    return sum(field.padded for field in fields(ports))
+
+
+class OutputBuffer(wiring.Component):
+    """Two-entry buffer between a pipeline and an AXI4-Stream sink.
+
+    The pipeline may advance while `advance` is high, which depends on registers only; a word that it
+    delivers then is never lost. Latency: one clock. Throughput: one word per clock.
+
+    Parameters
+    ----------
+    width : int
+        Bits of a word.
+
+    Members
+    -------
+    i_data : In(width)
+        Word from the pipeline.
+    i_valid : In(1)
+        Whether there is one; taken if `advance` is high.
+    advance : Out(1)
+        Whether the pipeline may move at this clock.
+    o_data, o_valid, o_ready
+        The sink, by AXI4-Stream's rules: `o_data` stays while `o_valid` is high and `o_ready` is low.
+    """
+
+    def __init__(self, width: int) -> None:
+        self.width = width
+        super().__init__(
+            {
+                "i_data": In(width),
+                "i_valid": In(1),
+                "advance": Out(1),
+                "o_data": Out(width),
+                "o_valid": Out(1),
+                "o_ready": In(1),
+            }
+        )
+
+    def elaborate(self, platform: object) -> Module:
+        """Build the logic."""
+        m = Module()
+        second = Signal(self.width, reset_less=True)
+        full = Signal()
+        head = Signal(self.width, reset_less=True)
+        m.d.comb += [self.advance.eq(~full), self.o_data.eq(head)]
+        with m.If(self.o_ready | ~self.o_valid):
+            m.d.sync += [head.eq(second), self.o_valid.eq(1), full.eq(0)]
+            with m.If(~full):
+                m.d.sync += [head.eq(self.i_data), self.o_valid.eq(self.i_valid)]
+        with m.Elif(~full):
+            m.d.sync += [second.eq(self.i_data), full.eq(self.i_valid)]
+        return m

@@ -1,0 +1,205 @@
+"""The bit-true C model of a datapath: what `generate` writes and what `compute` compiles.
+
+Plain C99, no library. Values wider than 64 bits use the compiler's 128-bit integer (GCC, Clang); every
+other datapath is portable. Right shifts of negative numbers must be arithmetic, as they are in all
+compilers in use.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from sosmith.model.graph import Graph, Node, Op
+
+if TYPE_CHECKING:
+    from sosmith.model.datapath import Datapath
+
+_NARROW = 64
+_WIDEST = 128
+
+
+def c_header(datapath: Datapath) -> str:
+    """Return the text of ``<name>.h``."""
+    name, states = datapath.name, max(state_count(datapath), 1)
+    inputs = "".join(f", int64_t {port.name}_code" for port in datapath.inputs)
+    guard = f"{name.upper()}_H"
+    ports = "\n".join(
+        f" *   {port.name}_code: {port.lowest} .. {port.highest}, value = {float(port.zero)!r} + "
+        f"{float(port.lsb)!r} * code {port.unit}".rstrip()
+        for port in (*datapath.inputs, datapath.output)
+    )
+    return f"""/* {name}: bit-true model of the generated hardware, made by sosmith.
+ *
+ * Integer codes in, integer code out:
+{ports}
+ */
+#ifndef {guard}
+#define {guard}
+
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {{
+#endif
+
+/* The state of one channel. All zero is the state after reset. */
+typedef struct {{
+    {_type_of_states(datapath)} s[{states}];
+}} {name}_state;
+
+/* Put one channel into the state after reset. */
+void {name}_reset({name}_state *state);
+
+/* Compute one sample of one channel and advance its state. */
+int64_t {name}_step({name}_state *state{inputs});
+
+/* Compute samples x channels: in[sample][channel][input], out[sample][channel]; states[channel]. */
+void {name}_block({name}_state *states, size_t samples, size_t channels, const int64_t *in, int64_t *out);
+
+#ifdef __cplusplus
+}}
+#endif
+
+#endif
+"""
+
+
+def c_source(datapath: Datapath) -> str:
+    """Return the text of ``<name>.c``.
+
+    Raises
+    ------
+    ValueError
+        If a value inside is wider than 128 bits.
+    """
+    name, inputs = datapath.name, datapath.inputs
+    parameters = "".join(f", int64_t {port.name}_code" for port in inputs)
+    arguments = "".join(f", in[(n * channels + c) * {len(inputs)} + {i}]" for i in range(len(inputs)))
+    return f"""/* {name}: bit-true model of the generated hardware, made by sosmith. See {name}.h. */
+#include "{name}.h"
+
+#include <string.h>
+
+void {name}_reset({name}_state *state)
+{{
+    memset(state, 0, sizeof *state);
+}}
+
+static inline int64_t step({name}_state *state{parameters})
+{{
+{_body(datapath)}}}
+
+int64_t {name}_step({name}_state *state{parameters})
+{{
+    return step(state{"".join(f", {port.name}_code" for port in inputs)});
+}}
+
+void {name}_block({name}_state *states, size_t samples, size_t channels, const int64_t *in, int64_t *out)
+{{
+    for (size_t c = 0; c < channels; c++) {{
+        {name}_state state = states[c]; /* a local copy stays in registers */
+        for (size_t n = 0; n < samples; n++)
+            out[n * channels + c] = step(&state{arguments});
+        states[c] = state;
+    }}
+}}
+"""
+
+
+def state_count(datapath: Datapath) -> int:
+    """Count the state words of one channel."""
+    return sum(len(stage.graph.delays) for stage in datapath.stages)
+
+
+def state_bytes(datapath: Datapath) -> int:
+    """Size of one channel's state in the compiled model, in bytes."""
+    word = 16 if _type_of_states(datapath) == "__int128" else 8
+    return max(state_count(datapath), 1) * word
+
+
+def _type_of_states(datapath: Datapath) -> str:
+    widths = [stage.graph.nodes[i].width for stage in datapath.stages for i in stage.graph.delays]
+    return _type(max(widths, default=1))
+
+
+def _type(width: int) -> str:
+    if width > _WIDEST:
+        raise ValueError(f"values of the C model must be at most {_WIDEST} bits wide, not {width}")
+    return "int64_t" if width <= _NARROW else "__int128"
+
+
+def _body(datapath: Datapath) -> str:
+    lines: list[str] = []
+    wires = [f"{port.name}_code" for port in datapath.inputs]
+    offset = 0
+    for index, stage in enumerate(datapath.stages):
+        prefix = f"n{index}_"
+        lines.append(f"    /* {stage.name} */\n")
+        lines += _stage_lines(stage.graph, prefix, wires, offset)
+        wires = [f"{prefix}{i}" for i in stage.graph.outputs]
+        offset += len(stage.graph.delays)
+    lines.append(f"    return (int64_t){wires[0]};\n")
+    return "".join(lines)
+
+
+def _stage_lines(graph: Graph, prefix: str, wires: list[str], offset: int) -> list[str]:
+    lines = []
+    supply, memory = iter(wires), iter(range(offset, offset + len(graph.delays)))
+    for i, node in enumerate(graph.nodes):
+        if node.op is Op.INPUT:
+            expression = next(supply)
+        elif node.op is Op.DELAY:
+            expression = f"state->s[{next(memory)}]"
+        else:
+            expression = _expression(graph, node, prefix)
+        comment = f" /* {node.name}, {node.format} */" if node.name else ""
+        lines.append(f"    const {_type(node.width)} {prefix}{i} = {expression};{comment}\n")
+    lines += [
+        f"    state->s[{offset + k}] = {prefix}{graph.nodes[i].operands[0]};\n" for k, i in enumerate(graph.delays)
+    ]
+    used = {i for node in graph.nodes for i in node.operands} | set(graph.outputs)
+    lines += [f"    (void){prefix}{i};\n" for i in range(len(graph.nodes)) if i not in used]
+    return lines
+
+
+def _expression(graph: Graph, node: Node, prefix: str) -> str:
+    operands = [graph.nodes[i] for i in node.operands]
+    names = [f"{prefix}{i}" for i in node.operands]
+    kind = _type(max([node.width, *(operand.width for operand in operands)]))
+    if node.op is Op.CONSTANT:
+        return _literal(node.parameter)
+    if node.op in {Op.ADD, Op.SUBTRACT}:
+        sign = "+" if node.op is Op.ADD else "-"
+        terms = [_scaled(kind, name, node.frac - operand.frac) for name, operand in zip(names, operands, strict=True)]
+        return f" {sign} ".join(terms)
+    if node.op is Op.SCALE:
+        return f"({kind}){names[0]} * {_literal(node.parameter)}"
+    if node.op is Op.MULTIPLY:
+        return f"({kind}){names[0]} * {names[1]}"
+    if node.op is Op.FLOOR:
+        return f"{names[0]} >> {operands[0].frac - node.frac}"
+    if node.op is Op.TRUNCATE:  # as C99 divides
+        return f"{names[0]} / {_power(operands[0].frac - node.frac)}"
+    if node.op is Op.FRACTION:
+        return f"{names[0]} & ({_power(operands[0].frac - node.parameter)} - 1)"
+    if node.op is Op.CLAMP:
+        low, high = _literal(node.low), _literal(node.high)
+        return f"{names[0]} < {low} ? {low} : {names[0]} > {high} ? {high} : {names[0]}"
+    return names[0]  # SHIFT and BOUND keep the code
+
+
+def _scaled(kind: str, name: str, shift: int) -> str:
+    # A multiplication, because shifting a negative number to the left is undefined in C.
+    return f"({kind}){name} * {_power(shift)}" if shift else f"({kind}){name}"
+
+
+def _power(exponent: int) -> str:
+    return _literal(1 << exponent)
+
+
+def _literal(number: int) -> str:
+    if -(1 << 63) < number < 1 << 63:
+        return f"INT64_C({number})"
+    high, low = divmod(number, 1 << 62)
+    return f"((__int128)INT64_C({high}) * (INT64_C(1) << 62) + INT64_C({low}))"

@@ -1,0 +1,90 @@
+"""The calibration polynomial in two variables, ``d = sum a[i][j] V**i T**j``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+import numpy.typing as npt
+
+from sosmith.model.port import Values
+
+
+@dataclass(frozen=True)
+class Polynomial:
+    """Clearance as a polynomial of sensor voltage and temperature, equation 1 of the paper.
+
+    Attributes
+    ----------
+    coefficients : tuple of tuple of Fraction
+        ``coefficients[i][j]`` belongs to ``V**i * T**j``, in mm / (V**i degC**j) for the paper's
+        sensors. Rows may be of different length; a coefficient that is not there is zero. A
+        polynomial of one variable has one coefficient in every row.
+
+    Raises
+    ------
+    ValueError
+        If there is no row, or a row without a coefficient.
+    TypeError
+        If a coefficient is no Fraction.
+    """
+
+    coefficients: tuple[tuple[Fraction, ...], ...]
+
+    def __post_init__(self) -> None:
+        if not self.coefficients:
+            raise ValueError("coefficients must have at least one row, not none")
+        for index, row in enumerate(self.coefficients):
+            if not row:
+                raise ValueError(f"coefficients[{index}] must have at least one coefficient, not none")
+            for value in row:
+                if not isinstance(value, Fraction):
+                    raise TypeError(f"coefficients[{index}] must hold Fractions, not {value!r}")
+
+    @classmethod
+    def from_numbers(cls, rows: Sequence[Iterable[float | str | Fraction]]) -> Polynomial:
+        """Make a polynomial of `rows` of numbers.
+
+        A float stands for its exact binary value, a string for its exact decimal one.
+        """
+        return cls(tuple(tuple(Fraction(value) for value in row) for row in rows))
+
+    @property
+    def orders(self) -> tuple[int, int]:
+        """Highest powers (m, n) of the first and of the second variable."""
+        return len(self.coefficients) - 1, max(map(len, self.coefficients)) - 1
+
+    def __call__(self, V: npt.ArrayLike, T: npt.ArrayLike = 0.0) -> Values:
+        """Evaluate in double precision, by Horner's rule in `T` for every row, then in `V`.
+
+        Parameters
+        ----------
+        V, T : array_like
+            Values of the variables, of shapes that broadcast.
+
+        Returns
+        -------
+        ndarray
+            Values of the polynomial, of the common shape.
+        """
+        v, t = np.broadcast_arrays(np.asarray(V, dtype=np.float64), np.asarray(T, dtype=np.float64))
+        result = np.zeros(v.shape)
+        for row in reversed(self.coefficients):
+            inner = np.zeros(t.shape)
+            for value in reversed(row):
+                inner = inner * t + float(value)
+            result = result * v + inner
+        return result
+
+    def exact(self, V: Fraction, T: Fraction = Fraction(0)) -> Fraction:
+        """Evaluate without any rounding at one point."""
+        return sum(
+            (value * V**i * T**j for i, row in enumerate(self.coefficients) for j, value in enumerate(row)),
+            Fraction(0),
+        )
+
+
+EQUATION_5A = Polynomial.from_numbers([["1.16", "-0.0036"], ["0.3672", "0.0006618"], ["0.05812"]])
+"""The paper's regression over 19.8 to 98 degC: clearance in mm from volts and degrees Celsius."""

@@ -1,0 +1,99 @@
+"""Physical meaning of an integer at the edge of a core: ``value = zero + lsb * code``."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+import numpy.typing as npt
+
+Codes = npt.NDArray[np.int64]
+Values = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Port:
+    """An input or output quantity of a core and its integer format.
+
+    Attributes
+    ----------
+    name : str
+        Name of the quantity, also the name of its field on the stream.
+    bits : int
+        Width of the code in bits, 2 to 32.
+    signed : bool
+        Two's complement if true, else unsigned.
+    lsb : Fraction
+        Physical size of one code step, in `unit`, positive.
+    zero : Fraction
+        Physical value of code 0, in `unit`.
+    unit : str
+        Physical unit, ``""`` for a plain number.
+    """
+
+    name: str
+    bits: int
+    signed: bool
+    lsb: Fraction
+    zero: Fraction
+    unit: str = ""
+
+    def __post_init__(self) -> None:
+        if not 2 <= self.bits <= 32:
+            raise ValueError(f"bits must be in 2..32, not {self.bits!r}")
+        if self.lsb <= 0:
+            raise ValueError(f"lsb must be positive, not {self.lsb!r}")
+
+    @classmethod
+    def from_range(
+        cls, name: str, bits: int, low: Fraction, high: Fraction, *, signed: bool = False, unit: str = ""
+    ) -> Port:
+        """Make the port whose codes divide the range [low, high) into ``2**bits`` equal steps.
+
+        A signed port needs a symmetric range (``low == -high``) and then has ``zero == 0``.
+        """
+        if not low < high:
+            raise ValueError(f"range must rise from low to high, not {float(low)!r} to {float(high)!r}")
+        if signed and low != -high:
+            raise ValueError(f"range of a signed port must be symmetric, not {float(low)!r} to {float(high)!r}")
+        return cls(
+            name=name,
+            bits=bits,
+            signed=signed,
+            lsb=(high - low) / 2**bits,
+            zero=Fraction(0) if signed else low,
+            unit=unit,
+        )
+
+    @property
+    def lowest(self) -> int:
+        """Smallest code."""
+        return -(1 << (self.bits - 1)) if self.signed else 0
+
+    @property
+    def highest(self) -> int:
+        """Largest code."""
+        return (1 << (self.bits - 1)) - 1 if self.signed else (1 << self.bits) - 1
+
+    @property
+    def bytes(self) -> int:
+        """Whole bytes that the code takes on an AXI4-Stream."""
+        return (self.bits + 7) // 8
+
+    def decode(self, codes: Codes) -> Values:
+        """Physical values of `codes` in double precision, in `unit`."""
+        return float(self.zero) + float(self.lsb) * codes.astype(np.float64)
+
+    def encode(self, values: Values) -> Codes:
+        """Nearest codes of physical `values`, limited to the range of the format.
+
+        Raises
+        ------
+        ValueError
+            If a value is not finite.
+        """
+        if not np.all(np.isfinite(values)):
+            raise ValueError(f"values of {self.name} must be finite, not {values[~np.isfinite(values)][0]!r}")
+        codes = np.floor((np.asarray(values, dtype=np.float64) - float(self.zero)) / float(self.lsb) + 0.5)
+        return np.clip(codes, self.lowest, self.highest).astype(np.int64)

@@ -1,0 +1,95 @@
+"""Reads generated SystemVerilog with Verilator's linter and with Icarus, and tells what they object to."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+from collections.abc import Collection
+from pathlib import Path
+
+from sosmith.model.errors import ShortfallError
+from sosmith.sim.simulators import find_simulator
+
+WAIVERS = {
+    "DECLFILENAME": "all modules of a core stand in one file, which has the name of the top module",
+    "PROCASSINIT": "a register's declaration gives the value that an FPGA loads at configuration, as its reset does",
+    "UNUSEDSIGNAL": "a format drops the bits beyond its proven range or below its rounding, on purpose",
+    "WIDTHEXPAND": "operands of a sum differ in width, and the language extends the narrower one by its sign",
+}
+"""Warnings of Verilator's ``-Wall`` that generated cores draw, and why each is as meant."""
+
+
+def lint(sv: Path, top: str, build_dir: Path, *, waived: Collection[str] = tuple(WAIVERS)) -> list[str]:
+    """Read `sv` with Verilator's ``--lint-only -Wall``.
+
+    Parameters
+    ----------
+    sv : Path
+        The SystemVerilog file.
+    top : str
+        Its top module.
+    build_dir : Path
+        Folder that Verilator may write into, made if missing.
+    waived : collection of str
+        Names of the warnings to leave out.
+
+    Returns
+    -------
+    list of str
+        The other warnings, one line each.
+
+    Raises
+    ------
+    ShortfallError
+        If Verilator does not take the file; says why.
+    ToolError
+        If Verilator is missing.
+    """
+    verilator = find_simulator("verilator", build_dir / "bin")
+    # -Wno-fatal: the exit status then tells errors from warnings.
+    options = ["--lint-only", "-Wall", "-Wno-fatal", *(f"-Wno-{name}" for name in sorted(waived))]
+    result = subprocess.run(
+        ["verilator", *options, "--top-module", top, str(sv.resolve())],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=build_dir,
+        env=verilator.environment,
+    )
+    if result.returncode:
+        raise ShortfallError(f"{sv} must be taken by Verilator, not refused: {_first_error(result.stderr, '%Error')}")
+    return re.findall(r"^%Warning-.*", result.stderr, flags=re.MULTILINE)
+
+
+def icarus_check(sv: Path, top: str) -> list[str]:
+    """Read and elaborate `sv` with Icarus (``-g2012 -Wall``).
+
+    Returns
+    -------
+    list of str
+        Its warnings, one line each.
+
+    Raises
+    ------
+    ShortfallError
+        If Icarus does not take the file; says why.
+    ToolError
+        If Icarus is missing.
+    """
+    icarus = find_simulator("icarus", sv.parent)
+    result = subprocess.run(
+        ["iverilog", "-g2012", "-Wall", "-t", "null", "-s", top, str(sv)],
+        capture_output=True,
+        text=True,
+        check=False,
+        env=icarus.environment,
+    )
+    if result.returncode:
+        raise ShortfallError(f"{sv} must be taken by Icarus, not refused: {_first_error(result.stderr, 'error')}")
+    return result.stderr.splitlines()
+
+
+def _first_error(text: str, mark: str) -> str:
+    """First line with `mark`, or the first of all."""
+    lines = text.splitlines() or ["no message"]
+    return next((line for line in lines if mark in line), lines[0]).strip()

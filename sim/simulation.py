@@ -1,0 +1,220 @@
+"""One co-simulation from design to report: hardware, integer model and golden chain on the same input codes."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+
+from sosmith.gen.core import CoreDesign
+from sosmith.gen.evidence import Alternative, Evidence, FilterFacts, Format
+from sosmith.gen.generate import generate
+from sosmith.gen.manifest import manifest, section_entry
+from sosmith.gen.quantize import Quantized, with_realization
+from sosmith.gen.realizations import ERROR_FEEDBACK
+from sosmith.model.errors import SpecificationError
+from sosmith.model.golden import calibrated, filtered
+from sosmith.model.port import Values
+from sosmith.model.scenarios import SCENARIOS, Bench, emulate
+from sosmith.model.text_files import write_files
+from sosmith.model.trace import Trace, read_csv
+from sosmith.sim.cosimulate import CosimulationResult, cosimulate
+from sosmith.sim.simulators import check_name
+
+Progress = Callable[[str, int, int], None]
+"""Told the step, what is done of it and the total; a total of 0 means that only the step's name is known."""
+
+
+def bench_of(design: CoreDesign) -> Bench:
+    """Make what the scenarios need to know of a core."""
+    quantized = design.quantized
+    return Bench(
+        ports=design.datapath.inputs,
+        output=design.datapath.output,
+        sample_rate=design.spec.sample_rate,
+        polynomial=quantized.polynomial,
+        impulse_response=np.ones(1) if quantized.filter is None else quantized.filter.impulse_response,
+    )
+
+
+def default_scenario(design: CoreDesign) -> str:
+    """Scenario that shows most of a core, for when none is named."""
+    return "sweep" if design.quantized.polynomial is None else "wear_ramp"
+
+
+def trace_for(design: CoreDesign, source: str, *, seed: int, seconds: float | None = None) -> Trace:
+    """Trace from a CSV file or a scenario's name.
+
+    Raises
+    ------
+    SpecificationError
+        If the file is unfit or the scenario does not exist for this core.
+    """
+    if source in SCENARIOS:
+        return emulate(source, bench_of(design), seed=seed, seconds=seconds)
+    if source.lower().endswith(".csv") or Path(source).exists():
+        if seconds is not None:
+            raise SpecificationError(f"--seconds must come with a scenario, not with the file {source}")
+        return read_csv(Path(source), design.datapath.inputs, design.spec.sample_rate)
+    return emulate(source, bench_of(design), seed=seed, seconds=seconds)  # refuses, listing those that fit
+
+
+def simulate(
+    design: CoreDesign,
+    trace: Trace,
+    directory: Path,
+    *,
+    simulator: str = "verilator",
+    seed: int = 1,
+    idle: float = 0.3,
+    stall: float = 0.3,
+    waves: bool = False,
+    progress: Progress = lambda step, done, total: None,
+) -> Evidence:
+    """Generate the core into `directory`, run `trace` through it, and set the result beside model and golden chain.
+
+    Raises
+    ------
+    ShortfallError
+        If the hardware breaks the stream protocol.
+    ToolError
+        If a tool is missing or fails.
+    SpecificationError
+        If there is no such simulator, or the folder cannot be written or is in use by another run.
+    """
+    started = time.monotonic()
+    check_name(simulator)
+    with _alone_in(directory):
+        for stale in ("report.json", "report.html"):  # of a run of another core, if this one fails
+            (directory / stale).unlink(missing_ok=True)
+        generate(design, directory, lambda step: progress(f"generating {step}", 0, 0))
+        progress(f"building with {simulator}", 0, 0)
+        result = cosimulate(
+            directory / f"{design.datapath.name}.sv",
+            manifest(design),
+            trace.codes,
+            build_dir=directory / "simulation",
+            simulator=simulator,
+            seed=seed,
+            idle=idle,
+            stall=stall,
+            waves=waves,
+            progress=lambda done, total: progress("co-simulating", done, total),
+        )
+    progress("comparing", 0, 0)
+    return _evidence(design, trace, result, seed=seed, wall_seconds=time.monotonic() - started)
+
+
+@contextmanager
+def _alone_in(directory: Path) -> Iterator[None]:
+    """Hold `directory`, made if missing, against a second run, whose files would mix with those of this one."""
+    write_files(directory, {})
+    handle = os.open(directory, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise SpecificationError(
+                f"{directory}: the output folder must be free, not in use by another run; choose one with -o"
+            ) from None
+        yield
+    finally:
+        os.close(handle)
+
+
+def _evidence(
+    design: CoreDesign, trace: Trace, result: CosimulationResult, *, seed: int, wall_seconds: float
+) -> Evidence:
+    quantized, datapath = design.quantized, design.datapath
+    output = datapath.output
+    expected = datapath.compute(trace.codes)
+    received = result.codes[:, 0]
+    wrong = np.flatnonzero(expected != received)
+    unfiltered = calibrated(trace.codes, datapath.inputs, quantized.polynomial)
+    golden = filtered(unfiltered, None if quantized.filter is None else quantized.filter.sos, output)
+    facts = manifest(design)
+    low, high = output.decode(np.array([output.lowest, output.highest]))
+    return Evidence(
+        name=datapath.name,
+        core=design.core,
+        description="" if quantized.filter is None else quantized.filter.describe,
+        scenario=trace.name,
+        unit=output.unit,
+        lsb=float(output.lsb),
+        low=float(low),
+        high=float(high),
+        bound=facts["error_bound"],
+        bound_parts=facts["error_parts"],
+        proven=facts["error_bound_proven"],
+        max_error=float(design.spec.max_error),
+        time=trace.time,
+        truth=trace.truth,
+        reading=trace.reading,
+        unfiltered=unfiltered,
+        golden=golden,
+        hardware=output.decode(received),
+        mismatches=len(wrong),
+        first_mismatch=int(wrong[0]) if len(wrong) else None,
+        samples=len(received),
+        cycles=result.cycles,
+        latency_cycles=facts["latency_cycles"],
+        simulator=result.simulator,
+        seed=seed,
+        tools=result.tools,
+        wall_seconds=wall_seconds,
+        cycles_per_second=result.cycles_per_second,
+        realization=quantized.realization if quantized.sections else "none",
+        architecture=design.architecture,
+        why=" ".join(f"{reason}." for reason in design.reasons.values()),
+        formats=[
+            Format(
+                node=f"{row['stage']}.{row['node']}",
+                notation=row["format"],
+                low=row["low"],
+                high=row["high"],
+                unit=row["unit"],
+            )
+            for row in facts["formats"]
+        ],
+        sections=[section_entry(s) | {"realization": quantized.realization} for s in quantized.sections],
+        filter=_filter_facts(quantized),
+        alternatives=_alternatives(quantized, trace, golden),
+    )
+
+
+def _filter_facts(quantized: Quantized) -> FilterFacts | None:
+    ideal = quantized.filter
+    if ideal is None:
+        return None
+    return FilterFacts(
+        sample_rate=ideal.sample_rate,
+        ideal_sos=ideal.sos,
+        quantized_sos=quantized.quantized_sos,
+        kind=ideal.kind,
+        passband_edge=ideal.passband_edge,
+        stopband_edge=ideal.stopband_edge,
+        passband_loss=ideal.passband_loss,
+        stopband_loss=ideal.stopband_loss,
+        cutoff=ideal.cutoff,
+    )
+
+
+def _alternatives(quantized: Quantized, trace: Trace, golden: Values) -> list[Alternative]:
+    """Compute with the integer model what each other realization makes of the same input at the same word lengths."""
+    if quantized.realization not in ERROR_FEEDBACK or not quantized.sections:
+        return []
+    rows = []
+    for realization in ERROR_FEEDBACK:
+        if realization == quantized.realization:
+            continue
+        other = with_realization(quantized, realization).datapath
+        error = other.output.decode(other.compute(trace.codes)) - golden
+        rows.append(
+            Alternative(name=realization, max_abs=float(np.abs(error).max()), rms=float(np.sqrt(np.mean(error**2))))
+        )
+    return rows

