@@ -25,7 +25,7 @@ from sosmith.gen.certificate_file import (
 )
 from sosmith.gen.linear_model import LinearModel, linear_model
 from sosmith.gen.peak_gain import Drive, Horizon, Response, horizon, impulse
-from sosmith.gen.proof import Section, ideal_gain
+from sosmith.gen.proof import TransferFunction, ideal_gain
 from sosmith.gen.quantize import Quantized, ideal_sections
 from sosmith.model.datapath import Stage
 from sosmith.model.graph import Node
@@ -88,7 +88,7 @@ def _node(node: Node) -> NodeEntry:
     )
 
 
-def _claims(quantized: Quantized, ideal: Sequence[Section]) -> ClaimsEntry:
+def _claims(quantized: Quantized, ideal: Sequence[TransferFunction]) -> ClaimsEntry:
     budget = dict(quantized.budget)
     gain: Fraction | None = None
     sections: tuple[GainEntry, ...] = ()
@@ -115,7 +115,7 @@ class _Closer:
     gain: Fraction
 
 
-def _closer(models: Sequence[LinearModel], ideal: Sequence[Section], low: Fraction, high: Fraction) -> _Closer:
+def _closer(models: Sequence[LinearModel], ideal: Sequence[TransferFunction], low: Fraction, high: Fraction) -> _Closer:
     at = _finer(horizon([[model.denominator for model in models], [denominator for _, denominator in ideal]]))
     made = impulse(at)
     errors: list[Drive] = []

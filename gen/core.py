@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from sosmith.gen.cost import cost_of
 from sosmith.gen.design import Filter, design
-from sosmith.gen.quantize import Quantized, quantize, with_realization
+from sosmith.gen.quantize import Plan, Quantized, plan, prove, with_realization
 from sosmith.gen.realizations import ERROR_FEEDBACK, REALIZATIONS
 from sosmith.gen.specification import Specification
 from sosmith.model.calibration import Fit, fit, read_measurements
@@ -21,6 +22,9 @@ CORES = ("instrument", "filter", "calibration")
 
 AUTO = "auto"
 """Realization that stands for the cheapest proven one."""
+
+_HOPELESS = 2.5
+"""Ratio to the least area beyond which a plan is not trimmed: in no design seen did trimming save a half."""
 
 Progress = Callable[[str], None]
 
@@ -97,9 +101,9 @@ def design_core(
     progress("filter design")
     ideal = _filter(spec) if chosen != "calibration" else None
 
-    def attempt(name: str) -> Quantized:
+    def attempt(name: str) -> Plan:
         progress(f"word lengths, {name}" if ideal is not None else "word lengths")
-        return quantize(
+        return plan(
             name=spec.name,
             inputs=_inputs(spec, chosen),
             output=spec.output,
@@ -110,19 +114,19 @@ def design_core(
         )
 
     if ideal is None:
-        quantized, reason = attempt(next(iter(REALIZATIONS))), "none: a calibration has no filter sections"
+        quantized, reason = prove(attempt(next(iter(REALIZATIONS)))), "none: a calibration has no filter sections"
     elif widths_of is not None:
         if wanted not in ERROR_FEEDBACK:
             raise SpecificationError(
                 f"the realization at the widths of {widths_of} must be {', '.join(ERROR_FEEDBACK)}, not {wanted}"
             )
-        quantized = with_realization(attempt(widths_of), wanted)
+        quantized = with_realization(prove(attempt(widths_of).trimmed()), wanted)
         reason = f"{wanted} at the word lengths chosen for {widths_of}, as asked"
     elif wanted == AUTO:
-        quantized, reason = _cheapest(attempt)
+        quantized, reason = _cheapest(attempt, progress)
     else:
         source = "on the command line" if realization is not None else "in the specification"
-        quantized, reason = attempt(wanted), f"{wanted}: asked for {source}"
+        quantized, reason = prove(attempt(wanted).trimmed()), f"{wanted}: asked for {source}"
     reasons = {
         "realization": reason,
         "architecture": "parallel: the architecture available now, one sample per clock",
@@ -130,31 +134,52 @@ def design_core(
     return CoreDesign(spec=spec, core=chosen, quantized=quantized, architecture="parallel", reasons=reasons, fit=fitted)
 
 
-def _cheapest(attempt: Callable[[str], Quantized]) -> tuple[Quantized, str]:
-    """Try every realization; return the proven one of the smallest estimated area, and why.
+def _cheapest(attempt: Callable[[str], Plan], progress: Progress) -> tuple[Quantized, str]:
+    """Plan every realization; return the proven one of the smallest estimated area, and why.
+
+    Plans that are not far larger than the least are trimmed. Proofs are made in the order of the planned areas, until
+    none that is left promises to be smaller.
 
     Raises
     ------
     ShortfallError
-        If none meets the specification; says what stands in the way of the last one tried.
+        If none meets the specification; says what stands in the way of the first one.
     """
-    proven: list[tuple[int, str, Quantized]] = []
+    plans: list[Plan] = []
     failure: ShortfallError | None = None
     for name in REALIZATIONS:
         try:
-            quantized = attempt(name)
+            plans.append(attempt(name))
+        except ShortfallError as error:
+            failure = failure or error
+    least = math.inf
+    for index, planned in sorted(enumerate(plans), key=lambda entry: entry[1].area):
+        if planned.area <= _HOPELESS * least:
+            progress(f"trimming, {planned.realization}")
+            plans[index] = planned.trimmed()
+            least = min(least, plans[index].area)
+    plans.sort(key=lambda planned: planned.area)
+    best: tuple[float, Quantized] | None = None
+    for planned in plans:
+        if best is not None and planned.area >= best[0]:
+            break
+        progress(f"proof, {planned.realization}")
+        try:
+            quantized = prove(planned)
         except ShortfallError as error:
             failure = failure or error
             continue
-        proven.append((cost_of(quantized.datapath).area, name, quantized))
-    if not proven:
+        found = cost_of(quantized.datapath).area
+        if best is None or found < best[0]:
+            best = found, quantized
+    if best is None:
         assert failure is not None
         raise failure
-    proven.sort(key=lambda entry: entry[0])
-    area, name, best = proven[0]
-    rest = "".join(f", {other} {size:,}" for size, other, _ in proven[1:3])
-    reason = f"{name}: the smallest estimated area of {len(proven)} proven, {area:,} LUT4 in all"
-    return best, f"{reason} (then{rest[1:]})" if rest else reason
+    area, quantized = best
+    others = [planned for planned in plans if planned.realization != quantized.realization]
+    rest = ", ".join(f"{other.realization} {round(other.area):,}" for other in others[:2] if other.area < math.inf)
+    reason = f"{quantized.realization}: the smallest estimated area of {len(plans)}, {round(area):,} LUT4 in all"
+    return quantized, f"{reason} (then {rest})" if rest else reason
 
 
 def _chosen_core(spec: Specification, core: str | None) -> str:

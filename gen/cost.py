@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from sosmith.model.datapath import Datapath
-from sosmith.model.graph import Node, Op
+from sosmith.model.graph import Graph, Node, Op
 
-_BLOCK = 18
+MULTIPLIER_BITS = 18
+"""Bits of each operand of a hardware multiplier; Yosys makes a nineteenth of a few LUTs."""
+
 _LUTS_PER_ADDER_BIT, _LUTS_PER_SPLIT, _LUTS_AROUND = 0.87, 77.0, -51.0
 """Fitted by benchmarks/cost_model.py to synthesis of the examples for ECP5, to within a fifth."""
 
@@ -36,7 +39,7 @@ class Cost:
     @property
     def multiplier_blocks(self) -> int:
         """Hardware multipliers of 18 x 18 bits, signed, that the multiplications take."""
-        return sum(-(-a // _BLOCK) * -(-b // _BLOCK) for a, b in self.multipliers)
+        return sum(_pieces(a) * _pieces(b) for a, b in self.multipliers)
 
     @property
     def splits(self) -> int:
@@ -62,10 +65,15 @@ class Cost:
 
 def cost_of(datapath: Datapath) -> Cost:
     """Count the operators of `datapath`."""
+    return cost_of_graphs([stage.graph for stage in datapath.stages])
+
+
+def cost_of_graphs(graphs: Sequence[Graph]) -> Cost:
+    """Count the operators of a chain of graphs."""
     multipliers: list[tuple[int, int]] = []
     adders = registers = 0
-    for stage in datapath.stages:
-        nodes = stage.graph.nodes
+    for graph in graphs:
+        nodes = graph.nodes
         for node in nodes:
             if node.op is Op.SCALE:
                 multipliers.append((nodes[node.operands[0]].width, constant_width(node)))
@@ -73,10 +81,21 @@ def cost_of(datapath: Datapath) -> Cost:
                 multipliers.append((nodes[node.operands[0]].width, nodes[node.operands[1]].width))
             elif node.op in {Op.ADD, Op.SUBTRACT}:
                 adders += node.width
+            elif node.op is Op.TRUNCATE:  # adds what makes negative values round upward
+                adders += nodes[node.operands[0]].width
             elif node.op is Op.DELAY:
                 registers += node.width
-        registers += sum(nodes[i].width for i in stage.graph.outputs)
+        registers += sum(nodes[i].width for i in graph.outputs)
     return Cost(multipliers=tuple(multipliers), adder_bits=adders, register_bits=registers)
+
+
+def area_of(graph: Graph) -> int:
+    """Return the part of a graph in the area of a datapath."""
+    return cost_of_graphs([graph]).area - cost_of_graphs([]).area
+
+
+def _pieces(bits: int) -> int:
+    return max(1, -(-(bits - 1) // MULTIPLIER_BITS))
 
 
 def constant_width(node: Node) -> int:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from functools import lru_cache
@@ -12,6 +11,7 @@ from itertools import product as cartesian
 import numpy as np
 from scipy import signal
 
+from sosmith.gen.coefficients import Rounding
 from sosmith.gen.design import decay_length
 from sosmith.model.direct_form import DirectForm1, Product
 from sosmith.model.errors import ShortfallError
@@ -21,8 +21,10 @@ Row = Sequence[float]
 _EQUAL = 1e-9  # relative distance below which a design's numbers count as equal
 
 
-def products(row: Row, bits: int, name: str, side: int | None = None) -> tuple[tuple[Product, ...], tuple[int, int]]:
-    """Products and integer part of a section, its coefficients rounded to `bits` significant bits.
+def products(
+    row: Row, rounding: Rounding, name: str, side: int | None = None
+) -> tuple[tuple[Product, ...], tuple[int, int]]:
+    """Products and integer part of a section with rounded coefficients.
 
     The recursion is written about z = s, with s = 1 or -1. Its coefficients A1 and A2 are small on the side
     of the poles; on either side A2 is what sets the gain there. A numerator whose gain at z = s is one shares
@@ -33,8 +35,8 @@ def products(row: Row, bits: int, name: str, side: int | None = None) -> tuple[t
     ----------
     row : sequence of float
         b0, b1, b2, 1, a1, a2.
-    bits : int
-        Significant bits of each coefficient.
+    rounding : Rounding
+        Rounds the coefficients.
     name : str
         Name of the section, for messages.
     side : int or None
@@ -58,9 +60,7 @@ def products(row: Row, bits: int, name: str, side: int | None = None) -> tuple[t
         terms, integer_part = _first_order(b0, b1, a1, side)
     else:
         terms, integer_part = _second_order(row, side)
-    made = tuple(
-        Product(label, *round_significant(value, bits), x, y, shift) for label, value, x, y, shift in terms if value
-    )
+    made = tuple(Product(label, *rounding(label, value), x, y, shift) for label, value, x, y, shift in terms if value)
     if not any(any(p.x) for p in made):
         raise ShortfallError(f"numerator of {name} must not be zero")
     return made, integer_part
@@ -140,27 +140,16 @@ def _numerator(b0: float, b1: float, b2: float, scale: float) -> list[_Term]:
     ]
 
 
-def round_significant(value: float, bits: int) -> tuple[int, int]:
-    """Round `value` to `bits` significant bits; return the integer and its fraction bits, in lowest terms."""
-    frac = bits - math.frexp(value)[1]
-    integer = round(math.ldexp(value, frac))
-    while integer % 2 == 0:
-        integer //= 2
-        frac -= 1
-    if frac < 0:
-        return integer << -frac, 0
-    return integer, frac
-
-
 def direct_form(
     row: Row,
     *,
     name: str,
     feedback_order: int,
-    coefficient_bits: int,
+    rounding: Rounding,
     x: tuple[int, int, int],
-    y_frac: int,
-    v_range: tuple[int, int],
+    fracs: Mapping[str, int],
+    ranges: Mapping[str, tuple[int, int]],
+    wide: tuple[int, int],
 ) -> DirectForm1:
     """Make a section.
 
@@ -172,36 +161,42 @@ def direct_form(
         Its name.
     feedback_order : int
         0, 1 or 2.
-    coefficient_bits : int
-        Significant bits of each coefficient.
+    rounding : Rounding
+        Rounds the coefficients.
     x : tuple of int
         Fraction bits, smallest and largest code of the input.
-    y_frac : int
-        Fraction bits of the output.
-    v_range : tuple of int
-        Smallest and largest code of v.
+    fracs : mapping of str to int
+        Fraction bits that are kept of v, none where missing, and of ``taps_A1`` and the like, all where missing.
+    ranges : mapping of str to tuple of int
+        Smallest and largest code of v and of ``taps_A1`` and the like.
+    wide : tuple of int
+        Range of a code that `ranges` does not name.
 
     Raises
     ------
     ShortfallError
         If the section passes nothing, or its rounded coefficients are unstable.
     """
-    made, integer_part = products(row, coefficient_bits, name)
+    made, integer_part = products(row, rounding, name)
+    fitted = tuple(
+        replace(p, kept=fracs.get(p.operand), range=ranges.get(p.operand, wide)) if p.is_sum else p for p in made
+    )
+    v_range = ranges.get("v", wide)
     try:
         section = DirectForm1(
             name=name,
-            products=made,
+            products=fitted,
             integer_part=integer_part,
             feedback=(0, 0),
             x_frac=x[0],
             x_low=x[1],
             x_high=x[2],
-            y_frac=y_frac,
+            y_frac=fracs.get("v", 0),
             v_low=v_range[0],
             v_high=v_range[1],
         )
     except ValueError as error:
-        raise ShortfallError(f"{name} must be stable with coefficients of {coefficient_bits} bits: {error}") from None
+        raise ShortfallError(f"{name} must be stable with coefficients of {rounding.bits} bits: {error}") from None
     return replace(section, feedback=best_feedback(section.denominator, integer_part, feedback_order))
 
 

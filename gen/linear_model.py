@@ -29,6 +29,8 @@ class Source:
         ``"input"``, ``"constant"``, or the name of the quantized node.
     low, high : Fraction
         Range of its value at every sample from reset on; for the input, the range its node states.
+    kept : int or None
+        Fraction bits that the quantizer keeps; None for what is no quantizer.
     numerators : mapping of int to Polynomial
         From this source to the output node and to every BOUND node, over the stage's denominator.
     """
@@ -36,6 +38,7 @@ class Source:
     name: str
     low: Fraction
     high: Fraction
+    kept: int | None
     numerators: Mapping[int, Polynomial]
 
 
@@ -90,7 +93,8 @@ def linear_model(graph: Graph) -> LinearModel:
         responses = _impulse_responses(graph, key, watched, 2 * len(graph.delays) + 1)
         numerators = {i: _trim(_product(responses[i], denominator, len(responses[i]))) for i in watched}
         low, high = _range(graph, key)
-        sources.append(Source(_name(graph, key), low, high, numerators))
+        kept = key[2] if key[0] in {"error", "truncation"} else None
+        sources.append(Source(_name(graph, key), low, high, kept, numerators))
     return LinearModel(denominator, output, bounds, tuple(sources))
 
 

@@ -15,7 +15,7 @@ from fractions import Fraction
 from sosmith.gen.linear_model import LinearModel
 from sosmith.gen.peak_gain import Drive, Extent, Horizon, Response, extent, horizon, impulse
 
-Section = tuple[tuple[Fraction, ...], tuple[Fraction, ...]]
+TransferFunction = tuple[tuple[Fraction, ...], tuple[Fraction, ...]]
 """Numerator and denominator in ``w = z**-1``."""
 
 
@@ -45,7 +45,7 @@ class CascadeProof:
 
 
 def prove_cascade(
-    models: Sequence[LinearModel], ideal: Sequence[Section], low: Fraction, high: Fraction
+    models: Sequence[LinearModel], ideal: Sequence[TransferFunction], low: Fraction, high: Fraction
 ) -> CascadeProof:
     """Prove a cascade of at least one stage for inputs in [low, high] from reset on.
 
@@ -73,7 +73,7 @@ def prove_cascade(
 
 
 def coefficient_extent(
-    models: Sequence[LinearModel], ideal: Sequence[Section], low: Fraction, high: Fraction
+    models: Sequence[LinearModel], ideal: Sequence[TransferFunction], low: Fraction, high: Fraction
 ) -> Extent:
     """Limits of what the stages' transfer functions give, minus what the ideal sections give."""
     at = _horizon(models, ideal)
@@ -96,12 +96,12 @@ def rounding_gains(models: Sequence[LinearModel]) -> list[dict[str, Fraction]]:
     return gains[::-1]
 
 
-def ideal_gain(ideal: Sequence[Section]) -> Fraction:
+def ideal_gain(ideal: Sequence[TransferFunction]) -> Fraction:
     """Worst-case peak gain of the ideal sections."""
     return _gain(_through(ideal, _horizon([], ideal)))
 
 
-def _horizon(models: Sequence[LinearModel], ideal: Sequence[Section]) -> Horizon:
+def _horizon(models: Sequence[LinearModel], ideal: Sequence[TransferFunction]) -> Horizon:
     return horizon([[model.denominator for model in models], [denominator for _, denominator in ideal]])
 
 
@@ -116,7 +116,7 @@ def _at_node(model: LinearModel, arrived: Sequence[Drive], own: Response, node: 
     return drives + [Drive(own.taps(source.numerators[node]), source.low, source.high) for source in sources]
 
 
-def _through(sections: Sequence[Section], at: Horizon) -> Response:
+def _through(sections: Sequence[TransferFunction], at: Horizon) -> Response:
     response = impulse(at)
     for numerator, denominator in sections:
         response = response.all_pole(denominator).taps(numerator)

@@ -1,8 +1,9 @@
-"""From a specification to a frozen datapath: word lengths chosen on proven bounds.
+"""From a specification to a frozen datapath: word lengths chosen by estimates, then proven.
 
 All amounts inside are in output LSBs. What `max_error` leaves beside the half LSB of the output rounding is
-divided between calibration, filter coefficients and filter rounding; each part gets the fewest bits that keep
-to its share. The parts of the bound are then proven for what came out, and so are the ranges of all nodes.
+divided equally between calibration, filter coefficients and filter rounding to begin with; then words are trimmed to
+the smallest estimated area, on whichever part that costs error (`sosmith.gen.word_lengths`). The parts of the bound
+are proven for what came out, and so are the ranges of all nodes.
 """
 
 from __future__ import annotations
@@ -12,23 +13,26 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
+from typing import cast
 
 import numpy as np
 import numpy.typing as npt
 
+from sosmith.gen.cost import area_of, cost_of_graphs
 from sosmith.gen.design import Filter
 from sosmith.gen.linear_model import LinearModel, linear_model
 from sosmith.gen.ordering import best_order
 from sosmith.gen.peak_gain import Extent
 from sosmith.gen.proof import (
     CascadeProof,
-    Section,
+    TransferFunction,
     coefficient_extent,
     ideal_gain,
     prove_cascade,
     rounding_gains,
 )
-from sosmith.gen.realizations import REALIZATIONS, SectionFormat
+from sosmith.gen.realizations import REALIZATIONS, Section, SectionFormat
+from sosmith.gen.word_lengths import FEWEST_BITS, Choice, Entry, Search, Signal, Words
 from sosmith.model.datapath import Datapath, Stage
 from sosmith.model.errors import ShortfallError
 from sosmith.model.horner import HornerPolynomial, HornerStep, Variable
@@ -38,15 +42,18 @@ from sosmith.model.port import Port
 
 Array = npt.NDArray[np.float64]
 
-_FEWEST_BITS, _MOST_BITS = 4, 40
+_MOST_BITS = 40
 """Significant bits of a coefficient that are tried; as many fraction bits of a signal at most: no useful design lies
 beyond."""
 
 _BITS_TO_ORDER = 24
 """Significant bits of the coefficients with which orders of the sections are compared."""
 
-_Format = tuple[int, int, int]
-"""Fraction bits, smallest and largest code of a signal."""
+_ATTEMPTS = 4
+"""Times that words are chosen anew before they are chosen another way."""
+
+_COARSER = 4
+"""Fraction bits that the calibration may have less than with an equal share of the budget."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,8 +70,6 @@ class Quantized:
         The ideal polynomial; None for a filter core.
     realization : str
         Name of the sections' realization.
-    coefficient_bits : int
-        Significant bits of the sections' coefficients; 0 without a filter.
     budget : dict of str to Fraction
         Parts of the error bound in output LSBs, each proven.
     proof : CascadeProof or None
@@ -75,7 +80,6 @@ class Quantized:
     filter: Filter | None
     polynomial: Polynomial | None
     realization: str
-    coefficient_bits: int
     budget: dict[str, Fraction]
     proof: CascadeProof | None
 
@@ -85,9 +89,9 @@ class Quantized:
         return sum(self.budget.values(), Fraction(0))
 
     @property
-    def sections(self) -> tuple[Stage, ...]:
+    def sections(self) -> tuple[Section, ...]:
         """The filter's sections, in the order of the cascade."""
-        return tuple(s for s in self.datapath.stages if not isinstance(s, HornerStep | OutputStage))
+        return tuple(cast("Section", s) for s in self.datapath.stages if not isinstance(s, HornerStep | OutputStage))
 
     @cached_property
     def quantized_sos(self) -> Array:
@@ -99,7 +103,66 @@ class Quantized:
         return np.array(rows, dtype=np.float64).reshape(-1, 6)
 
 
-def quantize(
+@dataclass(frozen=True, kw_only=True)
+class _Entry:
+    """What may stand before the sections: its stages, the signal they give, and their error at the filter's output."""
+
+    stages: tuple[Stage, ...]
+    signal: Signal
+    error: Fraction
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plan:
+    """Words chosen in double precision, not proven yet.
+
+    Attributes
+    ----------
+    name, inputs, output, max_error, ideal, polynomial, realization
+        As for `plan`, the filter's sections in the order of the cascade.
+    share : Fraction
+        Error of each part of the budget but the output rounding, in output LSBs, where all get the same.
+    entries : tuple of _Entry
+        What may stand before the sections, each a little coarser than the one before.
+    search : Search or None
+        The search that words come from; None without a filter.
+    start : Choice or None
+        Words that keep to `share`; None where double precision found none.
+    """
+
+    name: str
+    inputs: tuple[Port, ...]
+    output: Port
+    max_error: Fraction
+    ideal: Filter | None
+    polynomial: Polynomial | None
+    realization: str
+    share: Fraction
+    entries: tuple[_Entry, ...]
+    search: Search | None
+    start: Choice | None
+
+    @property
+    def allowed(self) -> Fraction:
+        """Error of everything but the output rounding, in output LSBs."""
+        return self.max_error / self.output.lsb - Fraction(1, 2)
+
+    @cached_property
+    def area(self) -> float:
+        """Estimated area, infinite where there is no estimate."""
+        if self.search is None or self.start is None:
+            return math.inf
+        last, _ = _output_stage(self.search.output(self.start), self.output)
+        return self.search.area(self.start) + cost_of_graphs([last.graph]).area
+
+    def trimmed(self) -> Plan:
+        """Return the same with words from which nothing more can be saved."""
+        if self.search is None or self.start is None:
+            return self
+        return replace(self, start=self.search.trimmed(self.start, float(self.allowed)))
+
+
+def plan(
     *,
     name: str,
     inputs: tuple[Port, ...],
@@ -108,8 +171,8 @@ def quantize(
     ideal: Filter | None,
     polynomial: Polynomial | None,
     realization: str,
-) -> Quantized:
-    """Choose formats and integer coefficients, and prove their error.
+) -> Plan:
+    """Choose formats and integer coefficients that keep to equal shares of the error allowed.
 
     Parameters
     ----------
@@ -129,49 +192,134 @@ def quantize(
     Raises
     ------
     ShortfallError
-        If no formats within the limits keep to `max_error`.
+        If the calibration cannot keep to its share of `max_error`, or a section cannot be built.
     """
-    parts = (polynomial is not None or _needs_scaling(inputs[0], output)) + 2 * (ideal is not None)
+    scaled = polynomial is not None or _needs_scaling(inputs[0], output)
+    parts = scaled + 2 * (ideal is not None)
     share = (max_error / output.lsb - Fraction(1, 2)) / max(parts, 1)
     gain = Fraction(1) if ideal is None else _gain(ideal)
-    stages: list[Stage] = []
-    budget: dict[str, Fraction] = {}
-    if polynomial is None and not _needs_scaling(inputs[0], output):
+    if scaled:
+        normalised = _normalised(polynomial or _IDENTITY, inputs, output)
+        entries = _entries(normalised, inputs, share / gain, gain)
+    else:
         exponent = _exponent_of_two(inputs[0].lsb / output.lsb)
         assert exponent is not None
-        signal: _Format = (-exponent, inputs[0].lowest, inputs[0].highest)
-    else:
-        horner, error = _horner(_normalised(polynomial or _IDENTITY, inputs, output), inputs, share / gain)
-        stages += horner.stages
-        signal = _format_of(horner.stages[-1])
-        budget["calibration" if polynomial is not None else "input scaling"] = error * gain
-    proof, bits = None, 0
+        signal = Signal(-exponent, inputs[0].lowest, inputs[0].highest)
+        entries = (_Entry(stages=(), signal=signal, error=Fraction(0)),)
+    search, start = None, None
     if ideal is not None:
         ideal = _ordered(ideal, realization)
-        bits = _coefficient_bits(ideal, realization, signal, share)
-        fracs = _fraction_bits(ideal, realization, bits, share)
-        sections, proof = _cascade(ideal, realization, bits, fracs, signal)
-        while proof.rounding.magnitude > share:  # where a quantizer's error is not centred
-            fracs = [{name: frac + 1 for name, frac in sources.items()} for sources in fracs]
-            sections, proof = _cascade(ideal, realization, bits, fracs, signal)
-        stages += sections
-        budget |= _filter_budget(proof)
-        signal = _format_of(sections[-1])
-    stage, error = _output_stage(signal, output)
-    budget["output rounding"] = error
-    return Quantized(
-        datapath=Datapath(name=name, inputs=inputs, output=output, stages=(*stages, stage)),
-        filter=ideal,
+        search = Search(
+            ideal.rows,
+            realization,
+            [Entry(e.signal, float(e.error), sum(area_of(stage.graph) for stage in e.stages)) for e in entries],
+        )
+        start = search.start(float(share), _MOST_BITS)
+    return Plan(
+        name=name,
+        inputs=inputs,
+        output=output,
+        max_error=max_error,
+        ideal=ideal,
         polynomial=polynomial,
         realization=realization,
-        coefficient_bits=bits,
+        share=share,
+        entries=entries,
+        search=search,
+        start=start,
+    )
+
+
+def quantize(
+    *,
+    name: str,
+    inputs: tuple[Port, ...],
+    output: Port,
+    max_error: Fraction,
+    ideal: Filter | None,
+    polynomial: Polynomial | None,
+    realization: str,
+) -> Quantized:
+    """Choose formats and integer coefficients, and prove their error: `prove` of a trimmed `plan`."""
+    return prove(
+        plan(
+            name=name,
+            inputs=inputs,
+            output=output,
+            max_error=max_error,
+            ideal=ideal,
+            polynomial=polynomial,
+            realization=realization,
+        ).trimmed()
+    )
+
+
+def prove(planned: Plan) -> Quantized:
+    """Fix formats and integer coefficients, and prove their error.
+
+    Where the proof finds the planned words too short, they are chosen again with less allowed; if that does not end
+    well, with the same share for every part of the budget and exact figures instead of estimates.
+
+    Raises
+    ------
+    ShortfallError
+        If no formats within the limits keep to the error allowed.
+    """
+    ideal, search, start = planned.ideal, planned.search, planned.start
+    if ideal is None:
+        return _assembled(planned, planned.entries[0], (), None)
+    allowed = planned.allowed
+    if search is not None and start is not None:
+        choice = start
+        for _ in range(_ATTEMPTS):
+            entry = planned.entries[choice.entry]
+            try:
+                made = _assembled(planned, entry, *_cascade(ideal, planned.realization, choice.words, entry.signal))
+            except ShortfallError:
+                break
+            excess = made.bound * planned.output.lsb - planned.max_error
+            if excess <= 0:
+                return made
+            allowed -= max(2 * excess / planned.output.lsb, allowed / 64)
+            choice = search.trimmed(search.start(float(planned.share), _MOST_BITS) or start, float(allowed))
+    return _equally_shared(planned, ideal)
+
+
+def _equally_shared(planned: Plan, ideal: Filter) -> Quantized:
+    """Give every part of the budget the same share, by exact figures."""
+    entry, realization, share = planned.entries[0], planned.realization, planned.share
+    bits = _coefficient_bits(ideal, realization, entry.signal, share)
+    fracs = _fraction_bits(ideal, realization, bits, share)
+    while True:
+        words = _rounded(ideal, realization, bits, fracs)
+        sections, proof = _cascade(ideal, realization, words, entry.signal)
+        if proof.rounding.magnitude <= share:
+            return _assembled(planned, entry, sections, proof)
+        # A quantizer's error is not centred.
+        fracs = [{name: frac + 1 for name, frac in sources.items()} for sources in fracs]
+
+
+def _assembled(planned: Plan, entry: _Entry, sections: Sequence[Section], proof: CascadeProof | None) -> Quantized:
+    budget: dict[str, Fraction] = {}
+    if entry.stages:
+        budget["calibration" if planned.polynomial is not None else "input scaling"] = entry.error
+    if proof is not None:
+        budget |= _filter_budget(proof)
+    stages = (*entry.stages, *sections)
+    stage, error = _output_stage(_format_of(stages[-1]) if stages else entry.signal, planned.output)
+    budget["output rounding"] = error
+    return Quantized(
+        datapath=Datapath(name=planned.name, inputs=planned.inputs, output=planned.output, stages=(*stages, stage)),
+        filter=planned.ideal,
+        polynomial=planned.polynomial,
+        realization=planned.realization,
         budget=budget,
         proof=proof,
     )
 
 
 def with_realization(quantized: Quantized, realization: str) -> Quantized:
-    """Return the design in another realization with the same coefficient width and fraction bits of each section.
+    """Return the design in another of the realizations of `ERROR_FEEDBACK`, with the same words.
 
     The bound is proven anew and may exceed what the specification allows.
     """
@@ -181,11 +329,11 @@ def with_realization(quantized: Quantized, realization: str) -> Quantized:
     first = next(index for index, stage in enumerate(stages) if stage in quantized.sections)
     entry = quantized.sections[0].graph
     node = entry.nodes[entry.inputs[0]]
-    signal = (node.frac, node.low, node.high)
-    kept = [_format_of(section)[0] for section in quantized.sections]
-    models = _wide(ideal, realization, quantized.coefficient_bits)
-    fracs = [dict.fromkeys(_quantizers(model), frac) for model, frac in zip(models, kept, strict=True)]
-    sections, proof = _cascade(ideal, realization, quantized.coefficient_bits, fracs, signal)
+    words = []
+    for section in quantized.sections:
+        kept = {source.name: source.kept for source in linear_model(section.graph).sources if source.kept is not None}
+        words.append(Words(section.coefficients, {"v": _format_of(section).frac} | kept))
+    sections, proof = _cascade(ideal, realization, words, Signal(node.frac, node.low, node.high))
     stage, error = _output_stage(_format_of(sections[-1]), quantized.datapath.output)
     return replace(
         quantized,
@@ -236,27 +384,27 @@ def _padded(values: Sequence[Fraction]) -> list[float]:
     return [*(float(value) for value in values), 0.0, 0.0][:3]
 
 
-def _format_of(stage: Stage) -> _Format:
+def _format_of(stage: Stage) -> Signal:
     node = stage.graph.nodes[stage.graph.outputs[0]]
-    return node.frac, node.low, node.high
+    return Signal(node.frac, node.low, node.high)
 
 
 def _filter_budget(proof: CascadeProof) -> dict[str, Fraction]:
     return {"filter coefficients": proof.coefficients.magnitude, "filter rounding": proof.rounding.magnitude}
 
 
-def _output_stage(signal: _Format, output: Port) -> tuple[OutputStage, Fraction]:
+def _output_stage(signal: Signal, output: Port) -> tuple[OutputStage, Fraction]:
     """Make the last stage and tell its error: half an LSB where anything is rounded, and the offset's own rounding."""
-    frac = max(signal[0], 0)
+    frac = max(signal.frac, 0)
     exact = -output.zero / output.lsb * 2**frac
     offset = round(exact)
-    rounding = Fraction(1, 2) if signal[0] > 0 else Fraction(0)
+    rounding = Fraction(1, 2) if signal.frac > 0 else Fraction(0)
     stage = OutputStage(
         offset=offset,
         offset_frac=frac,
-        x_frac=signal[0],
-        x_low=signal[1],
-        x_high=signal[2],
+        x_frac=signal.frac,
+        x_low=signal.low,
+        x_high=signal.high,
         low=output.lowest,
         high=output.highest,
     )
@@ -300,17 +448,20 @@ def _substitution(port: Port, count: int) -> list[list[Fraction]]:
     return powers
 
 
-def _horner(
-    coefficients: tuple[tuple[Fraction, ...], ...], inputs: Sequence[Port], allowed: Fraction
-) -> tuple[HornerPolynomial, Fraction]:
-    """Find the fewest fraction bits whose error stays below `allowed`, both in output LSBs."""
+def _entries(
+    coefficients: tuple[tuple[Fraction, ...], ...], inputs: Sequence[Port], allowed: Fraction, gain: Fraction
+) -> tuple[_Entry, ...]:
+    """Polynomials with the fewest fraction bits whose error stays below `allowed` output LSBs, and with fewer."""
     variables = tuple(Variable(name=p.name, bits=p.bits, signed=p.signed) for p in inputs)
+    made: list[_Entry] = []
     for frac in range(_MOST_BITS + 1):
         integers = tuple(tuple(round(c * 2**frac) for c in row) for row in coefficients)
         horner = HornerPolynomial(coefficients=integers, frac=frac, variables=variables)
         error = _horner_error(coefficients, horner)
+        stages = horner.stages
+        made.insert(0, _Entry(stages=stages, signal=_format_of(stages[-1]), error=error * gain))
         if error <= allowed:
-            return horner, error
+            return tuple(made[:_COARSER])
     raise ShortfallError(
         f"the calibration must keep its error below {float(allowed):.3g} output LSB with {_MOST_BITS} fraction bits, "
         f"not {float(error):.3g}: raise output.max_error or output.bits"
@@ -327,7 +478,7 @@ def _horner_error(exact: tuple[tuple[Fraction, ...], ...], horner: HornerPolynom
     return Fraction(sum(rows) + half * (len(rows) - 1))
 
 
-def ideal_sections(ideal: Filter) -> list[Section]:
+def ideal_sections(ideal: Filter) -> list[TransferFunction]:
     """Return the ideal sections as exact rationals of their double-precision coefficients."""
     sections = []
     for row in ideal.rows:
@@ -341,9 +492,9 @@ def _shortened(values: Sequence[Fraction]) -> tuple[Fraction, ...]:
     return tuple(values[: end + 1])
 
 
-def _values(signal: _Format) -> tuple[Fraction, Fraction]:
-    unit = Fraction(2) ** -signal[0]
-    return signal[1] * unit, signal[2] * unit
+def _values(signal: Signal) -> tuple[Fraction, Fraction]:
+    unit = Fraction(2) ** -signal.frac
+    return signal.low * unit, signal.high * unit
 
 
 def _wide(ideal: Filter, realization: str, bits: int) -> list[LinearModel]:
@@ -354,13 +505,13 @@ def _wide(ideal: Filter, realization: str, bits: int) -> list[LinearModel]:
 
 
 def _quantizers(model: LinearModel) -> list[str]:
-    return [source.name for source in model.sources if source.name not in {"input", "constant"}]
+    return [source.name for source in model.sources if source.kept is not None]
 
 
-def _coefficient_bits(ideal: Filter, realization: str, signal: _Format, share: Fraction) -> int:
+def _coefficient_bits(ideal: Filter, realization: str, signal: Signal, share: Fraction) -> int:
     """Fewest significant bits whose proven effect stays within `share`."""
     sections, ends = ideal_sections(ideal), _values(signal)
-    bits = _FEWEST_BITS
+    bits = FEWEST_BITS
     while bits <= _MOST_BITS:
         try:
             error = coefficient_extent(_wide(ideal, realization, bits), sections, *ends).magnitude
@@ -410,16 +561,25 @@ def _total(fracs: Sequence[Mapping[str, int]], unit: Sequence[Mapping[str, Fract
     )
 
 
+def _rounded(ideal: Filter, realization: str, bits: int, fracs: Sequence[Mapping[str, int]]) -> list[Words]:
+    """Words of sections whose coefficients all have the same significant bits."""
+    build = REALIZATIONS[realization].build
+    words = SectionFormat(coefficient_bits=bits)
+    return [
+        Words(build(row, words, f"section{k}").coefficients, kept)
+        for k, (row, kept) in enumerate(zip(ideal.rows, fracs, strict=True))
+    ]
+
+
 def _cascade(
-    ideal: Filter, realization: str, bits: int, fracs: Sequence[Mapping[str, int]], signal: _Format
-) -> tuple[list[Stage], CascadeProof]:
+    ideal: Filter, realization: str, words: Sequence[Words], signal: Signal
+) -> tuple[list[Section], CascadeProof]:
     """Build the sections, prove their ranges, and build them again with these."""
     build = REALIZATIONS[realization].build
     entry = signal
-    stages = []
+    stages: list[Section] = []
     for k, row in enumerate(ideal.rows):
-        words = SectionFormat(coefficient_bits=bits, fracs=fracs[k], x_frac=entry[0])
-        stages.append(build(row, words, f"section{k}"))
+        stages.append(build(row, _section_format(words[k], x_frac=entry.frac), f"section{k}"))
         entry = _format_of(stages[-1])
     proof = prove_cascade([linear_model(s.graph) for s in stages], ideal_sections(ideal), *_values(signal))
     entry = signal
@@ -427,17 +587,18 @@ def _cascade(
     for k, row in enumerate(ideal.rows):
         nodes = stages[k].graph.nodes
         ranges = {nodes[i].name: _codes(extent, nodes[i].frac) for i, extent in proof.nodes[k].items()}
-        words = SectionFormat(
-            coefficient_bits=bits,
-            fracs=fracs[k],
-            ranges=ranges,
-            x_frac=entry[0],
-            x_low=entry[1],
-            x_high=entry[2],
+        formats = replace(
+            _section_format(words[k], x_frac=entry.frac), ranges=ranges, x_low=entry.low, x_high=entry.high
         )
-        result.append(build(row, words, f"section{k}"))
+        result.append(build(row, formats, f"section{k}"))
         entry = _format_of(result[-1])
     return result, proof
+
+
+def _section_format(words: Words, *, x_frac: int) -> SectionFormat:
+    return SectionFormat(
+        coefficient_bits=words.coefficient_bits, coefficients=words.coefficients, fracs=words.fracs, x_frac=x_frac
+    )
 
 
 def _codes(extent: Extent, frac: int) -> tuple[int, int]:

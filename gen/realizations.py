@@ -7,7 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Protocol
 
+from sosmith.gen.coefficients import Rounding
 from sosmith.gen.direct_form_design import direct_form
 from sosmith.gen.state_space_design import StateDesign, minimum_noise, normal, state_space
 from sosmith.gen.transposed_design import transposed_form
@@ -20,6 +22,20 @@ WIDE = 1 << 256
 """Limit of a code whose range is not known yet; it never meets hardware."""
 
 
+class Section(Stage, Protocol):
+    """A stage with coefficients."""
+
+    @property
+    def coefficients(self) -> dict[str, tuple[int, int]]:
+        """Integer and fraction bits of every coefficient, by name."""
+        ...
+
+    @property
+    def optional_quantizers(self) -> tuple[str, ...]:
+        """Names of the nodes of which bits may be dropped without need."""
+        ...
+
+
 @dataclass(frozen=True, kw_only=True)
 class SectionFormat:
     """Everything about a section's words.
@@ -30,6 +46,8 @@ class SectionFormat:
         Fraction bits and range of the input's code.
     coefficient_bits : int
         Significant bits of each coefficient.
+    coefficients : mapping of str to tuple of int
+        Integer and fraction bits of the coefficients, by name, that take another value than the nearest.
     fracs : mapping of str to int
         Fraction bits kept by each quantizer, by the name of the node that it quantizes.
     ranges : mapping of str to tuple of int
@@ -40,8 +58,14 @@ class SectionFormat:
     x_low: int = -WIDE
     x_high: int = WIDE
     coefficient_bits: int
+    coefficients: Mapping[str, tuple[int, int]] = field(default_factory=dict)
     fracs: Mapping[str, int] = field(default_factory=dict)
     ranges: Mapping[str, tuple[int, int]] = field(default_factory=dict)
+
+    @property
+    def rounding(self) -> Rounding:
+        """How coefficients become integers."""
+        return Rounding(self.coefficient_bits, self.coefficients)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,31 +84,32 @@ class Realization:
 
     name: str
     title: str
-    build: Callable[[Row, SectionFormat, str], Stage]
+    build: Callable[[Row, SectionFormat, str], Section]
 
 
-def _direct_form(order: int) -> Callable[[Row, SectionFormat, str], Stage]:
-    def build(row: Row, words: SectionFormat, name: str) -> Stage:
+def _direct_form(order: int) -> Callable[[Row, SectionFormat, str], Section]:
+    def build(row: Row, words: SectionFormat, name: str) -> Section:
         return direct_form(
             row,
             name=name,
             feedback_order=order,
-            coefficient_bits=words.coefficient_bits,
+            rounding=words.rounding,
             x=(words.x_frac, words.x_low, words.x_high),
-            y_frac=words.fracs.get("v", 0),
-            v_range=words.ranges.get("v", (-WIDE, WIDE)),
+            fracs=words.fracs,
+            ranges=words.ranges,
+            wide=(-WIDE, WIDE),
         )
 
     return build
 
 
-def _transposed_form(*, delta: bool) -> Callable[[Row, SectionFormat, str], Stage]:
-    def build(row: Row, words: SectionFormat, name: str) -> Stage:
+def _transposed_form(*, delta: bool) -> Callable[[Row, SectionFormat, str], Section]:
+    def build(row: Row, words: SectionFormat, name: str) -> Section:
         return transposed_form(
             row,
             name=name,
             delta=delta,
-            coefficient_bits=words.coefficient_bits,
+            rounding=words.rounding,
             x=(words.x_frac, words.x_low, words.x_high),
             fracs=words.fracs,
             ranges=words.ranges,
@@ -96,14 +121,14 @@ def _transposed_form(*, delta: bool) -> Callable[[Row, SectionFormat, str], Stag
 
 def _state_space(
     design: Callable[[Row], StateDesign], *, truncating: bool
-) -> Callable[[Row, SectionFormat, str], Stage]:
-    def build(row: Row, words: SectionFormat, name: str) -> Stage:
+) -> Callable[[Row, SectionFormat, str], Section]:
+    def build(row: Row, words: SectionFormat, name: str) -> Section:
         return state_space(
             row,
             name=name,
             design=design,
             truncating=truncating,
-            coefficient_bits=words.coefficient_bits,
+            rounding=words.rounding,
             u=(words.x_frac, words.x_low, words.x_high),
             fracs=words.fracs,
             ranges=words.ranges,

@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import linalg
 
-from sosmith.gen.direct_form_design import round_significant
+from sosmith.gen.coefficients import Rounding
 from sosmith.gen.noise import StateSystem, minimum_noise_coordinates
 from sosmith.model.errors import ShortfallError
 from sosmith.model.state_space import Coefficient, StateSpace
@@ -181,7 +181,7 @@ def state_space(
     name: str,
     design: Callable[[Row], StateDesign],
     truncating: bool,
-    coefficient_bits: int,
+    rounding: Rounding,
     u: tuple[int, int, int],
     fracs: Mapping[str, int],
     ranges: Mapping[str, tuple[int, int]],
@@ -199,8 +199,8 @@ def state_space(
         `minimum_noise` or `normal`.
     truncating : bool
         Whether the states are truncated towards zero, not rounded.
-    coefficient_bits : int
-        Significant bits of each coefficient.
+    rounding : Rounding
+        Rounds the coefficients.
     u : tuple of int
         Fraction bits, smallest and largest code of the input.
     fracs : mapping of str to int
@@ -219,15 +219,15 @@ def state_space(
         raise ShortfallError(f"numerator of {name} must not be zero")
     made = design(row)
     states = range(len(made.B))
-    a, integer_part = _rounded_matrix(made, coefficient_bits)
+    a, integer_part = _rounded_matrix(made, rounding)
     try:
         return StateSpace(
             name=name,
             a=a,
             integer_part=integer_part,
-            b=tuple(_rounded(value, coefficient_bits) for value in made.B),
-            c=tuple(_rounded(value, coefficient_bits) for value in made.C),
-            d=_rounded(made.D, coefficient_bits),
+            b=tuple(Coefficient(*rounding(f"b{i}", value)) for i, value in enumerate(made.B, start=1)),
+            c=tuple(Coefficient(*rounding(f"c{i}", value)) for i, value in enumerate(made.C, start=1)),
+            d=Coefficient(*rounding("d", made.D)),
             truncating=truncating,
             u_frac=u[0],
             u_low=u[1],
@@ -238,17 +238,18 @@ def state_space(
             y_range=ranges.get("y", wide),
         )
     except ValueError as error:
-        raise ShortfallError(f"{name} must be stable with coefficients of {coefficient_bits} bits: {error}") from None
+        raise ShortfallError(f"{name} must be stable with coefficients of {rounding.bits} bits: {error}") from None
 
 
-def _rounded_matrix(made: StateDesign, bits: int) -> tuple[tuple[tuple[Coefficient, ...], ...], tuple[int, ...]]:
+def _rounded_matrix(
+    made: StateDesign, rounding: Rounding
+) -> tuple[tuple[tuple[Coefficient, ...], ...], tuple[int, ...]]:
     """Rows of A with its diagonal split, and the integer part: 0 where a diagonal entry is closer to 0 than to s."""
     integers = [round(1 + entry) for entry in np.diag(made.M)]
     rest = made.M + np.diag([1 - integer for integer in integers])
     rest[np.abs(rest) < _ROUNDING * np.abs(rest).max()] = 0
-    rows = tuple(tuple(_rounded(made.side * value, bits) for value in line) for line in rest)
+    rows = tuple(
+        tuple(Coefficient(*rounding(f"a{i}{j}", made.side * value)) for j, value in enumerate(line, start=1))
+        for i, line in enumerate(rest, start=1)
+    )
     return rows, tuple(made.side * integer for integer in integers)
-
-
-def _rounded(value: float, bits: int) -> Coefficient:
-    return Coefficient(*round_significant(value, bits)) if value else Coefficient(0, 0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
+from sosmith.gen.coefficients import Rounding
 from sosmith.gen.direct_form_design import pole_side, products
 from sosmith.model.errors import ShortfallError
 from sosmith.model.transposed_form import Limits, TransposedForm
@@ -17,7 +18,7 @@ def transposed_form(
     *,
     name: str,
     delta: bool,
-    coefficient_bits: int,
+    rounding: Rounding,
     x: tuple[int, int, int],
     fracs: Mapping[str, int],
     ranges: Mapping[str, Limits],
@@ -33,8 +34,8 @@ def transposed_form(
         Its name.
     delta : bool
         In the delta operator about the side of the unit circle where its poles lie, not in the shift operator.
-    coefficient_bits : int
-        Significant bits of each coefficient.
+    rounding : Rounding
+        Rounds the coefficients.
     x : tuple of int
         Fraction bits, smallest and largest code of the input.
     fracs : mapping of str to int
@@ -52,7 +53,7 @@ def transposed_form(
     """
     # In transposed form each coefficient meets x by itself, so that a unity gain on the other side saves nothing.
     side = pole_side(row)
-    made, integer_part = products(row, coefficient_bits, name, side)
+    made, integer_part = products(row, rounding, name, side)
     operator = side if delta else 0
     exponent = _delta_exponent(row, operator)
     state_fracs = (fracs.get("t1"), fracs.get("t2")) if fracs else (0, 0)
@@ -75,7 +76,7 @@ def transposed_form(
             t2_range=ranges.get("t2", wide),
         )
     except ValueError as error:
-        raise ShortfallError(f"{name} must be stable with coefficients of {coefficient_bits} bits: {error}") from None
+        raise ShortfallError(f"{name} must be stable with coefficients of {rounding.bits} bits: {error}") from None
 
 
 def _exact_frac(x_frac: int, fracs: Mapping[str, int], delta_exponent: int) -> int:

@@ -18,6 +18,9 @@ For a low-pass section with unity gain at zero frequency, two products do::
     v(n) = 2 v(n-1) - v(n-2) - A1 (y(n-1) - y(n-2)) + A2 ((x(n) + 2 x(n-1) + x(n-2)) / 4 - y(n-2))
     A1 = 2 + a1,  A2 = 1 + a1 + a2
 
+The tap sum of a product may be quantized too, with first-order error feedback: it then fits the operand of a
+hardware multiplier, and because c_i is small and the error differenced, next to nothing of it reaches the output.
+
 A1 and A2 keep their relative precision in few bits however low the cutoff, and the gain at zero
 frequency is exactly one whatever they are rounded to.
 
@@ -53,6 +56,10 @@ class Product:
         Taps on y(n-1), y(n-2), likewise.
     shift : int
         Right shift of the tap sum, exact.
+    kept : int or None
+        Fraction bits kept of the tap sum, what is dropped being added at the next sample; None keeps all.
+    range : tuple of int or None
+        Smallest and largest code of the tap sum before bits are dropped, known from peak gains.
     """
 
     name: str
@@ -61,6 +68,8 @@ class Product:
     x: tuple[int, int, int]
     y: tuple[int, int]
     shift: int = 0
+    kept: int | None = None
+    range: tuple[int, int] | None = None
 
     def __post_init__(self) -> None:
         if self.coefficient == 0:
@@ -72,6 +81,16 @@ class Product:
     def value(self) -> Fraction:
         """Exact value of the coefficient, without the shift."""
         return self.coefficient * Fraction(2) ** -self.frac
+
+    @property
+    def operand(self) -> str:
+        """Name of the tap sum."""
+        return f"taps_{self.name}"
+
+    @property
+    def is_sum(self) -> bool:
+        """Whether there is more than one tap."""
+        return sum(map(bool, (*self.x, *self.y))) > 1
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -156,14 +175,24 @@ class DirectForm1:
                 terms += [(-m, y), (-k, g.fraction(v, self.y_frac))]
         for product in self.products:
             taps = [*zip(product.x, taps_x, strict=False), *zip(product.y, taps_y, strict=False)]
-            tap_sum = g.shift(g.combine(taps, f"taps_{product.name}"), -product.shift)
-            terms.append((1, g.scale(tap_sum, product.coefficient, product.frac, f"product_{product.name}")))
+            operand = _operand(g, product, g.shift(g.combine(taps), -product.shift))
+            terms.append((1, g.scale(operand, product.coefficient, product.frac, f"product_{product.name}")))
         centre = 1 + sum(self.feedback)
         if frac > self.y_frac and centre:
             terms.append((1, g.constant(centre, self.y_frac + 1, "centre")))
         v = g.bound(g.floor(g.combine(terms), frac), self.v_low, self.v_high, "v")
         g.connect(v1, v)
         return g.build([g.floor(v, self.y_frac, "y")])
+
+    @property
+    def coefficients(self) -> dict[str, tuple[int, int]]:
+        """Integer and fraction bits of every coefficient, by name."""
+        return {p.name: (p.coefficient, p.frac) for p in self.products}
+
+    @property
+    def optional_quantizers(self) -> tuple[str, ...]:
+        """Names of the nodes of which bits may be dropped without need."""
+        return tuple(p.operand for p in self.products if p.is_sum)
 
     @property
     def _order(self) -> int:
@@ -176,8 +205,24 @@ class DirectForm1:
         fracs = [self.y_frac]
         for p in self.products:
             inputs = ([self.x_frac] if any(p.x) else []) + ([self.y_frac] if any(p.y) else [])
-            fracs.append(max(inputs) + p.shift + p.frac)
+            exact = max(inputs) + p.shift
+            fracs.append((exact if p.kept is None else min(exact, p.kept)) + p.frac)
         return max(fracs)
+
+
+def _operand(g: GraphBuilder, product: Product, taps: Wire) -> Wire:
+    """State the range of a tap sum and drop those of its bits that are not kept."""
+    frac = g[taps].frac
+    kept = frac if product.kept is None else min(frac, product.kept)
+    if kept < frac:
+        error = g.delay(f"error_{product.name}", frac, 0, (1 << (frac - kept)) - 1)
+        taps = g.add(taps, error)
+    if product.range is not None:
+        taps = g.bound(taps, *product.range)
+    taps = g.named(taps, product.operand)
+    if kept < frac:
+        g.connect(error, g.fraction(taps, kept))
+    return g.floor(taps, kept)
 
 
 def _reach(taps: tuple[int, int, int]) -> int:

@@ -102,6 +102,19 @@ class StateSpace:
         )
 
     @property
+    def coefficients(self) -> dict[str, tuple[int, int]]:
+        """Integer and fraction bits of every coefficient that is not zero, by name."""
+        order = range(1, len(self.a) + 1)
+        named = {f"a{i}{j}": self.a[i - 1][j - 1] for i in order for j in order}
+        named |= {f"b{i}": self.b[i - 1] for i in order} | {f"c{i}": self.c[i - 1] for i in order} | {"d": self.d}
+        return {name: (c.integer, c.frac) for name, c in named.items() if c.integer}
+
+    @property
+    def optional_quantizers(self) -> tuple[str, ...]:
+        """Names of the nodes of which bits may be dropped without need: none."""
+        return ()
+
+    @property
     def denominator(self) -> tuple[Fraction, Fraction]:
         """Exact (a1, a2) of the integer coefficients, in scipy's sign convention."""
         if len(self.a) == 1:

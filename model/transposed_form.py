@@ -85,6 +85,16 @@ class TransposedForm:
         """1 or 2."""
         return 2 if self.integer_part[1] or any(p.y[1] or p.x[2] for p in self.products) else 1
 
+    @property
+    def coefficients(self) -> dict[str, tuple[int, int]]:
+        """Integer and fraction bits of every coefficient, by name."""
+        return {p.name: (p.coefficient, p.frac) for p in self.products}
+
+    @property
+    def optional_quantizers(self) -> tuple[str, ...]:
+        """Names of the nodes of which bits may be dropped without need: none."""
+        return ()
+
     @cached_property
     def direct(self) -> DirectForm1:
         """The direct form I with the same coefficients, the same formats of x and y, and the same error path of y."""

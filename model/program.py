@@ -1,0 +1,561 @@
+"""A datapath as a program for one multiply-accumulate unit: the schedule of the folded and serial architectures.
+
+Numbers are split into digits of ``digit_bits`` bits: the lower ones lie in [0, 2**digit_bits), the top one has a
+sign, so that every product of two digits fits one small signed multiplier. A sum of products is computed column by
+column, the lowest first; when a column is complete its low digit is stored and the rest carried on by a shift.
+Dropping a column instead of storing it is the floor that the datapath asks for, so nothing is approximate here.
+
+Each value that has to exist is stored with just those fraction bits that bring a quantizer's cut between two
+digits: ``floor(v)`` is then the upper digits of v and what it drops the lower ones, at no cost.
+
+The program is made from the graphs of the datapath's stages and nothing else, and computes the same codes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from fractions import Fraction
+from typing import NamedTuple
+
+from sosmith.model.datapath import Datapath
+from sosmith.model.graph import Node, Op
+
+HAZARD = 4
+"""An instruction that reads what another stored must come at least so many places after it."""
+
+ONE = 0
+"""Address of a word that always holds 1."""
+
+
+class Do(Enum):
+    """What an instruction does: ``m`` is the word at its address, ``acc`` the accumulator, ``t`` the operand register."""
+
+    NOTHING = "nothing"
+    TAKE = "take"  # m = next digit of the input sample
+    MULTIPLY = "multiply"  # acc += m * constant
+    OPERAND = "operand"  # t = m
+    PRODUCT = "product"  # acc += m * t
+    STORE = "store"  # m = low digit of acc; acc >>= digit_bits
+    DROP = "drop"  # acc >>= digit_bits
+    FINISH = "finish"  # m = low digit_bits + 1 bits of acc, signed; acc = 0
+    GIVE = "give"  # next digit of the output sample = m
+
+
+class Instruction(NamedTuple):
+    """One step of a program."""
+
+    do: Do
+    address: int = 0
+    constant: int = 0
+
+
+class FoldingError(ValueError):
+    """The datapath has an operation that one multiply-accumulate unit cannot do."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a value lives.
+
+    Attributes
+    ----------
+    name : str
+        Of the value.
+    address : int
+        Of its lowest digit, in the words of one channel.
+    digits : int
+        Number of digits.
+    frac : int
+        Fraction bits of the stored code.
+    is_state : bool
+        Whether it is kept from sample to sample.
+    """
+
+    name: str
+    address: int
+    digits: int
+    frac: int
+    is_state: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class Program:
+    """A datapath, folded.
+
+    Attributes
+    ----------
+    digit_bits : int
+        Bits of a digit; a multiplier of ``digit_bits + 1`` bits, signed, serves.
+    instructions : tuple of Instruction
+        Executed once for each sample of each channel.
+    places : tuple of Place
+        All values that are stored.
+    inputs : tuple of Place
+        Those of the input ports, in port order, filled by TAKE.
+    output : Place
+        What GIVE hands out, before it is limited to the output's range.
+    words : int
+        Words of memory for each channel.
+    accumulator_bits : int
+        Width that the accumulator needs, by the ranges of everything that enters it.
+    """
+
+    digit_bits: int
+    instructions: tuple[Instruction, ...]
+    places: tuple[Place, ...]
+    inputs: tuple[Place, ...]
+    output: Place
+    words: int
+    accumulator_bits: int
+
+    def reset(self) -> list[int]:
+        """Words of a channel after reset."""
+        return [int(address == ONE) for address in range(self.words)]
+
+    def step(self, codes: Sequence[int], words: list[int], input_fracs: Sequence[int]) -> int:
+        """Compute one sample in exact integers and advance `words` in place; the slow reference.
+
+        Parameters
+        ----------
+        codes : sequence of int
+            One code per input port.
+        words : list of int
+            The channel's memory, as from `reset`.
+        input_fracs : sequence of int
+            Fraction bits of the ports' codes.
+
+        Returns
+        -------
+        int
+            Code of the output, before it is limited to the output's range.
+
+        Raises
+        ------
+        OverflowError
+            If the accumulator leaves its width, or a word its digit.
+        """
+        base, limit = 1 << self.digit_bits, 1 << (self.accumulator_bits - 1)
+        supply = (
+            digit
+            for code, frac, place in zip(codes, input_fracs, self.inputs, strict=True)
+            for digit in digits_of(code << (place.frac - frac), place.digits, self.digit_bits)
+        )
+        given: list[int] = []
+        acc = operand = 0
+        for do, address, constant in self.instructions:
+            if do is Do.TAKE:
+                words[address] = next(supply)
+            elif do is Do.MULTIPLY:
+                acc += words[address] * constant
+            elif do is Do.OPERAND:
+                operand = words[address]
+            elif do is Do.PRODUCT:
+                acc += words[address] * operand
+            elif do is Do.STORE:
+                words[address], acc = acc % base, acc >> self.digit_bits
+            elif do is Do.DROP:
+                acc >>= self.digit_bits
+            elif do is Do.FINISH:
+                words[address], acc = (acc + base) % (2 * base) - base, 0
+            elif do is Do.GIVE:
+                given.append(words[address])
+            if not (-limit <= acc < limit and -base <= words[address] < base):
+                raise OverflowError(f"the accumulator must stay within {self.accumulator_bits} bits, not {acc}")
+        return sum(digit << (self.digit_bits * k) for k, digit in enumerate(given))
+
+
+def digits_of(code: int, count: int, digit_bits: int) -> list[int]:
+    """Split `code` into `count` digits, the lowest first; only the top one has a sign."""
+    low = [(code >> (digit_bits * k)) & ((1 << digit_bits) - 1) for k in range(count - 1)]
+    return [*low, code >> (digit_bits * (count - 1))]
+
+
+def program(datapath: Datapath, digit_bits: int) -> Program:
+    """Fold a datapath.
+
+    Parameters
+    ----------
+    datapath : Datapath
+        What is to be computed.
+    digit_bits : int
+        Bits of a digit, one less than the multiplier has.
+
+    Raises
+    ------
+    FoldingError
+        If the datapath has an operation that cannot be folded.
+    """
+    return _Folding(_flattened(datapath), digit_bits).program()
+
+
+class _Flat(NamedTuple):
+    """All stages' nodes in one list; `inputs` and `output` index it."""
+
+    nodes: list[Node]
+    inputs: list[int]
+    output: int
+
+
+def _flattened(datapath: Datapath) -> _Flat:
+    nodes: list[Node] = []
+    inputs: list[int] = []
+    passed: list[int] = []
+    for stage in datapath.stages:
+        graph = stage.graph
+        supply = iter(passed)
+        at: list[int] = []
+        start = len(nodes)
+        for node in graph.nodes:
+            if node.op is Op.INPUT and passed:
+                at.append(next(supply))
+                continue
+            at.append(len(nodes))
+            name = f"{stage.name}.{node.name}" if node.name else ""
+            nodes.append(Node(**{**vars(node), "name": name}))
+            if node.op is Op.INPUT:
+                inputs.append(len(nodes) - 1)
+        for index in range(start, len(nodes)):
+            node = nodes[index]
+            nodes[index] = Node(**{**vars(node), "operands": tuple(at[i] for i in node.operands)})
+        passed = [at[i] for i in graph.outputs]
+    (output,) = passed
+    return _Flat(nodes, inputs, output)
+
+
+class _Term(NamedTuple):
+    """Digits of a stored value: those from `first` on, `length` of them; `other` is a second factor or -1."""
+
+    place: int
+    first: int
+    length: int
+    other: int = -1
+
+
+_Sum = dict[_Term, Fraction]
+"""Multiples of stored digits, each read as a number with the fraction bits of its lowest digit."""
+
+
+class _Folding:
+    """Works out what to store, where, and in which order to compute it."""
+
+    def __init__(self, flat: _Flat, digit_bits: int) -> None:
+        self._nodes, self._inputs, self._output = flat
+        self._bits = digit_bits
+        last = self._nodes[self._output]
+        if last.op is Op.CLAMP:  # done on the way out
+            self._nodes.remove(last)
+            self._output = last.operands[0]
+        self._stored = self._find_stored()
+        self._fracs = self._find_fracs()
+        while apart := self._cut_elsewhere():
+            self._stored |= apart
+            self._fracs = self._find_fracs()
+        self._sums: dict[int, tuple[_Sum, Fraction]] = {}
+        self._places: dict[int, Place] = {}
+        self._instructions: list[Instruction] = []
+
+    def program(self) -> Program:
+        """Make the program."""
+        address = ONE + 1
+        for index in sorted(self._stored, key=lambda i: self._nodes[i].op is not Op.DELAY):
+            node = self._nodes[index]
+            count = self._digits(
+                node.low << (self._fracs[index] - node.frac), node.high << (self._fracs[index] - node.frac)
+            )
+            state = node.op is Op.DELAY
+            self._places[index] = Place(node.name or f"value{index}", address, count, self._fracs[index], state)
+            address += count
+        for index in self._inputs:
+            place = self._places[index]
+            for k in range(place.digits):
+                self._emit(Do.TAKE, place.address + k)
+        for index in sorted(self._stored):
+            if self._nodes[index].op not in {Op.INPUT, Op.DELAY}:
+                self._compute(index)
+        for delay in self._delays_in_order():
+            place, source = self._places[delay], self._nodes[delay].operands[0]
+            total, constant = self._value(source)
+            self._evaluate(place, total, constant)
+        output = self._places[self._output]
+        for k in range(output.digits):
+            self._emit(Do.GIVE, output.address + k)
+        return Program(
+            digit_bits=self._bits,
+            instructions=tuple(self._instructions),
+            places=tuple(self._places.values()),
+            inputs=tuple(self._places[i] for i in self._inputs),
+            output=output,
+            words=address,
+            accumulator_bits=self._accumulator_bits(),
+        )
+
+    # What is stored.
+
+    def _find_stored(self) -> set[int]:
+        """Nodes that need a place: ports, states, and whatever is cut, delayed or multiplied as a whole."""
+        stored = {*self._inputs, self._output}
+        for index, node in enumerate(self._nodes):
+            first = node.operands[0] if node.operands else -1
+            if node.op is Op.DELAY:
+                is_cut = self._nodes[first].op in {Op.FLOOR, Op.FRACTION}
+                stored |= {index} if is_cut else {index, first}
+            elif node.op is Op.FRACTION:
+                stored.add(first)
+            elif node.op is Op.MULTIPLY:
+                stored |= {i for i in node.operands if self._nodes[i].op is not Op.CONSTANT}
+            elif node.op is Op.SCALE and self._nodes[first].op in {Op.ADD, Op.SUBTRACT, Op.SHIFT, Op.BOUND}:
+                stored.add(first)
+            elif node.op in {Op.CLAMP, Op.TRUNCATE}:
+                raise FoldingError(f"the datapath must not {node.op.value} inside to be folded: {node.name!r}")
+        for index, node in enumerate(self._nodes):
+            if node.op is Op.FLOOR and node.operands[0] not in stored:
+                stored.add(index)
+        return {i for i in stored if self._nodes[i].op is not Op.CONSTANT}
+
+    def _cut_elsewhere(self) -> set[int]:
+        """FLOOR nodes whose cut does not lie between two digits of the stored value: they need a place of their own."""
+        return {
+            index
+            for index, node in enumerate(self._nodes)
+            if node.op is Op.FLOOR
+            and index not in self._stored
+            and (self._fracs[node.operands[0]] - node.frac) % self._bits
+        }
+
+    def _find_fracs(self) -> dict[int, int]:
+        """Fraction bits of each stored code: at least the node's, with its first cut between two digits."""
+        group = {index: index for index in self._stored}
+        for index in self._stored:
+            node = self._nodes[index]
+            if node.op is Op.DELAY:
+                group[index] = self._first_source(index)
+        cuts: dict[int, int] = {}
+        for node in self._nodes:
+            if node.op in {Op.FLOOR, Op.FRACTION}:
+                operand = node.operands[0]
+                if operand in self._stored:
+                    cuts.setdefault(group[operand], node.parameter if node.op is Op.FRACTION else node.frac)
+            elif node.op is Op.MULTIPLY and all(self._nodes[i].op is not Op.CONSTANT for i in node.operands):
+                cuts.setdefault(group[node.operands[1]], 0)
+        fracs = {}
+        for index in self._stored:
+            frac = max(self._nodes[i].frac for i in self._stored if group[i] == group[index])
+            cut = cuts.get(group[index], frac)
+            fracs[index] = cut + self._bits * -(-(frac - cut) // self._bits)
+        return fracs
+
+    def _first_source(self, index: int) -> int:
+        """Follow a chain of delays to what it begins with."""
+        while self._nodes[index].op is Op.DELAY:
+            index = self._nodes[index].operands[0]
+        return index
+
+    def _digits(self, low: int, high: int) -> int:
+        count = 1
+        while not (-(1 << (self._bits * count)) <= low and high < 1 << (self._bits * count)):
+            count += 1
+        return count
+
+    # What values are made of.
+
+    def _value(self, index: int) -> tuple[_Sum, Fraction]:
+        """Return a node as a sum of stored digits and a constant."""
+        if index in self._places:
+            return {_Term(index, 0, self._places[index].digits): Fraction(1)}, Fraction(0)
+        if index not in self._sums:
+            self._sums[index] = self._definition(index)
+        return self._sums[index]
+
+    def _definition(self, index: int) -> tuple[_Sum, Fraction]:
+        node = self._nodes[index]
+        if node.op is Op.CONSTANT:
+            return {}, node.parameter * Fraction(2) ** -node.frac
+        if node.op in {Op.ADD, Op.SUBTRACT}:
+            sign = 1 if node.op is Op.ADD else -1
+            (a, constant_a), (b, constant_b) = map(self._value, node.operands)
+            total = dict(a)
+            for term, weight in b.items():
+                total[term] = total.get(term, Fraction(0)) + sign * weight
+            return {term: weight for term, weight in total.items() if weight}, constant_a + sign * constant_b
+        if node.op in {Op.SHIFT, Op.SCALE}:
+            factor = Fraction(2) ** node.parameter
+            if node.op is Op.SCALE:
+                factor = node.parameter * Fraction(2) ** -node.parameter_frac
+            total, constant = self._value(node.operands[0])
+            return {term: weight * factor for term, weight in total.items()}, constant * factor
+        if node.op is Op.BOUND:
+            return self._value(node.operands[0])
+        if node.op is Op.MULTIPLY:
+            return self._product(*node.operands)
+        if node.op in {Op.FLOOR, Op.FRACTION}:
+            return self._cut(node)
+        raise FoldingError(f"the datapath must not {node.op.value} inside to be folded: {node.name!r}")
+
+    def _product(self, a: int, b: int) -> tuple[_Sum, Fraction]:
+        for one, other in ((a, b), (b, a)):
+            if self._nodes[one].op is Op.CONSTANT:
+                _, factor = self._value(one)
+                total, constant = self._value(other)
+                return {term: weight * factor for term, weight in total.items()}, constant * factor
+        first, second = self._places[a], b
+        return {_Term(a, 0, first.digits, second): Fraction(1)}, Fraction(0)
+
+    def _cut(self, node: Node) -> tuple[_Sum, Fraction]:
+        """Return the upper or the lower digits of a stored value."""
+        root = node.operands[0]
+        if root not in self._places:
+            raise FoldingError(f"{node.name!r} must cut a stored value to be folded")
+        place = self._places[root]
+        kept = node.parameter if node.op is Op.FRACTION else node.frac
+        lower, rest = divmod(place.frac - kept, self._bits)
+        if rest:
+            raise FoldingError(f"{node.name!r} must cut its value where another quantizer does to be folded")
+        if node.op is Op.FRACTION:
+            return ({_Term(root, 0, lower): Fraction(1)} if lower else {}), Fraction(0)
+        if lower >= place.digits:
+            raise FoldingError(f"{node.name!r} must leave a digit to be folded")
+        return {_Term(root, lower, place.digits - lower): Fraction(1)}, Fraction(0)
+
+    # How they are computed.
+
+    def _compute(self, index: int) -> None:
+        node = self._nodes[index]
+        total, constant = self._value(node.operands[0]) if node.op is Op.FLOOR else self._definition(index)
+        self._evaluate(self._places[index], total, constant)
+
+    def _delays_in_order(self) -> list[int]:
+        """Delays, each before the one that it takes its value from is overwritten."""
+        delays = [i for i, node in enumerate(self._nodes) if node.op is Op.DELAY]
+        order: list[int] = []
+        while len(order) < len(delays):
+            for delay in delays:
+                readers = [d for d in delays if d not in order and d != delay and self._reads(d, delay)]
+                if delay not in order and not readers:
+                    order.append(delay)
+        return order
+
+    def _reads(self, delay: int, other: int) -> bool:
+        total, _ = self._value(self._nodes[delay].operands[0])
+        return any(term.place == other for term in total)
+
+    def _evaluate(self, place: Place, total: _Sum, constant: Fraction) -> None:
+        """Emit the columns of a sum, the lowest first, and store those from the place's own on."""
+        terms: list[tuple[_Term, int, Fraction]] = []
+        for term, weight in total.items():
+            stored = self._places[term.place]
+            frac = stored.frac - self._bits * term.first
+            if term.other >= 0:
+                frac += self._places[term.other].frac
+            terms.append((term, frac, weight))
+        exact = max([frac + _fraction_bits(weight) for _, frac, weight in terms] + [_fraction_bits(constant)])
+        below = max(0, -(-(exact - place.frac) // self._bits))
+        unit = Fraction(2) ** (place.frac + self._bits * below)
+        columns: list[list[Instruction]] = [[] for _ in range(below + place.digits)]
+        for term, frac, weight in terms:
+            factor = weight * unit / Fraction(2) ** frac
+            for instructions, column in self._products(term, int(factor)):
+                self._place(instructions, column, columns)
+        for column, digit in enumerate(self._constant_digits(int(constant * unit))):
+            self._place([Instruction(Do.MULTIPLY, ONE, digit)], column, columns)
+        for column, instructions in enumerate(columns):
+            for instruction in instructions:
+                self._emit(*instruction)
+            if column < below:
+                self._emit(Do.DROP)
+            elif column < len(columns) - 1:
+                self._emit(Do.STORE, place.address + column - below)
+            else:
+                self._emit(Do.FINISH, place.address + column - below)
+
+    def _place(self, instructions: list[Instruction], column: int, columns: list[list[Instruction]]) -> None:
+        """Put instructions into their column.
+
+        FINISH keeps ``digit_bits + 1`` bits, so that of a product one column above the top only the lowest bit
+        counts, and nothing of those farther up; the value is known to fit.
+        """
+        if column < len(columns):
+            columns[column] += instructions
+        elif column == len(columns):
+            (instruction,) = instructions
+            if instruction.do is not Do.MULTIPLY:
+                raise FoldingError("a product of two values must end below its sum's top digit to be folded")
+            if instruction.constant % 2:
+                columns[-1].append(instruction._replace(constant=-1 << self._bits))
+
+    def _products(self, term: _Term, factor: int) -> Iterator[tuple[list[Instruction], int]]:
+        start = self._places[term.place].address + term.first
+        if term.other < 0:
+            for j, digit in enumerate(self._constant_digits(factor)):
+                if not digit:
+                    continue
+                for i in range(term.length):
+                    yield [Instruction(Do.MULTIPLY, start + i, digit)], i + j
+            return
+        shift = factor.bit_length() - 1
+        if factor != 1 << shift or shift % self._bits:
+            raise FoldingError("a product of two values must fall on a digit to be folded")
+        other = self._places[term.other]
+        for i in range(term.length):
+            for j in range(other.digits):
+                pair = [Instruction(Do.OPERAND, start + i), Instruction(Do.PRODUCT, other.address + j)]
+                yield pair, i + j + shift // self._bits
+
+    def _constant_digits(self, value: int) -> list[int]:
+        """Digits of a constant, balanced about zero, unless one digit does."""
+        base, half = 1 << self._bits, 1 << (self._bits - 1)
+        digits = []
+        while value:
+            if -base <= value < base:
+                digits.append(value)
+                break
+            digit = (value + half) % base - half
+            digits.append(digit)
+            value = (value - digit) >> self._bits
+        return digits
+
+    def _emit(self, do: Do, address: int = 0, constant: int = 0) -> None:
+        """Append an instruction, and before it what keeps it far enough from the one that stores what it reads."""
+        if do in {Do.MULTIPLY, Do.OPERAND, Do.PRODUCT, Do.GIVE}:
+            for distance, earlier in enumerate(reversed(self._instructions[-HAZARD + 1 :]), start=1):
+                if earlier.do in {Do.TAKE, Do.STORE, Do.FINISH} and earlier.address == address:
+                    self._instructions += [Instruction(Do.NOTHING)] * (HAZARD - distance)
+                    break
+        self._instructions.append(Instruction(do, address, constant))
+
+    def _accumulator_bits(self) -> int:
+        """Width by interval arithmetic over the program; every digit may take any value of its range."""
+        base = 1 << self._bits
+        tops = {p.address + p.digits - 1: self._top_range(i, p) for i, p in self._places.items()}
+        tops[ONE] = (1, 1)
+        low = high = least = most = 0
+        operand = (0, 0)
+        for do, address, constant in self._instructions:
+            word = tops.get(address, (0, base - 1))
+            if do is Do.OPERAND:
+                operand = word
+            elif do in {Do.MULTIPLY, Do.PRODUCT}:
+                factors = (constant, constant) if do is Do.MULTIPLY else operand
+                ends = [a * b for a in word for b in factors]
+                low, high = low + min(ends), high + max(ends)
+            elif do in {Do.STORE, Do.DROP}:
+                low, high = low >> self._bits, high >> self._bits
+            elif do is Do.FINISH:
+                low = high = 0
+            least, most = min(least, low), max(most, high)
+        return max((-least - 1).bit_length(), most.bit_length()) + 1
+
+    def _top_range(self, index: int, place: Place) -> tuple[int, int]:
+        node = self._nodes[index]
+        shift = place.frac - node.frac - self._bits * (place.digits - 1)
+        low, high = (_shifted(end, shift) for end in (node.low, node.high))
+        return low, high
+
+
+def _shifted(code: int, shift: int) -> int:
+    return code << shift if shift >= 0 else code >> -shift
+
+
+def _fraction_bits(value: Fraction) -> int:
+    return value.denominator.bit_length() - 1
