@@ -152,7 +152,8 @@ def quantize(
         fracs = _fraction_bits(ideal, realization, bits, share)
         sections, proof = _cascade(ideal, realization, bits, fracs, signal)
         while proof.rounding.magnitude > share:  # where a quantizer's error is not centred
-            fracs = [{name: frac + 1 for name, frac in sources.items()} for sources in fracs]
+            finer = [{name: frac + 1 for name, frac in sources.items()} for sources in fracs]
+            fracs = _within_limits(finer, ideal, share)
             sections, proof = _cascade(ideal, realization, bits, fracs, signal)
         stages += sections
         budget |= _filter_budget(proof)
@@ -385,17 +386,26 @@ def _fraction_bits(ideal: Filter, realization: str, bits: int, share: Fraction) 
         {name: max(0, math.ceil(math.log2(error * count / share))) if error else 0 for name, error in sources.items()}
         for sources in unit
     ]
-    if max((frac for sources in fracs for frac in sources.values()), default=0) > _MOST_BITS:
-        raise ShortfallError(
-            f"the filter must keep its rounding error below {float(share):.3g} output LSB with {_MOST_BITS} fraction "
-            f"bits in each state, and does not: {_remedy(ideal, 'choose a realization with error feedback')}"
-        )
+    _within_limits(fracs, ideal, share)
     # An equal split wastes up to a bit each; give back what the sum allows, the first section first.
     for sources, errors in zip(fracs, unit, strict=True):
         for name in sources:
             total = _total(fracs, unit) + errors[name] * Fraction(2) ** -sources[name]
             if sources[name] > 0 and total <= share:
                 sources[name] -= 1
+    return fracs
+
+
+_Fracs = list[dict[str, int]]
+
+
+def _within_limits(fracs: _Fracs, ideal: Filter, share: Fraction) -> _Fracs:
+    """Return `fracs` unless there are more than may be."""
+    if max((frac for sources in fracs for frac in sources.values()), default=0) > _MOST_BITS:
+        raise ShortfallError(
+            f"the filter must keep its rounding error below {float(share):.3g} output LSB with {_MOST_BITS} fraction "
+            f"bits in each state, and does not: {_remedy(ideal, 'choose a realization with error feedback')}"
+        )
     return fracs
 
 

@@ -31,7 +31,8 @@ class SectionFormat:
     coefficient_bits : int
         Significant bits of each coefficient.
     fracs : mapping of str to int
-        Fraction bits kept by each quantizer, by the name of the node that it quantizes.
+        Fraction bits kept by each quantizer, by the name of the node that it quantizes. Empty, they keep as many as
+        the input has; else those that are missing keep all, because with none nothing was left there to drop.
     ranges : mapping of str to tuple of int
         Range of the code of every node whose range is stated, by its name; `WIDE` where missing.
     """
@@ -71,7 +72,7 @@ def _direct_form(order: int) -> Callable[[Row, SectionFormat, str], Stage]:
             feedback_order=order,
             coefficient_bits=words.coefficient_bits,
             x=(words.x_frac, words.x_low, words.x_high),
-            y_frac=words.fracs.get("v", 0),
+            y_frac=words.fracs.get("v", words.x_frac),
             v_range=words.ranges.get("v", (-WIDE, WIDE)),
         )
 
