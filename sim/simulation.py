@@ -184,6 +184,7 @@ def _evidence(
             for row in facts["formats"]
         ],
         sections=[section_entry(s) | {"realization": quantized.realization} for s in quantized.sections],
+        limit_cycles=facts["limit_cycles"],
         filter=_filter_facts(quantized),
         alternatives=_alternatives(quantized, trace, golden),
     )
