@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from sosmith.gen.cost import cost_of
+from sosmith.gen.cost import LUTS_OF_A_BLOCK, cost_of
 from sosmith.gen.design import Filter, design
 from sosmith.gen.quantize import Quantized, quantize, with_realization
-from sosmith.gen.realizations import ERROR_FEEDBACK, REALIZATIONS
+from sosmith.gen.realizations import BEST_KEPT, ERROR_FEEDBACK, REALIZATIONS
 from sosmith.gen.specification import Specification
 from sosmith.model.calibration import Fit, fit, read_measurements
 from sosmith.model.datapath import Datapath
@@ -136,25 +136,35 @@ def _cheapest(attempt: Callable[[str], Quantized]) -> tuple[Quantized, str]:
     Raises
     ------
     ShortfallError
-        If none meets the specification; says what stands in the way of the last one tried.
+        If none meets the specification; says what stands in the way, where that differs for `BEST_KEPT`.
     """
     proven: list[tuple[int, str, Quantized]] = []
-    failure: ShortfallError | None = None
+    failures: dict[str, str] = {}
     for name in REALIZATIONS:
         try:
             quantized = attempt(name)
         except ShortfallError as error:
-            failure = failure or error
+            failures[name] = str(error)
             continue
         proven.append((cost_of(quantized.datapath).area, name, quantized))
     if not proven:
-        assert failure is not None
-        raise failure
+        with_best = "" if len(set(failures.values())) == 1 else f"with {BEST_KEPT}, "
+        raise ShortfallError(
+            f"none of the {len(failures)} realizations meets the specification: {with_best}{failures[BEST_KEPT]}"
+        )
     proven.sort(key=lambda entry: entry[0])
     area, name, best = proven[0]
-    rest = "".join(f", {other} {size:,}" for size, other, _ in proven[1:3])
-    reason = f"{name}: the smallest estimated area of {len(proven)} proven, {area:,} LUT4 in all"
-    return best, f"{reason} (then{rest[1:]})" if rest else reason
+    why = f"the smallest estimated area of {len(proven)} proven" if len(proven) > 1 else "the only one proven"
+    reason = f"{name}: {why}, {area:,} LUT4 with a multiplier block counted as {LUTS_OF_A_BLOCK}"
+    others = [", ".join(f"{other} {size:,}" for size, other, _ in proven[1:]), _falling_short(list(failures))]
+    rest = "; ".join(other for other in others if other)
+    return best, f"{reason} ({rest})" if rest else reason
+
+
+def _falling_short(names: list[str]) -> str:
+    if not names:
+        return ""
+    return f"{names[0]} falls short" if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]} fall short"
 
 
 def _chosen_core(spec: Specification, core: str | None) -> str:

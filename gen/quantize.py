@@ -28,7 +28,7 @@ from sosmith.gen.proof import (
     prove_cascade,
     rounding_gains,
 )
-from sosmith.gen.realizations import REALIZATIONS, SectionFormat
+from sosmith.gen.realizations import BEST_KEPT, REALIZATIONS, SectionFormat
 from sosmith.model.datapath import Datapath, Stage
 from sosmith.model.errors import ShortfallError
 from sosmith.model.horner import HornerPolynomial, HornerStep, Variable
@@ -153,7 +153,7 @@ def quantize(
         sections, proof = _cascade(ideal, realization, bits, fracs, signal)
         while proof.rounding.magnitude > share:  # where a quantizer's error is not centred
             finer = [{name: frac + 1 for name, frac in sources.items()} for sources in fracs]
-            fracs = _within_limits(finer, ideal, share)
+            fracs = _within_limits(finer, ideal, realization, share)
             sections, proof = _cascade(ideal, realization, bits, fracs, signal)
         stages += sections
         budget |= _filter_budget(proof)
@@ -386,7 +386,7 @@ def _fraction_bits(ideal: Filter, realization: str, bits: int, share: Fraction) 
         {name: max(0, math.ceil(math.log2(error * count / share))) if error else 0 for name, error in sources.items()}
         for sources in unit
     ]
-    _within_limits(fracs, ideal, share)
+    _within_limits(fracs, ideal, realization, share)
     # An equal split wastes up to a bit each; give back what the sum allows, the first section first.
     for sources, errors in zip(fracs, unit, strict=True):
         for name in sources:
@@ -399,12 +399,13 @@ def _fraction_bits(ideal: Filter, realization: str, bits: int, share: Fraction) 
 _Fracs = list[dict[str, int]]
 
 
-def _within_limits(fracs: _Fracs, ideal: Filter, share: Fraction) -> _Fracs:
+def _within_limits(fracs: _Fracs, ideal: Filter, realization: str, share: Fraction) -> _Fracs:
     """Return `fracs` unless there are more than may be."""
     if max((frac for sources in fracs for frac in sources.values()), default=0) > _MOST_BITS:
+        better = [] if realization == BEST_KEPT else [f"set hardware.realization to {BEST_KEPT}"]
         raise ShortfallError(
             f"the filter must keep its rounding error below {float(share):.3g} output LSB with {_MOST_BITS} fraction "
-            f"bits in each state, and does not: {_remedy(ideal, 'choose a realization with error feedback')}"
+            f"bits in each state, and does not: {_remedy(ideal, *better)}"
         )
     return fracs
 
