@@ -6,10 +6,10 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from sosmith.gen.cost import cost_of
+from sosmith.gen.cost import LUTS_OF_A_BLOCK, cost_of
 from sosmith.gen.design import Filter, design
 from sosmith.gen.quantize import Plan, Quantized, plan, prove, with_realization
-from sosmith.gen.realizations import ERROR_FEEDBACK, REALIZATIONS
+from sosmith.gen.realizations import BEST_KEPT, ERROR_FEEDBACK, REALIZATIONS
 from sosmith.gen.specification import Specification
 from sosmith.model.calibration import Fit, fit, read_measurements
 from sosmith.model.datapath import Datapath
@@ -143,15 +143,15 @@ def _cheapest(attempt: Callable[[str], Plan], progress: Progress) -> tuple[Quant
     Raises
     ------
     ShortfallError
-        If none meets the specification; says what stands in the way of the first one.
+        If none meets the specification; says what stands in the way, where that differs for `BEST_KEPT`.
     """
     plans: list[Plan] = []
-    failure: ShortfallError | None = None
+    failures: dict[str, str] = {}
     for name in REALIZATIONS:
         try:
             plans.append(attempt(name))
         except ShortfallError as error:
-            failure = failure or error
+            failures[name] = str(error)
     least = math.inf
     for index, planned in sorted(enumerate(plans), key=lambda entry: entry[1].area):
         if planned.area <= _HOPELESS * least:
@@ -167,19 +167,32 @@ def _cheapest(attempt: Callable[[str], Plan], progress: Progress) -> tuple[Quant
         try:
             quantized = prove(planned)
         except ShortfallError as error:
-            failure = failure or error
+            failures[planned.realization] = str(error)
             continue
         found = cost_of(quantized.datapath).area
         if best is None or found < best[0]:
             best = found, quantized
     if best is None:
-        assert failure is not None
-        raise failure
+        with_best = "" if len(set(failures.values())) == 1 else f"with {BEST_KEPT}, "
+        raise ShortfallError(
+            f"none of the {len(failures)} realizations meets the specification: {with_best}{failures[BEST_KEPT]}"
+        )
     area, quantized = best
-    others = [planned for planned in plans if planned.realization != quantized.realization]
-    rest = ", ".join(f"{other.realization} {round(other.area):,}" for other in others[:2] if other.area < math.inf)
-    reason = f"{quantized.realization}: the smallest estimated area of {len(plans)}, {round(area):,} LUT4 in all"
-    return quantized, f"{reason} (then {rest})" if rest else reason
+    done = {quantized.realization, *failures}
+    left = [planned for planned in plans if planned.realization not in done and planned.area < math.inf]
+    why = f"the smallest estimated area of {len(left) + 1}" if left else "the only one proven"
+    reason = (
+        f"{quantized.realization}: {why}, {round(area):,} LUT4 with a multiplier block counted as {LUTS_OF_A_BLOCK}"
+    )
+    others = [", ".join(f"{other.realization} {round(other.area):,}" for other in left), _falling_short(list(failures))]
+    rest = "; ".join(other for other in others if other)
+    return quantized, f"{reason} ({rest})" if rest else reason
+
+
+def _falling_short(names: list[str]) -> str:
+    if not names:
+        return ""
+    return f"{names[0]} falls short" if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]} fall short"
 
 
 def _chosen_core(spec: Specification, core: str | None) -> str:

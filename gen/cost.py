@@ -14,8 +14,8 @@ MULTIPLIER_BITS = 18
 _LUTS_PER_ADDER_BIT, _LUTS_PER_SPLIT, _LUTS_AROUND = 0.87, 77.0, -51.0
 """Fitted by benchmarks/cost_model.py to synthesis of the examples for ECP5, to within a fifth."""
 
-_LUTS_WORTH_OF_A_BLOCK = 864
-"""24,192 LUT4 and 28 multiplier blocks are on an ECP5-25 (Lattice FPGA-DS-02012, family table)."""
+LUTS_OF_A_BLOCK = 864
+"""What a multiplier block counts in LUT4: an ECP5-25 has 24,192 and 28 (Lattice FPGA-DS-02012, family table)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,7 +54,7 @@ class Cost:
     @property
     def area(self) -> int:
         """One number to compare designs by: LUT4, with a multiplier block as much as its share of an ECP5-25."""
-        return self.luts + _LUTS_WORTH_OF_A_BLOCK * self.multiplier_blocks
+        return self.luts + LUTS_OF_A_BLOCK * self.multiplier_blocks
 
     @property
     def multiplier_sizes(self) -> str:

@@ -166,7 +166,8 @@ def direct_form(
     x : tuple of int
         Fraction bits, smallest and largest code of the input.
     fracs : mapping of str to int
-        Fraction bits that are kept of v, none where missing, and of ``taps_A1`` and the like, all where missing.
+        Fraction bits that are kept of v, as many as x has where missing, and of ``taps_A1`` and the like, all where
+        missing.
     ranges : mapping of str to tuple of int
         Smallest and largest code of v and of ``taps_A1`` and the like.
     wide : tuple of int
@@ -191,7 +192,7 @@ def direct_form(
             x_frac=x[0],
             x_low=x[1],
             x_high=x[2],
-            y_frac=fracs.get("v", 0),
+            y_frac=fracs.get("v", x[0]),
             v_low=v_range[0],
             v_high=v_range[1],
         )

@@ -158,6 +158,9 @@ class Evidence:
     sections : sequence of Mapping
         As in the manifest: ``name``, ``realization``, ``coefficients`` with ``name``, ``integer``, ``frac``
         (fractional bits) and ``value`` each.
+    limit_cycles : sequence of Mapping
+        As in the manifest, one for each section: ``section``, ``largest`` and ``dead_band`` in `unit`, ``none``
+        (whether it is proven to come to rest), ``lyapunov`` (weights as texts of rationals, or None).
     filter : FilterFacts or None
         None for a core without a filter.
     alternatives : sequence of Alternative
@@ -198,6 +201,7 @@ class Evidence:
     unfiltered: Array | None = None
     formats: Sequence[Format] = ()
     sections: Sequence[Mapping[str, Any]] = ()
+    limit_cycles: Sequence[Mapping[str, Any]] = ()
     filter: FilterFacts | None = None
     alternatives: Sequence[Alternative] = ()
 

@@ -395,7 +395,9 @@ def delay_figure(facts: FilterFacts) -> str:
         frequency = frequency_grid(facts)
         ideal = group_delay(facts.ideal_sos, frequency, facts.sample_rate)
         quantized = group_delay(facts.quantized_sos, frequency, facts.sample_rate)
-        both = np.concatenate([ideal, quantized])
+        # Zeros just off the unit circle, where nothing passes anyway, have delays beyond all bounds: not to be framed.
+        most = 2 * float(np.nanmax(np.abs(ideal)))
+        both = np.concatenate([ideal, np.clip(quantized, -most, most)])
         factor, unit = scale(float(np.nanmax(np.abs(both))), "s")
         axes.plot(frequency, ideal * factor, color=COLOUR["golden"], **IDEAL_LINE)
         axes.plot(frequency, quantized * factor, color=COLOUR["hardware"], **REAL_LINE)

@@ -31,7 +31,7 @@ from sosmith.gen.proof import (
     prove_cascade,
     rounding_gains,
 )
-from sosmith.gen.realizations import REALIZATIONS, Section, SectionFormat
+from sosmith.gen.realizations import BEST_KEPT, REALIZATIONS, Section, SectionFormat
 from sosmith.gen.word_lengths import FEWEST_BITS, Choice, Entry, Search, Signal, Words
 from sosmith.model.datapath import Datapath, Stage
 from sosmith.model.errors import ShortfallError
@@ -296,7 +296,8 @@ def _equally_shared(planned: Plan, ideal: Filter) -> Quantized:
         if proof.rounding.magnitude <= share:
             return _assembled(planned, entry, sections, proof)
         # A quantizer's error is not centred.
-        fracs = [{name: frac + 1 for name, frac in sources.items()} for sources in fracs]
+        finer = [{name: frac + 1 for name, frac in sources.items()} for sources in fracs]
+        fracs = _within_limits(finer, ideal, realization, share)
 
 
 def _assembled(planned: Plan, entry: _Entry, sections: Sequence[Section], proof: CascadeProof | None) -> Quantized:
@@ -536,17 +537,27 @@ def _fraction_bits(ideal: Filter, realization: str, bits: int, share: Fraction) 
         {name: max(0, math.ceil(math.log2(error * count / share))) if error else 0 for name, error in sources.items()}
         for sources in unit
     ]
-    if max((frac for sources in fracs for frac in sources.values()), default=0) > _MOST_BITS:
-        raise ShortfallError(
-            f"the filter must keep its rounding error below {float(share):.3g} output LSB with {_MOST_BITS} fraction "
-            f"bits in each state, and does not: {_remedy(ideal, 'choose a realization with error feedback')}"
-        )
+    _within_limits(fracs, ideal, realization, share)
     # An equal split wastes up to a bit each; give back what the sum allows, the first section first.
     for sources, errors in zip(fracs, unit, strict=True):
         for name in sources:
             total = _total(fracs, unit) + errors[name] * Fraction(2) ** -sources[name]
             if sources[name] > 0 and total <= share:
                 sources[name] -= 1
+    return fracs
+
+
+_Fracs = list[dict[str, int]]
+
+
+def _within_limits(fracs: _Fracs, ideal: Filter, realization: str, share: Fraction) -> _Fracs:
+    """Return `fracs` unless there are more than may be."""
+    if max((frac for sources in fracs for frac in sources.values()), default=0) > _MOST_BITS:
+        better = [] if realization == BEST_KEPT else [f"set hardware.realization to {BEST_KEPT}"]
+        raise ShortfallError(
+            f"the filter must keep its rounding error below {float(share):.3g} output LSB with {_MOST_BITS} fraction "
+            f"bits in each state, and does not: {_remedy(ideal, *better)}"
+        )
     return fracs
 
 

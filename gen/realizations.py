@@ -49,7 +49,8 @@ class SectionFormat:
     coefficients : mapping of str to tuple of int
         Integer and fraction bits of the coefficients, by name, that take another value than the nearest.
     fracs : mapping of str to int
-        Fraction bits kept by each quantizer, by the name of the node that it quantizes.
+        Fraction bits kept by each quantizer, by the name of the node that it quantizes. Empty, they keep as many as
+        the input has; else those that are missing keep all, because with none nothing was left there to drop.
     ranges : mapping of str to tuple of int
         Range of the code of every node whose range is stated, by its name; `WIDE` where missing.
     """
@@ -164,3 +165,6 @@ REALIZATIONS: dict[str, Realization] = {
 
 ERROR_FEEDBACK = ("df1", "df1_ef1", "df1_ef2")
 """Realizations that differ in nothing but the error feedback, and so can be set side by side at the same widths."""
+
+BEST_KEPT = "df1_ef2"
+"""Realization whose rounding needs the fewest bits at low cutoffs: where it falls short, its reason tells most."""

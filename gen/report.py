@@ -111,7 +111,7 @@ def summarise(evidence: Evidence) -> dict[str, Any]:
     dict
         The keys of the contract, and: ``core``, ``scenario``, ``realization``, ``architecture``, ``lsb``,
         ``range``, ``max_error``, ``error.{max_lsb,mean,proven,parts}``, ``first_mismatch``, ``latency_cycles``,
-        ``cycles_per_sample`` (of this run, waiting included), ``alternatives``, ``tools``,
+        ``cycles_per_sample`` (of this run, waiting included), ``alternatives``, ``limit_cycles``, ``tools``,
         ``sosmith_version``, ``shortfalls`` (why it did not pass) and ``notes``. Lengths are in samples or
         cycles, errors in ``error.unit``. What is unknown or not finite is None.
         ``passed`` is true if hardware and integer model agree bit for bit, the largest error is within
@@ -157,6 +157,7 @@ def summarise(evidence: Evidence) -> dict[str, Any]:
         "alternatives": [
             {"name": other.name, "max_abs": other.max_abs, "rms": other.rms} for other in evidence.alternatives
         ],
+        "limit_cycles": [dict(found) for found in evidence.limit_cycles],
         "realization": evidence.realization,
         "architecture": evidence.architecture,
         "cycles_per_second": evidence.cycles_per_second,

@@ -6,6 +6,7 @@ Every text that comes from outside (names, units, descriptions) passes through `
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from fractions import Fraction
 from html import escape
 from importlib.resources import files
 from typing import Any
@@ -310,11 +311,39 @@ def _budget_table(evidence: Evidence) -> str:
     )
 
 
+def _limit_cycles_table(evidence: Evidence) -> str:
+    """Tell what each section's rounding can keep up by itself, at the section's own output."""
+    rows = []
+    for found in evidence.limit_cycles:
+        weights = [f"{float(Fraction(weight)):.4g}" for weight in found["lyapunov"] or ()]
+        rows.append(
+            (
+                text(found["section"]),
+                "none, proven" if found["none"] else amount(found["largest"], evidence.unit),
+                "" if found["none"] else _lsb(found["largest"] / evidence.lsb),
+                amount(found["dead_band"], evidence.unit) if found["dead_band"] else "none",
+                _lsb(found["dead_band"] / evidence.lsb) if found["dead_band"] else "",
+                text(", ".join(weights)) or "none exist",
+            )
+        )
+    caption = (
+        "Largest limit cycle without input, and the farthest that a constant output can stay from where it should be: "
+        "bounds, proven for each section at its own output. Where Lyapunov weights exist, the section cannot go on "
+        "oscillating after an overflow either."
+    )
+    head = ("section", "without input, at most", "", "dead band", "", "Lyapunov weights")
+    return (
+        "<figure><h3>What rounding can keep up by itself</h3>\n"
+        f"{table(head, rows, numbers=range(1, 6))}<figcaption>{caption}</figcaption></figure>\n"
+    )
+
+
 def _error_section(evidence: Evidence, summary: Summary) -> str:
     pairs = _histogram_figure(evidence) + _budget_table(evidence)
     if evidence.rivals:
         pairs += _alternatives_pair(evidence, summary)
-    return f'<h2>The error</h2>\n{_error_figure(evidence)}<div class="pair">\n{pairs}</div>\n'
+    own = _limit_cycles_table(evidence) if evidence.limit_cycles else ""
+    return f'<h2>The error</h2>\n{_error_figure(evidence)}<div class="pair">\n{pairs}</div>\n{own}'
 
 
 def _hertz(edges: Sequence[float]) -> str:

@@ -204,7 +204,8 @@ def state_space(
     u : tuple of int
         Fraction bits, smallest and largest code of the input.
     fracs : mapping of str to int
-        Fraction bits that are kept of ``x1_sum``, ``x2_sum`` and ``y_sum``; those of the input where missing.
+        Fraction bits that are kept of ``x1_sum``, ``x2_sum`` and ``y_sum``. A missing one keeps all where the sum is
+        of integer multiples, else as many as the input has.
     ranges : mapping of str to tuple of int
         Smallest and largest code of ``x1_next``, ``x2_next`` and ``y``.
     wide : tuple of int
@@ -220,25 +221,39 @@ def state_space(
     made = design(row)
     states = range(len(made.B))
     a, integer_part = _rounded_matrix(made, rounding)
+    b = tuple(Coefficient(*rounding(f"b{i}", value)) for i, value in enumerate(made.B, start=1))
+    c = tuple(Coefficient(*rounding(f"c{i}", value)) for i, value in enumerate(made.C, start=1))
+    d = Coefficient(*rounding("d", made.D))
+    x_fracs = [fracs.get(f"x{i + 1}_sum", u[0]) for i in states]
+    for i in [*states, *states]:  # twice, as a state that only copies may stand before the one that it copies
+        if f"x{i + 1}_sum" not in fracs:
+            x_fracs[i] = _exact_frac([*zip(a[i], x_fracs, strict=True), (b[i], u[0])], u[0])
     try:
         return StateSpace(
             name=name,
             a=a,
             integer_part=integer_part,
-            b=tuple(Coefficient(*rounding(f"b{i}", value)) for i, value in enumerate(made.B, start=1)),
-            c=tuple(Coefficient(*rounding(f"c{i}", value)) for i, value in enumerate(made.C, start=1)),
-            d=Coefficient(*rounding("d", made.D)),
+            b=b,
+            c=c,
+            d=d,
             truncating=truncating,
             u_frac=u[0],
             u_low=u[1],
             u_high=u[2],
-            x_fracs=tuple(fracs.get(f"x{i + 1}_sum", u[0]) for i in states),
+            x_fracs=tuple(x_fracs),
             x_ranges=tuple(ranges.get(f"x{i + 1}_next", wide) for i in states),
-            y_frac=fracs.get("y_sum", u[0]),
+            y_frac=fracs.get("y_sum", _exact_frac([*zip(c, x_fracs, strict=True), (d, u[0])], u[0])),
             y_range=ranges.get("y", wide),
         )
     except ValueError as error:
         raise ShortfallError(f"{name} must be stable with coefficients of {rounding.bits} bits: {error}") from None
+
+
+def _exact_frac(terms: Sequence[tuple[Coefficient, int]], otherwise: int) -> int:
+    """Fraction bits of a sum of integer multiples of signals with so many each, or else `otherwise`."""
+    used = [(coefficient, frac) for coefficient, frac in terms if coefficient.integer]
+    whole = all(coefficient.frac == 0 for coefficient, _ in used)
+    return max((frac for _, frac in used), default=otherwise) if whole else otherwise
 
 
 def _rounded_matrix(

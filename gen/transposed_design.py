@@ -39,8 +39,8 @@ def transposed_form(
     x : tuple of int
         Fraction bits, smallest and largest code of the input.
     fracs : mapping of str to int
-        Fraction bits that the quantizers of v, t1 and t2 keep. Empty, they keep none; else those that are missing
-        keep all, because with none nothing was left there to drop.
+        Fraction bits that the quantizers of v, t1 and t2 keep. Empty, they keep as many as the input has; else those
+        that are missing keep all, because with none nothing was left there to drop.
     ranges : mapping of str to tuple of int
         Ranges of the codes of v, t1 and t2.
     wide : tuple of int
@@ -56,7 +56,7 @@ def transposed_form(
     made, integer_part = products(row, rounding, name, side)
     operator = side if delta else 0
     exponent = _delta_exponent(row, operator)
-    state_fracs = (fracs.get("t1"), fracs.get("t2")) if fracs else (0, 0)
+    state_fracs = (fracs.get("t1"), fracs.get("t2")) if fracs else (x[0], x[0])
     # Without x(n) in it, y(n) is s1, which is quantized already.
     output = "v" if any(product.x[0] for product in made) else "t1"
     try:
@@ -82,7 +82,7 @@ def transposed_form(
 def _exact_frac(x_frac: int, fracs: Mapping[str, int], delta_exponent: int) -> int:
     """Fraction bits of y where it adds only integer multiples of x and of what the states keep."""
     if not fracs:
-        return 0
+        return x_frac
     return max(x_frac, fracs.get("t1", 0), fracs.get("t2", 0) - delta_exponent)
 
 

@@ -30,7 +30,7 @@ ONE = 0
 
 
 class Do(Enum):
-    """What an instruction does: ``m`` is the word at its address, ``acc`` the accumulator, ``t`` the operand register."""
+    """What an instruction does: ``m`` is the word at its address, ``acc`` the accumulator, ``t`` the operand."""
 
     NOTHING = "nothing"
     TAKE = "take"  # m = next digit of the input sample

@@ -7,7 +7,7 @@ the same on every run.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -74,6 +74,9 @@ STEP_LEVELS = (0.5, -0.5, 0.25, -0.25)
 Half of full scale leaves room for the overshoot of any usual filter.
 """
 
+STRONG_PART = 0.999
+"""Share of an impulse response's magnitudes that a worst case of the error paths keeps: the rest is a long tail."""
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Bench:
@@ -93,11 +96,13 @@ class Bench:
     impulse_response : ndarray, shape (n,)
         Impulse response of the ideal filter, long enough for the rest not to matter; ``[1.0]`` for a
         core without a filter.
+    error_responses : tuple of ndarray, shape (m,)
+        Impulse response from each rounding inside the filter to its output; none for a core without a filter.
 
     Raises
     ------
     ValueError
-        If the count of ports does not fit, the impulse response is empty or not finite, or the sample
+        If the count of ports does not fit, an impulse response is empty or not finite, or the sample
         rate is not positive.
     """
 
@@ -106,6 +111,7 @@ class Bench:
     sample_rate: Fraction
     polynomial: Polynomial | None
     impulse_response: Values
+    error_responses: tuple[Values, ...] = ()
 
     def __post_init__(self) -> None:
         most, expected = (1, "one input") if self.polynomial is None else (2, "one or two inputs")
@@ -113,9 +119,11 @@ class Bench:
             raise ValueError(f"ports must be {expected}, not {len(self.ports)}")
         if self.sample_rate <= 0:
             raise ValueError(f"sample_rate must be positive, not {self.sample_rate}")
-        h = self.impulse_response
-        if h.ndim != 1 or not len(h) or not np.all(np.isfinite(h)):
-            raise ValueError(f"impulse_response must be a row of finite numbers, not of shape {h.shape}")
+        named = [("impulse_response", self.impulse_response)]
+        named += [(f"error_responses[{k}]", response) for k, response in enumerate(self.error_responses)]
+        for name, h in named:
+            if h.ndim != 1 or not len(h) or not np.all(np.isfinite(h)):
+                raise ValueError(f"{name} must be a row of finite numbers, not of shape {h.shape}")
 
     @property
     def kind(self) -> str:
@@ -333,25 +341,49 @@ def _settlings(count: int, step: float) -> Callable[[Bench], int]:
     return samples
 
 
-# Both kinds: the input that drives the filter's output as far as any input can.
+# Both kinds: the inputs that drive the filter's output, or the way of an error to it, as far as any input can.
 
 
-def _worst_case(run: _Run) -> _Signal:
-    """Extreme inputs in the sign pattern of the reversed impulse response, in both polarities in turn.
+def sign_matched(response: Values) -> npt.NDArray[np.bool_]:
+    """Tell at which samples an input must be at its high end to drive what has this impulse response furthest.
 
-    At the last sample of a pattern every term ``h[k] x[n - k]`` has the same sign.
+    The pattern is that of the signs of the reversed response, so that at its last sample every term
+    ``h[k] x[n - k]`` is at its largest, followed by the same with the ends exchanged.
+
+    Parameters
+    ----------
+    response : ndarray, shape (n,)
+
+    Returns
+    -------
+    ndarray of bool, shape (2 n,)
     """
+    towards_high = (response >= 0)[::-1]
+    return np.concatenate([towards_high, ~towards_high])
+
+
+def _worst_cases(run: _Run, responses: Sequence[Values]) -> _Signal:
+    """Extreme inputs in the patterns of `responses` in turn, over and over; long ones lose their tails."""
     low, high = _extreme_codes(run.bench)
-    taps = run.bench.impulse_response[: max(run.samples // 2, 1)]
-    towards_high = (taps >= 0)[::-1]
-    pattern = np.concatenate([towards_high, ~towards_high])
-    repeated = np.resize(pattern, run.samples)
-    return _Signal(np.where(repeated[:, np.newaxis], high, low))
+    most = max(run.samples // (2 * len(responses)), 1)
+    pattern = np.concatenate([sign_matched(response[:most]) for response in responses])
+    return _Signal(np.where(np.resize(pattern, run.samples)[:, np.newaxis], high, low))
 
 
-def _worst_case_samples(bench: Bench) -> int:
-    pattern = 2 * len(bench.impulse_response)
-    return min(pattern * math.ceil(LEAST_SAMPLES / pattern), MOST_SAMPLES)
+def _worst_cases_samples(responses: Sequence[Values]) -> int:
+    """Count the samples in which `_worst_cases` shows whole patterns."""
+    patterns = 2 * len(responses) * max(map(len, responses))
+    return min(patterns * math.ceil(LEAST_SAMPLES / patterns), MOST_SAMPLES)
+
+
+def _strong(response: Values) -> Values:
+    """First part of a response that holds `STRONG_PART` of its magnitudes."""
+    so_far = np.cumsum(np.abs(response))
+    return response[: int(np.searchsorted(so_far, STRONG_PART * so_far[-1])) + 1]
+
+
+def _all_responses(bench: Bench) -> list[Values]:
+    return [_strong(response) for response in (bench.impulse_response, *bench.error_responses)]
 
 
 def _extreme_codes(bench: Bench) -> tuple[Codes, Codes]:
@@ -453,8 +485,15 @@ SCENARIOS: dict[str, Scenario] = {
             "worst_case",
             "extreme codes in the sign pattern that drives the filter's output furthest",
             ("instrument", "filter"),
-            _worst_case_samples,
-            _worst_case,
+            lambda bench: _worst_cases_samples([bench.impulse_response]),
+            lambda run: _worst_cases(run, [run.bench.impulse_response]),
+        ),
+        Scenario(
+            "worst_case_errors",
+            "the same for the way of every rounding error through the filter to the output, one after another",
+            ("instrument", "filter"),
+            lambda bench: _worst_cases_samples(_all_responses(bench)),
+            lambda run: _worst_cases(run, _all_responses(run.bench)),
         ),
         Scenario(
             "step",

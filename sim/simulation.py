@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from sosmith.gen.core import CoreDesign
+from sosmith.gen.error_paths import error_responses
 from sosmith.gen.evidence import Alternative, Evidence, FilterFacts, Format
 from sosmith.gen.generate import generate
 from sosmith.gen.manifest import manifest, section_entry
@@ -39,6 +40,7 @@ def bench_of(design: CoreDesign) -> Bench:
         sample_rate=design.spec.sample_rate,
         polynomial=quantized.polynomial,
         impulse_response=np.ones(1) if quantized.filter is None else quantized.filter.impulse_response,
+        error_responses=tuple(error_responses(quantized)),
     )
 
 
@@ -182,6 +184,7 @@ def _evidence(
             for row in facts["formats"]
         ],
         sections=[section_entry(s) | {"realization": quantized.realization} for s in quantized.sections],
+        limit_cycles=facts["limit_cycles"],
         filter=_filter_facts(quantized),
         alternatives=_alternatives(quantized, trace, golden),
     )

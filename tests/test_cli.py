@@ -196,16 +196,16 @@ UNFIT = {
     ),
     "unknown scenario to simulate": (
         ("simulate", "plain.toml", "--trace", "drive"),
-        "scenario for a plain filter must be one of worst_case, step, sweep, noise, not 'drive'",
+        "scenario for a plain filter must be one of worst_case, worst_case_errors, step, sweep, noise, not 'drive'",
     ),
     "scenario of the other kind": (
         ("simulate", "demo.toml", "--trace", "sweep"),
         "scenario for an instrument must be one of bench_43_50, bench_92_96, temperature_ramp, wear_ramp, worst_case, "
-        "not 'sweep'",
+        "worst_case_errors, not 'sweep'",
     ),
     "unknown scenario to emulate": (
         ("emulate", "plain.toml", "drive"),
-        "the scenario must be one of worst_case, step, sweep, noise, not drive",
+        "the scenario must be one of worst_case, worst_case_errors, step, sweep, noise, not drive",
     ),
     "simulator to come": (
         ("simulate", "plain.toml", "--simulator", "cxxrtl"),
@@ -469,7 +469,7 @@ def test_generate_prints_the_paths_of_its_files(sosmith: Command) -> None:
 
 def test_emulate_lists_prints_and_writes(sosmith: Command) -> None:
     listed = sosmith("emulate", "demo.toml").stdout
-    for name in ("bench_43_50", "bench_92_96", "temperature_ramp", "wear_ramp", "worst_case"):
+    for name in ("bench_43_50", "bench_92_96", "temperature_ramp", "wear_ramp", "worst_case", "worst_case_errors"):
         assert name in listed
     assert "sweep" not in listed
     printed = sosmith("emulate", "demo.toml", "wear_ramp", "--seconds", "3", "--seed", "4")

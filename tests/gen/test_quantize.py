@@ -155,6 +155,31 @@ def test_given_sections_of_an_elliptic_filter() -> None:
     assert np.abs(errors(quantized, stimulus((SIGNED,), 5))).max() <= quantized.bound <= 1
 
 
+INTEGER_ROWS = {
+    "pass": (1.0, 0.0, 0.0, 1.0, 0.0, 0.0),
+    "delay": (0.0, 0.0, 1.0, 1.0, 0.0, 0.0),
+    "slope": (2.0, -1.0, 0.0, 1.0, 0.0, 0.0),
+}
+
+
+@pytest.mark.parametrize("realization", list(REALIZATIONS))
+@pytest.mark.parametrize("name", INTEGER_ROWS)
+def test_a_section_of_whole_numbers_rounds_nothing(name: str, realization: str) -> None:
+    """What it passes on has the fraction bits of the section before it; a quantizer of its own would have none."""
+    first, last = butterworth(2, 0.05).rows[0], butterworth(2, 0.1).rows[0]
+    quantized = plain(replace(butterworth(2, 0.1), rows=(first, INTEGER_ROWS[name], last)), realization)
+    codes = stimulus((SIGNED,), 6)
+    assert np.abs(errors(quantized, codes)).max() <= quantized.bound <= 1
+    assert quantized.datapath.compute(codes[6500:8500]).tolist() == quantized.datapath.compute_exact(codes[6500:8500])
+
+
+def test_a_state_that_copies_another_keeps_all_its_bits() -> None:
+    """In normal form a real pole and two zeros make a second state that is the first one, a sample ago."""
+    ideal = replace(butterworth(2, 0.1), rows=((0.25, 0.1, 0.25, 1.0, -0.4, 0.0), butterworth(2, 0.1).rows[0]))
+    quantized = plain(ideal, "normal")
+    assert np.abs(errors(quantized, stimulus((SIGNED,), 7))).max() <= quantized.bound <= 1
+
+
 def test_polynomial_of_higher_order() -> None:
     polynomial = Polynomial.from_numbers([["0.5", "-0.01", "0.0002"], ["0.3", "0.001"], ["0.02"], ["0.003", "0.00001"]])
     inputs = (

@@ -104,6 +104,10 @@ def evidence(**changes: Any) -> Evidence:
                 "coefficients": [{"name": "a1", "integer": -66026473, "frac": 26, "value": -0.98387}],
             },
         ),
+        "limit_cycles": (
+            {"section": "section 0", "largest": 0.00003, "dead_band": 0.0, "none": False, "lyapunov": None},
+            {"section": "section 1", "largest": 0.00003, "dead_band": 0.000061, "none": True, "lyapunov": ["1", "1/3"]},
+        ),
         "filter": facts(),
         "alternatives": (Alternative(name="df1", max_abs=0.4, rms=0.1),),
     }
@@ -120,6 +124,7 @@ def plain(**changes: Any) -> Evidence:
         "filter": None,
         "formats": (),
         "sections": (),
+        "limit_cycles": (),
         "alternatives": (),
         "bound_parts": {},
         "unit": "",
@@ -200,7 +205,8 @@ def test_summary_has_the_keys_of_the_contract(built: tuple[str, Path, dict[str, 
     }  # fmt: skip
     assert report.keys() >= {
         "core", "scenario", "realization", "architecture", "lsb", "range", "max_error", "first_mismatch",
-        "latency_cycles", "cycles_per_sample", "alternatives", "tools", "sosmith_version", "shortfalls", "notes",
+        "latency_cycles", "cycles_per_sample", "alternatives", "limit_cycles", "tools", "sosmith_version", "shortfalls",
+        "notes",
     }  # fmt: skip
     assert report["error"].keys() >= {"max_abs", "rms", "bound", "unit", "max_lsb", "mean", "proven", "parts"}
     assert report["frequency_response"].keys() >= {"max_deviation_db_passband", "stopband_attenuation_db"}
@@ -542,6 +548,23 @@ def test_texts_from_outside_are_escaped() -> None:
 
 def test_a_dollar_sign_in_a_figure_is_no_formula() -> None:
     assert "output in $x^2$" in Page(page_of(evidence(unit="$x^2$"))).words
+
+
+def test_page_shows_what_rounding_keeps_up() -> None:
+    words = " ".join(Page(page_of(evidence())).words).replace("\u00a0", " ")
+    start = words.index("What rounding can keep up by itself")
+    rows = " ".join(words[start:].split())
+    assert "section 0 30.0 nm 0.123 LSB none none exist" in rows
+    assert "section 1 none, proven 61.0 nm 0.250 LSB 1, 0.3333" in rows
+    assert "What rounding can keep up by itself" not in page_of(plain())
+
+
+def test_a_delay_beyond_all_bounds_is_not_framed() -> None:
+    """A zero that rounding has moved off z = -1 delays the nothing that is left at Nyquist by any time at all."""
+    ideal = signal.butter(1, 1000, fs=48000, output="sos")
+    moved = ideal * [1, 1 + 1e-6, 1, 1, 1, 1]
+    drawn = plots.delay_figure(facts(ideal_sos=ideal, quantized_sos=moved, sample_rate=48000.0, cutoff=(1000.0,)))
+    assert "group delay in µs" in Page(drawn).words
 
 
 def test_this_design_is_not_its_own_alternative() -> None:

@@ -11,15 +11,15 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from scipy import signal
 
-from sosmith.gen.design import decay_length, design
-from sosmith.gen.linear_model import linear_model
+from sosmith.gen.design import decay_length, design, impulse_response
+from sosmith.gen.error_paths import error_responses
 from sosmith.gen.quantize import Quantized, quantize
 from sosmith.gen.realizations import REALIZATIONS
 from sosmith.gen.specification import FilterSpec
 from sosmith.model.golden import calibrated, filtered
 from sosmith.model.port import Port
+from sosmith.model.scenarios import sign_matched
 
 RANDOM_SAMPLES = 1_000_000
 
@@ -117,33 +117,12 @@ def quantized_design(number: int, realization: str) -> Quantized:
     )
 
 
-def error_paths(quantized: Quantized) -> Iterator[np.ndarray]:
-    """Impulse responses to the output: of the whole filter, then of every quantizer's error."""
-    sos = quantized.quantized_sos
-    yield response_of(sos)
-    for index, section in enumerate(quantized.sections):
-        model = linear_model(section.graph)
-        after = sos[index:].copy()
-        for source in model.sources[1:]:
-            taps = np.array([float(value) for value in source.numerators[model.output]])
-            after[0, :3] = [1, 0, 0]
-            yield np.convolve(response_of(after), taps)
-
-
-def response_of(sos: np.ndarray) -> np.ndarray:
-    impulse = np.zeros(decay_length(sos))
-    impulse[0] = 1
-    return np.asarray(signal.sosfilt(sos, impulse))
-
-
 def stimuli(quantized: Quantized, seed: int) -> Iterator[np.ndarray]:
     (port,) = quantized.datapath.inputs
     rng = np.random.default_rng(seed)
     yield rng.integers(port.lowest, port.highest + 1, RANDOM_SAMPLES)
-    ends = np.array([port.lowest, port.highest])
-    for response in error_paths(quantized):
-        signs = (response[::-1] > 0).astype(int)
-        yield np.concatenate([ends[signs], ends[1 - signs]])
+    for response in (impulse_response(quantized.quantized_sos), *error_responses(quantized)):
+        yield np.where(sign_matched(response), port.highest, port.lowest)
     settle = decay_length(quantized.quantized_sos)
     heights = [1, port.highest // 3, port.highest, port.lowest, 5, 0]
     yield np.repeat(heights, min(settle, 200_000))
@@ -171,10 +150,10 @@ def test_no_value_leaves_its_proven_range(number: int, realization: str) -> None
     """The exact interpreter checks every node on the worst case of the whole filter, its end and then noise."""
     quantized = quantized_design(number, realization)
     (port,) = quantized.datapath.inputs
-    response = next(error_paths(quantized))
+    response = impulse_response(quantized.quantized_sos)
     strongest = int(np.searchsorted(np.cumsum(np.abs(response)), 0.999 * np.abs(response).sum()))
-    signs = (response[: min(strongest + 1, 12_000)][::-1] > 0).astype(int)
-    codes = np.array([port.lowest, port.highest])[signs]
+    pattern = sign_matched(response[: min(strongest + 1, 12_000)])
+    codes = np.where(pattern[: len(pattern) // 2], port.highest, port.lowest)
     noise = np.random.default_rng(number).integers(port.lowest, port.highest + 1, 1000)
     column = np.concatenate([codes, noise]).reshape(-1, 1)
     assert quantized.datapath.compute_exact(column) == quantized.datapath.compute(column).tolist()

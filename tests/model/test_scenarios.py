@@ -84,7 +84,7 @@ def test_same_seed_same_trace_of_reasonable_length(name: str, bench: str) -> Non
     assert LEAST_SAMPLES <= len(trace) <= MOST_SAMPLES
     assert len(trace) == round(SCENARIOS[name].default_seconds(BENCHES[bench]) * BENCHES[bench].sample_rate)
     assert (trace.name, trace.seed) == (name, 7)
-    random = name not in {"worst_case", "step", "sweep"}
+    random = name not in {"worst_case", "worst_case_errors", "step", "sweep"}
     assert random == bool(np.any(trace.codes != emulate(name, BENCHES[bench], seed=8).codes))
 
 
@@ -181,6 +181,32 @@ def test_worst_case_takes_the_extreme_codes(polynomial: Polynomial) -> None:
     assert (values.min(), values.max()) == (every.min(), every.max())
 
 
+ERROR_PATHS = (butterworth(2, 0.4, 6), np.array([1.0, -1.0, 0.5, -0.25]), np.array([-2.0, 1.0]))
+"""Responses from three quantizers, of very different lengths."""
+
+
+@pytest.mark.parametrize("bench", [INSTRUMENT, FILTER], ids=["F5", "audio"])
+def test_worst_case_of_every_error_path(bench: Bench) -> None:
+    """Each response in turn sees both of its worst inputs, but for the thousandth of it that is left out."""
+    bench = replace(bench, error_responses=ERROR_PATHS)
+    trace = emulate("worst_case_errors", bench, seed=1)
+    x = trace.values()[:, 0] if bench.polynomial is None else clearance(trace)
+    low, high = x.min(), x.max()
+    middle, half = (high + low) / 2, (high - low) / 2
+    for response in (bench.impulse_response, *ERROR_PATHS):
+        reached = np.convolve(x - middle, response)[: len(x)]
+        most = half * np.abs(response).sum()
+        assert 0.997 * most < reached.max() <= most + 1e-9
+        assert -most - 1e-9 <= reached.min() < -0.997 * most
+
+
+def test_error_paths_share_a_length_that_is_given() -> None:
+    bench = replace(FILTER, impulse_response=np.array([1.0, 1.0, 1.0]), error_responses=(np.ones(100), np.ones(2)))
+    codes = emulate("worst_case_errors", bench, seed=1, seconds=60 / 48000).codes[:, 0]
+    pattern = np.repeat([1, 0, 1, 0, 1, 0], [3, 3, 10, 10, 2, 2])
+    np.testing.assert_array_equal(codes > 0, np.resize(pattern, 60))
+
+
 def test_step() -> None:
     trace = emulate("step", FILTER, seed=1)
     truth, reading = measures(trace)
@@ -242,13 +268,14 @@ def test_seconds_give_the_length() -> None:
             INSTRUMENT,
             {},
             "scenario for an instrument must be one of bench_43_50, bench_92_96, temperature_ramp, "
-            "wear_ramp, worst_case, not 'bench'",
+            "wear_ramp, worst_case, worst_case_errors, not 'bench'",
         ),
         (
             "wear_ramp",
             FILTER,
             {},
-            "scenario for a plain filter must be one of worst_case, step, sweep, noise, not 'wear_ramp'",
+            "scenario for a plain filter must be one of worst_case, worst_case_errors, step, sweep, noise, "
+            "not 'wear_ramp'",
         ),
         ("noise", FILTER, {"seed": -1}, "seed must be 0 or more, not -1"),
         (
@@ -316,6 +343,10 @@ def test_bench_refusals() -> None:
         (
             {"impulse_response": np.array([1.0, np.inf])},
             "impulse_response must be a row of finite numbers, not of shape (2,)",
+        ),
+        (
+            {"error_responses": (np.ones(3), np.ones((2, 1)))},
+            "error_responses[1] must be a row of finite numbers, not of shape (2, 1)",
         ),
     ):
         with pytest.raises(ValueError, match=f"^{re.escape(message)}$"):

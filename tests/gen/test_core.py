@@ -1,0 +1,91 @@
+"""The choice of a realization: the cheapest that is proven, its reason, and what is said where there is none."""
+
+import re
+from dataclasses import replace
+from fractions import Fraction
+from typing import Any
+
+import pytest
+from tests.gen.designs import EXAMPLES
+
+from sosmith.gen import core
+from sosmith.gen.core import design_core
+from sosmith.gen.cost import cost_of
+from sosmith.gen.quantize import Quantized, quantize
+from sosmith.gen.realizations import REALIZATIONS
+from sosmith.gen.specification import Specification, load
+from sosmith.model.errors import ShortfallError
+
+
+@pytest.fixture(name="spec")
+def low_pass() -> Specification:
+    """Second-order low-pass at a thousandth of the sample rate, 8 bits out."""
+    audio = load(EXAMPLES / "audio_lowpass.toml")
+    output = replace(audio.output, bits=8, lsb=audio.output.lsb * 256)
+    return replace(
+        audio, output=output, max_error=output.lsb, filter=replace(audio.filter, order=2, cutoff=(Fraction(48),))
+    )
+
+
+def within(spec: Specification, beyond_half: Fraction) -> Specification:
+    """Allow so much beside the half LSB of the output rounding."""
+    return replace(spec, max_error=spec.output.lsb * (Fraction(1, 2) + beyond_half))
+
+
+def test_the_cheapest_is_taken_and_the_rest_are_told(spec: Specification) -> None:
+    made = design_core(spec)
+    areas = {name: cost_of(design_core(spec, realization=name).datapath).area for name in REALIZATIONS}
+    ranked = sorted(areas, key=lambda name: areas[name])
+    best, *others = ranked
+    rest = ", ".join(f"{name} {areas[name]:,}" for name in others)
+    assert made.quantized.realization == best
+    assert made.reasons["realization"] == (
+        f"{best}: the smallest estimated area of {len(areas)} proven, {areas[best]:,} LUT4 with a multiplier block "
+        f"counted as 864 ({rest})"
+    )
+
+
+def test_those_that_fall_short_are_told(spec: Specification) -> None:
+    assert design_core(within(spec, Fraction(1, 10**8))).reasons["realization"].endswith("; df1 and df2t fall short)")
+
+
+def test_the_only_one_that_is_left(spec: Specification, monkeypatch: pytest.MonkeyPatch) -> None:
+    fail(monkeypatch, {name: "it must fit, and does not" for name in REALIZATIONS if name != "delta"})
+    others = [name for name in REALIZATIONS if name != "delta"]
+    reason = design_core(spec).reasons["realization"]
+    assert re.fullmatch(
+        r"delta: the only one proven, [0-9,]+ LUT4 with a multiplier block counted as 864 "
+        rf"\({', '.join(others[:-1])} and {others[-1]} fall short\)",
+        reason,
+    )
+
+
+def fail(monkeypatch: pytest.MonkeyPatch, sentences: dict[str, str]) -> None:
+    """Have these realizations fall short."""
+
+    def failing(**options: Any) -> Quantized:
+        if options["realization"] in sentences:
+            raise ShortfallError(sentences[options["realization"]])
+        return quantize(**options)
+
+    monkeypatch.setattr(core, "quantize", failing)
+
+
+def test_none_for_one_reason(spec: Specification) -> None:
+    sentence = (
+        f"none of the {len(REALIZATIONS)} realizations meets the specification: the filter's coefficients must keep "
+        "their error below 5e-13 output LSB with 40 significant bits each, and do not: raise output.max_error, raise "
+        "output.bits or decimate by 32 first, as the cutoff is 1/1000 of the sample rate"
+    )
+    with pytest.raises(ShortfallError, match=f"^{re.escape(sentence)}$"):
+        design_core(within(spec, Fraction(1, 10**12)))
+
+
+def test_none_for_several_reasons(spec: Specification, monkeypatch: pytest.MonkeyPatch) -> None:
+    fail(monkeypatch, {name: f"the bound must hold for {name}, and does not" for name in REALIZATIONS})
+    sentence = (
+        f"none of the {len(REALIZATIONS)} realizations meets the specification: with df1_ef2, the bound must hold for "
+        "df1_ef2, and does not"
+    )
+    with pytest.raises(ShortfallError, match=f"^{re.escape(sentence)}$"):
+        design_core(spec)
