@@ -67,6 +67,8 @@ class Quantized:
         Significant bits of the sections' coefficients; 0 without a filter.
     budget : dict of str to Fraction
         Parts of the error bound in output LSBs, each proven.
+    entry_error : Fraction
+        Bound on the error of what comes before the filter, at the filter's input, in output LSBs; exact.
     proof : CascadeProof or None
         The proof of the sections; None without a filter.
     """
@@ -77,6 +79,7 @@ class Quantized:
     realization: str
     coefficient_bits: int
     budget: dict[str, Fraction]
+    entry_error: Fraction
     proof: CascadeProof | None
 
     @property
@@ -136,15 +139,16 @@ def quantize(
     gain = Fraction(1) if ideal is None else _gain(ideal)
     stages: list[Stage] = []
     budget: dict[str, Fraction] = {}
+    entry_error = Fraction(0)
     if polynomial is None and not _needs_scaling(inputs[0], output):
         exponent = _exponent_of_two(inputs[0].lsb / output.lsb)
         assert exponent is not None
         signal: _Format = (-exponent, inputs[0].lowest, inputs[0].highest)
     else:
-        horner, error = _horner(_normalised(polynomial or _IDENTITY, inputs, output), inputs, share / gain)
+        horner, entry_error = _horner(_normalised(polynomial or _IDENTITY, inputs, output), inputs, share / gain)
         stages += horner.stages
         signal = _format_of(horner.stages[-1])
-        budget["calibration" if polynomial is not None else "input scaling"] = error * gain
+        budget["calibration" if polynomial is not None else "input scaling"] = entry_error * gain
     proof, bits = None, 0
     if ideal is not None:
         ideal = _ordered(ideal, realization)
@@ -166,6 +170,7 @@ def quantize(
         realization=realization,
         coefficient_bits=bits,
         budget=budget,
+        entry_error=entry_error,
         proof=proof,
     )
 
