@@ -25,7 +25,7 @@ from sosmith.gen.certificate_file import (
 )
 from sosmith.gen.linear_model import LinearModel, linear_model
 from sosmith.gen.peak_gain import Drive, Horizon, Response, horizon, impulse
-from sosmith.gen.proof import TransferFunction, ideal_gain
+from sosmith.gen.proof import TransferFunction
 from sosmith.gen.quantize import Quantized, ideal_sections
 from sosmith.model.datapath import Stage
 from sosmith.model.graph import Node
@@ -100,8 +100,8 @@ def _claims(quantized: Quantized, ideal: Sequence[TransferFunction]) -> ClaimsEn
         closer = _closer(models, ideal, node.low * unit, node.high * unit)
         gain = closer.gain
         budget["filter coefficients"], budget["filter rounding"] = closer.coefficients, closer.rounding
-        for part in budget.keys() & {"calibration", "input scaling"}:  # an exact error times the filter's gain
-            budget[part] *= gain / ideal_gain(ideal)
+        for part in budget.keys() & {"calibration", "input scaling"}:
+            budget[part] = quantized.entry_error * gain
         sections = tuple(_gains(s.name, m) for s, m in zip(quantized.sections, models, strict=True))
     return ClaimsEntry(budget=budget, bound=sum(budget.values(), Fraction(0)), peak_gain=gain, sections=sections)
 

@@ -72,6 +72,8 @@ class Quantized:
         Name of the sections' realization.
     budget : dict of str to Fraction
         Parts of the error bound in output LSBs, each proven.
+    entry_error : Fraction
+        Bound on the error of what comes before the filter, at the filter's input, in output LSBs; exact.
     proof : CascadeProof or None
         The proof of the sections; None without a filter.
     """
@@ -81,6 +83,7 @@ class Quantized:
     polynomial: Polynomial | None
     realization: str
     budget: dict[str, Fraction]
+    entry_error: Fraction
     proof: CascadeProof | None
 
     @property
@@ -105,7 +108,7 @@ class Quantized:
 
 @dataclass(frozen=True, kw_only=True)
 class _Entry:
-    """What may stand before the sections: its stages, the signal they give, and their error at the filter's output."""
+    """What may stand before the sections: its stages, the signal that they give, and its error in output LSBs."""
 
     stages: tuple[Stage, ...]
     signal: Signal
@@ -120,6 +123,8 @@ class Plan:
     ----------
     name, inputs, output, max_error, ideal, polynomial, realization
         As for `plan`, the filter's sections in the order of the cascade.
+    gain : Fraction
+        Worst-case peak gain of the filter, 1 without one.
     share : Fraction
         Error of each part of the budget but the output rounding, in output LSBs, where all get the same.
     entries : tuple of _Entry
@@ -137,6 +142,7 @@ class Plan:
     ideal: Filter | None
     polynomial: Polynomial | None
     realization: str
+    gain: Fraction
     share: Fraction
     entries: tuple[_Entry, ...]
     search: Search | None
@@ -200,7 +206,7 @@ def plan(
     gain = Fraction(1) if ideal is None else _gain(ideal)
     if scaled:
         normalised = _normalised(polynomial or _IDENTITY, inputs, output)
-        entries = _entries(normalised, inputs, share / gain, gain)
+        entries = _entries(normalised, inputs, share / gain)
     else:
         exponent = _exponent_of_two(inputs[0].lsb / output.lsb)
         assert exponent is not None
@@ -212,7 +218,7 @@ def plan(
         search = Search(
             ideal.rows,
             realization,
-            [Entry(e.signal, float(e.error), sum(area_of(stage.graph) for stage in e.stages)) for e in entries],
+            [Entry(e.signal, float(e.error * gain), sum(area_of(stage.graph) for stage in e.stages)) for e in entries],
         )
         start = search.start(float(share), _MOST_BITS)
     return Plan(
@@ -223,6 +229,7 @@ def plan(
         ideal=ideal,
         polynomial=polynomial,
         realization=realization,
+        gain=gain,
         share=share,
         entries=entries,
         search=search,
@@ -303,7 +310,7 @@ def _equally_shared(planned: Plan, ideal: Filter) -> Quantized:
 def _assembled(planned: Plan, entry: _Entry, sections: Sequence[Section], proof: CascadeProof | None) -> Quantized:
     budget: dict[str, Fraction] = {}
     if entry.stages:
-        budget["calibration" if planned.polynomial is not None else "input scaling"] = entry.error
+        budget["calibration" if planned.polynomial is not None else "input scaling"] = entry.error * planned.gain
     if proof is not None:
         budget |= _filter_budget(proof)
     stages = (*entry.stages, *sections)
@@ -315,6 +322,8 @@ def _assembled(planned: Plan, entry: _Entry, sections: Sequence[Section], proof:
         polynomial=planned.polynomial,
         realization=planned.realization,
         budget=budget,
+        entry_error=entry.error,
+        entry_error=entry_error,
         proof=proof,
     )
 
@@ -450,7 +459,7 @@ def _substitution(port: Port, count: int) -> list[list[Fraction]]:
 
 
 def _entries(
-    coefficients: tuple[tuple[Fraction, ...], ...], inputs: Sequence[Port], allowed: Fraction, gain: Fraction
+    coefficients: tuple[tuple[Fraction, ...], ...], inputs: Sequence[Port], allowed: Fraction
 ) -> tuple[_Entry, ...]:
     """Polynomials with the fewest fraction bits whose error stays below `allowed` output LSBs, and with fewer."""
     variables = tuple(Variable(name=p.name, bits=p.bits, signed=p.signed) for p in inputs)
@@ -460,7 +469,7 @@ def _entries(
         horner = HornerPolynomial(coefficients=integers, frac=frac, variables=variables)
         error = _horner_error(coefficients, horner)
         stages = horner.stages
-        made.insert(0, _Entry(stages=stages, signal=_format_of(stages[-1]), error=error * gain))
+        made.insert(0, _Entry(stages=stages, signal=_format_of(stages[-1]), error=error))
         if error <= allowed:
             return tuple(made[:_COARSER])
     raise ShortfallError(

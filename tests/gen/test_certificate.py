@@ -22,9 +22,11 @@ from tests.gen.test_quantize import OUT, SIGNED, butterworth, plain
 from sosmith.cli import main
 from sosmith.gen.certificate import certificate
 from sosmith.gen.certificate_file import Certificate, certificate_text, on_grid, read_certificate
+from sosmith.gen.design import design
 from sosmith.gen.l1_response import UndecidedError, inverse, is_stable, response
 from sosmith.gen.quantize import Quantized, quantize
 from sosmith.gen.realizations import REALIZATIONS
+from sosmith.gen.specification import FilterSpec
 from sosmith.gen.verification import RejectedError, verify
 from sosmith.model.errors import SpecificationError
 from sosmith.model.graph import Graph, Node, Op
@@ -99,6 +101,27 @@ def test_any_input_and_output_range(inputs: Port, output: Port) -> None:
 )
 def test_designs(kind: str, order: int, cutoff: float, realization: str) -> None:
     proven(plain(butterworth(order, cutoff, kind), realization))
+
+
+def test_an_input_to_be_scaled_before_sections_in_another_order() -> None:
+    """An error before the filter counts by the filter's gain, whose last digits depend on the order of the sections."""
+    given = FilterSpec(
+        family="elliptic",
+        kind="lowpass",
+        method="bilinear",
+        order=5,
+        cutoff=(Fraction(1, 20),),
+        passband_edge=None,
+        stopband_edge=None,
+        passband_loss=Fraction(1),
+        stopband_loss=Fraction(60),
+        sos=None,
+    )
+    ideal = design(given, Fraction(1))
+    quantized = plain(ideal, inputs=Port.from_range("x", 14, Fraction(0), Fraction(33, 10)))
+    assert quantized.filter is not None
+    assert quantized.filter.rows != ideal.rows
+    proven(quantized)
 
 
 def test_the_same_section_twice() -> None:
