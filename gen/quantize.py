@@ -323,7 +323,6 @@ def _assembled(planned: Plan, entry: _Entry, sections: Sequence[Section], proof:
         realization=planned.realization,
         budget=budget,
         entry_error=entry.error,
-        entry_error=entry_error,
         proof=proof,
     )
 
