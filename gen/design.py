@@ -27,6 +27,7 @@ _LONGEST_RESPONSE = 1 << 24  # samples; poles closer to the unit circle than thi
 _DECAY = 1e-12  # where an impulse response counts as over, of its envelope
 _COMFORTABLE = 20  # samples per period of the band edge: word lengths hardly fall with fewer
 _SNAP = 1e-9  # relative distance at which a gain counts as one: rounding of the design, not intent
+_SNAP_GIVEN = 1e-14  # the same for given sections, where only the products of their gains are rounded
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -324,7 +325,7 @@ def _normalise(sos: Array, kind: str, cutoff: tuple[float, ...] | None, fs: floa
             continue
         total *= gain
         row[:3] /= gain
-    if abs(total - 1) > _SNAP:
+    if abs(total - 1) > (_SNAP if cutoff is not None else _SNAP_GIVEN):
         result[0, :3] *= total
     return result
 

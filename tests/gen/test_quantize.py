@@ -1,5 +1,6 @@
 """Formats and coefficients: the integer model against the golden chain, over examples and many designs."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
 
@@ -48,6 +49,25 @@ def plain(ideal: Filter, realization: str = "df1_ef2", inputs: Port = SIGNED, ou
         ideal=ideal,
         polynomial=None,
         realization=realization,
+    )
+
+
+def given(*rows: Sequence[str]) -> Filter:
+    """Filter of sections given as decimal numbers."""
+    return design(
+        FilterSpec(
+            family="sections",
+            kind="sections",
+            method="sections",
+            order=None,
+            cutoff=None,
+            passband_edge=None,
+            stopband_edge=None,
+            passband_loss=None,
+            stopband_loss=None,
+            sos=tuple(tuple(map(Fraction, row)) for row in rows),
+        ),
+        Fraction(1),
     )
 
 
@@ -198,3 +218,32 @@ def test_polynomial_of_higher_order() -> None:
     )
     codes = np.random.default_rng(3).integers(0, [65536, 4096], (20000, 2))
     assert np.abs(errors(quantized, codes)).max() <= quantized.bound <= 1
+
+
+LOWPASS = ("0.1", "0", "0", "1", "-0.9", "0")
+ONE_LATER, TWO_LATER = ("0", "1", "0", "1", "0", "0"), ("0", "0", "1", "1", "0", "0")
+
+
+@pytest.mark.parametrize("realization", REALIZATIONS)
+@pytest.mark.parametrize(
+    "rows",
+    [
+        (TWO_LATER,),
+        (LOWPASS, ONE_LATER),
+        (LOWPASS, ("2", "-1", "0", "1", "0", "0")),
+        (("0.3", "0.3", "0.3", "1", "-0.1", "0"),),
+    ],
+)
+def test_quantizers_with_nothing_to_drop_until_there_are_fraction_bits_before_them(
+    rows: Sequence[Sequence[str]], realization: str
+) -> None:
+    quantized = plain(given(*rows), realization)
+    assert quantized.bound <= 1
+    worst = np.abs(errors(quantized, stimulus(quantized.datapath.inputs, 1, 4000))).max()
+    assert worst <= float(quantized.bound) + 1e-9
+
+
+def test_given_sections_keep_their_gain() -> None:
+    """One part in 10**9 is half an LSB of 30 bits: what is given is meant."""
+    (row,) = given(("0.5000000004", "0.5000000004", "0", "1", "0", "0")).rows
+    assert row[:3] == pytest.approx((0.5000000004, 0.5000000004, 0), rel=1e-15)
