@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -76,7 +77,7 @@ def load_report(path: Path) -> dict[str, Any]:
     except OSError as error:
         reason = (error.strerror or "unreadable").lower()
         raise SpecificationError(f"{path} must be a report.json or a folder with one, not {reason}") from error
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:  # no JSON, or lists some thousand deep
         raise SpecificationError(f"{file} must be a report.json of sosmith, not text that is no JSON") from error
     problem = _problem(content)
     if problem:
@@ -101,6 +102,9 @@ def _problem(content: Any) -> str:
         # bool is a kind of int in Python, not in JSON
         if not isinstance(value, types) or (isinstance(value, bool) and bool not in types):
             return f"with {value!r} as {'.'.join(keys)}"
+        # no float holds such a number, and 1e999 is read as infinity
+        if isinstance(value, _NUMBER) and not abs(value) <= sys.float_info.max:
+            return f"with a number out of range as {'.'.join(keys)}"
     return ""
 
 

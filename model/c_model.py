@@ -25,7 +25,7 @@ def c_header(datapath: Datapath) -> str:
     guard = f"{name.upper()}_H"
     ports = "\n".join(
         f" *   {port.name}_code: {port.lowest} .. {port.highest}, value = {float(port.zero)!r} + "
-        f"{float(port.lsb)!r} * code {port.unit}".rstrip()
+        f"{float(port.lsb)!r} * code {port.unit.replace('*/', '* /')}".rstrip()
         for port in (*datapath.inputs, datapath.output)
     )
     return f"""/* {name}: bit-true model of the generated hardware, made by sosmith.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from html.parser import HTMLParser
 from pathlib import Path
@@ -157,12 +158,18 @@ def test_load_by_file_and_by_folder(tmp_path: Path) -> None:
     assert load_report(tmp_path / "report.json") == report()
 
 
+_OUT_OF_RANGE = "JSON with a number out of range as error.max_abs"
+
+
 @pytest.mark.parametrize(
     ("content", "reason"),
     [
         ("name = 1", "text that is no JSON"),
         ('{"sqnr_db": NaN}', "text that is no JSON"),
+        ("[" * 100_000 + "]" * 100_000, "text that is no JSON"),
         ("[]", "JSON without name"),
+        (json.dumps(report(**{"error.max_abs": math.inf})).replace("Infinity", "1e999"), _OUT_OF_RANGE),
+        (json.dumps(report(**{"error.max_abs": 10**400})), _OUT_OF_RANGE),
         (json.dumps(report(error=3)), "JSON without error.unit"),
         (json.dumps(report(**{"error.max_abs": "small"})), "JSON with 'small' as error.max_abs"),
         (json.dumps(report(samples=True)), "JSON with True as samples"),

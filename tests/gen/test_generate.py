@@ -6,6 +6,7 @@ import os
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from tests.gen.designs import ALL, EXAMPLES, example_design
 from tests.gen.test_quantize import stimulus
 
 from sosmith.gen.generate import generate
+from sosmith.model.c_model import c_header
 from sosmith.model.errors import SpecificationError
 from sosmith.model.text_files import write_files
 
@@ -85,6 +87,12 @@ def test_c_model_compiles_without_a_warning_and_computes(compiler: str, tmp_path
     codes = stimulus(design.datapath.inputs, 6, 2000)
     computed = [step(state.ctypes.data, *sample) for sample in codes.tolist()]
     assert computed == design.datapath.compute(codes).tolist()
+
+
+def test_a_unit_cannot_end_the_comment_in_the_header() -> None:
+    datapath = example_design("audio_lowpass.toml").datapath
+    odd = replace(datapath, output=replace(datapath.output, unit="*/ #error"))
+    assert c_header(odd).count("*/") == c_header(datapath).count("*/")
 
 
 def test_modules_have_plain_names(tmp_path: Path) -> None:
