@@ -1,4 +1,4 @@
-"""Measures every realization and writes docs/numerics.md with its plot: `python benchmarks/numerics.py`.
+"""Measures every realization and writes docs/numerics.md with its plot: `python -m benchmarks.numerics`.
 
 With `--check` nothing is written; the exit status says whether the document is what this run gives.
 """
@@ -12,22 +12,32 @@ from pathlib import Path
 
 import matplotlib
 import numpy as np
+from benchmarks import published
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from scipy import signal
 
 from sosmith.gen.core import CoreDesign, design_core
-from sosmith.gen.cost import cost_of
+from sosmith.gen.cost import LUTS_OF_A_BLOCK, cost_of
 from sosmith.gen.design import decay_length
 from sosmith.gen.linear_model import linear_model
+from sosmith.gen.noise import minimum_gain, second_order_modes
 from sosmith.gen.realizations import REALIZATIONS, SectionFormat
 from sosmith.gen.specification import load
+from sosmith.gen.state_space_design import minimum_noise
+from sosmith.model.errors import ShortfallError
 from sosmith.model.golden import calibrated, filtered
+from sosmith.model.graph import Op
+from sosmith.model.port import Codes
+from sosmith.sim.simulation import trace_for
 
 ROOT = Path(__file__).resolve().parent.parent
 SPECIFICATIONS = ("audio_lowpass", "flange_wear_locomotive")
-QUALITY = 2.24698  # of the section that is plotted: the highest of a 7th-order Butterworth filter
-CUTOFFS = np.geomspace(5e-4, 5e-2, 21)  # over the sample rate
+QUALITY = published.qualities(7)[0]  # of the section that is plotted: the highest of a 7th-order Butterworth filter
+CUTOFFS = np.geomspace(5e-4, 5e-2, 41)  # over the sample rate
+SLOPES = (-30, -10, 0)  # dB per decade, drawn for reference
+COEFFICIENT_BITS = 40  # of the section that is plotted
+NOISE_SAMPLES = 200_000
 SEED = 1
 
 
@@ -35,67 +45,79 @@ SEED = 1
 class Row:
     """One realization of one filter, as the table shows it."""
 
-    name: str
-    coefficient_bits: int
+    coefficient_bits: str
     states: str
     multipliers: str
     bound: float
     worst: float
     rms: float
+    area: int
+
+
+def stimulus(design: CoreDesign) -> Codes:
+    """White noise, both rails and a small step until they have settled, the worst case of every error path."""
+    assert design.quantized.filter is not None
+    (port,) = design.datapath.inputs
+    settle = len(design.quantized.filter.impulse_response)
+    levels = (port.highest, port.lowest, (port.lowest + port.highest) // 2 + 3)
+    parts = [
+        np.random.default_rng(SEED).integers(port.lowest, port.highest + 1, NOISE_SAMPLES),
+        *(np.full(settle, level) for level in levels),
+        trace_for(design, "worst_case", seed=SEED).codes[:, 0],
+        trace_for(design, "worst_case_errors", seed=SEED).codes[:, 0],
+    ]
+    return np.concatenate(parts).reshape(-1, 1)
 
 
 def measure(design: CoreDesign) -> Row:
-    """Run noise, both rails and a small step, and the sign-matched worst case, through the integer model."""
+    """Run the stimulus through the integer model and the golden chain."""
     quantized, datapath = design.quantized, design.datapath
     assert quantized.filter is not None
-    (port,) = datapath.inputs
-    rng = np.random.default_rng(SEED)
-    response = quantized.filter.impulse_response
-    ends = np.array([port.lowest, port.highest])
-    worst_case = ends[(response[::-1] > 0).astype(int)]
-    settle = len(response)
-    parts = [
-        rng.integers(port.lowest, port.highest + 1, 200_000),
-        *(np.full(settle, level) for level in (port.highest, port.lowest, (port.lowest + port.highest) // 2 + 3)),
-        worst_case,
-    ]
-    codes = np.concatenate(parts).reshape(-1, 1)
+    codes = stimulus(design)
     golden = filtered(calibrated(codes, datapath.inputs, None), quantized.filter.sos, datapath.output)
     error = (datapath.output.decode(datapath.compute(codes)) - golden) / float(datapath.output.lsb)
+    nodes = [node for section in quantized.sections for node in section.graph.nodes]
+    coefficients = [abs(node.parameter).bit_length() for node in nodes if node.op is Op.SCALE]
     states = [section.graph.nodes[i].width for section in quantized.sections for i in section.graph.delays]
     return Row(
-        name=quantized.realization,
-        coefficient_bits=quantized.coefficient_bits,
+        coefficient_bits=f"{min(coefficients)}..{max(coefficients)}" if coefficients else "none",
         states=f"{min(states)}..{max(states)}, {sum(states)} in all",
         multipliers=cost_of(datapath).multiplier_sizes,
         bound=float(quantized.bound),
         worst=float(np.abs(error).max()),
         rms=float(np.sqrt(np.mean(error**2))),
+        area=round(cost_of(datapath).area),
     )
 
 
 def table(name: str) -> str:
     """Markdown table of all realizations of one example's filter."""
+    spec = load(ROOT / "examples" / f"{name}.toml")
     lines = [
-        "| realization | coefficient bits | state bits (each, sum) | multipliers (bits x bits) "
-        "| bound (LSB) | worst found (LSB) | rms (LSB) |",
-        "|---|---|---|---|---|---|---|",
+        f"Allowed: {float(spec.max_error / spec.output.lsb):.4f} LSB.",
+        "",
+        "| realization | coefficient bits | state bits (each, sum) | multipliers (bits x bits) | bound (LSB) "
+        "| worst found (LSB) | worst / bound | rms (LSB) | estimated area (LUT4) |",
+        "|---|---|---|---|---|---|---|---|---|",
     ]
     for realization in REALIZATIONS:
-        row = measure(design_core(load(ROOT / "examples" / f"{name}.toml"), core="filter", realization=realization))
+        try:
+            design = design_core(spec, core="filter", realization=realization)
+        except ShortfallError as error:
+            lines.append(f"| {realization} | refused: {error} |" + " |" * 7)
+            continue
+        row = measure(design)
         lines.append(
-            f"| {row.name} | {row.coefficient_bits} | {row.states} | {row.multipliers} "
-            f"| {row.bound:.4f} | {row.worst:.4f} | {row.rms:.4f} |"
+            f"| {realization} | {row.coefficient_bits} | {row.states} | {row.multipliers} | {row.bound:.4f} "
+            f"| {row.worst:.4f} | {100 * row.worst / row.bound:.0f} % | {row.rms:.4f} | {row.area:,} |"
         )
     return "\n".join(lines)
 
 
 def noise_gain(realization: str, cutoff: float) -> float:
     """Power gain from all quantizers of one unity-gain low-pass section to its output, each of the same variance."""
-    u = np.tan(np.pi * cutoff)
-    a0 = 1 + u / QUALITY + u * u
-    row = (u * u / a0, 2 * u * u / a0, u * u / a0, 1.0, 2 * (u * u - 1) / a0, (1 - u / QUALITY + u * u) / a0)
-    stage = REALIZATIONS[realization].build(row, SectionFormat(coefficient_bits=40), "section")
+    words = SectionFormat(coefficient_bits=COEFFICIENT_BITS)
+    stage = REALIZATIONS[realization].build(published.lowpass(cutoff, QUALITY), words, "section")
     model = linear_model(stage.graph)
     a = [float(value) for value in model.denominator]
     impulse = np.zeros(decay_length(np.array([[1.0, 0, 0, *a, *[0.0] * (3 - len(a))]])))
@@ -108,51 +130,136 @@ def noise_gain(realization: str, cutoff: float) -> float:
     return gain
 
 
-def plot() -> tuple[str, dict[str, float]]:
-    """SVG of noise gain against cutoff, and the slope of each realization in dB per decade, fitted to it."""
-    figure = Figure(figsize=(8, 5), layout="constrained")
-    FigureCanvasSVG(figure)
-    axes = figure.add_subplot()
-    slopes = {}
-    for realization in REALIZATIONS:
-        decibels = np.array([10 * np.log10(noise_gain(realization, cutoff)) for cutoff in CUTOFFS])
-        slopes[realization] = float(np.polyfit(np.log10(CUTOFFS), decibels, 1)[0])
-        axes.semilogx(CUTOFFS, decibels, label=f"{realization} ({slopes[realization]:+.1f} dB/decade)")
-    axes.set_xlabel("cutoff over sample rate")
-    axes.set_ylabel("noise gain in dB, all quantizers at one width")
-    axes.grid(visible=True, which="both", alpha=0.3)
-    axes.legend()
-    text = io.StringIO()
-    with matplotlib.rc_context({"svg.hashsalt": "sosmith"}):
+def noise_curve(realization: str) -> list[float] | str:
+    """Noise gain in dB at each of the cutoffs, or why there is none."""
+    try:
+        return [10 * float(np.log10(noise_gain(realization, cutoff))) for cutoff in CUTOFFS]
+    except ShortfallError as error:
+        return f"refused: {error}"
+
+
+def slope_of(decibels: list[float]) -> float:
+    """Slope in dB per decade of the cutoff, fitted."""
+    return float(np.polyfit(np.log10(CUTOFFS), decibels, 1)[0])
+
+
+def plot(curves: dict[str, list[float] | str]) -> str:
+    """SVG of noise gain in dB against cutoff, by realization."""
+    with matplotlib.rc_context({"svg.hashsalt": "sosmith", "svg.fonttype": "none"}):
+        figure = Figure(figsize=(8, 5.5), layout="constrained")
+        FigureCanvasSVG(figure)
+        axes = figure.add_subplot()
+        for style, (realization, decibels) in enumerate(curves.items()):
+            if isinstance(decibels, str):
+                continue
+            dashes = ("-", "--", "-.", ":")[style % 4]  # curves lie on each other
+            axes.semilogx(CUTOFFS, decibels, dashes, label=f"{realization} ({slope_of(decibels):+.1f} dB/decade)")
+        ends = CUTOFFS[[0, -1]]
+        for slope in SLOPES:
+            axes.semilogx(ends, -6 + slope * np.log10(ends / ends[1]), color="0.6", lw=0.8)
+            axes.annotate(f"{slope} dB/decade", (ends[0], -6 + slope * np.log10(ends[0] / ends[1])), color="0.4")
+        axes.set_xlabel("cutoff over sample rate")
+        axes.set_ylabel("noise gain in dB, all quantizers at one width")
+        axes.grid(visible=True, which="both", alpha=0.3)
+        axes.legend()
+        text = io.StringIO()
         figure.savefig(text, format="svg", metadata={"Date": None})
-    return text.getvalue(), slopes
+    return "\n".join(line.rstrip() for line in text.getvalue().splitlines()) + "\n"
+
+
+def slope_table(curves: dict[str, list[float] | str]) -> str:
+    """Markdown table of the slopes."""
+    rows = []
+    for name, curve in curves.items():
+        slope = curve if isinstance(curve, str) else f"{slope_of(curve):+.1f}"
+        rows.append(f"| {name} | {REALIZATIONS[name].title} | {slope} |")
+    return "\n".join(["| realization | | slope, dB per decade of the cutoff |", "|---|---|---|", *rows])
+
+
+def jenssen_table() -> str:
+    """Markdown table of the figures for a 10th-order cascade, ours beside the published ones."""
+    lines = [
+        "| structure | noise gain | published | estimated variance | published | simulated variance | published |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for structure, (gain, estimate, simulated) in published.JENSSEN.items():
+        lines.append(
+            f"| {structure} | {published.jenssen_gain(structure):.2f} | {gain:.2f} "
+            f"| {published.jenssen_estimate(structure):.2f} | {estimate:.2f} "
+            f"| {published.jenssen_simulated(structure):.2f} | {simulated:.2f} |"
+        )
+    return "\n".join(lines)
+
+
+def section_table() -> str:
+    """Markdown table of the least noise of sections, at two cutoffs, beside figure and closed form."""
+    lines = [
+        "| order of the filter | Q of the section | gain at 0.0026 | gain at 0.1 | figure | Q^2/2 + 1/8 |",
+        "|---|---|---|---|---|---|",
+    ]
+    for order, figures in published.SECTION_GAINS.items():
+        for q, figure in zip(published.qualities(order), figures, strict=True):
+            low, high = (
+                minimum_gain(second_order_modes(minimum_noise(published.lowpass(cutoff, q)).system))
+                for cutoff in (0.0026, 0.1)
+            )
+            lines.append(f"| {order} | {q:.5f} | {low:.6f} | {high:.6f} | {figure:.6f} | {q * q / 2 + 1 / 8:.6f} |")
+    return "\n".join(lines)
+
+
+def order_table() -> str:
+    """Markdown table of the least noise of whole filters beside its figures."""
+    lines = ["| order | least noise gain | figure |", "|---|---|---|"]
+    for order, figure in enumerate(published.BUTTERWORTH_GAINS, start=1):
+        lines.append(f"| {order} | {published.butterworth_gain(order):.6f} | {figure:.6f} |")
+    return "\n".join(lines)
 
 
 def document() -> dict[str, str]:
     """Texts of the document and its plot, by path from the root."""
-    svg, slopes = plot()
+    curves = {name: noise_curve(name) for name in REALIZATIONS}
     sections = "\n\n".join(f"## {name}\n\n{table(name)}" for name in SPECIFICATIONS)
-    slope_rows = "\n".join(f"| {name} | {REALIZATIONS[name].title} | {slope:+.1f} |" for name, slope in slopes.items())
     text = f"""# Numerics of the realizations, side by side
 
-Written by `python benchmarks/numerics.py`; nothing here is typed in. The filter core alone, at one output LSB of
-allowed error. The bound is proven for every input; "worst found" is the largest error of the integer model against
-the double-precision golden chain on noise, rails, a small step and the sign-matched worst case.
+Written by `python -m benchmarks.numerics`; nothing here is typed in. The filter core alone, within the error that its
+specification allows. The bound is proven for every input. "Worst found" is the largest error of the integer model against
+the double-precision golden chain on noise, rails, a small step, and the sign-matched worst cases of the whole filter
+and of every quantizer's way to the output. The area is estimated for an ECP5 in the parallel architecture, a
+multiplier block counted as {LUTS_OF_A_BLOCK} LUT4.
 
 {sections}
 
 ## Rounding noise against the cutoff
 
-One section of Q = {QUALITY}, every quantizer at the same width. Plain direct forms lose 30 dB for each decade that
-the cutoff goes down, first-order error feedback 10, second-order none.
+One section of Q = {QUALITY:.5f}, every quantizer at the same width: the noise at the output over that of one quantizer.
+Plain direct forms lose 30 dB for each decade that the cutoff goes down. First-order error feedback loses 10, and so
+does the delta form, whose noise is that of its states. Second-order error feedback loses none, nor do state-space forms
+with scaled states, but for the steps of scaling by powers of two.
 
 ![noise gain](images/noise.svg)
 
-| realization | | slope, dB per decade of the cutoff |
-|---|---|---|
-{slope_rows}
+{slope_table(curves)}
+
+## Least noise of any structure
+
+With words that hold their states to equal parts, no coordinates of a state space make less noise than
+(sum of the second-order modes)^2 / n: for a Butterworth section Q^2/2 + 1/8, whatever the cutoff.
+
+{section_table()}
+
+A whole Butterworth low-pass as one system:
+
+{order_table()}
+
+## Jenssen's table
+
+Butterworth low-pass of order 10 at 0.1 of the sample rate, coefficients of 10 bits, words that hold plus or minus
+{published.DELTA:g} standard deviations of their states; gains, and variances in squares of an LSB, beside those
+published (Jenssen, Design of IIR Filters). The simulation runs {published.SAMPLES:,} samples of uniform noise.
+
+{jenssen_table()}
 """
-    return {"docs/numerics.md": text, "docs/images/noise.svg": svg}
+    return {"docs/numerics.md": text, "docs/images/noise.svg": plot(curves)}
 
 
 def main() -> None:

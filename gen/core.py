@@ -178,13 +178,16 @@ def _cheapest(attempt: Callable[[str], Plan], progress: Progress) -> tuple[Quant
             f"none of the {len(failures)} realizations meets the specification: {with_best}{failures[BEST_KEPT]}"
         )
     area, quantized = best
-    done = {quantized.realization, *failures}
-    left = [planned for planned in plans if planned.realization not in done and planned.area < math.inf]
+    short = {*failures, *(planned.realization for planned in plans if planned.area == math.inf)}
+    left = [planned for planned in plans if planned.realization not in {quantized.realization, *short}]
     why = f"the smallest estimated area of {len(left) + 1}" if left else "the only one proven"
     reason = (
         f"{quantized.realization}: {why}, {round(area):,} LUT4 with a multiplier block counted as {LUTS_OF_A_BLOCK}"
     )
-    others = [", ".join(f"{other.realization} {round(other.area):,}" for other in left), _falling_short(list(failures))]
+    others = [
+        ", ".join(f"{other.realization} {round(other.area):,}" for other in left),
+        _falling_short([name for name in REALIZATIONS if name in short]),
+    ]
     rest = "; ".join(other for other in others if other)
     return quantized, f"{reason} ({rest})" if rest else reason
 

@@ -1,0 +1,34 @@
+"""The document of the realizations' numerics: it is what the benchmark writes, refusals included."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from benchmarks import numerics
+
+from sosmith.gen.realizations import REALIZATIONS, Realization
+from sosmith.model.datapath import Stage
+from sosmith.model.errors import ShortfallError
+
+
+@pytest.mark.slow
+def test_the_numerics_are_what_the_benchmark_writes() -> None:
+    command = [sys.executable, "-m", "benchmarks.numerics", "--check"]
+    result = subprocess.run(
+        command, cwd=Path(numerics.__file__).parents[1], capture_output=True, text=True, check=False
+    )
+    assert (result.returncode, result.stderr) == (0, "")
+
+
+def test_the_numerics_show_a_refusal_as_such(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> Stage:
+        raise ShortfallError("it must fit, and does not")
+
+    only = {"df1": Realization(name="df1", title="", build=refuse)}
+    monkeypatch.setitem(REALIZATIONS, "df1", only["df1"])
+    monkeypatch.setattr(numerics, "REALIZATIONS", only)
+    *_, head, _, row = numerics.table("audio_lowpass").splitlines()
+    assert row.startswith("| df1 | refused: it must fit, and does not |")
+    assert row.count("|") == head.count("|")
+    assert numerics.noise_curve("df1") == "refused: it must fit, and does not"
