@@ -222,9 +222,9 @@ def document() -> dict[str, str]:
     text = f"""# Numerics of the realizations, side by side
 
 Written by `python -m benchmarks.numerics`; nothing here is typed in. The filter core alone, within the error that its
-specification allows. The bound is proven for every input. "Worst found" is the largest error of the integer model against
-the double-precision golden chain on noise, rails, a small step, and the sign-matched worst cases of the whole filter
-and of every quantizer's way to the output. The area is estimated for an ECP5 in the parallel architecture, a
+specification allows. The bound is proven for every input. "Worst found" is the largest error of the integer model
+against the double-precision golden chain on noise, rails, a small step, and the sign-matched worst cases of the whole
+filter and of every quantizer's way to the output. The area is estimated for an ECP5 in the parallel architecture, a
 multiplier block counted as {LUTS_OF_A_BLOCK} LUT4.
 
 {sections}
