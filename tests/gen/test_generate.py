@@ -62,7 +62,7 @@ def test_manifest_says_what_the_contract_asks(tmp_path: Path) -> None:
     assert (temperature["offset"], temperature["unit"]) == (16, "degC")
     assert manifest["streams"]["m_axis"]["fields"][0]["unit"] == "mm"
     assert manifest["error_bound"] == pytest.approx(sum(manifest["error_parts"].values()))
-    assert 0 < manifest["error_bound"] <= 16 / 65536
+    assert 0 < manifest["error_bound"] <= manifest["spec"]["output"]["max_error"]
     for section in manifest["sections"]:
         for coefficient in section["coefficients"]:
             assert coefficient["value"] == coefficient["integer"] / 2 ** coefficient["frac"]

@@ -40,7 +40,7 @@ def section_0() -> Row:
 
 def graph_of(realization: str, row: Row, bits: int = 24, x_frac: int = 0) -> Graph:
     """Section with every quantizer at whole LSBs."""
-    words = SectionFormat(coefficient_bits=bits, x_frac=x_frac)
+    words = SectionFormat(coefficient_bits=bits, x_frac=x_frac, fracs={"v": 0} if x_frac else {})
     return REALIZATIONS[realization].build(row, words, "section").graph
 
 
