@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+from sosmith.gen.architecture import Architecture, chosen
 from sosmith.gen.cost import LUTS_OF_A_BLOCK, cost_of
 from sosmith.gen.design import Filter, design
 from sosmith.gen.quantize import Plan, Quantized, plan, prove, with_realization
@@ -41,7 +42,7 @@ class CoreDesign:
         One of `CORES`.
     quantized : Quantized
         The datapath, with the ideal filter and polynomial it stands for.
-    architecture : str
+    architecture : Architecture
         How the datapath becomes hardware.
     reasons : dict of str to str
         Why this realization and this architecture, one sentence each.
@@ -52,7 +53,7 @@ class CoreDesign:
     spec: Specification
     core: str
     quantized: Quantized
-    architecture: str
+    architecture: Architecture
     reasons: dict[str, str]
     fit: Fit | None
 
@@ -93,19 +94,19 @@ def design_core(
     ShortfallError
         If no formats meet the specification.
     """
-    chosen = _chosen_core(spec, core)
+    kind = _chosen_core(spec, core)
     wanted = _known(realization or spec.hardware.realization)
-    if chosen != "filter":
+    if kind != "filter":
         progress("calibration")
-    polynomial, fitted = _polynomial(spec) if chosen != "filter" else (None, None)
+    polynomial, fitted = _polynomial(spec) if kind != "filter" else (None, None)
     progress("filter design")
-    ideal = _filter(spec) if chosen != "calibration" else None
+    ideal = _filter(spec) if kind != "calibration" else None
 
     def attempt(name: str) -> Plan:
         progress(f"word lengths, {name}" if ideal is not None else "word lengths")
         return plan(
             name=spec.name,
-            inputs=_inputs(spec, chosen),
+            inputs=_inputs(spec, kind),
             output=spec.output,
             max_error=spec.max_error,
             ideal=ideal,
@@ -127,11 +128,12 @@ def design_core(
     else:
         source = "on the command line" if realization is not None else "in the specification"
         quantized, reason = prove(attempt(wanted).trimmed()), f"{wanted}: asked for {source}"
-    reasons = {
-        "realization": reason,
-        "architecture": "parallel: the architecture available now, one sample per clock",
-    }
-    return CoreDesign(spec=spec, core=chosen, quantized=quantized, architecture="parallel", reasons=reasons, fit=fitted)
+    hardware = spec.hardware
+    architecture, why = chosen(
+        hardware.architecture, quantized.datapath, clock=hardware.clock, sample_rate=spec.sample_rate
+    )
+    reasons = {"realization": reason, "architecture": why}
+    return CoreDesign(spec=spec, core=kind, quantized=quantized, architecture=architecture, reasons=reasons, fit=fitted)
 
 
 def _cheapest(attempt: Callable[[str], Plan], progress: Progress) -> tuple[Quantized, str]:

@@ -10,7 +10,6 @@ from sosmith.gen.certificate_file import certificate_text
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.manifest import manifest
 from sosmith.gen.verilog import to_rtlil, to_verilog
-from sosmith.hdl.core import Core
 from sosmith.model.c_model import c_header, c_source
 from sosmith.model.text_files import to_json, write_files
 
@@ -29,7 +28,7 @@ def generate(design: CoreDesign, directory: Path, progress: Callable[[str], None
     """
     name, datapath = design.spec.name, design.datapath
     progress("RTLIL")
-    rtlil_text = to_rtlil(Core(datapath))
+    rtlil_text = to_rtlil(design.architecture.component(), datapath.name)
     progress("SystemVerilog")
     verilog_text = to_verilog(rtlil_text)
     progress("certificate")

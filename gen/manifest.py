@@ -10,7 +10,6 @@ from sosmith.gen.cost import cost_of
 from sosmith.gen.limit_cycles import limit_cycles
 from sosmith.gen.linear_model import linear_model
 from sosmith.hdl.axi_stream import fields, width
-from sosmith.hdl.core import latency_cycles
 from sosmith.model.datapath import Datapath, Stage
 from sosmith.model.direct_form import DirectForm1
 from sosmith.model.graph import Op
@@ -28,10 +27,10 @@ def manifest(design: CoreDesign) -> dict[str, Any]:
         "sosmith_version": sosmith.__version__,
         "spec": design.spec.source,
         "streams": {"s_axis": _stream(datapath.inputs), "m_axis": _stream((datapath.output,))},
-        "latency_cycles": latency_cycles(datapath),
-        "cycles_per_sample": 1,
+        "latency_cycles": design.architecture.latency_cycles,
+        "cycles_per_sample": design.architecture.cycles_per_sample,
         "realization": quantized.realization if quantized.sections else None,
-        "architecture": design.architecture,
+        "architecture": design.architecture.name,
         "reasons": design.reasons,
         "sections": [section_entry(section) for section in quantized.sections],
         "formats": [row for stage in datapath.stages for row in _formats(stage, datapath)],

@@ -87,7 +87,7 @@ class HardwareSpec:
     realization : str
         "auto", "df1", "df1_ef1" or "df1_ef2".
     architecture : str
-        "auto" or "parallel".
+        "auto", "parallel", "folded" or "serial".
     clock : Fraction
         In Hz, at least the sample rate.
     reload : bool

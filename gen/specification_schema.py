@@ -37,10 +37,9 @@ FAMILIES = ("butterworth", "chebyshev1", "chebyshev2", "elliptic", "bessel")
 KINDS = ("lowpass", "highpass", "bandpass", "bandstop")
 METHODS = ("bilinear", "impulse_invariant")
 REALIZATIONS = ("auto", "df1", "df1_ef1", "df1_ef2", "df2t", "delta", "state_space", "normal")
-ARCHITECTURES = ("auto", "parallel")
+ARCHITECTURES = ("auto", "parallel", "folded", "serial")
 
 REALIZATIONS_LATER = ("lattice_wdf",)
-ARCHITECTURES_LATER = ("folded", "serial")
 
 MAX_ORDER = 20
 """Highest order of the digital filter, ten second-order sections."""
@@ -126,7 +125,7 @@ class HardwareTable(Table):
     """``[hardware]``: how the datapath is built."""
 
     realization: Annotated[str, PlainValidator(choice(REALIZATIONS, REALIZATIONS_LATER))] = "auto"
-    architecture: Annotated[str, PlainValidator(choice(ARCHITECTURES, ARCHITECTURES_LATER))] = "auto"
+    architecture: Annotated[str, PlainValidator(choice(ARCHITECTURES))] = "auto"
     clock: Annotated[Fraction, PlainValidator(positive("Hz"))] = Fraction(12_000_000)
     reload: Annotated[bool, PlainValidator(flag_not_yet)] = False
 

@@ -7,8 +7,8 @@ import subprocess
 import sys
 
 from amaranth.back import rtlil
+from amaranth.lib.wiring import Component
 
-from sosmith.hdl.core import Core
 from sosmith.model.errors import ToolError
 
 # Without `-nomux` there is no combinational process left, which Icarus would leave unevaluated at time 0.
@@ -26,9 +26,9 @@ write_verilog -sv -norename
 """
 
 
-def to_rtlil(core: Core) -> str:
-    """RTLIL text of `core`, with its datapath's name as the top module."""
-    text = str(rtlil.convert(core, name=core.datapath.name, emit_src=False))
+def to_rtlil(core: Component, name: str) -> str:
+    """RTLIL text of `core` with the top module `name`."""
+    text = str(rtlil.convert(core, name=name, emit_src=False))
     # Plain module names: an escaped identifier such as `\\top.section0 ` is legal Verilog and still trips tools.
     return re.sub(r"^( *(?:module|cell) \\)(\S+)", lambda m: m[1] + m[2].replace(".", "_"), text, flags=re.MULTILINE)
 

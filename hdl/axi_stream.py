@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from amaranth.hdl import Module, Signal
+from amaranth.hdl import Cat, Module, Signal, Value
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
@@ -38,6 +38,14 @@ def fields(ports: Sequence[Port]) -> tuple[Field, ...]:
 def width(ports: Sequence[Port]) -> int:
     """Width of ``tdata`` for `ports`, in bits."""
     return sum(field.padded for field in fields(ports))
+
+
+def extended(code: Value, bits: int) -> Value:
+    """Extend `code` to `bits` bits by its sign."""
+    if len(code) >= bits:
+        return code
+    top = code[-1] if code.shape().signed else 0
+    return Cat(code, *([top] * (bits - len(code))))
 
 
 class OutputBuffer(wiring.Component):

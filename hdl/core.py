@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from amaranth.hdl import Cat, ClockDomain, ClockSignal, Module, ResetSignal, Value
+from amaranth.hdl import ClockDomain, ClockSignal, Module, ResetSignal, Value
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
-from sosmith.hdl.axi_stream import OutputBuffer, fields, width
+from sosmith.hdl.axi_stream import OutputBuffer, extended, fields, width
 from sosmith.hdl.stage import PipelineStage
 from sosmith.model.datapath import Datapath
 
@@ -71,7 +71,7 @@ class Core(wiring.Component):
             codes = [getattr(component, f"o{k}") for k in range(len(stage.graph.outputs))]
         m.d.comb += [
             buffer.i_valid.eq(valid),
-            buffer.i_data.eq(_extended(codes[0], self.datapath.output.bytes * 8)),
+            buffer.i_data.eq(extended(codes[0], self.datapath.output.bytes * 8)),
             self.m_axis_tvalid.eq(buffer.o_valid),
             self.m_axis_tdata.eq(buffer.o_data),
             buffer.o_ready.eq(self.m_axis_tready),
@@ -80,11 +80,3 @@ class Core(wiring.Component):
 
     def _code(self, offset: int, bits: int) -> Value:
         return self.s_axis_tdata[offset : offset + bits]
-
-
-def _extended(code: Value, bits: int) -> Value:
-    """Extend `code` to `bits` bits by its sign."""
-    if len(code) >= bits:
-        return code
-    top = code[-1] if code.shape().signed else 0
-    return Cat(code, *([top] * (bits - len(code))))

@@ -110,6 +110,19 @@ class Program:
     words: int
     accumulator_bits: int
 
+    @property
+    def serial_cycles(self) -> int:
+        """Clocks of all instructions where a multiplication takes one for each bit of its second factor, at most."""
+        return sum(map(self._serial_cycles, self.instructions))
+
+    def _serial_cycles(self, instruction: Instruction) -> int:
+        if instruction.do is Do.PRODUCT:
+            return self.digit_bits + 1
+        if instruction.do is not Do.MULTIPLY:
+            return 1
+        value = instruction.constant
+        return value.bit_length() if value > 0 else (-value - 1).bit_length() + 1
+
     def reset(self) -> list[int]:
         """Words of a channel after reset."""
         return [int(address == ONE) for address in range(self.words)]

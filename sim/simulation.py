@@ -171,7 +171,7 @@ def _evidence(
         wall_seconds=wall_seconds,
         cycles_per_second=result.cycles_per_second,
         realization=quantized.realization if quantized.sections else "none",
-        architecture=design.architecture,
+        architecture=design.architecture.name,
         why=" ".join(f"{reason}." for reason in design.reasons.values()),
         formats=[
             Format(
