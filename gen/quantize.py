@@ -18,7 +18,7 @@ from typing import Any, cast
 import numpy as np
 import numpy.typing as npt
 
-from sosmith.gen.cost import area_of, cost_of_graphs
+from sosmith.gen.cost import area_of, cost_of, cost_of_graphs
 from sosmith.gen.design import Filter
 from sosmith.gen.effective import effective_sections
 from sosmith.gen.linear_model import linear_model, linear_models
@@ -131,6 +131,8 @@ class Plan:
         The search that words come from; None without a filter.
     start : Choice or None
         Words that keep to `share`; None where double precision found none.
+    made : Quantized or None
+        The proven design itself, of a realization that there are no estimates for.
     """
 
     name: str
@@ -145,6 +147,7 @@ class Plan:
     entries: tuple[_Entry, ...]
     search: Search | None
     start: Choice | None
+    made: Quantized | None = None
 
     @property
     def allowed(self) -> Fraction:
@@ -154,6 +157,8 @@ class Plan:
     @cached_property
     def area(self) -> float:
         """Estimated area, infinite where there is no estimate."""
+        if self.made is not None:
+            return cost_of(self.made.datapath).area
         if self.search is None or self.start is None:
             return math.inf
         last, _ = _output_stage(self.search.output(self.start), self.output)
@@ -196,7 +201,8 @@ def plan(
     Raises
     ------
     ShortfallError
-        If the calibration cannot keep to its share of `max_error`, or a section cannot be built.
+        If the calibration cannot keep to its share of `max_error`, a section cannot be built, or the filter cannot be
+        realized so.
     """
     scaled = polynomial is not None or _needs_scaling(inputs[0], output)
     parts = scaled + 2 * (ideal is not None)
@@ -211,9 +217,7 @@ def plan(
         signal = Signal(-exponent, inputs[0].lowest, inputs[0].highest)
         entries = (_Entry(stages=(), signal=signal, error=Fraction(0)),)
     search, start = None, None
-    if ideal is not None and not REALIZATIONS[realization].cascade:
-        _parts(ideal, realization)  # refused here if it cannot be realized so
-    elif ideal is not None:
+    if ideal is not None and REALIZATIONS[realization].cascade:
         ideal = _ordered(ideal, realization)
         search = Search(
             ideal.rows,
@@ -221,7 +225,7 @@ def plan(
             [Entry(e.signal, float(e.error * gain), sum(area_of(stage.graph) for stage in e.stages)) for e in entries],
         )
         start = search.start(float(share), _MOST_BITS)
-    return Plan(
+    planned = Plan(
         name=name,
         inputs=inputs,
         output=output,
@@ -235,6 +239,9 @@ def plan(
         search=search,
         start=start,
     )
+    if ideal is None or search is not None:
+        return planned
+    return replace(planned, made=_equally_shared(planned, ideal))
 
 
 def quantize(
@@ -272,6 +279,8 @@ def prove(planned: Plan) -> Quantized:
     ShortfallError
         If no formats within the limits keep to the error allowed.
     """
+    if planned.made is not None:
+        return planned.made
     ideal, search, start = planned.ideal, planned.search, planned.start
     if ideal is None:
         return _assembled(planned, planned.entries[0], (), None)
@@ -295,6 +304,7 @@ def prove(planned: Plan) -> Quantized:
 def _equally_shared(planned: Plan, ideal: Filter) -> Quantized:
     """Give every part of the budget the same share, by exact figures."""
     entry, realization, share = planned.entries[0], planned.realization, planned.share
+    _parts(ideal, realization)  # refused here, not for want of bits, if it cannot be realized so
     bits = _coefficient_bits(ideal, realization, entry.signal, share)
     fracs = _fraction_bits(ideal, realization, bits, share)
     while True:

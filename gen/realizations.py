@@ -11,6 +11,7 @@ from typing import Any, Protocol
 
 from sosmith.gen.coefficients import Rounding
 from sosmith.gen.direct_form_design import direct_form
+from sosmith.gen.lattice_design import Part, lattice_parts, lattice_stage
 from sosmith.gen.state_space_design import StateDesign, minimum_noise, normal, state_space
 from sosmith.gen.transposed_design import transposed_form
 from sosmith.model.datapath import Stage
@@ -149,6 +150,18 @@ def _state_space(
     return build
 
 
+def _lattice(part: Part, words: SectionFormat, name: str) -> Section:
+    return lattice_stage(
+        part,
+        name=name,
+        rounding=words.rounding,
+        entries=((words.x_frac, words.x_low, words.x_high), *words.beside),
+        fracs=words.fracs,
+        ranges=words.ranges,
+        wide=(-WIDE, WIDE),
+    )
+
+
 REALIZATIONS: dict[str, Realization] = {
     realization.name: realization
     for realization in (
@@ -168,6 +181,13 @@ REALIZATIONS: dict[str, Realization] = {
             name="normal",
             title="normal form with truncated magnitudes, free of limit cycles",
             build=_state_space(normal, truncating=True),
+        ),
+        Realization(
+            name="lattice_wdf",
+            title="lattice wave digital filter, free of limit cycles",
+            build=_lattice,
+            parts=lattice_parts,
+            cascade=False,
         ),
     )
 }
