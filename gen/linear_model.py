@@ -114,16 +114,20 @@ def linear_models(graph: Graph) -> tuple[LinearModel, ...]:
     for node in graph.nodes:
         if node.op in {Op.MULTIPLY, Op.CLAMP}:
             raise ValueError(f"graph must be linear, not {node.op.value}")
-    models = tuple(_model(*cone(graph, output)) for output in graph.outputs)
+    bounds = [index for index, node in enumerate(graph.nodes) if node.op is Op.BOUND]
+    # Beside a single output, a state that does not reach it has its range proven too.
+    beside = bounds if len(graph.outputs) == 1 else []
+    models = tuple(_model(*cone(graph, output, beside)) for output in graph.outputs)
     seen = {index for model in models for index in model.bounds}
-    for index, node in enumerate(graph.nodes):
-        if node.op is Op.BOUND and index not in seen:
+    for index in bounds:
+        if index not in seen:
+            node = graph.nodes[index]
             raise ValueError(f"outputs must depend on every range that is stated, not leave out {node.name or index}")
     return models
 
 
-def cone(graph: Graph, output: int) -> tuple[Graph, tuple[int, ...], tuple[int, ...]]:
-    """Cut out what leads to one node of `graph`.
+def cone(graph: Graph, output: int, beside: Sequence[int] = ()) -> tuple[Graph, tuple[int, ...], tuple[int, ...]]:
+    """Cut out what leads to one node of `graph`, and to those `beside` it.
 
     Returns
     -------
@@ -134,7 +138,7 @@ def cone(graph: Graph, output: int) -> tuple[Graph, tuple[int, ...], tuple[int, 
     entries : tuple of int
         For each of its inputs the position among those of the whole.
     """
-    reached, pending = {output}, [output]
+    reached, pending = {output, *beside}, [output, *beside]
     while pending:
         new = set(graph.nodes[pending.pop()].operands) - reached
         reached |= new
