@@ -217,7 +217,7 @@ def order_table() -> str:
 
 def document() -> dict[str, str]:
     """Texts of the document and its plot, by path from the root."""
-    curves = {name: noise_curve(name) for name in REALIZATIONS}
+    curves = {name: noise_curve(name) for name, realization in REALIZATIONS.items() if realization.cascade}
     sections = "\n\n".join(f"## {name}\n\n{table(name)}" for name in SPECIFICATIONS)
     text = f"""# Numerics of the realizations, side by side
 

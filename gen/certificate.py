@@ -23,9 +23,16 @@ from sosmith.gen.certificate_file import (
     StageEntry,
     on_grid,
 )
-from sosmith.gen.linear_model import LinearModel, linear_model
+from sosmith.gen.linear_model import linear_models
 from sosmith.gen.peak_gain import Drive, Horizon, Response, horizon, impulse
-from sosmith.gen.proof import TransferFunction
+from sosmith.gen.proof import (
+    StageModel,
+    TransferFunction,
+    cascade_horizon,
+    error_drives,
+    made_response,
+    through,
+)
 from sosmith.gen.quantize import Quantized, ideal_sections
 from sosmith.model.datapath import Stage
 from sosmith.model.graph import Node
@@ -93,7 +100,7 @@ def _claims(quantized: Quantized, ideal: Sequence[TransferFunction]) -> ClaimsEn
     gain: Fraction | None = None
     sections: tuple[GainEntry, ...] = ()
     if quantized.sections:
-        models = [linear_model(section.graph) for section in quantized.sections]
+        models = [linear_models(section.graph) for section in quantized.sections]
         entry = quantized.sections[0].graph
         node = entry.nodes[entry.inputs[0]]
         unit = Fraction(2) ** -node.frac
@@ -115,32 +122,27 @@ class _Closer:
     gain: Fraction
 
 
-def _closer(models: Sequence[LinearModel], ideal: Sequence[TransferFunction], low: Fraction, high: Fraction) -> _Closer:
-    at = _finer(horizon([[model.denominator for model in models], [denominator for _, denominator in ideal]]))
-    made = impulse(at)
-    errors: list[Drive] = []
-    for model in models:
-        own = impulse(at).all_pole(model.denominator)
-        errors = [Drive(_through(d.response, model), d.low, d.high) for d in errors]
-        errors += [Drive(own.taps(s.numerators[model.output]), s.low, s.high) for s in model.sources[1:]]
-        made = _through(made, model)
-    exact = impulse(at)
-    for numerator, denominator in ideal:
-        exact = exact.all_pole(denominator).taps(numerator)
+def _closer(stages: Sequence[StageModel], ideal: Sequence[TransferFunction], low: Fraction, high: Fraction) -> _Closer:
+    at = _finer(cascade_horizon(stages, ideal))
+    exact = through(ideal, at)
     return _Closer(
-        rounding=on_grid(_magnitude(errors)),
-        coefficients=on_grid(_magnitude([Drive(made.minus(exact), low, high)])),
+        rounding=on_grid(_magnitude(error_drives(stages, at))),
+        coefficients=on_grid(_magnitude([Drive(made_response(stages, at).minus(exact), low, high)])),
         gain=_gain(exact),
     )
 
 
-def _through(response: Response, model: LinearModel) -> Response:
-    return response.all_pole(model.denominator).taps(model.transfer)
-
-
-def _gains(name: str, model: LinearModel) -> GainEntry:
-    recursion = impulse(_finer(horizon([[model.denominator]]))).all_pole(model.denominator)
-    return GainEntry(section=name, peak_gain=_gain(recursion.taps(model.transfer)), recursion_gain=_gain(recursion))
+def _gains(name: str, stage: StageModel) -> GainEntry:
+    """Gains of a stage: the largest of its outputs', and that of the recursions of all its outputs in a row."""
+    at = _finer(horizon([[model.denominator for model in stage]]))
+    largest = Fraction(0)
+    recursion = impulse(at)
+    for model in stage:
+        own = impulse(at).all_pole(model.denominator)
+        drives = [Drive(own.taps(transfer), Fraction(-1), Fraction(1)) for transfer in model.transfers]
+        largest = max(largest, _magnitude(drives))
+        recursion = recursion.all_pole(model.denominator)
+    return GainEntry(section=name, peak_gain=on_grid(largest), recursion_gain=_gain(recursion))
 
 
 def _gain(response: Response) -> Fraction:

@@ -13,7 +13,7 @@ without effect. Three things are told of a section's dataflow graph.
   states overflow, the same D excludes overflow oscillations (Mills, Mullis and Roberts 1978). D and its proof are in
   rationals.
 
-Small sections can also be searched exhaustively.
+A section with several outputs is told of output by output. Small sections can also be searched exhaustively.
 """
 
 from __future__ import annotations
@@ -25,14 +25,28 @@ from functools import lru_cache
 from itertools import product
 from math import prod
 
-from sosmith.gen.linear_model import LinearModel, linear_model, state_matrix
+from sosmith.gen.linear_model import LinearModel, cone, linear_model, state_matrix
 from sosmith.gen.peak_gain import Drive, extent, horizon, impulse
+from sosmith.model.datapath import Stage
 from sosmith.model.graph import Graph, Op, value
 
 Matrix = Sequence[Sequence[Fraction]]
 
 _MOST_STARTS = 1 << 20
 _SMALLEST_SHARE = 400  # of the weight of one state in a triangular matrix, as a power of two
+
+
+def recursions(section: Stage) -> dict[str, Graph]:
+    """Recursions of a section by name, each with one input and one output.
+
+    They are the section itself, or where it has several inputs or outputs, what leads to each output that depends on a
+    state.
+    """
+    graph = section.graph
+    if len(graph.inputs) == len(graph.outputs) == 1:
+        return {section.name: graph}
+    parts = {f"{section.name} {graph.nodes[output].name}": cone(graph, output)[0] for output in graph.outputs}
+    return {name: part for name, part in parts.items() if part.delays}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,7 +64,7 @@ class LimitCycles:
         Diagonal D of the certificate, one entry per state in the loop; None if there is none.
     none : bool
         Whether it is proven that the section comes to rest without input: there is a certificate, and no other
-        quantizer in the loop than truncation of the states' magnitudes.
+        quantizer in the loop than truncation of magnitudes, of the states or on the only way to one.
     """
 
     largest: Fraction
@@ -161,23 +175,37 @@ def lyapunov_diagonal(matrix: Matrix) -> tuple[Fraction, ...] | None:
 
 def _only_truncates_states(graph: Graph) -> bool:
     delays = graph.delays
-    return all(_is_truncated_sum(graph, graph.nodes[delays[k]].operands[0]) for k in loop_states(graph))
+    return all(_never_grows(graph, graph.nodes[delays[k]].operands[0]) for k in loop_states(graph))
 
 
-def _is_truncated_sum(graph: Graph, index: int) -> bool:
-    """Whether a node is the truncation of exact operations on delays and inputs, or those themselves."""
-    while graph.nodes[index].op is Op.BOUND:
-        index = graph.nodes[index].operands[0]
+def _never_grows(graph: Graph, index: int) -> bool:
+    """Whether a node's quantizers can only make it smaller in magnitude than the states make it without them.
+
+    It is a sum of multiples of states, or a multiple of just one value that is truncated in turn, and is truncated
+    itself or not quantized.
+    """
+    index = _unbounded(graph, index)
     if graph.nodes[index].op is Op.TRUNCATE:
         index = graph.nodes[index].operands[0]
-    pending = [index]
+    pending, states, truncated = [index], 0, set[int]()
     while pending:
-        node = graph.nodes[pending.pop()]
-        if node.op in {Op.FLOOR, Op.FRACTION, Op.TRUNCATE} or (node.op is Op.CONSTANT and node.parameter):
+        current = pending.pop()
+        node = graph.nodes[current]
+        if node.op in {Op.FLOOR, Op.FRACTION} or (node.op is Op.CONSTANT and node.parameter):
             return False
-        if node.op is not Op.DELAY:
+        if node.op is Op.TRUNCATE:
+            truncated.add(current)
+        elif node.op is Op.DELAY:
+            states += 1
+        else:
             pending += node.operands
-    return True
+    return not truncated or (not states and len(truncated) == 1 and _never_grows(graph, truncated.pop()))
+
+
+def _unbounded(graph: Graph, index: int) -> int:
+    while graph.nodes[index].op is Op.BOUND:
+        index = graph.nodes[index].operands[0]
+    return index
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,7 +9,7 @@ in ``w = z**-1`` with rational coefficients.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
 
@@ -44,34 +44,52 @@ class Source:
 
 @dataclass(frozen=True)
 class LinearModel:
-    """A single-input, single-output stage: one denominator, and a numerator for every source and node.
+    """What leads to one output of a stage: one denominator, and a numerator for every source and node.
 
     Attributes
     ----------
     denominator : Polynomial
-        Constant term 1.
+        Constant term 1; of the states that this output depends on.
     output : int
         Index of the output node.
+    entries : tuple of int
+        Which of the stage's inputs it depends on, as positions among them.
     bounds : tuple of int
-        Indices of the BOUND nodes, whose ranges are to be proven.
+        Indices of the BOUND nodes that it depends on, whose ranges are to be proven.
     sources : tuple of Source
-        The input first.
+        The inputs first, as in `entries`.
     """
 
     denominator: Polynomial
     output: int
+    entries: tuple[int, ...]
     bounds: tuple[int, ...]
     sources: tuple[Source, ...]
 
     @property
+    def transfers(self) -> tuple[Polynomial, ...]:
+        """Numerators from the inputs to the output."""
+        return tuple(source.numerators[self.output] for source in self.sources[: len(self.entries)])
+
+    @property
     def transfer(self) -> Polynomial:
-        """Numerator from the input to the output."""
-        return self.sources[0].numerators[self.output]
+        """Numerator from the one input to the output."""
+        (numerator,) = self.transfers
+        return numerator
+
+    @property
+    def own(self) -> tuple[Source, ...]:
+        """All sources but the inputs."""
+        return self.sources[len(self.entries) :]
+
+    @property
+    def quantizers(self) -> tuple[Source, ...]:
+        """The sources that are errors of a quantizer."""
+        return tuple(source for source in self.own if source.kept is not None)
 
 
-@lru_cache(maxsize=256)
 def linear_model(graph: Graph) -> LinearModel:
-    """Extract the model of `graph`.
+    """Extract the model of a graph with one input and one output.
 
     Raises
     ------
@@ -80,9 +98,65 @@ def linear_model(graph: Graph) -> LinearModel:
     """
     if len(graph.inputs) != 1 or len(graph.outputs) != 1:
         raise ValueError(f"graph must have one input and one output, not {len(graph.inputs)}, {len(graph.outputs)}")
+    (model,) = linear_models(graph)
+    return model
+
+
+@lru_cache(maxsize=256)
+def linear_models(graph: Graph) -> tuple[LinearModel, ...]:
+    """Extract the models of all outputs of `graph`, each of what leads to that output alone.
+
+    Raises
+    ------
+    ValueError
+        If the graph multiplies two variables or clamps, or states a range of what no output depends on.
+    """
     for node in graph.nodes:
         if node.op in {Op.MULTIPLY, Op.CLAMP}:
             raise ValueError(f"graph must be linear, not {node.op.value}")
+    bounds = [index for index, node in enumerate(graph.nodes) if node.op is Op.BOUND]
+    # Beside a single output, a state that does not reach it has its range proven too.
+    beside = bounds if len(graph.outputs) == 1 else []
+    models = tuple(_model(*cone(graph, output, beside)) for output in graph.outputs)
+    seen = {index for model in models for index in model.bounds}
+    for index in bounds:
+        if index not in seen:
+            node = graph.nodes[index]
+            raise ValueError(f"outputs must depend on every range that is stated, not leave out {node.name or index}")
+    return models
+
+
+def cone(graph: Graph, output: int, beside: Sequence[int] = ()) -> tuple[Graph, tuple[int, ...], tuple[int, ...]]:
+    """Cut out what leads to one node of `graph`, and to those `beside` it.
+
+    Returns
+    -------
+    graph : Graph
+        With all its inputs among those of the whole, and the one output.
+    indices : tuple of int
+        For each of its nodes the index in the whole.
+    entries : tuple of int
+        For each of its inputs the position among those of the whole.
+    """
+    reached, pending = {output, *beside}, [output, *beside]
+    while pending:
+        new = set(graph.nodes[pending.pop()].operands) - reached
+        reached |= new
+        pending += new
+    indices = tuple(sorted(reached))
+    place = {index: k for k, index in enumerate(indices)}
+    nodes = (graph.nodes[index] for index in indices)
+    entries = tuple(k for k, index in enumerate(graph.inputs) if index in reached)
+    part = Graph(
+        tuple(replace(node, operands=tuple(place[i] for i in node.operands)) for node in nodes),
+        tuple(place[graph.inputs[k]] for k in entries),
+        (place[output],),
+    )
+    return part, indices, entries
+
+
+def _model(graph: Graph, indices: Sequence[int], entries: tuple[int, ...]) -> LinearModel:
+    """Model of `graph`, which has one output; `indices` and `entries` tell its nodes and inputs in the whole."""
     (output,) = graph.outputs
     bounds = tuple(i for i, node in enumerate(graph.nodes) if node.op is Op.BOUND)
     denominator = _denominator(state_matrix(graph))
@@ -91,11 +165,11 @@ def linear_model(graph: Graph) -> LinearModel:
     for key in _source_keys(graph):
         # A numerator's degree is at most the number of states and the longest delay of an error together.
         responses = _impulse_responses(graph, key, watched, 2 * len(graph.delays) + 1)
-        numerators = {i: _trim(_product(responses[i], denominator, len(responses[i]))) for i in watched}
+        numerators = {indices[i]: _trim(_product(responses[i], denominator, len(responses[i]))) for i in watched}
         low, high = _range(graph, key)
         kept = key[2] if key[0] in {"error", "truncation"} else None
         sources.append(Source(_name(graph, key), low, high, kept, numerators))
-    return LinearModel(denominator, output, bounds, tuple(sources))
+    return LinearModel(denominator, indices[output], entries, tuple(indices[i] for i in bounds), tuple(sources))
 
 
 _Key = tuple[str, int, int]
@@ -104,7 +178,7 @@ kept."""
 
 
 def _source_keys(graph: Graph) -> list[_Key]:
-    keys: dict[_Key, None] = {("input", graph.inputs[0], 0): None}
+    keys: dict[_Key, None] = {("input", index, 0): None for index in graph.inputs}
     for index, node in enumerate(graph.nodes):
         if node.op is Op.CONSTANT and node.parameter:
             keys[("constant", index, 0)] = None

@@ -7,12 +7,12 @@ from typing import Any
 import sosmith
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.cost import cost_of
-from sosmith.gen.limit_cycles import limit_cycles
+from sosmith.gen.limit_cycles import limit_cycles, recursions
 from sosmith.gen.linear_model import linear_model
 from sosmith.hdl.axi_stream import fields, width
 from sosmith.model.datapath import Datapath, Stage
 from sosmith.model.direct_form import DirectForm1
-from sosmith.model.graph import Op
+from sosmith.model.graph import Graph, Op
 from sosmith.model.horner import HornerStep
 from sosmith.model.port import Port
 
@@ -32,25 +32,37 @@ def manifest(design: CoreDesign) -> dict[str, Any]:
         "realization": quantized.realization if quantized.sections else None,
         "architecture": design.architecture.name,
         "reasons": design.reasons,
-        "sections": [section_entry(section) for section in quantized.sections],
+        "sections": [entry for section in quantized.sections for entry in section_entries(section)],
         "formats": [row for stage in datapath.stages for row in _formats(stage, datapath)],
         "error_bound": float(quantized.bound * output.lsb),
         "error_bound_proven": True,
         "error_parts": {part: float(value * output.lsb) for part, value in quantized.budget.items()},
         "error_unit": datapath.output.unit,
-        "limit_cycles": [_limit_cycles(section, output) for section in quantized.sections],
+        "limit_cycles": [
+            _limit_cycles(name, graph, output)
+            for section in quantized.sections
+            for name, graph in recursions(section).items()
+        ],
         "aliasing": _aliasing(design),
         "cost": _cost(design),
     }
 
 
-def section_entry(section: Stage) -> dict[str, Any]:
-    """One section: its integer coefficients, and the transfer function they make exactly."""
-    nodes = section.graph.nodes
-    model = linear_model(section.graph)
+def section_entries(section: Stage) -> list[dict[str, Any]]:
+    """Integer coefficients of a section, and the transfer function they make exactly: one entry for each recursion."""
+    entries = [_section_entry(name, graph) for name, graph in recursions(section).items()]
+    if isinstance(section, DirectForm1):
+        for entry in entries:
+            entry["error_feedback"] = list(section.feedback)
+    return entries
+
+
+def _section_entry(name: str, graph: Graph) -> dict[str, Any]:
+    nodes = graph.nodes
+    model = linear_model(graph)
     b, a = ([*map(float, values), 0.0, 0.0][:3] for values in (model.transfer, model.denominator))
-    entry = {
-        "name": section.name,
+    return {
+        "name": name,
         "coefficients": [
             {
                 "name": node.name.removeprefix("product_"),
@@ -61,22 +73,19 @@ def section_entry(section: Stage) -> dict[str, Any]:
             for node in nodes
             if node.op is Op.SCALE
         ],
-        "states": {nodes[i].name: nodes[i].format for i in section.graph.delays},
+        "states": {nodes[i].name: nodes[i].format for i in graph.delays},
         "b": b,
         "a": a,
-        "input": nodes[section.graph.inputs[0]].format,
-        "output": nodes[section.graph.outputs[0]].format,
+        "input": nodes[graph.inputs[0]].format,
+        "output": nodes[graph.outputs[0]].format,
     }
-    if isinstance(section, DirectForm1):
-        entry["error_feedback"] = list(section.feedback)
-    return entry
 
 
-def _limit_cycles(section: Stage, output: Port) -> dict[str, Any]:
+def _limit_cycles(name: str, graph: Graph, output: Port) -> dict[str, Any]:
     """Tell what a section's quantizers can sustain at its own output, in the output's unit."""
-    found = limit_cycles(section.graph)
+    found = limit_cycles(graph)
     return {
-        "section": section.name,
+        "section": name,
         "largest": float(found.largest * output.lsb),
         "dead_band": float(found.dead_band * output.lsb),
         "none": found.none,

@@ -123,6 +123,15 @@ class Response:
             _rounded_up(self.magnitude * growth),
         )
 
+    def plus(self, other: Response) -> Response:
+        """Sum of two responses over the same horizon."""
+        return Response(
+            self.horizon,
+            [a + b for a, b in zip(self.samples, other.samples, strict=True)],
+            self.rounding + other.rounding,
+            self.magnitude + other.magnitude,
+        )
+
     def minus(self, other: Response) -> Response:
         """Difference of two responses over the same horizon."""
         return Response(

@@ -13,25 +13,27 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
 
-from sosmith.gen.cost import area_of, cost_of_graphs
+from sosmith.gen.cost import area_of, cost_of, cost_of_graphs
 from sosmith.gen.design import Filter
-from sosmith.gen.linear_model import LinearModel, linear_model
+from sosmith.gen.effective import effective_sections
+from sosmith.gen.linear_model import linear_model, linear_models
 from sosmith.gen.ordering import best_order
 from sosmith.gen.peak_gain import Extent
 from sosmith.gen.proof import (
     CascadeProof,
+    StageModel,
     TransferFunction,
     coefficient_extent,
     ideal_gain,
     prove_cascade,
     rounding_gains,
 )
-from sosmith.gen.realizations import BEST_KEPT, REALIZATIONS, Section, SectionFormat
+from sosmith.gen.realizations import BEST_KEPT, REALIZATIONS, WIDE, Section, SectionFormat
 from sosmith.gen.word_lengths import FEWEST_BITS, Choice, Entry, Search, Signal, Words
 from sosmith.model.datapath import Datapath, Stage
 from sosmith.model.errors import ShortfallError
@@ -99,11 +101,7 @@ class Quantized:
     @cached_property
     def quantized_sos(self) -> Array:
         """The transfer functions that the integer coefficients make, shape (sections, 6)."""
-        rows = []
-        for section in self.sections:
-            model = linear_model(section.graph)
-            rows.append([*_padded(model.transfer), *_padded(model.denominator)])
-        return np.array(rows, dtype=np.float64).reshape(-1, 6)
+        return effective_sections([linear_models(section.graph) for section in self.sections])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -133,6 +131,8 @@ class Plan:
         The search that words come from; None without a filter.
     start : Choice or None
         Words that keep to `share`; None where double precision found none.
+    made : Quantized or None
+        The proven design itself, of a realization that there are no estimates for.
     """
 
     name: str
@@ -147,6 +147,7 @@ class Plan:
     entries: tuple[_Entry, ...]
     search: Search | None
     start: Choice | None
+    made: Quantized | None = None
 
     @property
     def allowed(self) -> Fraction:
@@ -156,6 +157,8 @@ class Plan:
     @cached_property
     def area(self) -> float:
         """Estimated area, infinite where there is no estimate."""
+        if self.made is not None:
+            return cost_of(self.made.datapath).area
         if self.search is None or self.start is None:
             return math.inf
         last, _ = _output_stage(self.search.output(self.start), self.output)
@@ -198,7 +201,8 @@ def plan(
     Raises
     ------
     ShortfallError
-        If the calibration cannot keep to its share of `max_error`, or a section cannot be built.
+        If the calibration cannot keep to its share of `max_error`, a section cannot be built, or the filter cannot be
+        realized so.
     """
     scaled = polynomial is not None or _needs_scaling(inputs[0], output)
     parts = scaled + 2 * (ideal is not None)
@@ -213,7 +217,7 @@ def plan(
         signal = Signal(-exponent, inputs[0].lowest, inputs[0].highest)
         entries = (_Entry(stages=(), signal=signal, error=Fraction(0)),)
     search, start = None, None
-    if ideal is not None:
+    if ideal is not None and REALIZATIONS[realization].cascade:
         ideal = _ordered(ideal, realization)
         search = Search(
             ideal.rows,
@@ -221,7 +225,7 @@ def plan(
             [Entry(e.signal, float(e.error * gain), sum(area_of(stage.graph) for stage in e.stages)) for e in entries],
         )
         start = search.start(float(share), _MOST_BITS)
-    return Plan(
+    planned = Plan(
         name=name,
         inputs=inputs,
         output=output,
@@ -235,6 +239,9 @@ def plan(
         search=search,
         start=start,
     )
+    if ideal is None or search is not None:
+        return planned
+    return replace(planned, made=_equally_shared(planned, ideal))
 
 
 def quantize(
@@ -272,6 +279,8 @@ def prove(planned: Plan) -> Quantized:
     ShortfallError
         If no formats within the limits keep to the error allowed.
     """
+    if planned.made is not None:
+        return planned.made
     ideal, search, start = planned.ideal, planned.search, planned.start
     if ideal is None:
         return _assembled(planned, planned.entries[0], (), None)
@@ -295,6 +304,7 @@ def prove(planned: Plan) -> Quantized:
 def _equally_shared(planned: Plan, ideal: Filter) -> Quantized:
     """Give every part of the budget the same share, by exact figures."""
     entry, realization, share = planned.entries[0], planned.realization, planned.share
+    _parts(ideal, realization)  # refused here, not for want of bits, if it cannot be realized so
     bits = _coefficient_bits(ideal, realization, entry.signal, share)
     fracs = _fraction_bits(ideal, realization, bits, share)
     while True:
@@ -363,7 +373,7 @@ def _gain(ideal: Filter) -> Fraction:
 def _ordered(ideal: Filter, realization: str) -> Filter:
     """Return the filter with its sections in the order that rounds best, if that is worth a change."""
     try:
-        models = _wide(ideal, realization, _BITS_TO_ORDER)
+        models = [model for (model,) in _wide(ideal, realization, _BITS_TO_ORDER)]
     except ShortfallError:
         return ideal  # not to be built with so few bits
     return replace(ideal, rows=tuple(ideal.rows[k] for k in best_order(models)))
@@ -387,15 +397,15 @@ def _needs_scaling(port: Port, output: Port) -> bool:
     return port.zero != 0 or _exponent_of_two(port.lsb / output.lsb) is None
 
 
-def _padded(values: Sequence[Fraction]) -> list[float]:
-    if len(values) > 3:
-        raise ValueError(f"section must have an order of at most 2, not {len(values) - 1}")
-    return [*(float(value) for value in values), 0.0, 0.0][:3]
+def _formats_of(stage: Stage) -> list[Signal]:
+    nodes = stage.graph.nodes
+    return [Signal(nodes[i].frac, nodes[i].low, nodes[i].high) for i in stage.graph.outputs]
 
 
 def _format_of(stage: Stage) -> Signal:
-    node = stage.graph.nodes[stage.graph.outputs[0]]
-    return Signal(node.frac, node.low, node.high)
+    """Format of the only output."""
+    (form,) = _formats_of(stage)
+    return form
 
 
 def _filter_budget(proof: CascadeProof) -> dict[str, Fraction]:
@@ -506,15 +516,14 @@ def _values(signal: Signal) -> tuple[Fraction, Fraction]:
     return signal.low * unit, signal.high * unit
 
 
-def _wide(ideal: Filter, realization: str, bits: int) -> list[LinearModel]:
-    """Models of the sections with every quantizer at whole output LSBs and no ranges."""
-    build = REALIZATIONS[realization].build
-    words = SectionFormat(coefficient_bits=bits)
-    return [linear_model(build(row, words, f"section{k}").graph) for k, row in enumerate(ideal.rows)]
+def _parts(ideal: Filter, realization: str) -> Sequence[Any]:
+    return REALIZATIONS[realization].parts(ideal.rows)
 
 
-def _quantizers(model: LinearModel) -> list[str]:
-    return [source.name for source in model.sources if source.kept is not None]
+def _wide(ideal: Filter, realization: str, bits: int) -> list[StageModel]:
+    """Models of the stages with every quantizer at whole output LSBs and no ranges."""
+    formats = [SectionFormat(coefficient_bits=bits)] * len(_parts(ideal, realization))
+    return [linear_models(stage.graph) for stage in _stages(ideal, realization, formats, Signal(0, -WIDE, WIDE))]
 
 
 def _coefficient_bits(ideal: Filter, realization: str, signal: Signal, share: Fraction) -> int:
@@ -581,43 +590,38 @@ def _total(fracs: Sequence[Mapping[str, int]], unit: Sequence[Mapping[str, Fract
 
 
 def _rounded(ideal: Filter, realization: str, bits: int, fracs: Sequence[Mapping[str, int]]) -> list[Words]:
-    """Words of sections whose coefficients all have the same significant bits."""
-    build = REALIZATIONS[realization].build
-    words = SectionFormat(coefficient_bits=bits)
-    return [
-        Words(build(row, words, f"section{k}").coefficients, kept)
-        for k, (row, kept) in enumerate(zip(ideal.rows, fracs, strict=True))
-    ]
+    """Words of stages whose coefficients all have the same significant bits."""
+    formats = [SectionFormat(coefficient_bits=bits)] * len(fracs)
+    stages = _stages(ideal, realization, formats, Signal(0, -WIDE, WIDE))
+    return [Words(stage.coefficients, kept) for stage, kept in zip(stages, fracs, strict=True)]
 
 
 def _cascade(
     ideal: Filter, realization: str, words: Sequence[Words], signal: Signal
 ) -> tuple[list[Section], CascadeProof]:
-    """Build the sections, prove their ranges, and build them again with these."""
+    """Build the stages, prove their ranges, and build them again with these."""
+    formats = [
+        SectionFormat(coefficient_bits=w.coefficient_bits, coefficients=w.coefficients, fracs=w.fracs) for w in words
+    ]
+    stages = _stages(ideal, realization, formats, Signal(signal.frac, -WIDE, WIDE))
+    proof = prove_cascade([linear_models(s.graph) for s in stages], ideal_sections(ideal), *_values(signal))
+    for k, (stage, extents) in enumerate(zip(stages, proof.nodes, strict=True)):
+        nodes = stage.graph.nodes
+        ranges = {nodes[i].name: _codes(extent, nodes[i].frac) for i, extent in extents.items()}
+        formats[k] = replace(formats[k], ranges=ranges)
+    return _stages(ideal, realization, formats, signal), proof
+
+
+def _stages(ideal: Filter, realization: str, formats: Sequence[SectionFormat], signal: Signal) -> list[Section]:
+    """Build the stages one after the other, each for what the one before hands on."""
     build = REALIZATIONS[realization].build
-    entry = signal
+    first, beside = signal, list[Signal]()
     stages: list[Section] = []
-    for k, row in enumerate(ideal.rows):
-        stages.append(build(row, _section_format(words[k], x_frac=entry.frac), f"section{k}"))
-        entry = _format_of(stages[-1])
-    proof = prove_cascade([linear_model(s.graph) for s in stages], ideal_sections(ideal), *_values(signal))
-    entry = signal
-    result = []
-    for k, row in enumerate(ideal.rows):
-        nodes = stages[k].graph.nodes
-        ranges = {nodes[i].name: _codes(extent, nodes[i].frac) for i, extent in proof.nodes[k].items()}
-        formats = replace(
-            _section_format(words[k], x_frac=entry.frac), ranges=ranges, x_low=entry.low, x_high=entry.high
-        )
-        result.append(build(row, formats, f"section{k}"))
-        entry = _format_of(result[-1])
-    return result, proof
-
-
-def _section_format(words: Words, *, x_frac: int) -> SectionFormat:
-    return SectionFormat(
-        coefficient_bits=words.coefficient_bits, coefficients=words.coefficients, fracs=words.fracs, x_frac=x_frac
-    )
+    for k, (part, form) in enumerate(zip(_parts(ideal, realization), formats, strict=True)):
+        entry = replace(form, x_frac=first.frac, x_low=first.low, x_high=first.high, beside=tuple(beside))
+        stages.append(build(part, entry, f"section{k}"))
+        first, *beside = _formats_of(stages[-1])
+    return stages
 
 
 def _codes(extent: Extent, frac: int) -> tuple[int, int]:

@@ -7,10 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Any, Protocol
 
 from sosmith.gen.coefficients import Rounding
 from sosmith.gen.direct_form_design import direct_form
+from sosmith.gen.lattice_design import Part, lattice_parts, lattice_stage
 from sosmith.gen.state_space_design import StateDesign, minimum_noise, normal, state_space
 from sosmith.gen.transposed_design import transposed_form
 from sosmith.model.datapath import Stage
@@ -44,6 +45,8 @@ class SectionFormat:
     ----------
     x_frac, x_low, x_high : int
         Fraction bits and range of the input's code.
+    beside : tuple of tuple of int
+        The same of each further input.
     coefficient_bits : int
         Significant bits of each coefficient.
     coefficients : mapping of str to tuple of int
@@ -58,6 +61,7 @@ class SectionFormat:
     x_frac: int = 0
     x_low: int = -WIDE
     x_high: int = WIDE
+    beside: tuple[tuple[int, int, int], ...] = ()
     coefficient_bits: int
     coefficients: Mapping[str, tuple[int, int]] = field(default_factory=dict)
     fracs: Mapping[str, int] = field(default_factory=dict)
@@ -71,7 +75,7 @@ class SectionFormat:
 
 @dataclass(frozen=True, kw_only=True)
 class Realization:
-    """One way to compute a section.
+    """One way to compute a filter.
 
     Attributes
     ----------
@@ -80,12 +84,19 @@ class Realization:
     title : str
         A few words for people.
     build : callable
-        Makes the stage of a row in given formats, with a given name.
+        Makes the stage of a part in given formats, with a given name.
+    parts : callable
+        Takes the ideal sections apart into what the stages are made from; the rows themselves for a cascade. Raises
+        ShortfallError where the filter cannot be realized so.
+    cascade : bool
+        Whether every stage is one of the ideal sections, in whichever order.
     """
 
     name: str
     title: str
-    build: Callable[[Row, SectionFormat, str], Section]
+    build: Callable[[Any, SectionFormat, str], Section]
+    parts: Callable[[Sequence[Row]], Sequence[Any]] = tuple
+    cascade: bool = True
 
 
 def _direct_form(order: int) -> Callable[[Row, SectionFormat, str], Section]:
@@ -139,6 +150,18 @@ def _state_space(
     return build
 
 
+def _lattice(part: Part, words: SectionFormat, name: str) -> Section:
+    return lattice_stage(
+        part,
+        name=name,
+        rounding=words.rounding,
+        entries=((words.x_frac, words.x_low, words.x_high), *words.beside),
+        fracs=words.fracs,
+        ranges=words.ranges,
+        wide=(-WIDE, WIDE),
+    )
+
+
 REALIZATIONS: dict[str, Realization] = {
     realization.name: realization
     for realization in (
@@ -159,9 +182,19 @@ REALIZATIONS: dict[str, Realization] = {
             title="normal form with truncated magnitudes, free of limit cycles",
             build=_state_space(normal, truncating=True),
         ),
+        Realization(
+            name="lattice_wdf",
+            title="lattice wave digital filter, free of limit cycles",
+            build=_lattice,
+            parts=lattice_parts,
+            cascade=False,
+        ),
     )
 }
 """All realizations, by name, in the order in which lists show them."""
+
+CASCADES = tuple(name for name, realization in REALIZATIONS.items() if realization.cascade)
+"""Names of the realizations whose stages are the ideal sections."""
 
 ERROR_FEEDBACK = ("df1", "df1_ef1", "df1_ef2")
 """Realizations that differ in nothing but the error feedback, and so can be set side by side at the same widths."""

@@ -36,10 +36,8 @@ from sosmith.gen.specification_values import (
 FAMILIES = ("butterworth", "chebyshev1", "chebyshev2", "elliptic", "bessel")
 KINDS = ("lowpass", "highpass", "bandpass", "bandstop")
 METHODS = ("bilinear", "impulse_invariant")
-REALIZATIONS = ("auto", "df1", "df1_ef1", "df1_ef2", "df2t", "delta", "state_space", "normal")
+REALIZATIONS = ("auto", "df1", "df1_ef1", "df1_ef2", "df2t", "delta", "state_space", "normal", "lattice_wdf")
 ARCHITECTURES = ("auto", "parallel", "folded", "serial")
-
-REALIZATIONS_LATER = ("lattice_wdf",)
 
 MAX_ORDER = 20
 """Highest order of the digital filter, ten second-order sections."""
@@ -124,7 +122,7 @@ class FilterTable(Table):
 class HardwareTable(Table):
     """``[hardware]``: how the datapath is built."""
 
-    realization: Annotated[str, PlainValidator(choice(REALIZATIONS, REALIZATIONS_LATER))] = "auto"
+    realization: Annotated[str, PlainValidator(choice(REALIZATIONS))] = "auto"
     architecture: Annotated[str, PlainValidator(choice(ARCHITECTURES))] = "auto"
     clock: Annotated[Fraction, PlainValidator(positive("Hz"))] = Fraction(12_000_000)
     reload: Annotated[bool, PlainValidator(flag_not_yet)] = False

@@ -172,12 +172,12 @@ def file_name(value: object) -> str:
     return value
 
 
-def choice(now: Sequence[str], later: Sequence[str] = ()) -> Callable[[object], str]:
-    """Return the reader of one of the names `now`; those of `later` are answered with "not yet available"."""
+def choice(names: Sequence[str]) -> Callable[[object], str]:
+    """Return the reader of one of `names`."""
 
     def read(value: object) -> str:
-        if not isinstance(value, str) or value not in now:
-            raise UnfitError(one_of(now), literal(value), later=value in later)
+        if not isinstance(value, str) or value not in names:
+            raise UnfitError(one_of(names), literal(value))
         return value
 
     return read

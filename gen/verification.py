@@ -2,7 +2,8 @@
 
 1. Every graph is well formed, and every range in it follows from the ranges before (`sosmith.gen.verified_graph`).
 2. The polynomial and the output rounding are followed symbolically (`sosmith.gen.verified_polynomial`).
-3. The sections' transfer functions are found as determinants, and stability by the Schur-Cohn recursion.
+3. The sections' transfer functions are found as determinants, and stability by the Schur-Cohn recursion. A section
+   may have several inputs and outputs; the cascade has one of each.
 4. Responses are enclosed by approximate inverses (`sosmith.gen.l1_response`). Every range that a BOUND states must
    hold what they allow, and every figure claimed must be what they give, to the last unit of the certificate's grid.
 
@@ -193,10 +194,10 @@ def _check_plain_input(certificate: Certificate) -> None:
 
 @dataclass(frozen=True)
 class _Drive:
-    """A source on its way: where it entered, the numerator that it has gathered, and its range."""
+    """A source on its way: where it entered, the numerator that it has gathered on each wire, and its range."""
 
     first: int
-    numerator: fmpq_poly
+    numerators: Sequence[fmpq_poly]
     low: Fraction
     high: Fraction
 
@@ -211,16 +212,16 @@ class _Cascade:
     def __init__(self, certificate: Certificate, sections: Sequence[StageEntry], progress: Progress) -> None:
         self._models = [Transfer(section) for section in sections]
         self._inverses: dict[tuple[int, int], Inverse] = {}
+        shape = (len(inputs_of(sections[0])), len(sections[-1].outputs))
+        require(shape == (1, 1), f"the sections must have one input and one output in all, not {shape}")
         for section, model in zip(sections, self._models, strict=True):
-            shape = (len(inputs_of(section)), len(section.outputs))
-            require(shape == (1, 1), f"{section.name} must have one input and one output, not {shape}")
             require(is_stable(model.denominator), f"{section.name} must have its poles inside the unit circle")
         self._compare_gains(certificate)
-        entry = next(iter(self._models[0].sources.values()))
+        entry = self._models[0].sources[self._models[0].inputs[0]]
         exact = self._ideal(certificate)
         self.peak_gain = on_grid(exact.gain)
         self.ranges = 0
-        drives = [_Drive(0, fmpq_poly([1]), *entry)]
+        drives = [_Drive(0, [fmpq_poly([1])], *entry)]
         for index, model in enumerate(self._models):
             progress("sections", index, len(self._models))
             arrived = drives
@@ -228,7 +229,7 @@ class _Cascade:
                 if entry_of.op is Op.BOUND:
                     self._check_bound(index, node, arrived)
                     self.ranges += 1
-            drives = self._at(index, model.stage.outputs[0], arrived)
+            drives = self._at(index, model.stage.outputs, arrived)
         progress("sections", len(self._models), len(self._models))
         made, *errors = (self._driven(drive, len(self._models) - 1) for drive in drives)
         self.rounding = on_grid(_magnitude(errors))
@@ -244,8 +245,11 @@ class _Cascade:
         )
         for index, (claim, model) in enumerate(zip(claims, self._models, strict=True)):
             over = self._inverse(index, index)
-            through = model.numerator(next(iter(model.sources)), model.stage.outputs[0])
-            _compare(f"peak_gain of {claim.section}", claim.peak_gain, on_grid(response(through, over).gain))
+            gains = [
+                sum((response(model.numerator(entry, output), over).gain for entry in model.inputs), Fraction(0))
+                for output in model.stage.outputs
+            ]
+            _compare(f"peak_gain of {claim.section}", claim.peak_gain, on_grid(max(gains)))
             recursion = response(fmpq_poly([1]), over)
             _compare(f"recursion_gain of {claim.section}", claim.recursion_gain, on_grid(recursion.gain))
 
@@ -270,30 +274,41 @@ class _Cascade:
             self._inverses[first, last] = inverse(denominator)
         return self._inverses[first, last]
 
-    def _at(self, index: int, node: int, arrived: Sequence[_Drive]) -> list[_Drive]:
-        """All that drives a node: what arrives at its section, then the section's own sources."""
+    def _at(self, index: int, nodes: Sequence[int], arrived: Sequence[_Drive]) -> list[_Drive]:
+        """All that drives some nodes: what arrives at their section, then the section's own sources."""
         model = self._models[index]
-        (entry, _), *own = model.sources.items()
-        through = model.numerator(entry, node)
+        ways = [[model.numerator(entry, node) for entry in model.inputs] for node in nodes]
         return [
-            *(_Drive(d.first, d.numerator * through, d.low, d.high) for d in arrived),
-            *(_Drive(index, model.numerator(source, node), *ends) for source, ends in own),
+            *(_Drive(d.first, [_combined(d.numerators, way) for way in ways], d.low, d.high) for d in arrived),
+            *(
+                _Drive(index, [model.numerator(source, node) for node in nodes], *ends)
+                for source, ends in model.sources.items()
+                if source not in model.inputs
+            ),
         ]
 
     def _driven(self, drive: _Drive, last: int) -> _Driven:
-        return response(drive.numerator, self._inverse(drive.first, last)), drive.low, drive.high
+        (numerator,) = drive.numerators
+        return response(numerator, self._inverse(drive.first, last)), drive.low, drive.high
 
     def _check_bound(self, index: int, node: int, arrived: Sequence[_Drive]) -> None:
         stage = self._models[index].stage
         bound = stage.nodes[node]
         of = stage.nodes[bound.operands[0]]
         low, high = (
-            end * 2**bound.frac for end in _extremes([self._driven(d, index) for d in self._at(index, node, arrived)])
+            end * 2**bound.frac for end in _extremes([self._driven(d, index) for d in self._at(index, [node], arrived)])
         )
         require(
             bound.low <= max(low, of.low) and min(high, of.high) <= bound.high,
             f"{label(stage, node)} must hold {float(low):.17g}..{float(high):.17g}, not {bound.low}..{bound.high}",
         )
+
+
+def _combined(numerators: Sequence[fmpq_poly], way: Sequence[fmpq_poly]) -> fmpq_poly:
+    total = fmpq_poly([0])
+    for numerator, through in zip(numerators, way, strict=True):
+        total += numerator * through
+    return total
 
 
 def _difference(a: Response, b: Response) -> Response:

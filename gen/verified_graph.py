@@ -216,6 +216,11 @@ class Transfer:
                         found[key[0]] = (Fraction(0) if op is Op.FLOOR else -most), most
         return dict(sorted(found.items(), key=lambda item: item[0][0] is not Op.INPUT))
 
+    @property
+    def inputs(self) -> list[Source]:
+        """The stage's inputs as sources, in order."""
+        return [(Op.INPUT, index, 0) for index in inputs_of(self.stage)]
+
     @cached_property
     def denominator(self) -> fmpq_poly:
         """``det(I - w A)`` for the state matrix A."""

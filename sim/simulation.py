@@ -15,7 +15,7 @@ from sosmith.gen.core import CoreDesign
 from sosmith.gen.error_paths import error_responses
 from sosmith.gen.evidence import Alternative, Evidence, FilterFacts, Format
 from sosmith.gen.generate import generate
-from sosmith.gen.manifest import manifest, section_entry
+from sosmith.gen.manifest import manifest, section_entries
 from sosmith.gen.quantize import Quantized, with_realization
 from sosmith.gen.realizations import ERROR_FEEDBACK
 from sosmith.model.errors import SpecificationError
@@ -183,7 +183,9 @@ def _evidence(
             )
             for row in facts["formats"]
         ],
-        sections=[section_entry(s) | {"realization": quantized.realization} for s in quantized.sections],
+        sections=[
+            entry | {"realization": quantized.realization} for s in quantized.sections for entry in section_entries(s)
+        ],
         limit_cycles=facts["limit_cycles"],
         filter=_filter_facts(quantized),
         alternatives=_alternatives(quantized, trace, golden),

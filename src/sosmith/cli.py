@@ -32,8 +32,8 @@ from sosmith.gen.comparison import compare as compare_reports
 from sosmith.gen.core import CORES, CoreDesign, design_core
 from sosmith.gen.cost import cost_of
 from sosmith.gen.generate import generate as generate_files
-from sosmith.gen.limit_cycles import limit_cycles
-from sosmith.gen.manifest import manifest, section_entry
+from sosmith.gen.limit_cycles import limit_cycles, recursions
+from sosmith.gen.manifest import manifest, section_entries
 from sosmith.gen.realizations import ERROR_FEEDBACK, REALIZATIONS
 from sosmith.gen.report import write_report
 from sosmith.gen.specification import example, load
@@ -527,11 +527,10 @@ def _print_design(made: CoreDesign, *, brief: bool = False) -> None:
     if brief:
         return
     sections = _table("Sections", ["section", "coefficients", "input", "states", "output"])
-    for section in quantized.sections:
-        entry = section_entry(section)
+    for entry in (entry for section in quantized.sections for entry in section_entries(section)):
         coefficients = "\n".join(f"{c['name']} = {c['integer']} * 2^-{c['frac']}" for c in entry["coefficients"])
         states = "\n".join(f"{name} {form}" for name, form in entry["states"].items())
-        sections.add_row(section.name, coefficients, entry["input"], states, entry["output"])
+        sections.add_row(entry["name"], coefficients, entry["input"], states, entry["output"])
     if quantized.sections:
         console.print(sections)
         _print_limit_cycles(console, made)
@@ -542,11 +541,11 @@ def _print_limit_cycles(console: Console, made: CoreDesign) -> None:
         "Limit cycles: what a section's own rounding can sustain, in output LSB",
         ["section", "without input", "dead band", "Lyapunov weights"],
     )
-    for section in made.quantized.sections:
-        found = limit_cycles(section.graph)
+    for name, graph in (pair for section in made.quantized.sections for pair in recursions(section).items()):
+        found = limit_cycles(graph)
         largest = "none, proven" if found.none else f"up to {float(found.largest):.4g}"
         weights = ", ".join(f"{float(weight):.4g}" for weight in found.lyapunov or ())
-        table.add_row(section.name, largest, f"{float(found.dead_band):.4g}", weights or "none exist")
+        table.add_row(name, largest, f"{float(found.dead_band):.4g}", weights or "none exist")
     console.print(table)
 
 

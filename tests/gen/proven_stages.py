@@ -29,7 +29,7 @@ def proven_cascade(builds: Sequence[Build], port: Port) -> list[Stage]:
         entry = (format_of(stages[-1])[0], -WIDE, WIDE)
     models = [linear_model(stage.graph) for stage in stages]
     exact = [(model.transfer, model.denominator) for model in models]
-    proof = prove_cascade(models, exact, Fraction(port.lowest), Fraction(port.highest))
+    proof = prove_cascade([(model,) for model in models], exact, Fraction(port.lowest), Fraction(port.highest))
     entry = (0, port.lowest, port.highest)
     result = []
     for build, stage, extents in zip(builds, stages, proof.nodes, strict=True):

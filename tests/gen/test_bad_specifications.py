@@ -757,17 +757,11 @@ BAD = [
         "output.unit must be a printable text of at most 16 characters, not 'millimetres of clearance'",
     ),
     (
-        "lattice realization",
-        CLOCK,
-        CLOCK + '\nrealization = "lattice_wdf"',
-        "not yet available: hardware.realization must be one of auto, df1, df1_ef1, df1_ef2, df2t, delta, "
-        "state_space, normal, not 'lattice_wdf'",
-    ),
-    (
         "unknown realization",
         CLOCK,
         CLOCK + '\nrealization = "df3"',
-        "hardware.realization must be one of auto, df1, df1_ef1, df1_ef2, df2t, delta, state_space, normal, not 'df3'",
+        "hardware.realization must be one of auto, df1, df1_ef1, df1_ef2, df2t, delta, state_space, normal, "
+        "lattice_wdf, not 'df3'",
     ),
     (
         "folded architecture",

@@ -19,11 +19,11 @@ from sosmith.model.errors import ShortfallError
 
 @pytest.fixture(name="spec")
 def low_pass() -> Specification:
-    """Second-order low-pass at a thousandth of the sample rate, 8 bits out."""
+    """Third-order low-pass at a thousandth of the sample rate, 8 bits out."""
     audio = load(EXAMPLES / "audio_lowpass.toml")
     output = replace(audio.output, bits=8, lsb=audio.output.lsb * 256)
     return replace(
-        audio, output=output, max_error=output.lsb, filter=replace(audio.filter, order=2, cutoff=(Fraction(48),))
+        audio, output=output, max_error=output.lsb, filter=replace(audio.filter, order=3, cutoff=(Fraction(48),))
     )
 
 

@@ -1,9 +1,11 @@
 """Many designs in every realization: never beyond the proven bound, and not far below it either.
 
 Each design meets random full-scale samples, the sign-matched worst case of the whole filter and of every
-quantizer's error path, and steps. `./run test --slow` runs all designs; the fast tests take every eighth.
+quantizer's error path, and steps. `./run test --slow` runs all designs; the fast tests take every eighth. What no
+lattice can be made of is refused in that realization; it gets further designs of its own.
 """
 
+import re
 from collections.abc import Iterator
 from fractions import Fraction
 from functools import lru_cache
@@ -15,8 +17,9 @@ import pytest
 from sosmith.gen.design import decay_length, design, impulse_response
 from sosmith.gen.error_paths import error_responses
 from sosmith.gen.quantize import Quantized, quantize
-from sosmith.gen.realizations import REALIZATIONS
+from sosmith.gen.realizations import CASCADES, REALIZATIONS
 from sosmith.gen.specification import FilterSpec
+from sosmith.model.errors import ShortfallError
 from sosmith.model.golden import calibrated, filtered
 from sosmith.model.port import Port
 from sosmith.model.scenarios import sign_matched
@@ -33,6 +36,11 @@ class Design(NamedTuple):
     cutoff: tuple[float, ...]
     bits_in: int
     bits_out: int
+
+
+def is_lattice(wanted: Design) -> bool:
+    """Whether a filter is half the sum or difference of two allpass filters: known from the theory."""
+    return wanted.order % 2 == 1 and wanted.family != "bessel"
 
 
 DESIGNS = [
@@ -80,16 +88,51 @@ DESIGNS = [
     Design("bessel", "lowpass", 3, (0.15,), 12, 12),
 ]
 
+LATTICES = [
+    Design("butterworth", "lowpass", 1, (0.45,), 16, 16),
+    Design("butterworth", "lowpass", 3, (0.001,), 16, 16),
+    Design("butterworth", "lowpass", 3, (0.45,), 12, 12),
+    Design("butterworth", "lowpass", 7, (0.05,), 16, 24),
+    Design("butterworth", "lowpass", 9, (0.02,), 16, 16),
+    Design("butterworth", "lowpass", 9, (0.3,), 24, 20),
+    Design("butterworth", "highpass", 7, (0.05,), 12, 14),
+    Design("butterworth", "highpass", 9, (0.4,), 16, 16),
+    Design("butterworth", "bandpass", 1, (0.2, 0.21), 20, 20),
+    Design("butterworth", "bandpass", 3, (0.02, 0.04), 16, 16),
+    Design("butterworth", "bandpass", 5, (0.1, 0.15), 12, 12),
+    Design("butterworth", "bandstop", 1, (0.01, 0.011), 16, 16),
+    Design("butterworth", "bandstop", 3, (0.05, 0.3), 14, 16),
+    Design("chebyshev1", "lowpass", 1, (0.01,), 10, 10),
+    Design("chebyshev1", "lowpass", 3, (0.002,), 16, 16),
+    Design("chebyshev1", "lowpass", 9, (0.2,), 16, 16),
+    Design("chebyshev1", "highpass", 5, (0.01,), 16, 16),
+    Design("chebyshev1", "bandpass", 3, (0.2, 0.3), 8, 12),
+    Design("chebyshev2", "lowpass", 3, (0.45,), 16, 16),
+    Design("chebyshev2", "lowpass", 7, (0.05,), 18, 18),
+    Design("chebyshev2", "highpass", 5, (0.3,), 24, 24),
+    Design("chebyshev2", "bandpass", 3, (0.05, 0.1), 16, 14),
+    Design("elliptic", "lowpass", 5, (0.1,), 8, 8),
+    Design("elliptic", "lowpass", 9, (0.25,), 16, 16),
+    Design("elliptic", "highpass", 3, (0.001,), 14, 14),
+    Design("elliptic", "highpass", 7, (0.2,), 16, 12),
+    Design("elliptic", "bandpass", 3, (0.15, 0.2), 16, 16),
+]
+"""Designs for the realization that takes only some of the others."""
+
 ALL = [
     pytest.param(number, realization, marks=[] if number % 8 == 4 else [pytest.mark.slow])
     for number in range(len(DESIGNS))
     for realization in REALIZATIONS
+    if realization in CASCADES or is_lattice(DESIGNS[number])
+] + [
+    pytest.param(number, "lattice_wdf", marks=[] if number % 8 == 4 else [pytest.mark.slow])
+    for number in range(len(DESIGNS), len(DESIGNS) + len(LATTICES))
 ]
 
 
 @lru_cache(maxsize=8)
 def quantized_design(number: int, realization: str) -> Quantized:
-    wanted = DESIGNS[number]
+    wanted = [*DESIGNS, *LATTICES][number]
     ideal = design(
         FilterSpec(
             family=wanted.family,
@@ -143,6 +186,23 @@ def test_no_input_exceeds_the_certificate(number: int, realization: str) -> None
         assert error <= float(quantized.bound) + 1e-6
         worst = max(worst, float(error))
     assert worst >= 0.4 * float(quantized.bound)
+
+
+REFUSED = (
+    "lattice_wdf must have a filter that is half the sum or difference of two allpass filters, as Butterworth, "
+    "Chebyshev and elliptic filters of odd order are, or a band-pass or band-stop made from one: choose an odd order "
+    "or another realization"
+)
+
+
+@pytest.mark.parametrize("number", [k for k, wanted in enumerate(DESIGNS) if not is_lattice(wanted)])
+def test_what_is_no_lattice_is_refused(number: int) -> None:
+    with pytest.raises(ShortfallError, match=f"^{re.escape(REFUSED)}$"):
+        quantized_design(number, "lattice_wdf")
+
+
+def test_there_are_enough_lattices() -> None:
+    assert sum(map(is_lattice, [*DESIGNS, *LATTICES])) >= 40
 
 
 @pytest.mark.parametrize(("number", "realization"), ALL)
