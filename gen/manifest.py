@@ -15,6 +15,7 @@ from sosmith.model.direct_form import DirectForm1
 from sosmith.model.graph import Graph, Op
 from sosmith.model.horner import HornerStep
 from sosmith.model.port import Port
+from sosmith.model.program import Program
 
 
 def manifest(design: CoreDesign) -> dict[str, Any]:
@@ -31,6 +32,7 @@ def manifest(design: CoreDesign) -> dict[str, Any]:
         "cycles_per_sample": design.architecture.cycles_per_sample,
         "realization": quantized.realization if quantized.sections else None,
         "architecture": design.architecture.name,
+        "schedule": _schedule(design.architecture.program),
         "reasons": design.reasons,
         "sections": [entry for section in quantized.sections for entry in section_entries(section)],
         "formats": [row for stage in datapath.stages for row in _formats(stage, datapath)],
@@ -90,6 +92,22 @@ def _limit_cycles(name: str, graph: Graph, output: Port) -> dict[str, Any]:
         "dead_band": float(found.dead_band * output.lsb),
         "none": found.none,
         "lyapunov": None if found.lyapunov is None else [str(weight) for weight in found.lyapunov],
+    }
+
+
+def _schedule(program: Program | None) -> dict[str, Any] | None:
+    """Program of the folded and serial architectures; each instruction as what it does, address and constant."""
+    if program is None:
+        return None
+    return {
+        "digit_bits": program.digit_bits,
+        "accumulator_bits": program.accumulator_bits,
+        "words": program.words,
+        "places": [
+            {"name": p.name, "address": p.address, "digits": p.digits, "frac": p.frac, "state": p.is_state}
+            for p in sorted(program.places, key=lambda place: place.address)
+        ],
+        "instructions": [[do.value, address, constant] for do, address, constant in program.instructions],
     }
 
 

@@ -15,7 +15,7 @@ from amaranth.lib.wiring import In, Out
 from sosmith.hdl.axi_stream import extended, fields, width
 from sosmith.model.datapath import Datapath
 from sosmith.model.graph import Op
-from sosmith.model.program import ONE, Do, Instruction, Place, Program
+from sosmith.model.program import Do, Instruction, Place, Program
 
 _AROUND = 4
 """Clocks from the edge that accepts a sample to the one that can hand it on, beside those of the instructions."""
@@ -182,7 +182,7 @@ class FoldedCore(wiring.Component):
         stores = take | last.does(Do.STORE) | last.does(Do.FINISH)
         m.d.comb += [
             write.addr.eq(Mux(clearing, counter, last.address)),
-            write.data.eq(Mux(clearing, counter == ONE, digit)),
+            write.data.eq(Mux(clearing, ~counter.any(), digit)),  # the word ONE is the first
             write.en.eq(clearing | (advance & last.valid & stores)),
         ]
 
@@ -210,7 +210,7 @@ class FoldedCore(wiring.Component):
         shifted = Signal(signed(2 * word), reset_less=True)
         left = Signal(signed(word), reset_less=True)
         done = Signal()
-        m.d.comb += [done.eq((left == -1) | (left[1:] == 0)), advance.eq(~multiplies | done)]
+        m.d.comb += [done.eq((left == -1) | ~left[1:].any()), advance.eq(~multiplies | done)]
         with m.If(multiplies & left[0]):
             m.d.sync += total.eq(Mux(left == -1, total - shifted, total + shifted))
         m.d.sync += [shifted.eq(shifted << 1), left.eq(left >> 1)]

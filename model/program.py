@@ -123,6 +123,25 @@ class Program:
         value = instruction.constant
         return value.bit_length() if value > 0 else (-value - 1).bit_length() + 1
 
+    @property
+    def schedule(self) -> list[tuple[str, int, int]]:
+        """What is done one after the other: name, first instruction and number of instructions of each value."""
+        names = {place.address + place.digits - 1: place.name for place in self.places}
+        found: list[tuple[str, int, int]] = []
+        start = 0
+        for index, (do, address, _) in enumerate(self.instructions):
+            following = self.instructions[index + 1].do if index + 1 < len(self.instructions) else None
+            if do is Do.FINISH:
+                found.append((names[address], start, index + 1 - start))
+            elif do is Do.TAKE and following is not Do.TAKE:
+                found.append(("input", start, index + 1 - start))
+            elif following is None:
+                found.append(("output", start, index + 1 - start))
+            else:
+                continue
+            start = index + 1
+        return found
+
     def reset(self) -> list[int]:
         """Words of a channel after reset."""
         return [int(address == ONE) for address in range(self.words)]
@@ -321,7 +340,7 @@ class _Folding:
             elif node.op is Op.SCALE and self._nodes[first].op in {Op.ADD, Op.SUBTRACT, Op.SHIFT, Op.BOUND}:
                 stored.add(first)
             elif node.op in {Op.CLAMP, Op.TRUNCATE}:
-                raise FoldingError(f"the datapath must not {node.op.value} inside to be folded: {node.name!r}")
+                raise FoldingError(f"the datapath must not {node.op.value} inside to be folded")
         for index, node in enumerate(self._nodes):
             if node.op is Op.FLOOR and node.operands[0] not in stored:
                 stored.add(index)
@@ -404,7 +423,7 @@ class _Folding:
             return self._product(*node.operands)
         if node.op in {Op.FLOOR, Op.FRACTION}:
             return self._cut(node)
-        raise FoldingError(f"the datapath must not {node.op.value} inside to be folded: {node.name!r}")
+        raise FoldingError(f"the datapath must not {node.op.value} inside to be folded")
 
     def _product(self, a: int, b: int) -> tuple[_Sum, Fraction]:
         for one, other in ((a, b), (b, a)):

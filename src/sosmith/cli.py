@@ -40,6 +40,7 @@ from sosmith.gen.specification import example, load
 from sosmith.gen.verification import RejectedError, Verdict
 from sosmith.gen.verification import verify as verify_certificate
 from sosmith.model.errors import SosmithError, SpecificationError, ToolError
+from sosmith.model.program import Program
 from sosmith.model.scenarios import SCENARIOS
 from sosmith.model.text_files import write_files
 from sosmith.sim.simulation import bench_of, default_scenario, simulate, trace_for
@@ -534,6 +535,21 @@ def _print_design(made: CoreDesign, *, brief: bool = False) -> None:
     if quantized.sections:
         console.print(sections)
         _print_limit_cycles(console, made)
+    _print_schedule(console, made.architecture.program)
+
+
+def _print_schedule(console: Console, program: Program | None) -> None:
+    if program is None:
+        return
+    table = _table(
+        f"Schedule: {len(program.instructions)} instructions, {program.words} words of {program.digit_bits + 1} bits, "
+        f"accumulator of {program.accumulator_bits} bits",
+        ["from", "clocks", "value", "words"],
+    )
+    places = {place.name: f"{place.address}..{place.address + place.digits - 1}" for place in program.places}
+    for name, start, count in program.schedule:
+        table.add_row(str(start), str(count), escape(name), places.get(name, ""))
+    console.print(table)
 
 
 def _print_limit_cycles(console: Console, made: CoreDesign) -> None:

@@ -3,22 +3,28 @@
 import re
 import subprocess
 import sysconfig
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
 import pytest
 from tests.gen.designs import ALL, example_design
 
+from sosmith.gen.architecture import Architecture
 from sosmith.gen.core import CORES
 from sosmith.gen.generate import generate
 from sosmith.model.errors import ShortfallError
 from sosmith.sim.lint import WAIVERS, icarus_check, lint
 
 VARIANTS = [
-    (example, core, realization)
+    (example, core, realization, "parallel")
     for example in ALL
     for core in (["filter"] if example.startswith("audio") else CORES)
     for realization in ("df1", "df1_ef2")
+] + [
+    (example, "filter" if example.startswith("audio") else "instrument", "df1_ef2", architecture)
+    for example in ALL
+    for architecture in ("folded", "serial")
 ]
 
 
@@ -28,9 +34,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @cache
-def emitted(folder: Path, example: str, core: str, realization: str) -> Path:
+def emitted(folder: Path, example: str, core: str, realization: str, architecture: str) -> Path:
     made = example_design(example, core=core, realization=realization)
-    return generate(made, folder / f"{made.spec.name}_{core}_{realization}")[0]
+    made = replace(made, architecture=Architecture(architecture, made.datapath))
+    return generate(made, folder / f"{made.spec.name}_{core}_{realization}_{architecture}")[0]
 
 
 @pytest.fixture(params=VARIANTS, ids="-".join)
@@ -40,7 +47,7 @@ def core(request: pytest.FixtureRequest, folder: Path) -> Path:
 
 @pytest.fixture
 def locomotive(folder: Path) -> Path:
-    return emitted(folder, "flange_wear_locomotive.toml", "instrument", "df1_ef2")
+    return emitted(folder, "flange_wear_locomotive.toml", "instrument", "df1_ef2", "parallel")
 
 
 def yosys(sv: Path) -> subprocess.CompletedProcess[str]:

@@ -1,0 +1,72 @@
+"""Architectures: what is taken and why, and what cannot keep up."""
+
+import json
+import re
+from dataclasses import replace
+from fractions import Fraction
+
+import pytest
+from tests.gen.designs import EXAMPLES, example_design
+
+from sosmith.gen.architecture import chosen
+from sosmith.gen.core import CoreDesign, design_core
+from sosmith.gen.manifest import manifest
+from sosmith.gen.specification import load
+from sosmith.model.errors import ShortfallError
+
+
+def design_in(architecture: str, example: str = "audio_lowpass.toml", *, clock: int = 100_000_000) -> CoreDesign:
+    spec = load(EXAMPLES / example)
+    hardware = replace(spec.hardware, architecture=architecture, clock=Fraction(clock), realization="df1_ef2")
+    return design_core(replace(spec, hardware=hardware))
+
+
+@pytest.mark.parametrize("architecture", ["folded", "serial"])
+def test_one_unit_for_all(architecture: str) -> None:
+    made = design_in(architecture)
+    program = made.architecture.program
+    assert program is not None
+    clocks = len(program.instructions) if architecture == "folded" else program.serial_cycles
+    tree = manifest(made)
+    assert tree["architecture"] == architecture
+    assert tree["latency_cycles"] == clocks + 4
+    assert tree["cycles_per_sample"] == clocks + 5
+    assert made.reasons["architecture"] == (
+        f"{architecture}: asked for in the specification; takes {clocks + 5:,} of 2,083 clocks a sample"
+    )
+    schedule = json.loads(json.dumps(tree["schedule"]))
+    assert [[i.do.value, i.address, i.constant] for i in program.instructions] == schedule["instructions"]
+    assert sum(count for _, _, count in program.schedule) == len(program.instructions)
+    assert [name for name, _, _ in program.schedule][:: len(program.schedule) - 1] == ["input", "output"]
+
+
+def test_parallel_is_what_is_taken_unless_another_is_asked_for() -> None:
+    made = example_design("audio_lowpass.toml")
+    assert made.reasons["architecture"] == "parallel: what is taken unless another is asked for"
+    assert (manifest(made)["cycles_per_sample"], manifest(made)["schedule"]) == (1, None)
+
+
+@pytest.mark.parametrize(("architecture", "clock"), [("folded", 8_000_000), ("serial", 30_000_000)])
+def test_an_architecture_that_cannot_keep_up_says_what_it_could_do(architecture: str, clock: int) -> None:
+    with pytest.raises(
+        ShortfallError,
+        match=rf"^the {architecture} architecture takes ([\d,]+) clocks a sample: at a clock of {clock:,} Hz the "
+        r"sample rate must be at most ([\d,.]+) Hz, not 48,000 Hz$",
+    ) as refusal:
+        design_in(architecture, clock=clock)
+    words = re.search(r"takes ([\d,]+) clocks.* at most ([\d,.]+) Hz", str(refusal.value))
+    assert words is not None
+    needed, most = (float(word.replace(",", "")) for word in words.groups())
+    assert most == pytest.approx(clock / needed, rel=1e-5)
+    made = design_in(architecture, clock=int(needed) * 48_000)
+    assert made.architecture.cycles_per_sample == needed
+
+
+def test_a_realization_that_cannot_be_folded_is_refused() -> None:
+    datapath = example_design("audio_lowpass.toml", realization="normal").datapath
+    with pytest.raises(
+        ShortfallError,
+        match=r"^the realization must suit the folded architecture: "
+        r"the datapath must not truncate inside to be folded$",
+    ):
+        chosen("folded", datapath, clock=Fraction(10**8), sample_rate=Fraction(48_000))
