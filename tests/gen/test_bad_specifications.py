@@ -764,16 +764,10 @@ BAD = [
         "lattice_wdf, not 'df3'",
     ),
     (
-        "folded architecture",
-        CLOCK,
-        CLOCK + '\narchitecture = "folded"',
-        "not yet available: hardware.architecture must be one of auto, parallel, not 'folded'",
-    ),
-    (
         "unknown architecture",
         CLOCK,
         CLOCK + '\narchitecture = "systolic"',
-        "hardware.architecture must be one of auto, parallel, not 'systolic'",
+        "hardware.architecture must be one of auto, parallel, folded, serial, not 'systolic'",
     ),
     (
         "reload",

@@ -46,9 +46,9 @@ def tree_of(name: str = BENCH, realization: str = "df1_ef2") -> Any:
     return json.loads(text_of(name, realization))
 
 
-def proven(quantized: Quantized) -> None:
-    """Certify a design, prove it again from the text, and compare with what it was designed on."""
-    text = certificate_text(certificate(quantized, quantized.datapath.output.lsb))
+def proven(quantized: Quantized, max_error: Fraction | None = None) -> None:
+    """Certify a design for one LSB, prove it again from the text, and compare with what it was designed on."""
+    text = certificate_text(certificate(quantized, max_error or quantized.datapath.output.lsb))
     verdict = verify(Certificate.model_validate(json.loads(text)))
     assert verdict.budget.keys() == quantized.budget.keys()
     for part, value in quantized.budget.items():
@@ -63,7 +63,8 @@ def proven(quantized: Quantized) -> None:
     "name", [name if name != LOCOMOTIVE else pytest.param(name, marks=pytest.mark.slow) for name in ALL]
 )
 def test_examples_in_every_realization(name: str, realization: str) -> None:
-    proven(example_design(name, realization=realization).quantized)
+    design = example_design(name, realization=realization)
+    proven(design.quantized, design.spec.max_error)
 
 
 def test_the_locomotive() -> None:
