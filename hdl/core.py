@@ -7,13 +7,13 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from sosmith.hdl.axi_stream import OutputBuffer, extended, fields, width
-from sosmith.hdl.stage import PipelineStage
+from sosmith.hdl.stage import PipelineStage, rank_count
 from sosmith.model.datapath import Datapath
 
 
 def latency_cycles(datapath: Datapath) -> int:
-    """Clocks from the edge that accepts a sample to the edge that can hand it on: one rank a stage, and the buffer."""
-    return len(datapath.stages) + 1
+    """Clocks from the edge that accepts a sample to the edge that can hand it on: all stages' ranks, and the buffer."""
+    return sum(rank_count(stage.graph) for stage in datapath.stages) + 1
 
 
 class Core(wiring.Component):
