@@ -9,7 +9,7 @@ from sosmith.model.datapath import Datapath
 from sosmith.model.graph import Graph, Node, Op
 
 MULTIPLIER_BITS = 18
-"""Bits of each operand of a hardware multiplier; Yosys makes a nineteenth of a few LUTs."""
+"""Bits of each operand of a hardware multiplier; Yosys adds what one bit more contributes instead of taking a block."""
 
 _LUTS_PER_ADDER_BIT, _LUTS_PER_SPLIT, _LUTS_AROUND = 0.87, 77.0, -51.0
 """Fitted by benchmarks/cost_model.py to synthesis of the examples for ECP5, to within a fifth."""
@@ -47,9 +47,15 @@ class Cost:
         return self.multiplier_blocks - len(self.multipliers)
 
     @property
+    def extra_bits(self) -> int:
+        """Adder bits for operands that have one bit more than whole blocks."""
+        return sum(_extra(a) * b + _extra(b) * a for a, b in self.multipliers)
+
+    @property
     def luts(self) -> int:
         """Estimate of the LUT4 on an ECP5, a carry cell counting as two."""
-        return round(_LUTS_PER_ADDER_BIT * self.adder_bits + _LUTS_PER_SPLIT * self.splits + _LUTS_AROUND)
+        adder_bits = self.adder_bits + self.extra_bits
+        return round(_LUTS_PER_ADDER_BIT * adder_bits + _LUTS_PER_SPLIT * self.splits + _LUTS_AROUND)
 
     @property
     def area(self) -> int:
@@ -92,6 +98,10 @@ def cost_of_graphs(graphs: Sequence[Graph]) -> Cost:
 def area_of(graph: Graph) -> int:
     """Return the part of a graph in the area of a datapath."""
     return cost_of_graphs([graph]).area - cost_of_graphs([]).area
+
+
+def _extra(bits: int) -> int:
+    return int(bits > MULTIPLIER_BITS and bits % MULTIPLIER_BITS == 1)
 
 
 def _pieces(bits: int) -> int:
