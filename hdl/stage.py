@@ -1,7 +1,8 @@
-"""One stage of a datapath in hardware: its dataflow graph as combinational logic, its state, one or two register ranks.
+"""One stage of a datapath in hardware: its dataflow graph as logic, its state, and one to three register ranks.
 
-Where a stage has a recursion, what only feeds it has a rank of its own: the sums and products of the input alone are
-registered before they enter the loop, whose delay then is all that limits the clock.
+Where a stage has a recursion, only what depends on the newest sample that it remembers has to be done within a clock.
+What depends on the input alone, and what depends on older samples, is done and registered a rank before; the delay
+of the loop proper then is all that limits the clock.
 """
 
 from __future__ import annotations
@@ -21,35 +22,70 @@ def shape_of(node: Node) -> Shape:
     return Shape(node.width, signed=node.signed)
 
 
-def rank_count(graph: Graph) -> int:
-    """Register ranks of a stage: 2 where arithmetic feeds a recursion, else 1."""
-    loop = _recursive(graph)
-    feeds = (i for i, node in enumerate(graph.nodes) if i not in loop and node.op not in _PLAIN)
-    return 2 if loop and any(feeds) else 1
-
-
 _PLAIN = {Op.INPUT, Op.CONSTANT, Op.DELAY, Op.SHIFT, Op.FLOOR, Op.FRACTION, Op.BOUND}
 """What takes no time in hardware."""
 
 
+def rank_count(graph: Graph) -> int:
+    """Register ranks of a stage, 1 to 3."""
+    return max(_ranks(graph)) + 1
+
+
+def _ranks(graph: Graph) -> list[int]:
+    """Rank of each node.
+
+    What no recursion reaches comes first. Then comes what depends on a recursion only through states that are at
+    least two samples old, so that it can be had a rank before it is needed; and last the rest of the loop.
+    """
+    loop = _recursive(graph)
+    late = _late(graph, loop)
+    ranks = [0] * len(graph.nodes)
+    for part, whole in ((loop, set(range(len(ranks)))), (late, loop)):
+        if part and any(graph.nodes[i].op not in _PLAIN for i in whole - part):
+            for i in part:
+                ranks[i] += 1
+    return ranks
+
+
 def _recursive(graph: Graph) -> set[int]:
     """Nodes that depend on a state which depends on itself."""
-    reached: list[set[int]] = []  # for each node the delays it depends on, through any number of samples
-    delays = graph.delays
-    sources = {delay: set[int]() for delay in delays}
+    sources = {delay: set[int]() for delay in graph.delays}
     while True:
-        reached = []
+        reached: list[set[int]] = []  # the delays that a node depends on, through any number of samples
         for index, node in enumerate(graph.nodes):
-            if node.op is Op.DELAY:
-                reached.append({index} | sources[index])
-            else:
-                reached.append(set().union(*(reached[i] for i in node.operands)))
-        found = {delay: reached[graph.nodes[delay].operands[0]] for delay in delays}
+            own = {index} | sources[index] if node.op is Op.DELAY else set[int]()
+            reached.append(own.union(*(reached[i] for i in node.operands if node.op is not Op.DELAY)))
+        found = {delay: reached[graph.nodes[delay].operands[0]] for delay in graph.delays}
         if found == sources:
             break
         sources = found
-    loop = {delay for delay in delays if delay in sources[delay]}
+    loop = {delay for delay in graph.delays if delay in sources[delay]}
     return {index for index, depends in enumerate(reached) if depends & loop}
+
+
+def _late(graph: Graph, loop: set[int]) -> set[int]:
+    """Nodes of the loop that depend on the newest of several samples that it remembers; all of it if it has but one."""
+    late = {i for i in graph.delays if i in loop and graph.nodes[i].operands[0] in loop and _is_followed(graph, i)}
+    if not late:
+        return loop
+    while more := {i for i in loop - late if any(_is_new(graph, i, k, late) for k in graph.nodes[i].operands)}:
+        late |= more
+    return late
+
+
+def _is_new(graph: Graph, user: int, operand: int, late: set[int]) -> bool:
+    """Whether what `user` takes from `operand` can be had in the last rank only."""
+    return operand in late and not (_is_older(graph, operand) and graph.nodes[user].op is not Op.DELAY)
+
+
+def _is_followed(graph: Graph, delay: int) -> bool:
+    return any(graph.nodes[other].operands[0] == delay for other in graph.delays)
+
+
+def _is_older(graph: Graph, index: int) -> bool:
+    """Whether a node is a delay of another delay."""
+    node = graph.nodes[index]
+    return node.op is Op.DELAY and graph.nodes[node.operands[0]].op is Op.DELAY
 
 
 class PipelineStage(wiring.Component):
@@ -87,26 +123,24 @@ class PipelineStage(wiring.Component):
         """Build the logic."""
         m = Module()
         graph = self.stage.graph
-        names = _unique_names(graph)
-        takes, valid = self._ranks(m)
-        later = _recursive(graph) if len(takes) > 1 else set[int]()
-        last = len(takes) - 1
+        names, ranks = _unique_names(graph), _ranks(graph)
+        valid, takes = self._control(m, max(ranks) + 1)
         wires: list[Value] = []
-        across: dict[int, Signal] = {}
+        passed: dict[tuple[int, int], Value] = {}
 
-        def in_last_rank(index: int) -> Value:
-            """Value of a node in the last rank: registered if it comes from the one before."""
-            if last == 0 or index in later or graph.nodes[index].op is Op.CONSTANT:
+        def at(index: int, rank: int) -> Value:
+            """Value of a node as a rank sees it that belongs to a sample at least as new."""
+            node, own = graph.nodes[index], ranks[index]
+            if own == rank or node.op is Op.CONSTANT:
                 return wires[index]
-            if index not in across:
-                across[index] = Signal(shape_of(graph.nodes[index]), name=f"{names[index]}_across", reset_less=True)
-                with m.If(takes[0]):
-                    m.d.sync += across[index].eq(wires[index])
-            return across[index]
-
-        def seen(user: int, operand: int) -> Value:
-            """Value of an operand in the rank of the node that uses it."""
-            return in_last_rank(operand) if user in later else wires[operand]
+            if own > rank:  # the loop may still be about the sample before, with all its states one sample behind
+                return Mux(valid[own], wires[node.operands[0]], wires[index])
+            if (index, rank) not in passed:
+                register = Signal(shape_of(node), name=f"{names[index]}_passed{rank}", reset_less=True)
+                passed[index, rank] = register
+                with m.If(takes[rank - 1]):
+                    m.d.sync += register.eq(at(index, rank - 1))
+            return passed[index, rank]
 
         inputs = iter([getattr(self, f"i{k}") for k in range(len(graph.inputs))])
         for index, (node, name) in enumerate(zip(graph.nodes, names, strict=True)):
@@ -114,43 +148,40 @@ class PipelineStage(wiring.Component):
                 wires.append(next(inputs))
                 continue
             if node.op is Op.SHIFT:  # the same code
-                wires.append(seen(index, node.operands[0]))
+                wires.append(at(node.operands[0], ranks[index]))
                 continue
             wire = Signal(shape_of(node), name=name)
             if node.op is not Op.DELAY:
-                m.d.comb += wire.eq(_logic(graph, node, [seen(index, i) for i in node.operands]))
+                m.d.comb += wire.eq(_logic(graph, node, [at(i, ranks[index]) for i in node.operands]))
             wires.append(wire)
         for i in graph.delays:
-            with m.If(takes[last if i in later else 0]):
-                m.d.sync += wires[i].eq(seen(i, graph.nodes[i].operands[0]))
+            with m.If(takes[ranks[i]]):
+                m.d.sync += wires[i].eq(at(graph.nodes[i].operands[0], ranks[i]))
+        last = len(takes) - 1
         with m.If(self.advance):
-            m.d.sync += self.o_valid.eq(valid)
+            m.d.sync += self.o_valid.eq(valid[last])
         for k, i in enumerate(graph.outputs):
             output = getattr(self, f"o{k}")
-            held = _held(graph, i, wires) if last == 0 or i in later else None
+            held = _held(graph, i, wires) if ranks[i] == last else None
             if held is not None:
                 m.d.comb += output.eq(held)
             else:
                 register = Signal(shape_of(graph.nodes[i]), name=f"{names[i]}_register", reset_less=True)
                 m.d.comb += output.eq(register)
                 with m.If(takes[last]):
-                    m.d.sync += register.eq(in_last_rank(i))
+                    m.d.sync += register.eq(at(i, last))
         return m
 
-    def _ranks(self, m: Module) -> tuple[list[Value], Value]:
-        """When each rank takes a sample, and whether the last one holds one to take."""
-        takes: list[Value] = []
-        valid: Value = self.i_valid
-        for rank in range(rank_count(self.stage.graph)):
-            if rank:
-                passed = Signal(name="valid_across")
-                with m.If(self.advance):
-                    m.d.sync += passed.eq(valid)
-                valid = passed
-            take = Signal(name=f"take{rank}")
-            m.d.comb += take.eq(self.advance & valid)
-            takes.append(take)
-        return takes, valid
+    def _control(self, m: Module, count: int) -> tuple[list[Value], list[Value]]:
+        """Return for each rank whether it is about a sample, and whether it takes it at this clock."""
+        valid: list[Value] = [self.i_valid]
+        for rank in range(1, count):
+            valid.append(Signal(name=f"valid{rank}"))
+            with m.If(self.advance):
+                m.d.sync += valid[rank].eq(valid[rank - 1])
+        takes: list[Value] = [Signal(name=f"take{rank}") for rank in range(count)]
+        m.d.comb += [take.eq(self.advance & ready) for take, ready in zip(takes, valid, strict=True)]
+        return valid, takes
 
 
 def _unique_names(graph: Graph) -> list[str]:
