@@ -47,6 +47,25 @@ def _ranks(graph: Graph) -> list[int]:
     return ranks
 
 
+def _known_early(graph: Graph, ranks: list[int]) -> set[int]:
+    """Find sums without a product of their rank that are added to one with a product.
+
+    They are kept apart in synthesis, which would else delay the product by adding up everything at once.
+    """
+    products: set[int] = set()
+    for index, node in enumerate(graph.nodes):
+        own = [i for i in node.operands if ranks[i] == ranks[index] and node.op is not Op.DELAY]
+        if node.op in {Op.SCALE, Op.MULTIPLY} or products & set(own):
+            products.add(index)
+    return {
+        i
+        for index, node in enumerate(graph.nodes)
+        if index in products and node.op in {Op.ADD, Op.SUBTRACT}
+        for i in node.operands
+        if i not in products and ranks[i] == ranks[index] and graph.nodes[i].op in {Op.ADD, Op.SUBTRACT}
+    }
+
+
 def _recursive(graph: Graph) -> set[int]:
     """Nodes that depend on a state which depends on itself."""
     sources = {delay: set[int]() for delay in graph.delays}
@@ -125,6 +144,7 @@ class PipelineStage(wiring.Component):
         graph = self.stage.graph
         names, ranks = _unique_names(graph), _ranks(graph)
         valid, takes = self._control(m, max(ranks) + 1)
+        apart = _known_early(graph, ranks)
         wires: list[Value] = []
         passed: dict[tuple[int, int], Value] = {}
 
@@ -150,7 +170,7 @@ class PipelineStage(wiring.Component):
             if node.op is Op.SHIFT:  # the same code
                 wires.append(at(node.operands[0], ranks[index]))
                 continue
-            wire = Signal(shape_of(node), name=name)
+            wire = Signal(shape_of(node), name=name, attrs={"keep": 1} if index in apart else {})
             if node.op is not Op.DELAY:
                 m.d.comb += wire.eq(_logic(graph, node, [at(i, ranks[index]) for i in node.operands]))
             wires.append(wire)

@@ -167,19 +167,23 @@ class DirectForm1:
         v1 = g.delay("v1", frac, self.v_low, self.v_high)
         past = [v1, g.previous(v1, "v2")] if self._order > 1 else [v1]
         taps_y = [g.floor(v, self.y_frac, f"y{i}") for i, v in enumerate(past, start=1)]
-        terms: list[tuple[int, Wire]] = []
+        # Products that need y(n-1) are known last and are added last.
+        products: list[tuple[bool, tuple[int, Wire]]] = []
+        for product in self.products:
+            taps = [*zip(product.x, taps_x, strict=False), *zip(product.y, taps_y, strict=False)]
+            operand = _operand(g, product, g.shift(g.combine(taps), -product.shift))
+            made = g.scale(operand, product.coefficient, product.frac, f"product_{product.name}")
+            products.append((product.y[0] != 0, (1, made)))
+        terms = [term for is_newest, term in products if not is_newest]
+        centre = 1 + sum(self.feedback)
+        if frac > self.y_frac and centre:
+            terms.append((1, g.constant(centre, self.y_frac + 1, "centre")))
         for v, y, m, k in zip(past, taps_y, self.integer_part, self.feedback, strict=False):
             if m == k:
                 terms.append((-m, v))
             else:
                 terms += [(-m, y), (-k, g.fraction(v, self.y_frac))]
-        for product in self.products:
-            taps = [*zip(product.x, taps_x, strict=False), *zip(product.y, taps_y, strict=False)]
-            operand = _operand(g, product, g.shift(g.combine(taps), -product.shift))
-            terms.append((1, g.scale(operand, product.coefficient, product.frac, f"product_{product.name}")))
-        centre = 1 + sum(self.feedback)
-        if frac > self.y_frac and centre:
-            terms.append((1, g.constant(centre, self.y_frac + 1, "centre")))
+        terms += [term for is_newest, term in products if is_newest]
         v = g.bound(g.floor(g.combine(terms), frac), self.v_low, self.v_high, "v")
         g.connect(v1, v)
         return g.build([g.floor(v, self.y_frac, "y")])

@@ -291,8 +291,10 @@ class GraphBuilder:
     def combine(self, terms: Iterable[tuple[int, Wire]], name: str = "") -> Wire:
         """Sum small integer multiples of wires exactly; each factor must be 0 or plus or minus a power of two."""
         total: Wire | None = None
-        # What is added comes first, so that a negation is needed only where everything is subtracted.
-        for factor, wire in sorted((term for term in terms if term[0]), key=lambda term: term[0] < 0):
+        ordered = [term for term in terms if term[0]]
+        # The first of those that are added comes first: a negation is needed only where everything is subtracted.
+        first = next((k for k, (factor, _) in enumerate(ordered) if factor > 0), 0)
+        for factor, wire in [*ordered[first : first + 1], *ordered[:first], *ordered[first + 1 :]]:
             size = abs(factor)
             if size & (size - 1):
                 raise ValueError(f"factor must be 0 or plus or minus a power of two, not {factor!r}")
