@@ -26,7 +26,7 @@ from scipy import signal
 from sosmith.gen.coefficients import lowest_terms, round_significant
 from sosmith.gen.cost import MULTIPLIER_BITS, area_of
 from sosmith.gen.design import decay_length
-from sosmith.gen.linear_model import linear_model
+from sosmith.gen.linear_model import Source, linear_model
 from sosmith.gen.realizations import REALIZATIONS, Section, SectionFormat
 from sosmith.model.errors import ShortfallError
 
@@ -154,7 +154,7 @@ class Search:
                 for e, kept in zip(self._estimates, fracs, strict=True)
             )
             choice = Choice(0, words)
-            error = self._coefficient_error(choice)
+            error = self.coefficient_error(choice)
             if error <= share and self._is_stable(choice):
                 return choice
             # An error falls by half with each bit, now and then by more: leap most of the way.
@@ -171,14 +171,14 @@ class Search:
         allowed : float
             Error of entry, coefficients and rounding together, in output LSBs.
         """
-        choice, error, area = start, self._error(start), self.area(start)
+        choice, error, area = start, self.error(start), self.area(start)
         while error <= allowed:
             best: tuple[float, Choice, float, float] | None = None
             for candidate in self._steps(choice):
                 saved = area - self.area(candidate)
                 if saved <= 0:
                     continue
-                after = self._error(candidate)
+                after = self.error(candidate)
                 if after > allowed:
                     continue
                 merit = saved / max(after - error, 1e-6 * allowed)
@@ -214,15 +214,17 @@ class Search:
                     for neighbour in {math.floor(exact), math.ceil(exact)} - {0}:
                         yield words.with_coefficient(name, lowest_terms(neighbour, frac - step))
 
-    def _error(self, choice: Choice) -> float:
+    def error(self, choice: Choice) -> float:
+        """Estimated error of entry, coefficients and rounding together, in output LSBs."""
         rounding = sum(
             estimate.gains.get(name, 0.0) * 2.0**-frac
             for estimate, words in zip(self._estimates, choice.words, strict=True)
             for name, frac in words.fracs.items()
         )
-        return self._entries[choice.entry].error + rounding + self._coefficient_error(choice)
+        return self._entries[choice.entry].error + rounding + self.coefficient_error(choice)
 
-    def _coefficient_error(self, choice: Choice) -> float:
+    def coefficient_error(self, choice: Choice) -> float:
+        """Estimated error of the coefficients in output LSBs."""
         response = np.zeros(1)
         for estimate, words in zip(self._estimates, choice.words, strict=True):
             for name, (integer, frac) in words.coefficients.items():
@@ -265,7 +267,7 @@ class Search:
         ranges = {}
         for node in self._build(self._rows[k], formats, name).graph.nodes:
             if node.name in self._estimates[k].limits:
-                low, high = self._estimates[k].limits[node.name]
+                low, high = self._estimates[k].limits_of(node.name, words.fracs)
                 ranges[node.name] = math.floor(low * 2.0**node.frac), math.ceil(high * 2.0**node.frac)
         section = self._build(self._rows[k], replace(formats, ranges=ranges, x_low=entry.low, x_high=entry.high), name)
         graph = section.graph
@@ -292,7 +294,9 @@ class _Estimate:
     gains : dict of str to float
         Largest error at the filter's output of each quantizer to whole numbers, centred.
     limits : dict of str to tuple of float
-        Smallest and largest value of every node whose range is stated.
+        Smallest and largest value of every node whose range is stated, without quantizers.
+    spreads : dict of str to dict of str to float
+        Largest error at every such node of each of the section's quantizers to whole numbers, centred.
     optional : tuple of str
         Those of `gains` that need not be.
     """
@@ -301,7 +305,14 @@ class _Estimate:
     slopes: dict[str, Array]
     gains: dict[str, float]
     limits: dict[str, tuple[float, float]]
+    spreads: dict[str, dict[str, float]]
     optional: tuple[str, ...]
+
+    def limits_of(self, node: str, fracs: Mapping[str, int]) -> tuple[float, float]:
+        """Limits of a node with quantizers: what cannot be negative without them may need a sign bit with them."""
+        low, high = self.limits[node]
+        spread = sum(self.spreads[node].get(name, 0.0) * 2.0**-frac for name, frac in fracs.items())
+        return low - spread, high + spread
 
 
 def _estimates(rows: Sequence[Sequence[float]], realization: str, ends: tuple[float, float]) -> list[_Estimate]:
@@ -327,18 +338,22 @@ def _estimates(rows: Sequence[Sequence[float]], realization: str, ends: tuple[fl
             _Estimate(
                 ideal={name: integer * 2.0**-frac for name, (integer, frac) in section.coefficients.items()},
                 slopes={name: _slope(row, realization, section, name, others[k]) for name in section.coefficients},
-                gains={
-                    s.name: float(np.abs(_filtered(s.numerators[model.output], poles, behind[k])).sum()) / 2
-                    for s in quantizers
-                },
+                gains={s.name: _gain(s, model.output, poles, behind[k]) for s in quantizers},
                 limits={
                     name: _limits(_filtered(model.sources[0].numerators[i], poles, through[k]), ends)
                     for i, name in names.items()
                 },
+                spreads={name: {s.name: _gain(s, i, poles, impulse) for s in quantizers} for i, name in names.items()},
                 optional=section.optional_quantizers,
             )
         )
     return result
+
+
+def _gain(quantizer: Source, node: int, poles: Sequence[float], behind: Array) -> float:
+    """Largest error through a node of a quantizer to whole numbers: half a unit centred, or one either way."""
+    unit = 1.0 if quantizer.low < 0 else 0.5
+    return unit * float(np.abs(_filtered(quantizer.numerators[node], poles, behind)).sum())
 
 
 def _exact(
