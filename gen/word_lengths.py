@@ -106,6 +106,15 @@ class Choice:
     words: tuple[Words, ...]
 
 
+@dataclass(frozen=True, eq=False)
+class _Base:
+    """Words that others differ from in a few coefficients, and the deviation and error that theirs make."""
+
+    words: tuple[Words, ...]
+    deviation: Array
+    error: float
+
+
 class Search:
     """Looks for the words of a cascade.
 
@@ -131,6 +140,7 @@ class Search:
         entry = entries[0].signal
         self._ends = entry.low * 2.0**-entry.frac, entry.high * 2.0**-entry.frac
         self._estimates = _estimates(rows, realization, self._ends)
+        self._base: _Base | None = None
         self._known: dict[tuple[object, ...], tuple[float, Signal, dict[str, int]]] = {}
 
     def start(self, share: float, most: int) -> Choice | None:
@@ -173,6 +183,8 @@ class Search:
         """
         choice, error, area = start, self.error(start), self.area(start)
         while error <= allowed:
+            deviation = self._deviation(choice, None)
+            self._base = _Base(choice.words, deviation, max(map(abs, _limits(deviation, self._ends))))
             best: tuple[float, Choice, float, float] | None = None
             for candidate in self._steps(choice):
                 saved = area - self.area(candidate)
@@ -225,11 +237,26 @@ class Search:
 
     def coefficient_error(self, choice: Choice) -> float:
         """Estimated error of the coefficients in output LSBs."""
-        response = np.zeros(1)
-        for estimate, words in zip(self._estimates, choice.words, strict=True):
+        base = self._base
+        if base is not None and all(
+            a.coefficients is b.coefficients for a, b in zip(choice.words, base.words, strict=True)
+        ):
+            return base.error
+        return max(map(abs, _limits(self._deviation(choice, base), self._ends)))
+
+    def _deviation(self, choice: Choice, base: _Base | None) -> Array:
+        """Deviation of the impulse response by the coefficients, from that of `base` on."""
+        response = np.zeros(1) if base is None else base.deviation
+        for k, (estimate, words) in enumerate(zip(self._estimates, choice.words, strict=True)):
+            before = None if base is None else base.words[k].coefficients
             for name, (integer, frac) in words.coefficients.items():
-                response = response + (integer * 2.0**-frac - estimate.ideal[name]) * estimate.slopes[name]
-        return max(map(abs, _limits(response, self._ends)))
+                start = estimate.ideal[name]
+                if before is not None:
+                    if before[name] == (integer, frac):
+                        continue
+                    start = before[name][0] * 2.0 ** -before[name][1]
+                response = response + (integer * 2.0**-frac - start) * estimate.slopes[name]
+        return response
 
     def _is_stable(self, choice: Choice) -> bool:
         return self.area(choice) < math.inf
