@@ -45,11 +45,13 @@ def main() -> None:
             f"{area.multipliers:6} {cost.multiplier_blocks:6}",
             flush=True,
         )
-    features = np.array([[cost.adder_bits, cost.splits, 1] for cost, *_ in found], dtype=float)
-    luts_found = np.array([luts for _, luts, _, _ in found], dtype=float)
-    fit, *_ = np.linalg.lstsq(features, luts_found, rcond=None)
-    print("LUT4 = {:.3f} * adder bits + {:.1f} * splits + {:.0f}".format(*fit))
-    error = features @ fit / luts_found - 1
+    # Of what is fitted, relative errors count: each core as much as any other, whatever its size.
+    features = np.array(
+        [[(cost.adder_bits + cost.extra_bits) / luts, cost.splits / luts] for cost, luts, _, _ in found]
+    )
+    fit, *_ = np.linalg.lstsq(features, np.ones(len(found)), rcond=None)
+    print("LUT4 = {:.2f} * adder bits + {:.1f} * splits".format(*fit))
+    error = features @ fit - 1
     print(f"fitted to within {100 * np.abs(error).max():.0f} %, {100 * np.sqrt(np.mean(error**2)):.0f} % rms")
 
 

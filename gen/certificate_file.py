@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainSerializer, ValidationError
+from pydantic_core import ErrorDetails
 
 from sosmith.model.errors import SpecificationError
 from sosmith.model.graph import Op
@@ -22,6 +23,7 @@ from sosmith.model.graph import Op
 FORMAT = "sosmith certificate 1"
 _GRID_BITS = 64
 _MOST_BITS = 4096  # of any number; far beyond any design, and short of what would stall the arithmetic
+_MOST_DIGITS = 1300  # of an integer in the file, somewhat beyond the same
 _RATIONAL = re.compile(r"(-?[0-9]{1,1200})(?:/([0-9]{1,1200}))?")
 
 
@@ -173,16 +175,65 @@ def read_certificate(path: Path) -> Certificate:
         reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8"
         raise SpecificationError(f"{path}: the certificate must be a file that can be read, not: {reason}") from None
     try:
-        tree = json.loads(text, object_pairs_hook=_without_duplicates, parse_float=_refused, parse_constant=_refused)
+        tree = json.loads(
+            text,
+            object_pairs_hook=_without_duplicates,
+            parse_int=_integer,
+            parse_float=_refused,
+            parse_constant=_refused,
+        )
         return Certificate.model_validate(tree)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         place = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in first["loc"]).lstrip(".")
         raise SpecificationError(
-            f"{path}: the file must be a certificate, not one where {place or 'the whole'} is wrong: {first['msg']}"
+            f"{path}: the file must be a certificate, not one where {place or 'the whole'} is wrong: {_said(first)}"
         ) from None
-    except (ValueError, RecursionError) as error:
+    except json.JSONDecodeError as error:
+        where = f"line {error.lineno}, column {error.colno}"
+        raise SpecificationError(f"{path}: the file must be a certificate in JSON, not: what is at {where}") from None
+    except RecursionError:
+        raise SpecificationError(f"{path}: the file must be a certificate in JSON, not: one nested so deep") from None
+    except ValueError as error:
         raise SpecificationError(f"{path}: the file must be a certificate in JSON, not: {error}") from None
+
+
+_SENTENCES = {
+    "missing": "the key is missing",
+    "extra_forbidden": "there is no such key",
+    "model_type": "it must be an object",
+    "dict_type": "it must be an object",
+    "tuple_type": "it must be a list",
+    "int_type": "it must be an integer",
+    "bool_type": "it must be true or false",
+    "string_type": "it must be a text",
+    "string_too_long": "it must have at most {max_length} characters",
+    "too_short": "it must have no fewer entries than {min_length}",
+    "too_long": "it must have no more entries than {max_length}",
+    "literal_error": "it must be {expected}",
+    "enum": "it must be {expected}",
+    "greater_than_equal": "it must be at least {ge}",
+    "less_than_equal": "it must be at most {le}",
+    "less_than": "it must be less than {lt}",
+    "value_error": "it {error}",
+}
+"""What to say of the errors that validation finds, by their type; in braces what it knows about them."""
+
+
+def _said(error: ErrorDetails) -> str:
+    known = {key: _power(value) if isinstance(value, int) else value for key, value in error.get("ctx", {}).items()}
+    return _SENTENCES[error["type"]].format(**known)
+
+
+def _power(value: int) -> str:
+    """Write a limit, which is a power of two where it is large."""
+    return str(value) if abs(value) < 10**6 else f"{'-' if value < 0 else ''}2**{value.bit_length() - 1}"
+
+
+def _integer(text: str) -> int:
+    if len(text) > _MOST_DIGITS:
+        raise ValueError(f"an integer of {len(text)} digits")
+    return int(text)
 
 
 def _without_duplicates(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

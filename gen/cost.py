@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from sosmith.model.datapath import Datapath
 from sosmith.model.graph import Graph, Node, Op
@@ -11,11 +12,45 @@ from sosmith.model.graph import Graph, Node, Op
 MULTIPLIER_BITS = 18
 """Bits of each operand of a hardware multiplier; Yosys adds what one bit more contributes instead of taking a block."""
 
-_LUTS_PER_ADDER_BIT, _LUTS_PER_SPLIT, _LUTS_AROUND = 0.87, 77.0, -51.0
-"""Fitted by benchmarks/cost_model.py to synthesis of the examples for ECP5, to within a fifth."""
+_LUTS_PER_ADDER_BIT, _LUTS_PER_SPLIT = 1.04, 30.7
+"""Fitted by benchmarks/cost_model.py to synthesis of the examples for ECP5, to within two fifths."""
 
 LUTS_OF_A_BLOCK = 864
 """What a multiplier block counts in LUT4: an ECP5-25 has 24,192 and 28 (Lattice FPGA-DS-02012, family table)."""
+
+
+class Operand(NamedTuple):
+    """One operand of a multiplication: its bits, with a sign bit if it is signed."""
+
+    bits: int
+    signed: bool
+
+    def beside(self, other: Operand) -> int:
+        """Bits that the multiplier sees: it takes both operands signed or neither."""
+        return self.bits + (other.signed and not self.signed)
+
+
+@dataclass(frozen=True)
+class Multiplication:
+    """Two operands, data first."""
+
+    data: Operand
+    factor: Operand
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Bits of both operands."""
+        return self.data.bits, self.factor.bits
+
+    @property
+    def blocks(self) -> int:
+        """Hardware multipliers of 18 x 18 bits, signed."""
+        return _pieces(self.data.beside(self.factor)) * _pieces(self.factor.beside(self.data))
+
+    @property
+    def extra_bits(self) -> int:
+        """Adder bits for operands that have one bit more than whole blocks; a sign that is always 0 adds nothing."""
+        return _extra(self.data, self.factor) * self.factor.bits + _extra(self.factor, self.data) * self.data.bits
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,38 +59,43 @@ class Cost:
 
     Attributes
     ----------
-    multipliers : tuple of tuple of int
-        Operand widths in bits of each multiplication, data first, in the order of the datapath.
+    multiplications : tuple of Multiplication
+        In the order of the datapath.
     adder_bits : int
         Result bits of all additions and subtractions.
     register_bits : int
         State bits and pipeline registers.
     """
 
-    multipliers: tuple[tuple[int, int], ...]
+    multiplications: tuple[Multiplication, ...]
     adder_bits: int
     register_bits: int
 
     @property
+    def multipliers(self) -> tuple[tuple[int, int], ...]:
+        """Operand widths in bits of each multiplication, data first."""
+        return tuple(m.size for m in self.multiplications)
+
+    @property
     def multiplier_blocks(self) -> int:
         """Hardware multipliers of 18 x 18 bits, signed, that the multiplications take."""
-        return sum(_pieces(a) * _pieces(b) for a, b in self.multipliers)
+        return sum(m.blocks for m in self.multiplications)
 
     @property
     def splits(self) -> int:
         """Blocks beyond the first of each multiplication: so many partial products have to be added."""
-        return self.multiplier_blocks - len(self.multipliers)
+        return self.multiplier_blocks - len(self.multiplications)
 
     @property
     def extra_bits(self) -> int:
         """Adder bits for operands that have one bit more than whole blocks."""
-        return sum(_extra(a) * b + _extra(b) * a for a, b in self.multipliers)
+        return sum(m.extra_bits for m in self.multiplications)
 
     @property
     def luts(self) -> int:
         """Estimate of the LUT4 on an ECP5, a carry cell counting as two."""
         adder_bits = self.adder_bits + self.extra_bits
-        return round(_LUTS_PER_ADDER_BIT * adder_bits + _LUTS_PER_SPLIT * self.splits + _LUTS_AROUND)
+        return round(_LUTS_PER_ADDER_BIT * adder_bits + _LUTS_PER_SPLIT * self.splits)
 
     @property
     def area(self) -> int:
@@ -76,15 +116,17 @@ def cost_of(datapath: Datapath) -> Cost:
 
 def cost_of_graphs(graphs: Sequence[Graph]) -> Cost:
     """Count the operators of a chain of graphs."""
-    multipliers: list[tuple[int, int]] = []
+    multiplications: list[Multiplication] = []
     adders = registers = 0
     for graph in graphs:
         nodes = graph.nodes
         for node in nodes:
             if node.op is Op.SCALE:
-                multipliers.append((nodes[node.operands[0]].width, constant_width(node)))
+                factor = Operand(abs(node.parameter).bit_length() + (node.parameter < 0), node.parameter < 0)
+                multiplications.append(Multiplication(_operand(nodes[node.operands[0]]), factor))
             elif node.op is Op.MULTIPLY:
-                multipliers.append((nodes[node.operands[0]].width, nodes[node.operands[1]].width))
+                a, b = (_operand(nodes[i]) for i in node.operands)
+                multiplications.append(Multiplication(a, b))
             elif node.op in {Op.ADD, Op.SUBTRACT}:
                 adders += node.width
             elif node.op is Op.TRUNCATE:  # adds what makes negative values round upward
@@ -92,22 +134,22 @@ def cost_of_graphs(graphs: Sequence[Graph]) -> Cost:
             elif node.op is Op.DELAY:
                 registers += node.width
         registers += sum(nodes[i].width for i in graph.outputs)
-    return Cost(multipliers=tuple(multipliers), adder_bits=adders, register_bits=registers)
+    return Cost(multiplications=tuple(multiplications), adder_bits=adders, register_bits=registers)
 
 
 def area_of(graph: Graph) -> int:
     """Return the part of a graph in the area of a datapath."""
-    return cost_of_graphs([graph]).area - cost_of_graphs([]).area
+    return cost_of_graphs([graph]).area
 
 
-def _extra(bits: int) -> int:
-    return int(bits > MULTIPLIER_BITS and bits % MULTIPLIER_BITS == 1)
+def _operand(node: Node) -> Operand:
+    return Operand(node.width, node.signed)
+
+
+def _extra(operand: Operand, other: Operand) -> bool:
+    seen = operand.beside(other)
+    return seen == operand.bits and seen > MULTIPLIER_BITS and seen % MULTIPLIER_BITS == 1
 
 
 def _pieces(bits: int) -> int:
     return max(1, -(-(bits - 1) // MULTIPLIER_BITS))
-
-
-def constant_width(node: Node) -> int:
-    """Bits of a SCALE node's constant, with a sign bit if it is negative."""
-    return abs(node.parameter).bit_length() + (node.parameter < 0)

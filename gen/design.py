@@ -123,8 +123,8 @@ def decay_length(sos: Array) -> int:
     samples = 64.0 if radius < 1e-3 else 64 + 1.5 * math.log(_DECAY) / math.log(min(radius, 1 - 1e-15))
     if samples > _LONGEST_RESPONSE:
         raise ShortfallError(
-            f"the impulse response must decay within {_LONGEST_RESPONSE} samples, not {samples:.3g}: "
-            "the cutoff is too low for this sample rate, decimate first"
+            f"the impulse response must decay within {_LONGEST_RESPONSE} samples, not {samples:.3g}: a pole lies too "
+            "close to the unit circle"
         )
     return int(samples)
 

@@ -71,8 +71,8 @@ def horizon(paths: Iterable[Iterable[Coefficients]]) -> Horizon:
     length = 64 + math.ceil(wanted / math.log2(rho))
     if length > _LONGEST:
         raise ShortfallError(
-            f"the impulse response must end within {_LONGEST} samples, not {length}: "
-            "the cutoff is too low for this sample rate, decimate first"
+            f"the impulse response must end within {_LONGEST} samples, not {length}: a pole lies too close to the unit "
+            "circle"
         )
     return Horizon(length, math.ceil(log_rounding + math.log2(length)) + _RELATIVE_BITS + 16, rho)
 

@@ -367,7 +367,18 @@ def _gain(ideal: Filter) -> Fraction:
     try:
         return ideal_gain(ideal_sections(ideal))
     except ShortfallError as error:
-        raise ShortfallError(f"{error}{f' by {ideal.decimation}' if ideal.decimation > 1 else ''}") from None
+        raise ShortfallError(f"{error}{_remedy_of_poles(ideal)}") from None
+
+
+def _remedy_of_poles(ideal: Filter) -> str:
+    """Name what moves a filter's poles away from the unit circle, if that is known."""
+    if ideal.cutoff is None:
+        return ""
+    if ideal.decimation > 1:
+        return f", decimate by {ideal.decimation} first"
+    if len(ideal.cutoff) > 1:
+        return ", widen the band"
+    return ", move the cutoff further from 0 and from half the sample rate"
 
 
 def _ordered(ideal: Filter, realization: str) -> Filter:

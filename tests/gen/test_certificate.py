@@ -549,12 +549,14 @@ def test_text_and_back(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "the file must be a certificate in JSON, not: Expecting value: line 1 column 1 (char 0)"),
-        ("[" * 100000, "the file must be a certificate in JSON, not: maximum recursion depth exceeded"),
+        ("", "the file must be a certificate in JSON, not: what is at line 1, column 1"),
+        ("[" * 100000, "the file must be a certificate in JSON, not: one nested so deep"),
+        ("9" * 5000, "the file must be a certificate in JSON, not: an integer of 5000 digits"),
         ("1.5", "the file must be a certificate in JSON, not: 1.5, which is neither an integer nor a text"),
         ("NaN", "the file must be a certificate in JSON, not: NaN, which is neither an integer nor a text"),
         ('{"a": 1, "a": 2}', "the file must be a certificate in JSON, not: an object with the same key twice"),
-        ("{}", "the file must be a certificate, not one where format is wrong: Field required"),
+        ("{}", "the file must be a certificate, not one where format is wrong: the key is missing"),
+        ("[]", "the file must be a certificate, not one where the whole is wrong: it must be an object"),
     ],
 )
 def test_what_is_no_certificate(text: str, message: str, tmp_path: Path) -> None:
@@ -567,14 +569,31 @@ def test_what_is_no_certificate(text: str, message: str, tmp_path: Path) -> None
 @pytest.mark.parametrize(
     ("place", "new", "message"),
     [
-        (("format",), "sosmith certificate 2", "Input should be 'sosmith certificate 1'"),
-        (("max_error",), 1, 'Value error, must be a rational number as a text "p/q"'),
-        (("max_error",), "1/0", 'Value error, must be a rational number as a text "p/q"'),
-        (("inputs", 0, "bits"), 33, "Input should be less than or equal to 32"),
-        (("inputs", 0, "bits"), "16", "Input should be a valid integer"),
-        (("stages", 0, "nodes", 0, "frac"), 10**9, "Input should be less than or equal to 4096"),
-        (("stages", 0, "role"), "poem", "Input should be 'polynomial', 'section' or 'output'"),
-        (("claims", "extra"), 1, "Extra inputs are not permitted"),
+        (("format",), "sosmith certificate 2", "it must be 'sosmith certificate 1'"),
+        (("max_error",), 1, 'it must be a rational number as a text "p/q"'),
+        (("max_error",), "1/0", 'it must be a rational number as a text "p/q"'),
+        (("inputs", 0, "bits"), 33, "it must be at most 32"),
+        (("inputs", 0, "bits"), "16", "it must be an integer"),
+        (("inputs", 0, "bits"), 1, "it must be at least 2"),
+        (("inputs", 0, "signed"), 1, "it must be true or false"),
+        (("inputs",), [], "it must have no fewer entries than 1"),
+        (("stages",), {}, "it must be a list"),
+        (("stages", 0, "name"), "x" * 1001, "it must have at most 1000 characters"),
+        (("stages", 0, "name"), 1, "it must be a text"),
+        (("stages", 0, "outputs", 0), 10000, "it must be less than 10000"),
+        (
+            ("stages", 0, "nodes", 0, "op"),
+            "divide",
+            "it must be 'input', 'constant', 'add', 'subtract', 'shift', 'scale', 'multiply', 'floor', 'fraction', "
+            "'truncate', 'clamp', 'bound' or 'delay'",
+        ),
+        (("stages", 0, "nodes", 0, "low"), 2**4096 + 1, "it must be at most 2**4096"),
+        (("stages", 0, "nodes", 0, "low"), -(2**4096) - 1, "it must be at least -2**4096"),
+        (("ideal", "sections", 0, "numerator"), ["1"] * 4, "it must have no more entries than 3"),
+        (("claims", "budget"), 1, "it must be an object"),
+        (("stages", 0, "nodes", 0, "frac"), 10**9, "it must be at most 4096"),
+        (("stages", 0, "role"), "poem", "it must be 'polynomial', 'section' or 'output'"),
+        (("claims", "extra"), 1, "there is no such key"),
     ],
 )
 def test_a_certificate_of_the_wrong_form(place: PLACE, new: Any, message: str, tmp_path: Path) -> None:

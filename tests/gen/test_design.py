@@ -198,7 +198,9 @@ def test_refusals() -> None:
         design(tight, 100.0)
     barely_stable = np.array([[1.0, 0, 0, 1, -2 + 1e-9, 1 - 1e-9]])
     with pytest.raises(
-        ShortfallError, match=r"^the impulse response must decay within 16777216 samples, not .*decimate first$"
+        ShortfallError,
+        match=r"^the impulse response must decay within 16777216 samples, not 8\.29e\+10: "
+        r"a pole lies too close to the unit circle$",
     ):
         decay_length(barely_stable)
 

@@ -1,10 +1,11 @@
 """Designs that cannot be: each refused in one sentence that says what is in the way and what would help."""
 
 import re
+from dataclasses import replace
 from fractions import Fraction
 
 import pytest
-from tests.gen.test_quantize import OUT, SIGNED, butterworth
+from tests.gen.test_quantize import OUT, SIGNED, butterworth, plain
 
 from sosmith.gen.design import Filter
 from sosmith.gen.quantize import quantize
@@ -83,12 +84,31 @@ def test_calibration() -> None:
 @pytest.mark.parametrize("realization", ["df1", "df1_ef2"])
 def test_a_cutoff_too_low_for_any_format(realization: str) -> None:
     refused(
-        "the impulse response must end within 1048576 samples, not 107619414: the cutoff is too low for this sample "
-        "rate, decimate first by 32768",
+        "the impulse response must end within 1048576 samples, not 107619414: a pole lies too close to the unit "
+        "circle, decimate by 32768 first",
         beyond_half=Fraction(1, 2),
         ideal=butterworth(7, 0.000001),
         realization=realization,
     )
+
+
+LONG = r"the impulse response must end within 1048576 samples, not \d+: a pole lies too close to the unit circle"
+AWAY = ", move the cutoff further from 0 and from half the sample rate"
+
+
+@pytest.mark.parametrize(
+    ("ideal", "remedy"),
+    [
+        (replace(butterworth(1, 0.2, "bandstop"), cutoff=(0.2, 0.2000001)), ", widen the band"),
+        (replace(butterworth(1, 0.2, "highpass"), cutoff=(1e-6,)), AWAY),
+        (replace(butterworth(1, 0.2), cutoff=(0.499999,)), AWAY),
+        (replace(butterworth(1, 0.2), cutoff=None), ""),
+    ],
+)
+def test_a_response_too_long_for_another_reason(ideal: Filter, remedy: str) -> None:
+    slow = replace(ideal, rows=((1.0, 0.0, 0.0, 1.0, 0.0, 1 - 2.0**-22),))
+    with pytest.raises(ShortfallError, match=f"^{LONG}{remedy}$"):
+        plain(slow)
 
 
 NARROW: Row = (0.1425, 0.285, 0.1425, 1.0, -1.4, 0.97)
