@@ -40,6 +40,20 @@ def width(ports: Sequence[Port]) -> int:
     return sum(field.padded for field in fields(ports))
 
 
+def core_members(inputs: Sequence[Port], output: Port) -> dict[str, In | Out]:
+    """Clock, reset and the two streams of a core."""
+    return {
+        "aclk": In(1),
+        "aresetn": In(1),
+        "s_axis_tdata": In(width(inputs)),
+        "s_axis_tvalid": In(1),
+        "s_axis_tready": Out(1),
+        "m_axis_tdata": Out(width([output])),
+        "m_axis_tvalid": Out(1),
+        "m_axis_tready": In(1),
+    }
+
+
 def extended(code: Value, bits: int) -> Value:
     """Extend `code` to `bits` bits by its sign."""
     if len(code) >= bits:

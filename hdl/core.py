@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from amaranth.hdl import ClockDomain, ClockSignal, Module, ResetSignal, Value
 from amaranth.lib import wiring
-from amaranth.lib.wiring import In, Out
 
-from sosmith.hdl.axi_stream import OutputBuffer, extended, fields, width
+from sosmith.hdl.axi_stream import OutputBuffer, core_members, extended, fields, width
 from sosmith.hdl.stage import PipelineStage, rank_count
 from sosmith.model.datapath import Datapath
 
@@ -40,18 +39,7 @@ class Core(wiring.Component):
 
     def __init__(self, datapath: Datapath) -> None:
         self.datapath = datapath
-        super().__init__(
-            {
-                "aclk": In(1),
-                "aresetn": In(1),
-                "s_axis_tdata": In(width(datapath.inputs)),
-                "s_axis_tvalid": In(1),
-                "s_axis_tready": Out(1),
-                "m_axis_tdata": Out(width([datapath.output])),
-                "m_axis_tvalid": Out(1),
-                "m_axis_tready": In(1),
-            }
-        )
+        super().__init__(core_members(datapath.inputs, datapath.output))
 
     def elaborate(self, platform: object) -> Module:
         """Build the pipeline."""

@@ -10,9 +10,8 @@ from __future__ import annotations
 from amaranth.hdl import Cat, ClockDomain, ClockSignal, Const, Module, Mux, ResetSignal, Signal, Value, signed
 from amaranth.lib import wiring
 from amaranth.lib.memory import Memory
-from amaranth.lib.wiring import In, Out
 
-from sosmith.hdl.axi_stream import extended, fields, width
+from sosmith.hdl.axi_stream import core_members, extended, fields
 from sosmith.model.datapath import Datapath
 from sosmith.model.graph import Op
 from sosmith.model.program import Do, Instruction, Place, Program
@@ -53,18 +52,7 @@ class FoldedCore(wiring.Component):
         self.datapath = datapath
         self.program = program
         self.serial = serial
-        super().__init__(
-            {
-                "aclk": In(1),
-                "aresetn": In(1),
-                "s_axis_tdata": In(width(datapath.inputs)),
-                "s_axis_tvalid": In(1),
-                "s_axis_tready": Out(1),
-                "m_axis_tdata": Out(width([datapath.output])),
-                "m_axis_tvalid": Out(1),
-                "m_axis_tready": In(1),
-            }
-        )
+        super().__init__(core_members(datapath.inputs, datapath.output))
 
     def elaborate(self, platform: object) -> Module:
         """Build the unit around its two memories."""
