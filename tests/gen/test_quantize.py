@@ -226,7 +226,7 @@ LOWPASS = ("0.1", "0", "0", "1", "-0.9", "0")
 ONE_LATER, TWO_LATER = ("0", "1", "0", "1", "0", "0"), ("0", "0", "1", "1", "0", "0")
 
 
-@pytest.mark.parametrize("realization", REALIZATIONS)
+@pytest.mark.parametrize("realization", CASCADES)
 @pytest.mark.parametrize(
     "rows",
     [
