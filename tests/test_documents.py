@@ -18,7 +18,7 @@ from sosmith.cli import cli
 ROOT = Path(__file__).parents[1]
 README = ROOT / "README.md"
 ARCHITECTURE = ROOT / "docs" / "architecture.md"
-DOCUMENTS = [README, ROOT / "CHANGELOG.md", ARCHITECTURE, ROOT / "docs" / "hardware.md", ROOT / "docs" / "numerics.md"]
+DOCUMENTS = [README, ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").glob("*.md"))]
 ROOMS = ("model", "hdl", "gen", "sim")
 BY_CI = {"./run demo", "./run test"}
 """Lines that other tests and the set-up on a fresh machine stand for."""

