@@ -1,8 +1,9 @@
 """The folded and serial architectures: one multiply-accumulate unit that runs a datapath's program.
 
-Five ranks work on five instructions at once: fetch, read, hold, multiply, accumulate; the program keeps an
-instruction that reads a word far enough from the one that stores it (`sosmith.model.program.HAZARD`). In the serial
-architecture the multiplication is done by shifts and additions in the accumulator, and the ranks wait for it.
+Several ranks work on as many instructions at once: fetch, read, multiply, accumulate; the program keeps an
+instruction that reads a word far enough from the one that stores it (`sosmith.model.program.HAZARD`). In the folded
+architecture both memories have a register behind them, for speed. In the serial one they have none, for size, the
+multiplication is done by shifts and additions in the accumulator, and the ranks wait for it.
 """
 
 from __future__ import annotations
@@ -16,15 +17,14 @@ from sosmith.model.datapath import Datapath
 from sosmith.model.graph import Op
 from sosmith.model.program import Do, Instruction, Place, Program
 
-_AROUND = 4
-"""Clocks from the edge that accepts a sample to the one that can hand it on, beside those of the instructions."""
+_FOLDED_RANKS, _SERIAL_RANKS = 5, 3
 
 _DO_BITS = 4
 
 
 def latency_cycles(program: Program, *, serial: bool) -> int:
     """Clocks from the edge that accepts a sample to the edge that can hand it on; in serial, at most so many."""
-    return (program.serial_cycles if serial else len(program.instructions)) + _AROUND
+    return program.serial_cycles + _SERIAL_RANKS if serial else len(program.instructions) + _FOLDED_RANKS
 
 
 class FoldedCore(wiring.Component):
@@ -112,7 +112,7 @@ class FoldedCore(wiring.Component):
         ranks = [_Rank(fetch.data, valid, self._address_bits)]
         with m.If(advance):
             m.d.sync += valid.eq(fetching)
-            for k in (2, 3, 4):
+            for k in range(2, _SERIAL_RANKS + 1 if self.serial else _FOLDED_RANKS + 1):
                 word = Signal(len(fetch.data), name=f"instruction{k}", reset_less=True)
                 valid = Signal(name=f"valid{k}")
                 m.d.sync += [word.eq(ranks[-1].word), valid.eq(ranks[-1].valid)]
@@ -120,13 +120,13 @@ class FoldedCore(wiring.Component):
         return ranks
 
     def _accumulate(self, m: Module, advance: Signal, ranks: list[_Rank], data: Signal) -> Signal:
-        """Multiply `data`, which the third rank is about, and add the product up at the fourth."""
-        *_, third, last = ranks
+        """Multiply `data`, which the last rank but one is about, and add the product up at the last."""
+        *_, present, last = ranks
         operand = Signal(signed(self._word), reset_less=True)
         factor = Signal(signed(self._word))
         total = Signal(signed(self.program.accumulator_bits))
-        m.d.comb += factor.eq(Mux(third.does(Do.PRODUCT), operand, third.constant))
-        with m.If(advance & third.does(Do.OPERAND)):
+        m.d.comb += factor.eq(Mux(present.does(Do.PRODUCT), operand, present.constant))
+        with m.If(advance & present.does(Do.OPERAND)):
             m.d.sync += operand.eq(data)
         multiplies = last.valid & (last.does(Do.MULTIPLY) | last.does(Do.PRODUCT))
         if self.serial:
@@ -152,12 +152,15 @@ class FoldedCore(wiring.Component):
     ) -> None:
         """Read the words that instructions are about, and write those that they store."""
         (advance, clearing, accept), (counter, total, data) = control, values
-        first, *_, last = ranks
+        first, last = ranks[0 if self.serial else 1], ranks[-1]
         m.submodules.words = ram = Memory(shape=self._word, depth=self.program.words, init=self.program.reset())
         read, write = ram.read_port(), ram.write_port()
         m.d.comb += [read.addr.eq(first.address), read.en.eq(advance)]
-        with m.If(advance):
-            m.d.sync += data.eq(read.data)
+        if self.serial:
+            m.d.comb += data.eq(read.data)
+        else:
+            with m.If(advance):
+                m.d.sync += data.eq(read.data)
         sample = self._input_digits()
         supply = Signal(self._word * len(sample), reset_less=True)
         take = last.does(Do.TAKE)
@@ -176,11 +179,11 @@ class FoldedCore(wiring.Component):
 
     def _hand_out(self, m: Module, advance: Signal, ranks: list[_Rank], data: Signal) -> None:
         """Collect the digits of the result; the last instruction of a program gives the last one."""
-        _, second, third, _ = ranks
+        *_, following, present, _ = ranks
         given = Signal(self._word * self.program.output.digits, reset_less=True)
-        with m.If(advance & third.valid & third.does(Do.GIVE)):
+        with m.If(advance & present.valid & present.does(Do.GIVE)):
             m.d.sync += given.eq(Cat(given[self._word :], data))
-        with m.If(advance & third.valid & ~second.valid):
+        with m.If(advance & present.valid & ~following.valid):
             m.d.sync += self.m_axis_tvalid.eq(1)
         with m.If(self.m_axis_tvalid & self.m_axis_tready):
             m.d.sync += self.m_axis_tvalid.eq(0)
