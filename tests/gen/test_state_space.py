@@ -4,11 +4,9 @@ import math
 import re
 from dataclasses import replace
 from fractions import Fraction
-from typing import Any
 
 import numpy as np
 import pytest
-from amaranth.sim import Simulator
 from benchmarks.published import (
     BUTTERWORTH_GAINS,
     DELTA,
@@ -26,6 +24,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import signal
 from tests.gen.test_quantize import butterworth, errors, plain, stimulus
+from tests.hdl.stage_bench import run
 
 from sosmith.gen.linear_model import linear_model
 from sosmith.gen.noise import (
@@ -36,7 +35,6 @@ from sosmith.gen.noise import (
 )
 from sosmith.gen.realizations import REALIZATIONS, SectionFormat
 from sosmith.gen.state_space_design import StateDesign, minimum_noise, normal
-from sosmith.hdl.stage import PipelineStage
 from sosmith.model.datapath import Datapath, Stage
 from sosmith.model.errors import ShortfallError
 from sosmith.model.graph import Graph, GraphBuilder
@@ -319,22 +317,7 @@ def test_hardware_equals_its_graph(name: str, realization: str) -> None:
     quantized = plain(replace(butterworth(2, 0.1), rows=(ROWS[name],)), realization)
     samples: list[list[int]] = stimulus(quantized.datapath.inputs, 3, 200).tolist()
     stage: Stage = quantized.sections[0]
-    dut: Any = PipelineStage(stage)
-    results: list[list[int]] = []
-
-    async def bench(ctx: Any) -> None:
-        ctx.set(dut.advance, 1)
-        ctx.set(dut.i_valid, 1)
-        for (code,) in samples:
-            ctx.set(dut.i0, code)
-            await ctx.tick()
-            results.append([ctx.get(dut.o0)])
-
-    simulator = Simulator(dut)
-    simulator.add_clock(1e-6)
-    simulator.add_testbench(bench)
-    simulator.run()
-    assert results == stage.graph.run(samples)
+    assert run(stage, samples, 3) == stage.graph.run(samples)
 
 
 def test_powers_of_two_are_not_multiplied() -> None:
