@@ -210,7 +210,7 @@ WRONG: dict[str, tuple[str, Callable[[str], str]]] = {
         "audio_lowpass.toml",
         flip(r"\? (?P<constant>(?P<width>1[67])'h(?P<value>0[0-9a-f]+)) :", 0),
     ),
-    "a delay that stands still": ("audio_lowpass.toml", replaced("v2 <= v1;", "v2 <= v2;")),
+    "a delay too short": ("audio_lowpass.toml", replaced("x2 <= x1;", "x2 <= i0;")),
 }
 
 
