@@ -232,12 +232,11 @@ class FoldedCore(wiring.Component):
         value = Cat(*digits, given[-1]).as_signed()
         stage = self.datapath.stages[-1].graph
         last = stage.nodes[stage.outputs[0]]
-        if last.op is not Op.CLAMP:
-            return (
-                value[: self.datapath.output.bits] if last.low >= 0 else value[: self.datapath.output.bits].as_signed()
-            )
-        low, high = Const(last.low), Const(last.high)
-        return Mux(value < low, low, Mux(value > high, high, value))[: self.datapath.output.bits]
+        if last.op is Op.CLAMP:
+            low, high = Const(last.low), Const(last.high)
+            value = Mux(value < low, low, Mux(value > high, high, value))
+        code = value[: self.datapath.output.bits]
+        return code.as_signed() if self.datapath.output.signed else code
 
 
 class _Rank:
