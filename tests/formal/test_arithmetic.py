@@ -4,7 +4,7 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
-from amaranth.hdl import Assert, Const, Module, Signal, Value
+from amaranth.hdl import Assert, Assume, Const, Module, Signal, Value
 from tests.formal.prover import INDUCTION, Proof, broken, prove
 
 from sosmith.hdl import stage
@@ -19,7 +19,7 @@ class Quantizers(Proof):
 
         floor:     floor * 2**k <= v < (floor + 1) * 2**k, and floor * 2**k + fraction = v, 0 <= fraction < 2**k
         truncate:  a distance below 2**k towards zero, never beyond it
-        round:     -2**k < 2 * (round * 2**k - v) <= ... ties upward: -2**(k-1) <= v - round * 2**k < 2**(k-1)
+        round:     to nearest, ties upward: -2**(k-1) <= v - round * 2**k < 2**(k-1)
         clamp:     v between the limits, else the limit that v is beyond
 
     Parameters
@@ -27,7 +27,7 @@ class Quantizers(Proof):
     module : ModuleType
         `sosmith.hdl.stage`, or a broken one.
     low, high : int
-        Range of the input code.
+        Range of the input code, which the stage before keeps.
     drop : int
         k.
     limits : tuple of int
@@ -39,15 +39,17 @@ class Quantizers(Proof):
         v = g.input("v", drop, low, high)
         outputs = [g.floor(v, 0), g.fraction(v, 0), g.truncate(v, 0), g.round(v, 0), g.clamp(v, *limits)]
         super().__init__(module.PipelineStage(HornerStep("quantizers", g.build(outputs))))
-        self.drop, self.limits = drop, limits
+        self.range, self.drop, self.limits = (low, high), drop, limits
 
     def state(self, m: Module) -> None:
         """State what each output is, of the input that was taken last."""
         d = self.design
         v = Signal(d.i0.shape())
+        m.d.comb += Assume((d.i0 >= self.range[0]) & (d.i0 <= self.range[1]))
         with m.If(d.i_valid & d.advance):
             m.d.proof += v.eq(d.i0)
         with m.If(self.started & d.o_valid):
+            m.d.comb += Assert((v >= self.range[0]) & (v <= self.range[1]))
             m.d.comb += [Assert(law) for law in self._laws(v)]
 
     def _laws(self, v: Value) -> list[Value]:
