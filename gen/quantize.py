@@ -418,7 +418,7 @@ def with_constants(made: Quantized, ideal: Filter | None, polynomial: Polynomial
 
 
 def _entry_with(made: Quantized, polynomial: Polynomial | None) -> _Entry:
-    """What stands before the sections, for another polynomial if it is not None."""
+    """Return what stands before the sections, for another polynomial if it is not None."""
     datapath = made.datapath
     stages = tuple(stage for stage in datapath.stages if isinstance(stage, HornerStep))
     if polynomial is None or made.polynomial is None:
