@@ -12,7 +12,7 @@ from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.design import Filter, design
 from sosmith.gen.quantize import with_constants
 from sosmith.gen.realizations import REALIZATIONS
-from sosmith.gen.reload import OtherSet, fingerprint, other_set, parallel_bank
+from sosmith.gen.reload import OtherSet, fingerprint, other_set, parallel_bank, room_of
 from sosmith.gen.specification import load
 from sosmith.model.constants import constants, unpacked
 from sosmith.model.errors import ShortfallError
@@ -105,12 +105,9 @@ def test_a_program_takes_over_at_any_sample(example: str) -> None:
     assert other.program is not None
     codes = stimulus(hardware, 160)
     swaps = [(0, first), (37, one.program), (38, other.program), (90, first), (117, one.program)]
-    datapaths = [(37, one), (38, other), (90, None), (117, one)]
-    expected = compute_swapping(
-        hardware.datapath,
-        [(at, hardware.datapath if made is None else made.quantized.datapath) for at, made in datapaths],
-        codes,
-    )
+    own = with_constants(hardware.quantized, None, None, room=room_of(hardware)).datapath
+    datapaths = [(37, one.quantized.datapath), (38, other.quantized.datapath), (90, own), (117, one.quantized.datapath)]
+    expected = compute_swapping(own, datapaths, codes)
     assert interpreted(hardware, swaps, codes) == expected
     assert interpreted(hardware, [(0, first), (38, one.program), *swaps[2:]], codes) != expected
 
@@ -119,7 +116,7 @@ def test_a_set_that_breaks_the_bound_is_refused() -> None:
     hardware = hardware_in("folded")
     with pytest.raises(
         ShortfallError,
-        match=r"^the set must keep its error within 15 × 10⁻⁶, and is proven to [\d.]+ × 10⁻⁶ only: "
+        match=r"^the set must keep its error within 15.0 × 10⁻⁶, and is proven to [\d.]+ × 10⁻⁶ only: "
         r"nothing is to be loaded$",
     ):
         other_set(hardware, ideal=moved(hardware, "0.95"), max_error=Fraction(15, 1_000_000))
@@ -151,7 +148,8 @@ def test_the_parallel_bank_holds_the_constants() -> None:
     hardware = hardware_in("parallel")
     made = other_set(hardware, ideal=moved(hardware, "0.95"))
     words = parallel_bank(hardware, made)
-    values = dict(zip([c.name for c in constants(hardware.datapath)], unpacked(words, constants(hardware.datapath))))
+    loadable = constants(hardware.datapath)
+    values = dict(zip([constant.name for constant in loadable], unpacked(words, loadable), strict=True))
     expected = {
         f"{section.name}.product_{name}": integer
         for section in made.quantized.sections
