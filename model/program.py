@@ -489,9 +489,8 @@ class _Folding:
                 total[term] = total.get(term, Fraction(0)) + sign * weight
             return {term: weight for term, weight in total.items() if weight}, constant_a + sign * constant_b
         if node.op in {Op.SHIFT, Op.SCALE}:
-            factor = Fraction(2) ** node.parameter
-            if node.op is Op.SCALE:
-                factor = node.parameter * Fraction(2) ** -node.parameter_frac
+            scales = node.op is Op.SCALE
+            factor = node.parameter * Fraction(2) ** -node.parameter_frac if scales else Fraction(2) ** node.parameter
             total, constant = self._value(node.operands[0])
             return {term: weight * factor for term, weight in total.items()}, constant * factor
         if node.op is Op.BOUND:
