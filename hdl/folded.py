@@ -8,8 +8,6 @@ multiplication is done by shifts and additions in the accumulator, and the ranks
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from amaranth.hdl import Cat, ClockDomain, ClockSignal, Const, Module, Mux, ResetSignal, Signal, Value, signed
 from amaranth.lib import wiring
 from amaranth.lib.memory import Memory
@@ -33,59 +31,13 @@ def latency_cycles(program: Program, *, serial: bool) -> int:
     return program.serial_cycles + _SERIAL_RANKS if serial else len(program.instructions) + _FOLDED_RANKS
 
 
-@dataclass(frozen=True)
-class Addresses:
-    """Where a program's words lie in the memory: first the states of every channel, then what all channels share.
+_SLICES = {256: 16, 512: 8, 1024: 4, 2048: 2}
+"""Bits that a block RAM of an iCE40 has to a word when it has so many words."""
 
-    An instruction has an index and, as its top bit, whether it is among the shared words. The places of a channel's
-    states are a power of two, so that the channel's number stands beside the index and nothing has to be added.
 
-    Attributes
-    ----------
-    program : Program
-        Whose words they are.
-    channels : int
-        Number of channels.
-    """
-
-    program: Program
-    channels: int
-
-    @property
-    def _state_bits(self) -> int:
-        return max(self.program.states - 1, 0).bit_length()
-
-    @property
-    def _shared_bits(self) -> int:
-        return (self.program.words - self.program.states - 1).bit_length()
-
-    @property
-    def instruction_bits(self) -> int:
-        """Width of an instruction's address."""
-        return max(self._state_bits, self._shared_bits) + 1
-
-    @property
-    def bits(self) -> int:
-        """Width of an address of the memory."""
-        return max(self._state_bits + channel_bits(self.channels), self._shared_bits) + 1
-
-    @property
-    def depth(self) -> int:
-        """Words of the memory."""
-        return (1 << self.bits - 1) + self.program.words - self.program.states
-
-    def encoded(self, address: int) -> int:
-        """Address of the program as instructions have it."""
-        shared = address - self.program.states
-        return address if shared < 0 else shared | 1 << self.instruction_bits - 1
-
-    def of(self, encoded: Value, channel: Value) -> Value:
-        """Address of the memory from that of an instruction and the channel's number."""
-        is_shared = encoded[-1]
-        if self.channels == 1:
-            return encoded
-        state, shared = Cat(encoded[: self._state_bits], channel), encoded[: self._shared_bits]
-        return Cat(Mux(is_shared, shared, state) | Const(0, self.bits - 1), is_shared)
+def memory_depth(program: Program, channels: int) -> int:
+    """Words of the memory: those of the program for each channel, the channel's number above the word's."""
+    return program.words * channels
 
 
 class FoldedCore(wiring.Component):
@@ -127,7 +79,6 @@ class FoldedCore(wiring.Component):
         self.serial = serial
         self.channels = channels
         self.fingerprint = fingerprint
-        self._addresses = Addresses(program, channels)
         members = core_members(datapath.inputs, datapath.output, channels)
         super().__init__(members if fingerprint is None else members | slave_members(ADDRESS_BITS))
 
@@ -173,7 +124,7 @@ class FoldedCore(wiring.Component):
         self, m: Module, advance: Signal, clearing: Signal, start: Signal, busy: Signal
     ) -> tuple[Signal, Signal]:
         """Count through the words to clear after reset, and through the program for each sample."""
-        count, words = len(self.program.instructions), self._addresses.depth
+        count, words = len(self.program.instructions), memory_depth(self.program, self.channels)
         counter, fetching = Signal(range(max(count, words))), Signal()
         with m.If(clearing):
             m.d.sync += counter.eq(counter + 1)
@@ -195,7 +146,7 @@ class FoldedCore(wiring.Component):
         """Return the reload port and the bank that the sample in work uses."""
         if self.fingerprint is None:
             return None
-        depth, bits = len(self.program.instructions), instruction_bits(self._addresses, self._word)
+        depth, bits = len(self.program.instructions), instruction_bits(self.program)
         m.submodules.reload_port = port = ReloadPort(depth, bits=bits, design=self.fingerprint)
         for name in slave_members(ADDRESS_BITS):
             outer, inner = getattr(self, name), getattr(port, name)
@@ -210,8 +161,8 @@ class FoldedCore(wiring.Component):
         self, m: Module, advance: Signal, counter: Signal, fetching: Signal, reload: tuple[ReloadPort, Signal] | None
     ) -> list[_Rank]:
         """Read the program; return the ranks, the first one holding what has just been read."""
-        code = [encoded(instruction, self._addresses, self._word) for instruction in self.program.instructions]
-        bits, address_bits = instruction_bits(self._addresses, self._word), self._addresses.instruction_bits
+        code = [encoded(instruction, self.program) for instruction in self.program.instructions]
+        bits, address_bits = instruction_bits(self.program), _address_bits(self.program)
         if reload is not None:
             code += [0] * ((1 << (len(code) - 1).bit_length()) - len(code))
             code += [0] * len(code)
@@ -273,26 +224,50 @@ class FoldedCore(wiring.Component):
         """Read the words that instructions are about, and write those that they store."""
         (advance, clearing), (counter, total, data, channel) = control, values
         first, last = ranks[0 if self.serial else 1], ranks[-1]
-        addresses = self._addresses
-        # After reset, states are 0 and the word of ones is 1; so may be the others that channels share.
-        initial = [address >> addresses.bits - 1 for address in range(addresses.depth)]
-        m.submodules.words = ram = Memory(shape=self._word, depth=addresses.depth, init=initial)
-        read, write = ram.read_port(), ram.write_port()
-        m.d.comb += [read.addr.eq(addresses.of(first.address, channel)), read.en.eq(advance)]
-        if self.serial:
-            m.d.comb += data.eq(read.data)
-        else:
-            with m.If(advance):
-                m.d.sync += data.eq(read.data)
         take = last.does(Do.TAKE)
         top = total[self._word - 1] & last.does(Do.FINISH)
         digit = Mux(take, self._input_digit(last.constant), Cat(total[: self._word - 1], top))
         stores = take | last.does(Do.STORE) | last.does(Do.FINISH)
-        m.d.comb += [
-            write.addr.eq(Mux(clearing, counter, addresses.of(last.address, channel))),
-            write.data.eq(Mux(clearing, counter[addresses.bits - 1], digit)),
-            write.en.eq(clearing | (advance & last.valid & stores)),
-        ]
+        address_bits = _address_bits(self.program)
+        is_one = counter[:address_bits].all()
+        word = self._memory(
+            m,
+            read=(Cat(first.address, channel), advance),
+            write=(
+                Mux(clearing, counter, Cat(last.address, channel)),
+                Mux(clearing, is_one, digit),
+                clearing | (advance & last.valid & stores),
+            ),
+        )
+        if self.serial:
+            m.d.comb += data.eq(word)
+        else:
+            with m.If(advance):
+                m.d.sync += data.eq(word)
+
+    def _memory(self, m: Module, read: tuple[Value, Value], write: tuple[Value, Value, Value]) -> Value:
+        """Make the memory of all channels; return the word read.
+
+        It is cut into slices as wide as a block RAM is where it has that many words: side by side they need no logic,
+        as blocks behind each other would.
+        """
+        words, depth = self.program.words, memory_depth(self.program, self.channels)
+        width = next((bits for most, bits in _SLICES.items() if depth <= most), _SLICES[max(_SLICES)])
+        slices: list[Value] = []
+        for low in range(0, self._word, width):
+            high = min(low + width, self._word)
+            init = [int(low == 0 and address % words == self.program.one) for address in range(depth)]
+            m.submodules[f"words{low}"] = ram = Memory(shape=high - low, depth=depth, init=init)
+            reader, writer = ram.read_port(), ram.write_port()
+            m.d.comb += [
+                reader.addr.eq(read[0]),
+                reader.en.eq(read[1]),
+                writer.addr.eq(write[0]),
+                writer.data.eq(write[1][low:high]),
+                writer.en.eq(write[2]),
+            ]
+            slices.append(reader.data)
+        return Cat(*slices)
 
     def _hand_out(
         self, m: Module, control: tuple[Signal, Signal], values: tuple[Signal, Signal], ranks: list[_Rank]
@@ -392,13 +367,17 @@ class _Rank:
         return self.word[:_DO_BITS] == list(Do).index(do)
 
 
-def instruction_bits(addresses: Addresses, word: int) -> int:
+def _address_bits(program: Program) -> int:
+    return (program.words - 1).bit_length()
+
+
+def instruction_bits(program: Program) -> int:
     """Width of an instruction in the program's memory."""
-    return _DO_BITS + addresses.instruction_bits + word
+    return _DO_BITS + _address_bits(program) + program.digit_bits + 1
 
 
-def encoded(instruction: Instruction, addresses: Addresses, word: int) -> int:
+def encoded(instruction: Instruction, program: Program) -> int:
     """Instruction as the program's memory has it: what to do lowest, then the address, then the constant."""
     do, address, constant = instruction
-    upper = addresses.encoded(address) | (constant % (1 << word)) << addresses.instruction_bits
+    upper = address | (constant % (1 << program.digit_bits + 1)) << _address_bits(program)
     return list(Do).index(do) | upper << _DO_BITS

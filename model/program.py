@@ -21,6 +21,7 @@ from typing import NamedTuple
 
 from sosmith.model.datapath import Datapath
 from sosmith.model.graph import Node, Op
+from sosmith.model.word_reuse import Extent, Life, packed
 
 HAZARD = 4
 """An instruction that reads what another stored must come at least so many places after it."""
@@ -104,7 +105,9 @@ class Program:
     states : int
         Words that are kept from sample to sample, for each channel: the addresses from 0 on.
     words : int
-        All words; those beyond the states serve every channel. The first of these always holds 1.
+        Words of memory for each channel, a power of two. The last one always holds 1.
+    schedule : tuple of (str, int, int)
+        What is done one after the other: name, first instruction and number of instructions of each value.
     accumulator_bits : int
         Width that the accumulator needs, by the ranges of everything that enters it.
     """
@@ -116,12 +119,13 @@ class Program:
     output: Place
     states: int
     words: int
+    schedule: tuple[tuple[str, int, int], ...]
     accumulator_bits: int
 
     @property
     def one(self) -> int:
         """Address of the word that always holds 1."""
-        return self.states
+        return self.words - 1
 
     @property
     def serial_cycles(self) -> int:
@@ -136,27 +140,6 @@ class Program:
         value = instruction.constant
         return value.bit_length() if value > 0 else (-value - 1).bit_length() + 1
 
-    @property
-    def schedule(self) -> list[tuple[str, int, int]]:
-        """What is done one after the other: name, first instruction and number of instructions of each value."""
-        names = {place.address + place.digits - 1: place.name for place in self.places}
-        found: list[tuple[str, int, int]] = []
-        start = 0
-        for index, (do, address, _) in enumerate(self.instructions):
-            following = self.instructions[index + 1].do if index + 1 < len(self.instructions) else None
-            if do is Do.FINISH:
-                found.append((names[address], start, index + 1 - start))
-            elif do is Do.TAKE and following is not Do.TAKE:
-                found.append(("input", start, index + 1 - start))
-            elif do is Do.JUDGE:
-                found.append(("range", start, index + 1 - start))
-            elif following is None:
-                found.append(("output", start, index + 1 - start))
-            else:
-                continue
-            start = index + 1
-        return found
-
     def padded(self, count: int) -> Program:
         """Return the same in `count` instructions: those that are missing do nothing, before all others.
 
@@ -168,11 +151,16 @@ class Program:
         missing = count - len(self.instructions)
         if missing < 0:
             raise ValueError(f"a program must have at most {count} instructions, not {len(self.instructions)}")
-        return replace(self, instructions=(*[Instruction(Do.NOTHING)] * missing, *self.instructions))
+        waiting = [("waiting", 0, missing)] if missing else []
+        return replace(
+            self,
+            instructions=(*[Instruction(Do.NOTHING)] * missing, *self.instructions),
+            schedule=(*waiting, *((name, start + missing, count) for name, start, count in self.schedule)),
+        )
 
     def reset(self) -> list[int]:
-        """Words of a channel after reset: states are 0, and what is not the word of ones may be anything."""
-        return [int(address >= self.one) for address in range(self.words)]
+        """Words of a channel after reset."""
+        return [int(address == self.one) for address in range(self.words)]
 
     def step(self, codes: Sequence[int], words: list[int], input_fracs: Sequence[int]) -> Sample:
         """Compute one sample in exact integers and advance `words` in place; the slow reference.
@@ -254,11 +242,12 @@ def program(datapath: Datapath, digit_bits: int, *, like: Program | None = None)
         If the datapath has an operation that cannot be folded, or the program cannot take over from `like`.
     """
     kept = {} if like is None else {place.name: place.digits for place in like.places}
-    made = _Folding(_flattened(datapath), digit_bits, kept, datapath.calibrated).program()
+    least = 0 if like is None else like.words
+    made = _Folding(_flattened(datapath), digit_bits, kept, datapath.calibrated).program(least)
     if like is None:
         return made
     _check_can_take_over(made, like)
-    return replace(made, words=like.words, accumulator_bits=like.accumulator_bits)
+    return replace(made, accumulator_bits=like.accumulator_bits)
 
 
 def _check_can_take_over(made: Program, like: Program) -> None:
@@ -356,10 +345,14 @@ class _Folding:
         self._sums: dict[int, tuple[_Sum, Fraction]] = {}
         self._places: dict[int, Place] = {}
         self._instructions: list[Instruction] = []
+        self._schedule: list[tuple[str, int, int]] = []
         self._one = 0
 
-    def program(self) -> Program:
-        """Make the program."""
+    def program(self, least_words: int) -> Program:
+        """Make the program, for a memory of at least so many words.
+
+        At first every value has words of its own, and the word of ones comes behind the states.
+        """
         address = states = 0
         for index in sorted(self._stored, key=lambda i: self._nodes[i].op is not Op.DELAY):
             node = self._nodes[index]
@@ -374,31 +367,66 @@ class _Folding:
             address += count
             states += count * state
         self._one = states
-        places = [self._places[index] for index in self._inputs]
-        for k, digit in enumerate(place.address + k for place in places for k in range(place.digits)):
-            self._emit(Do.TAKE, digit, k)
-        for index, ends in zip(self._inputs, self._calibrated, strict=True):
-            self._judge(index, *ends)
-        for index in sorted(self._stored):
-            if self._nodes[index].op not in {Op.INPUT, Op.DELAY}:
-                self._compute(index)
-        for delay in self._delays_in_order():
-            place, source = self._places[delay], self._nodes[delay].operands[0]
-            total, constant = self._value(source)
-            self._evaluate(place, total, constant)
-        output = self._places[self._output]
-        for k in range(output.digits):
-            self._emit(Do.GIVE, output.address + k, k)
+        self._emit_all()
+        accumulator_bits = self._accumulator_bits()
+        words = self._share_words(states, least_words)
         return Program(
             digit_bits=self._bits,
             instructions=tuple(self._instructions),
             places=tuple(self._places.values()),
             inputs=tuple(self._places[i] for i in self._inputs),
-            output=output,
+            output=self._places[self._output],
             states=states,
-            words=address,
-            accumulator_bits=self._accumulator_bits(),
+            words=words,
+            schedule=tuple(self._schedule),
+            accumulator_bits=accumulator_bits,
         )
+
+    def _emit_all(self) -> None:
+        places = [self._places[index] for index in self._inputs]
+        for k, digit in enumerate(place.address + k for place in places for k in range(place.digits)):
+            self._emit(Do.TAKE, digit, k)
+        self._scheduled("input")
+        for index, ends in zip(self._inputs, self._calibrated, strict=True):
+            self._judge(index, *ends)
+        self._scheduled("range")
+        for index in self._in_order():
+            self._evaluate(self._places[index], *self._sum(index))
+            self._scheduled(self._places[index].name)
+        output = self._places[self._output]
+        for k in range(output.digits):
+            self._emit(Do.GIVE, output.address + k, k)
+        self._scheduled("output")
+
+    def _scheduled(self, name: str) -> None:
+        """Note that all instructions since the last note are about `name`."""
+        start = sum(self._schedule[-1][1:]) if self._schedule else 0
+        count = len(self._instructions) - start
+        if count:
+            self._schedule.append((name, start, count))
+
+    def _share_words(self, states: int, least: int) -> int:
+        """Give words to several values where their lives allow it; return how many there are then, a power of two."""
+        uses: dict[int, list[int]] = {}
+        for number, (do, address, _) in enumerate(self._instructions):
+            if do not in {Do.NOTHING, Do.DROP, Do.JUDGE}:
+                uses.setdefault(address, []).append(number)
+        values = []
+        for place in self._places.values():
+            if not place.is_state:
+                found = sorted(number for k in range(place.digits) for number in uses.get(place.address + k, ()))
+                values.append((Extent(place.address, place.digits), Life(found[0], found[-1])))
+        given, end = packed(values, states)
+        words = max(1 << end.bit_length(), least)
+        moved = {self._one: words - 1} | {
+            extent.address + k: address + k for extent, address in given.items() for k in range(extent.words)
+        }
+        self._instructions = [i._replace(address=moved.get(i.address, i.address)) for i in self._instructions]
+        self._places = {
+            index: replace(place, address=moved.get(place.address, place.address))
+            for index, place in self._places.items()
+        }
+        return words
 
     # What is stored.
 
@@ -538,25 +566,35 @@ class _Folding:
                 self._emit(Do.MULTIPLY, self._one, -sign * digit)
                 self._emit(*((Do.JUDGE,) if k == place.digits - 1 else (Do.DROP,)))
 
-    def _compute(self, index: int) -> None:
+    def _sum(self, index: int) -> tuple[_Sum, Fraction]:
+        """Return what a stored value is, in terms of others."""
         node = self._nodes[index]
-        total, constant = self._value(node.operands[0]) if node.op is Op.FLOOR else self._definition(index)
-        self._evaluate(self._places[index], total, constant)
+        return self._value(node.operands[0]) if node.op in {Op.FLOOR, Op.DELAY} else self._definition(index)
 
-    def _delays_in_order(self) -> list[int]:
-        """Delays, each before the one that it takes its value from is overwritten."""
-        delays = [i for i, node in enumerate(self._nodes) if node.op is Op.DELAY]
-        order: list[int] = []
-        while len(order) < len(delays):
-            for delay in delays:
-                readers = [d for d in delays if d not in order and d != delay and self._reads(d, delay)]
-                if delay not in order and not readers:
-                    order.append(delay)
-        return order
+    def _in_order(self) -> Iterator[int]:
+        """Yield values in the order of the datapath, and states as soon as nothing needs what they held before.
 
-    def _reads(self, delay: int, other: int) -> bool:
-        total, _ = self._value(self._nodes[delay].operands[0])
-        return any(term.place == other for term in total)
+        The sooner, the shorter the lives of the values that states come from.
+        """
+        read = {
+            i: {place for term in self._sum(i)[0] for place in (term.place, term.other)}
+            for i in self._stored
+            if self._nodes[i].op is not Op.INPUT
+        }
+        values = [i for i in sorted(read) if self._nodes[i].op is not Op.DELAY]
+        delays = [i for i in sorted(read) if self._nodes[i].op is Op.DELAY]
+        while values or delays:
+            waiting = set(values)
+            free = [
+                d
+                for d in delays
+                if not read[d] & waiting and not any(d in read[i] for i in (*values, *delays) if i != d)
+            ]
+            if free:
+                delays.remove(free[0])
+                yield free[0]
+            else:
+                yield values.pop(0)
 
     def _evaluate(self, place: Place, total: _Sum, constant: Fraction) -> None:
         """Emit the columns of a sum, the lowest first, and store those from the place's own on."""

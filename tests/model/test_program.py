@@ -73,13 +73,26 @@ def test_constants_and_words_fit_the_multiplier(digit_bits: int) -> None:
     limit = 1 << digit_bits
     assert all(-limit <= constant < limit for _, _, constant in made.instructions)
     assert {address for do, address, _ in made.instructions if do in WRITES}.isdisjoint({made.one})
-    places = sorted(made.places, key=lambda place: place.address)
-    ends = [place.address + place.digits for place in places]
-    starts = [end + (end == made.one) for end in [0, *ends[:-1]]]  # the word of ones lies behind the states
-    assert [place.address for place in places] == starts
-    assert {place.is_state for place in places if place.address < made.one} == {True}
-    assert {place.is_state for place in places if place.address > made.one} == {False}
-    assert made.words == ends[-1]
+    states = sorted((place for place in made.places if place.is_state), key=lambda place: place.address)
+    ends = [place.address + place.digits for place in states]
+    assert [place.address for place in states] == [0, *ends[:-1]]
+    assert made.states == ends[-1]
+    others = [place for place in made.places if not place.is_state]
+    assert all(made.states <= place.address <= made.one - place.digits for place in others)
+    assert made.words == made.one + 1 == 1 << made.one.bit_length()
+
+
+def test_words_are_used_again() -> None:
+    made = program(example_design("flange_wear_locomotive.toml", realization="df1_ef2").datapath, 15)
+    others = [place for place in made.places if not place.is_state]
+    assert made.words - made.states < sum(place.digits for place in others)
+
+
+def test_the_schedule_covers_the_program() -> None:
+    made = program(example_design("flange_wear_locomotive.toml", realization="df1_ef2").datapath, 15)
+    ends = [start + count for _, start, count in made.schedule]
+    assert [start for _, start, _ in made.schedule] == [0, *ends[:-1]]
+    assert ends[-1] == len(made.instructions)
 
 
 def test_an_accumulator_that_is_too_narrow_is_noticed() -> None:
