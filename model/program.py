@@ -30,14 +30,15 @@ class Do(Enum):
     """What an instruction does: ``m`` is the word at its address, ``acc`` the accumulator, ``t`` the operand."""
 
     NOTHING = "nothing"
-    TAKE = "take"  # m = next digit of the input sample
+    TAKE = "take"  # m = digit of the input sample that the constant counts
     MULTIPLY = "multiply"  # acc += m * constant
     OPERAND = "operand"  # t = m
     PRODUCT = "product"  # acc += m * t
     STORE = "store"  # m = low digit of acc; acc >>= digit_bits
     DROP = "drop"  # acc >>= digit_bits
     FINISH = "finish"  # m = low digit_bits + 1 bits of acc, signed; acc = 0
-    GIVE = "give"  # next digit of the output sample = m
+    GIVE = "give"  # digit of the output sample that the constant counts = m
+    JUDGE = "judge"  # the input is outside the calibrated range if acc < 0; acc = 0
 
 
 class Instruction(NamedTuple):
@@ -46,6 +47,13 @@ class Instruction(NamedTuple):
     do: Do
     address: int = 0
     constant: int = 0
+
+
+class Sample(NamedTuple):
+    """What comes of a sample: the output's code before it is limited, and whether the input was outside its range."""
+
+    code: int
+    outside: bool
 
 
 class FoldingError(ValueError):
@@ -140,6 +148,8 @@ class Program:
                 found.append((names[address], start, index + 1 - start))
             elif do is Do.TAKE and following is not Do.TAKE:
                 found.append(("input", start, index + 1 - start))
+            elif do is Do.JUDGE:
+                found.append(("range", start, index + 1 - start))
             elif following is None:
                 found.append(("output", start, index + 1 - start))
             else:
@@ -164,7 +174,7 @@ class Program:
         """Words of a channel after reset: states are 0, and what is not the word of ones may be anything."""
         return [int(address >= self.one) for address in range(self.words)]
 
-    def step(self, codes: Sequence[int], words: list[int], input_fracs: Sequence[int]) -> int:
+    def step(self, codes: Sequence[int], words: list[int], input_fracs: Sequence[int]) -> Sample:
         """Compute one sample in exact integers and advance `words` in place; the slow reference.
 
         Parameters
@@ -178,8 +188,8 @@ class Program:
 
         Returns
         -------
-        int
-            Code of the output, before it is limited to the output's range.
+        Sample
+            The output.
 
         Raises
         ------
@@ -187,16 +197,17 @@ class Program:
             If the accumulator leaves its width, or a word its digit.
         """
         base, limit = 1 << self.digit_bits, 1 << (self.accumulator_bits - 1)
-        supply = (
+        supply = [
             digit
             for code, frac, place in zip(codes, input_fracs, self.inputs, strict=True)
             for digit in digits_of(code << (place.frac - frac), place.digits, self.digit_bits)
-        )
-        given: list[int] = []
+        ]
+        code = 0
+        outside = False
         acc = operand = 0
         for do, address, constant in self.instructions:
             if do is Do.TAKE:
-                words[address] = next(supply)
+                words[address] = supply[constant]
             elif do is Do.MULTIPLY:
                 acc += words[address] * constant
             elif do is Do.OPERAND:
@@ -210,10 +221,12 @@ class Program:
             elif do is Do.FINISH:
                 words[address], acc = (acc + base) % (2 * base) - base, 0
             elif do is Do.GIVE:
-                given.append(words[address])
+                code += words[address] << (self.digit_bits * constant)
+            elif do is Do.JUDGE:
+                outside, acc = outside or acc < 0, 0
             if not (-limit <= acc < limit and -base <= words[address] < base):
                 raise OverflowError(f"the accumulator must stay within {self.accumulator_bits} bits, not {acc}")
-        return sum(digit << (self.digit_bits * k) for k, digit in enumerate(given))
+        return Sample(code, outside)
 
 
 def digits_of(code: int, count: int, digit_bits: int) -> list[int]:
@@ -241,7 +254,7 @@ def program(datapath: Datapath, digit_bits: int, *, like: Program | None = None)
         If the datapath has an operation that cannot be folded, or the program cannot take over from `like`.
     """
     kept = {} if like is None else {place.name: place.digits for place in like.places}
-    made = _Folding(_flattened(datapath), digit_bits, kept).program()
+    made = _Folding(_flattened(datapath), digit_bits, kept, datapath.calibrated).program()
     if like is None:
         return made
     _check_can_take_over(made, like)
@@ -324,8 +337,11 @@ _Sum = dict[_Term, Fraction]
 class _Folding:
     """Works out what to store, where, and in which order to compute it."""
 
-    def __init__(self, flat: _Flat, digit_bits: int, kept: Mapping[str, int]) -> None:
+    def __init__(
+        self, flat: _Flat, digit_bits: int, kept: Mapping[str, int], calibrated: Sequence[tuple[int, int]]
+    ) -> None:
         self._nodes, self._inputs, self._output = flat
+        self._calibrated = calibrated
         self._bits = digit_bits
         self._kept = kept
         last = self._nodes[self._output]
@@ -358,10 +374,11 @@ class _Folding:
             address += count
             states += count * state
         self._one = states
-        for index in self._inputs:
-            place = self._places[index]
-            for k in range(place.digits):
-                self._emit(Do.TAKE, place.address + k)
+        places = [self._places[index] for index in self._inputs]
+        for k, digit in enumerate(place.address + k for place in places for k in range(place.digits)):
+            self._emit(Do.TAKE, digit, k)
+        for index, ends in zip(self._inputs, self._calibrated, strict=True):
+            self._judge(index, *ends)
         for index in sorted(self._stored):
             if self._nodes[index].op not in {Op.INPUT, Op.DELAY}:
                 self._compute(index)
@@ -371,7 +388,7 @@ class _Folding:
             self._evaluate(place, total, constant)
         output = self._places[self._output]
         for k in range(output.digits):
-            self._emit(Do.GIVE, output.address + k)
+            self._emit(Do.GIVE, output.address + k, k)
         return Program(
             digit_bits=self._bits,
             instructions=tuple(self._instructions),
@@ -511,6 +528,16 @@ class _Folding:
 
     # How they are computed.
 
+    def _judge(self, index: int, low: int, high: int) -> None:
+        """Subtract the ends of an input's calibrated range that are not those of its codes, and judge by the sign."""
+        node, place = self._nodes[index], self._places[index]
+        ends = [(low, 1)] * (low > node.low) + [(high, -1)] * (high < node.high)
+        for end, sign in ends:
+            for k, digit in enumerate(digits_of(end << (place.frac - node.frac), place.digits, self._bits)):
+                self._emit(Do.MULTIPLY, place.address + k, sign)
+                self._emit(Do.MULTIPLY, self._one, -sign * digit)
+                self._emit(*((Do.JUDGE,) if k == place.digits - 1 else (Do.DROP,)))
+
     def _compute(self, index: int) -> None:
         node = self._nodes[index]
         total, constant = self._value(node.operands[0]) if node.op is Op.FLOOR else self._definition(index)
@@ -632,7 +659,7 @@ class _Folding:
                 low, high = low + min(ends), high + max(ends)
             elif do in {Do.STORE, Do.DROP}:
                 low, high = low >> self._bits, high >> self._bits
-            elif do is Do.FINISH:
+            elif do in {Do.FINISH, Do.JUDGE}:
                 low = high = 0
             least, most = min(least, low), max(most, high)
         return max((-least - 1).bit_length(), most.bit_length()) + 1

@@ -31,7 +31,7 @@ def run(made: Program, datapath: Datapath, codes: np.ndarray) -> list[int]:
     graph = datapath.stages[0].graph
     fracs = [graph.nodes[i].frac for i in graph.inputs]
     words = made.reset()
-    given_out = [made.step(sample, words, fracs) for sample in codes.tolist()]
+    given_out = [made.step(sample, words, fracs).code for sample in codes.tolist()]
     return [min(max(code, datapath.output.lowest), datapath.output.highest) for code in given_out]
 
 
