@@ -80,7 +80,8 @@ def interpreted(hardware: CoreDesign, programs: list[tuple[int, Program]], codes
     results = []
     for number, sample in enumerate(codes.tolist()):
         running = [program for start, program in programs if start <= number][-1]
-        results.append(min(max(running.step(sample, words, fracs), output.lowest), output.highest))
+        code = running.step(sample, words, fracs).code
+        results.append(min(max(code, output.lowest), output.highest))
     return results
 
 
