@@ -429,7 +429,7 @@ def with_constants(
 
 
 def _entry_with(made: Quantized, polynomial: Polynomial | None) -> _Entry:
-    """Return what stands before the sections, for another polynomial if it is not None."""
+    """Make what stands before the sections, for another polynomial if it is not None."""
     datapath = made.datapath
     stages = tuple(stage for stage in datapath.stages if isinstance(stage, HornerStep))
     if polynomial is None or made.polynomial is None:

@@ -80,8 +80,7 @@ def interpreted(hardware: CoreDesign, programs: list[tuple[int, Program]], codes
     results = []
     for number, sample in enumerate(codes.tolist()):
         running = [program for start, program in programs if start <= number][-1]
-        code = running.step(sample, words, fracs).code
-        results.append(min(max(code, output.lowest), output.highest))
+        results.append(min(max(running.step(sample, words, fracs).code, output.lowest), output.highest))
     return results
 
 
