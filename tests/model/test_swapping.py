@@ -10,6 +10,7 @@ from tests.gen.designs import example_design
 from sosmith.gen.design import design
 from sosmith.gen.quantize import with_constants
 from sosmith.model.datapath import Datapath
+from sosmith.model.graph import RangeError
 from sosmith.model.swapping import compute_swapping
 
 
@@ -48,6 +49,24 @@ def test_direct_form_i_is_continuous_at_rest(realization: str) -> None:
     codes = np.full((2600, 1), 12345)
     results = np.array(compute_swapping(first, [(2000, other)], codes))
     assert np.ptp(results[1900:]) <= 1
+
+
+def test_a_state_of_another_filter_may_leave_the_ranges_that_are_proven_from_reset() -> None:
+    """The proofs do not cover a swap: with rails as input and twice the cutoff, values come out of their ranges."""
+    made = example_design("audio_lowpass.toml", realization="df1_ef2")
+    assert made.spec.filter.cutoff is not None
+    higher = replace(made.spec.filter, cutoff=tuple(2 * value for value in made.spec.filter.cutoff))
+    other = with_constants(made.quantized, design(higher, float(made.spec.sample_rate)), None).datapath
+    port = made.datapath.inputs[0]
+    codes = np.where(np.arange(400) // 78 % 2, port.highest, port.lowest).reshape(-1, 1)
+    other.compute_exact(codes)
+
+    def swapped_anywhere() -> None:
+        for at in range(100, 300, 9):
+            compute_swapping(made.datapath, [(at, other)], codes)
+
+    with pytest.raises(RangeError, match=r"^(v|taps_A1|taps_A2) must be in -\d+\.\.\d+, not -?\d+$"):
+        swapped_anywhere()
 
 
 def test_states_must_be_the_same() -> None:
