@@ -1,4 +1,8 @@
-"""Other coefficients for hardware that exists: made in its formats, proven anew, and refused where they do not fit."""
+"""Other coefficients for hardware that exists: made in its formats, proven anew, and refused where they do not fit.
+
+Ranges and bound are proven for a core that runs from reset with one set. What a swap hands on is a state that
+another filter made: until it has died away, neither is proven, and at the rails values do leave the ranges.
+"""
 
 from __future__ import annotations
 

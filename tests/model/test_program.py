@@ -126,3 +126,48 @@ def test_digits_make_the_code(code: int) -> None:
     assert sum(digit * Fraction(2) ** (15 * k) for k, digit in enumerate(digits)) == code
     assert all(0 <= digit < 1 << 15 for digit in digits[:-1])
     assert -(1 << 15) <= digits[-1] < 1 << 15
+
+
+def test_a_padded_program_does_nothing_first() -> None:
+    datapath = example_design("audio_lowpass.toml", realization="df1_ef2").datapath
+    made = program(datapath, 15)
+    count = len(made.instructions)
+    padded = made.padded(count + 7)
+    assert padded.instructions == (*[Instruction(Do.NOTHING)] * 7, *made.instructions)
+    codes = stimulus(datapath, 20)
+    assert run(padded, datapath, codes) == datapath.compute_exact(codes)
+    with pytest.raises(ValueError, match=rf"^a program must have at most {count - 1} instructions, not {count}$"):
+        made.padded(count - 1)
+
+
+def test_a_program_takes_over_only_where_everything_fits() -> None:
+    datapath = example_design("audio_lowpass.toml", realization="df1_ef2").datapath
+    made = program(datapath, 15)
+    assert program(datapath, 15, like=made) == made
+    roomy = replace(made, words=made.words + 3, accumulator_bits=made.accumulator_bits + 2)
+    taken = program(datapath, 15, like=roomy)
+    assert (taken.words, taken.accumulator_bits) == (roomy.words, roomy.accumulator_bits)
+    for changed, message in (
+        ({"accumulator_bits": 20}, rf"bits of the accumulator must be at most 20, not {made.accumulator_bits}"),
+        ({"words": 5}, rf"words of memory must be at most 5, not {made.words}"),
+        ({"digit_bits": 14}, "digit_bits must be 14, not 15"),
+        ({"places": ()}, r"its states must be \[\], not \[.*\]"),
+        ({"inputs": ()}, r"digits and fraction bits of its inputs must be \[\], not \[.*\]"),
+    ):
+        with pytest.raises(FoldingError, match=rf"^to take over, {message}$"):
+            program(datapath, 15, like=replace(made, **changed))
+
+
+def test_a_state_keeps_its_digits() -> None:
+    """A program that would need fewer digits for a state takes as many as before: the upper ones hold its sign."""
+    datapath = example_design("audio_lowpass.toml", realization="df1_ef2").datapath
+    made = program(datapath, 15)
+    wider = tuple(replace(p, digits=p.digits + (p.name == "section1.v1")) for p in made.places)
+    with pytest.raises(FoldingError, match=r"^to take over, its states must be .*$"):
+        program(datapath, 15, like=replace(made, places=wider))  # the places behind it would have to move
+    last = [p for p in made.places if p.is_state][-1].name
+    wider = tuple(replace(p, digits=p.digits + (p.name == last)) for p in made.places)
+    taken = program(datapath, 15, like=replace(made, places=wider, words=made.words + 1))
+    assert next(p.digits for p in taken.places if p.name == last) == next(p.digits for p in wider if p.name == last)
+    codes = stimulus(datapath, 20)
+    assert run(taken, datapath, codes) == datapath.compute_exact(codes)
