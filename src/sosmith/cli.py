@@ -26,6 +26,7 @@ from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeEl
 from rich.table import Table
 
 import sosmith
+from sosmith.gen.architecture import Architecture
 from sosmith.gen.certificate_file import Certificate, read_certificate
 from sosmith.gen.comparison import column_names, comparison_json, comparison_page, load_report
 from sosmith.gen.comparison import compare as compare_reports
@@ -43,7 +44,7 @@ from sosmith.model.errors import SosmithError, SpecificationError, ToolError
 from sosmith.model.program import Program
 from sosmith.model.scenarios import SCENARIOS
 from sosmith.model.text_files import write_files
-from sosmith.sim.simulation import bench_of, default_scenario, simulate, trace_for
+from sosmith.sim.simulation import bench_of, default_scenario, simulate, traces_for
 
 _LATER = ("build", "explore", "calibrate", "monitor", "board")
 """Commands that this version does not have yet."""
@@ -294,7 +295,7 @@ def emulate_command(
             _list_scenarios(made)
             return
         step(f"emulating {scenario}")
-        trace = trace_for(made, _known_scenario(made, scenario), seed=seed, seconds=seconds)
+        trace, *_ = traces_for(made, _known_scenario(made, scenario), seed=seed, seconds=seconds)
         if output is not None:
             trace.write_csv(output)
     if output is None:
@@ -400,8 +401,8 @@ def _simulate(
     folder = output or _default_folder(made)
     chosen = source or default_scenario(made)
     step(f"trace {chosen}")
-    trace = trace_for(made, chosen, seed=options["seed"], seconds=seconds)
-    evidence = simulate(made, trace, folder, progress=step, **options)
+    traces = traces_for(made, chosen, seed=options["seed"], seconds=seconds)
+    evidence = simulate(made, traces, folder, progress=step, **options)
     step("writing the report")
     return write_report(evidence, folder), folder
 
@@ -521,8 +522,10 @@ def _print_design(made: CoreDesign, *, brief: bool = False) -> None:
     for subject, reason in made.reasons.items():
         overview.add_row(subject, reason)
     overview.add_row("output", f"{datapath.output.bits} bits, one LSB = {lsb:.6g}{unit}")
-    overview.add_row("multipliers", cost_of(datapath).multiplier_sizes)
-    overview.add_row("adder bits, register bits", f"{cost_of(datapath).adder_bits}, {cost_of(datapath).register_bits}")
+    for name, value in _hardware_rows(made.architecture):
+        overview.add_row(name, value)
+    if made.spec.channels > 1:
+        overview.add_row("channels", f"{made.spec.channels:,}, each at {float(made.spec.sample_rate):,.6g} Hz")
     console.print(overview)
     _print_budget(console, quantized.budget, datapath.output.lsb, datapath.output.unit, made.spec.max_error)
     if brief:
@@ -538,12 +541,30 @@ def _print_design(made: CoreDesign, *, brief: bool = False) -> None:
     _print_schedule(console, made.architecture.program)
 
 
+def _hardware_rows(architecture: Architecture) -> list[tuple[str, str]]:
+    """Say what the hardware has, before synthesis."""
+    program, cost = architecture.program, cost_of(architecture.datapath)
+    latency = ("latency", f"{architecture.latency_cycles:,} clocks")
+    if program is None:
+        sizes = f"{cost.adder_bits}, {cost.register_bits}"
+        return [latency, ("multipliers", cost.multiplier_sizes), ("adder bits, state and register bits", sizes)]
+    word = program.digit_bits + 1
+    multiplier = "none, shifts and additions" if architecture.name == "serial" else f"1 of {word} x {word}"
+    memory = f"{program.words:,} words of {word} bits a channel, {program.states:,} of them states"
+    accumulator = f"{program.accumulator_bits} bits"
+    return [
+        latency,
+        ("multipliers", multiplier),
+        ("accumulator", accumulator),
+        ("memory", memory),
+    ]
+
+
 def _print_schedule(console: Console, program: Program | None) -> None:
     if program is None:
         return
     table = _table(
-        f"Schedule: {len(program.instructions)} instructions, {program.words} words of {program.digit_bits + 1} bits, "
-        f"accumulator of {program.accumulator_bits} bits",
+        f"Schedule: {len(program.instructions)} instructions for each sample of each channel",
         ["from", "clocks", "value", "words"],
     )
     places = {place.name: f"{place.address}..{place.address + place.digits - 1}" for place in program.places}

@@ -10,7 +10,7 @@ from tests.formal.small import port, resonator
 from tests.gen.proven_stages import Format, Ranges, proven_cascade
 
 from sosmith.gen.realizations import WIDE
-from sosmith.hdl.stage import PipelineStage, _ranks, _unique_names
+from sosmith.hdl.stage import PipelineStage, _ranks, unique_names
 from sosmith.model.datapath import Stage
 from sosmith.model.direct_form import DirectForm1, Product
 from sosmith.model.graph import Op
@@ -34,7 +34,7 @@ class StatedRanges(Proof):
         for k, index in enumerate(self.graph.inputs):
             node, code = self.graph.nodes[index], getattr(self.design, f"i{k}")
             m.d.comb += Assume((code >= node.low) & (code <= node.high))
-        names, ranks = _unique_names(self.graph), _ranks(self.graph)
+        names, ranks = unique_names(self.graph), _ranks(self.graph)
         for index, node in enumerate(self.graph.nodes):
             if node.op in {Op.INPUT, Op.CONSTANT, Op.SHIFT}:
                 continue

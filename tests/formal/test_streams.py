@@ -104,7 +104,7 @@ class StreamRules(Proof):
 
 
 def buffer_rules(module: ModuleType = axi_stream) -> StreamRules:
-    return StreamRules(module.OutputBuffer(8), 2, patience=1)
+    return StreamRules(module.StreamBuffer(8), 2, patience=1)
 
 
 def core_rules(module: ModuleType = core, datapath: Datapath | None = None) -> StreamRules:
@@ -203,7 +203,7 @@ def test_a_limit_without_a_sign_is_found_out(tmp_path: Path) -> None:
 
 
 DESIGNS = {
-    "buffer": lambda: axi_stream.OutputBuffer(8),
+    "buffer": lambda: axi_stream.StreamBuffer(8),
     "parallel": lambda: core.Core(resonator()),
     "folded": lambda: folded.FoldedCore(resonator(), program(resonator(), DIGIT_BITS), serial=False),
     "serial": lambda: folded.FoldedCore(resonator(), program(resonator(), DIGIT_BITS), serial=True),
@@ -217,4 +217,4 @@ def test_no_output_depends_on_an_input_within_a_clock(name: str, tmp_path: Path)
 
 def test_a_path_from_sink_to_source_is_found_out(tmp_path: Path) -> None:
     module = broken(axi_stream, "self.advance.eq(~full)", "self.advance.eq(~full | self.o_ready)")
-    assert combinational_outputs(module.OutputBuffer(8), tmp_path) == ["advance"]
+    assert combinational_outputs(module.StreamBuffer(8), tmp_path) == ["advance"]
