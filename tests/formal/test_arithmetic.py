@@ -91,9 +91,14 @@ def test_quantizers_are_what_they_are_called(
         ("[: fracs[0] - node.parameter]", "[: fracs[0] - node.parameter - 1]"),
         ("(1 << shift) - 1, 0)", "1 << shift, 0)"),  # beyond zero
         ("operands[0] < 0, (1 << shift) - 1, 0", "0, 0, 0"),  # downwards
-        ("low, high = Const(node.low), Const(node.high)", "low, high = Const(node.low), Const(node.high - 1)"),
-        ("Mux(operands[0] < low, low,", "Mux(operands[0] <= low, operands[0],"),  # one end alone
+        ("value < Const(low)", "value < Const(low - 1)"),
+        ("value > Const(high)", "value > Const(high + 1)"),
     ],
 )
 def test_a_broken_quantizer_is_found_out(right: str, wrong: str, tmp_path: Path) -> None:
     assert prove(Quantizers(broken(stage, right, wrong), *CASES[0]), tmp_path) == "FAIL"
+
+
+def test_a_broken_limit_of_whole_bits_is_found_out(tmp_path: Path) -> None:
+    module = broken(stage, "top & ~value[bits:-1].all()", "top & ~value[bits + 1 : -1].all()")
+    assert prove(Quantizers(module, *CASES[1]), tmp_path) == "FAIL"
