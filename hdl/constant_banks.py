@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
+
 from amaranth.hdl import Cat, Module, Mux, Signal, Value, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In
@@ -13,6 +16,9 @@ _WORD = 32
 
 Pair = tuple[Value, Value]
 """A constant in the first bank and in the second."""
+
+NO_CONSTANTS: Mapping[int, Pair] = MappingProxyType({})
+"""For a stage whose constants stay."""
 
 
 class ConstantBanks(wiring.Component):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from amaranth.hdl import Cat, ClockDomain, ClockSignal, Const, Module, Mux, ResetSignal, Signal, Value
 from amaranth.lib import wiring
 
@@ -16,7 +18,7 @@ from sosmith.hdl.axi_stream import (
     outside_calibration,
     width,
 )
-from sosmith.hdl.constant_banks import ConstantBanks, Pair
+from sosmith.hdl.constant_banks import NO_CONSTANTS, ConstantBanks, Pair
 from sosmith.hdl.interleaved import InterleavedStage, schedule
 from sosmith.hdl.reload import ReloadPort
 from sosmith.hdl.stage import PipelineStage, banks_in_use, rank_count
@@ -91,7 +93,7 @@ class Core(wiring.Component):
         )
         banks = None if self.fingerprint is None else ConstantBanks(self.datapath, constants(self.datapath))
         stages = [
-            self._stage(m, stage, {} if banks is None else banks.of_stage(k), buffer.advance)
+            self._stage(m, stage, NO_CONSTANTS if banks is None else banks.of_stage(k), buffer.advance)
             for k, stage in enumerate(self.datapath.stages)
         ]
         bank, waiting = Signal(), Signal(2)
@@ -130,7 +132,7 @@ class Core(wiring.Component):
         return m
 
     def _stage(
-        self, m: Module, stage: Stage, constants: dict[int, Pair], advance: Value
+        self, m: Module, stage: Stage, constants: Mapping[int, Pair], advance: Value
     ) -> PipelineStage | InterleavedStage:
         several = self.channels > 1
         component = InterleavedStage(stage, self.channels, constants) if several else PipelineStage(stage, constants)

@@ -17,7 +17,7 @@ from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
 from sosmith.hdl.axi_stream import channel_bits
-from sosmith.hdl.constant_banks import Pair, chosen
+from sosmith.hdl.constant_banks import NO_CONSTANTS, Pair, chosen
 from sosmith.hdl.stage import PLAIN, banks_in_use, limits, logic, shape_of, unique_names
 from sosmith.model.datapath import Stage
 from sosmith.model.graph import Graph, Node, Op
@@ -159,7 +159,7 @@ class InterleavedStage(wiring.Component):
         Whether the stage had to limit it.
     """
 
-    def __init__(self, stage: Stage, channels: int, constants: Mapping[int, Pair]) -> None:
+    def __init__(self, stage: Stage, channels: int, constants: Mapping[int, Pair] = NO_CONSTANTS) -> None:
         self.stage = stage
         self.constants = constants
         self.channels = channels

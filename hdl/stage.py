@@ -13,7 +13,7 @@ from amaranth.hdl import Cat, Const, Module, Mux, Shape, Signal, Value
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
-from sosmith.hdl.constant_banks import Pair, chosen
+from sosmith.hdl.constant_banks import NO_CONSTANTS, Pair, chosen
 from sosmith.model.datapath import Stage
 from sosmith.model.graph import Graph, Node, Op
 
@@ -138,7 +138,7 @@ class PipelineStage(wiring.Component):
         Whether the stage had to limit it.
     """
 
-    def __init__(self, stage: Stage, constants: Mapping[int, Pair]) -> None:
+    def __init__(self, stage: Stage, constants: Mapping[int, Pair] = NO_CONSTANTS) -> None:
         self.stage = stage
         self.constants = constants
         graph = stage.graph

@@ -54,8 +54,8 @@ def test_what_folding_cannot_keep_up_with_is_parallel() -> None:
     made = design_core(replace(spec, channels=64))
     assert made.architecture.name == "parallel"
     assert re.fullmatch(
-        r"parallel: none of the 8 realizations meets the specification: .*the folded architecture takes [\d,]+ clocks a "
-        r"sample: at a clock of [\d,]+ Hz with 64 channels the sample rate must be at most [\d,.]+ Hz, not 48,000 Hz",
+        r"parallel: none of the 8 realizations meets the specification: .*the folded architecture takes [\d,]+ clocks "
+        r"a sample: at a clock of [\d,]+ Hz with 64 channels the sample rate must be at most [\d,.]+ Hz, not 48,000 Hz",
         made.reasons["architecture"],
     )
     assert (manifest(made)["cycles_per_sample"], manifest(made)["schedule"]) == (1, None)
