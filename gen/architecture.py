@@ -28,10 +28,13 @@ class Architecture:
         "serial": the same without a multiplier block.
     datapath : Datapath
         What is computed.
+    channels : int
+        For how many channels.
     """
 
     name: str
     datapath: Datapath
+    channels: int = 1
 
     @cached_property
     def program(self) -> Program | None:
@@ -53,8 +56,15 @@ class Architecture:
     def latency_cycles(self) -> int:
         """Clocks from the edge that accepts a sample to the edge that can hand it on; in serial, at most so many."""
         if self.program is None:
-            return core.latency_cycles(self.datapath)
+            return core.latency_cycles(self.datapath, self.channels)
         return folded.latency_cycles(self.program, serial=self.name == "serial")
+
+    @property
+    def reset_cycles(self) -> int:
+        """Clocks after a reset until the first sample is taken: memories are cleared."""
+        if self.program is None:
+            return self.channels if self.channels > 1 else 0
+        return folded.Addresses(self.program, self.channels).depth
 
     @property
     def cycles_per_sample(self) -> int:
@@ -64,38 +74,73 @@ class Architecture:
     def component(self) -> Component:
         """Make the hardware, whose top module's name is that of the datapath."""
         if self.program is None:
-            return core.Core(self.datapath)
-        return folded.FoldedCore(self.datapath, self.program, serial=self.name == "serial")
+            return core.Core(self.datapath, self.channels)
+        return folded.FoldedCore(self.datapath, self.program, serial=self.name == "serial", channels=self.channels)
 
 
-def chosen(wanted: str, datapath: Datapath, *, clock: Fraction, sample_rate: Fraction) -> tuple[Architecture, str]:
-    """Take the architecture that is asked for; return it and why.
+@dataclass(frozen=True, kw_only=True)
+class Budget:
+    """Time that the hardware has.
 
-    Parameters
+    Attributes
     ----------
-    wanted : str
-        As in the specification.
-    datapath : Datapath
-        What is to be computed.
     clock, sample_rate : Fraction
-        Hz.
+        Hz; the second of each channel.
+    channels : int
+        Number of channels.
+    """
+
+    clock: Fraction
+    sample_rate: Fraction
+    channels: int = 1
+
+    @property
+    def cycles(self) -> int:
+        """Clocks for one sample of one channel."""
+        return int(self.clock / (self.sample_rate * self.channels))
+
+    def check(self, architecture: Architecture) -> None:
+        """Check that `architecture` keeps up.
+
+        Raises
+        ------
+        ShortfallError
+            If the architecture takes more clocks than there are; tells the rate that it could do.
+        """
+        needed = architecture.cycles_per_sample
+        if needed <= self.cycles:
+            return
+        most = float(self.clock / (needed * self.channels))
+        many = f" with {self.channels:,} channels" if self.channels > 1 else ""
+        raise ShortfallError(
+            f"the {architecture.name} architecture takes {needed:,} clock{'s' * (needed > 1)} a sample: at a clock of "
+            f"{float(self.clock):,.0f} Hz{many} the sample rate must be at most {most:,.6g} Hz, "
+            f"not {float(self.sample_rate):,.6g} Hz"
+        )
+
+
+def candidates(wanted: str) -> tuple[str, ...]:
+    """Architectures to be tried for what the specification asks for, the smallest first."""
+    return ("folded", "parallel") if wanted == "auto" else (wanted,)
+
+
+def fitting(name: str, budget: Budget, datapath: Datapath) -> Architecture:
+    """Return the architecture `name` of `datapath`.
 
     Raises
     ------
     ShortfallError
-        If the datapath cannot be folded, or the architecture cannot keep up with the sample rate.
+        If the datapath cannot be folded, or the architecture does not keep up.
     """
-    if wanted == "auto":
-        return Architecture("parallel", datapath), "parallel: what is taken unless another is asked for"
-    architecture = Architecture(wanted, datapath)
-    needed = architecture.cycles_per_sample
-    if needed * sample_rate > clock:
-        most = float(clock / needed)
-        raise ShortfallError(
-            f"the {wanted} architecture takes {needed:,} clocks a sample: at a clock of {float(clock):,.0f} Hz the "
-            f"sample rate must be at most {most:,.6g} Hz, not {float(sample_rate):,.6g} Hz"
-        )
+    architecture = Architecture(name, datapath, budget.channels)
+    budget.check(architecture)
+    return architecture
+
+
+def reason_for(architecture: Architecture, budget: Budget, *, asked: bool, refused: str) -> str:
+    """Say why an architecture was taken; `refused` is why a smaller one was not, if one was tried."""
+    name, needed = architecture.name, architecture.cycles_per_sample
+    why = "asked for in the specification" if asked else refused or "the smallest that keeps up"
     if architecture.program is None:
-        return architecture, "parallel: asked for in the specification"
-    available = int(clock / sample_rate)
-    return architecture, f"{wanted}: asked for in the specification; takes {needed:,} of {available:,} clocks a sample"
+        return f"{name}: {why}"
+    return f"{name}: {why}; takes {needed:,} of {budget.cycles:,} clocks a sample"

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
-from sosmith.gen.architecture import Architecture, chosen
-from sosmith.gen.cost import LUTS_OF_A_BLOCK, cost_of
+from sosmith.gen.architecture import Architecture, Budget, candidates, fitting, reason_for
 from sosmith.gen.design import Filter, design
 from sosmith.gen.quantize import Plan, Quantized, plan, prove, with_realization
-from sosmith.gen.realizations import BEST_KEPT, ERROR_FEEDBACK, REALIZATIONS
+from sosmith.gen.realizations import ERROR_FEEDBACK, REALIZATIONS
+from sosmith.gen.selection import Accept, Selection
 from sosmith.gen.specification import Specification
 from sosmith.model.calibration import Fit, fit, read_measurements
 from sosmith.model.datapath import Datapath
@@ -23,9 +23,6 @@ CORES = ("instrument", "filter", "calibration")
 
 AUTO = "auto"
 """Realization that stands for the cheapest proven one."""
-
-_HOPELESS = 2.5
-"""Ratio to the least area beyond which a plan is not trimmed: in no design seen did trimming save a half."""
 
 Progress = Callable[[str], None]
 
@@ -102,7 +99,7 @@ def design_core(
     progress("filter design")
     ideal = _filter(spec) if kind != "calibration" else None
 
-    def attempt(name: str) -> Plan:
+    def plan_of(name: str) -> Plan:
         progress(f"word lengths, {name}" if ideal is not None else "word lengths")
         return plan(
             name=spec.name,
@@ -114,90 +111,45 @@ def design_core(
             realization=name,
         )
 
+    selection = Selection(plan_of, progress)
+    given: tuple[Quantized, str] | None = None
     if ideal is None:
-        quantized, reason = prove(attempt(next(iter(REALIZATIONS)))), "none: a calibration has no filter sections"
+        given = prove(plan_of(next(iter(REALIZATIONS)))), "none: a calibration has no filter sections"
     elif widths_of is not None:
         if wanted not in ERROR_FEEDBACK:
             raise SpecificationError(
                 f"the realization at the widths of {widths_of} must be {', '.join(ERROR_FEEDBACK)}, not {wanted}"
             )
-        quantized = with_realization(prove(attempt(widths_of).trimmed()), wanted)
-        reason = f"{wanted} at the word lengths chosen for {widths_of}, as asked"
-    elif wanted == AUTO:
-        quantized, reason = _cheapest(attempt, progress)
-    else:
+        quantized = with_realization(selection.proven(widths_of), wanted)
+        given = quantized, f"{wanted} at the word lengths chosen for {widths_of}, as asked"
+    elif wanted != AUTO:
         source = "on the command line" if realization is not None else "in the specification"
-        quantized, reason = prove(attempt(wanted).trimmed()), f"{wanted}: asked for {source}"
-    hardware = spec.hardware
-    architecture, why = chosen(
-        hardware.architecture, quantized.datapath, clock=hardware.clock, sample_rate=spec.sample_rate
-    )
-    reasons = {"realization": reason, "architecture": why}
-    return CoreDesign(spec=spec, core=kind, quantized=quantized, architecture=architecture, reasons=reasons, fit=fitted)
+        given = selection.proven(wanted), f"{wanted}: asked for {source}"
 
+    def select(accept: Accept) -> tuple[Quantized, str]:
+        return selection.cheapest(accept) if given is None else given
 
-def _cheapest(attempt: Callable[[str], Plan], progress: Progress) -> tuple[Quantized, str]:
-    """Plan every realization; return the proven one of the smallest estimated area, and why.
-
-    Plans that are not far larger than the least are trimmed. Proofs are made in the order of the planned areas, until
-    none that is left promises to be smaller.
-
-    Raises
-    ------
-    ShortfallError
-        If none meets the specification; says what stands in the way, where that differs for `BEST_KEPT`.
-    """
-    plans: list[Plan] = []
-    failures: dict[str, str] = {}
-    for name in REALIZATIONS:
+    budget = Budget(clock=spec.hardware.clock, sample_rate=spec.sample_rate, channels=spec.channels)
+    names = candidates(spec.hardware.architecture)
+    refused = ""
+    for name in names:
         try:
-            plans.append(attempt(name))
-        except ShortfallError as error:
-            failures[name] = str(error)
-    least = math.inf
-    for index, planned in sorted(enumerate(plans), key=lambda entry: entry[1].area):
-        if planned.area <= _HOPELESS * least:
-            progress(f"trimming, {planned.realization}")
-            plans[index] = planned.trimmed()
-            least = min(least, plans[index].area)
-    plans.sort(key=lambda planned: planned.area)
-    best: tuple[float, Quantized] | None = None
-    for planned in plans:
-        if best is not None and planned.area >= best[0]:
+            quantized, reason = select(partial(fitting, name, budget))
+            architecture = fitting(name, budget, quantized.datapath)
             break
-        progress(f"proof, {planned.realization}")
-        try:
-            quantized = prove(planned)
         except ShortfallError as error:
-            failures[planned.realization] = str(error)
-            continue
-        found = cost_of(quantized.datapath).area
-        if best is None or found < best[0]:
-            best = found, quantized
-    if best is None:
-        with_best = "" if len(set(failures.values())) == 1 else f"with {BEST_KEPT}, "
-        raise ShortfallError(
-            f"none of the {len(failures)} realizations meets the specification: {with_best}{failures[BEST_KEPT]}"
-        )
-    area, quantized = best
-    short = {*failures, *(planned.realization for planned in plans if planned.area == math.inf)}
-    left = [planned for planned in plans if planned.realization not in {quantized.realization, *short}]
-    why = f"the smallest estimated area of {len(left) + 1}" if left else "the only one proven"
-    reason = (
-        f"{quantized.realization}: {why}, {round(area):,} LUT4 with a multiplier block counted as {LUTS_OF_A_BLOCK}"
+            if name == names[-1]:
+                raise
+            refused = str(error)
+    why = reason_for(architecture, budget, asked=len(names) == 1, refused=refused)
+    return CoreDesign(
+        spec=spec,
+        core=kind,
+        quantized=quantized,
+        architecture=architecture,
+        reasons={"realization": reason, "architecture": why},
+        fit=fitted,
     )
-    others = [
-        ", ".join(f"{other.realization} {round(other.area):,}" for other in left),
-        _falling_short([name for name in REALIZATIONS if name in short]),
-    ]
-    rest = "; ".join(other for other in others if other)
-    return quantized, f"{reason} ({rest})" if rest else reason
-
-
-def _falling_short(names: list[str]) -> str:
-    if not names:
-        return ""
-    return f"{names[0]} falls short" if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]} fall short"
 
 
 def _chosen_core(spec: Specification, core: str | None) -> str:

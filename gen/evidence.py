@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -105,7 +105,8 @@ class Format:
 class Evidence:
     """Everything a report shows.
 
-    The sample arrays have the shape (n,), one entry per output sample, in the output's `unit`.
+    The sample arrays have the shape (n,) or (n, channels), one entry per output sample, in the output's `unit`; `time`
+    is always of the shape (n,).
 
     Attributes
     ----------
@@ -161,6 +162,8 @@ class Evidence:
     limit_cycles : sequence of Mapping
         As in the manifest, one for each section: ``section``, ``largest`` and ``dead_band`` in `unit`, ``none``
         (whether it is proven to come to rest), ``lyapunov`` (weights as texts of rationals, or None).
+    shown_channel : int or None
+        Channel that the sample arrays are of, where they are of one of several.
     filter : FilterFacts or None
         None for a core without a filter.
     alternatives : sequence of Alternative
@@ -202,6 +205,7 @@ class Evidence:
     formats: Sequence[Format] = ()
     sections: Sequence[Mapping[str, Any]] = ()
     limit_cycles: Sequence[Mapping[str, Any]] = ()
+    shown_channel: int | None = None
     filter: FilterFacts | None = None
     alternatives: Sequence[Alternative] = ()
 
@@ -213,9 +217,11 @@ class Evidence:
         if self.samples < 1:
             raise ValueError(f"samples must be at least 1, not {self.samples!r}")
         shape = np.shape(self.hardware)
-        if len(shape) != 1 or shape[0] < 1:
-            raise ValueError(f"hardware must have the shape (n,) with n >= 1, not {shape!r}")
-        for name in ("time", "golden", "truth", "reading", "unfiltered"):
+        if len(shape) not in {1, 2} or min(shape) < 1:
+            raise ValueError(f"hardware must have the shape (n,) or (n, channels) with n >= 1, not {shape!r}")
+        if np.shape(self.time) != shape[:1]:
+            raise ValueError(f"time must have the shape {shape[:1]!r}, not {np.shape(self.time)!r}")
+        for name in ("golden", "truth", "reading", "unfiltered"):
             values = getattr(self, name)
             if values is not None and np.shape(values) != shape:
                 raise ValueError(f"{name} must have the shape {shape!r}, not {np.shape(values)!r}")
@@ -225,8 +231,22 @@ class Evidence:
 
     @property
     def error(self) -> Array:
-        """Hardware minus golden, shape (n,), in `unit`."""
+        """Hardware minus golden, in `unit`."""
         return self.hardware - self.golden
+
+    @property
+    def worst_channel(self) -> int:
+        """Number of the channel that has the largest error."""
+        return int(np.argmax(np.abs(self.error).max(axis=0))) if self.error.ndim == 2 else 0
+
+    def of_channel(self, channel: int) -> Evidence:
+        """Return the same with arrays of the shape (n,), those of one channel."""
+        if self.error.ndim == 1:
+            return self
+        names = ("golden", "hardware", "truth", "reading", "unfiltered")
+        arrays = {name: getattr(self, name) for name in names}
+        columns: dict[str, Any] = {name: None if array is None else array[:, channel] for name, array in arrays.items()}
+        return replace(self, shown_channel=channel if self.channels > 1 else None, **columns)
 
     @property
     def rivals(self) -> list[Alternative]:

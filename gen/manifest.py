@@ -9,25 +9,32 @@ from sosmith.gen.core import CoreDesign
 from sosmith.gen.cost import cost_of
 from sosmith.gen.limit_cycles import limit_cycles, recursions
 from sosmith.gen.linear_model import linear_model
-from sosmith.hdl.axi_stream import fields, width
+from sosmith.hdl.axi_stream import dest_width, fields, width
 from sosmith.model.datapath import Datapath, Stage
 from sosmith.model.direct_form import DirectForm1
 from sosmith.model.graph import Graph, Op
 from sosmith.model.horner import HornerStep
 from sosmith.model.port import Port
 from sosmith.model.program import Program
+from sosmith.model.status import STATUS_BITS, Flag
 
 
 def manifest(design: CoreDesign) -> dict[str, Any]:
     """Return the manifest as a tree of JSON values; lengths in bits, errors in the output's unit."""
-    quantized, datapath = design.quantized, design.datapath
+    quantized, datapath, channels = design.quantized, design.datapath, design.spec.channels
     output = datapath.output
     return {
         "name": datapath.name,
         "core": design.core,
         "sosmith_version": sosmith.__version__,
         "spec": design.spec.source,
-        "streams": {"s_axis": _stream(datapath.inputs), "m_axis": _stream((datapath.output,))},
+        "channels": channels,
+        "streams": {
+            "s_axis": _stream(datapath.inputs, channels),
+            "m_axis": _stream((datapath.output,), channels)
+            | {"tuser": {"width": STATUS_BITS, "flags": {flag.name.lower(): flag.value for flag in Flag}}},
+        },
+        "reset_cycles": design.architecture.reset_cycles,
         "latency_cycles": design.architecture.latency_cycles,
         "cycles_per_sample": design.architecture.cycles_per_sample,
         "realization": quantized.realization if quantized.sections else None,
@@ -102,6 +109,7 @@ def _schedule(program: Program | None) -> dict[str, Any] | None:
     return {
         "digit_bits": program.digit_bits,
         "accumulator_bits": program.accumulator_bits,
+        "states": program.states,
         "words": program.words,
         "places": [
             {"name": p.name, "address": p.address, "digits": p.digits, "frac": p.frac, "state": p.is_state}
@@ -118,8 +126,9 @@ def _aliasing(design: CoreDesign) -> dict[str, float] | None:
     return {"max_deviation": ideal.aliasing.max_deviation, "dc_error": ideal.aliasing.dc_error}
 
 
-def _stream(ports: tuple[Port, ...]) -> dict[str, Any]:
-    return {
+def _stream(ports: tuple[Port, ...], channels: int) -> dict[str, Any]:
+    dest = {"tdest": {"width": dest_width(channels)}} if channels > 1 else {}
+    return dest | {
         "width": width(ports),
         "fields": [
             {

@@ -221,6 +221,11 @@ def _trace_section(evidence: Evidence) -> str:
     )
     if evidence.truth is not None and evidence.filter is not None:
         caption += " Their distance from the true value is the noise the filter lets through, and its delay."
+    if evidence.shown_channel is not None:
+        caption += (
+            f" All pictures show channel {evidence.shown_channel:,}, the one of {evidence.channels:,} "
+            "with the largest error; the figures above are of all channels."
+        )
     drawing = both_widths(plots.trace_figure(evidence, plots.WIDE), plots.trace_figure(evidence, plots.NARROW))
     return "<h2>The measured signal</h2>\n" + _figure("", drawing, caption, legend) + _close_up_figure(evidence)
 
@@ -482,7 +487,9 @@ def _run_section(evidence: Evidence) -> str:
 
 def render_page(evidence: Evidence, summary: Summary) -> str:
     """Whole report page; `summary` is what `sosmith.gen.report.summarise` makes of `evidence`."""
-    body = _header(evidence, summary) + _tiles(evidence, summary) + _trace_section(evidence)
+    body = _header(evidence, summary) + _tiles(evidence, summary)
+    evidence = evidence.of_channel(evidence.worst_channel)
+    body += _trace_section(evidence)
     body += _error_section(evidence, summary)
     if evidence.filter is not None:
         body += _filter_section(evidence.filter, summary["frequency_response"])

@@ -115,7 +115,7 @@ class Specification:
     sample_rate : Fraction
         In Hz, of each channel.
     channels : int
-        Number of channels, 1 so far.
+        Number of channels.
     inputs : tuple of Port
         Voltage (V) and temperature (degC), in this order also where the file has another; without
         `calibration` the one input of the filter, in the unit of the output.

@@ -42,20 +42,15 @@ ARCHITECTURES = ("auto", "parallel", "folded", "serial")
 MAX_ORDER = 20
 """Highest order of the digital filter, ten second-order sections."""
 
+MAX_CHANNELS = 65536
+"""So many channels have numbers of two bytes."""
+
 LOSS_LIMITS = (Fraction(1, 10**6), Fraction(200))
 """In dB: double precision designs ripples down to the first, and a 32-bit code spans less than the second."""
 
 Rows = tuple[tuple[Fraction, ...], ...]
 Loss = Annotated[Fraction | None, PlainValidator(between(*LOSS_LIMITS, "dB"))]
 Edges = Annotated[tuple[Fraction, ...] | None, PlainValidator(edges)]
-
-
-def read_channels(value: object) -> int:
-    """Read the number of channels, of which only one is carried out so far."""
-    channels = whole(1, 65536)(value)
-    if channels > 1:
-        raise UnfitError("1", literal(value), later=True)
-    return channels
 
 
 def read_max_error(value: object) -> Fraction | None:
@@ -133,7 +128,7 @@ class Document(Table):
 
     name: Annotated[str, PlainValidator(identifier)] = Field(description=IDENTIFIER)
     sample_rate: Annotated[Fraction, PlainValidator(positive("Hz"))] = Field(description="a positive number of Hz")
-    channels: Annotated[int, PlainValidator(read_channels)] = 1
+    channels: Annotated[int, PlainValidator(whole(1, MAX_CHANNELS))] = 1
     input: dict[str, InputTable] = Field(description="a table [input.NAME] per input")
     calibration: CalibrationTable | None = Field(default=None, description="a table [calibration]")
     filter: FilterTable = Field(description="a table [filter]")

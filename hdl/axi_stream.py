@@ -1,15 +1,17 @@
-"""AXI4-Stream: where fields lie on the bus, and the output buffer that cuts back-pressure off the inputs."""
+"""AXI4-Stream: a core's ports, where fields lie on the bus, and the buffer that cuts back-pressure off the inputs."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from amaranth.hdl import Cat, Module, Signal, Value
+from amaranth.hdl import Cat, Const, Module, Signal, Value
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
+from sosmith.model.datapath import Datapath
 from sosmith.model.port import Port
+from sosmith.model.status import STATUS_BITS, Flag
 
 
 @dataclass(frozen=True)
@@ -40,18 +42,55 @@ def width(ports: Sequence[Port]) -> int:
     return sum(field.padded for field in fields(ports))
 
 
-def core_members(inputs: Sequence[Port], output: Port) -> dict[str, In | Out]:
+def channel_bits(channels: int) -> int:
+    """Bits that number `channels` channels; 0 for one."""
+    return (channels - 1).bit_length()
+
+
+def dest_width(channels: int) -> int:
+    """Width of ``tdest``, whole bytes; 0 for one channel, which has none."""
+    return -(-channel_bits(channels) // 8) * 8
+
+
+def core_members(inputs: Sequence[Port], output: Port, channels: int = 1) -> dict[str, In | Out]:
     """Clock, reset and the two streams of a core."""
-    return {
+    members: dict[str, In | Out] = {
         "aclk": In(1),
         "aresetn": In(1),
         "s_axis_tdata": In(width(inputs)),
         "s_axis_tvalid": In(1),
         "s_axis_tready": Out(1),
         "m_axis_tdata": Out(width([output])),
+        "m_axis_tuser": Out(STATUS_BITS),
         "m_axis_tvalid": Out(1),
         "m_axis_tready": In(1),
     }
+    if channels > 1:
+        members |= {"s_axis_tdest": In(dest_width(channels)), "m_axis_tdest": Out(dest_width(channels))}
+    return members
+
+
+def input_flags(datapath: Datapath, tdata: Value) -> dict[Flag, Value]:
+    """Tell the flags that a word of the input stream decides."""
+    at_rail: Value = Const(0, 1)
+    outside: Value = Const(0, 1)
+    for field, (low, high) in zip(fields(datapath.inputs), datapath.calibrated, strict=True):
+        code = tdata[field.offset : field.offset + field.port.bits]
+        body = code[:-1]
+        # Both rails have equal bits below the top one; signed or not, the top bit says which of them can be.
+        ones, zeros = (code[-1], ~code[-1]) if not field.port.signed else (~code[-1], code[-1])
+        at_rail = at_rail | (body.all() & ones) | (~body.any() & zeros)
+        value = code.as_signed() if field.port.signed else code
+        if low > field.port.lowest:
+            outside = outside | (value < low)
+        if high < field.port.highest:
+            outside = outside | (value > high)
+    return {Flag.INPUT_AT_RAIL: at_rail, Flag.OUTSIDE_CALIBRATION: outside}
+
+
+def status_word(flags: Mapping[Flag, Value]) -> Value:
+    """Put flags at their places in ``tuser``."""
+    return Cat(*(flags.get(flag, Const(0, 1)) for flag in Flag), Const(0, STATUS_BITS - len(Flag)))
 
 
 def extended(code: Value, bits: int) -> Value:
@@ -62,11 +101,11 @@ def extended(code: Value, bits: int) -> Value:
     return Cat(code, *([top] * (bits - len(code))))
 
 
-class OutputBuffer(wiring.Component):
-    """Two-entry buffer between a pipeline and an AXI4-Stream sink.
+class StreamBuffer(wiring.Component):
+    """Two-entry buffer that no combinational path crosses, between a pipeline and an AXI4-Stream peer.
 
-    The pipeline may advance while `advance` is high, which depends on registers only; a word that it
-    delivers then is never lost. Latency: one clock. Throughput: one word per clock.
+    The source may move while `advance` is high, which depends on registers only; a word that it delivers then is
+    never lost. Latency: one clock. Throughput: one word per clock.
 
     Parameters
     ----------
@@ -76,11 +115,11 @@ class OutputBuffer(wiring.Component):
     Members
     -------
     i_data : In(width)
-        Word from the pipeline.
+        Word from the source.
     i_valid : In(1)
         Whether there is one; taken if `advance` is high.
     advance : Out(1)
-        Whether the pipeline may move at this clock.
+        Whether the source may move at this clock.
     o_data, o_valid, o_ready
         The sink, by AXI4-Stream's rules: `o_data` stays while `o_valid` is high and `o_ready` is low.
     """

@@ -8,14 +8,17 @@ multiplication is done by shifts and additions in the accumulator, and the ranks
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from amaranth.hdl import Cat, ClockDomain, ClockSignal, Const, Module, Mux, ResetSignal, Signal, Value, signed
 from amaranth.lib import wiring
 from amaranth.lib.memory import Memory
 
-from sosmith.hdl.axi_stream import core_members, extended, fields
+from sosmith.hdl.axi_stream import channel_bits, core_members, extended, fields, input_flags, status_word
 from sosmith.model.datapath import Datapath
 from sosmith.model.graph import Op
 from sosmith.model.program import Do, Instruction, Place, Program
+from sosmith.model.status import Flag
 
 _FOLDED_RANKS, _SERIAL_RANKS = 5, 3
 
@@ -27,11 +30,66 @@ def latency_cycles(program: Program, *, serial: bool) -> int:
     return program.serial_cycles + _SERIAL_RANKS if serial else len(program.instructions) + _FOLDED_RANKS
 
 
-class FoldedCore(wiring.Component):
-    """A datapath on one multiply-accumulate unit.
+@dataclass(frozen=True)
+class Addresses:
+    """Where a program's words lie in the memory: first the states of every channel, then what all channels share.
 
-    Latency: `latency_cycles`. Throughput: one sample in one clock more. After reset it first clears its memory, one
-    word a clock.
+    An instruction has an index and, as its top bit, whether it is among the shared words. The places of a channel's
+    states are a power of two, so that the channel's number stands beside the index and nothing has to be added.
+
+    Attributes
+    ----------
+    program : Program
+        Whose words they are.
+    channels : int
+        Number of channels.
+    """
+
+    program: Program
+    channels: int
+
+    @property
+    def _state_bits(self) -> int:
+        return max(self.program.states - 1, 0).bit_length()
+
+    @property
+    def _shared_bits(self) -> int:
+        return (self.program.words - self.program.states - 1).bit_length()
+
+    @property
+    def instruction_bits(self) -> int:
+        """Width of an instruction's address."""
+        return max(self._state_bits, self._shared_bits) + 1
+
+    @property
+    def bits(self) -> int:
+        """Width of an address of the memory."""
+        return max(self._state_bits + channel_bits(self.channels), self._shared_bits) + 1
+
+    @property
+    def depth(self) -> int:
+        """Words of the memory."""
+        return (1 << self.bits - 1) + self.program.words - self.program.states
+
+    def encoded(self, address: int) -> int:
+        """Address of the program as instructions have it."""
+        shared = address - self.program.states
+        return address if shared < 0 else shared | 1 << self.instruction_bits - 1
+
+    def of(self, encoded: Value, channel: Value) -> Value:
+        """Address of the memory from that of an instruction and the channel's number."""
+        is_shared = encoded[-1]
+        if self.channels == 1:
+            return encoded
+        state, shared = Cat(encoded[: self._state_bits], channel), encoded[: self._shared_bits]
+        return Cat(Mux(is_shared, shared, state) | Const(0, self.bits - 1), is_shared)
+
+
+class FoldedCore(wiring.Component):
+    """A datapath on one multiply-accumulate unit, for any number of channels in any order.
+
+    Latency: `latency_cycles`. Throughput: one sample of one channel in one clock more. After reset it first clears its
+    memory, one word a clock. A sample of a channel that does not exist is taken and dropped.
 
     Parameters
     ----------
@@ -41,58 +99,70 @@ class FoldedCore(wiring.Component):
         How.
     serial : bool
         Whether to multiply by shifts and additions instead of a hardware multiplier.
+    channels : int
+        Number of channels.
 
     Members
     -------
-    aclk, aresetn, s_axis_tdata, s_axis_tvalid, s_axis_tready, m_axis_tdata, m_axis_tvalid, m_axis_tready
+    aclk, aresetn, s_axis_*, m_axis_*
         As of `sosmith.hdl.core.Core`.
     """
 
-    def __init__(self, datapath: Datapath, program: Program, *, serial: bool) -> None:
+    def __init__(self, datapath: Datapath, program: Program, *, serial: bool, channels: int = 1) -> None:
         self.datapath = datapath
         self.program = program
         self.serial = serial
-        super().__init__(core_members(datapath.inputs, datapath.output))
+        self.channels = channels
+        self._addresses = Addresses(program, channels)
+        super().__init__(core_members(datapath.inputs, datapath.output, channels))
 
     def elaborate(self, platform: object) -> Module:
         """Build the unit around its two memories."""
         m = Module()
         m.domains.sync = ClockDomain(local=True)
         m.d.comb += [ClockSignal("sync").eq(self.aclk), ResetSignal("sync").eq(~self.aresetn)]
-        advance, clearing, accept = Signal(), Signal(init=1), Signal()
-        m.d.comb += accept.eq(self.s_axis_tvalid & self.s_axis_tready)
-        counter, fetching = self._control(m, advance, clearing, accept)
+        advance, clearing, start = Signal(), Signal(init=1), Signal()
+        channel = self._channel(m, start)
+        counter, fetching = self._control(m, advance, clearing, start)
         ranks = self._fetch(m, advance, counter, fetching)
         data = Signal(signed(self._word), reset_less=True)
         total = self._accumulate(m, advance, ranks, data)
-        self._remember(m, (advance, clearing, accept), (counter, total, data), ranks)
-        self._hand_out(m, advance, ranks, data)
+        self._remember(m, (advance, clearing, start), (counter, total, data, channel), ranks)
+        self._hand_out(m, (advance, start), ranks, data)
         return m
 
     @property
     def _word(self) -> int:
         return self.program.digit_bits + 1
 
-    @property
-    def _address_bits(self) -> int:
-        return max((self.program.words - 1).bit_length(), 1)
+    def _channel(self, m: Module, start: Signal) -> Signal:
+        """Take a sample where its channel exists; return the channel's number while it is computed."""
+        accept = self.s_axis_tvalid & self.s_axis_tready
+        channel = Signal(channel_bits(self.channels), reset_less=True)
+        if self.channels == 1:
+            m.d.comb += start.eq(accept)
+        else:
+            m.d.comb += [start.eq(accept & (self.s_axis_tdest < self.channels)), self.m_axis_tdest.eq(channel)]
+            with m.If(start):
+                m.d.sync += channel.eq(self.s_axis_tdest)
+        return channel
 
-    def _control(self, m: Module, advance: Signal, clearing: Signal, accept: Signal) -> tuple[Signal, Signal]:
+    def _control(self, m: Module, advance: Signal, clearing: Signal, start: Signal) -> tuple[Signal, Signal]:
         """Count through the words to clear after reset, and through the program for each sample."""
-        count, words = len(self.program.instructions), self.program.words
+        count, words = len(self.program.instructions), self._addresses.depth
         counter, fetching = Signal(range(max(count, words))), Signal()
         with m.If(clearing):
             m.d.sync += counter.eq(counter + 1)
             with m.If(counter == words - 1):
                 m.d.sync += [clearing.eq(0), counter.eq(0)]
-        with m.Elif(accept):
+        with m.Elif(start):
             m.d.sync += fetching.eq(1)
         with m.Elif(fetching & advance):
             m.d.sync += counter.eq(counter + 1)
             with m.If(counter == count - 1):
                 m.d.sync += [fetching.eq(0), counter.eq(0)]
         busy = Signal()
-        with m.If(accept):
+        with m.If(start):
             m.d.sync += busy.eq(1)
         with m.If(self.m_axis_tvalid & self.m_axis_tready):
             m.d.sync += busy.eq(0)
@@ -102,21 +172,20 @@ class FoldedCore(wiring.Component):
     def _fetch(self, m: Module, advance: Signal, counter: Signal, fetching: Signal) -> list[_Rank]:
         """Read the program; return the ranks, the first one holding what has just been read."""
         instructions = self.program.instructions
-        code = [_encoded(instruction, self._address_bits, self._word) for instruction in instructions]
-        m.submodules.program = rom = Memory(
-            shape=_DO_BITS + self._address_bits + self._word, depth=len(code), init=code
-        )
+        code = [_encoded(instruction, self._addresses, self._word) for instruction in instructions]
+        address_bits = self._addresses.instruction_bits
+        m.submodules.program = rom = Memory(shape=_DO_BITS + address_bits + self._word, depth=len(code), init=code)
         fetch = rom.read_port()
         m.d.comb += [fetch.addr.eq(counter), fetch.en.eq(advance)]
         valid = Signal(name="valid1")
-        ranks = [_Rank(fetch.data, valid, self._address_bits)]
+        ranks = [_Rank(fetch.data, valid, address_bits)]
         with m.If(advance):
             m.d.sync += valid.eq(fetching)
             for k in range(2, _SERIAL_RANKS + 1 if self.serial else _FOLDED_RANKS + 1):
                 word = Signal(len(fetch.data), name=f"instruction{k}", reset_less=True)
                 valid = Signal(name=f"valid{k}")
                 m.d.sync += [word.eq(ranks[-1].word), valid.eq(ranks[-1].valid)]
-                ranks.append(_Rank(word, valid, self._address_bits))
+                ranks.append(_Rank(word, valid, address_bits))
         return ranks
 
     def _accumulate(self, m: Module, advance: Signal, ranks: list[_Rank], data: Signal) -> Signal:
@@ -147,15 +216,18 @@ class FoldedCore(wiring.Component):
         self,
         m: Module,
         control: tuple[Signal, Signal, Signal],
-        values: tuple[Signal, Signal, Signal],
+        values: tuple[Signal, Signal, Signal, Signal],
         ranks: list[_Rank],
     ) -> None:
         """Read the words that instructions are about, and write those that they store."""
-        (advance, clearing, accept), (counter, total, data) = control, values
+        (advance, clearing, start), (counter, total, data, channel) = control, values
         first, last = ranks[0 if self.serial else 1], ranks[-1]
-        m.submodules.words = ram = Memory(shape=self._word, depth=self.program.words, init=self.program.reset())
+        addresses = self._addresses
+        # After reset, states are 0 and the word of ones is 1; so may be the others that channels share.
+        initial = [address >> addresses.bits - 1 for address in range(addresses.depth)]
+        m.submodules.words = ram = Memory(shape=self._word, depth=addresses.depth, init=initial)
         read, write = ram.read_port(), ram.write_port()
-        m.d.comb += [read.addr.eq(first.address), read.en.eq(advance)]
+        m.d.comb += [read.addr.eq(addresses.of(first.address, channel)), read.en.eq(advance)]
         if self.serial:
             m.d.comb += data.eq(read.data)
         else:
@@ -164,7 +236,7 @@ class FoldedCore(wiring.Component):
         sample = self._input_digits()
         supply = Signal(self._word * len(sample), reset_less=True)
         take = last.does(Do.TAKE)
-        with m.If(accept):
+        with m.If(start):
             m.d.sync += supply.eq(Cat(*sample))
         with m.Elif(advance & last.valid & take):
             m.d.sync += supply.eq(supply >> self._word)
@@ -172,13 +244,14 @@ class FoldedCore(wiring.Component):
         digit = Mux(take, supply[: self._word], Cat(total[: self._word - 1], top))
         stores = take | last.does(Do.STORE) | last.does(Do.FINISH)
         m.d.comb += [
-            write.addr.eq(Mux(clearing, counter, last.address)),
-            write.data.eq(Mux(clearing, ~counter.any(), digit)),  # the word ONE is the first
+            write.addr.eq(Mux(clearing, counter, addresses.of(last.address, channel))),
+            write.data.eq(Mux(clearing, counter[addresses.bits - 1], digit)),
             write.en.eq(clearing | (advance & last.valid & stores)),
         ]
 
-    def _hand_out(self, m: Module, advance: Signal, ranks: list[_Rank], data: Signal) -> None:
+    def _hand_out(self, m: Module, control: tuple[Signal, Signal], ranks: list[_Rank], data: Signal) -> None:
         """Collect the digits of the result; the last instruction of a program gives the last one."""
+        advance, start = control
         *_, following, present, _ = ranks
         given = Signal(self._word * self.program.output.digits, reset_less=True)
         with m.If(advance & present.valid & present.does(Do.GIVE)):
@@ -187,7 +260,16 @@ class FoldedCore(wiring.Component):
             m.d.sync += self.m_axis_tvalid.eq(1)
         with m.If(self.m_axis_tvalid & self.m_axis_tready):
             m.d.sync += self.m_axis_tvalid.eq(0)
-        m.d.comb += self.m_axis_tdata.eq(extended(self._limited(given), self.datapath.output.bytes * 8))
+        code, saturated = self._limited(given)
+        flags: dict[Flag, Value] = {Flag.OUTPUT_SATURATED: saturated}
+        for flag, value in input_flags(self.datapath, self.s_axis_tdata).items():
+            flags[flag] = held = Signal(name=flag.name.lower(), reset_less=True)
+            with m.If(start):
+                m.d.sync += held.eq(value)
+        m.d.comb += [
+            self.m_axis_tdata.eq(extended(code, self.datapath.output.bytes * 8)),
+            self.m_axis_tuser.eq(status_word(flags)),
+        ]
 
     def _multiply_serially(
         self, m: Module, total: Signal, factors: tuple[Value, Value], control: tuple[Signal, Value]
@@ -225,19 +307,21 @@ class FoldedCore(wiring.Component):
         low = [Cat(whole[bits * k : bits * (k + 1)], Const(0, 1)) for k in range(place.digits - 1)]
         return [*low, whole[bits * (place.digits - 1) : bits * place.digits + 1]]
 
-    def _limited(self, given: Value) -> Value:
-        """Return the output code from its digits, limited to the port's range where the datapath limits it."""
-        bits, count = self.program.digit_bits, self.program.output.digits
+    def _limited(self, given: Value) -> tuple[Value, Value]:
+        """Return the output code from its digits, limited to the port's range, and whether it had to be."""
+        bits, count, output = self.program.digit_bits, self.program.output.digits, self.datapath.output
         digits = [given[(bits + 1) * k : (bits + 1) * k + bits] for k in range(count)]
         value = Cat(*digits, given[-1]).as_signed()
         stage = self.datapath.stages[-1].graph
         last = stage.nodes[stage.outputs[0]]
-        if last.op is not Op.CLAMP:
-            return (
-                value[: self.datapath.output.bits] if last.low >= 0 else value[: self.datapath.output.bits].as_signed()
-            )
-        low, high = Const(last.low), Const(last.high)
-        return Mux(value < low, low, Mux(value > high, high, value))[: self.datapath.output.bits]
+        code: Value = value
+        below: Value = Const(0, 1)
+        above: Value = Const(0, 1)
+        if last.op is Op.CLAMP:
+            below, above = value < last.low, value > last.high
+            code = Mux(below, Const(last.low), Mux(above, Const(last.high), value))
+        cut = code[: output.bits]
+        return (cut.as_signed() if output.signed else cut), below | above
 
 
 class _Rank:
@@ -254,6 +338,7 @@ class _Rank:
         return self.word[:_DO_BITS] == list(Do).index(do)
 
 
-def _encoded(instruction: Instruction, address_bits: int, word: int) -> int:
+def _encoded(instruction: Instruction, addresses: Addresses, word: int) -> int:
     do, address, constant = instruction
-    return list(Do).index(do) | address << _DO_BITS | (constant % (1 << word)) << (_DO_BITS + address_bits)
+    upper = addresses.encoded(address) | (constant % (1 << word)) << addresses.instruction_bits
+    return list(Do).index(do) | upper << _DO_BITS

@@ -22,7 +22,7 @@ def shape_of(node: Node) -> Shape:
     return Shape(node.width, signed=node.signed)
 
 
-_PLAIN = {Op.INPUT, Op.CONSTANT, Op.DELAY, Op.SHIFT, Op.FLOOR, Op.FRACTION, Op.BOUND}
+PLAIN = {Op.INPUT, Op.CONSTANT, Op.DELAY, Op.SHIFT, Op.FLOOR, Op.FRACTION, Op.BOUND}
 """What takes no time in hardware."""
 
 
@@ -41,7 +41,7 @@ def _ranks(graph: Graph) -> list[int]:
     late = _late(graph, loop)
     ranks = [0] * len(graph.nodes)
     for part, whole in ((loop, set(range(len(ranks)))), (late, loop)):
-        if part and any(graph.nodes[i].op not in _PLAIN for i in whole - part):
+        if part and any(graph.nodes[i].op not in PLAIN for i in whole - part):
             for i in part:
                 ranks[i] += 1
     return ranks
@@ -129,6 +129,8 @@ class PipelineStage(wiring.Component):
         Output codes of the sample before; defined while `o_valid` is high.
     o_valid : Out(1)
         Whether the outputs hold a sample.
+    o_saturated : Out(1)
+        Whether the stage had to limit it.
     """
 
     def __init__(self, stage: Stage) -> None:
@@ -136,13 +138,13 @@ class PipelineStage(wiring.Component):
         graph = stage.graph
         members = {f"i{k}": In(shape_of(graph.nodes[i])) for k, i in enumerate(graph.inputs)}
         members |= {f"o{k}": Out(shape_of(graph.nodes[i])) for k, i in enumerate(graph.outputs)}
-        super().__init__({**members, "i_valid": In(1), "advance": In(1), "o_valid": Out(1)})
+        super().__init__({**members, "i_valid": In(1), "advance": In(1), "o_valid": Out(1), "o_saturated": Out(1)})
 
     def elaborate(self, platform: object) -> Module:
         """Build the logic."""
         m = Module()
         graph = self.stage.graph
-        names, ranks = _unique_names(graph), _ranks(graph)
+        names, ranks = unique_names(graph), _ranks(graph)
         valid, takes = self._control(m, max(ranks) + 1)
         apart = _known_early(graph, ranks)
         wires: list[Value] = []
@@ -172,7 +174,7 @@ class PipelineStage(wiring.Component):
                 continue
             wire = Signal(shape_of(node), name=name, attrs={"keep": 1} if index in apart else {})
             if node.op is not Op.DELAY:
-                m.d.comb += wire.eq(_logic(graph, node, [at(i, ranks[index]) for i in node.operands]))
+                m.d.comb += wire.eq(logic(graph, node, [at(i, ranks[index]) for i in node.operands]))
             wires.append(wire)
         for i in graph.delays:
             with m.If(takes[ranks[i]]):
@@ -190,6 +192,8 @@ class PipelineStage(wiring.Component):
                 m.d.comb += output.eq(register)
                 with m.If(takes[last]):
                     m.d.sync += register.eq(at(i, last))
+                    if graph.nodes[i].op is Op.CLAMP:
+                        m.d.sync += self.o_saturated.eq(limits(graph.nodes[i], at(graph.nodes[i].operands[0], last)))
         return m
 
     def _control(self, m: Module, count: int) -> tuple[list[Value], list[Value]]:
@@ -204,7 +208,7 @@ class PipelineStage(wiring.Component):
         return valid, takes
 
 
-def _unique_names(graph: Graph) -> list[str]:
+def unique_names(graph: Graph) -> list[str]:
     """Name every node's signal: by its own name, with the index where that is missing or taken."""
     seen: set[str] = set()
     names = []
@@ -241,7 +245,7 @@ def _drop(graph: Graph, node: Node, value: Value) -> Value:
     return value.shift_right(shift)
 
 
-def _logic(graph: Graph, node: Node, operands: list[Value]) -> Value:
+def logic(graph: Graph, node: Node, operands: list[Value]) -> Value:
     """Value of a node from those of its operands; every intermediate result is exact."""
     fracs = [graph.nodes[i].frac for i in node.operands]
     if node.op is Op.CONSTANT:
@@ -264,6 +268,11 @@ def _logic(graph: Graph, node: Node, operands: list[Value]) -> Value:
         low, high = Const(node.low), Const(node.high)
         return Mux(operands[0] < low, low, Mux(operands[0] > high, high, operands[0]))
     return operands[0]  # BOUND drops bits that are known to repeat the sign
+
+
+def limits(node: Node, operand: Value) -> Value:
+    """Whether a CLAMP has to limit `operand`."""
+    return (operand < Const(node.low)) | (operand > Const(node.high))
 
 
 def _aligned(operands: list[Value], fracs: list[int], frac: int) -> Iterator[Value]:

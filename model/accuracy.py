@@ -24,7 +24,7 @@ class ErrorStatistics:
     mean : float
         Mean, the systematic part.
     worst : int
-        Index of the first sample with the largest magnitude.
+        Index of the first sample with the largest magnitude, in the order of the flattened signal.
     """
 
     max_abs: float
@@ -41,9 +41,9 @@ def accuracy_percent(measured: Values, truth: Values, reading: npt.NDArray[np.bo
 
     Parameters
     ----------
-    measured, truth : ndarray, shape (n,)
+    measured, truth : ndarray, shape (n,) or (n, channels)
         Measured and true values in the same unit.
-    reading : ndarray of bool, shape (n,), optional
+    reading : ndarray of bool, shape as these, optional
         The samples that count; without it all of them.
 
     Returns
@@ -68,19 +68,19 @@ def accuracy_percent(measured: Values, truth: Values, reading: npt.NDArray[np.bo
 
 
 def error_statistics(error: Values) -> ErrorStatistics:
-    """Statistics of the error signal `error` of shape (n,).
+    """Statistics of the error signal `error` of any shape.
 
     Raises
     ------
     ValueError
         If it has no sample.
     """
-    if not len(error):
+    if not error.size:
         raise ValueError("error must have at least one sample, not none")
     magnitude = np.abs(error)
     worst = int(np.argmax(magnitude))
     return ErrorStatistics(
-        max_abs=float(magnitude[worst]),
+        max_abs=float(magnitude.max()),
         rms=math.sqrt(float(np.mean(error**2))),
         mean=float(np.mean(error)),
         worst=worst,

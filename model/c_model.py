@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from sosmith.model.graph import Graph, Node, Op
+from sosmith.model.status import Flag
 
 if TYPE_CHECKING:
     from sosmith.model.datapath import Datapath
@@ -28,10 +29,14 @@ def c_header(datapath: Datapath) -> str:
         f"{float(port.lsb)!r} * code {port.unit.replace('*/', '* /')}".rstrip()
         for port in (*datapath.inputs, datapath.output)
     )
+    flags = "\n".join(f" *   {1 << flag:#04x}: {flag.meaning}" for flag in Flag)
     return f"""/* {name}: bit-true model of the generated hardware, made by sosmith.
  *
  * Integer codes in, integer code out:
 {ports}
+ *
+ * Bits of the status of a sample:
+{flags}
  */
 #ifndef {guard}
 #define {guard}
@@ -51,11 +56,13 @@ typedef struct {{
 /* Put one channel into the state after reset. */
 void {name}_reset({name}_state *state);
 
-/* Compute one sample of one channel and advance its state. */
-int64_t {name}_step({name}_state *state{inputs});
+/* Compute one sample of one channel and advance its state; status may be NULL. */
+int64_t {name}_step({name}_state *state{inputs}, uint8_t *status);
 
-/* Compute samples x channels: in[sample][channel][input], out[sample][channel]; states[channel]. */
-void {name}_block({name}_state *states, size_t samples, size_t channels, const int64_t *in, int64_t *out);
+/* Compute samples x channels: in[sample][channel][input], out[sample][channel], status[sample][channel] or NULL;
+ * states[channel]. */
+void {name}_block({name}_state *states, size_t samples, size_t channels, const int64_t *in, int64_t *out,
+{" " * len(f"void {name}_block(")}uint8_t *status);
 
 #ifdef __cplusplus
 }}
@@ -86,21 +93,22 @@ void {name}_reset({name}_state *state)
     memset(state, 0, sizeof *state);
 }}
 
-static inline int64_t step({name}_state *state{parameters})
+static inline int64_t step({name}_state *state{parameters}, uint8_t *status)
 {{
 {_body(datapath)}}}
 
-int64_t {name}_step({name}_state *state{parameters})
+int64_t {name}_step({name}_state *state{parameters}, uint8_t *status)
 {{
-    return step(state{"".join(f", {port.name}_code" for port in inputs)});
+    return step(state{"".join(f", {port.name}_code" for port in inputs)}, status);
 }}
 
-void {name}_block({name}_state *states, size_t samples, size_t channels, const int64_t *in, int64_t *out)
+void {name}_block({name}_state *states, size_t samples, size_t channels, const int64_t *in, int64_t *out,
+{" " * len(f"void {name}_block(")}uint8_t *status)
 {{
     for (size_t c = 0; c < channels; c++) {{
         {name}_state state = states[c]; /* a local copy stays in registers */
         for (size_t n = 0; n < samples; n++)
-            out[n * channels + c] = step(&state{arguments});
+            out[n * channels + c] = step(&state{arguments}, status ? &status[n * channels + c] : 0);
         states[c] = state;
     }}
 }}
@@ -139,8 +147,28 @@ def _body(datapath: Datapath) -> str:
         lines += _stage_lines(stage.graph, prefix, wires, offset)
         wires = [f"{prefix}{i}" for i in stage.graph.outputs]
         offset += len(stage.graph.delays)
+    lines += ["    if (status)\n", f"        *status = {_status(datapath, prefix)};\n"]
     lines.append(f"    return (int64_t){wires[0]};\n")
     return "".join(lines)
+
+
+def _status(datapath: Datapath, prefix: str) -> str:
+    """Expression of the flags; `prefix` is that of the last stage's values."""
+    last = datapath.stages[-1].graph
+    node = last.nodes[last.outputs[0]]
+    conditions: dict[Flag, list[str]] = {flag: [] for flag in Flag}
+    for port, (low, high) in zip(datapath.inputs, datapath.calibrated, strict=True):
+        code = f"{port.name}_code"
+        conditions[Flag.INPUT_AT_RAIL] += [f"{code} == {port.lowest}", f"{code} == {port.highest}"]
+        if low > port.lowest:
+            conditions[Flag.OUTSIDE_CALIBRATION].append(f"{code} < {low}")
+        if high < port.highest:
+            conditions[Flag.OUTSIDE_CALIBRATION].append(f"{code} > {high}")
+    if node.op is Op.CLAMP:
+        before = f"{prefix}{node.operands[0]}"
+        conditions[Flag.OUTPUT_SATURATED] += [f"{before} < {_literal(node.low)}", f"{before} > {_literal(node.high)}"]
+    terms = [f"({' || '.join(found)}) << {flag.value}" for flag, found in conditions.items() if found]
+    return f"(uint8_t)({' | '.join(terms)})"
 
 
 def _stage_lines(graph: Graph, prefix: str, wires: list[str], offset: int) -> list[str]:

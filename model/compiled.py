@@ -7,9 +7,8 @@ import functools
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -20,14 +19,23 @@ from sosmith.model.errors import ToolError
 if TYPE_CHECKING:
     from sosmith.model.datapath import Datapath
 
-Block = Callable[[npt.NDArray[np.int64]], npt.NDArray[np.int64]]
+
+class Block(Protocol):
+    """A compiled datapath."""
+
+    def __call__(
+        self, codes: npt.NDArray[np.int64], *, with_status: bool = False
+    ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.uint8]]:
+        """Compute output codes and, if asked for, status: both (samples, channels), else the status is empty."""
+        ...
+
 
 _FLAGS = ("-O2", "-std=gnu99", "-shared", "-fPIC")
 
 
 @functools.lru_cache(maxsize=64)
 def compile_block(datapath: Datapath) -> Block:
-    """Compile `datapath`; the function returned maps (samples, channels, inputs) to (samples, channels).
+    """Compile `datapath`; the function returned takes codes of the shape (samples, channels, inputs).
 
     Raises
     ------
@@ -37,17 +45,34 @@ def compile_block(datapath: Datapath) -> Block:
     library = _load(datapath.name, c_header(datapath), c_source(datapath))
     function = getattr(library, f"{datapath.name}_block")
     function.restype = None
-    function.argtypes = [ctypes.c_void_p, ctypes.c_size_t, ctypes.c_size_t, ctypes.c_void_p, ctypes.c_void_p]
+    function.argtypes = [
+        ctypes.c_void_p,
+        ctypes.c_size_t,
+        ctypes.c_size_t,
+        ctypes.c_void_p,
+        ctypes.c_void_p,
+        ctypes.c_void_p,
+    ]
     state_size = state_bytes(datapath)
 
-    def block(codes: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+    def block(
+        codes: npt.NDArray[np.int64], *, with_status: bool = False
+    ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.uint8]]:
         samples, channels, _ = codes.shape
         source = np.ascontiguousarray(codes, dtype=np.int64)
         result = np.empty((samples, channels), dtype=np.int64)
         # 16 bytes of alignment for states of 128 bits; numpy allocates large arrays so.
         states = np.zeros((channels, state_size // 8), dtype=np.int64)
-        function(states.ctypes.data, samples, channels, source.ctypes.data, result.ctypes.data)
-        return result
+        status = np.empty((samples, channels) if with_status else (0, 0), dtype=np.uint8)
+        function(
+            states.ctypes.data,
+            samples,
+            channels,
+            source.ctypes.data,
+            result.ctypes.data,
+            status.ctypes.data if with_status else None,
+        )
+        return result, status
 
     return block
 

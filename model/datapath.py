@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+import numpy.typing as npt
 
 from sosmith.model.compiled import compile_block
 from sosmith.model.graph import Graph
@@ -47,14 +48,19 @@ class Datapath:
         Output quantity.
     stages : tuple of Stage
         At least one; the outputs of each are the inputs of the next.
+    calibrated : tuple of (int, int)
+        Lowest and highest code of each input that the calibration's measurements covered; by default, all codes.
     """
 
     name: str
     inputs: tuple[Port, ...]
     output: Port
     stages: tuple[Stage, ...]
+    calibrated: tuple[tuple[int, int], ...] = ()
 
     def __post_init__(self) -> None:
+        if not self.calibrated:
+            object.__setattr__(self, "calibrated", tuple((port.lowest, port.highest) for port in self.inputs))
         first, last = self.stages[0].graph, self.stages[-1].graph
         ports = [(port.lowest, port.highest) for port in self.inputs]
         expected = [(first.nodes[i].low, first.nodes[i].high) for i in first.inputs]
@@ -92,8 +98,19 @@ class Datapath:
         """
         checked = self._checked(codes)
         block = checked[:, np.newaxis, :] if checked.ndim == 2 else checked
-        result = compile_block(self)(block)
+        result, _ = compile_block(self)(block)
         return result[:, 0] if checked.ndim == 2 else result
+
+    def compute_status(self, codes: Codes) -> npt.NDArray[np.uint8]:
+        """Compute the status of each sample, from reset, bit for bit as the hardware does.
+
+        Parameters, errors and shape of the result are those of `compute`; the bits are those of
+        `sosmith.model.status.Flag`.
+        """
+        checked = self._checked(codes)
+        block = checked[:, np.newaxis, :] if checked.ndim == 2 else checked
+        _, status = compile_block(self)(block, with_status=True)
+        return status[:, 0] if checked.ndim == 2 else status
 
     def compute_exact(self, codes: Codes) -> list[int]:
         """Compute one channel in exact integers, checking every node's range; slow.

@@ -25,9 +25,6 @@ from sosmith.model.graph import Node, Op
 HAZARD = 4
 """An instruction that reads what another stored must come at least so many places after it."""
 
-ONE = 0
-"""Address of a word that always holds 1."""
-
 
 class Do(Enum):
     """What an instruction does: ``m`` is the word at its address, ``acc`` the accumulator, ``t`` the operand."""
@@ -96,8 +93,10 @@ class Program:
         Those of the input ports, in port order, filled by TAKE.
     output : Place
         What GIVE hands out, before it is limited to the output's range.
+    states : int
+        Words that are kept from sample to sample, for each channel: the addresses from 0 on.
     words : int
-        Words of memory for each channel.
+        All words; those beyond the states serve every channel. The first of these always holds 1.
     accumulator_bits : int
         Width that the accumulator needs, by the ranges of everything that enters it.
     """
@@ -107,8 +106,14 @@ class Program:
     places: tuple[Place, ...]
     inputs: tuple[Place, ...]
     output: Place
+    states: int
     words: int
     accumulator_bits: int
+
+    @property
+    def one(self) -> int:
+        """Address of the word that always holds 1."""
+        return self.states
 
     @property
     def serial_cycles(self) -> int:
@@ -143,8 +148,8 @@ class Program:
         return found
 
     def reset(self) -> list[int]:
-        """Words of a channel after reset."""
-        return [int(address == ONE) for address in range(self.words)]
+        """Words of a channel after reset: states are 0, and what is not the word of ones may be anything."""
+        return [int(address >= self.one) for address in range(self.words)]
 
     def step(self, codes: Sequence[int], words: list[int], input_fracs: Sequence[int]) -> int:
         """Compute one sample in exact integers and advance `words` in place; the slow reference.
@@ -287,18 +292,23 @@ class _Folding:
         self._sums: dict[int, tuple[_Sum, Fraction]] = {}
         self._places: dict[int, Place] = {}
         self._instructions: list[Instruction] = []
+        self._one = 0
 
     def program(self) -> Program:
         """Make the program."""
-        address = ONE + 1
+        address = states = 0
         for index in sorted(self._stored, key=lambda i: self._nodes[i].op is not Op.DELAY):
             node = self._nodes[index]
+            if node.op is not Op.DELAY and address == states:
+                address += 1  # the word of ones
             count = self._digits(
                 node.low << (self._fracs[index] - node.frac), node.high << (self._fracs[index] - node.frac)
             )
             state = node.op is Op.DELAY
             self._places[index] = Place(node.name or f"value{index}", address, count, self._fracs[index], state)
             address += count
+            states += count * state
+        self._one = states
         for index in self._inputs:
             place = self._places[index]
             for k in range(place.digits):
@@ -319,6 +329,7 @@ class _Folding:
             places=tuple(self._places.values()),
             inputs=tuple(self._places[i] for i in self._inputs),
             output=output,
+            states=states,
             words=address,
             accumulator_bits=self._accumulator_bits(),
         )
@@ -490,7 +501,7 @@ class _Folding:
             for instructions, column in self._products(term, int(factor)):
                 self._place(instructions, column, columns)
         for column, digit in enumerate(self._constant_digits(int(constant * unit))):
-            self._place([Instruction(Do.MULTIPLY, ONE, digit)], column, columns)
+            self._place([Instruction(Do.MULTIPLY, self._one, digit)], column, columns)
         for column, instructions in enumerate(columns):
             for instruction in instructions:
                 self._emit(*instruction)
@@ -560,7 +571,7 @@ class _Folding:
         """Width by interval arithmetic over the program; every digit may take any value of its range."""
         base = 1 << self._bits
         tops = {p.address + p.digits - 1: self._top_range(i, p) for i, p in self._places.items()}
-        tops[ONE] = (1, 1)
+        tops[self._one] = (1, 1)
         low = high = least = most = 0
         operand = (0, 0)
         for do, address, constant in self._instructions:

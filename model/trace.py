@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -92,6 +92,16 @@ class Trace:
     def time(self) -> Values:
         """Time of each sample in s, shape (n,), from 0."""
         return np.arange(len(self), dtype=np.float64) / float(self.sample_rate)
+
+    def delayed(self, samples: int) -> Trace:
+        """Return the same trace, of the same length, beginning `samples` later; its first sample is held until then."""
+        source = np.maximum(np.arange(len(self)) - samples, 0)
+        return replace(
+            self,
+            codes=self.codes[source],
+            truth=None if self.truth is None else self.truth[source],
+            reading=None if self.reading is None else self.reading[source],
+        )
 
     def values(self) -> Values:
         """Physical values of the codes in the ports' units, shape (n, n_inputs)."""

@@ -14,17 +14,6 @@ from typing import Any
 
 from cocotb_tools.runner import Icarus, Verilator, VerilatorControlFile
 
-_PORTS = [
-    "aclk",
-    "aresetn",
-    "s_axis_tdata",
-    "s_axis_tvalid",
-    "s_axis_tready",
-    "m_axis_tdata",
-    "m_axis_tvalid",
-    "m_axis_tready",
-]
-
 
 class _FastVerilator(Verilator):  # type: ignore[misc]
     """Cocotb's runner with only the ports public: builds and simulations are several times faster."""
@@ -40,7 +29,7 @@ def main() -> None:
     if job["simulator"] == "verilator":
         runner: Any = _FastVerilator()
         control = folder / "ports.vlt"
-        control.write_text(_control_file(job["top"]), encoding="utf-8")
+        control.write_text(_control_file(job["top"], job["ports"]), encoding="utf-8")
         sources = [VerilatorControlFile(control), Path(job["source"])]
         # Registers without a reset start at random, as they do in hardware.
         arguments = ["-Wno-fatal", "-O3", "-CFLAGS", "-O2", "--x-initial", "unique"]
@@ -87,8 +76,8 @@ def _build_and_test(job: dict[str, Any], runner: Any, sources: list[Any], argume
     )
 
 
-def _control_file(top: str) -> str:
-    lines = [f'public_flat_rw -module "{top}" -var "{port}"' for port in _PORTS]
+def _control_file(top: str, ports: list[str]) -> str:
+    lines = [f'public_flat_rw -module "{top}" -var "{port}"' for port in ports]
     return "`verilator_config\n" + "\n".join(lines) + "\n"
 
 
@@ -98,7 +87,7 @@ def _changed(job: dict[str, Any], record: Path, arguments: list[str]) -> bool:
 
 def _fingerprint(job: dict[str, Any], arguments: list[str]) -> str:
     source = Path(job["source"]).read_bytes()
-    choices = [job["simulator"], job["version"], job["waves"], sys.version, arguments, __file__]
+    choices = [job["simulator"], job["version"], job["waves"], job["ports"], sys.version, arguments, __file__]
     return hashlib.sha256(source + json.dumps(choices).encode()).hexdigest()
 
 

@@ -20,12 +20,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from sosmith.model.errors import ShortfallError, ToolError
 from sosmith.model.port import Codes
 from sosmith.sim.simulators import Simulator, find_simulator
 
 _POLL_SECONDS = 0.05
+_BLOCK = 8  # samples of each channel in turn, then as many shuffled
 _LOG_TAIL = 12  # lines of the log that an error shows
 
 
@@ -35,8 +37,10 @@ class CosimulationResult:
 
     Attributes
     ----------
-    codes : int64 array, shape (samples, outputs)
-        Output codes in the order received.
+    codes : int64 array, shape (samples, channels, outputs)
+        Output codes.
+    status : uint8 array, shape (samples, channels)
+        Status of the outputs, 0 where the core gives none.
     cycles : int
         Clocks from the end of reset to the last sample received.
     wall_seconds : float
@@ -50,6 +54,7 @@ class CosimulationResult:
     """
 
     codes: Codes
+    status: npt.NDArray[np.uint8]
     cycles: int
     wall_seconds: float
     cycles_per_second: float
@@ -77,9 +82,10 @@ def cosimulate(
     sv : Path
         The SystemVerilog file.
     manifest : mapping
-        The core's manifest: name, streams and latency.
-    codes : int64 array, shape (samples, inputs)
-        Input codes, at least one sample.
+        The core's manifest: name, streams, latency and clocks after a reset.
+    codes : int64 array, shape (samples, channels, inputs)
+        Input codes, at least one sample. Several channels come in an order that changes from the one after the other
+        to any at all.
     build_dir : Path
         Folder for the simulation; an unchanged core is not built again.
     simulator : str
@@ -96,7 +102,7 @@ def cosimulate(
     Raises
     ------
     ShortfallError
-        If the core breaks a rule of AXI4-Stream; says which and where.
+        If the core breaks a rule of AXI4-Stream, or hands out a sample as another channel's; says which and where.
     ToolError
         If a tool is missing or fails.
     """
@@ -107,20 +113,56 @@ def cosimulate(
     with _plain_path(folder) as plain:
         tool = find_simulator(simulator, plain / "bin")
         _write_job(plain, sv, manifest, tool, seed=seed, idle=idle, stall=stall, waves=waves)
-        (plain / "words.txt").write_text("\n".join(f"{word:x}" for word in _pack(codes, inputs)), encoding="utf-8")
-        _run(plain, tool, len(codes), progress)
+        samples, channels, _ = codes.shape
+        order = _order(samples, channels, seed)
+        words = _pack(codes[_turns(order), order], inputs)
+        sent = "\n".join(f"{channel:x} {word:x}" for channel, word in zip(order.tolist(), words, strict=True))
+        (plain / "words.txt").write_text(sent, encoding="utf-8")
+        _run(plain, tool, len(words), progress)
     outcome = json.loads((folder / "result.json").read_text(encoding="utf-8"))
     if outcome["failure"] is not None:
         raise ShortfallError(f"{manifest['name']} in {simulator}: {outcome['failure']}")
-    received = [int(word, 16) for word in (folder / "received.txt").read_text(encoding="utf-8").split()]
+    lines = (folder / "received.txt").read_text(encoding="utf-8").splitlines()
+    received = [[int(value, 16) for value in line.split()] for line in lines]
+    _check_channels([dest for dest, _, _ in received], order)
+    result = np.empty((samples, channels, len(outputs["fields"])), dtype=np.int64)
+    status = np.empty((samples, channels), dtype=np.uint8)
+    result[_turns(order), order] = _unpack([word for _, word, _ in received], outputs)
+    status[_turns(order), order] = [user for _, _, user in received]
     return CosimulationResult(
-        codes=_unpack(received, outputs),
+        codes=result,
+        status=status,
         cycles=outcome["clocks"],
         wall_seconds=time.monotonic() - started,
         cycles_per_second=outcome["clocks"] / outcome["seconds"],
         simulator=simulator,
         tools={simulator: tool.version, "cocotb": metadata.version("cocotb"), "python": platform.python_version()},
     )
+
+
+def _order(samples: int, channels: int, seed: int) -> npt.NDArray[np.int64]:
+    """Channel of each sample sent, shape (samples * channels,): in turn, and shuffled among some samples of each."""
+    rng = np.random.default_rng(seed)
+    blocks = []
+    for start in range(0, samples, _BLOCK):
+        block = np.tile(np.arange(channels), min(_BLOCK, samples - start))
+        blocks.append(rng.permutation(block) if start // _BLOCK % 2 else block)
+    return np.concatenate(blocks)
+
+
+def _turns(order: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+    """Index of each sample within its channel, shape as `order`."""
+    turns = np.empty_like(order)
+    for channel in range(int(order.max()) + 1):
+        mine = np.flatnonzero(order == channel)
+        turns[mine] = np.arange(len(mine))
+    return turns
+
+
+def _check_channels(received: list[int], order: npt.NDArray[np.int64]) -> None:
+    for index, (found, expected) in enumerate(zip(received, order.tolist(), strict=True)):
+        if found != expected:
+            raise ShortfallError(f"m_axis_tdest must be {expected}, not {found}, at output {index}")
 
 
 @contextlib.contextmanager
@@ -139,6 +181,10 @@ def _plain_path(folder: Path) -> Iterator[Path]:
 def _write_job(folder: Path, sv: Path, manifest: Mapping[str, Any], tool: Simulator, **options: Any) -> None:
     for name in ("result.json", "received.txt", "progress.txt"):
         (folder / name).unlink(missing_ok=True)
+    inputs, outputs = manifest["streams"]["s_axis"], manifest["streams"]["m_axis"]
+    optional = {name: name in outputs for name in ("tdest", "tuser")}
+    ports = ["aclk", "aresetn", *(f"s_axis_{name}" for name in _signals(inputs))]
+    ports += [f"m_axis_{name}" for name in _signals(outputs)]
     job = {
         "folder": str(folder),
         "source": str(folder / "core.sv"),
@@ -147,11 +193,17 @@ def _write_job(folder: Path, sv: Path, manifest: Mapping[str, Any], tool: Simula
         "version": tool.version,
         "seed": options["seed"],
         "waves": options["waves"],
+        "ports": ports,
     }
-    bench = {key: options[key] for key in ("seed", "idle", "stall")} | {"latency_cycles": manifest["latency_cycles"]}
+    bench = optional | {key: options[key] for key in ("seed", "idle", "stall")}
+    bench |= {key: manifest[key] for key in ("latency_cycles", "reset_cycles")}
     (folder / "core.sv").write_bytes(sv.read_bytes())
     (folder / "job.json").write_text(json.dumps(job), encoding="utf-8")
     (folder / "bench.json").write_text(json.dumps(bench), encoding="utf-8")
+
+
+def _signals(stream: Mapping[str, Any]) -> list[str]:
+    return ["tdata", "tvalid", "tready", *(name for name in ("tdest", "tuser") if name in stream)]
 
 
 def _run(folder: Path, tool: Simulator, total: int, progress: Callable[[int, int], None]) -> None:

@@ -5,11 +5,13 @@ from __future__ import annotations
 import fcntl
 import os
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.error_paths import error_responses
@@ -20,12 +22,14 @@ from sosmith.gen.quantize import Quantized, with_realization
 from sosmith.gen.realizations import ERROR_FEEDBACK
 from sosmith.model.errors import SpecificationError
 from sosmith.model.golden import calibrated, filtered
-from sosmith.model.port import Values
+from sosmith.model.port import Codes, Values
 from sosmith.model.scenarios import SCENARIOS, Bench, emulate
 from sosmith.model.text_files import write_files
 from sosmith.model.trace import Trace, read_csv
 from sosmith.sim.cosimulate import CosimulationResult, cosimulate
 from sosmith.sim.simulators import check_name
+
+_Kind = TypeVar("_Kind", bound=np.generic)
 
 Progress = Callable[[str, int, int], None]
 """Told the step, what is done of it and the total; a total of 0 means that only the step's name is known."""
@@ -49,26 +53,29 @@ def default_scenario(design: CoreDesign) -> str:
     return "sweep" if design.quantized.polynomial is None else "wear_ramp"
 
 
-def trace_for(design: CoreDesign, source: str, *, seed: int, seconds: float | None = None) -> Trace:
-    """Trace from a CSV file or a scenario's name.
+def traces_for(design: CoreDesign, source: str, *, seed: int, seconds: float | None = None) -> tuple[Trace, ...]:
+    """Make a trace for every channel from a CSV file or a scenario's name.
+
+    Each channel begins a sample later than the one before, and has noise of its own, so that none looks like another.
 
     Raises
     ------
     SpecificationError
         If the file is unfit or the scenario does not exist for this core.
     """
-    if source in SCENARIOS:
-        return emulate(source, bench_of(design), seed=seed, seconds=seconds)
-    if source.lower().endswith(".csv") or Path(source).exists():
+    channels = range(design.spec.channels)
+    if source not in SCENARIOS and (source.lower().endswith(".csv") or Path(source).exists()):
         if seconds is not None:
             raise SpecificationError(f"--seconds must come with a scenario, not with the file {source}")
-        return read_csv(Path(source), design.datapath.inputs, design.spec.sample_rate)
-    return emulate(source, bench_of(design), seed=seed, seconds=seconds)  # refuses, listing those that fit
+        trace = read_csv(Path(source), design.datapath.inputs, design.spec.sample_rate)
+        return tuple(trace.delayed(channel) for channel in channels)
+    bench = bench_of(design)  # an unknown scenario is refused there, with a list of those that fit
+    return tuple(emulate(source, bench, seed=seed + k, seconds=seconds).delayed(k) for k in channels)
 
 
 def simulate(
     design: CoreDesign,
-    trace: Trace,
+    traces: Sequence[Trace],
     directory: Path,
     *,
     simulator: str = "verilator",
@@ -78,7 +85,9 @@ def simulate(
     waves: bool = False,
     progress: Progress = lambda step, done, total: None,
 ) -> Evidence:
-    """Generate the core into `directory`, run `trace` through it, and set the result beside model and golden chain.
+    """Generate the core into `directory`, run `traces` through it, and set the result beside model and golden chain.
+
+    There is one trace for each channel, all of the same length.
 
     Raises
     ------
@@ -99,7 +108,7 @@ def simulate(
         result = cosimulate(
             directory / f"{design.datapath.name}.sv",
             manifest(design),
-            trace.codes,
+            np.stack([trace.codes for trace in traces], axis=1),
             build_dir=directory / "simulation",
             simulator=simulator,
             seed=seed,
@@ -109,7 +118,7 @@ def simulate(
             progress=lambda done, total: progress("co-simulating", done, total),
         )
     progress("comparing", 0, 0)
-    return _evidence(design, trace, result, seed=seed, wall_seconds=time.monotonic() - started)
+    return _evidence(design, traces, result, seed=seed, wall_seconds=time.monotonic() - started)
 
 
 @contextmanager
@@ -130,18 +139,22 @@ def _alone_in(directory: Path) -> Iterator[None]:
 
 
 def _evidence(
-    design: CoreDesign, trace: Trace, result: CosimulationResult, *, seed: int, wall_seconds: float
+    design: CoreDesign, traces: Sequence[Trace], result: CosimulationResult, *, seed: int, wall_seconds: float
 ) -> Evidence:
     quantized, datapath = design.quantized, design.datapath
     output = datapath.output
-    expected = datapath.compute(trace.codes)
-    received = result.codes[:, 0]
-    wrong = np.flatnonzero(expected != received)
-    unfiltered = calibrated(trace.codes, datapath.inputs, quantized.polynomial)
-    golden = filtered(unfiltered, None if quantized.filter is None else quantized.filter.sos, output)
+    codes = np.stack([trace.codes for trace in traces], axis=1)
+    expected = datapath.compute(codes)
+    received = result.codes[:, :, 0]
+    differs = (expected != received) | (datapath.compute_status(codes) != result.status)
+    wrong = np.flatnonzero(differs.any(axis=1))
+    unfiltered = np.stack([calibrated(t.codes, datapath.inputs, quantized.polynomial) for t in traces], axis=1)
+    sos = None if quantized.filter is None else quantized.filter.sos
+    golden = np.stack([filtered(column, sos, output) for column in unfiltered.T], axis=1)
+    trace = traces[0]
     facts = manifest(design)
     low, high = output.decode(np.array([output.lowest, output.highest]))
-    return Evidence(
+    evidence = Evidence(
         name=datapath.name,
         core=design.core,
         description="" if quantized.filter is None else quantized.filter.describe,
@@ -155,14 +168,15 @@ def _evidence(
         proven=facts["error_bound_proven"],
         max_error=float(design.spec.max_error),
         time=trace.time,
-        truth=trace.truth,
-        reading=trace.reading,
+        truth=_stacked([trace.truth for trace in traces]),
+        reading=_stacked([trace.reading for trace in traces]),
         unfiltered=unfiltered,
         golden=golden,
         hardware=output.decode(received),
-        mismatches=len(wrong),
+        mismatches=int(np.count_nonzero(differs)),
         first_mismatch=int(wrong[0]) if len(wrong) else None,
-        samples=len(received),
+        samples=received.size,
+        channels=len(traces),
         cycles=result.cycles,
         latency_cycles=facts["latency_cycles"],
         simulator=result.simulator,
@@ -188,8 +202,15 @@ def _evidence(
         ],
         limit_cycles=facts["limit_cycles"],
         filter=_filter_facts(quantized),
-        alternatives=_alternatives(quantized, trace, golden),
+        alternatives=_alternatives(quantized, codes, golden),
     )
+    return evidence.of_channel(0) if len(traces) == 1 else evidence
+
+
+def _stacked(columns: Sequence[npt.NDArray[_Kind] | None]) -> npt.NDArray[_Kind] | None:
+    """Columns of all channels side by side, or None if they are not there."""
+    present = [column for column in columns if column is not None]
+    return np.stack(present, axis=1) if present else None
 
 
 def _filter_facts(quantized: Quantized) -> FilterFacts | None:
@@ -209,7 +230,7 @@ def _filter_facts(quantized: Quantized) -> FilterFacts | None:
     )
 
 
-def _alternatives(quantized: Quantized, trace: Trace, golden: Values) -> list[Alternative]:
+def _alternatives(quantized: Quantized, codes: Codes, golden: Values) -> list[Alternative]:
     """Compute with the integer model what each other realization makes of the same input at the same word lengths."""
     if quantized.realization not in ERROR_FEEDBACK or not quantized.sections:
         return []
@@ -218,7 +239,7 @@ def _alternatives(quantized: Quantized, trace: Trace, golden: Values) -> list[Al
         if realization == quantized.realization:
             continue
         other = with_realization(quantized, realization).datapath
-        error = other.output.decode(other.compute(trace.codes)) - golden
+        error = other.output.decode(other.compute(codes)) - golden
         rows.append(
             Alternative(name=realization, max_abs=float(np.abs(error).max()), rms=float(np.sqrt(np.mean(error**2))))
         )

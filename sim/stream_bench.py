@@ -2,7 +2,8 @@
 
 Configuration and stimulus come from the folder named by SOSMITH_BENCH: ``bench.json`` and ``words.txt``;
 ``result.json`` and ``received.txt`` go there. The bench wakes once a clock, at the falling edge: there it reads
-what the rising edge before has left, settled, and sets the inputs that the next rising edge takes.
+what the rising edge before has left, settled, and sets the inputs that the next rising edge takes. While a core that
+takes many clocks a sample is busy and nothing can happen, it sleeps.
 """
 
 from __future__ import annotations
@@ -12,21 +13,34 @@ import os
 import random
 import time
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import cocotb
 from cocotb.clock import Clock
-from cocotb.triggers import FallingEdge, Timer
+from cocotb.triggers import FallingEdge, First, RisingEdge, Timer
+from cocotb.utils import get_sim_time
 
 _PERIOD_NS = 20
 _SETTLE_NS = 1  # for the probes, several of which fit into half a period
 _SILENCE = 2000  # clocks without a transfer, both sides willing most of the time, that mean a hang
 _PROGRESS_EVERY = 4096  # clocks
+_BUSY = 64  # clocks from input to output beyond which it pays to sleep while a core is busy
 _PROBED_SHARE = 1 / 32  # of all clocks, at which combinational paths between the handshakes are looked for
 
 
 class ProtocolError(Exception):
     """The core broke a rule of AXI4-Stream."""
+
+
+class Word(NamedTuple):
+    """A word of a stream: channel, data and, on the way out, status."""
+
+    tdest: int
+    tdata: int
+    tuser: int = 0
+
+    def __str__(self) -> str:
+        return " ".join(f"{value:x}" for value in self)
 
 
 class _Bench:
@@ -36,22 +50,52 @@ class _Bench:
         self.dut = dut
         self.folder = folder
         self.config = json.loads((folder / "bench.json").read_text(encoding="utf-8"))
-        self.words: list[int] = [int(word, 16) for word in (folder / "words.txt").read_text().split()]
+        lines = (folder / "words.txt").read_text().splitlines()
+        self.words = [Word(*(int(value, 16) for value in line.split())) for line in lines]
         self.clocks = 0
-        self.received: list[int] = []
+        self.received: list[Word] = []
+        self.patience = self.config["latency_cycles"] + self.config["reset_cycles"]
+        self._outputs = [
+            (name, getattr(dut, f"m_axis_{name}")) for name in ("tdest", "tdata", "tuser") if self.has(name)
+        ]
         self._falling = FallingEdge(dut.aclk)
+        self._shown = 0
+
+    def has(self, name: str) -> bool:
+        """Whether the streams have the optional signal `name`."""
+        return name == "tdata" or bool(self.config[name])
 
     async def clock(self) -> None:
         """Let one rising edge pass."""
         await self._falling
         self.clocks += 1
 
+    def start_counting(self) -> None:
+        """Count clocks from here."""
+        self.clocks = self._shown = 0
+
+    async def busy(self) -> None:
+        """Let the clocks pass at which the core neither takes nor offers anything."""
+        dut, before = self.dut, get_sim_time("ns")
+        limit = Timer(self.patience * _PERIOD_NS, "ns")
+        await First(RisingEdge(dut.s_axis_tready), RisingEdge(dut.m_axis_tvalid), limit)
+        await self._falling
+        self.clocks += round((get_sim_time("ns") - before) / _PERIOD_NS)
+
+    def offer(self, word: Word | None) -> None:
+        """Offer `word` to the core, or nothing."""
+        self.dut.s_axis_tvalid.value = int(word is not None)
+        if word is not None:
+            self.dut.s_axis_tdata.value = word.tdata
+            if self.has("tdest"):
+                self.dut.s_axis_tdest.value = word.tdest
+
     async def reset(self) -> None:
         """Hold the reset for some clocks with the inputs idle."""
         dut = self.dut
         dut.aresetn.value = 0
-        dut.s_axis_tvalid.value = 0
-        dut.s_axis_tdata.value = 0
+        self.offer(Word(0, 0))
+        self.offer(None)
         dut.m_axis_tready.value = 0
         for _ in range(4):
             await self.clock()
@@ -67,35 +111,36 @@ class _Bench:
             raise ProtocolError(f"{name} must be 0 or 1, not {value}, at clock {self.clocks}")
         return bool(value)
 
-    def word(self) -> int:
+    def word(self) -> Word:
         """Output word, every bit of which must be known."""
-        value = self.dut.m_axis_tdata.value
-        if not value.is_resolvable:
-            raise ProtocolError(f"m_axis_tdata must be known, not {value}, at sample {len(self.received)}")
-        return int(value.to_unsigned())
+        found = {}
+        for name, handle in self._outputs:
+            value = handle.value
+            if not value.is_resolvable:
+                raise ProtocolError(f"m_axis_{name} must be known, not {value}, at sample {len(self.received)}")
+            found[name] = int(value.to_unsigned())
+        return Word(found.get("tdest", 0), found["tdata"], found.get("tuser", 0))
 
     async def output_appears_without_ready(self) -> None:
         """Check that a core offers a result that it holds whether or not the sink is ready."""
-        dut = self.dut
-        dut.s_axis_tvalid.value = 1
-        dut.s_axis_tdata.value = self.words[0]
-        for _ in range(self.config["latency_cycles"] + 64):
+        self.offer(self.words[0])
+        for _ in range(self.patience + 64):
             await self.clock()
-            if self.bit(dut.m_axis_tvalid, "m_axis_tvalid"):
+            if self.bit(self.dut.m_axis_tvalid, "m_axis_tvalid"):
                 return
         raise ProtocolError("m_axis_tvalid must not wait for m_axis_tready")
 
     async def probe(self) -> None:
         """Neither handshake output may follow an input within a clock."""
         dut = self.dut
-        before = str(dut.s_axis_tready.value), str(dut.m_axis_tvalid.value), str(dut.m_axis_tdata.value)
+        watched = [dut.s_axis_tready, dut.m_axis_tvalid, *(handle for _, handle in self._outputs)]
+        before = [str(handle.value) for handle in watched]
         held = int(dut.s_axis_tvalid.value), int(dut.m_axis_tready.value)
         for valid, ready in ((0, 0), (0, 1), (1, 0), (1, 1)):
             dut.s_axis_tvalid.value = valid
             dut.m_axis_tready.value = ready
             await Timer(_SETTLE_NS, "ns")
-            after = str(dut.s_axis_tready.value), str(dut.m_axis_tvalid.value), str(dut.m_axis_tdata.value)
-            if after != before:
+            if [str(handle.value) for handle in watched] != before:
                 raise ProtocolError(
                     "outputs must not follow s_axis_tvalid or m_axis_tready within a clock, "
                     f"as they did at clock {self.clocks}"
@@ -103,7 +148,7 @@ class _Bench:
         dut.s_axis_tvalid.value, dut.m_axis_tready.value = held[0], held[1]
         await Timer(_SETTLE_NS, "ns")
 
-    async def stream(self, words: list[int], *, probe: bool) -> None:
+    async def stream(self, words: list[Word], *, probe: bool) -> None:
         """Send `words` at a random pace and receive as many, checking every clock."""
         dut = self.dut
         pace = random.Random(self.config["seed"])
@@ -112,15 +157,13 @@ class _Bench:
         sent, offered, silence = 0, False, 0
         was_ready: bool | None = None
         was_offered: bool | None = None
-        held: int | None = None  # the word that the core offers and we have not taken
+        held: Word | None = None  # the word that the core offers and we have not taken
         while len(self.received) < target:
             if not offered:
                 offered = sent < len(words) and next(idle)
-                if offered != was_offered:
-                    dut.s_axis_tvalid.value = int(offered)
-                    was_offered = offered
-                if offered:
-                    dut.s_axis_tdata.value = words[sent]
+                if offered or offered != was_offered:
+                    self.offer(words[sent] if offered else None)
+                was_offered = offered
             ready = next(stall)
             if ready != was_ready:  # a write costs as much as the rest of a clock
                 dut.m_axis_tready.value = int(ready)
@@ -132,23 +175,30 @@ class _Bench:
             accepted = offered and self.bit(dut.s_axis_tready, "s_axis_tready")
             word = self.word() if valid else None
             if held is not None and word != held:
-                what = "drop m_axis_tvalid" if word is None else f"change m_axis_tdata from {held:#x} to {word:#x}"
-                raise ProtocolError(f"a stalled core must not {what}, as it did at sample {len(self.received)}")
+                raise ProtocolError(
+                    f"a stalled core must not {_change(held, word)}, as it did at sample {len(self.received)}"
+                )
             held = word if valid and not ready else None
             if word is not None and ready:
                 self.received.append(word)
             if accepted:
                 sent, offered = sent + 1, False
             silence = 0 if accepted or (valid and ready) else silence + 1
-            if silence > _SILENCE + self.config["latency_cycles"]:
+            if silence > _SILENCE + self.patience:
                 raise ProtocolError(
                     f"a sample must move at least every {silence - 1} clocks: "
                     f"{sent} went in and {len(self.received)} came out before it hung"
                 )
-            await self.clock()
-            if self.clocks % _PROGRESS_EVERY == 0:
+            if offered and not accepted and not valid and self.patience > _BUSY:
+                before = self.clocks
+                await self.busy()
+                silence += self.clocks - before - 1
+            else:
+                await self.clock()
+            if self.clocks >= self._shown + _PROGRESS_EVERY:
+                self._shown = self.clocks
                 self.report(len(self.received))
-        dut.s_axis_tvalid.value = 0
+        self.offer(None)
 
     async def nothing_more_comes(self) -> None:
         """After the last result the core must be silent."""
@@ -161,6 +211,14 @@ class _Bench:
     def report(self, done: int) -> None:
         """Leave the count of samples for the parent process to show."""
         (self.folder / "progress.txt").write_text(str(done), encoding="utf-8")
+
+
+def _change(held: Word, word: Word | None) -> str:
+    """Say what a stalled core did to the word that it offered."""
+    if word is None:
+        return "drop m_axis_tvalid"
+    name = next(name for name in Word._fields if getattr(held, name) != getattr(word, name))
+    return f"change m_axis_{name} from {getattr(held, name):#x} to {getattr(word, name):#x}"
 
 
 class _Pace:
@@ -182,7 +240,7 @@ class _Pace:
 
 async def _run(bench: _Bench) -> None:
     bench.dut.aclk.value = 0
-    Clock(bench.dut.aclk, _PERIOD_NS, "ns").start(start_high=False)
+    Clock(bench.dut.aclk, _PERIOD_NS, "ns", impl="gpi").start(start_high=False)
     await bench.reset()
     await bench.output_appears_without_ready()
     # Reset in mid-run: what went in before must leave no trace.
@@ -192,7 +250,7 @@ async def _run(bench: _Bench) -> None:
     again = list(bench.received)
     bench.received.clear()
     await bench.reset()
-    bench.clocks = 0
+    bench.start_counting()
     await bench.stream(bench.words, probe=False)
     clocks = bench.clocks
     await bench.nothing_more_comes()
@@ -212,7 +270,7 @@ async def core_under_test(dut: Any) -> None:
         await _run(bench)
     except ProtocolError as error:
         failure = str(error)
-    (folder / "received.txt").write_text("\n".join(f"{word:x}" for word in bench.received), encoding="utf-8")
+    (folder / "received.txt").write_text("\n".join(map(str, bench.received)), encoding="utf-8")
     bench.report(len(bench.received))
     outcome = {"clocks": bench.clocks, "failure": failure, "seconds": time.monotonic() - started}
     (folder / "result.json").write_text(json.dumps(outcome), encoding="utf-8")

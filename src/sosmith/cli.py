@@ -43,7 +43,7 @@ from sosmith.model.errors import SosmithError, SpecificationError, ToolError
 from sosmith.model.program import Program
 from sosmith.model.scenarios import SCENARIOS
 from sosmith.model.text_files import write_files
-from sosmith.sim.simulation import bench_of, default_scenario, simulate, trace_for
+from sosmith.sim.simulation import bench_of, default_scenario, simulate, traces_for
 
 _LATER = ("build", "explore", "calibrate", "monitor", "board")
 """Commands that this version does not have yet."""
@@ -294,7 +294,7 @@ def emulate_command(
             _list_scenarios(made)
             return
         step(f"emulating {scenario}")
-        trace = trace_for(made, _known_scenario(made, scenario), seed=seed, seconds=seconds)
+        trace, *_ = traces_for(made, _known_scenario(made, scenario), seed=seed, seconds=seconds)
         if output is not None:
             trace.write_csv(output)
     if output is None:
@@ -400,8 +400,8 @@ def _simulate(
     folder = output or _default_folder(made)
     chosen = source or default_scenario(made)
     step(f"trace {chosen}")
-    trace = trace_for(made, chosen, seed=options["seed"], seconds=seconds)
-    evidence = simulate(made, trace, folder, progress=step, **options)
+    traces = traces_for(made, chosen, seed=options["seed"], seconds=seconds)
+    evidence = simulate(made, traces, folder, progress=step, **options)
     step("writing the report")
     return write_report(evidence, folder), folder
 

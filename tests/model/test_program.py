@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from tests.gen.designs import ALL, example_design
 
 from sosmith.model.datapath import Datapath
-from sosmith.model.program import HAZARD, ONE, Do, FoldingError, Instruction, Program, digits_of, program
+from sosmith.model.program import HAZARD, Do, FoldingError, Instruction, Program, digits_of, program
 
 FOLDABLE = ("df1", "df1_ef1", "df1_ef2", "df2t", "delta", "state_space")
 READS = {Do.MULTIPLY, Do.OPERAND, Do.PRODUCT, Do.GIVE}
@@ -72,10 +72,13 @@ def test_constants_and_words_fit_the_multiplier(digit_bits: int) -> None:
     made = program(example_design("flange_wear_locomotive.toml", realization="df1_ef2").datapath, digit_bits)
     limit = 1 << digit_bits
     assert all(-limit <= constant < limit for _, _, constant in made.instructions)
-    assert {address for do, address, _ in made.instructions if do in WRITES}.isdisjoint({ONE})
+    assert {address for do, address, _ in made.instructions if do in WRITES}.isdisjoint({made.one})
     places = sorted(made.places, key=lambda place: place.address)
     ends = [place.address + place.digits for place in places]
-    assert [place.address for place in places] == [ONE + 1, *ends[:-1]]
+    starts = [end + (end == made.one) for end in [0, *ends[:-1]]]  # the word of ones lies behind the states
+    assert [place.address for place in places] == starts
+    assert {place.is_state for place in places if place.address < made.one} == {True}
+    assert {place.is_state for place in places if place.address > made.one} == {False}
     assert made.words == ends[-1]
 
 

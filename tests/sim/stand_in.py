@@ -9,6 +9,7 @@ import numpy as np
 MANIFEST: dict[str, Any] = {
     "name": "stand_in",
     "latency_cycles": 2,
+    "reset_cycles": 0,
     "streams": {
         "s_axis": {"width": 16, "fields": [{"name": "x", "offset": 0, "width": 11, "signed": True}]},
         "m_axis": {"width": 16, "fields": [{"name": "y", "offset": 0, "width": 12, "signed": True}]},
@@ -109,8 +110,8 @@ BROKEN: dict[str, tuple[Break, str]] = {
 
 
 def stimulus(samples: int = 300) -> np.ndarray:
-    """Codes of the stand-in's input."""
-    return np.random.default_rng(11).integers(-1024, 1024, (samples, 1))
+    """Codes of the stand-in's input, of one channel."""
+    return np.random.default_rng(11).integers(-1024, 1024, (samples, 1, 1))
 
 
 def write(folder: Path, text: str = SOUND) -> Path:

@@ -22,7 +22,7 @@ from sosmith.model.errors import ShortfallError
 from sosmith.model.scenarios import SCENARIOS
 from sosmith.model.trace import Trace
 from sosmith.sim import simulation
-from sosmith.sim.simulation import bench_of, simulate, trace_for
+from sosmith.sim.simulation import bench_of, simulate, traces_for
 
 LOCOMOTIVE = "flange_wear_locomotive.toml"
 SAMPLES_ASKED = 100_000
@@ -47,7 +47,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[tuple[str, str], tupl
         folder = tmp_path_factory.mktemp(made.spec.name)
         for scenario in scenarios(made):
             seed = 100 + len(found)
-            evidence = simulate(made, trace_for(made, scenario, seed=seed), folder, seed=seed)
+            evidence = simulate(made, traces_for(made, scenario, seed=seed), folder, seed=seed)
             found[example, scenario] = evidence, summarise(evidence)
     return found
 
@@ -83,7 +83,8 @@ def test_worst_cases_stay_within_the_proof(
         assert report["bit_exact"]
         assert 0.4 * made.quantized.bound < report["error"]["max_lsb"] <= made.quantized.bound
     # The interpreter raises where a node leaves its range, and the hardware computed these very samples.
-    codes = trace_for(made, "worst_case_errors", seed=1).codes
+    (trace,) = traces_for(made, "worst_case_errors", seed=1)
+    codes = trace.codes
     exact = made.datapath.compute_exact(codes)
     assert made.datapath.output.decode(np.array(exact)).tolist() == evidence.hardware.tolist()
 
@@ -94,10 +95,10 @@ def test_worst_cases_stay_within_the_proof(
 def test_worst_cases_in_every_realization(example: str, realization: str, tmp_path: Path) -> None:
     """Two rounds, the second from where the first has left the states."""
     made = example_design(example, realization=realization)
-    once = trace_for(made, "worst_case_errors", seed=1)
+    (once,) = traces_for(made, "worst_case_errors", seed=1)
     seconds = 2 * len(once) / float(made.spec.sample_rate)
-    trace = trace_for(made, "worst_case_errors", seed=1, seconds=seconds)
-    evidence = simulate(made, trace, tmp_path)
+    (trace,) = traces_for(made, "worst_case_errors", seed=1, seconds=seconds)
+    evidence = simulate(made, [trace], tmp_path)
     report = summarise(evidence)
     assert report["bit_exact"]
     assert report["error"]["max_lsb"] <= made.quantized.bound
@@ -130,8 +131,8 @@ def test_enough_samples_under_different_handshakes(
 @pytest.mark.parametrize("example", ALL)
 def test_icarus_agrees(example: str, tmp_path: Path) -> None:
     made = example_design(example)
-    trace = short(trace_for(made, "worst_case", seed=3), 1200)
-    evidence = simulate(made, trace, tmp_path, simulator="icarus", seed=7, idle=0.1, stall=0.5)
+    trace = short(traces_for(made, "worst_case", seed=3)[0], 1200)
+    evidence = simulate(made, [trace], tmp_path, simulator="icarus", seed=7, idle=0.1, stall=0.5)
     assert (evidence.mismatches, evidence.samples) == (0, 1200)
     assert summarise(evidence)["passed"]
 
@@ -141,8 +142,8 @@ def test_icarus_agrees(example: str, tmp_path: Path) -> None:
 def test_every_pace_of_the_streams(example: str, tmp_path: Path) -> None:
     made = example_design(example)
     for seed, (idle, stall) in enumerate([(0.0, 0.0), (0.95, 0.0), (0.0, 0.95), (0.5, 0.5), (0.9, 0.9)]):
-        trace = trace_for(made, "worst_case", seed=seed)
-        evidence = simulate(made, trace, tmp_path, seed=seed, idle=idle, stall=stall)
+        (trace,) = traces_for(made, "worst_case", seed=seed)
+        evidence = simulate(made, [trace], tmp_path, seed=seed, idle=idle, stall=stall)
         assert evidence.mismatches == 0
         assert summarise(evidence)["passed"]
         if idle == stall == 0:
@@ -232,8 +233,8 @@ def test_a_wrong_bit_in_the_hardware_is_found(
 ) -> None:
     spoil_emitted_file(spoil, monkeypatch)
     made = example_design(example)
-    trace = short(trace_for(made, "worst_case", seed=1), 3000)
-    evidence = simulate(made, trace, tmp_path, simulator="icarus", idle=0.1, stall=0.1)
+    trace = short(traces_for(made, "worst_case", seed=1)[0], 3000)
+    evidence = simulate(made, [trace], tmp_path, simulator="icarus", idle=0.1, stall=0.1)
     report = summarise(evidence)
     assert not report["passed"]
     assert not report["bit_exact"]
@@ -250,7 +251,7 @@ def test_a_state_that_moves_in_idle_clocks_is_found(tmp_path: Path, monkeypatch:
     """Its results hang on the handshakes, which the bench notices before any value is compared."""
     spoil_emitted_file(replaced("else if (take1) v1 <=", "else if (advance) v1 <="), monkeypatch)
     made = example_design("audio_lowpass.toml")
-    trace = short(trace_for(made, "worst_case", seed=1), 500)
+    trace = short(traces_for(made, "worst_case", seed=1)[0], 500)
     message = "audio_lowpass in icarus: the first results after a reset must not depend on what came before it"
     with pytest.raises(ShortfallError, match=f"^{re.escape(message)}$"):
-        simulate(made, trace, tmp_path, simulator="icarus")
+        simulate(made, [trace], tmp_path, simulator="icarus")

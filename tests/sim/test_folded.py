@@ -7,7 +7,7 @@ import pytest
 from tests.gen.test_architecture import design_in
 
 from sosmith.gen.core import CoreDesign, design_core
-from sosmith.sim.simulation import simulate, trace_for
+from sosmith.sim.simulation import simulate, traces_for
 
 FOLDABLE = ("df1", "df1_ef1", "df1_ef2", "df2t", "delta", "state_space")
 FAST = {
@@ -37,10 +37,10 @@ def test_hardware_equals_the_integer_model(
     example: str, architecture: str, realization: str, simulator: str, tmp_path: Path
 ) -> None:
     made = made_in(example, architecture, realization)
-    trace = trace_for(made, "worst_case", seed=5)
+    (trace,) = traces_for(made, "worst_case", seed=5)
     start = max(0, len(trace.codes) // 2 - 30)  # where the sign pattern turns over
     trace = replace(trace, codes=trace.codes[start : start + 60], truth=None, reading=None)
-    evidence = simulate(made, trace, tmp_path, seed=5, simulator=simulator)
+    evidence = simulate(made, [trace], tmp_path, seed=5, simulator=simulator)
     assert evidence.mismatches == 0
     assert evidence.samples == 60
 
@@ -48,9 +48,9 @@ def test_hardware_equals_the_integer_model(
 @pytest.mark.parametrize("architecture", ["folded", "serial"])
 def test_samples_come_at_the_rate_that_is_stated(architecture: str, tmp_path: Path) -> None:
     made = design_in(architecture)
-    trace = trace_for(made, "noise", seed=1)
+    (trace,) = traces_for(made, "noise", seed=1)
     trace = replace(trace, codes=trace.codes[:40], truth=None, reading=None)
-    evidence = simulate(made, trace, tmp_path, seed=1, idle=0.0, stall=0.0)
+    evidence = simulate(made, [trace], tmp_path, seed=1, idle=0.0, stall=0.0)
     program = made.architecture.program
     assert program is not None
     # The memory is cleared first, one word a clock. Without a product of two values serial takes just what is stated.

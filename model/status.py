@@ -1,0 +1,28 @@
+"""Status flags of a sample: what the hardware hands on beside the output code, one bit each."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+STATUS_BITS = 8
+"""Width of ``tuser``: a whole byte; bits that are no flag are 0."""
+
+
+class Flag(IntEnum):
+    """Number of a flag's bit."""
+
+    INPUT_AT_RAIL = 0
+    OUTSIDE_CALIBRATION = 1
+    OUTPUT_SATURATED = 2
+
+    @property
+    def meaning(self) -> str:
+        """The flag in words."""
+        return _MEANINGS[self]
+
+
+_MEANINGS = {
+    Flag.INPUT_AT_RAIL: "an input code is the lowest or the highest of its range",
+    Flag.OUTSIDE_CALIBRATION: "an input is outside the range of the calibration's measurements",
+    Flag.OUTPUT_SATURATED: "the output was limited to its range",
+}
