@@ -129,26 +129,18 @@ _ECP5_25 = Device(
     block_ram="DP16KD",
     block_rams=56,
 )
-_ECP5_45 = replace(
-    _ECP5_25, title="ECP5 LFE5U-45F", placer="--45k", logic_cells=43848, multipliers=72, block_rams=108
-)
-_ECP5_85 = replace(
-    _ECP5_25, title="ECP5 LFE5U-85F", placer="--85k", logic_cells=83640, multipliers=156, block_rams=208
-)
+_ECP5_45 = replace(_ECP5_25, title="ECP5 LFE5U-45F", placer="--45k", logic_cells=43848, multipliers=72, block_rams=108)
+_ECP5_85 = replace(_ECP5_25, title="ECP5 LFE5U-85F", placer="--85k", logic_cells=83640, multipliers=156, block_rams=208)
 _ECP5_85_5G = replace(_ECP5_85, title="ECP5 LFE5UM5G-85F", placer="--um5g-85k")
 
-_ULX3S = Board(
-    name="ulx3s_25f", title="ULX3S 25F", device=_ECP5_25, package="CABGA381", speed="6", clock=25_000_000
-)
+_ULX3S = Board(name="ulx3s_25f", title="ULX3S 25F", device=_ECP5_25, package="CABGA381", speed="6", clock=25_000_000)
 
 # FPGA, package, speed grade and clock as in amaranth-boards 0.0.21; those of the Colorlight i5, 7.0, as its pins are
 # documented in wuxx/Colorlight-FPGA-Projects. On an UPduino 3 the oscillator reaches its pin through a solder jumper.
 _ALL = (
     Board(name="icebreaker", title="iCEBreaker", device=_UP5K, package="sg48", speed="", clock=12_000_000),
     Board(name="upduino", title="UPduino 3", device=_UP5K, package="sg48", speed="", clock=12_000_000),
-    Board(
-        name="ice40_hx8k_b_evn", title="iCE40-HX8K-B-EVN", device=_HX8K, package="ct256", speed="", clock=12_000_000
-    ),
+    Board(name="ice40_hx8k_b_evn", title="iCE40-HX8K-B-EVN", device=_HX8K, package="ct256", speed="", clock=12_000_000),
     Board(name="icestick", title="iCEstick", device=_HX1K, package="tq144", speed="", clock=12_000_000),
     _ULX3S,
     replace(_ULX3S, name="ulx3s_45f", title="ULX3S 45F", device=_ECP5_45),

@@ -1,4 +1,4 @@
-"""Synthesizes a core's SystemVerilog for a device with Yosys: a netlist of the device's own cells."""
+"""Synthesizes a core's SystemVerilog for a board with Yosys: a netlist of the cells of its FPGA."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 
-from sosmith.gen.boards import Device
+from sosmith.gen.boards import Board
 from sosmith.model.errors import ToolError
 from sosmith.model.text_files import to_json, write_files
 
@@ -20,10 +20,12 @@ _LOG_TAIL = 12  # lines of what Yosys printed that an error shows
 
 @dataclass(frozen=True)
 class Netlist:
-    """A core in cells of a device.
+    """A core in cells of an FPGA.
 
     Attributes
     ----------
+    board : Board
+        What it was made for.
     path : Path
         The netlist as Verilog, one flat module with the ports of the core.
     cells : dict of str to int
@@ -32,13 +34,19 @@ class Netlist:
         Of Yosys.
     """
 
+    board: Board
     path: Path
     cells: dict[str, int]
     version: str
 
+    @property
+    def excess(self) -> list[str]:
+        """What it takes more of than the board has, such as ``"13 SB_MAC16 of 8"``."""
+        return self.board.device.excess(self.cells)
 
-def synthesize(sv: Path, top: str, device: Device, folder: Path) -> Netlist:
-    """Synthesize the core in `sv` for `device`; takes seconds, on the first call ever a minute more.
+
+def synthesize(sv: Path, top: str, board: Board, folder: Path) -> Netlist:
+    """Synthesize the core in `sv` for `board`; takes seconds, on the first call ever a minute more.
 
     Files go to `folder`, made if missing. What is there already is taken if it was made from the same text by the
     same Yosys.
@@ -49,8 +57,8 @@ def synthesize(sv: Path, top: str, device: Device, folder: Path) -> Netlist:
         The SystemVerilog file.
     top : str
         Its top module.
-    device : Device
-        What to synthesize for.
+    board : Board
+        What to synthesize for. More than it has may be taken.
     folder : Path
         Gets ``netlist.v`` and ``synthesis.json``.
 
@@ -60,7 +68,7 @@ def synthesize(sv: Path, top: str, device: Device, folder: Path) -> Netlist:
         If Yosys is missing or fails; shows its last lines.
     """
     script = (
-        f"read_verilog -sv core.sv; {device.synthesis} -top {top}; tee -q -o stat.json stat -json; "
+        f"read_verilog -sv core.sv; {board.device.synthesis} -top {top}; tee -q -o stat.json stat -json; "
         "write_verilog -noattr netlist.v"
     )
     text = sv.read_bytes()
@@ -70,14 +78,14 @@ def synthesize(sv: Path, top: str, device: Device, folder: Path) -> Netlist:
     if record.exists() and netlist.exists():
         made = json.loads(record.read_text(encoding="utf-8"))
         if made["fingerprint"] == fingerprint:
-            return Netlist(netlist, made["cells"], version)
+            return Netlist(board, netlist, made["cells"], version)
     record.unlink(missing_ok=True)  # what an interrupted run leaves must not pass for the one before
     write_files(folder, {"core.sv": text.decode()})
     _run_yosys(script, folder)
     found = json.loads((folder / "stat.json").read_text(encoding="utf-8"))["design"]["num_cells_by_type"]
     cells = {kind: count for kind, count in sorted(found.items()) if not kind.startswith("$")}
     write_files(folder, {"synthesis.json": to_json({"fingerprint": fingerprint, "cells": cells})})
-    return Netlist(netlist, cells, version)
+    return Netlist(board, netlist, cells, version)
 
 
 def share_folder() -> Path:

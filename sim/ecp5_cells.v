@@ -1,7 +1,7 @@
 // Models of ECP5 cells for simulation: those that Yosys has as black boxes only, and the flip-flop.
 // They do what synth_ecp5 uses of the cells, and end the simulation where anything else is asked of them.
 
-// Flip-flop. It starts at random: what a core computes must not hang on more than its reset.
+// Flip-flop. `START is its value at power-up as a function of what the bitstream says.
 module TRELLIS_FF (input CLK, LSR, CE, DI, M, output reg Q);
   parameter GSR = "ENABLED";
   parameter [127:0] CEMUX = "1";
@@ -17,7 +17,7 @@ module TRELLIS_FF (input CLK, LSR, CE, DI, M, output reg Q);
     if (CLKMUX != "CLK" || LSRMUX != "LSR" || LSRMODE != "LSR" || SRMODE != "LSR_OVER_CE" ||
         (CEMUX != "1" && CEMUX != "CE" && CEMUX != "INV") || (REGSET != "SET" && REGSET != "RESET"))
       $fatal(1, "TRELLIS_FF must have a rising edge and a synchronous reset, unlike %m");
-    Q = 1'($urandom);
+    Q = `START(REGSET == "SET");
   end
 
   always @(posedge CLK)

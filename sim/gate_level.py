@@ -1,7 +1,7 @@
-"""Makes one Verilog file of a netlist and the models of the cells in it, for a simulator to take in a core's place.
+"""Makes one Verilog file of a netlist and the models of its cells, for a simulator to take in a core's place.
 
-Flip-flops start at random there, so that results show that the reset reaches all that matters; memories start with the
-content that the bitstream gives them.
+Memories start with the content that the bitstream gives them. Flip-flops start at random, which shows that the reset
+reaches all that matters, or as the bitstream says.
 """
 
 from __future__ import annotations
@@ -9,7 +9,6 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from sosmith.gen.boards import Device
 from sosmith.gen.synthesis import Netlist, share_folder
 from sosmith.model.errors import ToolError
 from sosmith.model.text_files import write_files
@@ -21,8 +20,8 @@ _OURS = {"ice40": (), "ecp5": (Path(__file__).parent / "ecp5_cells.v",)}
 """Models to take in their place, and those that Yosys has not."""
 
 # The models of iCE40 flip-flops leave their initial value to a macro, and default values of inputs, which not every
-# simulator knows, to three others.
-_MACROS = """`define SB_DFF_INIT initial Q = 1'($urandom);
+# simulator knows, to three others. In hardware they start at 0.
+_MACROS = """`define SB_DFF_INIT initial Q = `START(0);
 `define ICE40_DEFAULT_ASSIGNMENT_V(v)
 `define ICE40_DEFAULT_ASSIGNMENT_0
 `define ICE40_DEFAULT_ASSIGNMENT_1
@@ -31,8 +30,16 @@ _MACROS = """`define SB_DFF_INIT initial Q = 1'($urandom);
 _MODULE = re.compile(r"^module\s+(\w+)\b.*?\bendmodule\b", re.MULTILINE | re.DOTALL)
 
 
-def with_cell_models(netlist: Netlist, device: Device) -> Path:
+def with_cell_models(netlist: Netlist, *, scrambled: bool) -> Path:
     """Write ``gates.v`` beside the netlist: the netlist, and a model of each cell that it needs.
+
+    Parameters
+    ----------
+    netlist : Netlist
+        What to simulate.
+    scrambled : bool
+        Whether flip-flops start at random. A memory whose content must outlast a reset cannot bear that: a register
+        before its write port may then write anything at the first clock edge.
 
     Returns
     -------
@@ -44,6 +51,7 @@ def with_cell_models(netlist: Netlist, device: Device) -> Path:
     ToolError
         If there is no model of a cell, or Yosys is missing.
     """
+    device = netlist.board.device
     files = [*(share_folder() / name for name in _OF_YOSYS[device.family]), *_OURS[device.family]]
     models = {found[1]: found[0] for file in files for found in _MODULE.finditer(file.read_text(encoding="utf-8"))}
     needed: list[str] = []
@@ -55,5 +63,6 @@ def with_cell_models(netlist: Netlist, device: Device) -> Path:
         if cell not in needed:
             needed.append(cell)
             wanted += sorted({word for word in re.findall(r"\w+", models[cell]) if word in models} - {cell})
-    texts = [_MACROS, *(models[cell] for cell in needed), netlist.path.read_text(encoding="utf-8")]
+    start = "`define START(configured) " + ("1'($urandom)" if scrambled else "(configured)")
+    texts = [start, _MACROS, *(models[cell] for cell in needed), netlist.path.read_text(encoding="utf-8")]
     return write_files(netlist.path.parent, {"gates.v": "\n".join(texts)})[0]
