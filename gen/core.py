@@ -141,6 +141,12 @@ def design_core(
             if name == names[-1]:
                 raise
             refused = str(error)
+    if fitted is not None:
+        codes = tuple(
+            port.enclosing(*ends) for port, ends in zip(quantized.datapath.inputs, fitted.covered, strict=True)
+        )
+        quantized = replace(quantized, datapath=replace(quantized.datapath, calibrated=codes))
+        architecture = replace(architecture, datapath=quantized.datapath)
     why = reason_for(architecture, budget, asked=len(names) == 1, refused=refused)
     return CoreDesign(
         spec=spec,

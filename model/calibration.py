@@ -75,6 +75,14 @@ class Measurements:
         """Count of measurements."""
         return len(self.clearance)
 
+    @property
+    def covered(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Least and largest voltage and temperature."""
+        voltage, temperature = (
+            (float(values.min()), float(values.max())) for values in (self.voltage, self.temperature)
+        )
+        return voltage, temperature
+
 
 @dataclass(frozen=True)
 class Trial:
@@ -114,12 +122,15 @@ class Fit:
         Root mean square residual in mm.
     rejected : tuple of Trial
         The smaller polynomials that fell short, in the order they were tried.
+    covered : tuple of (float, float)
+        Least and largest voltage in V and temperature in degC of the measurements.
     """
 
     polynomial: Polynomial
     accepted: Trial
     rms: float
     rejected: tuple[Trial, ...]
+    covered: tuple[tuple[float, float], tuple[float, float]]
 
     @property
     def orders(self) -> tuple[int, int]:
@@ -197,7 +208,8 @@ def fit(measurements: Measurements, required_r: float = REQUIRED_R) -> Fit:
         residual = measurements.clearance - polynomial(measurements.voltage, measurements.temperature)
         trial = Trial(orders, len(terms), _adjusted_r_squared(measurements.clearance, residual, len(terms)))
         if trial.adjusted_r >= required_r:
-            return Fit(polynomial, trial, math.sqrt(float(np.mean(residual**2))), tuple(rejected))
+            rms = math.sqrt(float(np.mean(residual**2)))
+            return Fit(polynomial, trial, rms, tuple(rejected), measurements.covered)
         rejected.append(trial)
     best = max(rejected, key=lambda trial: trial.adjusted_r_squared)
     raise SpecificationError(

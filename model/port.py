@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -80,6 +81,12 @@ class Port:
     def bytes(self) -> int:
         """Whole bytes that the code takes on an AXI4-Stream."""
         return (self.bits + 7) // 8
+
+    def enclosing(self, low: float, high: float) -> tuple[int, int]:
+        """Return the lowest and the highest code of the values from `low` to `high`, as far as there are any."""
+        ends = (math.floor((Fraction(low) - self.zero) / self.lsb), math.ceil((Fraction(high) - self.zero) / self.lsb))
+        first, last = (min(max(end, self.lowest), self.highest) for end in ends)
+        return first, last
 
     def decode(self, codes: Codes) -> Values:
         """Physical values of `codes` in double precision, in `unit`."""

@@ -26,6 +26,7 @@ from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeEl
 from rich.table import Table
 
 import sosmith
+from sosmith.gen.architecture import Architecture
 from sosmith.gen.boards import BOARDS, find_board
 from sosmith.gen.certificate_file import Certificate, read_certificate
 from sosmith.gen.comparison import column_names, comparison_json, comparison_page, load_report
@@ -533,8 +534,10 @@ def _print_design(made: CoreDesign, *, brief: bool = False) -> None:
     for subject, reason in made.reasons.items():
         overview.add_row(subject, reason)
     overview.add_row("output", f"{datapath.output.bits} bits, one LSB = {lsb:.6g}{unit}")
-    overview.add_row("multipliers", cost_of(datapath).multiplier_sizes)
-    overview.add_row("adder bits, register bits", f"{cost_of(datapath).adder_bits}, {cost_of(datapath).register_bits}")
+    for name, value in _hardware_rows(made.architecture):
+        overview.add_row(name, value)
+    if made.spec.channels > 1:
+        overview.add_row("channels", f"{made.spec.channels:,}, each at {float(made.spec.sample_rate):,.6g} Hz")
     console.print(overview)
     _print_budget(console, quantized.budget, datapath.output.lsb, datapath.output.unit, made.spec.max_error)
     if brief:
@@ -550,12 +553,31 @@ def _print_design(made: CoreDesign, *, brief: bool = False) -> None:
     _print_schedule(console, made.architecture.program)
 
 
+def _hardware_rows(architecture: Architecture) -> list[tuple[str, str]]:
+    """Say what the hardware has, before synthesis."""
+    program, cost = architecture.program, cost_of(architecture.datapath)
+    latency = ("latency", f"{architecture.latency_cycles:,} clocks")
+    if program is None:
+        sizes = f"{cost.adder_bits}, {cost.register_bits}"
+        return [latency, ("multipliers", cost.multiplier_sizes), ("adder bits, state and register bits", sizes)]
+    word = program.digit_bits + 1
+    states, shared = program.states, program.words - program.states
+    multiplier = "none, shifts and additions" if architecture.name == "serial" else f"1 of {word} x {word}"
+    memory = f"{states:,} words a channel, {shared:,} for all, of {word} bits"
+    accumulator = f"{program.accumulator_bits} bits"
+    return [
+        latency,
+        ("multipliers", multiplier),
+        ("accumulator", accumulator),
+        ("memory", memory),
+    ]
+
+
 def _print_schedule(console: Console, program: Program | None) -> None:
     if program is None:
         return
     table = _table(
-        f"Schedule: {len(program.instructions)} instructions, {program.words} words of {program.digit_bits + 1} bits, "
-        f"accumulator of {program.accumulator_bits} bits",
+        f"Schedule: {len(program.instructions)} instructions for each sample of each channel",
         ["from", "clocks", "value", "words"],
     )
     places = {place.name: f"{place.address}..{place.address + place.digits - 1}" for place in program.places}
