@@ -28,6 +28,7 @@ _MACROS = """`define SB_DFF_INIT initial Q = `START(0);
 """
 
 _MODULE = re.compile(r"^module\s+(\w+)\b.*?\bendmodule\b", re.MULTILINE | re.DOTALL)
+_PARAMETERS = re.compile(r"^  (\w+) #\((.*?)^  \) ", re.MULTILINE | re.DOTALL)
 
 
 def with_cell_models(netlist: Netlist, *, scrambled: bool) -> Path:
@@ -49,7 +50,7 @@ def with_cell_models(netlist: Netlist, *, scrambled: bool) -> Path:
     Raises
     ------
     ToolError
-        If there is no model of a cell, or Yosys is missing.
+        If there is no model of a cell, or not of what a netlist sets of it, or if Yosys is missing.
     """
     device = netlist.board.device
     files = [*(share_folder() / name for name in _OF_YOSYS[device.family]), *_OURS[device.family]]
@@ -63,6 +64,11 @@ def with_cell_models(netlist: Netlist, *, scrambled: bool) -> Path:
         if cell not in needed:
             needed.append(cell)
             wanted += sorted({word for word in re.findall(r"\w+", models[cell]) if word in models} - {cell})
+    text = netlist.path.read_text(encoding="utf-8")
+    for cell, parameters in _PARAMETERS.findall(text):  # a simulator may pass over one that the model does not know
+        unknown = set(re.findall(r"\.(\w+)\(", parameters)) - set(re.findall(r"\w+", models[cell]))
+        if unknown:
+            raise ToolError(f"the model of {cell} must know what a netlist sets of the cell, as {min(unknown)}")
     start = "`define START(configured) " + ("1'($urandom)" if scrambled else "(configured)")
-    texts = [start, _MACROS, *(models[cell] for cell in needed), netlist.path.read_text(encoding="utf-8")]
+    texts = [start, _MACROS, *(models[cell] for cell in needed), text]
     return write_files(netlist.path.parent, {"gates.v": "\n".join(texts)})[0]

@@ -165,14 +165,20 @@ def test_a_flip_flop_without_its_reset_is_found(folder: Path, monkeypatch: pytes
 
 def test_a_use_of_a_cell_that_its_model_has_not_is_refused(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     break_netlist(
-        lambda text: text.replace("\n  MULT18X18D ", '\n  MULT18X18D #(.REG_OUTPUT_CLK("CLK0")) ', 1), monkeypatch
+        lambda text: text.replace("\n  MULT18X18D ", '\n  MULT18X18D #(\n    .REG_OUTPUT_CLK("CLK0")\n  ) ', 1),
+        monkeypatch,
     )
     with pytest.raises(ToolError, match="MULT18X18D must have no register and no bypass, unlike little"):
         run(little("parallel", folder), "ulx3s_25f", folder, samples=80)
 
 
 def test_a_cell_without_a_model_is_refused(tmp_path: Path) -> None:
-    netlist = Netlist(find_board("ulx3s_25f"), tmp_path / "netlist.v", {"LUT4": 1, "ALU54B": 1}, "0")
+    path = tmp_path / "netlist.v"
+    netlist = Netlist(find_board("ulx3s_25f"), path, {"LUT4": 1, "ALU54B": 1}, "0")
     message = "every cell of ECP5 LFE5U-25F in a netlist must have a model, which ALU54B has not"
     with pytest.raises(ToolError, match=f"^{message}$"):
         with_cell_models(netlist, scrambled=True)
+    path.write_text("module little;\n  LUT4 #(\n    .INIT(16'h1234),\n    .SPEED(2'h1)\n  ) lut4 ();\nendmodule\n")
+    message = "the model of LUT4 must know what a netlist sets of the cell, as SPEED"
+    with pytest.raises(ToolError, match=f"^{message}$"):
+        with_cell_models(replace(netlist, cells={"LUT4": 1}), scrambled=True)
