@@ -55,15 +55,11 @@ def with_cell_models(netlist: Netlist, *, scrambled: bool) -> Path:
     device = netlist.board.device
     files = [*(share_folder() / name for name in _OF_YOSYS[device.family]), *_OURS[device.family]]
     models = {found[1]: found[0] for file in files for found in _MODULE.finditer(file.read_text(encoding="utf-8"))}
-    needed: list[str] = []
-    wanted = sorted(netlist.cells)
-    while wanted:
-        cell = wanted.pop(0)
+    needed = sorted(netlist.cells)
+    for cell in needed:  # it grows by the cells that models are made of
         if cell not in models:
             raise ToolError(f"every cell of {device.title} in a netlist must have a model, which {cell} has not")
-        if cell not in needed:
-            needed.append(cell)
-            wanted += sorted({word for word in re.findall(r"\w+", models[cell]) if word in models} - {cell})
+        needed += sorted(models.keys() & set(re.findall(r"\w+", models[cell])) - set(needed))
     text = netlist.path.read_text(encoding="utf-8")
     for cell, parameters in _PARAMETERS.findall(text):  # a simulator may pass over one that the model does not know
         unknown = set(re.findall(r"\.(\w+)\(", parameters)) - set(re.findall(r"\w+", models[cell]))
