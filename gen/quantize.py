@@ -54,6 +54,9 @@ _BITS_TO_ORDER = 24
 _ATTEMPTS = 4
 """Times that words are chosen anew before they are chosen another way."""
 
+_DOUBLE = 53
+"""Significant bits of a number in double precision."""
+
 _COARSER = 4
 """Fraction bits that the calibration may have less than with an equal share of the budget."""
 
@@ -361,6 +364,129 @@ def with_realization(quantized: Quantized, realization: str) -> Quantized:
         budget=quantized.budget | _filter_budget(proof) | {"output rounding": error},
         proof=proof,
     )
+
+
+def with_constants(made: Quantized, ideal: Filter | None, polynomial: Polynomial | None) -> Quantized:
+    """Return the design for another filter or another polynomial, with no bit more or less of anything.
+
+    Every constant keeps its fraction bits. The bound is proven anew and may exceed what the specification allows.
+
+    Parameters
+    ----------
+    made : Quantized
+        The design.
+    ideal : Filter or None
+        The other filter; None for the one it has. Sections take the places of those with the same rank by the
+        distance of their poles from the unit circle.
+    polynomial : Polynomial or None
+        The other polynomial; None for the one it has.
+
+    Raises
+    ------
+    ShortfallError
+        If the filter or polynomial does not have this structure, or is unstable with these fraction bits.
+    """
+    entry = _entry_with(made, polynomial)
+    filled = ideal or made.filter
+    sections: Sequence[Section] = ()
+    proof = None
+    if filled is not None:
+        if ideal is not None:
+            filled = _ranked(ideal, cast("Filter", made.filter), made.realization)
+        words = _words_of(made) if ideal is None else _words_with(made, filled)
+        sections, proof = _cascade(filled, made.realization, words, entry.signal)
+    datapath = made.datapath
+    return _assembled(
+        Plan(
+            name=datapath.name,
+            inputs=datapath.inputs,
+            output=datapath.output,
+            max_error=made.bound * datapath.output.lsb,
+            ideal=filled,
+            polynomial=polynomial or made.polynomial,
+            realization=made.realization,
+            gain=Fraction(1) if filled is None else _gain(filled),
+            share=Fraction(0),
+            entries=(entry,),
+            search=None,
+            start=None,
+        ),
+        entry,
+        sections,
+        proof,
+    )
+
+
+def _entry_with(made: Quantized, polynomial: Polynomial | None) -> _Entry:
+    """What stands before the sections, for another polynomial if it is not None."""
+    datapath = made.datapath
+    stages = tuple(stage for stage in datapath.stages if isinstance(stage, HornerStep))
+    if polynomial is None or made.polynomial is None:
+        node = datapath.stages[len(stages)].graph.nodes[datapath.stages[len(stages)].graph.inputs[0]]
+        return _Entry(stages=stages, signal=Signal(node.frac, node.low, node.high), error=made.entry_error)
+    room = [len(row) for row in _normalised(made.polynomial, datapath.inputs, datapath.output)]
+    exact = _normalised(polynomial, datapath.inputs, datapath.output)
+    counts = [len(row) for row in exact]
+    if len(counts) > len(room) or any(count > most for count, most in zip(counts, room, strict=False)):
+        raise ShortfallError(f"the calibration must have at most {room} coefficients in its rows, not {counts}")
+    zero = Fraction(0)
+    filled = tuple(
+        (*row, *[zero] * (most - len(row))) for row, most in zip([*exact, *[()] * len(room)], room, strict=False)
+    )
+    frac = _format_of(stages[-1]).frac
+    horner = HornerPolynomial(
+        coefficients=tuple(tuple(round(c * 2**frac) for c in row) for row in filled),
+        frac=frac,
+        variables=tuple(Variable(name=p.name, bits=p.bits, signed=p.signed) for p in datapath.inputs),
+    )
+    return _Entry(stages=horner.stages, signal=_format_of(horner.stages[-1]), error=_horner_error(filled, horner))
+
+
+def _ranked(ideal: Filter, like: Filter, realization: str) -> Filter:
+    """Return the filter with its sections in the order of `like`: each has the same rank by its pole radius."""
+    if not REALIZATIONS[realization].cascade or len(ideal.rows) != len(like.rows):
+        return ideal
+    ranks = sorted(range(len(like.rows)), key=lambda k: _nearness(like.rows[k]))
+    rows = dict(zip(ranks, sorted(ideal.rows, key=_nearness), strict=True))
+    return replace(ideal, rows=tuple(rows[k] for k in range(len(rows))))
+
+
+def _nearness(row: Sequence[float]) -> tuple[bool, float]:
+    """Key that sorts sections of first order first, then by the radius of their poles."""
+    return row[5] != 0, row[5]
+
+
+def _words_of(made: Quantized) -> list[Words]:
+    """Coefficients of all sections, and fraction bits that their quantizers keep."""
+    words = []
+    for section in made.sections:
+        models = linear_models(section.graph)
+        kept = {s.name: s.kept for model in models for s in model.sources if s.kept is not None}
+        words.append(Words(section.coefficients, {"v": _formats_of(section)[0].frac} | kept))
+    return words
+
+
+def _words_with(made: Quantized, ideal: Filter) -> list[Words]:
+    """Return the same with the coefficients of another filter, rounded to the fraction bits of these."""
+    exact = _stages(
+        ideal,
+        made.realization,
+        [SectionFormat(coefficient_bits=_DOUBLE)] * len(_parts(ideal, made.realization)),
+        Signal(0, -WIDE, WIDE),
+    )
+    words = _words_of(made)
+    names, wanted = ([list(w.coefficients) for w in words], [list(stage.coefficients) for stage in exact])
+    if names != wanted:
+        raise ShortfallError(f"the filter's sections must have the coefficients {names}, not {wanted}")
+    for k, stage in enumerate(exact):
+        coefficients = {}
+        for name, (integer, frac) in stage.coefficients.items():
+            kept = words[k].coefficients[name][1]
+            coefficients[name] = (round(integer * Fraction(2) ** (kept - frac)), kept)
+            if not coefficients[name][0]:
+                raise ShortfallError(f"{name} of {stage.name} must not vanish with {kept} fraction bits")
+        words[k] = replace(words[k], coefficients=coefficients)
+    return words
 
 
 def _gain(ideal: Filter) -> Fraction:

@@ -13,8 +13,8 @@ The program is made from the graphs of the datapath's stages and nothing else, a
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from enum import Enum
 from fractions import Fraction
 from typing import NamedTuple
@@ -147,6 +147,19 @@ class Program:
             start = index + 1
         return found
 
+    def padded(self, count: int) -> Program:
+        """Return the same in `count` instructions: those that are missing do nothing, before all others.
+
+        Raises
+        ------
+        ValueError
+            If it has more.
+        """
+        missing = count - len(self.instructions)
+        if missing < 0:
+            raise ValueError(f"a program must have at most {count} instructions, not {len(self.instructions)}")
+        return replace(self, instructions=(*[Instruction(Do.NOTHING)] * missing, *self.instructions))
+
     def reset(self) -> list[int]:
         """Words of a channel after reset: states are 0, and what is not the word of ones may be anything."""
         return [int(address >= self.one) for address in range(self.words)]
@@ -209,7 +222,7 @@ def digits_of(code: int, count: int, digit_bits: int) -> list[int]:
     return [*low, code >> (digit_bits * (count - 1))]
 
 
-def program(datapath: Datapath, digit_bits: int) -> Program:
+def program(datapath: Datapath, digit_bits: int, *, like: Program | None = None) -> Program:
     """Fold a datapath.
 
     Parameters
@@ -218,13 +231,47 @@ def program(datapath: Datapath, digit_bits: int) -> Program:
         What is to be computed.
     digit_bits : int
         Bits of a digit, one less than the multiplier has.
+    like : Program or None
+        A program that this one is to take over from at any sample, in the same hardware and with its states: places
+        of the same name get at least as many digits.
 
     Raises
     ------
     FoldingError
-        If the datapath has an operation that cannot be folded.
+        If the datapath has an operation that cannot be folded, or the program cannot take over from `like`.
     """
-    return _Folding(_flattened(datapath), digit_bits).program()
+    kept = {} if like is None else {place.name: place.digits for place in like.places}
+    made = _Folding(_flattened(datapath), digit_bits, kept).program()
+    if like is None:
+        return made
+    _check_can_take_over(made, like)
+    return replace(made, words=like.words, accumulator_bits=like.accumulator_bits)
+
+
+def _check_can_take_over(made: Program, like: Program) -> None:
+    """Check that states lie where they lay, that ports have as many digits, and that everything else has room."""
+    for what, new, old in (
+        ("digit_bits", made.digit_bits, like.digit_bits),
+        ("its states", _states(made), _states(like)),
+        ("digits and fraction bits of its inputs", _forms(made.inputs), _forms(like.inputs)),
+        ("digits and fraction bits of its output", _forms([made.output]), _forms([like.output])),
+    ):
+        if new != old:
+            raise FoldingError(f"to take over, {what} must be {old}, not {new}")
+    for what, new, old in (
+        ("words of memory", made.words, like.words),
+        ("bits of the accumulator", made.accumulator_bits, like.accumulator_bits),
+    ):
+        if new > old:
+            raise FoldingError(f"to take over, {what} must be at most {old}, not {new}")
+
+
+def _states(made: Program) -> list[tuple[str, int, int, int]]:
+    return [(place.name, place.address, place.digits, place.frac) for place in made.places if place.is_state]
+
+
+def _forms(places: Sequence[Place]) -> list[tuple[int, int]]:
+    return [(place.digits, place.frac) for place in places]
 
 
 class _Flat(NamedTuple):
@@ -277,9 +324,10 @@ _Sum = dict[_Term, Fraction]
 class _Folding:
     """Works out what to store, where, and in which order to compute it."""
 
-    def __init__(self, flat: _Flat, digit_bits: int) -> None:
+    def __init__(self, flat: _Flat, digit_bits: int, kept: Mapping[str, int]) -> None:
         self._nodes, self._inputs, self._output = flat
         self._bits = digit_bits
+        self._kept = kept
         last = self._nodes[self._output]
         if last.op is Op.CLAMP:  # done on the way out
             self._nodes.remove(last)
@@ -304,8 +352,9 @@ class _Folding:
             count = self._digits(
                 node.low << (self._fracs[index] - node.frac), node.high << (self._fracs[index] - node.frac)
             )
-            state = node.op is Op.DELAY
-            self._places[index] = Place(node.name or f"value{index}", address, count, self._fracs[index], state)
+            state, name = node.op is Op.DELAY, node.name or f"value{index}"
+            count = max(count, self._kept.get(name, 0))
+            self._places[index] = Place(name, address, count, self._fracs[index], state)
             address += count
             states += count * state
         self._one = states

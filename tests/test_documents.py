@@ -1,6 +1,7 @@
 """The documents: what the README shows is what the commands print, and the maps of the code are true.
 
-Run as a script, it renews what is generated in them: the output in the README, the file table of the architecture.
+Run as a script, it renews what is generated in them: the output in the README, the file table of the
+architecture, the register map.
 """
 
 import ast
@@ -14,10 +15,12 @@ import pytest
 from click.testing import CliRunner
 
 from sosmith.cli import cli
+from sosmith.gen.register_map import markdown
 
 ROOT = Path(__file__).parents[1]
 README = ROOT / "README.md"
 ARCHITECTURE = ROOT / "docs" / "architecture.md"
+REGISTERS = ROOT / "docs" / "registers.md"
 DOCUMENTS = [README, ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").glob("*.md"))]
 ROOMS = ("model", "hdl", "gen", "sim")
 BY_CI = {"./run demo", "./run test"}
@@ -26,6 +29,7 @@ NEEDS_SIMULATION = ("./run simulate ", "./run compare ")
 """Beginnings of the lines that only the longer test carries out."""
 
 _OUTPUT = re.compile(r"(?<=```text\n).*?(?=```)", re.DOTALL)
+_REGISTERS = re.compile(r"(?<=<!-- registers -->\n).*?(?=<!-- end of registers -->)", re.DOTALL)
 _TABLE = re.compile(r"(?<=\| file \| holds \|\n\|---\|---\|\n).*?(?=\n## )", re.DOTALL)
 
 
@@ -100,6 +104,10 @@ def test_the_file_table_is_up_to_date() -> None:
     assert shown == file_table()
 
 
+def test_the_register_map_is_up_to_date() -> None:
+    assert _REGISTERS.findall(REGISTERS.read_text(encoding="utf-8")) == [markdown()]
+
+
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
 def test_links_and_paths_lead_somewhere(document: Path) -> None:
     text = document.read_text(encoding="utf-8")
@@ -127,3 +135,4 @@ if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as scratch, contextlib.chdir(scratch):
         renew(README, _OUTPUT, worked_example(Path(scratch)))
     renew(ARCHITECTURE, _TABLE, file_table())
+    renew(REGISTERS, _REGISTERS, markdown())

@@ -1,0 +1,194 @@
+"""The reload port: new contents for a core's second bank over AXI4-Lite, checked by a CRC, swapped between samples."""
+
+from __future__ import annotations
+
+from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value
+from amaranth.lib import wiring
+from amaranth.lib.memory import Memory
+from amaranth.lib.wiring import In, Out
+
+from sosmith.hdl.axi_lite import BITS, SerialSlave, slave_members
+from sosmith.hdl.serial_crc import SerialCrc
+from sosmith.model.reload_registers import (
+    ADDRESS_BITS,
+    CRC,
+    DATA,
+    DESIGN,
+    ID,
+    INTERFACE,
+    LAYOUT,
+    MAGIC,
+    MOST_WORDS,
+    REGISTERS,
+    STATUS,
+    VERSION,
+    Outcome,
+    Register,
+)
+
+
+class ReloadPort(wiring.Component):
+    """Fills the bank of a core that is not active, and makes it active if it has arrived as it should.
+
+    The registers are those of `sosmith.model.reload_registers`. A load is a write of ``VERSION``, one of ``DATA`` for
+    each word of the bank, and one of ``CRC``. Any refused write ends it. Only a load whose words are complete and whose
+    CRC is right asks for a swap: `pending` is high from then on until a clock in which `may_swap` is high.
+
+    A reset ends a load and drops a pending swap. It does not touch what is active, nor its version, because it
+    could not restore the memories: a core goes on with the set that it has.
+
+    Latency and throughput: those of `sosmith.hdl.axi_lite.SerialSlave`.
+
+    Parameters
+    ----------
+    depth : int
+        Words of a bank, 1 to 65535.
+    bits : int
+        Bits of a word that are used, 1 to 32.
+    design : int
+        Fingerprint that ``DESIGN`` reads.
+
+    Members
+    -------
+    s_axil_awaddr, .., s_axil_rready
+        AXI4-Lite slave of `sosmith.model.reload_registers.ADDRESS_BITS` address lines.
+    write_enable : Out(1)
+        High for one clock for each word.
+    write_address : Out(range(depth))
+        Its place in the bank that is not `bank`.
+    write_data : Out(bits)
+        The word.
+    bank : Out(1)
+        Bank of the samples accepted from now on: one accepted in this clock uses what this is in this clock.
+    pending : Out(1)
+        Whether a swap is asked for. The core must give leave within finite time.
+    may_swap : In(1)
+        Whether `bank` may change at the end of this clock.
+    shadow_free : In(1)
+        Low while a sample on its way still uses the bank that is not `bank`; no load can begin then.
+    """
+
+    def __init__(self, depth: int, *, bits: int = BITS, design: int = 0) -> None:
+        if not 1 <= depth <= MOST_WORDS:
+            raise ValueError(f"depth must be 1 to {MOST_WORDS}, not {depth!r}")
+        if not 1 <= bits <= BITS:
+            raise ValueError(f"bits must be 1 to {BITS}, not {bits!r}")
+        self.depth = depth
+        self.bits = bits
+        self.design = design
+        super().__init__(
+            {
+                **slave_members(ADDRESS_BITS),
+                "write_enable": Out(1),
+                "write_address": Out(range(depth)),
+                "write_data": Out(bits),
+                "bank": Out(1),
+                "pending": Out(1),
+                "may_swap": In(1),
+                "shadow_free": In(1),
+            }
+        )
+
+    def elaborate(self, platform: object) -> Module:
+        """Build the port around the slave."""
+        m = Module()
+        m.submodules.slave = slave = SerialSlave(ADDRESS_BITS)
+        for name in slave_members(ADDRESS_BITS):
+            outer, inner = getattr(self, name), getattr(slave, name)
+            m.d.comb += outer.eq(inner) if self.signature.members[name].flow is Out else inner.eq(outer)
+        m.submodules.checksum = crc = SerialCrc()
+        turns = _is_at(slave, CRC)
+        m.d.comb += [
+            crc.i_clear.eq(slave.o_start & _writes(slave, VERSION)),
+            crc.i_shift.eq(slave.o_shift & (slave.o_writes | turns)),
+            crc.i_turn.eq(turns),
+            crc.i_bit.eq(slave.o_bit),
+        ]
+        bank = Signal(reset_less=True)
+        m.d.comb += self.bank.eq(bank)
+        with m.If(self.pending & self.may_swap):
+            m.d.sync += [bank.eq(~bank), self.pending.eq(0)]
+        loading, outcome = self._load(m, slave, crc)
+        self._read(m, slave, crc, bank, Cat(loading, outcome))
+        return m
+
+    def _load(self, m: Module, slave: SerialSlave, crc: SerialCrc) -> tuple[Signal, Signal]:
+        """Follow a load from its beginning to its end; return whether there is one, and how the last one ended."""
+        loading, outcome = Signal(), Signal(Outcome)
+        taken = Signal(range(self.depth + 1))
+        complete = taken == self.depth
+        writable = (
+            (_is_at(slave, VERSION) & ~self.pending & self.shadow_free)
+            | (_is_at(slave, DATA) & loading & ~complete)
+            | (_is_at(slave, CRC) & loading & complete)
+        )
+        readable = (slave.o_index < len(REGISTERS)) & ~_is_at(slave, DATA)
+        m.d.comb += slave.i_refuse.eq(~Mux(slave.o_writes, writable, readable))
+        with m.If(slave.o_start & _writes(slave, VERSION)):
+            m.d.sync += [loading.eq(1), taken.eq(0)]
+        m.d.comb += [
+            self.write_enable.eq(slave.o_start & _writes(slave, DATA)),
+            self.write_address.eq(taken),
+            self.write_data.eq(slave.o_word),
+        ]
+        with m.If(self.write_enable):
+            m.d.sync += taken.eq(taken + 1)
+        with m.If(slave.o_refused & slave.o_writes & loading):
+            m.d.sync += [loading.eq(0), outcome.eq(Outcome.BROKEN_OFF)]
+        right = Signal()
+        with m.If(slave.o_start):
+            m.d.sync += right.eq(1)
+        with m.If(slave.o_shift & (slave.o_bit != crc.o_bit)):
+            m.d.sync += right.eq(0)
+        with m.If(slave.o_last & _writes(slave, CRC)):
+            m.d.comb += slave.i_fail.eq(~right)
+            m.d.sync += [loading.eq(0), self.pending.eq(right)]
+            m.d.sync += outcome.eq(Mux(right, Outcome.ACCEPTED, Outcome.WRONG_CRC))
+        return loading, outcome
+
+    def _read(self, m: Module, slave: SerialSlave, crc: SerialCrc, bank: Signal, load: Value) -> None:
+        """Give what is read, bit by bit: constants and versions from a memory, the rest a clock late like these."""
+        seen_bank, seen_pending = Signal(), Signal()  # a swap must not show half-way through
+        with m.If(slave.o_check):
+            m.d.sync += [seen_bank.eq(bank), seen_pending.eq(self.pending)]
+        init = [word >> bit & 1 for word in self._rows() for bit in range(BITS)]
+        m.submodules.words = words = Memory(shape=1, depth=len(init), init=init, attrs={"ram_style": "block"})
+        store, fetch = words.write_port(), words.read_port()
+        m.d.comb += [
+            store.addr.eq(Cat(slave.o_count, slave.o_index ^ ~bank)),
+            store.data.eq(slave.o_bit),
+            store.en.eq(slave.o_shift & _writes(slave, VERSION)),
+            fetch.addr.eq(Cat(slave.o_count, slave.o_index ^ (_is_at(slave, VERSION) & seen_bank))),
+        ]
+        status = Cat(load[0], seen_pending, seen_bank, Const(0, 1), load[1:], Const(0, 2))
+        other = Signal()
+        m.d.sync += other.eq(_bit_of(status, slave.o_count[:3]) & ~slave.o_count[3:].any())
+        with m.If(_is_at(slave, CRC)):
+            m.d.sync += other.eq(crc.o_bit)
+        m.d.comb += slave.i_bit.eq(Mux(_is_at(slave, STATUS) | _is_at(slave, CRC), other, fetch.data))
+
+    def _rows(self) -> list[int]:
+        """Words of the memory that is read: a row for each register, two for the version, one for each bank."""
+        assert VERSION.index % 2 == 0  # the bank is the lowest bit of the row
+        assert VERSION.index + 1 == DATA.index  # which cannot be read
+        layout = INTERFACE << LAYOUT.field("INTERFACE").low | self.depth << LAYOUT.field("WORDS").low
+        rows = [0] * (1 << (ADDRESS_BITS - 2))
+        rows[ID.index], rows[LAYOUT.index], rows[DESIGN.index] = MAGIC, layout, self.design
+        return rows
+
+
+def _is_at(slave: SerialSlave, register: Register) -> Value:
+    return slave.o_index == register.index
+
+
+def _writes(slave: SerialSlave, register: Register) -> Value:
+    return slave.o_writes & _is_at(slave, register)
+
+
+def _bit_of(word: Value, index: Value) -> Value:
+    """Select a bit of `word`, which must have a power of two of them."""
+    bits = list(word)
+    for select in index:
+        bits = [Mux(select, high, low) for low, high in zip(bits[::2], bits[1::2], strict=True)]
+    (bit,) = bits
+    return bit

@@ -1,0 +1,491 @@
+# amaranth: UnusedElaboratable=no
+"""The reload port: what arrives whole and right becomes active between two samples, and nothing else ever does."""
+
+import random
+import sys
+import types
+import zlib
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from amaranth.hdl import ResetInserter, Signal
+from tests.hdl.axi_lite_bench import OKAY, SLVERR, Bus, run
+
+from sosmith.hdl import reload
+from sosmith.hdl.reload import ReloadPort
+from sosmith.model.reload_registers import (
+    ADDRESS_BITS,
+    CRC,
+    DATA,
+    DESIGN,
+    ID,
+    LAYOUT,
+    MAGIC,
+    REGISTERS,
+    STATUS,
+    VERSION,
+    Outcome,
+)
+
+DEPTH = 3
+
+
+def crc_of(version: int, words: list[int]) -> int:
+    """CRC of a set, by another implementation."""
+    return zlib.crc32(b"".join(word.to_bytes(4, "little") for word in (version, *words)))
+
+
+class Bench:
+    """A reload port with two banks behind it, and what must be true of them at every clock."""
+
+    def __init__(self, ctx: Any, dut: Any, reset: Signal, seed: int) -> None:
+        self.dut = dut
+        self.ctx = ctx
+        self.pace = random.Random(seed)
+        self.bus = Bus(ctx, dut, self.pace, self.every_clock)
+        self.banks: list[list[int | None]] = [[None] * dut.depth, [None] * dut.depth]
+        self.swaps = 0
+        self.gaps = 1.0  # share of the clocks in which the bank may change
+        self._reset = reset
+        self._expected = 0
+        ctx.set(dut.shadow_free, 1)
+
+    def every_clock(self) -> None:
+        """Keep the banks, and check that the bank changes if and only if it was asked to and allowed to."""
+        ctx, dut = self.ctx, self.dut
+        bank = int(ctx.get(dut.bank))
+        assert bank == self._expected
+        ctx.set(dut.may_swap, self.pace.random() < self.gaps)
+        swaps = bool(ctx.get(dut.pending) and ctx.get(dut.may_swap))
+        self._expected ^= swaps
+        self.swaps += swaps
+        if ctx.get(dut.write_enable):
+            address = int(ctx.get(dut.write_address))
+            assert not ctx.get(dut.pending)
+            assert address < dut.depth
+            self.banks[1 - bank][address] = ctx.get(dut.write_data)
+
+    @property
+    def active(self) -> list[int | None]:
+        """Words that samples would use now."""
+        return self.banks[int(self.ctx.get(self.dut.bank))]
+
+    async def reset(self) -> None:
+        """Reset the port for one clock, whatever it is doing."""
+        self.bus.set(awvalid=0, wvalid=0, arvalid=0)
+        self.ctx.set(self._reset, 1)
+        await self.ctx.tick()
+        self.ctx.set(self._reset, 0)
+        assert (self.bus.get("bvalid"), self.bus.get("rvalid")) == (0, 0)
+
+    async def status(self) -> dict[str, int]:
+        """Fields of the status."""
+        word, response = await self.bus.read(STATUS.address)
+        assert response == OKAY
+        return {field.name: field.of(word) for field in STATUS.fields}
+
+    async def version(self) -> int:
+        """Version of the active set."""
+        word, response = await self.bus.read(VERSION.address)
+        assert response == OKAY
+        return word
+
+    async def load(self, version: int, words: list[int], *, crc: int | None = None) -> list[int]:
+        """Load a set; return the responses."""
+        write = self.bus.write
+        responses = [await write(VERSION.address, version)]
+        responses += [await write(DATA.address, word) for word in words]
+        return [*responses, await write(CRC.address, crc_of(version, words) if crc is None else crc)]
+
+    def words(self, count: int | None = None) -> list[int]:
+        """Random words, with those among them that a CRC is easily wrong about."""
+        hard = (0, 0xFFFFFFFF, 0x80000000, 1)
+        count = self.dut.depth if count is None else count
+        return [self.pace.choice((*hard, self.pace.getrandbits(32))) for _ in range(count)]
+
+
+Scenario = Callable[[Bench], Awaitable[None]]
+
+
+def benched(scenario: Scenario, depth: int = DEPTH, *, seed: int = 1, **options: Any) -> None:
+    """Run a scenario on a port."""
+    dut: Any = ReloadPort(depth, **options)
+    reset = Signal()
+
+    async def testbench(ctx: Any) -> None:
+        await scenario(Bench(ctx, dut, reset, seed))
+
+    run(ResetInserter(reset)(dut), testbench)
+
+
+async def a_good_load_becomes_active(bench: Bench) -> None:
+    for _ in range(5):
+        version, words = bench.pace.getrandbits(32), bench.words()
+        assert set(await bench.load(version, words)) == {OKAY}
+        await bench.bus.idle(2)
+        assert bench.active == words
+        assert await bench.version() == version
+        assert await bench.bus.read(CRC.address) == (crc_of(version, words), OKAY)
+        found = await bench.status()
+        assert found == {"LOADING": 0, "PENDING": 0, "BANK": bench.swaps % 2, "OUTCOME": Outcome.ACCEPTED}
+    assert bench.swaps == 5
+
+
+async def a_wrong_crc_never_becomes_active(bench: Bench) -> None:
+    words = bench.words()
+    await bench.load(7, words)
+    await bench.bus.idle(2)
+    for flipped in (1, 2, 1 << 13, 1 << 31, 0xFFFFFFFF):
+        wrong = bench.words()
+        *others, last = await bench.load(8, wrong, crc=crc_of(8, wrong) ^ flipped)
+        assert (set(others), last) == ({OKAY}, SLVERR)
+        assert (await bench.status())["OUTCOME"] == Outcome.WRONG_CRC
+    await bench.bus.idle(20)
+    assert (bench.swaps, bench.active) == (1, words)
+    assert await bench.version() == 7
+
+
+async def a_load_broken_off_never_becomes_active(bench: Bench) -> None:
+    write = bench.bus.write
+    words, good = bench.words(), bench.words()
+    await bench.load(7, words)
+    await bench.bus.idle(2)
+
+    async def then_refused(count: int, *access: int) -> None:
+        """Begin a load of some words; break it off by a write that is refused; then nothing can save it."""
+        assert await write(VERSION.address, 9) == OKAY
+        for word in good[:count]:
+            assert await write(DATA.address, word) == OKAY
+        assert await write(*access) == SLVERR
+        found = await bench.status()
+        assert (found["LOADING"], found["OUTCOME"]) == (0, Outcome.BROKEN_OFF)
+        assert await write(DATA.address, good[-1]) == SLVERR
+        assert await write(CRC.address, crc_of(9, good)) == SLVERR
+
+    await then_refused(DEPTH - 1, CRC.address, crc_of(9, good[:-1]))  # a word is missing
+    await then_refused(DEPTH, DATA.address, 0)  # a word too many
+    for address in (ID.address, LAYOUT.address, DESIGN.address, STATUS.address, 4 * len(REGISTERS)):
+        await then_refused(DEPTH, address, 0)  # a write of what cannot be written
+    for strobe in (0, 7, 14, 13):
+        await then_refused(DEPTH, CRC.address, crc_of(9, good), strobe)
+    await bench.bus.idle(20)
+    assert (bench.swaps, bench.active) == (1, words)
+    assert await bench.version() == 7
+
+
+async def a_load_may_begin_anew(bench: Bench) -> None:
+    assert await bench.bus.write(VERSION.address, 1) == OKAY
+    assert await bench.bus.write(DATA.address, 5) == OKAY
+    words = bench.words()
+    assert set(await bench.load(2, words)) == {OKAY}
+    await bench.bus.idle(2)
+    assert bench.active == words
+
+
+async def a_refused_read_breaks_nothing(bench: Bench) -> None:
+    words = bench.words()
+    assert await bench.bus.write(VERSION.address, 3) == OKAY
+    for place, word in enumerate(words):
+        assert await bench.bus.write(DATA.address, word) == OKAY
+        assert await bench.bus.read(CRC.address) == (crc_of(3, words[: place + 1]), OKAY)
+        assert (await bench.bus.read(DATA.address))[1] == SLVERR
+        assert (await bench.bus.read(4 * len(REGISTERS)))[1] == SLVERR
+        assert (await bench.status())["LOADING"]
+    assert await bench.bus.write(CRC.address, crc_of(3, words)) == OKAY
+    await bench.bus.idle(2)
+    assert bench.active == words
+
+
+async def a_pending_set_waits_for_a_gap_and_keeps_new_loads_away(bench: Bench) -> None:
+    bench.gaps = 0.0
+    words = bench.words()
+    await bench.load(4, words)
+    await bench.bus.idle(300)
+    assert await bench.bus.write(VERSION.address, 5) == SLVERR
+    assert await bench.bus.write(DATA.address, 5) == SLVERR
+    found = await bench.status()
+    assert (found["PENDING"], found["LOADING"], found["OUTCOME"]) == (1, 0, Outcome.ACCEPTED)
+    assert await bench.version() == 0
+    assert bench.swaps == 0
+    bench.gaps = 1.0
+    await bench.bus.idle(2)
+    assert (bench.swaps, bench.active) == (1, words)
+    assert await bench.version() == 4
+
+
+async def no_load_begins_while_a_sample_uses_the_other_bank(bench: Bench) -> None:
+    bench.ctx.set(bench.dut.shadow_free, 0)
+    assert await bench.bus.write(VERSION.address, 5) == SLVERR
+    assert await bench.bus.write(DATA.address, 5) == SLVERR
+    assert not (await bench.status())["LOADING"]
+    bench.ctx.set(bench.dut.shadow_free, 1)
+    assert set(await bench.load(5, bench.words())) == {OKAY}
+
+
+async def a_swap_does_not_show_half_way_through_a_read(bench: Bench) -> None:
+    old, swap_at = 0, 0
+
+    def every_clock() -> None:
+        bench.gaps = float(bench.bus.clocks >= swap_at)
+        bench.every_clock()
+
+    bench.bus.every_clock = every_clock
+    for delay in range(0, 45, 3):
+        swap_at = 1 << 32
+        new = ~old & 0xFFFFFFFF
+        await bench.load(new, bench.words())
+        swap_at = bench.bus.clocks + delay
+        assert await bench.version() in {old, new}
+        await bench.bus.idle(45)
+        assert bench.swaps == delay // 3 + 1
+        old = new
+
+
+async def a_reset_ends_a_load_and_keeps_what_is_active(bench: Bench) -> None:
+    words = bench.words()
+    await bench.load(6, words)
+    await bench.bus.idle(2)
+    await bench.bus.write(VERSION.address, 7)
+    await bench.reset()
+    assert await bench.status() == {"LOADING": 0, "PENDING": 0, "BANK": 1, "OUTCOME": Outcome.NONE}
+    assert await bench.bus.write(DATA.address, 7) == SLVERR
+    bench.gaps = 0.0
+    await bench.load(8, bench.words())
+    await bench.reset()
+    bench.gaps = 1.0
+    await bench.bus.idle(20)
+    assert (bench.swaps, bench.active) == (1, words)
+    assert await bench.version() == 6
+    bench.bus.set(arvalid=1)
+    await bench.bus.idle(9)
+    await bench.reset()  # in the middle of an access
+    assert set(await bench.load(9, words)) == {OKAY}
+
+
+SCENARIOS: tuple[Scenario, ...] = (
+    a_good_load_becomes_active,
+    a_wrong_crc_never_becomes_active,
+    a_load_broken_off_never_becomes_active,
+    a_load_may_begin_anew,
+    a_refused_read_breaks_nothing,
+    a_pending_set_waits_for_a_gap_and_keeps_new_loads_away,
+    no_load_begins_while_a_sample_uses_the_other_bank,
+    a_swap_does_not_show_half_way_through_a_read,
+    a_reset_ends_a_load_and_keeps_what_is_active,
+)
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS, ids=lambda scenario: scenario.__name__)
+def test_the_port(scenario: Scenario) -> None:
+    assert len(REGISTERS) < 1 << (ADDRESS_BITS - 2)  # there is an address behind the last register
+    benched(scenario)
+
+
+MUTANTS: dict[str, tuple[Scenario, str, str, str]] = {
+    "another polynomial": (a_good_load_becomes_active, "serial_crc", "0xEDB88320", "0xEDB88321"),
+    "a CRC goes on from the load before": (
+        a_good_load_becomes_active,
+        "serial_crc",
+        "with m.If(self.i_clear)",
+        "with m.If(0)",
+    ),
+    "any CRC is right": (a_wrong_crc_never_becomes_active, "reload", "right.eq(0)", "right.eq(1)"),
+    "only the last bit of the CRC counts": (
+        a_wrong_crc_never_becomes_active,
+        "reload",
+        "with m.If(slave.o_start):",
+        "with m.If(slave.o_shift):",
+    ),
+    "words may be missing": (
+        a_load_broken_off_never_becomes_active,
+        "reload",
+        "_is_at(slave, CRC) & loading & complete",
+        "_is_at(slave, CRC) & loading",
+    ),
+    "words may be too many": (
+        a_load_broken_off_never_becomes_active,
+        "reload",
+        "_is_at(slave, DATA) & loading & ~complete",
+        "_is_at(slave, DATA) & loading",
+    ),
+    "a refused write is forgiven": (
+        a_load_broken_off_never_becomes_active,
+        "reload",
+        "[loading.eq(0), outcome.eq(Outcome.BR",
+        "[outcome.eq(Outcome.BR",
+    ),
+    "a swap without leave": (
+        a_pending_set_waits_for_a_gap_and_keeps_new_loads_away,
+        "reload",
+        "self.pending & self.may_swap",
+        "self.pending",
+    ),
+    "a load begins with a swap pending": (
+        a_pending_set_waits_for_a_gap_and_keeps_new_loads_away,
+        "reload",
+        "VERSION) & ~self.pending &",
+        "VERSION) &",
+    ),
+    "a load begins in a bank in use": (
+        no_load_begins_while_a_sample_uses_the_other_bank,
+        "reload",
+        "& self.shadow_free)",
+        ")",
+    ),
+    "a new version goes to the active set": (
+        a_good_load_becomes_active,
+        "reload",
+        "slave.o_index ^ ~bank",
+        "slave.o_index ^ bank",
+    ),
+    "a version is read across a swap": (
+        a_swap_does_not_show_half_way_through_a_read,
+        "reload",
+        "VERSION) & seen_bank",
+        "VERSION) & bank",
+    ),
+    "a load does not begin at the first word": (
+        a_load_may_begin_anew,
+        "reload",
+        "[loading.eq(1), taken.eq(0)]",
+        "loading.eq(1)",
+    ),
+    "a reset changes the bank": (
+        a_reset_ends_a_load_and_keeps_what_is_active,
+        "reload",
+        "bank = Signal(reset_less=True)",
+        "bank = Signal()",
+    ),
+    "single bytes are written": (
+        a_load_broken_off_never_becomes_active,
+        "axi_lite",
+        "partial.eq(~self.s_axil_wstrb.all())",
+        "partial.eq(0)",
+    ),
+    "an answer does not wait": (
+        a_refused_read_breaks_nothing,
+        "axi_lite",
+        "self.s_axil_bready, self.s_axil_rready",
+        "self.s_axil_bready, 1",
+    ),
+    "ready follows valid": (
+        a_good_load_becomes_active,
+        "axi_lite",
+        "arready.eq(idle & ~writes)",
+        "arready.eq(self.s_axil_arvalid & idle & ~writes)",
+    ),
+    "refusals are not told": (a_refused_read_breaks_nothing, "axi_lite", "failed.eq(refused)", "failed.eq(0)"),
+}
+"""For each the scenario that must notice it, the module, and what is replaced by what."""
+
+USED_BY = {"serial_crc": (reload, "SerialCrc"), "axi_lite": (reload, "SerialSlave")}
+"""Where the components of a module are looked up; the port itself here."""
+
+
+@pytest.mark.parametrize("mutant", MUTANTS.values(), ids=list(MUTANTS))
+def test_a_broken_port_is_noticed(mutant: tuple[Scenario, str, str, str], monkeypatch: pytest.MonkeyPatch) -> None:
+    scenario, name, old, new = mutant
+    path = Path(reload.__file__).with_name(f"{name}.py")
+    source = path.read_text(encoding="utf-8")
+    assert source.count(old) == 1
+    broken = types.ModuleType(f"sosmith.hdl.{name}")
+    exec(compile(source.replace(old, new), path, "exec"), vars(broken))
+    user, component = USED_BY.get(name, (sys.modules[__name__], "ReloadPort"))
+    monkeypatch.setattr(user, component, getattr(broken, component))
+
+    with pytest.raises(AssertionError):
+        benched(scenario)
+
+
+def test_constants_tell_what_the_core_is() -> None:
+    async def scenario(bench: Bench) -> None:
+        read = bench.bus.read
+        assert await read(ID.address) == (MAGIC, OKAY)
+        word, _ = await read(LAYOUT.address)
+        assert [field.of(word) for field in LAYOUT.fields] == [1, DEPTH]
+        assert await read(DESIGN.address) == (0x89ABCDEF, OKAY)
+        assert await bench.version() == 0
+        assert set((await bench.status()).values()) == {0}
+
+    benched(scenario, design=0x89ABCDEF)
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_loads_of_all_kinds_at_any_pace(seed: int) -> None:
+    async def scenario(bench: Bench) -> None:
+        pace, version = bench.pace, 0
+        active: list[int | None] = [None] * 3
+        for _ in range(15):
+            bench.gaps = pace.choice((1.0, 0.1, 0.01))
+            words, new, crc = bench.words(pace.choice((2, 3, 3, 3, 3, 4))), pace.getrandbits(32), None
+            if pace.random() < 0.3:
+                crc = crc_of(new, words) ^ 1 << pace.randrange(32)
+            responses = await bench.load(new, words, crc=crc)
+            while (await bench.status())["PENDING"]:
+                pass
+            good = crc is None and len(words) == 3
+            assert (responses[-1] == OKAY) == good
+            if good:
+                active, version = [word & 0x1FFFF for word in words], new
+            assert bench.active == active
+            assert await bench.version() == version
+
+    benched(scenario, bits=17, seed=seed)
+
+
+@pytest.mark.parametrize("depth", [1, 2, 4, 7])
+def test_every_word_of_a_bank_is_reached(depth: int) -> None:
+    async def scenario(bench: Bench) -> None:
+        words = bench.words()
+        assert set(await bench.load(1, words)) == {OKAY}
+        await bench.bus.idle(2)
+        assert bench.active == words
+
+    benched(scenario, depth)
+
+
+def test_latency_is_as_stated() -> None:
+    async def scenario(bench: Bench) -> None:
+        bus = bench.bus
+        found: dict[str, set[int]] = {"read": set(), "write": set(), "refused": set()}
+
+        async def timed(kind: str, asks: tuple[str, ...], answer: str, address: int) -> None:
+            bus.set(**{f"{channel}valid": 1 for channel in asks}, awaddr=address, araddr=address, wstrb=15)
+            start = bus.clocks
+            while not bus.get(f"{answer}valid"):
+                taken = [channel for channel in asks if bus.get(f"{channel}valid") and bus.get(f"{channel}ready")]
+                await bus.clock()
+                bus.set(**{f"{channel}valid": 0 for channel in taken})
+            found[kind].add(bus.clocks - start)
+            bus.set(**{f"{answer}ready": 1})
+            await bus.clock()
+            bus.set(**{f"{answer}ready": 0})
+
+        for wait in (1, 2, 1, 1, 2, 2, 1):
+            await bus.idle(wait)
+            await timed("read", ("ar",), "r", ID.address)
+            await bus.idle(wait // 2)
+            await timed("write", ("aw", "w"), "b", VERSION.address)
+            await bus.idle(wait)
+            await timed("refused", ("aw", "w"), "b", ID.address)
+            await bus.idle(wait // 2)
+            await timed("refused", ("ar",), "r", DATA.address)
+        assert found == {"read": {35, 36}, "write": {36, 37}, "refused": {2, 3, 4}}
+
+    benched(scenario)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"depth": 0}, r"^depth must be 1 to 65535, not 0$"),
+        ({"depth": 65536}, r"^depth must be 1 to 65535, not 65536$"),
+        ({"depth": 1, "bits": 33}, r"^bits must be 1 to 32, not 33$"),
+        ({"depth": 1, "bits": 0}, r"^bits must be 1 to 32, not 0$"),
+    ],
+)
+def test_impossible_sizes_are_refused(options: dict[str, int], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        ReloadPort(**options)
