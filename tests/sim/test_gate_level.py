@@ -80,7 +80,7 @@ EXAMPLES_IN = [
 
 def made_in(example: str, architecture: str, *, channels: int = 1) -> CoreDesign:
     spec = load(EXAMPLES / example)
-    hardware = replace(spec.hardware, architecture=architecture, clock=Fraction(100_000_000), realization="df1_ef2")
+    hardware = replace(spec.hardware, architecture=architecture, clock=Fraction(200_000_000), realization="df1_ef2")
     return design_core(replace(spec, hardware=hardware, channels=channels))
 
 
