@@ -64,7 +64,7 @@ class Architecture:
         """Clocks after a reset until the first sample is taken: memories are cleared."""
         if self.program is None:
             return self.channels if self.channels > 1 else 0
-        return folded.Addresses(self.program, self.channels).depth
+        return folded.memory_depth(self.program, self.channels)
 
     @property
     def cycles_per_sample(self) -> int:

@@ -366,10 +366,12 @@ def with_realization(quantized: Quantized, realization: str) -> Quantized:
     )
 
 
-def with_constants(made: Quantized, ideal: Filter | None, polynomial: Polynomial | None) -> Quantized:
-    """Return the design for another filter or another polynomial, with no bit more or less of anything.
+def with_constants(
+    made: Quantized, ideal: Filter | None, polynomial: Polynomial | None, *, finer: int = 0, room: int = 0
+) -> Quantized:
+    """Return the design for another filter or another polynomial, with no bit more or less of any signal.
 
-    Every constant keeps its fraction bits. The bound is proven anew and may exceed what the specification allows.
+    The bound is proven anew and may exceed what the specification allows.
 
     Parameters
     ----------
@@ -380,6 +382,11 @@ def with_constants(made: Quantized, ideal: Filter | None, polynomial: Polynomial
         distance of their poles from the unit circle.
     polynomial : Polynomial or None
         The other polynomial; None for the one it has.
+    finer : int
+        Fraction bits to which the coefficients of another filter are rounded beyond those of the design.
+    room : int
+        Fraction bits, at least `finer`, that all coefficients are written with beyond those of the design: sets that
+        are made with the same room have the same formats, so that states carry over from one to another.
 
     Raises
     ------
@@ -393,10 +400,13 @@ def with_constants(made: Quantized, ideal: Filter | None, polynomial: Polynomial
     if filled is not None:
         if ideal is not None:
             filled = _ranked(ideal, cast("Filter", made.filter), made.realization)
-        words = _words_of(made) if ideal is None else _words_with(made, filled)
+        words = _lifted(_words_of(made), finer)
+        if ideal is not None:
+            words = _words_with(words, made, filled)
+        words = _lifted(words, room - finer)
         sections, proof = _cascade(filled, made.realization, words, entry.signal)
     datapath = made.datapath
-    return _assembled(
+    found = _assembled(
         Plan(
             name=datapath.name,
             inputs=datapath.inputs,
@@ -415,10 +425,11 @@ def with_constants(made: Quantized, ideal: Filter | None, polynomial: Polynomial
         sections,
         proof,
     )
+    return replace(found, datapath=replace(found.datapath, calibrated=datapath.calibrated))
 
 
 def _entry_with(made: Quantized, polynomial: Polynomial | None) -> _Entry:
-    """What stands before the sections, for another polynomial if it is not None."""
+    """Make what stands before the sections, for another polynomial if it is not None."""
     datapath = made.datapath
     stages = tuple(stage for stage in datapath.stages if isinstance(stage, HornerStep))
     if polynomial is None or made.polynomial is None:
@@ -466,27 +477,35 @@ def _words_of(made: Quantized) -> list[Words]:
     return words
 
 
-def _words_with(made: Quantized, ideal: Filter) -> list[Words]:
-    """Return the same with the coefficients of another filter, rounded to the fraction bits of these."""
+def _lifted(words: Sequence[Words], bits: int) -> list[Words]:
+    """Write all coefficients with `bits` more fraction bits, of the same value."""
+    return [
+        replace(w, coefficients={name: (code << bits, frac + bits) for name, (code, frac) in w.coefficients.items()})
+        for w in words
+    ]
+
+
+def _words_with(words: Sequence[Words], made: Quantized, ideal: Filter) -> list[Words]:
+    """Return `words` with the coefficients of another filter, rounded to the fraction bits of these."""
     exact = _stages(
         ideal,
         made.realization,
         [SectionFormat(coefficient_bits=_DOUBLE)] * len(_parts(ideal, made.realization)),
         Signal(0, -WIDE, WIDE),
     )
-    words = _words_of(made)
     names, wanted = ([list(w.coefficients) for w in words], [list(stage.coefficients) for stage in exact])
     if names != wanted:
         raise ShortfallError(f"the filter's sections must have the coefficients {names}, not {wanted}")
-    for k, stage in enumerate(exact):
+    result = []
+    for old, stage in zip(words, exact, strict=True):
         coefficients = {}
         for name, (integer, frac) in stage.coefficients.items():
-            kept = words[k].coefficients[name][1]
+            kept = old.coefficients[name][1]
             coefficients[name] = (round(integer * Fraction(2) ** (kept - frac)), kept)
             if not coefficients[name][0]:
                 raise ShortfallError(f"{name} of {stage.name} must not vanish with {kept} fraction bits")
-        words[k] = replace(words[k], coefficients=coefficients)
-    return words
+        result.append(replace(old, coefficients=coefficients))
+    return result
 
 
 def _gain(ideal: Filter) -> Fraction:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from amaranth.hdl import Cat, Const, Module, Signal, Value
@@ -11,7 +11,7 @@ from amaranth.lib.wiring import In, Out
 
 from sosmith.model.datapath import Datapath
 from sosmith.model.port import Port
-from sosmith.model.status import STATUS_BITS, Flag
+from sosmith.model.status import STATUS_BITS
 
 
 @dataclass(frozen=True)
@@ -70,27 +70,29 @@ def core_members(inputs: Sequence[Port], output: Port, channels: int = 1) -> dic
     return members
 
 
-def input_flags(datapath: Datapath, tdata: Value) -> dict[Flag, Value]:
-    """Tell the flags that a word of the input stream decides."""
-    at_rail: Value = Const(0, 1)
-    outside: Value = Const(0, 1)
-    for field, (low, high) in zip(fields(datapath.inputs), datapath.calibrated, strict=True):
+def at_rail(inputs: Sequence[Port], tdata: Value) -> Value:
+    """Whether an input's code is the lowest or the highest there is, `Flag.INPUT_AT_RAIL`."""
+    found: Value = Const(0, 1)
+    for field in fields(inputs):
         code = tdata[field.offset : field.offset + field.port.bits]
         body = code[:-1]
         # Both rails have equal bits below the top one; signed or not, the top bit says which of them can be.
         ones, zeros = (code[-1], ~code[-1]) if not field.port.signed else (~code[-1], code[-1])
-        at_rail = at_rail | (body.all() & ones) | (~body.any() & zeros)
+        found = found | (body.all() & ones) | (~body.any() & zeros)
+    return found
+
+
+def outside_calibration(datapath: Datapath, tdata: Value) -> Value:
+    """Whether an input lies outside the range of the calibration, `Flag.OUTSIDE_CALIBRATION`."""
+    found: Value = Const(0, 1)
+    for field, (low, high) in zip(fields(datapath.inputs), datapath.calibrated, strict=True):
+        code = tdata[field.offset : field.offset + field.port.bits]
         value = code.as_signed() if field.port.signed else code
         if low > field.port.lowest:
-            outside = outside | (value < low)
+            found = found | (value < low)
         if high < field.port.highest:
-            outside = outside | (value > high)
-    return {Flag.INPUT_AT_RAIL: at_rail, Flag.OUTSIDE_CALIBRATION: outside}
-
-
-def status_word(flags: Mapping[Flag, Value]) -> Value:
-    """Put flags at their places in ``tuser``."""
-    return Cat(*(flags.get(flag, Const(0, 1)) for flag in Flag), Const(0, STATUS_BITS - len(Flag)))
+            found = found | (value > high)
+    return found
 
 
 def extended(code: Value, bits: int) -> Value:

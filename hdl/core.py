@@ -7,12 +7,12 @@ from amaranth.lib import wiring
 
 from sosmith.hdl.axi_stream import (
     StreamBuffer,
+    at_rail,
     channel_bits,
     core_members,
     extended,
     fields,
-    input_flags,
-    status_word,
+    outside_calibration,
     width,
 )
 from sosmith.hdl.interleaved import InterleavedStage, schedule
@@ -73,14 +73,13 @@ class Core(wiring.Component):
         m = Module()
         m.domains.sync = ClockDomain(local=True)
         m.d.comb += [ClockSignal("sync").eq(self.aclk), ResetSignal("sync").eq(~self.aresetn)]
-        flags = input_flags(self.datapath, self.s_axis_tdata)
-        live = len(Cat(*flags.values())) + 1
+        live = len(Flag)
         buffer = m.submodules.output_buffer = StreamBuffer(
             width([self.datapath.output]) + live + channel_bits(self.channels)
         )
         stages = [self._stage(m, stage, buffer.advance) for stage in self.datapath.stages]
         valid, channel, data = self._source(m, stages, buffer.advance)
-        status: Value = Cat(*input_flags(self.datapath, data).values())
+        status: Value = Cat(at_rail(self.datapath.inputs, data), outside_calibration(self.datapath, data))
         codes: list[Value] = [data[f.offset : f.offset + f.port.bits] for f in fields(self.datapath.inputs)]
         for component in stages:
             graph = component.stage.graph
@@ -103,10 +102,9 @@ class Core(wiring.Component):
             self.m_axis_tvalid.eq(buffer.o_valid),
             buffer.o_ready.eq(self.m_axis_tready),
         ]
-        held_flags = dict(zip([*flags, Flag.OUTPUT_SATURATED], buffer.o_data[len(output) :], strict=False))
         m.d.comb += [
             self.m_axis_tdata.eq(buffer.o_data[: len(output)]),
-            self.m_axis_tuser.eq(status_word(held_flags)),
+            self.m_axis_tuser.eq(buffer.o_data[len(output) : len(output) + live]),
         ]
         if self.channels > 1:
             m.d.comb += self.m_axis_tdest.eq(buffer.o_data[len(output) + live :])

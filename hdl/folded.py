@@ -8,17 +8,18 @@ multiplication is done by shifts and additions in the accumulator, and the ranks
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from amaranth.hdl import Cat, ClockDomain, ClockSignal, Const, Module, Mux, ResetSignal, Signal, Value, signed
 from amaranth.lib import wiring
 from amaranth.lib.memory import Memory
 
-from sosmith.hdl.axi_stream import channel_bits, core_members, extended, fields, input_flags, status_word
+from sosmith.hdl.axi_lite import slave_members
+from sosmith.hdl.axi_stream import at_rail, channel_bits, core_members, extended, fields
+from sosmith.hdl.reload import ReloadPort
+from sosmith.hdl.stage import limits
 from sosmith.model.datapath import Datapath
 from sosmith.model.graph import Op
 from sosmith.model.program import Do, Instruction, Place, Program
-from sosmith.model.status import Flag
+from sosmith.model.reload_registers import ADDRESS_BITS
 
 _FOLDED_RANKS, _SERIAL_RANKS = 5, 3
 
@@ -26,70 +27,28 @@ _DO_BITS = 4
 
 
 def latency_cycles(program: Program, *, serial: bool) -> int:
-    """Clocks from the edge that accepts a sample to the edge that can hand it on; in serial, at most so many."""
+    """Clocks from the edge that finds a sample to the edge that can hand it on; in serial, at most so many."""
     return program.serial_cycles + _SERIAL_RANKS if serial else len(program.instructions) + _FOLDED_RANKS
 
 
-@dataclass(frozen=True)
-class Addresses:
-    """Where a program's words lie in the memory: first the states of every channel, then what all channels share.
+_SLICES = {256: 16, 512: 8, 1024: 4, 2048: 2}
+"""Bits that a block RAM of an iCE40 has to a word when it has so many words."""
 
-    An instruction has an index and, as its top bit, whether it is among the shared words. The places of a channel's
-    states are a power of two, so that the channel's number stands beside the index and nothing has to be added.
 
-    Attributes
-    ----------
-    program : Program
-        Whose words they are.
-    channels : int
-        Number of channels.
-    """
-
-    program: Program
-    channels: int
-
-    @property
-    def _state_bits(self) -> int:
-        return max(self.program.states - 1, 0).bit_length()
-
-    @property
-    def _shared_bits(self) -> int:
-        return (self.program.words - self.program.states - 1).bit_length()
-
-    @property
-    def instruction_bits(self) -> int:
-        """Width of an instruction's address."""
-        return max(self._state_bits, self._shared_bits) + 1
-
-    @property
-    def bits(self) -> int:
-        """Width of an address of the memory."""
-        return max(self._state_bits + channel_bits(self.channels), self._shared_bits) + 1
-
-    @property
-    def depth(self) -> int:
-        """Words of the memory."""
-        return (1 << self.bits - 1) + self.program.words - self.program.states
-
-    def encoded(self, address: int) -> int:
-        """Address of the program as instructions have it."""
-        shared = address - self.program.states
-        return address if shared < 0 else shared | 1 << self.instruction_bits - 1
-
-    def of(self, encoded: Value, channel: Value) -> Value:
-        """Address of the memory from that of an instruction and the channel's number."""
-        is_shared = encoded[-1]
-        if self.channels == 1:
-            return encoded
-        state, shared = Cat(encoded[: self._state_bits], channel), encoded[: self._shared_bits]
-        return Cat(Mux(is_shared, shared, state) | Const(0, self.bits - 1), is_shared)
+def memory_depth(program: Program, channels: int) -> int:
+    """Words of the memory: those of the program for each channel, the channel's number above the word's."""
+    return program.words * channels
 
 
 class FoldedCore(wiring.Component):
     """A datapath on one multiply-accumulate unit, for any number of channels in any order.
 
     Latency: `latency_cycles`. Throughput: one sample of one channel in one clock more. After reset it first clears its
-    memory, one word a clock. A sample of a channel that does not exist is taken and dropped.
+    memory, one word a clock. A sample is taken as soon as the program has read it: `s_axis_tready` waits for
+    `s_axis_tvalid`, which AXI4-Stream allows. One of a channel that does not exist is taken and dropped.
+
+    With a fingerprint, the program can be loaded anew while the core works: there are two banks for it, and each sample
+    is computed by the one that was active when the core found it.
 
     Parameters
     ----------
@@ -101,20 +60,27 @@ class FoldedCore(wiring.Component):
         Whether to multiply by shifts and additions instead of a hardware multiplier.
     channels : int
         Number of channels.
+    fingerprint : int or None
+        Of the structure, 32 bits; None for a core whose program stays.
 
     Members
     -------
     aclk, aresetn, s_axis_*, m_axis_*
         As of `sosmith.hdl.core.Core`.
+    s_axil_*
+        AXI4-Lite slave of `sosmith.hdl.reload.ReloadPort`; only with a fingerprint.
     """
 
-    def __init__(self, datapath: Datapath, program: Program, *, serial: bool, channels: int = 1) -> None:
+    def __init__(
+        self, datapath: Datapath, program: Program, *, serial: bool, channels: int = 1, fingerprint: int | None = None
+    ) -> None:
         self.datapath = datapath
         self.program = program
         self.serial = serial
         self.channels = channels
-        self._addresses = Addresses(program, channels)
-        super().__init__(core_members(datapath.inputs, datapath.output, channels))
+        self.fingerprint = fingerprint
+        members = core_members(datapath.inputs, datapath.output, channels)
+        super().__init__(members if fingerprint is None else members | slave_members(ADDRESS_BITS))
 
     def elaborate(self, platform: object) -> Module:
         """Build the unit around its two memories."""
@@ -122,34 +88,43 @@ class FoldedCore(wiring.Component):
         m.domains.sync = ClockDomain(local=True)
         m.d.comb += [ClockSignal("sync").eq(self.aclk), ResetSignal("sync").eq(~self.aresetn)]
         advance, clearing, start = Signal(), Signal(init=1), Signal()
-        channel = self._channel(m, start)
-        counter, fetching = self._control(m, advance, clearing, start)
-        ranks = self._fetch(m, advance, counter, fetching)
+        busy, dropped = Signal(), Signal()
+        channel = self._channel(m, busy | clearing, dropped, start)
+        counter, fetching = self._control(m, advance, clearing, start, busy)
+        ranks = self._fetch(m, advance, counter, fetching, self._reload(m, start, busy))
         data = Signal(signed(self._word), reset_less=True)
         total = self._accumulate(m, advance, ranks, data)
-        self._remember(m, (advance, clearing, start), (counter, total, data, channel), ranks)
-        self._hand_out(m, (advance, start), ranks, data)
+        self._remember(m, (advance, clearing), (counter, total, data, channel), ranks)
+        self._hand_out(m, (advance, start), (total, data), ranks)
+        taken = Signal()
+        last_digit = ranks[-1].constant[:8] == sum(place.digits for place in self.program.inputs) - 1
+        m.d.sync += taken.eq(advance & ranks[-1].valid & ranks[-1].does(Do.TAKE) & last_digit)
+        m.d.comb += self.s_axis_tready.eq(taken | dropped)
         return m
 
     @property
     def _word(self) -> int:
         return self.program.digit_bits + 1
 
-    def _channel(self, m: Module, start: Signal) -> Signal:
-        """Take a sample where its channel exists; return the channel's number while it is computed."""
-        accept = self.s_axis_tvalid & self.s_axis_tready
+    def _channel(self, m: Module, busy: Value, dropped: Signal, start: Signal) -> Signal:
+        """Begin with a sample if its channel exists, else drop it; return the channel's number while it is computed."""
+        found = self.s_axis_tvalid & ~busy
         channel = Signal(channel_bits(self.channels), reset_less=True)
         if self.channels == 1:
-            m.d.comb += start.eq(accept)
-        else:
-            m.d.comb += [start.eq(accept & (self.s_axis_tdest < self.channels)), self.m_axis_tdest.eq(channel)]
-            with m.If(start):
-                m.d.sync += channel.eq(self.s_axis_tdest)
+            m.d.comb += start.eq(found)
+            return channel
+        exists = self.s_axis_tdest < self.channels
+        m.d.comb += [start.eq(found & exists), self.m_axis_tdest.eq(channel)]
+        m.d.sync += dropped.eq(found & ~exists & ~dropped)
+        with m.If(start):
+            m.d.sync += channel.eq(self.s_axis_tdest)
         return channel
 
-    def _control(self, m: Module, advance: Signal, clearing: Signal, start: Signal) -> tuple[Signal, Signal]:
+    def _control(
+        self, m: Module, advance: Signal, clearing: Signal, start: Signal, busy: Signal
+    ) -> tuple[Signal, Signal]:
         """Count through the words to clear after reset, and through the program for each sample."""
-        count, words = len(self.program.instructions), self._addresses.depth
+        count, words = len(self.program.instructions), memory_depth(self.program, self.channels)
         counter, fetching = Signal(range(max(count, words))), Signal()
         with m.If(clearing):
             m.d.sync += counter.eq(counter + 1)
@@ -161,22 +136,49 @@ class FoldedCore(wiring.Component):
             m.d.sync += counter.eq(counter + 1)
             with m.If(counter == count - 1):
                 m.d.sync += [fetching.eq(0), counter.eq(0)]
-        busy = Signal()
         with m.If(start):
             m.d.sync += busy.eq(1)
         with m.If(self.m_axis_tvalid & self.m_axis_tready):
             m.d.sync += busy.eq(0)
-        m.d.comb += self.s_axis_tready.eq(~(busy | clearing))
         return counter, fetching
 
-    def _fetch(self, m: Module, advance: Signal, counter: Signal, fetching: Signal) -> list[_Rank]:
+    def _reload(self, m: Module, start: Signal, busy: Signal) -> tuple[ReloadPort, Signal] | None:
+        """Return the reload port and the bank that the sample in work uses."""
+        if self.fingerprint is None:
+            return None
+        depth, bits = len(self.program.instructions), instruction_bits(self.program)
+        m.submodules.reload_port = port = ReloadPort(depth, bits=bits, design=self.fingerprint)
+        for name in slave_members(ADDRESS_BITS):
+            outer, inner = getattr(self, name), getattr(port, name)
+            m.d.comb += outer.eq(inner) if self.signature.members[name].flow is wiring.Out else inner.eq(outer)
+        bank = Signal(reset_less=True)
+        with m.If(start):
+            m.d.sync += bank.eq(port.bank)
+        m.d.comb += [port.may_swap.eq(1), port.shadow_free.eq(~busy | (bank == port.bank))]
+        return port, bank
+
+    def _fetch(
+        self, m: Module, advance: Signal, counter: Signal, fetching: Signal, reload: tuple[ReloadPort, Signal] | None
+    ) -> list[_Rank]:
         """Read the program; return the ranks, the first one holding what has just been read."""
-        instructions = self.program.instructions
-        code = [_encoded(instruction, self._addresses, self._word) for instruction in instructions]
-        address_bits = self._addresses.instruction_bits
-        m.submodules.program = rom = Memory(shape=_DO_BITS + address_bits + self._word, depth=len(code), init=code)
-        fetch = rom.read_port()
+        code = [encoded(instruction, self.program) for instruction in self.program.instructions]
+        bits, address_bits = instruction_bits(self.program), _address_bits(self.program)
+        if reload is not None:
+            code += [0] * ((1 << (len(code) - 1).bit_length()) - len(code))
+            code += [0] * len(code)
+        m.submodules.program = program = Memory(shape=bits, depth=len(code), init=code)
+        fetch = program.read_port()
         m.d.comb += [fetch.addr.eq(counter), fetch.en.eq(advance)]
+        if reload is not None:
+            port, bank = reload
+            index_bits = (len(code) // 2 - 1).bit_length()
+            write = program.write_port()
+            m.d.comb += [
+                fetch.addr.eq(Cat(counter[:index_bits], Const(0, max(0, index_bits - len(counter))), bank)),
+                write.addr.eq(Cat(port.write_address, Const(0, index_bits - len(port.write_address)), ~port.bank)),
+                write.data.eq(port.write_data),
+                write.en.eq(port.write_enable),
+            ]
         valid = Signal(name="valid1")
         ranks = [_Rank(fetch.data, valid, address_bits)]
         with m.If(advance):
@@ -208,67 +210,89 @@ class FoldedCore(wiring.Component):
                 m.d.sync += total.eq(total + product)
         with m.If(advance & last.valid & (last.does(Do.STORE) | last.does(Do.DROP))):
             m.d.sync += total.eq(total >> self.program.digit_bits)
-        with m.If(advance & last.valid & last.does(Do.FINISH)):
+        with m.If(advance & last.valid & (last.does(Do.FINISH) | last.does(Do.JUDGE))):
             m.d.sync += total.eq(0)
         return total
 
     def _remember(
         self,
         m: Module,
-        control: tuple[Signal, Signal, Signal],
+        control: tuple[Signal, Signal],
         values: tuple[Signal, Signal, Signal, Signal],
         ranks: list[_Rank],
     ) -> None:
         """Read the words that instructions are about, and write those that they store."""
-        (advance, clearing, start), (counter, total, data, channel) = control, values
+        (advance, clearing), (counter, total, data, channel) = control, values
         first, last = ranks[0 if self.serial else 1], ranks[-1]
-        addresses = self._addresses
-        # After reset, states are 0 and the word of ones is 1; so may be the others that channels share.
-        initial = [address >> addresses.bits - 1 for address in range(addresses.depth)]
-        m.submodules.words = ram = Memory(shape=self._word, depth=addresses.depth, init=initial)
-        read, write = ram.read_port(), ram.write_port()
-        m.d.comb += [read.addr.eq(addresses.of(first.address, channel)), read.en.eq(advance)]
+        take = last.does(Do.TAKE)
+        top = total[self._word - 1] & last.does(Do.FINISH)
+        digit = Mux(take, self._input_digit(last.constant), Cat(total[: self._word - 1], top))
+        stores = take | last.does(Do.STORE) | last.does(Do.FINISH)
+        address_bits = _address_bits(self.program)
+        is_one = counter[:address_bits].all()
+        word = self._memory(
+            m,
+            read=(Cat(first.address, channel), advance),
+            write=(
+                Mux(clearing, counter, Cat(last.address, channel)),
+                Mux(clearing, is_one, digit),
+                clearing | (advance & last.valid & stores),
+            ),
+        )
         if self.serial:
-            m.d.comb += data.eq(read.data)
+            m.d.comb += data.eq(word)
         else:
             with m.If(advance):
-                m.d.sync += data.eq(read.data)
-        sample = self._input_digits()
-        supply = Signal(self._word * len(sample), reset_less=True)
-        take = last.does(Do.TAKE)
-        with m.If(start):
-            m.d.sync += supply.eq(Cat(*sample))
-        with m.Elif(advance & last.valid & take):
-            m.d.sync += supply.eq(supply >> self._word)
-        top = total[self._word - 1] & last.does(Do.FINISH)
-        digit = Mux(take, supply[: self._word], Cat(total[: self._word - 1], top))
-        stores = take | last.does(Do.STORE) | last.does(Do.FINISH)
-        m.d.comb += [
-            write.addr.eq(Mux(clearing, counter, addresses.of(last.address, channel))),
-            write.data.eq(Mux(clearing, counter[addresses.bits - 1], digit)),
-            write.en.eq(clearing | (advance & last.valid & stores)),
-        ]
+                m.d.sync += data.eq(word)
 
-    def _hand_out(self, m: Module, control: tuple[Signal, Signal], ranks: list[_Rank], data: Signal) -> None:
-        """Collect the digits of the result; the last instruction of a program gives the last one."""
-        advance, start = control
-        *_, following, present, _ = ranks
-        given = Signal(self._word * self.program.output.digits, reset_less=True)
-        with m.If(advance & present.valid & present.does(Do.GIVE)):
-            m.d.sync += given.eq(Cat(given[self._word :], data))
+    def _memory(self, m: Module, read: tuple[Value, Value], write: tuple[Value, Value, Value]) -> Value:
+        """Make the memory of all channels; return the word read.
+
+        It is cut into slices as wide as a block RAM is where it has that many words: side by side they need no logic,
+        as blocks behind each other would.
+        """
+        words, depth = self.program.words, memory_depth(self.program, self.channels)
+        width = next((bits for most, bits in _SLICES.items() if depth <= most), _SLICES[max(_SLICES)])
+        slices: list[Value] = []
+        for low in range(0, self._word, width):
+            high = min(low + width, self._word)
+            init = [int(low == 0 and address % words == self.program.one) for address in range(depth)]
+            m.submodules[f"words{low}"] = ram = Memory(shape=high - low, depth=depth, init=init)
+            reader, writer = ram.read_port(), ram.write_port()
+            m.d.comb += [
+                reader.addr.eq(read[0]),
+                reader.en.eq(read[1]),
+                writer.addr.eq(write[0]),
+                writer.data.eq(write[1][low:high]),
+                writer.en.eq(write[2]),
+            ]
+            slices.append(reader.data)
+        return Cat(*slices)
+
+    def _hand_out(
+        self, m: Module, control: tuple[Signal, Signal], values: tuple[Signal, Signal], ranks: list[_Rank]
+    ) -> None:
+        """Collect the digits of the result, and what is said about it; the last instruction gives the last digit."""
+        (advance, start), (total, data) = control, values
+        *_, following, present, last = ranks
+        given = [Signal(self._word, name=f"given{k}", reset_less=True) for k in range(self.program.output.digits)]
+        for k, digit in enumerate(given):
+            with m.If(advance & present.valid & present.does(Do.GIVE) & (present.constant[:8] == k)):
+                m.d.sync += digit.eq(data)
         with m.If(advance & present.valid & ~following.valid):
             m.d.sync += self.m_axis_tvalid.eq(1)
         with m.If(self.m_axis_tvalid & self.m_axis_tready):
             m.d.sync += self.m_axis_tvalid.eq(0)
+        rail, outside = Signal(reset_less=True), Signal(reset_less=True)
+        with m.If(start):
+            m.d.sync += [rail.eq(at_rail(self.datapath.inputs, self.s_axis_tdata)), outside.eq(0)]
+        if self.fingerprint is not None or any(do is Do.JUDGE for do, _, _ in self.program.instructions):
+            with m.If(advance & last.valid & last.does(Do.JUDGE) & total[-1]):
+                m.d.sync += outside.eq(1)
         code, saturated = self._limited(given)
-        flags: dict[Flag, Value] = {Flag.OUTPUT_SATURATED: saturated}
-        for flag, value in input_flags(self.datapath, self.s_axis_tdata).items():
-            flags[flag] = held = Signal(name=flag.name.lower(), reset_less=True)
-            with m.If(start):
-                m.d.sync += held.eq(value)
         m.d.comb += [
             self.m_axis_tdata.eq(extended(code, self.datapath.output.bytes * 8)),
-            self.m_axis_tuser.eq(status_word(flags)),
+            self.m_axis_tuser.eq(Cat(rail, outside, saturated)),
         ]
 
     def _multiply_serially(
@@ -290,16 +314,19 @@ class FoldedCore(wiring.Component):
         with m.If(advance):
             m.d.sync += [shifted.eq(factors[0]), left.eq(factors[1])]
 
-    def _input_digits(self) -> list[Value]:
-        """Digits of the input sample, in the order in which the program takes them."""
+    def _input_digit(self, index: Value) -> Value:
+        """Digit of the input sample, counted through all ports in the order in which the program takes them."""
         graph = self.datapath.stages[0].graph
         digits: list[Value] = []
         ports = zip(fields(self.datapath.inputs), graph.inputs, self.program.inputs, strict=True)
-        for field, index, place in ports:
+        for field, node, place in ports:
             code = self.s_axis_tdata[field.offset : field.offset + field.port.bits]
-            padded = Cat(Const(0, place.frac - graph.nodes[index].frac), code)
+            padded = Cat(Const(0, place.frac - graph.nodes[node].frac), code)
             digits += self._split(padded, place, sign=padded[-1] if field.port.signed else Const(0, 1))
-        return digits
+        found = digits[-1]
+        for k, digit in enumerate(digits[:-1]):
+            found = Mux(index[:8] == k, digit, found)
+        return found
 
     def _split(self, value: Value, place: Place, sign: Value) -> list[Value]:
         bits = self.program.digit_bits
@@ -307,18 +334,20 @@ class FoldedCore(wiring.Component):
         low = [Cat(whole[bits * k : bits * (k + 1)], Const(0, 1)) for k in range(place.digits - 1)]
         return [*low, whole[bits * (place.digits - 1) : bits * place.digits + 1]]
 
-    def _limited(self, given: Value) -> tuple[Value, Value]:
+    def _limited(self, given: list[Signal]) -> tuple[Value, Value]:
         """Return the output code from its digits, limited to the port's range, and whether it had to be."""
-        bits, count, output = self.program.digit_bits, self.program.output.digits, self.datapath.output
-        digits = [given[(bits + 1) * k : (bits + 1) * k + bits] for k in range(count)]
-        value = Cat(*digits, given[-1]).as_signed()
-        stage = self.datapath.stages[-1].graph
-        last = stage.nodes[stage.outputs[0]]
-        code: Value = value
+        bits, output = self.program.digit_bits, self.datapath.output
+        value = Cat(*(digit[:bits] for digit in given), given[-1][-1]).as_signed()
+        graph = self.datapath.stages[-1].graph
+        last = graph.nodes[graph.outputs[0]]
         below: Value = Const(0, 1)
         above: Value = Const(0, 1)
+        code: Value = value
         if last.op is Op.CLAMP:
-            below, above = value < last.low, value > last.high
+            if self.fingerprint is None:  # another program may have other ranges
+                node = graph.nodes[last.operands[0]]
+                value = value[: node.width + (not node.signed)].as_signed()
+            below, above = limits(last, value)
             code = Mux(below, Const(last.low), Mux(above, Const(last.high), value))
         cut = code[: output.bits]
         return (cut.as_signed() if output.signed else cut), below | above
@@ -338,7 +367,17 @@ class _Rank:
         return self.word[:_DO_BITS] == list(Do).index(do)
 
 
-def _encoded(instruction: Instruction, addresses: Addresses, word: int) -> int:
+def _address_bits(program: Program) -> int:
+    return (program.words - 1).bit_length()
+
+
+def instruction_bits(program: Program) -> int:
+    """Width of an instruction in the program's memory."""
+    return _DO_BITS + _address_bits(program) + program.digit_bits + 1
+
+
+def encoded(instruction: Instruction, program: Program) -> int:
+    """Instruction as the program's memory has it: what to do lowest, then the address, then the constant."""
     do, address, constant = instruction
-    upper = addresses.encoded(address) | (constant % (1 << word)) << addresses.instruction_bits
+    upper = address | (constant % (1 << program.digit_bits + 1)) << _address_bits(program)
     return list(Do).index(do) | upper << _DO_BITS

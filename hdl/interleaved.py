@@ -20,11 +20,11 @@ from sosmith.hdl.stage import PLAIN, limits, logic, shape_of, unique_names
 from sosmith.model.datapath import Stage
 from sosmith.model.graph import Graph, Node, Op
 
-_ADDITION, _MULTIPLICATION, _PARTIAL_PRODUCT = 1, 2, 1
-"""Time that an operation takes, in additions; a product of several multiplier blocks has its parts added up."""
+_ADDITION, _MULTIPLICATION, _PARTIAL_PRODUCT = 5, 12, 2
+"""Time that an operation takes, some half nanoseconds of an ECP5; a product of several blocks has its parts added."""
 
-_BLOCK_BITS = 17
-"""Bits beside the sign that a multiplier block takes."""
+_BLOCK_BITS = 18
+"""Bits of each operand of a multiplier block, with the sign."""
 
 _Moment = tuple[int, int]
 """Rank and time in it."""
@@ -111,10 +111,11 @@ def _time(graph: Graph, node: Node) -> int:
     if node.op in PLAIN:
         return 0
     if node.op in {Op.SCALE, Op.MULTIPLY}:
-        widths = [graph.nodes[i].width for i in node.operands]
+        operands = [(graph.nodes[i].width, graph.nodes[i].signed) for i in node.operands]
         if node.op is Op.SCALE:
-            widths.append(abs(node.parameter).bit_length() + 1)
-        several = any(width > _BLOCK_BITS + 1 for width in widths)
+            operands.append((abs(node.parameter).bit_length() + (node.parameter < 0), node.parameter < 0))
+        signed = any(sign for _, sign in operands)  # a block takes both operands signed or neither
+        several = any(bits + (signed and not sign) > _BLOCK_BITS for bits, sign in operands)
         return _MULTIPLICATION + several * _PARTIAL_PRODUCT
     return _ADDITION
 
@@ -217,7 +218,8 @@ class InterleavedStage(wiring.Component):
             with m.If(self.advance):
                 m.d.sync += register.eq(at(i, last))
                 if graph.nodes[i].op is Op.CLAMP:
-                    m.d.sync += self.o_saturated.eq(limits(graph.nodes[i], at(graph.nodes[i].operands[0], last)))
+                    below, above = limits(graph.nodes[i], at(graph.nodes[i].operands[0], last))
+                    m.d.sync += self.o_saturated.eq(below | above)
         return m
 
     def _travelling(self, m: Module) -> tuple[list[Value], list[Value]]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from amaranth.hdl import Const, Module, Mux, Shape, Signal, Value
+from amaranth.hdl import Cat, Const, Module, Mux, Shape, Signal, Value
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
@@ -193,7 +193,9 @@ class PipelineStage(wiring.Component):
                 with m.If(takes[last]):
                     m.d.sync += register.eq(at(i, last))
                     if graph.nodes[i].op is Op.CLAMP:
-                        m.d.sync += self.o_saturated.eq(limits(graph.nodes[i], at(graph.nodes[i].operands[0], last)))
+                        m.d.sync += self.o_saturated.eq(
+                            Cat(*limits(graph.nodes[i], at(graph.nodes[i].operands[0], last))).any()
+                        )
         return m
 
     def _control(self, m: Module, count: int) -> tuple[list[Value], list[Value]]:
@@ -265,14 +267,27 @@ def logic(graph: Graph, node: Node, operands: list[Value]) -> Value:
     if node.op is Op.FRACTION:
         return operands[0].as_unsigned()[: fracs[0] - node.parameter]
     if node.op is Op.CLAMP:
-        low, high = Const(node.low), Const(node.high)
-        return Mux(operands[0] < low, low, Mux(operands[0] > high, high, operands[0]))
+        below, above = limits(node, operands[0])
+        return Mux(below, Const(node.low), Mux(above, Const(node.high), operands[0]))
     return operands[0]  # BOUND drops bits that are known to repeat the sign
 
 
-def limits(node: Node, operand: Value) -> Value:
-    """Whether a CLAMP has to limit `operand`."""
-    return (operand < Const(node.low)) | (operand > Const(node.high))
+def limits(node: Node, operand: Value) -> tuple[Value, Value]:
+    """Whether a CLAMP finds `operand` below its range, and above.
+
+    Where an end of the range is that of so many bits, the bits above them tell; else a comparison does.
+    """
+    low, high = node.low, node.high
+    bits = high.bit_length()
+    value = operand if operand.shape().signed else Cat(operand, Const(0, 1)).as_signed()
+    top = value[-1]
+    below: Value = value < Const(low)
+    above: Value = value > Const(high)
+    if len(value) > bits + 1 and high == (1 << bits) - 1:
+        above = ~top & value[bits:-1].any()
+        if low in {0, -high - 1}:
+            below = top if low == 0 else top & ~value[bits:-1].all()
+    return below, above
 
 
 def _aligned(operands: list[Value], fracs: list[int], frac: int) -> Iterator[Value]:

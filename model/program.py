@@ -21,6 +21,7 @@ from typing import NamedTuple
 
 from sosmith.model.datapath import Datapath
 from sosmith.model.graph import Node, Op
+from sosmith.model.word_reuse import Extent, Life, packed
 
 HAZARD = 4
 """An instruction that reads what another stored must come at least so many places after it."""
@@ -30,14 +31,15 @@ class Do(Enum):
     """What an instruction does: ``m`` is the word at its address, ``acc`` the accumulator, ``t`` the operand."""
 
     NOTHING = "nothing"
-    TAKE = "take"  # m = next digit of the input sample
+    TAKE = "take"  # m = digit of the input sample that the constant counts
     MULTIPLY = "multiply"  # acc += m * constant
     OPERAND = "operand"  # t = m
     PRODUCT = "product"  # acc += m * t
     STORE = "store"  # m = low digit of acc; acc >>= digit_bits
     DROP = "drop"  # acc >>= digit_bits
     FINISH = "finish"  # m = low digit_bits + 1 bits of acc, signed; acc = 0
-    GIVE = "give"  # next digit of the output sample = m
+    GIVE = "give"  # digit of the output sample that the constant counts = m
+    JUDGE = "judge"  # the input is outside the calibrated range if acc < 0; acc = 0
 
 
 class Instruction(NamedTuple):
@@ -46,6 +48,13 @@ class Instruction(NamedTuple):
     do: Do
     address: int = 0
     constant: int = 0
+
+
+class Sample(NamedTuple):
+    """What comes of a sample: the output's code before it is limited, and whether the input was outside its range."""
+
+    code: int
+    outside: bool
 
 
 class FoldingError(ValueError):
@@ -96,7 +105,9 @@ class Program:
     states : int
         Words that are kept from sample to sample, for each channel: the addresses from 0 on.
     words : int
-        All words; those beyond the states serve every channel. The first of these always holds 1.
+        Words of memory for each channel, a power of two. The last one always holds 1.
+    schedule : tuple of (str, int, int)
+        What is done one after the other: name, first instruction and number of instructions of each value.
     accumulator_bits : int
         Width that the accumulator needs, by the ranges of everything that enters it.
     """
@@ -108,12 +119,13 @@ class Program:
     output: Place
     states: int
     words: int
+    schedule: tuple[tuple[str, int, int], ...]
     accumulator_bits: int
 
     @property
     def one(self) -> int:
         """Address of the word that always holds 1."""
-        return self.states
+        return self.words - 1
 
     @property
     def serial_cycles(self) -> int:
@@ -128,25 +140,6 @@ class Program:
         value = instruction.constant
         return value.bit_length() if value > 0 else (-value - 1).bit_length() + 1
 
-    @property
-    def schedule(self) -> list[tuple[str, int, int]]:
-        """What is done one after the other: name, first instruction and number of instructions of each value."""
-        names = {place.address + place.digits - 1: place.name for place in self.places}
-        found: list[tuple[str, int, int]] = []
-        start = 0
-        for index, (do, address, _) in enumerate(self.instructions):
-            following = self.instructions[index + 1].do if index + 1 < len(self.instructions) else None
-            if do is Do.FINISH:
-                found.append((names[address], start, index + 1 - start))
-            elif do is Do.TAKE and following is not Do.TAKE:
-                found.append(("input", start, index + 1 - start))
-            elif following is None:
-                found.append(("output", start, index + 1 - start))
-            else:
-                continue
-            start = index + 1
-        return found
-
     def padded(self, count: int) -> Program:
         """Return the same in `count` instructions: those that are missing do nothing, before all others.
 
@@ -158,13 +151,18 @@ class Program:
         missing = count - len(self.instructions)
         if missing < 0:
             raise ValueError(f"a program must have at most {count} instructions, not {len(self.instructions)}")
-        return replace(self, instructions=(*[Instruction(Do.NOTHING)] * missing, *self.instructions))
+        waiting = [("waiting", 0, missing)] if missing else []
+        return replace(
+            self,
+            instructions=(*[Instruction(Do.NOTHING)] * missing, *self.instructions),
+            schedule=(*waiting, *((name, start + missing, count) for name, start, count in self.schedule)),
+        )
 
     def reset(self) -> list[int]:
-        """Words of a channel after reset: states are 0, and what is not the word of ones may be anything."""
-        return [int(address >= self.one) for address in range(self.words)]
+        """Words of a channel after reset."""
+        return [int(address == self.one) for address in range(self.words)]
 
-    def step(self, codes: Sequence[int], words: list[int], input_fracs: Sequence[int]) -> int:
+    def step(self, codes: Sequence[int], words: list[int], input_fracs: Sequence[int]) -> Sample:
         """Compute one sample in exact integers and advance `words` in place; the slow reference.
 
         Parameters
@@ -178,8 +176,8 @@ class Program:
 
         Returns
         -------
-        int
-            Code of the output, before it is limited to the output's range.
+        Sample
+            The output.
 
         Raises
         ------
@@ -187,16 +185,17 @@ class Program:
             If the accumulator leaves its width, or a word its digit.
         """
         base, limit = 1 << self.digit_bits, 1 << (self.accumulator_bits - 1)
-        supply = (
+        supply = [
             digit
             for code, frac, place in zip(codes, input_fracs, self.inputs, strict=True)
             for digit in digits_of(code << (place.frac - frac), place.digits, self.digit_bits)
-        )
-        given: list[int] = []
+        ]
+        code = 0
+        outside = False
         acc = operand = 0
         for do, address, constant in self.instructions:
             if do is Do.TAKE:
-                words[address] = next(supply)
+                words[address] = supply[constant]
             elif do is Do.MULTIPLY:
                 acc += words[address] * constant
             elif do is Do.OPERAND:
@@ -210,10 +209,12 @@ class Program:
             elif do is Do.FINISH:
                 words[address], acc = (acc + base) % (2 * base) - base, 0
             elif do is Do.GIVE:
-                given.append(words[address])
+                code += words[address] << (self.digit_bits * constant)
+            elif do is Do.JUDGE:
+                outside, acc = outside or acc < 0, 0
             if not (-limit <= acc < limit and -base <= words[address] < base):
                 raise OverflowError(f"the accumulator must stay within {self.accumulator_bits} bits, not {acc}")
-        return sum(digit << (self.digit_bits * k) for k, digit in enumerate(given))
+        return Sample(code, outside)
 
 
 def digits_of(code: int, count: int, digit_bits: int) -> list[int]:
@@ -241,11 +242,12 @@ def program(datapath: Datapath, digit_bits: int, *, like: Program | None = None)
         If the datapath has an operation that cannot be folded, or the program cannot take over from `like`.
     """
     kept = {} if like is None else {place.name: place.digits for place in like.places}
-    made = _Folding(_flattened(datapath), digit_bits, kept).program()
+    least = 0 if like is None else like.words
+    made = _Folding(_flattened(datapath), digit_bits, kept, datapath.calibrated).program(least)
     if like is None:
         return made
     _check_can_take_over(made, like)
-    return replace(made, words=like.words, accumulator_bits=like.accumulator_bits)
+    return replace(made, accumulator_bits=like.accumulator_bits)
 
 
 def _check_can_take_over(made: Program, like: Program) -> None:
@@ -324,8 +326,11 @@ _Sum = dict[_Term, Fraction]
 class _Folding:
     """Works out what to store, where, and in which order to compute it."""
 
-    def __init__(self, flat: _Flat, digit_bits: int, kept: Mapping[str, int]) -> None:
+    def __init__(
+        self, flat: _Flat, digit_bits: int, kept: Mapping[str, int], calibrated: Sequence[tuple[int, int]]
+    ) -> None:
         self._nodes, self._inputs, self._output = flat
+        self._calibrated = calibrated
         self._bits = digit_bits
         self._kept = kept
         last = self._nodes[self._output]
@@ -340,10 +345,14 @@ class _Folding:
         self._sums: dict[int, tuple[_Sum, Fraction]] = {}
         self._places: dict[int, Place] = {}
         self._instructions: list[Instruction] = []
+        self._schedule: list[tuple[str, int, int]] = []
         self._one = 0
 
-    def program(self) -> Program:
-        """Make the program."""
+    def program(self, least_words: int) -> Program:
+        """Make the program, for a memory of at least so many words.
+
+        At first every value has words of its own, and the word of ones comes behind the states.
+        """
         address = states = 0
         for index in sorted(self._stored, key=lambda i: self._nodes[i].op is not Op.DELAY):
             node = self._nodes[index]
@@ -358,30 +367,66 @@ class _Folding:
             address += count
             states += count * state
         self._one = states
-        for index in self._inputs:
-            place = self._places[index]
-            for k in range(place.digits):
-                self._emit(Do.TAKE, place.address + k)
-        for index in sorted(self._stored):
-            if self._nodes[index].op not in {Op.INPUT, Op.DELAY}:
-                self._compute(index)
-        for delay in self._delays_in_order():
-            place, source = self._places[delay], self._nodes[delay].operands[0]
-            total, constant = self._value(source)
-            self._evaluate(place, total, constant)
-        output = self._places[self._output]
-        for k in range(output.digits):
-            self._emit(Do.GIVE, output.address + k)
+        self._emit_all()
+        accumulator_bits = self._accumulator_bits()
+        words = self._share_words(states, least_words)
         return Program(
             digit_bits=self._bits,
             instructions=tuple(self._instructions),
             places=tuple(self._places.values()),
             inputs=tuple(self._places[i] for i in self._inputs),
-            output=output,
+            output=self._places[self._output],
             states=states,
-            words=address,
-            accumulator_bits=self._accumulator_bits(),
+            words=words,
+            schedule=tuple(self._schedule),
+            accumulator_bits=accumulator_bits,
         )
+
+    def _emit_all(self) -> None:
+        places = [self._places[index] for index in self._inputs]
+        for k, digit in enumerate(place.address + k for place in places for k in range(place.digits)):
+            self._emit(Do.TAKE, digit, k)
+        self._scheduled("input")
+        for index, ends in zip(self._inputs, self._calibrated, strict=True):
+            self._judge(index, *ends)
+        self._scheduled("range")
+        for index in self._in_order():
+            self._evaluate(self._places[index], *self._sum(index))
+            self._scheduled(self._places[index].name)
+        output = self._places[self._output]
+        for k in range(output.digits):
+            self._emit(Do.GIVE, output.address + k, k)
+        self._scheduled("output")
+
+    def _scheduled(self, name: str) -> None:
+        """Note that all instructions since the last note are about `name`."""
+        start = sum(self._schedule[-1][1:]) if self._schedule else 0
+        count = len(self._instructions) - start
+        if count:
+            self._schedule.append((name, start, count))
+
+    def _share_words(self, states: int, least: int) -> int:
+        """Give words to several values where their lives allow it; return how many there are then, a power of two."""
+        uses: dict[int, list[int]] = {}
+        for number, (do, address, _) in enumerate(self._instructions):
+            if do not in {Do.NOTHING, Do.DROP, Do.JUDGE}:
+                uses.setdefault(address, []).append(number)
+        values = []
+        for place in self._places.values():
+            if not place.is_state:
+                found = sorted(number for k in range(place.digits) for number in uses.get(place.address + k, ()))
+                values.append((Extent(place.address, place.digits), Life(found[0], found[-1])))
+        given, end = packed(values, states)
+        words = max(1 << end.bit_length(), least)
+        moved = {self._one: words - 1} | {
+            extent.address + k: address + k for extent, address in given.items() for k in range(extent.words)
+        }
+        self._instructions = [i._replace(address=moved.get(i.address, i.address)) for i in self._instructions]
+        self._places = {
+            index: replace(place, address=moved.get(place.address, place.address))
+            for index, place in self._places.items()
+        }
+        return words
 
     # What is stored.
 
@@ -472,9 +517,8 @@ class _Folding:
                 total[term] = total.get(term, Fraction(0)) + sign * weight
             return {term: weight for term, weight in total.items() if weight}, constant_a + sign * constant_b
         if node.op in {Op.SHIFT, Op.SCALE}:
-            factor = Fraction(2) ** node.parameter
-            if node.op is Op.SCALE:
-                factor = node.parameter * Fraction(2) ** -node.parameter_frac
+            scales = node.op is Op.SCALE
+            factor = node.parameter * Fraction(2) ** -node.parameter_frac if scales else Fraction(2) ** node.parameter
             total, constant = self._value(node.operands[0])
             return {term: weight * factor for term, weight in total.items()}, constant * factor
         if node.op is Op.BOUND:
@@ -512,25 +556,45 @@ class _Folding:
 
     # How they are computed.
 
-    def _compute(self, index: int) -> None:
+    def _judge(self, index: int, low: int, high: int) -> None:
+        """Subtract the ends of an input's calibrated range that are not those of its codes, and judge by the sign."""
+        node, place = self._nodes[index], self._places[index]
+        ends = [(low, 1)] * (low > node.low) + [(high, -1)] * (high < node.high)
+        for end, sign in ends:
+            for k, digit in enumerate(digits_of(end << (place.frac - node.frac), place.digits, self._bits)):
+                self._emit(Do.MULTIPLY, place.address + k, sign)
+                self._emit(Do.MULTIPLY, self._one, -sign * digit)
+                self._emit(*((Do.JUDGE,) if k == place.digits - 1 else (Do.DROP,)))
+
+    def _sum(self, index: int) -> tuple[_Sum, Fraction]:
+        """Return what a stored value is, in terms of others."""
         node = self._nodes[index]
-        total, constant = self._value(node.operands[0]) if node.op is Op.FLOOR else self._definition(index)
-        self._evaluate(self._places[index], total, constant)
+        return self._value(node.operands[0]) if node.op in {Op.FLOOR, Op.DELAY} else self._definition(index)
 
-    def _delays_in_order(self) -> list[int]:
-        """Delays, each before the one that it takes its value from is overwritten."""
-        delays = [i for i, node in enumerate(self._nodes) if node.op is Op.DELAY]
-        order: list[int] = []
-        while len(order) < len(delays):
-            for delay in delays:
-                readers = [d for d in delays if d not in order and d != delay and self._reads(d, delay)]
-                if delay not in order and not readers:
-                    order.append(delay)
-        return order
+    def _in_order(self) -> Iterator[int]:
+        """Yield values in the order of the datapath, and states as soon as nothing needs what they held before.
 
-    def _reads(self, delay: int, other: int) -> bool:
-        total, _ = self._value(self._nodes[delay].operands[0])
-        return any(term.place == other for term in total)
+        The sooner, the shorter the lives of the values that states come from.
+        """
+        read = {
+            i: {place for term in self._sum(i)[0] for place in (term.place, term.other)}
+            for i in self._stored
+            if self._nodes[i].op is not Op.INPUT
+        }
+        values = [i for i in sorted(read) if self._nodes[i].op is not Op.DELAY]
+        delays = [i for i in sorted(read) if self._nodes[i].op is Op.DELAY]
+        while values or delays:
+            waiting = set(values)
+            free = [
+                d
+                for d in delays
+                if not read[d] & waiting and not any(d in read[i] for i in (*values, *delays) if i != d)
+            ]
+            if free:
+                delays.remove(free[0])
+                yield free[0]
+            else:
+                yield values.pop(0)
 
     def _evaluate(self, place: Place, total: _Sum, constant: Fraction) -> None:
         """Emit the columns of a sum, the lowest first, and store those from the place's own on."""
@@ -633,7 +697,7 @@ class _Folding:
                 low, high = low + min(ends), high + max(ends)
             elif do in {Do.STORE, Do.DROP}:
                 low, high = low >> self._bits, high >> self._bits
-            elif do is Do.FINISH:
+            elif do in {Do.FINISH, Do.JUDGE}:
                 low = high = 0
             least, most = min(least, low), max(most, high)
         return max((-least - 1).bit_length(), most.bit_length()) + 1

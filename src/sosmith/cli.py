@@ -561,9 +561,8 @@ def _hardware_rows(architecture: Architecture) -> list[tuple[str, str]]:
         sizes = f"{cost.adder_bits}, {cost.register_bits}"
         return [latency, ("multipliers", cost.multiplier_sizes), ("adder bits, state and register bits", sizes)]
     word = program.digit_bits + 1
-    states, shared = program.states, program.words - program.states
     multiplier = "none, shifts and additions" if architecture.name == "serial" else f"1 of {word} x {word}"
-    memory = f"{states:,} words a channel, {shared:,} for all, of {word} bits"
+    memory = f"{program.words:,} words of {word} bits a channel, {program.states:,} of them states"
     accumulator = f"{program.accumulator_bits} bits"
     return [
         latency,

@@ -31,7 +31,7 @@ def run(made: Program, datapath: Datapath, codes: np.ndarray) -> list[int]:
     graph = datapath.stages[0].graph
     fracs = [graph.nodes[i].frac for i in graph.inputs]
     words = made.reset()
-    given_out = [made.step(sample, words, fracs) for sample in codes.tolist()]
+    given_out = [made.step(sample, words, fracs).code for sample in codes.tolist()]
     return [min(max(code, datapath.output.lowest), datapath.output.highest) for code in given_out]
 
 
@@ -73,13 +73,26 @@ def test_constants_and_words_fit_the_multiplier(digit_bits: int) -> None:
     limit = 1 << digit_bits
     assert all(-limit <= constant < limit for _, _, constant in made.instructions)
     assert {address for do, address, _ in made.instructions if do in WRITES}.isdisjoint({made.one})
-    places = sorted(made.places, key=lambda place: place.address)
-    ends = [place.address + place.digits for place in places]
-    starts = [end + (end == made.one) for end in [0, *ends[:-1]]]  # the word of ones lies behind the states
-    assert [place.address for place in places] == starts
-    assert {place.is_state for place in places if place.address < made.one} == {True}
-    assert {place.is_state for place in places if place.address > made.one} == {False}
-    assert made.words == ends[-1]
+    states = sorted((place for place in made.places if place.is_state), key=lambda place: place.address)
+    ends = [place.address + place.digits for place in states]
+    assert [place.address for place in states] == [0, *ends[:-1]]
+    assert made.states == ends[-1]
+    others = [place for place in made.places if not place.is_state]
+    assert all(made.states <= place.address <= made.one - place.digits for place in others)
+    assert made.words == made.one + 1 == 1 << made.one.bit_length()
+
+
+def test_words_are_used_again() -> None:
+    made = program(example_design("flange_wear_locomotive.toml", realization="df1_ef2").datapath, 15)
+    others = [place for place in made.places if not place.is_state]
+    assert made.words - made.states < sum(place.digits for place in others)
+
+
+def test_the_schedule_covers_the_program() -> None:
+    made = program(example_design("flange_wear_locomotive.toml", realization="df1_ef2").datapath, 15)
+    ends = [start + count for _, start, count in made.schedule]
+    assert [start for _, start, _ in made.schedule] == [0, *ends[:-1]]
+    assert ends[-1] == len(made.instructions)
 
 
 def test_an_accumulator_that_is_too_narrow_is_noticed() -> None:
@@ -113,3 +126,48 @@ def test_digits_make_the_code(code: int) -> None:
     assert sum(digit * Fraction(2) ** (15 * k) for k, digit in enumerate(digits)) == code
     assert all(0 <= digit < 1 << 15 for digit in digits[:-1])
     assert -(1 << 15) <= digits[-1] < 1 << 15
+
+
+def test_a_padded_program_does_nothing_first() -> None:
+    datapath = example_design("audio_lowpass.toml", realization="df1_ef2").datapath
+    made = program(datapath, 15)
+    count = len(made.instructions)
+    padded = made.padded(count + 7)
+    assert padded.instructions == (*[Instruction(Do.NOTHING)] * 7, *made.instructions)
+    codes = stimulus(datapath, 20)
+    assert run(padded, datapath, codes) == datapath.compute_exact(codes)
+    with pytest.raises(ValueError, match=rf"^a program must have at most {count - 1} instructions, not {count}$"):
+        made.padded(count - 1)
+
+
+def test_a_program_takes_over_only_where_everything_fits() -> None:
+    datapath = example_design("audio_lowpass.toml", realization="df1_ef2").datapath
+    made = program(datapath, 15)
+    assert program(datapath, 15, like=made) == made
+    roomy = replace(made, words=made.words + 3, accumulator_bits=made.accumulator_bits + 2)
+    taken = program(datapath, 15, like=roomy)
+    assert (taken.words, taken.accumulator_bits) == (roomy.words, roomy.accumulator_bits)
+    for changed, message in (
+        ({"accumulator_bits": 20}, rf"bits of the accumulator must be at most 20, not {made.accumulator_bits}"),
+        ({"words": 5}, rf"words of memory must be at most 5, not {made.words}"),
+        ({"digit_bits": 14}, "digit_bits must be 14, not 15"),
+        ({"places": ()}, r"its states must be \[\], not \[.*\]"),
+        ({"inputs": ()}, r"digits and fraction bits of its inputs must be \[\], not \[.*\]"),
+    ):
+        with pytest.raises(FoldingError, match=rf"^to take over, {message}$"):
+            program(datapath, 15, like=replace(made, **changed))
+
+
+def test_a_state_keeps_its_digits() -> None:
+    """A program that would need fewer digits for a state takes as many as before: the upper ones hold its sign."""
+    datapath = example_design("audio_lowpass.toml", realization="df1_ef2").datapath
+    made = program(datapath, 15)
+    wider = tuple(replace(p, digits=p.digits + (p.name == "section1.v1")) for p in made.places)
+    with pytest.raises(FoldingError, match=r"^to take over, its states must be .*$"):
+        program(datapath, 15, like=replace(made, places=wider))  # the places behind it would have to move
+    last = [p for p in made.places if p.is_state][-1].name
+    wider = tuple(replace(p, digits=p.digits + (p.name == last)) for p in made.places)
+    taken = program(datapath, 15, like=replace(made, places=wider, words=made.words + 1))
+    assert next(p.digits for p in taken.places if p.name == last) == next(p.digits for p in wider if p.name == last)
+    codes = stimulus(datapath, 20)
+    assert run(taken, datapath, codes) == datapath.compute_exact(codes)
