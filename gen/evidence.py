@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from sosmith.gen.synthesis import Netlist
+
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 
@@ -146,6 +148,8 @@ class Evidence:
         Compared samples over all channels, channels, clock cycles of the run, cycles from input to output.
     simulator : str
         Name of the simulator.
+    gates : Netlist or None
+        The netlist that ran, None if the SystemVerilog itself did.
     seed : int
         Seed of all random handshakes and noise.
     tools : Mapping of str to str
@@ -207,6 +211,7 @@ class Evidence:
     limit_cycles: Sequence[Mapping[str, Any]] = ()
     shown_channel: int | None = None
     filter: FilterFacts | None = None
+    gates: Netlist | None = None
     alternatives: Sequence[Alternative] = ()
 
     def __post_init__(self) -> None:

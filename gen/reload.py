@@ -6,11 +6,10 @@ another filter made: until it has died away, neither is proven, and at the rails
 
 from __future__ import annotations
 
-import zlib
 from dataclasses import dataclass
 from fractions import Fraction
 
-from sosmith.gen.architecture import Architecture, Budget
+from sosmith.gen.architecture import Budget, structure
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.design import Filter
 from sosmith.gen.quantity import quantity
@@ -19,7 +18,6 @@ from sosmith.hdl import folded
 from sosmith.model.constants import constants, packed, values_of, with_room
 from sosmith.model.datapath import Datapath
 from sosmith.model.errors import ShortfallError
-from sosmith.model.graph import Node, Op
 from sosmith.model.polynomial import Polynomial
 from sosmith.model.program import Program, program
 
@@ -38,16 +36,6 @@ class OtherSet:
 
     quantized: Quantized
     program: Program | None
-
-
-def fingerprint(architecture: Architecture) -> int:
-    """CRC-32 of everything about the hardware but its constants: sets are loadable where this is equal."""
-    datapath = architecture.datapath
-    stages = [(stage.name, [_structure(node) for node in stage.graph.nodes]) for stage in datapath.stages]
-    made = architecture.program
-    shape = (architecture.name, architecture.channels, datapath.inputs, datapath.output, stages)
-    sizes = None if made is None else (made.places, made.words, made.accumulator_bits, len(made.instructions))
-    return zlib.crc32(repr((shape, sizes)).encode())
 
 
 def other_set(
@@ -147,13 +135,6 @@ def _fitted(hardware: CoreDesign, quantized: Quantized) -> Program | None:
     return made
 
 
-def _structure(node: Node) -> tuple[object, ...]:
-    """Everything about a node that a set of constants must not change."""
-    constant = node.op in {Op.SCALE, Op.CONSTANT}
-    limits = (node.low, node.high) if node.op is Op.CLAMP else ()
-    return node.op.value, node.operands, node.frac, 0 if constant else node.parameter, node.parameter_frac, limits
-
-
 def _check_parallel(hardware: Datapath, other: Datapath) -> None:
     """Check that `other` is `hardware` with other constants, and that these and all ranges fit.
 
@@ -164,7 +145,7 @@ def _check_parallel(hardware: Datapath, other: Datapath) -> None:
     """
     loadable = constants(hardware)
     for old, new in zip(with_room(hardware).stages, other.stages, strict=True):
-        if [*map(_structure, old.graph.nodes)] != [*map(_structure, new.graph.nodes)]:
+        if [*map(structure, old.graph.nodes)] != [*map(structure, new.graph.nodes)]:
             raise ShortfallError(f"the set must fit the hardware: {old.name} must have the same operations")
     try:
         packed(values_of(other, loadable), loadable)

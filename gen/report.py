@@ -74,6 +74,9 @@ def _shortfalls(evidence: Evidence, max_abs: float, measures: ResponseMeasures |
 def _notes(evidence: Evidence) -> list[str]:
     """Say what a reader must know to judge the verdict, one sentence each."""
     notes = []
+    if evidence.gates is not None and evidence.gates.excess:
+        board = evidence.gates.board
+        notes.append(f"The netlist takes more than the {board.title} has: {', '.join(evidence.gates.excess)}.")
     if not evidence.proven:
         notes.append("The error limit is estimated in double precision, not yet proven.")
     if evidence.bound > evidence.max_error:
@@ -109,11 +112,12 @@ def summarise(evidence: Evidence) -> dict[str, Any]:
     Returns
     -------
     dict
-        The keys of the contract, and: ``core``, ``scenario``, ``realization``, ``architecture``, ``lsb``,
-        ``range``, ``max_error``, ``error.{max_lsb,mean,proven,parts}``, ``first_mismatch``, ``latency_cycles``,
-        ``cycles_per_sample`` (of this run, waiting included), ``alternatives``, ``limit_cycles``, ``tools``,
-        ``sosmith_version``, ``shortfalls`` (why it did not pass) and ``notes``. Lengths are in samples or
-        cycles, errors in ``error.unit``. What is unknown or not finite is None.
+        The keys of the contract, and: ``core``, ``scenario``, ``realization``, ``architecture``, ``gates`` (name of
+        the board whose netlist ran, None if the SystemVerilog itself did), ``lsb``, ``range``, ``max_error``,
+        ``error.{max_lsb,mean,proven,parts}``, ``first_mismatch``, ``latency_cycles``, ``cycles_per_sample`` (of
+        this run, waiting included), ``alternatives``, ``limit_cycles``, ``tools``, ``sosmith_version``,
+        ``shortfalls`` (why it did not pass) and ``notes``. Lengths are in samples or cycles, errors in
+        ``error.unit``. What is unknown or not finite is None.
         ``passed`` is true if hardware and integer model agree bit for bit, the largest error is within
         ``error.bound`` and ``max_error``, and the quantized filter is stable and meets the specification's
         mask (see `mask_shortfalls`).
@@ -134,6 +138,7 @@ def summarise(evidence: Evidence) -> dict[str, Any]:
         "cycles_per_sample": evidence.cycles / evidence.samples,
         "latency_cycles": evidence.latency_cycles,
         "simulator": evidence.simulator,
+        "gates": None if evidence.gates is None else evidence.gates.board.name,
         "seed": evidence.seed,
         "bit_exact": evidence.mismatches == 0,
         "mismatches": evidence.mismatches,

@@ -14,6 +14,7 @@ from typing import Any
 from sosmith.gen import plots
 from sosmith.gen.evidence import Evidence, FilterFacts, Format
 from sosmith.gen.quantity import count, decibels, duration, plain_number, quantity, scale, unit_symbol
+from sosmith.gen.synthesis import Netlist
 
 Summary = Mapping[str, Any]
 
@@ -185,7 +186,7 @@ def _tiles(evidence: Evidence, summary: Summary) -> str:
             "Simulation",
             f"{amount(evidence.cycles_per_second, '')} cycles/s",
             f"{count(evidence.cycles, 'clock cycle')} in {text(duration(evidence.wall_seconds))} "
-            f"with {text(evidence.simulator)}",
+            f"with {text(evidence.simulator)}{'' if evidence.gates is None else ', gate by gate'}",
         ),
     ]
     return f'<dl class="tiles">\n{"".join(tiles)}</dl>\n'
@@ -197,7 +198,7 @@ def _header(evidence: Evidence, summary: Summary) -> str:
     if summary["passed"]:
         title = "Passed"
         sentences = [
-            f"The simulated hardware agrees with its integer model bit for bit, and stays within {error} "
+            f"The simulated {_what_ran(evidence)} agrees with its integer model bit for bit, and stays within {error} "
             f"of the exact calculation; the limit is {bound}."
         ]
     else:
@@ -463,6 +464,15 @@ def _number_section(evidence: Evidence) -> str:
     return f"<h2>The numbers inside</h2>\n{body}" if body else ""
 
 
+def _what_ran(evidence: Evidence) -> str:
+    return "hardware" if evidence.gates is None else f"netlist for the {text(evidence.gates.board.title)}"
+
+
+def _netlist_in_words(netlist: Netlist) -> str:
+    cells = ", ".join(f"{number:,} {kind}" for kind, number in netlist.cells.items())
+    return f"the netlist for the {netlist.board.title}, {netlist.board.device.title}: {cells}"
+
+
 def _run_section(evidence: Evidence) -> str:
     span = float(evidence.time[-1] - evidence.time[0])
     facts = [
@@ -478,6 +488,7 @@ def _run_section(evidence: Evidence) -> str:
             f"{plain_number(evidence.low)} to {plain_number(evidence.high)} {unit_symbol(evidence.unit)}".rstrip(),
         ),
         ("simulator", evidence.simulator),
+        *([] if evidence.gates is None else [("what ran", _netlist_in_words(evidence.gates))]),
         ("seed", str(evidence.seed)),
         *evidence.tools.items(),
     ]

@@ -21,7 +21,6 @@ from sosmith.gen.specification_values import (
     edges,
     file_name,
     flag,
-    flag_not_yet,
     identifier,
     key_text,
     list_of,
@@ -120,7 +119,7 @@ class HardwareTable(Table):
     realization: Annotated[str, PlainValidator(choice(REALIZATIONS))] = "auto"
     architecture: Annotated[str, PlainValidator(choice(ARCHITECTURES))] = "auto"
     clock: Annotated[Fraction, PlainValidator(positive("Hz"))] = Fraction(12_000_000)
-    reload: Annotated[bool, PlainValidator(flag_not_yet)] = False
+    reload: Annotated[bool, PlainValidator(flag)] = False
 
 
 class Document(Table):

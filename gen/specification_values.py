@@ -147,13 +147,6 @@ def flag(value: object) -> bool:
     return value
 
 
-def flag_not_yet(value: object) -> bool:
-    """Read a flag of which only false is carried out so far."""
-    if flag(value):
-        raise UnfitError("false", "true", later=True)
-    return False
-
-
 def text(longest: int) -> Callable[[object], str]:
     """Return the reader of a printable text of at most `longest` characters."""
 

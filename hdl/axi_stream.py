@@ -124,6 +124,8 @@ class StreamBuffer(wiring.Component):
         Whether the source may move at this clock.
     o_data, o_valid, o_ready
         The sink, by AXI4-Stream's rules: `o_data` stays while `o_valid` is high and `o_ready` is low.
+    o_next : Out(width)
+        The word behind, if there is one: while `advance` is low.
     """
 
     def __init__(self, width: int) -> None:
@@ -136,6 +138,7 @@ class StreamBuffer(wiring.Component):
                 "o_data": Out(width),
                 "o_valid": Out(1),
                 "o_ready": In(1),
+                "o_next": Out(width),
             }
         )
 
@@ -145,7 +148,7 @@ class StreamBuffer(wiring.Component):
         second = Signal(self.width, reset_less=True)
         full = Signal()
         head = Signal(self.width, reset_less=True)
-        m.d.comb += [self.advance.eq(~full), self.o_data.eq(head)]
+        m.d.comb += [self.advance.eq(~full), self.o_data.eq(head), self.o_next.eq(second)]
         with m.If(self.o_ready | ~self.o_valid):
             m.d.sync += [head.eq(second), self.o_valid.eq(1), full.eq(0)]
             with m.If(~full):

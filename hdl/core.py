@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from amaranth.hdl import Cat, ClockDomain, ClockSignal, Const, Module, ResetSignal, Signal, Value
+from collections.abc import Mapping
+
+from amaranth.hdl import Cat, ClockDomain, ClockSignal, Const, Module, Mux, ResetSignal, Signal, Value
 from amaranth.lib import wiring
 
+from sosmith.hdl.axi_lite import slave_members
 from sosmith.hdl.axi_stream import (
     StreamBuffer,
     at_rail,
@@ -15,9 +18,13 @@ from sosmith.hdl.axi_stream import (
     outside_calibration,
     width,
 )
+from sosmith.hdl.constant_banks import NO_CONSTANTS, ConstantBanks, Pair
 from sosmith.hdl.interleaved import InterleavedStage, schedule
-from sosmith.hdl.stage import PipelineStage, rank_count
+from sosmith.hdl.reload import ReloadPort
+from sosmith.hdl.stage import PipelineStage, banks_in_use, rank_count
+from sosmith.model.constants import constants
 from sosmith.model.datapath import Datapath, Stage
+from sosmith.model.reload_registers import ADDRESS_BITS
 from sosmith.model.status import Flag
 
 
@@ -46,6 +53,9 @@ class Core(wiring.Component):
         What it computes.
     channels : int
         Number of channels.
+    fingerprint : int or None
+        Of the structure, 32 bits; None for a core whose constants stay. Otherwise they can be loaded while it works:
+        each sample is computed by the bank that was active when the core took it.
 
     Members
     -------
@@ -61,12 +71,16 @@ class Core(wiring.Component):
         Status of the output sample, bits as of `sosmith.model.status.Flag`.
     s_axis_tdest, m_axis_tdest
         Number of the sample's channel, in whole bytes; only with several channels.
+    s_axil_*
+        AXI4-Lite slave of `sosmith.hdl.reload.ReloadPort`; only with a fingerprint.
     """
 
-    def __init__(self, datapath: Datapath, channels: int = 1) -> None:
+    def __init__(self, datapath: Datapath, channels: int = 1, fingerprint: int | None = None) -> None:
         self.datapath = datapath
         self.channels = channels
-        super().__init__(core_members(datapath.inputs, datapath.output, channels))
+        self.fingerprint = fingerprint
+        members = core_members(datapath.inputs, datapath.output, channels)
+        super().__init__(members if fingerprint is None else members | slave_members(ADDRESS_BITS))
 
     def elaborate(self, platform: object) -> Module:
         """Build the pipeline."""
@@ -77,18 +91,25 @@ class Core(wiring.Component):
         buffer = m.submodules.output_buffer = StreamBuffer(
             width([self.datapath.output]) + live + channel_bits(self.channels)
         )
-        stages = [self._stage(m, stage, buffer.advance) for stage in self.datapath.stages]
-        valid, channel, data = self._source(m, stages, buffer.advance)
+        banks = None if self.fingerprint is None else ConstantBanks(self.datapath, constants(self.datapath))
+        stages = [
+            self._stage(m, stage, NO_CONSTANTS if banks is None else banks.of_stage(k), buffer.advance)
+            for k, stage in enumerate(self.datapath.stages)
+        ]
+        bank, waiting = Signal(), Signal(2)
+        valid, channel, taken, data = self._source(m, stages, buffer.advance, bank, waiting)
+        if banks is not None:
+            self._reload(m, banks, bank, Cat(waiting, *(component.uses for component in stages)))
         status: Value = Cat(at_rail(self.datapath.inputs, data), outside_calibration(self.datapath, data))
         codes: list[Value] = [data[f.offset : f.offset + f.port.bits] for f in fields(self.datapath.inputs)]
         for component in stages:
             graph = component.stage.graph
             m.d.comb += [getattr(component, f"i{k}").eq(code) for k, code in enumerate(codes)]
-            m.d.comb += component.i_valid.eq(valid)
+            m.d.comb += [component.i_valid.eq(valid), component.i_bank.eq(taken)]
             if isinstance(component, InterleavedStage):
                 m.d.comb += component.i_channel.eq(channel)
                 channel = component.o_channel
-            valid = component.o_valid
+            valid, taken = component.o_valid, component.o_bank
             codes = [getattr(component, f"o{k}") for k in range(len(graph.outputs))]
         for rank in range(sum(_ranks(self.datapath, self.channels))):
             held = Signal(len(status), name=f"status{rank + 1}", reset_less=True)
@@ -110,23 +131,46 @@ class Core(wiring.Component):
             m.d.comb += self.m_axis_tdest.eq(buffer.o_data[len(output) + live :])
         return m
 
-    def _stage(self, m: Module, stage: Stage, advance: Value) -> PipelineStage | InterleavedStage:
+    def _stage(
+        self, m: Module, stage: Stage, constants: Mapping[int, Pair], advance: Value
+    ) -> PipelineStage | InterleavedStage:
         several = self.channels > 1
-        component = InterleavedStage(stage, self.channels) if several else PipelineStage(stage)
+        component = InterleavedStage(stage, self.channels, constants) if several else PipelineStage(stage, constants)
         m.submodules[stage.name] = component
         m.d.comb += component.advance.eq(advance)
         return component
 
+    def _reload(self, m: Module, banks: ConstantBanks, bank: Signal, uses: Value) -> None:
+        """Connect the reload port to the banks; `uses` are pairs of bits, which of the banks samples use."""
+        assert self.fingerprint is not None
+        m.submodules.constant_banks = banks
+        m.submodules.reload_port = port = ReloadPort(banks.words, design=self.fingerprint)
+        for name in slave_members(ADDRESS_BITS):
+            outer, inner = getattr(self, name), getattr(port, name)
+            m.d.comb += outer.eq(inner) if self.signature.members[name].flow is wiring.Out else inner.eq(outer)
+        m.d.comb += [
+            bank.eq(port.bank),
+            port.may_swap.eq(1),
+            port.shadow_free.eq(~Mux(port.bank, uses[::2].any(), uses[1::2].any())),
+            banks.write_enable.eq(port.write_enable),
+            banks.write_bank.eq(~port.bank),
+            banks.write_address.eq(port.write_address),
+            banks.write_data.eq(port.write_data),
+        ]
+
     def _source(
-        self, m: Module, stages: list[PipelineStage | InterleavedStage], advance: Value
-    ) -> tuple[Value, Value, Value]:
-        """Return whether there is a sample for the first stage, its channel, and its word."""
+        self, m: Module, stages: list[PipelineStage | InterleavedStage], advance: Value, bank: Value, waiting: Signal
+    ) -> tuple[Value, Value, Value, Value]:
+        """Return whether there is a sample for the first stage, its channel, its bank, and its word.
+
+        `bank` is that of samples that are taken now; `waiting` is told which banks those use that wait.
+        """
         interleaved = [component for component in stages if isinstance(component, InterleavedStage)]
         if not interleaved:
             m.d.comb += self.s_axis_tready.eq(advance)
-            return self.s_axis_tvalid, Const(0, 0), self.s_axis_tdata
+            return self.s_axis_tvalid, Const(0, 0), bank, self.s_axis_tdata
         bits = channel_bits(self.channels)
-        buffer = m.submodules.input_buffer = StreamBuffer(len(self.s_axis_tdata) + bits)
+        buffer = m.submodules.input_buffer = StreamBuffer(len(self.s_axis_tdata) + bits + 1)
         clearing, cleared = Signal(init=1), Signal(bits)
         exists = self.s_axis_tdest < self.channels
         dest = buffer.o_data[:bits]
@@ -149,10 +193,11 @@ class Core(wiring.Component):
         m.d.comb += [
             self.s_axis_tready.eq(buffer.advance & ~clearing),
             buffer.i_valid.eq(self.s_axis_tvalid & exists & ~clearing),
-            buffer.i_data.eq(Cat(self.s_axis_tdest[:bits], self.s_axis_tdata)),
+            buffer.i_data.eq(Cat(self.s_axis_tdest[:bits], bank, self.s_axis_tdata)),
+            waiting.eq(banks_in_use([buffer.o_valid, ~buffer.advance], [buffer.o_data[bits], buffer.o_next[bits]])),
             valid.eq(buffer.o_valid & ~waits),
             buffer.o_ready.eq(advance & ~waits),
         ]
         for component in interleaved:
             m.d.comb += [component.clear.eq(clearing), component.clear_channel.eq(cleared)]
-        return valid, dest, buffer.o_data[bits:]
+        return valid, dest, buffer.o_data[bits], buffer.o_data[bits + 1 :]

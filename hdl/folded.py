@@ -35,6 +35,11 @@ _SLICES = {256: 16, 512: 8, 1024: 4, 2048: 2}
 """Bits that a block RAM of an iCE40 has to a word when it has so many words."""
 
 
+def reset_cycles(program: Program, channels: int) -> int:
+    """Clocks that the memory takes to be cleared after a reset."""
+    return memory_depth(program, channels) + (channels > 1)
+
+
 def memory_depth(program: Program, channels: int) -> int:
     """Words of the memory: those of the program for each channel, the channel's number above the word's."""
     return program.words * channels
@@ -90,7 +95,7 @@ class FoldedCore(wiring.Component):
         advance, clearing, start = Signal(), Signal(init=1), Signal()
         busy, dropped = Signal(), Signal()
         channel = self._channel(m, busy | clearing, dropped, start)
-        counter, fetching = self._control(m, advance, clearing, start, busy)
+        counter, fetching = self._control(m, (advance, clearing, start, busy), channel)
         ranks = self._fetch(m, advance, counter, fetching, self._reload(m, start, busy))
         data = Signal(signed(self._word), reset_less=True)
         total = self._accumulate(m, advance, ranks, data)
@@ -109,7 +114,7 @@ class FoldedCore(wiring.Component):
     def _channel(self, m: Module, busy: Value, dropped: Signal, start: Signal) -> Signal:
         """Begin with a sample if its channel exists, else drop it; return the channel's number while it is computed."""
         found = self.s_axis_tvalid & ~busy
-        channel = Signal(channel_bits(self.channels), reset_less=True)
+        channel = Signal(channel_bits(self.channels))
         if self.channels == 1:
             m.d.comb += start.eq(found)
             return channel
@@ -121,14 +126,20 @@ class FoldedCore(wiring.Component):
         return channel
 
     def _control(
-        self, m: Module, advance: Signal, clearing: Signal, start: Signal, busy: Signal
+        self, m: Module, control: tuple[Signal, Signal, Signal, Signal], channel: Signal
     ) -> tuple[Signal, Signal]:
-        """Count through the words to clear after reset, and through the program for each sample."""
-        count, words = len(self.program.instructions), memory_depth(self.program, self.channels)
-        counter, fetching = Signal(range(max(count, words))), Signal()
+        """Count through all words to clear them after reset, and through the program for each sample.
+
+        While it clears, the channel's number follows the upper half of the count, a clock late: a channel's word 0
+        comes last.
+        """
+        advance, clearing, start, busy = control
+        count, bits = len(self.program.instructions), _address_bits(self.program)
+        counter, fetching = Signal(max((count - 1).bit_length(), bits + len(channel))), Signal()
+        is_last = channel == self.channels - 1
         with m.If(clearing):
-            m.d.sync += counter.eq(counter + 1)
-            with m.If(counter == words - 1):
+            m.d.sync += [counter.eq(counter + 1), channel.eq(counter[bits:])]
+            with m.If(self._is_one(counter) if self.channels == 1 else is_last & ~counter[:bits].any()):
                 m.d.sync += [clearing.eq(0), counter.eq(0)]
         with m.Elif(start):
             m.d.sync += fetching.eq(1)
@@ -141,6 +152,10 @@ class FoldedCore(wiring.Component):
         with m.If(self.m_axis_tvalid & self.m_axis_tready):
             m.d.sync += busy.eq(0)
         return counter, fetching
+
+    def _is_one(self, address: Value) -> Value:
+        """Whether an address is that of the word of ones, a channel's last one."""
+        return address[: _address_bits(self.program)].all()
 
     def _reload(self, m: Module, start: Signal, busy: Signal) -> tuple[ReloadPort, Signal] | None:
         """Return the reload port and the bank that the sample in work uses."""
@@ -229,13 +244,12 @@ class FoldedCore(wiring.Component):
         digit = Mux(take, self._input_digit(last.constant), Cat(total[: self._word - 1], top))
         stores = take | last.does(Do.STORE) | last.does(Do.FINISH)
         address_bits = _address_bits(self.program)
-        is_one = counter[:address_bits].all()
         word = self._memory(
             m,
             read=(Cat(first.address, channel), advance),
             write=(
-                Mux(clearing, counter, Cat(last.address, channel)),
-                Mux(clearing, is_one, digit),
+                Cat(Mux(clearing, counter[:address_bits], last.address), channel),
+                Mux(clearing, self._is_one(counter), digit),
                 clearing | (advance & last.valid & stores),
             ),
         )

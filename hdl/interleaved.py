@@ -8,6 +8,7 @@ ranks, `Schedule.distance`; the core keeps it waiting that long (`sosmith.hdl.co
 from __future__ import annotations
 
 import itertools
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from amaranth.hdl import Module, Mux, Signal, Value
@@ -16,7 +17,8 @@ from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
 from sosmith.hdl.axi_stream import channel_bits
-from sosmith.hdl.stage import PLAIN, limits, logic, shape_of, unique_names
+from sosmith.hdl.constant_banks import NO_CONSTANTS, Pair, chosen
+from sosmith.hdl.stage import PLAIN, banks_in_use, limits, logic, shape_of, unique_names
 from sosmith.model.datapath import Stage
 from sosmith.model.graph import Graph, Node, Op
 
@@ -132,6 +134,8 @@ class InterleavedStage(wiring.Component):
         What it computes.
     channels : int
         Number of channels, at least 2.
+    constants : dict of int to Pair
+        Constants that come from one of two banks, by their nodes.
 
     Members
     -------
@@ -141,6 +145,8 @@ class InterleavedStage(wiring.Component):
         Whether the inputs hold a sample; without one, the states stay as they are.
     i_channel : In
         Number of its channel.
+    i_bank, o_bank, uses : In(1), Out(1), Out(2)
+        As of `sosmith.hdl.stage.PipelineStage`.
     advance : In(1)
         Whether the pipeline moves at this clock.
     clear, clear_channel : In
@@ -153,14 +159,16 @@ class InterleavedStage(wiring.Component):
         Whether the stage had to limit it.
     """
 
-    def __init__(self, stage: Stage, channels: int) -> None:
+    def __init__(self, stage: Stage, channels: int, constants: Mapping[int, Pair] = NO_CONSTANTS) -> None:
         self.stage = stage
+        self.constants = constants
         self.channels = channels
         self.schedule = schedule(stage.graph, channels)
         graph, bits = stage.graph, channel_bits(channels)
         members = {f"i{k}": In(shape_of(graph.nodes[i])) for k, i in enumerate(graph.inputs)}
         members |= {f"o{k}": Out(shape_of(graph.nodes[i])) for k, i in enumerate(graph.outputs)}
         members |= {"i_valid": In(1), "i_channel": In(bits), "advance": In(1)}
+        members |= {"i_bank": In(1), "o_bank": Out(1), "uses": Out(2)}
         members |= {"clear": In(1), "clear_channel": In(bits)}
         super().__init__({**members, "o_valid": Out(1), "o_channel": Out(bits), "o_saturated": Out(1)})
 
@@ -175,6 +183,8 @@ class InterleavedStage(wiring.Component):
         def at(index: int, rank: int) -> Value:
             """Value of a node as a rank sees it that is no earlier than the node's own."""
             node = graph.nodes[index]
+            if node.op is Op.CONSTANT and index in self.constants:
+                return chosen(self.constants[index], banks[rank])
             if node.op is Op.CONSTANT or plan.ranks[index] == rank:
                 return wires[index]
             if (index, rank) not in passed:
@@ -184,7 +194,7 @@ class InterleavedStage(wiring.Component):
                     m.d.sync += register.eq(at(index, rank - 1))
             return passed[index, rank]
 
-        valid, channel = self._travelling(m)
+        valid, channel, banks = self._travelling(m)
         inputs = iter([getattr(self, f"i{k}") for k in range(len(graph.inputs))])
         for index, (node, name) in enumerate(zip(graph.nodes, names, strict=True)):
             own = plan.ranks[index]
@@ -195,7 +205,9 @@ class InterleavedStage(wiring.Component):
             else:
                 wire = Signal(shape_of(node), name=name)
                 if node.op is not Op.DELAY:
-                    m.d.comb += wire.eq(logic(graph, node, [at(i, own) for i in node.operands]))
+                    pair = self.constants.get(index)
+                    factor = None if pair is None else chosen(pair, banks[own])
+                    m.d.comb += wire.eq(logic(graph, node, [at(i, own) for i in node.operands], factor))
                 wires.append(wire)
         for index in graph.delays:
             node, written = graph.nodes[index], plan.writes[index]
@@ -222,14 +234,18 @@ class InterleavedStage(wiring.Component):
                     m.d.sync += self.o_saturated.eq(below | above)
         return m
 
-    def _travelling(self, m: Module) -> tuple[list[Value], list[Value]]:
-        """Return for each rank whether there is a sample, and of which channel; hand on those behind the last."""
+    def _travelling(self, m: Module) -> tuple[list[Value], list[Value], list[Value]]:
+        """Return for each rank whether there is a sample, of which channel, and its bank; hand on those behind all."""
         valid: list[Value] = [self.i_valid]
         channel: list[Value] = [self.i_channel]
+        banks: list[Value] = [self.i_bank]
         for rank in range(1, self.schedule.count + 1):
             valid.append(Signal(name=f"valid{rank}"))
             channel.append(Signal(len(self.i_channel), name=f"channel{rank}", reset_less=True))
+            banks.append(Signal(name=f"bank{rank}", reset_less=True))
             with m.If(self.advance):
                 m.d.sync += [valid[rank].eq(valid[rank - 1]), channel[rank].eq(channel[rank - 1])]
-        m.d.comb += [self.o_valid.eq(valid[-1]), self.o_channel.eq(channel[-1])]
-        return valid, channel
+                m.d.sync += banks[rank].eq(banks[rank - 1])
+        m.d.comb += [self.o_valid.eq(valid[-1]), self.o_channel.eq(channel[-1]), self.o_bank.eq(banks[-1])]
+        m.d.comb += self.uses.eq(banks_in_use(valid[:-1], banks[:-1]))
+        return valid, channel, banks

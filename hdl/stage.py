@@ -7,12 +7,13 @@ of the loop proper then is all that limits the clock.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 
 from amaranth.hdl import Cat, Const, Module, Mux, Shape, Signal, Value
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
+from sosmith.hdl.constant_banks import NO_CONSTANTS, Pair, chosen
 from sosmith.model.datapath import Stage
 from sosmith.model.graph import Graph, Node, Op
 
@@ -116,6 +117,8 @@ class PipelineStage(wiring.Component):
     ----------
     stage : Stage
         What it computes.
+    constants : dict of int to Pair
+        Constants that come from one of two banks, by their nodes.
 
     Members
     -------
@@ -123,6 +126,8 @@ class PipelineStage(wiring.Component):
         Input codes, in the order of the graph's inputs.
     i_valid : In(1)
         Whether the inputs hold a sample; without one, the state stays as it is.
+    i_bank, o_bank, uses : In(1), Out(1), Out(2)
+        Bank of the sample that comes in, and of the one that goes out; which banks samples inside use.
     advance : In(1)
         Whether the pipeline moves at this clock.
     o0, o1, .. : Out(shape)
@@ -133,11 +138,13 @@ class PipelineStage(wiring.Component):
         Whether the stage had to limit it.
     """
 
-    def __init__(self, stage: Stage) -> None:
+    def __init__(self, stage: Stage, constants: Mapping[int, Pair] = NO_CONSTANTS) -> None:
         self.stage = stage
+        self.constants = constants
         graph = stage.graph
         members = {f"i{k}": In(shape_of(graph.nodes[i])) for k, i in enumerate(graph.inputs)}
         members |= {f"o{k}": Out(shape_of(graph.nodes[i])) for k, i in enumerate(graph.outputs)}
+        members |= {"i_bank": In(1), "o_bank": Out(1), "uses": Out(2)}
         super().__init__({**members, "i_valid": In(1), "advance": In(1), "o_valid": Out(1), "o_saturated": Out(1)})
 
     def elaborate(self, platform: object) -> Module:
@@ -145,7 +152,7 @@ class PipelineStage(wiring.Component):
         m = Module()
         graph = self.stage.graph
         names, ranks = unique_names(graph), _ranks(graph)
-        valid, takes = self._control(m, max(ranks) + 1)
+        valid, takes, banks = self._control(m, max(ranks) + 1)
         apart = _known_early(graph, ranks)
         wires: list[Value] = []
         passed: dict[tuple[int, int], Value] = {}
@@ -153,6 +160,8 @@ class PipelineStage(wiring.Component):
         def at(index: int, rank: int) -> Value:
             """Value of a node as a rank sees it that belongs to a sample at least as new."""
             node, own = graph.nodes[index], ranks[index]
+            if node.op is Op.CONSTANT and index in self.constants:
+                return chosen(self.constants[index], banks[rank])
             if own == rank or node.op is Op.CONSTANT:
                 return wires[index]
             if own > rank:  # the loop may still be about the sample before, with all its states one sample behind
@@ -174,14 +183,14 @@ class PipelineStage(wiring.Component):
                 continue
             wire = Signal(shape_of(node), name=name, attrs={"keep": 1} if index in apart else {})
             if node.op is not Op.DELAY:
-                m.d.comb += wire.eq(logic(graph, node, [at(i, ranks[index]) for i in node.operands]))
+                pair = self.constants.get(index)
+                factor = None if pair is None else chosen(pair, banks[ranks[index]])
+                m.d.comb += wire.eq(logic(graph, node, [at(i, ranks[index]) for i in node.operands], factor))
             wires.append(wire)
         for i in graph.delays:
             with m.If(takes[ranks[i]]):
                 m.d.sync += wires[i].eq(at(graph.nodes[i].operands[0], ranks[i]))
         last = len(takes) - 1
-        with m.If(self.advance):
-            m.d.sync += self.o_valid.eq(valid[last])
         for k, i in enumerate(graph.outputs):
             output = getattr(self, f"o{k}")
             held = _held(graph, i, wires) if ranks[i] == last else None
@@ -198,16 +207,27 @@ class PipelineStage(wiring.Component):
                         )
         return m
 
-    def _control(self, m: Module, count: int) -> tuple[list[Value], list[Value]]:
-        """Return for each rank whether it is about a sample, and whether it takes it at this clock."""
+    def _control(self, m: Module, count: int) -> tuple[list[Value], list[Value], list[Value]]:
+        """Return for each rank whether it is about a sample, whether it takes it at this clock, and its bank."""
         valid: list[Value] = [self.i_valid]
-        for rank in range(1, count):
+        banks: list[Value] = [self.i_bank]
+        for rank in range(1, count + 1):
             valid.append(Signal(name=f"valid{rank}"))
+            banks.append(Signal(name=f"bank{rank}", reset_less=True))
             with m.If(self.advance):
-                m.d.sync += valid[rank].eq(valid[rank - 1])
+                m.d.sync += [valid[rank].eq(valid[rank - 1]), banks[rank].eq(banks[rank - 1])]
         takes: list[Value] = [Signal(name=f"take{rank}") for rank in range(count)]
-        m.d.comb += [take.eq(self.advance & ready) for take, ready in zip(takes, valid, strict=True)]
-        return valid, takes
+        m.d.comb += [take.eq(self.advance & ready) for take, ready in zip(takes, valid, strict=False)]
+        m.d.comb += [self.o_valid.eq(valid[-1]), self.o_bank.eq(banks[-1])]
+        m.d.comb += self.uses.eq(banks_in_use(valid[:-1], banks[:-1]))
+        return valid, takes, banks
+
+
+def banks_in_use(valid: Sequence[Value], banks: Sequence[Value]) -> Value:
+    """Return for each bank whether a sample that is there uses it."""
+    inside = list(zip(valid, banks, strict=True))
+    first, second = (Cat(*(there & (own == bank) for there, own in inside)).any() for bank in (0, 1))
+    return Cat(first, second)
 
 
 def unique_names(graph: Graph) -> list[str]:
@@ -247,8 +267,11 @@ def _drop(graph: Graph, node: Node, value: Value) -> Value:
     return value.shift_right(shift)
 
 
-def logic(graph: Graph, node: Node, operands: list[Value]) -> Value:
-    """Value of a node from those of its operands; every intermediate result is exact."""
+def logic(graph: Graph, node: Node, operands: list[Value], factor: Value | None = None) -> Value:
+    """Value of a node from those of its operands; every intermediate result is exact.
+
+    `factor` is what a SCALE multiplies by, where that is not its parameter.
+    """
     fracs = [graph.nodes[i].frac for i in node.operands]
     if node.op is Op.CONSTANT:
         return Const(node.parameter, shape_of(node))
@@ -256,7 +279,7 @@ def logic(graph: Graph, node: Node, operands: list[Value]) -> Value:
         a, b = _aligned(operands, fracs, node.frac)
         return a + b if node.op is Op.ADD else a - b
     if node.op is Op.SCALE:
-        return operands[0] * Const(node.parameter)
+        return operands[0] * (Const(node.parameter) if factor is None else factor)
     if node.op is Op.MULTIPLY:
         return operands[0] * operands[1]
     if node.op is Op.FLOOR:

@@ -13,6 +13,7 @@ from typing import TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from sosmith.gen.boards import Board
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.error_paths import error_responses
 from sosmith.gen.evidence import Alternative, Evidence, FilterFacts, Format
@@ -20,6 +21,7 @@ from sosmith.gen.generate import generate
 from sosmith.gen.manifest import manifest, section_entries
 from sosmith.gen.quantize import Quantized, with_realization
 from sosmith.gen.realizations import ERROR_FEEDBACK
+from sosmith.gen.synthesis import Netlist, synthesize
 from sosmith.model.errors import SpecificationError
 from sosmith.model.golden import calibrated, filtered
 from sosmith.model.port import Codes, Values
@@ -27,6 +29,7 @@ from sosmith.model.scenarios import SCENARIOS, Bench, emulate
 from sosmith.model.text_files import write_files
 from sosmith.model.trace import Trace, read_csv
 from sosmith.sim.cosimulate import CosimulationResult, cosimulate
+from sosmith.sim.gate_level import with_cell_models
 from sosmith.sim.simulators import check_name
 
 _Kind = TypeVar("_Kind", bound=np.generic)
@@ -83,11 +86,13 @@ def simulate(
     idle: float = 0.3,
     stall: float = 0.3,
     waves: bool = False,
+    gates: Board | None = None,
     progress: Progress = lambda step, done, total: None,
 ) -> Evidence:
     """Generate the core into `directory`, run `traces` through it, and set the result beside model and golden chain.
 
-    There is one trace for each channel, all of the same length.
+    There is one trace for each channel, all of the same length. With `gates`, what runs is the netlist that synthesis
+    makes for that board.
 
     Raises
     ------
@@ -104,12 +109,18 @@ def simulate(
         for stale in ("report.json", "report.html"):  # of a run of another core, if this one fails
             (directory / stale).unlink(missing_ok=True)
         generate(design, directory, lambda step: progress(f"generating {step}", 0, 0))
+        source, build_dir, netlist = directory / f"{design.datapath.name}.sv", directory / "simulation", None
+        if gates is not None:
+            progress(f"synthesizing for {gates.title}", 0, 0)
+            build_dir = directory / "gates" / gates.name
+            netlist = synthesize(source, design.datapath.name, gates, build_dir)
+            source = with_cell_models(netlist, scrambled=not design.spec.hardware.reload)
         progress(f"building with {simulator}", 0, 0)
         result = cosimulate(
-            directory / f"{design.datapath.name}.sv",
+            source,
             manifest(design),
             np.stack([trace.codes for trace in traces], axis=1),
-            build_dir=directory / "simulation",
+            build_dir=build_dir,
             simulator=simulator,
             seed=seed,
             idle=idle,
@@ -118,7 +129,7 @@ def simulate(
             progress=lambda done, total: progress("co-simulating", done, total),
         )
     progress("comparing", 0, 0)
-    return _evidence(design, traces, result, seed=seed, wall_seconds=time.monotonic() - started)
+    return _evidence(design, traces, result, netlist, seed=seed, wall_seconds=time.monotonic() - started)
 
 
 @contextmanager
@@ -139,7 +150,13 @@ def _alone_in(directory: Path) -> Iterator[None]:
 
 
 def _evidence(
-    design: CoreDesign, traces: Sequence[Trace], result: CosimulationResult, *, seed: int, wall_seconds: float
+    design: CoreDesign,
+    traces: Sequence[Trace],
+    result: CosimulationResult,
+    netlist: Netlist | None,
+    *,
+    seed: int,
+    wall_seconds: float,
 ) -> Evidence:
     quantized, datapath = design.quantized, design.datapath
     output = datapath.output
@@ -181,7 +198,8 @@ def _evidence(
         latency_cycles=facts["latency_cycles"],
         simulator=result.simulator,
         seed=seed,
-        tools=result.tools,
+        gates=netlist,
+        tools=result.tools if netlist is None else {**result.tools, "yosys": netlist.version},
         wall_seconds=wall_seconds,
         cycles_per_second=result.cycles_per_second,
         realization=quantized.realization if quantized.sections else "none",

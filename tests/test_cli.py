@@ -110,7 +110,15 @@ NEEDED = {
     "design": ("SPEC", "--core", "--realization", "--widths-of", "--json"),
     "generate": ("SPEC", "SystemVerilog", "-o, --output", "build/<name>"),
     "verify": ("CERTIFICATE", "sosmith generate", "--json"),
-    "simulate": ("SPEC", "--trace FILE.csv|SCENARIO", "report.json", "report.html", "[default: verilator]", "--seed"),
+    "simulate": (
+        "SPEC",
+        "--trace FILE.csv|SCENARIO",
+        "report.json",
+        "report.html",
+        "[default: verilator]",
+        "--gates BOARD",
+        "--seed",
+    ),
     "emulate": ("SPEC", "[SCENARIO]", "CSV", "--seconds", "--seed", "stdout"),
     "compare": ("REPORT REPORT...", "--json", "HTML"),
     "demo": ("build/demo", "--seed"),
@@ -210,6 +218,11 @@ UNFIT = {
     "simulator to come": (
         ("simulate", "plain.toml", "--simulator", "cxxrtl"),
         "simulator cxxrtl is not yet available: use verilator or icarus",
+    ),
+    "unknown board": (
+        ("simulate", "plain.toml", "--gates", "basys3"),
+        "the board must be one of icebreaker, upduino, ice40_hx8k_b_evn, icestick, ulx3s_25f, ulx3s_45f, ulx3s_85f, "
+        "colorlight_i5, orangecrab_25f, ecp5_evn, not basys3",
     ),
     "too long": (
         ("emulate", "plain.toml", "noise", "--seconds", "1e9"),

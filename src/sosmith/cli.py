@@ -27,6 +27,7 @@ from rich.table import Table
 
 import sosmith
 from sosmith.gen.architecture import Architecture
+from sosmith.gen.boards import BOARDS, find_board
 from sosmith.gen.certificate_file import Certificate, read_certificate
 from sosmith.gen.comparison import column_names, comparison_json, comparison_page, load_report
 from sosmith.gen.comparison import compare as compare_reports
@@ -235,6 +236,12 @@ def verify(certificate: Path, as_json: bool) -> None:
     show_default=True,
     help="Share of clocks with the output held up.",
 )
+@click.option(
+    "--gates",
+    metavar="BOARD",
+    help="Run the netlist that Yosys makes of it for the FPGA of a board instead: "
+    f"{', '.join(BOARDS)}. Takes seconds to synthesize, and runs slower.",
+)
 @click.option("--waves", is_flag=True, help="Write a waveform (VCD) too.")
 @_SECONDS
 @_SEED
@@ -249,6 +256,7 @@ def simulate_command(
     simulator: str,
     idle: float,
     stall: float,
+    gates: str | None,
     waves: bool,
     seconds: float | None,
     seed: int,
@@ -260,7 +268,10 @@ def simulate_command(
     The SystemVerilog runs with random idle and back-pressure on both streams. Every sample is compared with the
     integer model for equality, and with the double-precision golden chain for the error. Writes report.json and
     report.html; exits with 1 if the result falls short. `sosmith emulate SPEC` lists the scenarios.
+
+    With --gates, the same bench runs the cells of an FPGA, their flip-flops at random when it starts.
     """
+    board = None if gates is None else find_board(gates)
     with _progress() as step:
         made = design_core(load(spec), core=core, realization=realization, widths_of=widths_of, progress=step)
         summary, folder = _simulate(
@@ -273,6 +284,7 @@ def simulate_command(
             seed=seed,
             idle=idle,
             stall=stall,
+            gates=board,
             waves=waves,
         )
     _finish(summary, folder, as_json=as_json)
@@ -643,7 +655,8 @@ def _print_summary(summary: dict[str, Any]) -> None:
         table.add_row(f"  {other['name']} at the same widths", f"largest error {other['max_abs']:.4g}{unit}")
     for reason in summary["shortfalls"]:
         table.add_row("[red]short[/]", escape(reason))
-    speed = f"{summary['simulator']}, {summary['cycles']} clocks at {summary['cycles_per_second']:.3g} a second"
+    gates = "" if summary["gates"] is None else f", the netlist for {summary['gates']}"
+    speed = f"{summary['simulator']}{gates}, {summary['cycles']} clocks at {summary['cycles_per_second']:.3g} a second"
     table.add_row("simulated in", speed)
     _Console().print(table)
 

@@ -8,7 +8,7 @@ from fractions import Fraction
 import pytest
 from tests.gen.designs import EXAMPLES, example_design
 
-from sosmith.gen.architecture import chosen
+from sosmith.gen.architecture import Budget, fitting
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.manifest import manifest
 from sosmith.gen.specification import load
@@ -40,10 +40,35 @@ def test_one_unit_for_all(architecture: str) -> None:
     assert [name for name, _, _ in program.schedule][:: len(program.schedule) - 1] == ["input", "output"]
 
 
-def test_parallel_is_what_is_taken_unless_another_is_asked_for() -> None:
+def test_the_smallest_that_keeps_up_is_taken() -> None:
     made = example_design("audio_lowpass.toml")
-    assert made.reasons["architecture"] == "parallel: what is taken unless another is asked for"
+    needed = made.architecture.cycles_per_sample
+    available = int(made.spec.hardware.clock / made.spec.sample_rate)
+    assert made.reasons["architecture"] == (
+        f"folded: the smallest that keeps up; takes {needed:,} of {available:,} clocks a sample"
+    )
+
+
+def test_what_folding_cannot_keep_up_with_is_parallel() -> None:
+    spec = load(EXAMPLES / "audio_lowpass.toml")
+    made = design_core(replace(spec, channels=64))
+    assert made.architecture.name == "parallel"
+    assert re.fullmatch(
+        r"parallel: none of the 8 realizations meets the specification: .*the folded architecture takes [\d,]+ clocks "
+        r"a sample: at a clock of [\d,]+ Hz with 64 channels the sample rate must be at most [\d,.]+ Hz, not 48,000 Hz",
+        made.reasons["architecture"],
+    )
     assert (manifest(made)["cycles_per_sample"], manifest(made)["schedule"]) == (1, None)
+
+
+def test_a_clock_that_nothing_keeps_up_with_is_refused() -> None:
+    spec = load(EXAMPLES / "audio_lowpass.toml")
+    with pytest.raises(
+        ShortfallError,
+        match=r"the parallel architecture takes 1 clock a sample: at a clock of [\d,]+ Hz with 60,000 channels the "
+        r"sample rate must be at most [\d,.]+ Hz, not 48,000 Hz$",
+    ):
+        design_core(replace(spec, channels=60_000))
 
 
 @pytest.mark.parametrize(("architecture", "clock"), [("folded", 8_000_000), ("serial", 30_000_000)])
@@ -69,4 +94,4 @@ def test_a_realization_that_cannot_be_folded_is_refused() -> None:
         match=r"^the realization must suit the folded architecture: "
         r"the datapath must not truncate inside to be folded$",
     ):
-        chosen("folded", datapath, clock=Fraction(10**8), sample_rate=Fraction(48_000))
+        fitting("folded", Budget(clock=Fraction(10**8), sample_rate=Fraction(48_000)), datapath)

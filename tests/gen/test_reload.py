@@ -12,7 +12,7 @@ from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.design import Filter, design
 from sosmith.gen.quantize import with_constants
 from sosmith.gen.realizations import REALIZATIONS
-from sosmith.gen.reload import OtherSet, fingerprint, other_set, parallel_bank, room_of
+from sosmith.gen.reload import OtherSet, other_set, parallel_bank, room_of
 from sosmith.gen.specification import load
 from sosmith.model.constants import constants, unpacked
 from sosmith.model.errors import ShortfallError
@@ -25,15 +25,12 @@ EXACT = [name for name in REALIZATIONS if name != "state_space"]  # that one rou
 
 @cache
 def hardware_in(architecture: str, example: str = "audio_lowpass.toml", *, clock: int = 100_000_000) -> CoreDesign:
-    """Design a core with room for other programs: two bits more in the accumulator, forty instructions more."""
+    """Design a core that can be loaded anew."""
     spec = load(EXAMPLES / example)
-    hardware = replace(spec.hardware, architecture=architecture, clock=Fraction(clock), realization="df1_ef2")
-    made = design_core(replace(spec, hardware=hardware))
-    program = made.architecture.program
-    if program is not None:
-        roomy = replace(program, accumulator_bits=program.accumulator_bits + 2).padded(len(program.instructions) + 40)
-        vars(made.architecture)["program"] = roomy  # as an architecture with `reload` is to make it
-    return made
+    hardware = replace(
+        spec.hardware, architecture=architecture, clock=Fraction(clock), realization="df1_ef2", reload=True
+    )
+    return design_core(replace(spec, hardware=hardware))
 
 
 def moved(hardware: CoreDesign, ratio: str) -> Filter:
@@ -135,7 +132,8 @@ def test_another_structure_is_refused() -> None:
 
 
 def test_a_program_that_has_no_room_is_refused() -> None:
-    tight = design_core(hardware_in("folded").spec)
+    spec = hardware_in("folded").spec
+    tight = design_core(replace(spec, hardware=replace(spec.hardware, reload=False)))
     with pytest.raises(
         ShortfallError,
         match=r"^the set must fit the hardware: (to take over, bits of the accumulator must be at most \d+|"
@@ -162,8 +160,8 @@ def test_the_parallel_bank_holds_the_constants() -> None:
 
 def test_fingerprints_tell_hardware_apart_and_not_constants() -> None:
     hardware = hardware_in("folded")
-    found = {fingerprint(hardware_in(name).architecture) for name in ("folded", "serial", "parallel")}
+    found = {hardware_in(name).architecture.fingerprint for name in ("folded", "serial", "parallel")}
     assert len(found) == 3
     parallel = hardware_in("parallel").architecture
     other = other_set(hardware_in("parallel"), ideal=moved(hardware, "0.95")).quantized.datapath
-    assert fingerprint(replace(parallel, datapath=other)) == fingerprint(parallel)
+    assert replace(parallel, datapath=other).fingerprint == parallel.fingerprint

@@ -18,8 +18,10 @@ import pytest
 from scipy import signal
 
 from sosmith.gen import plots, quantity, response
+from sosmith.gen.boards import find_board
 from sosmith.gen.report import Alternative, Evidence, FilterFacts, Format, summarise, write_report
 from sosmith.gen.report_page import render_page
+from sosmith.gen.synthesis import Netlist
 
 Array = npt.NDArray[np.float64]
 
@@ -211,6 +213,18 @@ def test_summary_has_the_keys_of_the_contract(built: tuple[str, Path, dict[str, 
     assert report["error"].keys() >= {"max_abs", "rms", "bound", "unit", "max_lsb", "mean", "proven", "parts"}
     assert report["frequency_response"].keys() >= {"max_deviation_db_passband", "stopband_attenuation_db"}
     assert report["accuracy_percent"].keys() == {"unfiltered", "golden", "hardware"}
+
+
+def test_gates_are_told_with_what_does_not_fit(tmp_path: Path) -> None:
+    cells = {"SB_LUT4": 952, "SB_MAC16": 13}
+    run = evidence(gates=Netlist(find_board("icebreaker"), tmp_path / "netlist.v", cells, "0.70"))
+    summary = summarise(run)
+    assert (summary["gates"], summary["passed"]) == ("icebreaker", True)
+    assert summary["notes"][0] == "The netlist takes more than the iCEBreaker has: 13 SB_MAC16 of 8."
+    words = " ".join(Page(page_of(run)).words)
+    assert "the netlist for the iCEBreaker, iCE40 UP5K: 952 SB_LUT4, 13 SB_MAC16" in words
+    assert "gate by gate" in words
+    assert summarise(evidence())["gates"] is None
 
 
 def test_file_holds_the_summary(built: tuple[str, Path, dict[str, Any]]) -> None:

@@ -7,14 +7,14 @@ from typing import Any
 import pytest
 from amaranth.sim import Simulator
 
-from sosmith.hdl.axi_stream import OutputBuffer, fields, width
+from sosmith.hdl.axi_stream import StreamBuffer, fields, width
 from sosmith.model.port import Port
 
 
 @pytest.mark.parametrize("ready", [0.0, 0.2, 0.5, 0.9, 1.0])
 @pytest.mark.parametrize("valid", [0.3, 1.0])
 def test_nothing_is_lost_and_payload_is_stable(valid: float, ready: float) -> None:
-    dut: Any = OutputBuffer(8)
+    dut: Any = StreamBuffer(8)
     pace = random.Random(f"{valid} {ready}")
     sent: list[int] = []
     received: list[int] = []

@@ -1,0 +1,181 @@
+"""FPGAs and the boards that carry them, as data: what synthesis, gate-level simulation and placement need to know."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from sosmith.model.errors import SpecificationError
+
+_LUTS = {"SB_LUT4": 1, "LUT4": 1, "CCU2C": 2, "TRELLIS_DPR16X4": 4}
+"""LUT4 that a cell takes."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Device:
+    """An FPGA, whatever its package.
+
+    Attributes
+    ----------
+    family : str
+        ``"ice40"`` or ``"ecp5"``: the name of the cell library.
+    title : str
+        For people.
+    synthesis : str
+        Yosys command that maps a design onto its cells.
+    placer : str
+        Option of nextpnr that chooses it.
+    logic_cells : int
+        LUT4, each with a flip-flop beside it.
+    multiplier : str or None
+        Cell type of the multiplier block, None if there is none: SB_MAC16 multiplies 16 x 16 bits, MULT18X18D 18 x 18.
+    multipliers : int
+        Number of those.
+    block_ram : str
+        Cell type of the block RAM: SB_RAM40_4K holds 4,096 bits, DP16KD 18,432.
+    block_rams : int
+        Number of those.
+    """
+
+    family: str
+    title: str
+    synthesis: str
+    placer: str
+    logic_cells: int
+    multiplier: str | None
+    multipliers: int
+    block_ram: str
+    block_rams: int
+
+    def excess(self, cells: dict[str, int]) -> list[str]:
+        """Tell of a netlist's cells what is more than there is; none of it means that placement may still fail.
+
+        Parameters
+        ----------
+        cells : dict of str to int
+            Count by cell type.
+
+        Returns
+        -------
+        list of str
+            Such as ``"13 SB_MAC16 of 8"``.
+        """
+        luts = sum(weight * cells.get(kind, 0) for kind, weight in _LUTS.items())
+        needed = [
+            ("LUT4", luts, self.logic_cells),
+            (self.multiplier, cells.get(self.multiplier or "", 0), self.multipliers),
+            (self.block_ram, cells.get(self.block_ram, 0), self.block_rams),
+        ]
+        return [f"{count:,} {kind} of {there:,}" for kind, count, there in needed if count > there]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Board:
+    """A board to be had.
+
+    Attributes
+    ----------
+    name : str
+        As on the command line.
+    title : str
+        For people.
+    device : Device
+        Its FPGA.
+    package, speed : str
+        As nextpnr calls them; iCE40 have no speed grade.
+    clock : int
+        Frequency of the oscillator at a clock pin, in Hz.
+    """
+
+    name: str
+    title: str
+    device: Device
+    package: str
+    speed: str
+    clock: int
+
+
+# Numbers of cells are those that nextpnr 0.11.1 tells for an empty design.
+_UP5K = Device(
+    family="ice40",
+    title="iCE40 UP5K",
+    synthesis="synth_ice40 -device u -dsp",
+    placer="--up5k",
+    logic_cells=5280,
+    multiplier="SB_MAC16",
+    multipliers=8,
+    block_ram="SB_RAM40_4K",
+    block_rams=30,
+)
+_HX8K = Device(
+    family="ice40",
+    title="iCE40 HX8K",
+    synthesis="synth_ice40 -device hx",
+    placer="--hx8k",
+    logic_cells=7680,
+    multiplier=None,
+    multipliers=0,
+    block_ram="SB_RAM40_4K",
+    block_rams=32,
+)
+_HX1K = replace(_HX8K, title="iCE40 HX1K", placer="--hx1k", logic_cells=1280, block_rams=16)
+_ECP5_25 = Device(
+    family="ecp5",
+    title="ECP5 LFE5U-25F",
+    synthesis="synth_ecp5",
+    placer="--25k",
+    logic_cells=24288,
+    multiplier="MULT18X18D",
+    multipliers=28,
+    block_ram="DP16KD",
+    block_rams=56,
+)
+_ECP5_45 = replace(_ECP5_25, title="ECP5 LFE5U-45F", placer="--45k", logic_cells=43848, multipliers=72, block_rams=108)
+_ECP5_85 = replace(_ECP5_25, title="ECP5 LFE5U-85F", placer="--85k", logic_cells=83640, multipliers=156, block_rams=208)
+_ECP5_85_5G = replace(_ECP5_85, title="ECP5 LFE5UM5G-85F", placer="--um5g-85k")
+
+_ULX3S = Board(name="ulx3s_25f", title="ULX3S 25F", device=_ECP5_25, package="CABGA381", speed="6", clock=25_000_000)
+
+# FPGA, package, speed grade and clock as in amaranth-boards 0.0.21; those of the Colorlight i5, 7.0, as its pins are
+# documented in wuxx/Colorlight-FPGA-Projects. On an UPduino 3 the oscillator reaches its pin through a solder jumper.
+_ALL = (
+    Board(name="icebreaker", title="iCEBreaker", device=_UP5K, package="sg48", speed="", clock=12_000_000),
+    Board(name="upduino", title="UPduino 3", device=_UP5K, package="sg48", speed="", clock=12_000_000),
+    Board(name="ice40_hx8k_b_evn", title="iCE40-HX8K-B-EVN", device=_HX8K, package="ct256", speed="", clock=12_000_000),
+    Board(name="icestick", title="iCEstick", device=_HX1K, package="tq144", speed="", clock=12_000_000),
+    _ULX3S,
+    replace(_ULX3S, name="ulx3s_45f", title="ULX3S 45F", device=_ECP5_45),
+    replace(_ULX3S, name="ulx3s_85f", title="ULX3S 85F", device=_ECP5_85),
+    replace(_ULX3S, name="colorlight_i5", title="Colorlight i5"),
+    Board(
+        name="orangecrab_25f",
+        title="OrangeCrab 25F",
+        device=_ECP5_25,
+        package="CSFBGA285",
+        speed="8",
+        clock=48_000_000,
+    ),
+    Board(
+        name="ecp5_evn",
+        title="ECP5-5G-EVN",
+        device=_ECP5_85_5G,
+        package="CABGA381",
+        speed="8",
+        clock=12_000_000,
+    ),
+)
+
+BOARDS = {board.name: board for board in _ALL}
+"""Boards by name."""
+
+
+def find_board(name: str) -> Board:
+    """Return the board `name`.
+
+    Raises
+    ------
+    SpecificationError
+        If there is none; lists those that there are.
+    """
+    if name not in BOARDS:
+        raise SpecificationError(f"the board must be one of {', '.join(BOARDS)}, not {name}")
+    return BOARDS[name]

@@ -1,0 +1,92 @@
+"""Two banks of registers for the constants of the parallel architecture; samples use one, the other can be filled."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from amaranth.hdl import Cat, Module, Mux, Signal, Value, signed
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In
+
+from sosmith.model.constants import Constant, packed, values_of
+from sosmith.model.datapath import Datapath
+
+_WORD = 32
+
+Pair = tuple[Value, Value]
+"""A constant in the first bank and in the second."""
+
+NO_CONSTANTS: Mapping[int, Pair] = MappingProxyType({})
+"""For a stage whose constants stay."""
+
+
+class ConstantBanks(wiring.Component):
+    """The constants of a datapath, twice.
+
+    The second bank holds anything until it has been filled. Reset touches neither.
+
+    Parameters
+    ----------
+    datapath : Datapath
+        Whose constants the first bank begins with.
+    loadable : tuple of Constant
+        Which they are.
+
+    Members
+    -------
+    write_enable : In(1)
+        Whether a word is written at this clock.
+    write_bank : In(1)
+        Into which bank.
+    write_address : In
+        Number of the word in the bank.
+    write_data : In(32)
+        The word.
+    """
+
+    def __init__(self, datapath: Datapath, loadable: tuple[Constant, ...]) -> None:
+        values = values_of(datapath, loadable)
+        self.loadable = loadable
+        self.words = len(packed(values, loadable))
+        self._registers = [
+            tuple(
+                Signal(signed(c.bits), name=f"bank{bank}_constant{k}", init=init, reset_less=True)
+                for bank, init in ends
+            )
+            for k, (c, value) in enumerate(zip(loadable, values, strict=True))
+            for ends in [((0, value), (1, 0))]
+        ]
+        super().__init__(
+            {
+                "write_enable": In(1),
+                "write_bank": In(1),
+                "write_address": In(range(self.words)),
+                "write_data": In(_WORD),
+            }
+        )
+
+    def of_stage(self, stage: int) -> dict[int, Pair]:
+        """Return the constants of a stage by their nodes."""
+        pairs = zip(self.loadable, self._registers, strict=True)
+        return {constant.node: (first, second) for constant, (first, second) in pairs if constant.stage == stage}
+
+    def elaborate(self, platform: object) -> Module:
+        """Build the logic that writes."""
+        m = Module()
+        word = 0
+        for constant, pair in zip(self.loadable, self._registers, strict=True):
+            for low in range(0, constant.bits, _WORD):
+                high = min(low + _WORD, constant.bits)
+                for bank, register in enumerate(pair):
+                    writes = self.write_enable & (self.write_bank == bank) & (self.write_address == word)
+                    with m.If(writes):
+                        m.d.sync += register.eq(Cat(register[:low], self.write_data[: high - low], register[high:]))
+                word += 1
+        return m
+
+
+def chosen(pair: Pair, bank: Value) -> Value:
+    """Return the constant of `bank`."""
+    first, second = pair
+    return Mux(bank, second, first).as_signed()
