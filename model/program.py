@@ -681,7 +681,7 @@ class _Folding:
         self._instructions.append(Instruction(do, address, constant))
 
     def _accumulator_bits(self) -> int:
-        """Width by interval arithmetic over the program; every digit may take any value of its range."""
+        """Width by interval arithmetic over the program, every digit taking any value; no less than a word has."""
         base = 1 << self._bits
         tops = {p.address + p.digits - 1: self._top_range(i, p) for i, p in self._places.items()}
         tops[self._one] = (1, 1)
@@ -700,7 +700,7 @@ class _Folding:
             elif do in {Do.FINISH, Do.JUDGE}:
                 low = high = 0
             least, most = min(least, low), max(most, high)
-        return max((-least - 1).bit_length(), most.bit_length()) + 1
+        return max((-least - 1).bit_length(), most.bit_length(), self._bits) + 1
 
     def _top_range(self, index: int, place: Place) -> tuple[int, int]:
         node = self._nodes[index]

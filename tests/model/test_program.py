@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.formal.small import limiter
 from tests.gen.designs import ALL, example_design
 
 from sosmith.model.datapath import Datapath
@@ -171,3 +172,8 @@ def test_a_state_keeps_its_digits() -> None:
     assert next(p.digits for p in taken.places if p.name == last) == next(p.digits for p in wider if p.name == last)
     codes = stimulus(datapath, 20)
     assert run(taken, datapath, codes) == datapath.compute_exact(codes)
+
+
+def test_the_accumulator_holds_a_word_however_small_the_sums() -> None:
+    made = program(limiter(), 15)
+    assert made.accumulator_bits == 16

