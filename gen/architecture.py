@@ -111,7 +111,13 @@ class Architecture:
         """Make the hardware, whose top module's name is that of the datapath."""
         if self.program is None:
             return core.Core(self.built, self.channels, fingerprint=self.fingerprint)
-        return folded.FoldedCore(self.datapath, self.program, serial=self.name == "serial", channels=self.channels)
+        return folded.FoldedCore(
+            self.datapath,
+            self.program,
+            serial=self.name == "serial",
+            channels=self.channels,
+            fingerprint=self.fingerprint,
+        )
 
 
 def structure(node: Node) -> tuple[object, ...]:

@@ -1,0 +1,139 @@
+"""Runs inside the simulator: samples stream through a core while sets of constants are loaded into it.
+
+Reads ``job.json`` of the folder named by RELOAD_BENCH: ``words`` of the input stream, ``loads`` (each a list of
+register writes [address, data], and whether it is right), ``seed``. Writes ``outcome.json``: ``received`` words,
+``swaps`` (number of swaps before each sample that was taken), ``accepted`` (numbers of the loads in the order in which
+they were accepted), ``refused`` (those whose last write was refused).
+"""
+
+import json
+import os
+import random
+from pathlib import Path
+from typing import Any
+
+import cocotb
+from cocotb.clock import Clock
+from cocotb.triggers import ClockCycles, FallingEdge, RisingEdge, ValueChange
+
+OKAY, SLVERR = 0, 2
+
+
+class Bench:
+    def __init__(self, dut: Any, job: dict[str, Any]) -> None:
+        self.dut, self.job = dut, job
+        self.pace = random.Random(job["seed"])
+        self.falling = FallingEdge(dut.aclk)
+        self.swaps = 0
+        self.loading = True
+        self.used: list[int] = []
+        self.received: list[int] = []
+        self.accepted: list[int] = []
+        self.refused: list[int] = []
+
+    async def count_swaps(self) -> None:
+        while True:
+            await ValueChange(self.dut.reload_port.bank)
+            self.swaps += 1
+
+    def swaps_before_sample(self) -> int:
+        """Count the swaps before the sample that is taken now; a folded core has chosen its bank some clocks before."""
+        if not self.job["folded"]:
+            return self.swaps
+        return self.swaps - (int(self.dut.bank.value) != self.swaps % 2)
+
+    async def send(self) -> None:
+        dut, number = self.dut, 0
+        words = self.job["words"]
+        await RisingEdge(dut.aclk)
+        while self.loading or number % len(words):
+            dut.s_axis_tdata.value = words[number % len(words)]
+            dut.s_axis_tvalid.value = 1
+            while True:
+                await self.falling  # outputs have settled, and the next edge takes what they say
+                if int(dut.s_axis_tready.value):
+                    break
+                if self.job["folded"]:
+                    await RisingEdge(dut.s_axis_tready)
+            self.used.append(self.swaps_before_sample())
+            await RisingEdge(dut.aclk)
+            number += 1
+            if self.pace.random() < 0.3:
+                dut.s_axis_tvalid.value = 0
+                await ClockCycles(dut.aclk, self.pace.randrange(1, 30))
+        dut.s_axis_tvalid.value = 0
+
+    async def receive(self) -> None:
+        dut = self.dut
+        while True:
+            if not int(dut.m_axis_tvalid.value):
+                await RisingEdge(dut.m_axis_tvalid)
+            await self.falling
+            ready = self.pace.random() < 0.5
+            dut.m_axis_tready.value = int(ready)
+            if not ready:
+                await ClockCycles(dut.aclk, self.pace.randrange(1, 12))
+                continue
+            self.received.append(int(dut.m_axis_tdata.value))
+            await RisingEdge(dut.aclk)
+            await self.falling
+            dut.m_axis_tready.value = 0
+
+    async def write(self, address: int, data: int) -> int:
+        dut = self.dut
+        await self.falling
+        dut.s_axil_awaddr.value, dut.s_axil_wdata.value, dut.s_axil_wstrb.value = address, data, 15
+        dut.s_axil_awvalid.value, dut.s_axil_wvalid.value, dut.s_axil_bready.value = 1, 1, 1
+        waiting = {"awready": dut.s_axil_awvalid, "wready": dut.s_axil_wvalid}
+        while True:
+            taken = [name for name in waiting if int(getattr(dut, f"s_axil_{name}").value)]
+            answered = int(dut.s_axil_bvalid.value)
+            response = int(dut.s_axil_bresp.value) if answered else 0
+            if not taken and not answered and not waiting:
+                await RisingEdge(dut.s_axil_bvalid)
+                await self.falling
+                continue
+            await self.falling
+            for name in taken:
+                waiting.pop(name).value = 0
+            if answered:
+                dut.s_axil_bready.value = 0
+                return response
+
+    async def load(self) -> None:
+        for number, (writes, right) in enumerate(self.job["loads"]):
+            await ClockCycles(self.dut.aclk, self.pace.randrange(1, 200))
+            (first, version), *middle, (last, crc) = writes
+            while await self.write(first, version) != OKAY:  # a swap is pending or a sample still uses the other bank
+                await ClockCycles(self.dut.aclk, self.pace.randrange(1, 50))
+            for address, data in middle:
+                assert await self.write(address, data) == OKAY
+            response = await self.write(last, crc)
+            (self.accepted if response == OKAY else self.refused).append(number)
+            assert (response == OKAY) == right
+        await ClockCycles(self.dut.aclk, 5)
+        self.loading = False
+
+
+@cocotb.test()
+async def reloading(dut: Any) -> None:
+    folder = Path(os.environ["RELOAD_BENCH"])
+    bench = Bench(dut, json.loads((folder / "job.json").read_text()))
+    Clock(dut.aclk, 10, "ns", impl="gpi").start(start_high=False)
+    for name in ("s_axis_tvalid", "m_axis_tready", "s_axil_awvalid", "s_axil_wvalid", "s_axil_arvalid"):
+        getattr(dut, name).value = 0
+    for name in ("s_axil_bready", "s_axil_rready", "s_axil_araddr", "s_axil_awprot", "s_axil_arprot"):
+        getattr(dut, name).value = 0
+    dut.aresetn.value = 0
+    await ClockCycles(dut.aclk, 4)
+    await FallingEdge(dut.aclk)
+    dut.aresetn.value = 1
+    cocotb.start_soon(bench.count_swaps())
+    cocotb.start_soon(bench.receive())
+    loading = cocotb.start_soon(bench.load())
+    await bench.send()
+    await loading
+    await ClockCycles(dut.aclk, 3000)
+    names = ("received", "accepted", "refused")
+    outcome = {name: getattr(bench, name) for name in names} | {"swaps": bench.used}
+    (folder / "outcome.json").write_text(json.dumps(outcome))

@@ -1,0 +1,162 @@
+"""Reloads at random moments under random back-pressure: every sample is computed with one set, and the right one."""
+
+import json
+import random
+import sys
+import zlib
+from dataclasses import replace
+from fractions import Fraction
+from functools import cache
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
+import numpy as np
+import pytest
+from amaranth.hdl import Module, Signal
+from cocotb_tools.runner import Icarus
+from tests.gen.designs import EXAMPLES
+
+from sosmith.gen.core import CoreDesign, design_core
+from sosmith.gen.design import design
+from sosmith.gen.quantize import with_constants
+from sosmith.gen.reload import OtherSet, other_set, parallel_bank, room_of
+from sosmith.gen.specification import load
+from sosmith.gen.verilog import to_rtlil, to_verilog
+from sosmith.hdl.folded import FoldedCore, encoded
+from sosmith.hdl.reload import ReloadPort
+from sosmith.model.reload_registers import CRC, DATA, VERSION
+from sosmith.model.swapping import compute_swapping
+
+RATIOS = ("0.8", "0.9", "1.1", "1.2")
+"""Cutoffs of the sets over that of the core."""
+
+ARCHITECTURES = ("parallel", "folded", "serial")
+
+
+@cache
+def hardware_in(architecture: str) -> CoreDesign:
+    spec = load(EXAMPLES / "audio_lowpass.toml")
+    hardware = replace(
+        spec.hardware, architecture=architecture, realization="df1_ef2", clock=Fraction(10**9), reload=True
+    )
+    return design_core(replace(spec, filter=replace(spec.filter, order=2), hardware=hardware))
+
+
+@cache
+def sets_for(architecture: str) -> list[OtherSet]:
+    made = hardware_in(architecture)
+    wanted = made.spec.filter
+    assert wanted.cutoff is not None
+    filters = [
+        design(replace(wanted, cutoff=tuple(f * Fraction(ratio) for f in wanted.cutoff)), float(made.spec.sample_rate))
+        for ratio in RATIOS
+    ]
+    return [other_set(made, ideal=ideal, max_error=4 * made.spec.max_error) for ideal in filters]
+
+
+def writes_of(made: CoreDesign, other: OtherSet, version: int, *, wrong: bool) -> list[tuple[int, int]]:
+    if other.program is None:
+        words = parallel_bank(made, other)
+    else:
+        words = [encoded(instruction, other.program) for instruction in other.program.instructions]
+    crc = zlib.crc32(b"".join(word.to_bytes(4, "little") for word in (version, *words)))
+    return [
+        (VERSION.address, version),
+        *((DATA.address, word) for word in words),
+        (CRC.address, crc ^ (wrong << version % 32)),
+    ]
+
+
+def run(folder: Path, made: CoreDesign, source: str, count: int, seed: int) -> tuple[dict[str, Any], list[int]]:
+    """Simulate `count` loads, one in eight with a wrong CRC; return the outcome and which set each load has."""
+    pace = random.Random(seed)
+    sets = sets_for(made.architecture.name)
+    chosen = [pace.randrange(len(sets)) for _ in range(count)]
+    wrong = [pace.randrange(8) == 0 for _ in range(count)]
+    loads = [
+        [writes_of(made, sets[kind], version + 1, wrong=bad), not bad]
+        for version, (kind, bad) in enumerate(zip(chosen, wrong, strict=True))
+    ]
+    port = made.datapath.inputs[0]
+    codes = np.random.default_rng(seed).integers(port.lowest // 2, port.highest // 2, 256).tolist()
+    job = {
+        "words": [code % (1 << 8 * port.bytes) for code in codes],
+        "loads": loads,
+        "seed": seed,
+        "folded": made.architecture.program is not None,
+    }
+    (folder / "core.sv").write_text(source)
+    (folder / "job.json").write_text(json.dumps(job))
+    runner = Icarus()
+    runner.build(
+        sources=[folder / "core.sv"],
+        hdl_toplevel=made.datapath.name,
+        build_dir=folder / "build",
+        timescale=("1ns", "1ps"),
+        always=True,
+    )
+    with patch.object(sys, "path", [str(EXAMPLES.parent), *sys.path]):  # where the simulator's Python looks
+        runner.test(
+            test_module="tests.sim.reload_bench",
+            hdl_toplevel=made.datapath.name,
+            build_dir=folder / "build",
+            test_dir=folder,
+            extra_env={"RELOAD_BENCH": str(folder), "COCOTB_LOG_LEVEL": "WARNING"},
+            timescale=("1ns", "1ps"),
+        )
+    outcome: dict[str, Any] = json.loads((folder / "outcome.json").read_text())
+    assert outcome["refused"] == [number for number, bad in enumerate(wrong) if bad]
+    assert outcome["accepted"] == [number for number, bad in enumerate(wrong) if not bad]
+    samples = [codes[k % len(codes)] for k in range(len(outcome["swaps"]))]
+    return outcome | {"samples": samples}, chosen
+
+
+def expected(made: CoreDesign, outcome: dict[str, Any], chosen: list[int]) -> list[int]:
+    sets = sets_for(made.architecture.name)
+    swaps, before = [], 0
+    for number, swapped in enumerate(outcome["swaps"]):
+        if swapped != before:
+            swaps.append((number, sets[chosen[outcome["accepted"][swapped - 1]]].quantized.datapath))
+            before = swapped
+    # A program keeps states with more fraction bits than the datapath has; in these, others take over.
+    first = with_constants(made.quantized, None, None, room=room_of(made)).datapath
+    codes = np.array(outcome["samples"])[:, np.newaxis]
+    bits = 8 * made.datapath.output.bytes
+    return [code % (1 << bits) for code in compute_swapping(first, swaps, codes)]
+
+
+def verilog(made: CoreDesign) -> str:
+    return to_verilog(to_rtlil(made.architecture.component(), made.datapath.name))
+
+
+COUNTS = [
+    *(pytest.param(name, 60, id=f"{name}-60") for name in ARCHITECTURES),
+    *(pytest.param(name, 10_000, id=f"{name}-10000", marks=pytest.mark.slow) for name in ARCHITECTURES),
+]
+
+
+@pytest.mark.parametrize(("architecture", "count"), COUNTS)
+def test_reloads_at_any_moment(architecture: str, count: int, tmp_path: Path) -> None:
+    made = hardware_in(architecture)
+    outcome, chosen = run(tmp_path, made, verilog(made), count, seed=count)
+    assert outcome["swaps"][-1] == len(outcome["accepted"])
+    assert len(set(outcome["swaps"])) > count // 2  # most sets were used by a sample
+    assert outcome["received"] == expected(made, outcome, chosen)
+
+
+def test_a_sample_that_sees_two_banks_is_noticed(tmp_path: Path) -> None:
+    """Break the core: what a sample uses follows the swap at once."""
+
+    def careless(core: FoldedCore, m: Module, start: Signal, busy: Signal) -> tuple[ReloadPort, Signal] | None:
+        found = original(core, m, start, busy)
+        assert found is not None
+        port, _ = found
+        return port, port.bank
+
+    original = FoldedCore._reload
+    made = hardware_in("folded")
+    with patch.object(FoldedCore, "_reload", careless):
+        source = verilog(made)
+    outcome, chosen = run(tmp_path, made, source, 60, seed=60)
+    assert outcome["received"] != expected(made, outcome, chosen)
