@@ -19,6 +19,7 @@ from rich.console import Console
 from rich.markup import escape
 
 import sosmith
+from sosmith.calibrate_cli import calibrate
 from sosmith.gen.architecture import Architecture
 from sosmith.gen.boards import BOARDS, Board, find_board
 from sosmith.gen.certificate_file import Certificate, read_certificate
@@ -52,7 +53,7 @@ from sosmith.terminal import (
     silence_stdout,
 )
 
-_LATER = ("build", "explore", "calibrate", "monitor", "board")
+_LATER = ("build", "explore", "monitor", "board")
 """Commands that this version does not have yet."""
 
 _INTERRUPTED = 130
@@ -358,6 +359,9 @@ def compare_command(reports: tuple[Path, ...], as_json: bool, output: Path | Non
         ]
         table.add_row(escape(row.title), *cells)
     TableConsole().print(table)
+
+
+cli.add_command(calibrate)
 
 
 @cli.command()
