@@ -188,7 +188,8 @@ def fit_command(store: Path, sensor: str, date: str, required_r: float, robust: 
 def history_command(store: Path, sensor: str, verify: bool, as_json: bool) -> None:
     """List the versions of a sensor's calibration.
 
-    Drift is the largest difference to the version before, over the voltages and temperatures that measurements cover.
+    Shown are orders, adjusted r, rms residual, cross-validated (CV) error and drift: the largest difference to the
+    version before, over the voltages and temperatures that measurements cover.
     With --verify, exits with 1 if a version does not come out the same.
     """
     with show_progress() as step, open_store(store) as opened:
@@ -281,9 +282,7 @@ def _print_calibration(made: Calibration) -> None:
     robust = ", robust" if version.robust else ""
     overview.add_row("measurements", f"{version.measurements:,}{robust}")
     m, n = version.polynomial.orders
-    overview.add_row(
-        "orders", f"{m} in voltage, {n} in temperature: the smallest that reaches r = {version.required_r:g}"
-    )
+    overview.add_row("orders", f"{m} in voltage, {n} in temperature, to reach r = {version.required_r:g}")
     overview.add_row("adjusted r", f"{made.fit.adjusted_r:.6f}{_rejected(made)}")
     overview.add_row("residual, rms", _mm(version.rms))
     overview.add_row("residual, largest", _mm(float(abs(quality.residual).max())))
@@ -291,9 +290,9 @@ def _print_calibration(made: Calibration) -> None:
     overview.add_row("cross-validated error, rms", left_out)
     (v_low, v_high), (t_low, t_high) = made.fit.covered
     overview.add_row("covered", f"{v_low:g} to {v_high:g} V, {t_low:g} to {t_high:g} °C")
-    overview.add_row(
-        "coverage of the range", f"{100 * made.coverage:.1f} %, and {100 * quality.filled_cells:.0f} % of cells"
-    )
+    overview.add_row("coverage of the range", f"{100 * made.coverage:.1f} % lies between measurements")
+    cells = round(quality.filled_cells * CELLS**2)
+    overview.add_row("cells with measurements", f"{cells} of {CELLS} x {CELLS}")
     mean = len(terms_of(made.fit.orders)) / version.measurements
     high = len(quality.high_leverage)
     overview.add_row("leverage, largest", f"{quality.leverage.max():.4f} (mean {mean:.4f}; {high} above 3 times that)")
@@ -319,8 +318,8 @@ def _rejected(made: Calibration) -> str:
 
 def _print_history(sensor: str, versions: list[Version]) -> None:
     table = new_table(
-        f"Sensor {escape(sensor)}",
-        ["no.", "date", "count", "orders", "adjusted r", "rms, mm", "cross-validated, mm", "drift, mm"],
+        f"Sensor {escape(sensor)}, errors in mm",
+        ["no.", "date", "count", "orders", "r", "rms", "CV error", "drift"],
     )
     for version in versions:
         m, n = version.polynomial.orders
@@ -330,7 +329,7 @@ def _print_history(sensor: str, versions: list[Version]) -> None:
             version.date,
             f"{version.measurements:,}",
             f"{m}, {n}{' robust' if version.robust else ''}",
-            f"{max(version.adjusted_r_squared, 0.0) ** 0.5:.6f}",
+            f"{max(version.adjusted_r_squared, 0.0) ** 0.5:.5f}",
             *("-" if figure is None else f"{figure:.4g}" for figure in figures),
         )
     TableConsole().print(table)
