@@ -9,7 +9,7 @@ import csv
 import datetime
 import hashlib
 import io
-import math
+import sys
 import warnings
 import zipfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -126,7 +126,7 @@ def read_measurement_file(
         raise SpecificationError(f"{path}: the file's name must end in .csv or .xlsx, not {path.suffix or 'neither'}")
     rows = ((line, cells) for line, cells in readers[path.suffix.lower()](path, content) if not _blank(cells))
     line, header = next(rows, (1, ()))
-    names = tuple(cell.strip() if isinstance(cell, str) else cell for cell in header)
+    names = tuple(cell.strip() if isinstance(cell, str) else cell for cell in _trimmed(header, 0))
     _check_header(f"{path}, line {line}", names)
     reader = _Rows(names, date, ranges)
     for line, cells in rows:
@@ -155,6 +155,14 @@ def parse_date(text: str) -> str:
 
 def _blank(cells: Sequence[Any]) -> bool:
     return all(cell is None or (isinstance(cell, str) and not cell.strip()) for cell in cells)
+
+
+def _trimmed(cells: Sequence[Any], least: int) -> Sequence[Any]:
+    """Leave out empty cells at the end of a row, as workbooks have them, down to `least` cells."""
+    end = len(cells)
+    while end > least and _blank(cells[end - 1 : end]):
+        end -= 1
+    return cells[:end]
 
 
 def _csv_rows(path: Path, content: bytes) -> Iterator[tuple[int, Sequence[Any]]]:
@@ -187,21 +195,18 @@ def _xlsx_rows(path: Path, content: bytes) -> Iterator[tuple[int, Sequence[Any]]
 
 def _check_header(where: str, names: Sequence[Any]) -> None:
     known = (*COLUMNS, DATE_COLUMN)
-    filled = [name for name in names if name not in (None, "")]
-    if not filled:
+    if not names:
         raise SpecificationError(f"{where}: header must be {','.join(COLUMNS)}, not empty")
-    for name in filled:
+    for name in names:
         if name not in known:
             raise SpecificationError(
-                f"{where}: column must be one of {', '.join(known)}, with the unit in its name, not {name!r}"
+                f"{where}: column must be one of {', '.join(known)}, with the unit in its name, not {name or ''!r}"
             )
-        if filled.count(name) > 1:
-            raise SpecificationError(f"{where}: column {name} must be there once, not {filled.count(name)} times")
+        if names.count(name) > 1:
+            raise SpecificationError(f"{where}: column {name} must be there once, not {names.count(name)} times")
     for name in COLUMNS:
-        if name not in filled:
-            raise SpecificationError(
-                f"{where}: column {name} must be there, not missing among {', '.join(map(str, filled))}"
-            )
+        if name not in names:
+            raise SpecificationError(f"{where}: column {name} must be there, not missing among {', '.join(names)}")
 
 
 @dataclass
@@ -231,9 +236,7 @@ class _Rows:
             )
 
     def _reading(self, line: int, cells: Sequence[Any]) -> Reading:
-        filled = list(cells)
-        while len(filled) > len(self.names) and filled[-1] in (None, ""):
-            filled.pop()
+        filled = _trimmed(cells, len(self.names))
         if len(filled) != len(self.names):
             raise SpecificationError(f"row must have {len(self.names)} cells, not {len(filled)}")
         row = dict(zip(self.names, filled, strict=True))
@@ -249,7 +252,7 @@ class _Rows:
 def _number(name: str, cell: Any) -> float:
     if cell is None or (isinstance(cell, str) and not cell.strip()):
         raise SpecificationError(f"{name} must be a finite number, not empty")
-    if isinstance(cell, bool | str) or not isinstance(cell, int | float) or not abs(cell) < math.inf:
+    if isinstance(cell, bool | str) or not isinstance(cell, int | float) or not abs(cell) <= sys.float_info.max:
         raise SpecificationError(f"{name} must be a finite number, not {_shown(cell)}")
     return float(cell) + 0.0  # so that -0 and 0 are the same measurement
 
