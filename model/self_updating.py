@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sosmith.model.calibration import REQUIRED_R, Fit, Measurements, fit
+from sosmith.model.calibration import REQUIRED_R, Fit, Measurements, fit, root_mean_square
 from sosmith.model.covered_region import CoveredRegion
 from sosmith.model.errors import ShortfallError, SpecificationError
 from sosmith.model.fit_quality import FitQuality, assess
@@ -21,8 +21,12 @@ from sosmith.model.measurement_store import (
     data_sha256,
 )
 
-SWAPPED_OFF = 4.0
-"""Residual, over the root mean square, from which a row is tried with clearance and voltage exchanged."""
+SWAPPED_FITS, SWAPPED_OFF = 2.0, 4.0
+"""A file is taken for swapped if its rms residual, over the version's, is less than the first with clearance and
+voltage exchanged and more than the second as it is. A sensor that has changed fits neither way."""
+
+SWAPPED_ROWS = 4
+"""Rows that it takes to tell."""
 
 
 @dataclass(frozen=True)
@@ -222,10 +226,10 @@ def _check_sensor(sensor: str) -> None:
 
 
 def _sift(store: MeasurementStore, sensor: str, file: MeasurementFile) -> MeasurementFile:
-    """Move what is in the store already to the refusals, and what only makes sense with two columns exchanged."""
+    """Move what is in the store already to the refusals, and everything if two columns are exchanged."""
     known = {one.reading.values: one for one in store.measurements(sensor)}
     versions = store.versions(sensor)
-    swapped = _swapped(file, versions[-1]) if versions else {}
+    swapped = _swapped(file, versions[-1]) if versions else ""
     refusals = list(file.refusals)
     readings = []
     for reading in file.readings:
@@ -233,25 +237,27 @@ def _sift(store: MeasurementStore, sensor: str, file: MeasurementFile) -> Measur
             one = known[reading.values]
             where = f"measurement {one.number} ({one.source}, line {one.reading.line}, {one.reading.date})"
             refusals.append(Refusal(reading.line, f"row must be a measurement of its own, not a duplicate of {where}"))
-        elif reading.line in swapped:
-            refusals.append(Refusal(reading.line, swapped[reading.line]))
+        elif swapped:
+            refusals.append(Refusal(reading.line, swapped))
         else:
             readings.append(reading)
     refusals.sort(key=lambda refusal: refusal.line)
     return replace(file, readings=tuple(readings), refusals=tuple(refusals))
 
 
-def _swapped(file: MeasurementFile, version: Version) -> dict[int, str]:
-    """Sentences, by line, about rows that fit the version well only with clearance and voltage exchanged."""
-    values = np.array([reading.values for reading in file.readings], dtype=np.float64).reshape(-1, 3)
-    clearance, voltage, temperature = values.T
-    as_is = np.abs(clearance - version.polynomial(voltage, temperature))
-    exchanged = np.abs(voltage - version.polynomial(clearance, temperature))
-    return {
-        file.readings[k].line: "clearance_mm and voltage_V must be in their own columns, not swapped: "
-        f"version {version.number} is {as_is[k]:.3g} mm off, and swapped {exchanged[k]:.3g} mm"
-        for k in np.flatnonzero((as_is > SWAPPED_OFF * version.rms) & (exchanged < version.rms)).tolist()
-    }
+def _swapped(file: MeasurementFile, version: Version) -> str:
+    """Sentence about a file that fits the version well only with clearance and voltage exchanged, or nothing."""
+    if len(file.readings) < SWAPPED_ROWS:
+        return ""
+    clearance, voltage, temperature = np.array([reading.values for reading in file.readings]).T
+    as_it_is = root_mean_square(clearance - version.polynomial(voltage, temperature))
+    exchanged = root_mean_square(voltage - version.polynomial(clearance, temperature))
+    if exchanged >= SWAPPED_FITS * version.rms or as_it_is <= SWAPPED_OFF * version.rms:
+        return ""
+    return (
+        "clearance_mm and voltage_V must be in their own columns, not swapped: the file is "
+        f"{as_it_is:.3g} mm rms off version {version.number}, and swapped {exchanged:.3g} mm"
+    )
 
 
 def _fit(store: MeasurementStore, sensor: str, date: str, required_r: float, *, robust: bool) -> Calibration:
