@@ -225,8 +225,8 @@ def history_command(store: Path, sensor: str, verify: bool, as_json: bool) -> No
 def export_command(store: Path, sensor: str, number: int | None, file_format: str, output: Path | None) -> None:
     """Write a version's coefficients as the table [calibration] of a specification, or its measurements as CSV.
 
-    Either gives the same hardware, since both read back as the same doubles. A core with reload = true takes the
-    specification with new coefficients at run time.
+    Either way the doubles read back are those of the version. A core with reload = true takes the specification with
+    new coefficients at run time.
     """
     with open_store(store) as opened:
         version = find_version(opened, sensor, number)
