@@ -47,8 +47,8 @@ LEAST_SCATTER = 1e-6
 WEIGHT_STEPS = 1024
 """Weights are whole multiples of one over this, so that rounds of weighting end."""
 
-MOST_ROUNDS = 50
-"""Rounds of weighting after which the weights are taken as they are."""
+MOST_ROUNDS = 25
+"""Rounds of weighting after which the weights are taken as they are; some ten are usual, but steps can alternate."""
 
 
 @dataclass(frozen=True, eq=False)

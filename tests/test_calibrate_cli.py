@@ -171,6 +171,8 @@ UNFIT = {
         ("add", "a.csv", "--voltage-range", "10", "0"),
         "--voltage-range must be two numbers, the lower one first, not 10 0",
     ),
+    "r that is none": (("fit", "--required-r", "nan"), "--required-r must be 0 or more and less than 1, not nan"),
+    "r that nothing reaches": (("fit", "--required-r", "1"), "--required-r must be 0 or more and less than 1, not 1"),
     "sensor without a name": (("add", "a.csv", "--sensor", " "), "the sensor's name must be printable text, not ' '"),
     "kind of plot": (("plot", "-o", "p.pdf"), "p.pdf: the plot's name must end in .svg or .png, not .pdf"),
 }

@@ -81,6 +81,12 @@ def _check_range(ctx: click.Context, parameter: click.Parameter, given: Range | 
     return given
 
 
+def _check_required_r(ctx: click.Context, parameter: click.Parameter, given: float) -> float:
+    if not 0 <= given < 1:  # NaN too
+        raise SpecificationError(f"--required-r must be 0 or more and less than 1, not {given:g}")
+    return given
+
+
 _STORE = click.option(
     "--store",
     type=click.Path(path_type=Path),
@@ -94,7 +100,8 @@ _DATE = click.option(
 )
 _REQUIRED_R = click.option(
     "--required-r",
-    type=click.FloatRange(0, 1, max_open=True),
+    type=float,
+    callback=_check_required_r,
     default=REQUIRED_R,
     show_default=True,
     help="Adjusted r to reach; orders rise until it is.",
