@@ -6,6 +6,7 @@ import random
 import re
 import signal
 import sqlite3
+import struct
 import subprocess
 import sys
 import time
@@ -278,13 +279,18 @@ def test_files_that_are_no_store(tmp_path: Path) -> None:
 def test_a_damaged_store_is_noticed(store: MeasurementStore, tmp_path: Path) -> None:
     add(store, "left", batch(tmp_path, "a.csv", 400), DAY)
     store.check()
-    content = bytearray(store.path.read_bytes())
-    for page in range(4, len(content) // 4096):
-        content[page * 4096 : page * 4096 + 16] = b"\xff" * 16
+    content = store.path.read_bytes()
+    voltage = store.measurements("left")[7].reading.values[1]
+    assert content.count(struct.pack(">d", voltage)) == 2  # in the table and in its index
     damaged = tmp_path / "damaged.db"
-    damaged.write_bytes(content)
-    with pytest.raises(SpecificationError, match=r"damaged\.db.* must be .*undamaged"), open_store(damaged) as opened:
+    damaged.write_bytes(content.replace(struct.pack(">d", voltage), struct.pack(">d", voltage + 1), 1))
+    pattern = r"^.*damaged\.db must be an undamaged store, not: .*sqlite_autoindex_measurement_1.*$"
+    with open_store(damaged) as opened, pytest.raises(SpecificationError, match=pattern):
         opened.check()
+    damaged.write_bytes(content[: len(content) // 2])
+    pattern = r"^.*damaged\.db: the file must be undamaged, not: .*$"
+    with pytest.raises(SpecificationError, match=pattern), open_store(damaged) as opened:
+        opened.measurements("left")
 
 
 def test_a_writer_that_waits_in_vain_says_so(
