@@ -121,6 +121,7 @@ NEEDED = {
     ),
     "emulate": ("SPEC", "[SCENARIO]", "CSV", "--seconds", "--seed", "stdout"),
     "compare": ("REPORT REPORT...", "--json", "HTML"),
+    "calibrate": ("clearance_mm", "sosmith calibrate add", "export"),
     "demo": ("build/demo", "--seed"),
 }
 
@@ -145,7 +146,7 @@ def test_version(sosmith: Command) -> None:
     assert sosmith("--version").stdout == f"sosmith, version {__version__}\n"
 
 
-@pytest.mark.parametrize("command", ["build", "explore", "calibrate", "monitor", "board"])
+@pytest.mark.parametrize("command", ["build", "explore", "monitor", "board"])
 def test_commands_of_the_contract_that_are_still_to_come(command: str, sosmith: Command) -> None:
     outcome = sosmith(command, "something")
     assert outcome.status == 2
