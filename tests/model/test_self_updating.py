@@ -161,7 +161,7 @@ def test_refits_from_the_store_are_the_same_to_the_bit(store: MeasurementStore, 
         assert again.version.polynomial.coefficients == version.polynomial.coefficients
 
 
-def test_another_process_on_another_day_with_other_threads_finds_the_same_bits(
+def test_a_process_that_takes_the_processor_for_an_older_one_finds_the_same_bits(
     store: MeasurementStore, tmp_path: Path
 ) -> None:
     add(store, "left", batch(tmp_path, "a.csv", 500), DAY, required_r=0.9999 - 0.001)
