@@ -87,14 +87,55 @@ def with_room(datapath: Datapath) -> Datapath:
     return replace(datapath, stages=tuple(stages))
 
 
-def _roomy(graph: Graph, inputs: Sequence[tuple[int, int]], bits: Mapping[int, int]) -> Graph:
-    """Compute all ranges anew; once more for each delay in a row, as a delay comes before what it remembers."""
+def with_ranges(datapath: Datapath, ranges: Sequence[Mapping[str, tuple[int, int]]]) -> Datapath:
+    """Return `datapath` with other ranges for what is proven, not computed, and all others made anew from these.
+
+    Parameters
+    ----------
+    datapath : Datapath
+        What is computed.
+    ranges : sequence of mapping of str to (int, int)
+        For each stage the smallest and largest codes of its inputs and BOUND nodes, by name, as far as they change.
+        An input's range is at least that of the output before it, and may be wider: delays hold what came earlier.
+
+    Raises
+    ------
+    ValueError
+        If the output's range leaves that of its port.
+    """
+    stages: list[Stage] = []
+    ends = [(port.lowest, port.highest) for port in datapath.inputs]
+    for stage, given in zip(datapath.stages, ranges, strict=True):
+        nodes = stage.graph.nodes
+        wide = [
+            (min(low, given.get(nodes[i].name, (low, high))[0]), max(high, given.get(nodes[i].name, (low, high))[1]))
+            for i, (low, high) in zip(stage.graph.inputs, ends, strict=True)
+        ]
+        stated = {i: given.get(node.name, (node.low, node.high)) for i, node in enumerate(nodes) if node.op is Op.BOUND}
+        graph = _roomy(stage.graph, wide, {}, stated)
+        ends = [(graph.nodes[i].low, graph.nodes[i].high) for i in graph.outputs]
+        stages.append(RoomyStage(stage.name, graph))
+    return replace(datapath, stages=tuple(stages))
+
+
+def _roomy(
+    graph: Graph,
+    inputs: Sequence[tuple[int, int]],
+    bits: Mapping[int, int],
+    stated: Mapping[int, tuple[int, int]] | None = None,
+) -> Graph:
+    """Compute all ranges but those that are `stated` anew; once more for each delay in a row.
+
+    A delay comes before what it remembers.
+    """
     nodes = list(graph.nodes)
     for _ in range(len(graph.delays) + 1):
         supply = iter(inputs)
         for index, node in enumerate(graph.nodes):
             if node.op is Op.INPUT:
                 low, high = next(supply)
+            elif stated is not None and index in stated:
+                low, high = stated[index]
             else:
                 low, high = _ends(node, [nodes[i] for i in node.operands], bits.get(index))
             nodes[index] = replace(node, low=low, high=high)
