@@ -7,7 +7,6 @@ be, and after how many samples the bound holds again (`sosmith.gen.transient`).
 
 from __future__ import annotations
 
-import zlib
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
@@ -22,10 +21,9 @@ from sosmith.hdl import folded
 from sosmith.model.constants import constants, packed, values_of, with_ranges, with_room
 from sosmith.model.datapath import Datapath
 from sosmith.model.errors import ShortfallError, SpecificationError
-from sosmith.model.graph import Op
+from sosmith.model.graph import Node, Op
 from sosmith.model.polynomial import Polynomial
 from sosmith.model.program import Program, program
-from sosmith.model.reload_registers import CRC, DATA, VERSION, Register
 
 ADVICE = (
     "go there in smaller steps, each after the one before has faded, or stop the samples and reset the core before "
@@ -62,7 +60,7 @@ class Swap:
         Length of the transient: from then on the error is within the set's bound and `sosmith.gen.transient.RESIDUE`
         output LSB, and another swap may follow.
     use : Fraction
-        Largest share that a state may take of what its word in the hardware holds, at most 1.
+        Largest share of what its word in the hardware holds that a state may take, at most 1.
     """
 
     made: OtherSet
@@ -187,19 +185,27 @@ def parallel_bank(hardware: CoreDesign, made: OtherSet) -> list[int]:
     return packed(values_of(made.quantized.datapath, loadable), loadable)
 
 
-def check_swap(hardware: CoreDesign, active: OtherSet, other: OtherSet) -> Swap:
+def check_swap(hardware: CoreDesign, active: OtherSet | None, other: OtherSet) -> Swap:
     """Prove that nothing wraps when `other` takes over from `active`, between any two samples, for all inputs in range.
 
-    The transient of the swap before must have ended, or `active` have run from reset on.
+    Parameters
+    ----------
+    hardware : CoreDesign
+        What the core was made from.
+    active : OtherSet or None
+        What it runs: from reset on, or since a swap whose transient has ended. None if the core is reset between the
+        swap and the next sample: then there is nothing to prove beyond the set.
+    other : OtherSet
+        The new set.
 
     Raises
     ------
     ShortfallError
         If something inside could leave what the hardware's words hold.
     """
+    if active is None or not other.quantized.sections:
+        return Swap(made=other, samples=0, use=_use(hardware, other.quantized.datapath, other.program))
     old, new = active.quantized, other.quantized
-    if not new.sections:
-        return Swap(made=other, samples=0, use=Fraction(0))
     found = transient(old, new)
     first = new.datapath.stages.index(new.sections[0])
     ranges: list[dict[str, tuple[int, int]]] = [{} for _ in new.datapath.stages]
@@ -214,41 +220,21 @@ def check_swap(hardware: CoreDesign, active: OtherSet, other: OtherSet) -> Swap:
     return Swap(made=replace(other, program=made), samples=found.samples, use=_use(hardware, during, made))
 
 
-def register_writes(hardware: CoreDesign, made: OtherSet, version: int) -> list[tuple[Register, int]]:
-    """List what is to be written to which register, in this order, so that a core takes a set over.
-
-    Parameters
-    ----------
-    hardware : CoreDesign
-        What the core was made from.
-    made : OtherSet
-        The set, as `check_swap` returns it.
-    version : int
-        What ``VERSION`` is to read once the set is active, 32 bits.
-    """
-    if not 0 <= version < 1 << 32:
-        raise ValueError(f"version must be in 0..4294967295, not {version}")
-    if made.program is None:
-        words = parallel_bank(hardware, made)
-    else:
-        words = [folded.encoded(instruction, made.program) for instruction in made.program.instructions]
-    crc = zlib.crc32(b"".join(word.to_bytes(4, "little") for word in (version, *words)))
-    return [(VERSION, version), *((DATA, word) for word in words), (CRC, crc)]
-
-
 def _use(hardware: CoreDesign, during: Datapath, made: Program | None) -> Fraction:
-    """Largest share of a state's range of what its word in the hardware holds."""
+    """Largest share of what its word holds that a state may take, of those that remember more than the input."""
     shares = []
     places = {} if made is None else {place.name: place for place in made.places}
     for stage, roomy in zip(during.stages, with_room(hardware.datapath).stages, strict=True):
         for index in stage.graph.delays:
-            node, room = stage.graph.nodes[index], roomy.graph.nodes[index]
-            low, high, shift = room.low, room.high, 0
+            node = stage.graph.nodes[index]
+            if stage.graph.nodes[node.operands[0]].op in {Op.INPUT, Op.FRACTION, Op.DELAY}:
+                continue
+            (low, high), shift = _word(roomy.graph.nodes[index]), 0
             if made is not None:
                 place = places[f"{stage.name}.{node.name}"]
                 high = (1 << made.digit_bits * place.digits) - 1
                 low, shift = -high - 1, place.frac - node.frac
-            shares += [Fraction(node.low << shift, low or -1), Fraction(node.high << shift, high or 1)]
+            shares += [Fraction(node.low << shift, low or -1), Fraction(node.high << shift, high)]
     return max(shares, default=Fraction(0))
 
 
@@ -321,8 +307,15 @@ def _check_parallel(hardware: Datapath, other: Datapath, what: str) -> None:
         raise ShortfallError(f"the {what} must fit the hardware: {error}") from None
     for old, new in zip(with_room(hardware).stages, other.stages, strict=True):
         for room, node in zip(old.graph.nodes, new.graph.nodes, strict=True):
-            if not room.low <= node.low <= node.high <= room.high:
+            low, high = _word(room)
+            if not low <= node.low <= node.high <= high:
                 raise ShortfallError(
                     f"the {what} must fit the hardware: {old.name}.{node.name or node.op.value} must stay in "
-                    f"{room.low}..{room.high}, not {node.low}..{node.high}"
+                    f"{low}..{high}, not {node.low}..{node.high}"
                 )
+
+
+def _word(node: Node) -> tuple[int, int]:
+    """Codes that the hardware's word for a node holds."""
+    span = 1 << node.width
+    return (-span // 2, span // 2 - 1) if node.signed else (0, span - 1)
