@@ -38,15 +38,15 @@ def generate(design: CoreDesign, directory: Path, progress: Callable[[str], None
     proven = certificate(design.quantized, design.spec.max_error)
     return write_files(
         directory,
-        _register_files(design)
-        | {
+        {
             f"{name}.sv": verilog_text,
             f"{name}.il": rtlil_text,
             f"{name}.json": to_json(manifest(design)),
             f"{name}.certificate.json": certificate_text(proven),
             f"{name}.c": c_source(datapath),
             f"{name}.h": c_header(datapath),
-        },
+        }
+        | _register_files(design),
     )
 
 
