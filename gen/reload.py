@@ -69,9 +69,29 @@ class Swap:
 
 
 def own_set(hardware: CoreDesign) -> OtherSet:
-    """Return the set that a core was generated with, in the formats of all others."""
+    """Return the set that a core was generated with, in the formats of all others.
+
+    Raises
+    ------
+    ShortfallError
+        If its constants cannot be written in these without a change.
+    """
     quantized = with_constants(hardware.quantized, None, None, room=room_of(hardware))
+    if _values(quantized.datapath) != _values(hardware.datapath):
+        raise ShortfallError(
+            f"the realization must keep its coefficients to be loaded anew, and {quantized.realization} does not"
+        )
     return OtherSet(quantized=quantized, program=hardware.architecture.program)
+
+
+def _values(datapath: Datapath) -> list[Fraction]:
+    """Values of all that multiplies or is added, in the order of the nodes."""
+    return [
+        node.parameter * Fraction(2) ** -(node.parameter_frac if node.op is Op.SCALE else node.frac)
+        for stage in datapath.stages
+        for node in stage.graph.nodes
+        if node.op in {Op.SCALE, Op.CONSTANT}
+    ]
 
 
 def set_for(hardware: CoreDesign, wanted: Specification) -> OtherSet:

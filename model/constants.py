@@ -160,7 +160,8 @@ def _ends(node: Node, operands: Sequence[Node], bits: int | None) -> tuple[int, 
         return min(products), max(products)
     if node.op in {Op.FLOOR, Op.TRUNCATE}:
         shift = operands[0].frac - node.frac
-        return first[0] >> shift, first[1] >> shift
+        up = (1 << shift) - 1 if node.op is Op.TRUNCATE else 0
+        return first[0] >> shift, max(first[1] >> shift, min(first[1] + up >> shift, 0))
     return first if node.op is not Op.DELAY else (min(first[0], 0), max(first[1], 0))
 
 

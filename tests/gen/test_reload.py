@@ -9,9 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests.gen.designs import EXAMPLES, example_design
+from tests.gen.swaps import during, moved, worst_input
 
+from sosmith.gen import reload
 from sosmith.gen.core import CoreDesign, design_core
-from sosmith.gen.design import Filter, design
+from sosmith.gen.design import design
 from sosmith.gen.quantize import Quantized, with_constants
 from sosmith.gen.realizations import REALIZATIONS
 from sosmith.gen.reload import ADVICE, OtherSet, check_swap, other_set, own_set, parallel_bank, room_of, set_for
@@ -36,14 +38,6 @@ def hardware_in(architecture: str, example: str = "audio_lowpass.toml", *, clock
         spec.hardware, architecture=architecture, clock=Fraction(clock), realization="df1_ef2", reload=True
     )
     return design_core(replace(spec, hardware=hardware))
-
-
-def moved(hardware: CoreDesign, ratio: str) -> Filter:
-    """Design the hardware's filter with another cutoff."""
-    wanted = hardware.spec.filter
-    assert wanted.cutoff is not None
-    cutoff = tuple(value * Fraction(ratio) for value in wanted.cutoff)
-    return design(replace(wanted, cutoff=cutoff), float(hardware.spec.sample_rate))
 
 
 @pytest.mark.parametrize("realization", EXACT)
@@ -188,6 +182,34 @@ def test_a_cutoff_a_fifth_away_may_be_swapped_to(example: str, ratio: str) -> No
     assert back.made.program is not None
     assert hardware.architecture.program is not None
     assert back.made.program.instructions == hardware.architecture.program.instructions
+
+
+def test_a_program_takes_over_under_the_worst_input() -> None:
+    """The interpreter, which minds the widths of words and accumulator, against the graphs with the swap's ranges."""
+    hardware = hardware_in("folded")
+    first, own = hardware.architecture.program, own_set(hardware)
+    made = other_set(hardware, ideal=moved(hardware, "0.5"))
+    swap = check_swap(hardware, own, made)
+    assert first is not None
+    assert swap.made.program is not None
+    codes = worst_input(own.quantized, made.quantized, 250, 300)
+    expected = compute_swapping(own.quantized.datapath, [(250, during(own.quantized, made.quantized))], codes)
+    assert interpreted(hardware, [(0, first), (250, swap.made.program)], codes) == expected
+    narrow = replace(swap.made.program, accumulator_bits=swap.made.program.accumulator_bits - 4)
+    with pytest.raises(OverflowError):
+        interpreted(hardware, [(0, first), (250, narrow)], codes)
+
+
+def test_a_realization_that_changes_its_coefficients_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    hardware = hardware_in("folded")
+    changed = with_constants(hardware.quantized, moved(hardware, "1.2"), None, room=room_of(hardware))
+    monkeypatch.setattr(reload, "with_constants", lambda *arguments, **options: changed)
+    monkeypatch.setattr(reload, "room_of", lambda hardware: 0)
+    with pytest.raises(
+        ShortfallError,
+        match=r"^the realization must keep its coefficients to be loaded anew, and df1_ef2 does not$",
+    ):
+        own_set(hardware)
 
 
 def test_a_swap_in_the_parallel_architecture_has_one_bit_of_room() -> None:

@@ -5,12 +5,11 @@ from functools import cache
 import numpy as np
 import pytest
 from tests.gen.designs import example_design
-from tests.gen.test_reload import moved
+from tests.gen.swaps import during, moved, worst_input
 
 from sosmith.gen import transient as module
 from sosmith.gen.quantize import Quantized, with_constants
 from sosmith.gen.transient import RESIDUE, transient
-from sosmith.model.constants import with_ranges
 from sosmith.model.datapath import Datapath
 from sosmith.model.errors import ShortfallError
 from sosmith.model.graph import RangeError
@@ -26,30 +25,6 @@ def sets(realization: str, ratio: str) -> tuple[Quantized, Quantized]:
     made = example_design("audio_lowpass.toml", realization=realization)
     own = with_constants(made.quantized, None, None, room=2)
     return own, with_constants(made.quantized, moved(made, ratio), None, finer=2, room=2)
-
-
-def during(active: Quantized, other: Quantized) -> Datapath:
-    """Return the other set with the ranges that are proven for the swap."""
-    first = len(other.datapath.stages) - len(other.sections) - 1
-    return with_ranges(other.datapath, [*[{}] * first, *transient(active, other).ranges, {}])
-
-
-def worst_input(active: Quantized, other: Quantized, swap: int, samples: int) -> np.ndarray:
-    """Return the input of one port that drives the last section's output highest after the swap.
-
-    By the responses to an impulse at every sample, for sections in direct form in double precision.
-    """
-    values = np.eye(samples)
-    for before, after in zip(active.quantized_sos, other.quantized_sos, strict=True):
-        x, y = np.zeros((2, samples, samples + 2))
-        x[:, 2:] = values
-        for n in range(samples):
-            b, a = np.split(before if n < swap else after, 2)
-            y[:, n + 2] = x[:, n : n + 3] @ b[::-1] - y[:, n : n + 2] @ a[:0:-1]
-        values = y[:, 2:]
-    worst = swap + int(np.argmax(np.abs(values[:, swap:]).sum(axis=0)))
-    (port,) = active.datapath.inputs
-    return np.where(values[:, worst] > 0, port.highest, port.lowest)[:, np.newaxis]
 
 
 def swapped(active: Quantized, other: Quantized, during: Datapath) -> None:
