@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from sosmith.model.datapath import Datapath, Stage
 from sosmith.model.graph import Graph, Node, Op
 from sosmith.model.horner import HornerStep
+from sosmith.model.port import Port
 
 SPARE_BITS = 1
 """Bits that a constant has more than its value takes with its sign."""
@@ -74,7 +75,8 @@ def with_room(datapath: Datapath) -> Datapath:
     """Return `datapath` with ranges for hardware whose constants can be loaded.
 
     Products and sums hold whatever a constant of its width may make. Ranges that are proven, not computed, have
-    `SPARE_BITS` more bits: a set whose own proven ranges are wider is not to be loaded.
+    `SPARE_BITS` more bits: a set whose own proven ranges are wider is not to be loaded, nor one whose output leaves
+    its port's range where nothing limits it.
     """
     widths = {(constant.stage, constant.node): constant.bits for constant in constants(datapath)}
     stages: list[Stage] = []
@@ -83,8 +85,18 @@ def with_room(datapath: Datapath) -> Datapath:
         bits = {node: width for (number, node), width in widths.items() if number == place}
         graph = _roomy(stage.graph, ends, bits)
         ends = [(graph.nodes[i].low, graph.nodes[i].high) for i in graph.outputs]
-        stages.append(RoomyStage(stage.name, graph))
+        stages.append(_with_graph(stage, graph))
+    stages[-1] = _with_graph(stages[-1], _ending(stages[-1].graph, datapath.output))
     return replace(datapath, stages=tuple(stages))
+
+
+def _ending(graph: Graph, port: Port) -> Graph:
+    """Return the last stage with a result no wider than its port: where nothing limits it, sets must keep to that."""
+    (output,) = graph.outputs
+    nodes = list(graph.nodes)
+    node = nodes[output]
+    nodes[output] = replace(node, low=max(node.low, port.lowest), high=min(node.high, port.highest))
+    return replace(graph, nodes=tuple(nodes))
 
 
 def with_ranges(datapath: Datapath, ranges: Sequence[Mapping[str, tuple[int, int]]]) -> Datapath:
@@ -114,8 +126,13 @@ def with_ranges(datapath: Datapath, ranges: Sequence[Mapping[str, tuple[int, int
         stated = {i: given.get(node.name, (node.low, node.high)) for i, node in enumerate(nodes) if node.op is Op.BOUND}
         graph = _roomy(stage.graph, wide, {}, stated)
         ends = [(graph.nodes[i].low, graph.nodes[i].high) for i in graph.outputs]
-        stages.append(RoomyStage(stage.name, graph))
+        stages.append(_with_graph(stage, graph))
     return replace(datapath, stages=tuple(stages))
+
+
+def _with_graph(stage: Stage, graph: Graph) -> Stage:
+    """Return a stage with other ranges; one of the polynomial stays one, for its constants can be loaded."""
+    return replace(stage, graph=graph) if isinstance(stage, HornerStep) else RoomyStage(stage.name, graph)
 
 
 def _roomy(
