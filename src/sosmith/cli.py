@@ -31,14 +31,16 @@ from sosmith.gen.generate import generate as generate_files
 from sosmith.gen.limit_cycles import limit_cycles, recursions
 from sosmith.gen.manifest import manifest, section_entries
 from sosmith.gen.realizations import ERROR_FEEDBACK, REALIZATIONS
+from sosmith.gen.reload import Swap, check_swap, own_set, set_for
+from sosmith.gen.reload_file import reload_json
 from sosmith.gen.report import write_report
-from sosmith.gen.specification import example, load
+from sosmith.gen.specification import Specification, example, load
 from sosmith.gen.verification import RejectedError, Verdict
 from sosmith.gen.verification import verify as verify_certificate
 from sosmith.model.errors import SosmithError, SpecificationError, ToolError
 from sosmith.model.program import Program
 from sosmith.model.scenarios import SCENARIOS
-from sosmith.model.text_files import write_files
+from sosmith.model.text_files import to_json, write_files
 from sosmith.sim.simulation import bench_of, default_scenario, simulate, traces_for
 from sosmith.terminal import (
     JSON_OPTION,
@@ -220,6 +222,80 @@ def verify(certificate: Path, as_json: bool) -> None:
         print_json(_verdict_json(read, verdict))
     else:
         _print_verdict(read, verdict)
+
+
+@cli.command("reload")
+@_SPEC
+@click.argument("other", type=click.Path(path_type=Path))
+@_CORE
+@_REALIZATION
+@_WIDTHS_OF
+@_BOARD
+@click.option(
+    "--active",
+    type=click.Path(path_type=Path),
+    help="Specification of the set that the core runs when it is loaded.  [default: SPEC]",
+)
+@click.option(
+    "--reset",
+    is_flag=True,
+    help="The core will be reset between the swap and its next sample: no transient then, and more sets fit.",
+)
+@click.option(
+    "--version",
+    type=click.IntRange(0, (1 << 32) - 1),
+    default=1,
+    show_default=True,
+    help="What the register VERSION is to read once the set is active.",
+)
+@JSON_OPTION
+@output_option("JSON file for the register writes.  [default: build/<name>/<stem of OTHER>.reload.json]")
+def reload_command(
+    spec: Path,
+    other: Path,
+    core: str | None,
+    realization: str | None,
+    widths_of: str | None,
+    board: str | None,
+    active: Path | None,
+    reset: bool,
+    version: int,
+    as_json: bool,
+    output: Path | None,
+) -> None:
+    """Prove a set of constants for a core that runs, and write what loads it.
+
+    SPEC is what the core was generated from, with `reload = true` under [hardware], and with the same options. OTHER is
+    a specification with another [calibration], [filter] or max_error, all else as in SPEC; its [hardware] does not
+    count.
+
+    The hardware keeps its word lengths, so not every set fits. This proves that the new set keeps its error within
+    OTHER's max_error, and that nothing inside can wrap while the filter still remembers the set before. The table says
+    after how many samples the bound holds again; no other swap may follow before. Exits with 1 and the reason if the
+    set is refused: then do not load it.
+
+    The file's `writes` are pairs of a byte address and a word for the AXI4-Lite port, in order. Before, compare
+    `design` with the register DESIGN. docs/registers.md has the registers.
+    """
+    target = _board(board)
+    with show_progress() as step:
+        made = design_core(
+            load(spec), core=core, realization=realization, widths_of=widths_of, board=target, progress=step
+        )
+        step("set")
+        wanted = load(other)
+        new = set_for(made, wanted)
+        before = own_set(made) if active is None else set_for(made, load(active))
+        step("swap")
+        swap = check_swap(made, None if reset else before, new)
+    tree = reload_json(made, swap, version)
+    path = output or _default_folder(made) / f"{other.stem}.reload.json"
+    write_files(path.parent, {path.name: to_json(tree)})
+    if as_json:
+        print_json(tree)
+    else:
+        _print_swap(made, wanted, swap, tree)
+    note(f"wrote {path}")
 
 
 @cli.command("simulate")
@@ -566,6 +642,28 @@ def _print_budget(console: Console, parts: dict[str, Fraction], lsb: Fraction, u
         budget.add_row(part, f"{float(value * lsb):.3g}", f"{float(value):.4f}")
     budget.add_row("allowed", f"{float(max_error):.3g}", f"{float(max_error / lsb):.4f}")
     console.print(budget)
+
+
+def _print_swap(made: CoreDesign, wanted: Specification, swap: Swap, tree: dict[str, Any]) -> None:
+    console = TableConsole()
+    output, quantized = made.datapath.output, swap.made.quantized
+    unit = escape(f" {output.unit}".rstrip())
+    bound, allowed = quantized.bound * output.lsb, wanted.max_error
+    table = new_table(f"{made.spec.name}: the set may be loaded", ["", ""])
+    if quantized.filter is not None:
+        table.add_row("filter", quantized.filter.describe)
+    table.add_row("error bound", f"{float(bound):.3g}{unit} of {float(allowed):.3g}{unit} allowed")
+    table.add_row("headroom", f"{float(allowed - bound):.3g}{unit}, {float(100 * (1 - bound / allowed)):.1f} %")
+    if swap.samples:
+        seconds = swap.samples / float(made.spec.sample_rate)
+        table.add_row("transient", f"{swap.samples:,} samples, {seconds:.3g} s, until the bound holds")
+    else:
+        table.add_row("transient", "none, the bound holds from the first sample on")
+    table.add_row("states", f"take at most {100 * float(swap.use):.3g} % of what their words hold")
+    crc = tree["writes"][-1][1]
+    table.add_row("load", f"version {tree['version']}, {tree['words']:,} words, CRC 0x{crc:08X}")
+    table.add_row("for the design", f"0x{tree['design']:08X}")
+    console.print(table)
 
 
 def _verdict_json(certificate: Certificate, verdict: Verdict) -> dict[str, Any]:
