@@ -9,6 +9,7 @@ from functools import cached_property
 
 from amaranth.lib.wiring import Component
 
+from sosmith.gen.boards import Board
 from sosmith.hdl import core, folded
 from sosmith.model.constants import with_room
 from sosmith.model.datapath import Datapath
@@ -171,9 +172,14 @@ class Budget:
         )
 
 
-def candidates(wanted: str) -> tuple[str, ...]:
-    """Architectures to be tried for what the specification asks for, the smallest first."""
-    return ("folded", "parallel") if wanted == "auto" else (wanted,)
+def candidates(wanted: str, board: Board | None) -> tuple[str, ...]:
+    """Architectures to be tried for what the specification asks for, the smallest first.
+
+    Without multiplier blocks on the board, shifts and additions are smaller than a multiplier made of LUT4.
+    """
+    if wanted != "auto":
+        return (wanted,)
+    return ("folded", "parallel") if board is None or board.device.multipliers else ("serial", "folded", "parallel")
 
 
 def fitting(name: str, budget: Budget, datapath: Datapath) -> Architecture:
@@ -189,10 +195,14 @@ def fitting(name: str, budget: Budget, datapath: Datapath) -> Architecture:
     return architecture
 
 
-def reason_for(architecture: Architecture, budget: Budget, *, asked: bool, refused: str) -> str:
+def reason_for(architecture: Architecture, budget: Budget, *, asked: bool, board: Board | None, refused: str) -> str:
     """Say why an architecture was taken; `refused` is why a smaller one was not, if one was tried."""
     name, needed = architecture.name, architecture.cycles_per_sample
-    why = "asked for in the specification" if asked else refused or "the smallest that keeps up"
+    smallest = "the smallest that keeps up"
+    if board is not None:
+        there = f"{board.device.multipliers} multipliers" if board.device.multipliers else "no multipliers"
+        smallest += f" on {board.name}, whose {board.device.title} has {there}"
+    why = "asked for in the specification" if asked else refused or smallest
     if architecture.program is None:
         return f"{name}: {why}"
     return f"{name}: {why}; takes {needed:,} of {budget.cycles:,} clocks a sample"

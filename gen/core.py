@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 from sosmith.gen.architecture import Architecture, Budget, candidates, fitting, reason_for
+from sosmith.gen.boards import Board
 from sosmith.gen.design import Filter, design
 from sosmith.gen.quantize import Plan, Quantized, plan, prove, with_realization
 from sosmith.gen.realizations import ERROR_FEEDBACK, REALIZATIONS
@@ -66,6 +67,7 @@ def design_core(
     core: str | None = None,
     realization: str | None = None,
     widths_of: str | None = None,
+    board: Board | None = None,
     progress: Progress = lambda step: None,
 ) -> CoreDesign:
     """Design a core of a specification.
@@ -81,6 +83,8 @@ def design_core(
     widths_of : str or None
         Choose fraction bits and coefficients for this realization, then use `realization` at these widths; the
         error may then exceed what the specification allows.
+    board : Board or None
+        What it is meant for: the automatic choice of an architecture heeds its multipliers.
     progress : callable
         Told the name of each step.
 
@@ -131,7 +135,7 @@ def design_core(
 
     hardware = spec.hardware
     budget = Budget(clock=hardware.clock, sample_rate=spec.sample_rate, channels=spec.channels, reload=hardware.reload)
-    names = candidates(hardware.architecture)
+    names = candidates(hardware.architecture, board)
     refused = ""
     for name in names:
         try:
@@ -148,7 +152,7 @@ def design_core(
         )
         quantized = replace(quantized, datapath=replace(quantized.datapath, calibrated=codes))
         architecture = replace(architecture, datapath=quantized.datapath)
-    why = reason_for(architecture, budget, asked=len(names) == 1, refused=refused)
+    why = reason_for(architecture, budget, asked=len(names) == 1, board=board, refused=refused)
     return CoreDesign(
         spec=spec,
         core=kind,

@@ -639,7 +639,8 @@ def test_a_signal_in_the_middle_of_the_simulation(
 
 def test_two_runs_in_one_folder_at_once(tmp_path: Path) -> None:
     """The second is refused at once, and the first is none the worse for it."""
-    (tmp_path / "plain.toml").write_text(FILTER, encoding="utf-8")
+    parallel = f'{FILTER}\n[hardware]\narchitecture = "parallel"\n'  # many clocks a second
+    (tmp_path / "plain.toml").write_text(parallel, encoding="utf-8")
     arguments = ["simulate", "plain.toml", "--trace", "noise", "--seconds", "80", "--simulator", "icarus", "-o", "out"]
     first = process(*arguments, folder=tmp_path)
     wait_for((tmp_path / "out" / "simulation").exists)

@@ -27,7 +27,7 @@ from rich.table import Table
 
 import sosmith
 from sosmith.gen.architecture import Architecture
-from sosmith.gen.boards import BOARDS, find_board
+from sosmith.gen.boards import BOARDS, Board, find_board
 from sosmith.gen.certificate_file import Certificate, read_certificate
 from sosmith.gen.comparison import column_names, comparison_json, comparison_page, load_report
 from sosmith.gen.comparison import compare as compare_reports
@@ -125,6 +125,11 @@ _WIDTHS_OF = click.option(
     help="Keep the word lengths chosen for this realization, to compare structures at equal width.",
 )
 _JSON = click.option("--json", "as_json", is_flag=True, help="Print JSON instead of tables.")
+_BOARD = click.option(
+    "--board",
+    metavar="BOARD",
+    help=f"What it is meant for: an automatic choice of the architecture heeds its multipliers. {', '.join(BOARDS)}.",
+)
 _SEED = click.option(
     "--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Seed of noise and handshakes."
 )
@@ -155,11 +160,17 @@ def init(file: Path, force: bool) -> None:
 @_CORE
 @_REALIZATION
 @_WIDTHS_OF
+@_BOARD
 @_JSON
-def design(spec: Path, core: str | None, realization: str | None, widths_of: str | None, as_json: bool) -> None:
+def design(
+    spec: Path, core: str | None, realization: str | None, widths_of: str | None, board: str | None, as_json: bool
+) -> None:
     """Show the design of SPEC: order, sections, realization, formats, error budget, cost."""
+    target = _board(board)
     with _progress() as step:
-        made = design_core(load(spec), core=core, realization=realization, widths_of=widths_of, progress=step)
+        made = design_core(
+            load(spec), core=core, realization=realization, widths_of=widths_of, board=target, progress=step
+        )
     if as_json:
         _print_json(manifest(made))
     else:
@@ -171,14 +182,25 @@ def design(spec: Path, core: str | None, realization: str | None, widths_of: str
 @_CORE
 @_REALIZATION
 @_WIDTHS_OF
+@_BOARD
 @_output_option("Folder for the files.  [default: build/<name>]")
-def generate(spec: Path, core: str | None, realization: str | None, widths_of: str | None, output: Path | None) -> None:
+def generate(
+    spec: Path,
+    core: str | None,
+    realization: str | None,
+    widths_of: str | None,
+    board: str | None,
+    output: Path | None,
+) -> None:
     """Write SystemVerilog, RTLIL, manifest, certificate and a bit-true C model of SPEC.
 
     The paths of the files go to stdout, one a line. Two runs write the same bytes.
     """
+    target = _board(board)
     with _progress() as step:
-        made = design_core(load(spec), core=core, realization=realization, widths_of=widths_of, progress=step)
+        made = design_core(
+            load(spec), core=core, realization=realization, widths_of=widths_of, board=target, progress=step
+        )
         paths = generate_files(made, output or _default_folder(made), step)
     for path in paths:
         click.echo(path)
@@ -210,6 +232,7 @@ def verify(certificate: Path, as_json: bool) -> None:
 @_CORE
 @_REALIZATION
 @_WIDTHS_OF
+@_BOARD
 @click.option(
     "--trace",
     "source",
@@ -252,6 +275,7 @@ def simulate_command(
     core: str | None,
     realization: str | None,
     widths_of: str | None,
+    board: str | None,
     source: str | None,
     simulator: str,
     idle: float,
@@ -269,11 +293,15 @@ def simulate_command(
     integer model for equality, and with the double-precision golden chain for the error. Writes report.json and
     report.html; exits with 1 if the result falls short. `sosmith emulate SPEC` lists the scenarios.
 
-    With --gates, the same bench runs the cells of an FPGA, their flip-flops at random when it starts.
+    With --gates, the same bench runs the cells of an FPGA, their flip-flops at random when it starts, and an automatic
+    choice of the architecture is made for that board.
     """
-    board = None if gates is None else find_board(gates)
+    netlist_for = _board(gates)
+    target = _board(board) or netlist_for
     with _progress() as step:
-        made = design_core(load(spec), core=core, realization=realization, widths_of=widths_of, progress=step)
+        made = design_core(
+            load(spec), core=core, realization=realization, widths_of=widths_of, board=target, progress=step
+        )
         summary, folder = _simulate(
             made,
             step,
@@ -284,7 +312,7 @@ def simulate_command(
             seed=seed,
             idle=idle,
             stall=stall,
-            gates=board,
+            gates=netlist_for,
             waves=waves,
         )
     _finish(summary, folder, as_json=as_json)
@@ -432,6 +460,10 @@ def _finish(summary: dict[str, Any], folder: Path, *, as_json: bool) -> None:
 
 def _default_folder(made: CoreDesign) -> Path:
     return Path("build") / made.spec.name
+
+
+def _board(name: str | None) -> Board | None:
+    return None if name is None else find_board(name)
 
 
 def _known_scenario(made: CoreDesign, name: str) -> str:

@@ -4,6 +4,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
+import pytest
 from amaranth.hdl import Assert, Assume, Module
 from tests.formal.prover import Proof, prove
 from tests.formal.small import port, resonator
@@ -77,6 +78,11 @@ def test_a_resonator_stays_in_its_range(tmp_path: Path) -> None:
 
 def test_a_section_stays_in_its_ranges(tmp_path: Path) -> None:
     assert prove(StatedRanges(proven_section(bits=2, y_frac=0)), tmp_path) == "PASS"
+
+
+@pytest.mark.slow
+def test_a_section_of_three_bits_stays_in_its_ranges(tmp_path: Path) -> None:
+    assert prove(StatedRanges(proven_section(bits=3, y_frac=0)), tmp_path, timeout=1800) == "PASS"
 
 
 def test_a_range_that_is_one_too_narrow_is_found_out(tmp_path: Path) -> None:

@@ -164,15 +164,28 @@ def test_the_folded_core_keeps_the_rules(serial: bool, tmp_path: Path) -> None:
     assert prove(folded_rules(serial=serial, progress=not serial), tmp_path) == "PASS"
 
 
-def test_the_parallel_core_keeps_the_rules_and_the_channels(tmp_path: Path) -> None:
-    capacity = core.latency_cycles(limiter(), 3) + 2
-    assert prove(StreamRules(core.Core(limiter(), 3), capacity), tmp_path) == "PASS"
+def channel_rules(module: ModuleType, serial: bool | None = None) -> StreamRules:
+    """Rules of a core with three channels, parallel if `serial` is None."""
+    if serial is None:
+        return StreamRules(module.Core(limiter(), 3), core.latency_cycles(limiter(), 3) + 2)
+    design = module.FoldedCore(limiter(), program(limiter(), DIGIT_BITS), serial=serial, channels=3)
+    return StreamRules(design, 1, source_waits=True)
 
 
-@pytest.mark.parametrize("serial", [False, True])
-def test_the_folded_core_keeps_the_rules_and_the_channels(serial: bool, tmp_path: Path) -> None:
-    design = folded.FoldedCore(limiter(), program(limiter(), DIGIT_BITS), serial=serial, channels=3)
-    assert prove(StreamRules(design, 1, source_waits=True), tmp_path) == "PASS"
+@pytest.mark.parametrize(("module", "serial"), [(core, None), (folded, False), (folded, True)])
+def test_channels_stay_with_their_samples(module: ModuleType, serial: bool | None, tmp_path: Path) -> None:
+    assert prove(channel_rules(module, serial), tmp_path) == "PASS"
+
+
+@pytest.mark.parametrize(("module", "serial"), [(core, None), (folded, False)])
+def test_a_channel_too_many_is_found_out(module: ModuleType, serial: bool | None, tmp_path: Path) -> None:
+    wrong = broken(module, "self.s_axis_tdest < self.channels", "self.s_axis_tdest <= self.channels")
+    assert prove(channel_rules(wrong, serial), tmp_path) == "FAIL"
+
+
+def test_a_channel_that_is_lost_is_found_out(tmp_path: Path) -> None:
+    wrong = broken(folded, "channel.eq(self.s_axis_tdest)", "channel.eq(0)")
+    assert prove(channel_rules(wrong, serial=False), tmp_path) == "FAIL"
 
 
 @pytest.mark.parametrize("serial", [False, True])

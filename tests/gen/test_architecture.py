@@ -9,6 +9,7 @@ import pytest
 from tests.gen.designs import EXAMPLES, example_design
 
 from sosmith.gen.architecture import Budget, fitting
+from sosmith.gen.boards import find_board
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.manifest import manifest
 from sosmith.gen.specification import load
@@ -46,6 +47,21 @@ def test_the_smallest_that_keeps_up_is_taken() -> None:
     available = int(made.spec.hardware.clock / made.spec.sample_rate)
     assert made.reasons["architecture"] == (
         f"folded: the smallest that keeps up; takes {needed:,} of {available:,} clocks a sample"
+    )
+
+
+@pytest.mark.parametrize(
+    ("board", "architecture", "there"),
+    [
+        ("icestick", "serial", "icestick, whose iCE40 HX1K has no multipliers"),
+        ("icebreaker", "folded", "icebreaker, whose iCE40 UP5K has 8 multipliers"),
+    ],
+)
+def test_the_board_s_multipliers_count(board: str, architecture: str, there: str) -> None:
+    made = design_core(load(EXAMPLES / "flange_wear_locomotive.toml"), realization="df1_ef2", board=find_board(board))
+    needed = made.architecture.cycles_per_sample
+    assert made.reasons["architecture"] == (
+        f"{architecture}: the smallest that keeps up on {there}; takes {needed:,} of 120,000 clocks a sample"
     )
 
 

@@ -222,7 +222,6 @@ BAD = [
         RATE + "\nchannels = 1.5",
         "channels must be a whole number from 1 to 65536, not 1.5",
     ),
-    ("several channels", RATE, RATE + "\nchannels = 4", "not yet available: channels must be 1, not 4"),
     (
         "bits with a point",
         VOLT,
@@ -768,12 +767,6 @@ BAD = [
         CLOCK,
         CLOCK + '\narchitecture = "systolic"',
         "hardware.architecture must be one of auto, parallel, folded, serial, not 'systolic'",
-    ),
-    (
-        "reload",
-        CLOCK,
-        CLOCK + "\nreload = true",
-        "not yet available: hardware.reload must be false, not true",
     ),
     (
         "reload is a text",

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.gen.designs import ALL, EXAMPLES, example_design
+from tests.gen.designs import ALL, EXAMPLES, parallel_design
 
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.evidence import Evidence
@@ -43,7 +43,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[tuple[str, str], tupl
     """Evidence and report of every scenario of every example; each example is built once."""
     found = {}
     for example in ALL:
-        made = example_design(example)
+        made = parallel_design(example)
         folder = tmp_path_factory.mktemp(made.spec.name)
         for scenario in scenarios(made):
             seed = 100 + len(found)
@@ -52,7 +52,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[tuple[str, str], tupl
     return found
 
 
-CASES = [(example, scenario) for example in ALL for scenario in scenarios(example_design(example))]
+CASES = [(example, scenario) for example in ALL for scenario in scenarios(parallel_design(example))]
 
 
 @pytest.mark.parametrize(("example", "scenario"), CASES)
@@ -77,7 +77,7 @@ def test_worst_cases_stay_within_the_proof(
     example: str, runs: dict[tuple[str, str], tuple[Evidence, dict[str, Any]]]
 ) -> None:
     """The inputs that drive the filter, and the way of every rounding error, furthest: hardware and exact graph."""
-    made = example_design(example)
+    made = parallel_design(example)
     for scenario in ("worst_case", "worst_case_errors"):
         evidence, report = runs[example, scenario]
         assert report["bit_exact"]
@@ -94,7 +94,7 @@ def test_worst_cases_stay_within_the_proof(
 @pytest.mark.parametrize("example", ALL)
 def test_worst_cases_in_every_realization(example: str, realization: str, tmp_path: Path) -> None:
     """Two rounds, the second from where the first has left the states."""
-    made = example_design(example, realization=realization)
+    made = parallel_design(example, realization=realization)
     (once,) = traces_for(made, "worst_case_errors", seed=1)
     seconds = 2 * len(once) / float(made.spec.sample_rate)
     (trace,) = traces_for(made, "worst_case_errors", seed=1, seconds=seconds)
@@ -130,7 +130,7 @@ def test_enough_samples_under_different_handshakes(
 
 @pytest.mark.parametrize("example", ALL)
 def test_icarus_agrees(example: str, tmp_path: Path) -> None:
-    made = example_design(example)
+    made = parallel_design(example)
     trace = short(traces_for(made, "worst_case", seed=3)[0], 1200)
     evidence = simulate(made, [trace], tmp_path, simulator="icarus", seed=7, idle=0.1, stall=0.5)
     assert (evidence.mismatches, evidence.samples) == (0, 1200)
@@ -140,7 +140,7 @@ def test_icarus_agrees(example: str, tmp_path: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("example", ALL)
 def test_every_pace_of_the_streams(example: str, tmp_path: Path) -> None:
-    made = example_design(example)
+    made = parallel_design(example)
     for seed, (idle, stall) in enumerate([(0.0, 0.0), (0.95, 0.0), (0.0, 0.95), (0.5, 0.5), (0.9, 0.9)]):
         (trace,) = traces_for(made, "worst_case", seed=seed)
         evidence = simulate(made, [trace], tmp_path, seed=seed, idle=idle, stall=stall)
@@ -232,7 +232,7 @@ def test_a_wrong_bit_in_the_hardware_is_found(
     example: str, spoil: Callable[[str], str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     spoil_emitted_file(spoil, monkeypatch)
-    made = example_design(example)
+    made = parallel_design(example)
     trace = short(traces_for(made, "worst_case", seed=1)[0], 3000)
     evidence = simulate(made, [trace], tmp_path, simulator="icarus", idle=0.1, stall=0.1)
     report = summarise(evidence)
@@ -250,7 +250,7 @@ def test_a_wrong_bit_in_the_hardware_is_found(
 def test_a_state_that_moves_in_idle_clocks_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its results hang on the handshakes, which the bench notices before any value is compared."""
     spoil_emitted_file(replaced("else if (take1) v1 <=", "else if (advance) v1 <="), monkeypatch)
-    made = example_design("audio_lowpass.toml")
+    made = parallel_design("audio_lowpass.toml")
     trace = short(traces_for(made, "worst_case", seed=1)[0], 500)
     message = "audio_lowpass in icarus: the first results after a reset must not depend on what came before it"
     with pytest.raises(ShortfallError, match=f"^{re.escape(message)}$"):
