@@ -14,7 +14,6 @@ from amaranth.lib.memory import Memory
 
 from sosmith.hdl.axi_lite import slave_members
 from sosmith.hdl.axi_stream import at_rail, channel_bits, core_members, extended, fields
-from sosmith.hdl.memory_attributes import NO_COLLISIONS
 from sosmith.hdl.reload import ReloadPort
 from sosmith.hdl.stage import limits
 from sosmith.model.datapath import Datapath
@@ -25,6 +24,13 @@ from sosmith.model.reload_registers import ADDRESS_BITS
 _FOLDED_RANKS, _SERIAL_RANKS = 5, 3
 
 _DO_BITS = 4
+
+_NO_COLLISIONS = {"no_rw_check": 1}
+"""Of memories: nobody uses what is read at the clock at which that very word is written.
+
+`HAZARD` sees to that, and a bank of the program is not written while it is read. Simulators give the old word. Block
+RAMs give anything, and Yosys, unless told that this will do, puts registers and a comparison around them.
+"""
 
 
 def latency_cycles(program: Program, *, serial: bool) -> int:
@@ -182,7 +188,7 @@ class FoldedCore(wiring.Component):
         if reload is not None:
             code += [0] * ((1 << (len(code) - 1).bit_length()) - len(code))
             code += [0] * len(code)
-        m.submodules.program = program = Memory(shape=bits, depth=len(code), init=code, attrs=NO_COLLISIONS)
+        m.submodules.program = program = Memory(shape=bits, depth=len(code), init=code, attrs=_NO_COLLISIONS)
         fetch = program.read_port()
         m.d.comb += [fetch.addr.eq(counter), fetch.en.eq(advance)]
         if reload is not None:
@@ -274,7 +280,7 @@ class FoldedCore(wiring.Component):
         for low in range(0, self._word, width):
             high = min(low + width, self._word)
             init = [int(low == 0 and address % words == self.program.one) for address in range(depth)]
-            m.submodules[f"words{low}"] = ram = Memory(shape=high - low, depth=depth, init=init, attrs=NO_COLLISIONS)
+            m.submodules[f"words{low}"] = ram = Memory(shape=high - low, depth=depth, init=init, attrs=_NO_COLLISIONS)
             reader, writer = ram.read_port(), ram.write_port()
             m.d.comb += [
                 reader.addr.eq(read[0]),

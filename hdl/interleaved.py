@@ -18,7 +18,6 @@ from amaranth.lib.wiring import In, Out
 
 from sosmith.hdl.axi_stream import channel_bits
 from sosmith.hdl.constant_banks import NO_CONSTANTS, Pair, chosen
-from sosmith.hdl.memory_attributes import NO_COLLISIONS
 from sosmith.hdl.stage import PLAIN, banks_in_use, limits, logic, shape_of, unique_names
 from sosmith.model.datapath import Stage
 from sosmith.model.graph import Graph, Node, Op
@@ -213,7 +212,7 @@ class InterleavedStage(wiring.Component):
         for index in graph.delays:
             node, written = graph.nodes[index], plan.writes[index]
             m.submodules[f"{names[index]}_memory"] = memory = Memory(
-                shape=shape_of(node), depth=self.channels, init=[0] * self.channels, attrs=NO_COLLISIONS
+                shape=shape_of(node), depth=self.channels, init=[0] * self.channels
             )
             read, write = memory.read_port(), memory.write_port()
             m.d.comb += [
