@@ -16,6 +16,7 @@ import json
 import statistics
 import sys
 import tempfile
+import textwrap
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, replace
@@ -269,12 +270,13 @@ def table(record: Figures, keys: tuple[str, ...]) -> str:
 
 
 def refusals(record: Figures) -> str:
-    """List what does not fit: too many cells, or the tool's words."""
-    return "\n".join(
-        f"- {core.label} on {title(TARGETS[key])}: {figures['refusal']}."
+    """Say what does not fit: too many cells, or the tool's words."""
+    lines = "".join(
+        f"- {core.label} on {title(TARGETS[key])}: {figures['refusal']}.\n"
         for core, key, figures in recorded(record, TARGETS)
         if figures["refusal"]
     )
+    return f"What does not fit, by the cells after synthesis or in the placer's words:\n\n{lines}" if lines else ""
 
 
 @dataclass(frozen=True)
@@ -385,7 +387,17 @@ def goal_table(record: Figures) -> str:
 def tries() -> str:
     """List what was tried for goals that are missed."""
     return "\n".join(
-        f"\n{tried.goal}\n\n" + "\n".join(f"- {way}" for way in tried.ways) + f"\n\n{tried.obstacle}" for tried in TRIES
+        "\n".join(
+            [
+                "",
+                textwrap.fill(tried.goal, 120),
+                "",
+                *(textwrap.fill(way, 120, initial_indent="- ", subsequent_indent="  ") for way in tried.ways),
+                "",
+                textwrap.fill(tried.obstacle, 120),
+            ]
+        )
+        for tried in TRIES
     )
 
 
@@ -406,7 +418,9 @@ def peer_table(record: Figures) -> str:
         "|---|---|---|---|---|---|---|---|",
     ]
     for architecture in ("parallel", "folded"):
-        figures = targets_in(record, _AUDIO[architecture])["ecp5"]
+        figures = targets_in(record, _AUDIO[architecture]).get("ecp5")
+        if figures is None:
+            continue
         area = figures["area"]
         lines.append(
             f"| this one | {architecture} | {area['luts']:,} | {area['all_luts']:,} | {area['flip_flops']:,} "
@@ -476,8 +490,8 @@ Written by `python -m benchmarks.cost` from the figures it recorded in `benchmar
 again what has changed and fails if a figure of synthesis has grown by more than {100 * (GROWTH - 1):.0f} %.
 
 The filter core of audio_lowpass, the whole instrument, calibration and filter, of the two others, each in all three
-architectures, for {", ".join(map(str, CHANNELS))} channels (and {_EIGHT.channels}, audio_lowpass parallel), and as
-specified but for that, so within the proven bound of the example. Not every one keeps up with the sample rate of its
+architectures, for {", ".join(map(str, CHANNELS))} channels, audio_lowpass parallel for {_EIGHT.channels} as well, and
+as specified but for that, so within the proven bound of the example. Not every one keeps up with the sample rate of its
 example at that many channels: the tables say how many samples a second, of all channels together, it can do.
 Realization, as `auto` chooses: {", ".join(realizations)}.
 
@@ -501,10 +515,7 @@ How cells are counted:
 
 {table(record, ("up5k", "hx8k", "hx1k"))}
 
-What does not fit, by the cells after synthesis or in the placer's words:
-
 {refusals(record)}
-
 ## ECP5
 
 {table(record, ("ecp5",))}
