@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -99,9 +99,9 @@ def design_core(
     wanted = _known(realization or spec.hardware.realization)
     if kind != "filter":
         progress("calibration")
-    polynomial, fitted = _polynomial(spec) if kind != "filter" else (None, None)
+    polynomial, fitted = polynomial_of(spec) if kind != "filter" else (None, None)
     progress("filter design")
-    ideal = _filter(spec) if kind != "calibration" else None
+    ideal = filter_of(spec) if kind != "calibration" else None
 
     def plan_of(name: str) -> Plan:
         progress(f"word lengths, {name}" if ideal is not None else "word lengths")
@@ -147,9 +147,7 @@ def design_core(
                 raise
             refused = str(error)
     if fitted is not None:
-        codes = tuple(
-            port.enclosing(*ends) for port, ends in zip(quantized.datapath.inputs, fitted.covered, strict=True)
-        )
+        codes = calibrated_codes(quantized.datapath.inputs, fitted)
         quantized = replace(quantized, datapath=replace(quantized.datapath, calibrated=codes))
         architecture = replace(architecture, datapath=quantized.datapath)
     why = reason_for(architecture, budget, asked=len(names) == 1, board=board, refused=refused)
@@ -186,7 +184,14 @@ def _inputs(spec: Specification, core: str) -> tuple[Port, ...]:
     return spec.inputs
 
 
-def _polynomial(spec: Specification) -> tuple[Polynomial, Fit | None]:
+def polynomial_of(spec: Specification) -> tuple[Polynomial, Fit | None]:
+    """Return the calibration of a specification that has one, and the fit if it came from measurements.
+
+    Raises
+    ------
+    SpecificationError
+        If the measurements are unfit.
+    """
     assert spec.calibration is not None
     if spec.calibration.data is not None:
         fitted = fit(read_measurements(spec.calibration.data))
@@ -195,5 +200,11 @@ def _polynomial(spec: Specification) -> tuple[Polynomial, Fit | None]:
     return Polynomial(spec.calibration.coefficients), None
 
 
-def _filter(spec: Specification) -> Filter:
+def calibrated_codes(inputs: Sequence[Port], fitted: Fit) -> tuple[tuple[int, int], ...]:
+    """Lowest and highest code of each input that the measurements covered."""
+    return tuple(port.enclosing(*ends) for port, ends in zip(inputs, fitted.covered, strict=True))
+
+
+def filter_of(spec: Specification) -> Filter:
+    """Design the filter of a specification."""
     return design(spec.filter, float(spec.sample_rate))

@@ -1,4 +1,4 @@
-"""Writes a core's files: SystemVerilog, RTLIL, manifest, certificate and the bit-true C model."""
+"""Writes a core's files: SystemVerilog, RTLIL, manifest, certificate, the bit-true C model, and its registers."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from sosmith.gen.certificate import certificate
 from sosmith.gen.certificate_file import certificate_text
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.manifest import manifest
+from sosmith.gen.register_map import c_registers, systemrdl
+from sosmith.gen.reload_file import bank_size
 from sosmith.gen.verilog import to_rtlil, to_verilog
 from sosmith.model.c_model import c_header, c_source
 from sosmith.model.text_files import to_json, write_files
@@ -17,7 +19,8 @@ from sosmith.model.text_files import to_json, write_files
 def generate(design: CoreDesign, directory: Path, progress: Callable[[str], None] = lambda step: None) -> list[Path]:
     """Write SystemVerilog, RTLIL, manifest, certificate and C model into `directory`; return the files' paths.
 
-    Two runs on the same specification write the same bytes.
+    Of a core that can be reloaded, the registers too: as a C header and in SystemRDL. Two runs on the same
+    specification write the same bytes.
 
     Raises
     ------
@@ -42,5 +45,17 @@ def generate(design: CoreDesign, directory: Path, progress: Callable[[str], None
             f"{name}.certificate.json": certificate_text(proven),
             f"{name}.c": c_source(datapath),
             f"{name}.h": c_header(datapath),
-        },
+        }
+        | _register_files(design),
     )
+
+
+def _register_files(design: CoreDesign) -> dict[str, str]:
+    fingerprint = design.architecture.fingerprint
+    if fingerprint is None:
+        return {}
+    name, (words, _) = design.spec.name, bank_size(design.architecture)
+    return {
+        f"{name}_registers.h": c_registers(name, words=words, design=fingerprint),
+        f"{name}.rdl": systemrdl(name, words=words, design=fingerprint),
+    }

@@ -9,6 +9,7 @@ from sosmith.gen.core import CoreDesign
 from sosmith.gen.cost import cost_of
 from sosmith.gen.limit_cycles import limit_cycles, recursions
 from sosmith.gen.linear_model import linear_model
+from sosmith.gen.reload_file import bank_size
 from sosmith.hdl.axi_stream import dest_width, fields, width
 from sosmith.model.datapath import Datapath, Stage
 from sosmith.model.direct_form import DirectForm1
@@ -16,6 +17,7 @@ from sosmith.model.graph import Graph, Op
 from sosmith.model.horner import HornerStep
 from sosmith.model.port import Port
 from sosmith.model.program import Program
+from sosmith.model.reload_registers import INTERFACE
 from sosmith.model.status import STATUS_BITS, Flag
 
 
@@ -40,6 +42,7 @@ def manifest(design: CoreDesign) -> dict[str, Any]:
         "realization": quantized.realization if quantized.sections else None,
         "architecture": design.architecture.name,
         "schedule": _schedule(design.architecture.program),
+        "reload": _reload(design),
         "reasons": design.reasons,
         "sections": [entry for section in quantized.sections for entry in section_entries(section)],
         "formats": [row for stage in datapath.stages for row in _formats(stage, datapath)],
@@ -116,6 +119,20 @@ def _schedule(program: Program | None) -> dict[str, Any] | None:
             for p in sorted(program.places, key=lambda place: place.address)
         ],
         "instructions": [[do.value, address, constant] for do, address, constant in program.instructions],
+    }
+
+
+def _reload(design: CoreDesign) -> dict[str, Any] | None:
+    """Tell what a set for this core has to fit, and which files describe its registers."""
+    if design.architecture.fingerprint is None:
+        return None
+    words, bits = bank_size(design.architecture)
+    return {
+        "interface": INTERFACE,
+        "design": design.architecture.fingerprint,
+        "words": words,
+        "word_bits": bits,
+        "registers": [f"{design.spec.name}_registers.h", f"{design.spec.name}.rdl"],
     }
 
 

@@ -144,9 +144,13 @@ class Response:
     @property
     def uncertainty(self) -> Fraction:
         """Bound on the sum over all k of what the samples do not say about ``|h_k|``: rounding and tail."""
+        return self.rounding * self.horizon.length / (1 << self.horizon.bits) + self.tail
+
+    @property
+    def tail(self) -> Fraction:
+        """Bound on the sum of ``|h_k|`` over all k beyond the samples."""
         h = self.horizon
-        tail = self.magnitude * _power_above(1 / h.rho, h.length) / (1 - 1 / h.rho)
-        return self.rounding * h.length / (1 << h.bits) + tail
+        return self.magnitude * _power_above(1 / h.rho, h.length) / (1 - 1 / h.rho)
 
 
 def impulse(at: Horizon) -> Response:

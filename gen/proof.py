@@ -64,7 +64,7 @@ def prove_cascade(
     wires: list[Drives] = [{INPUT: Drive(impulse(at), low, high)}]
     nodes = []
     for number, stage in enumerate(stages):
-        lanes = [_Lane(number, model, wires, at) for model in stage]
+        lanes = [Lane(number, model, wires, at) for model in stage]
         nodes.append({node: extent(list(lane.at(node).values())) for lane in lanes for node in lane.model.bounds})
         wires = [lane.at(lane.model.output) for lane in lanes]
     (drives,) = wires
@@ -99,7 +99,7 @@ def error_drives(stages: Sequence[StageModel], at: Horizon) -> list[Drive]:
     """Drives at the output by all that the stages add to the input: errors of the quantizers, and constants."""
     wires: list[Drives] = [{}]
     for number, stage in enumerate(stages):
-        lanes = [_Lane(number, model, wires, at) for model in stage]
+        lanes = [Lane(number, model, wires, at) for model in stage]
         wires = [lane.at(lane.model.output) for lane in lanes]
     (drives,) = wires
     return list(drives.values())
@@ -150,15 +150,15 @@ def cascade_horizon(stages: Sequence[StageModel], ideal: Sequence[TransferFuncti
     return horizon([*(path for wire in paths for path in wire), [denominator for _, denominator in ideal]])
 
 
-_Key = tuple[int, int, str, int]
+Key = tuple[int, int, str, int]
 """A source: number of the stage, output node, name, and position among the sources of that output's model."""
 
-Drives = Mapping[_Key, Drive]
+Drives = Mapping[Key, Drive]
 
-INPUT: _Key = (-1, 0, "input", 0)
+INPUT: Key = (-1, 0, "input", 0)
 
 
-class _Lane:
+class Lane:
     """One output of a stage, with all that arrives at it."""
 
     def __init__(self, number: int, model: LinearModel, wires: Sequence[Drives], at: Horizon) -> None:
@@ -173,7 +173,7 @@ class _Lane:
     def at(self, node: int) -> Drives:
         """Drives at a node: what has come from before, then the stage's own sources."""
         model = self.model
-        drives: dict[_Key, Drive] = {}
+        drives: dict[Key, Drive] = {}
         for source, arrived in zip(model.sources, self._arrived, strict=False):
             for key, drive in arrived.items():
                 response = drive.response.taps(source.numerators[node])

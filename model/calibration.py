@@ -4,24 +4,22 @@ The paper's method (section 2.2): least squares for the coefficients (equations 
 the linear polynomial, orders raised until the adjusted coefficient of correlation reaches 0.975; the
 smallest polynomial that reaches it is kept.
 
-Equation 3 is the normal equations. Their matrix holds sums of ``V**(2m) T**(2n)``, and solving them as
-printed squares a condition number that is already large. Here the same minimum is found from the
-measurements themselves: both variables are mapped to [-1, 1], the columns scaled to equal length, and the
-overdetermined system solved by its singular values. The mapping is undone in exact rational arithmetic.
+Equation 3 is the normal equations. `Sums` adds them up exactly and solves them without loss, so the same
+measurements give the same bits everywhere and in any order. On request, outliers are weighted down.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
-from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
 
 from sosmith.model.csv_table import CsvTable, check_rows, read_csv_table
 from sosmith.model.errors import SpecificationError
+from sosmith.model.least_squares import Solution, Sums, Term
 from sosmith.model.polynomial import Polynomial
 from sosmith.model.port import Values
 
@@ -34,12 +32,23 @@ REQUIRED_R = 0.975
 HIGHEST_ORDER = 6
 """Highest total order tried: 28 terms, far beyond the paper's second order."""
 
-RANK_TOLERANCE = 1e-10
-"""Ratio of singular values (columns of equal length) below which coefficients are not determined.
+HUBER = 1.345
+"""Residual, in standard deviations, from which a robust fit weights a measurement down.
 
-Five digits above the rounding of the doubles, so that columns which depend on each other except for
-rounding count as dependent, and well below what measurable variation of both variables gives.
+Huber's constant: 95 % of the efficiency of least squares where the errors are normal.
 """
+
+NORMAL_CONSISTENCY = 1.4826
+"""Standard deviation of a normal error over the median of its absolute value."""
+
+LEAST_SCATTER = 1e-6
+"""Standard deviation in mm taken at least: a nanometre, finer than anything measured."""
+
+WEIGHT_STEPS = 1024
+"""Weights are whole multiples of one over this, so that rounds of weighting end."""
+
+MOST_ROUNDS = 25
+"""Rounds of weighting after which the weights are taken as they are; some ten are usual, but steps can alternate."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,11 +128,13 @@ class Fit:
     accepted : Trial
         Orders and quality of `polynomial`.
     rms : float
-        Root mean square residual in mm.
+        Root mean square residual in mm, over all measurements with equal weight.
     rejected : tuple of Trial
         The smaller polynomials that fell short, in the order they were tried.
     covered : tuple of (float, float)
         Least and largest voltage in V and temperature in degC of the measurements.
+    weights : tuple of float
+        Weight of each measurement, in (0, 1]; empty where all have the same, as without `robust`.
     """
 
     polynomial: Polynomial
@@ -131,6 +142,7 @@ class Fit:
     rms: float
     rejected: tuple[Trial, ...]
     covered: tuple[tuple[float, float], tuple[float, float]]
+    weights: tuple[float, ...] = ()
 
     @property
     def orders(self) -> tuple[int, int]:
@@ -171,7 +183,7 @@ def _refuse_repeated_row(table: CsvTable) -> None:
             raise table.refuse(index, f"row must be a measurement of its own, not a duplicate of line {line}")
 
 
-def fit(measurements: Measurements, required_r: float = REQUIRED_R) -> Fit:
+def fit(measurements: Measurements, required_r: float = REQUIRED_R, *, robust: bool = False) -> Fit:
     """Find the smallest polynomial whose adjusted r reaches `required_r`.
 
     1. Orders (m, n) are tried by rising count of terms from (1, 1) on; among equals the lower total
@@ -184,6 +196,11 @@ def fit(measurements: Measurements, required_r: float = REQUIRED_R) -> Fit:
     Orders that the measurements cannot determine are passed over: too few rows, or too few different
     values of a variable.
 
+    With `robust`, step 2 weights each measurement by ``min(1, HUBER * s / |residual|)``, where s is the scatter by
+    the median of the absolute residuals, until the weights stay (Huber's M-estimate by iterated weighting).
+    RSS and TSS are weighted likewise. A measurement that is far off both in clearance and in voltage or temperature
+    can still pull the fit towards itself: its leverage tells.
+
     Raises
     ------
     SpecificationError
@@ -191,25 +208,25 @@ def fit(measurements: Measurements, required_r: float = REQUIRED_R) -> Fit:
         voltage and temperature only together; if no polynomial up to `HIGHEST_ORDER` is good enough.
     """
     _check_variation(measurements)
-    voltage, temperature = _Mapping.of(measurements.voltage), _Mapping.of(measurements.temperature)
-    x, y = voltage(measurements.voltage), temperature(measurements.temperature)
+    count = len(measurements)
     rejected: list[Trial] = []
+    minimize = _huber(measurements) if robust else _least_squares(measurements)
     for orders in candidate_orders():
-        terms = _terms(orders)
-        scaled = _least_squares(x, y, measurements.clearance, terms) if len(terms) < len(measurements) else None
-        if scaled is None:
+        terms = terms_of(orders)
+        found = minimize(terms) if len(terms) < count else None
+        if found is None:
             if not rejected:
                 raise SpecificationError(
                     f"{measurements.source}: voltage_V and temperature_C must vary independently, "
                     "not along one straight line"
                 )
             continue
-        polynomial = _unscale(dict(zip(terms, scaled.tolist(), strict=True)), voltage, temperature)
-        residual = measurements.clearance - polynomial(measurements.voltage, measurements.temperature)
-        trial = Trial(orders, len(terms), _adjusted_r_squared(measurements.clearance, residual, len(terms)))
+        solution, weights = found
+        unexplained = (solution.residual_squares / (count - len(terms))) / (solution.total_squares / (count - 1))
+        trial = Trial(orders, len(terms), 1.0 - float(unexplained))
         if trial.adjusted_r >= required_r:
-            rms = math.sqrt(float(np.mean(residual**2)))
-            return Fit(polynomial, trial, rms, tuple(rejected), measurements.covered)
+            rms = root_mean_square(residuals(measurements, solution.polynomial))
+            return Fit(solution.polynomial, trial, rms, tuple(rejected), measurements.covered, weights)
         rejected.append(trial)
     best = max(rejected, key=lambda trial: trial.adjusted_r_squared)
     raise SpecificationError(
@@ -219,19 +236,64 @@ def fit(measurements: Measurements, required_r: float = REQUIRED_R) -> Fit:
     )
 
 
+def residuals(measurements: Measurements, polynomial: Polynomial) -> Values:
+    """Measured clearance minus that of `polynomial`, in mm, shape (n,)."""
+    return measurements.clearance - polynomial(measurements.voltage, measurements.temperature)
+
+
+def root_mean_square(values: Values) -> float:
+    """Root of the mean square; the sum is rounded once, so that it is the same on every machine."""
+    return math.sqrt(math.fsum(values**2) / len(values))
+
+
+_Minimize = Callable[[tuple[Term, ...]], tuple[Solution, tuple[float, ...]] | None]
+"""From terms to coefficients and weights, or None if the measurements do not determine them."""
+
+
+def _least_squares(measurements: Measurements) -> _Minimize:
+    sums = Sums(measurements.clearance, measurements.voltage, measurements.temperature)
+
+    def minimize(terms: tuple[Term, ...]) -> tuple[Solution, tuple[float, ...]] | None:
+        solution = sums.solve(terms)
+        return None if solution is None else (solution, ())
+
+    return minimize
+
+
+def _huber(measurements: Measurements) -> _Minimize:
+    def minimize(terms: tuple[Term, ...]) -> tuple[Solution, tuple[float, ...]] | None:
+        weights = np.ones(len(measurements))
+        round_number = 0
+        while True:
+            round_number += 1
+            sums = Sums(measurements.clearance, measurements.voltage, measurements.temperature, weights)
+            solution = sums.solve(terms)
+            if solution is None:
+                return None
+            off = np.abs(residuals(measurements, solution.polynomial))
+            allowed = HUBER * max(NORMAL_CONSISTENCY * float(np.median(off)), LEAST_SCATTER)
+            exact = allowed / np.maximum(off, allowed)
+            before, weights = weights, np.maximum(np.rint(exact * WEIGHT_STEPS), 1.0) / WEIGHT_STEPS
+            if round_number == MOST_ROUNDS or np.array_equal(before, weights):
+                return solution, tuple(before.tolist())
+
+    return minimize
+
+
 def candidate_orders() -> tuple[tuple[int, int], ...]:
     """Orders (m, n) in the sequence in which `fit` tries them."""
     every = [(m, n) for m in range(1, HIGHEST_ORDER + 1) for n in range(1, HIGHEST_ORDER + 1)]
-    return tuple(sorted(every, key=lambda orders: (len(_terms(orders)), max(orders), orders[1])))
+    return tuple(sorted(every, key=lambda orders: (len(terms_of(orders)), max(orders), orders[1])))
 
 
-def _terms(orders: tuple[int, int]) -> tuple[tuple[int, int], ...]:
+def terms_of(orders: tuple[int, int]) -> tuple[Term, ...]:
+    """Powers (i, j) of voltage and temperature that a polynomial of `orders` has."""
     m, n = orders
     return tuple((i, j) for i in range(m + 1) for j in range(n + 1) if i + j <= max(m, n))
 
 
 def _check_variation(measurements: Measurements) -> None:
-    fewest = len(_terms((1, 1))) + 1
+    fewest = len(terms_of((1, 1))) + 1
     if len(measurements) < fewest:
         raise SpecificationError(
             f"{measurements.source} must hold at least {fewest} measurements for a linear regression, "
@@ -241,54 +303,3 @@ def _check_variation(measurements: Measurements) -> None:
     for name, values in zip(COLUMNS, columns, strict=True):
         if values.min() == values.max():
             raise SpecificationError(f"{measurements.source}: {name} must vary, not be {values[0]} in every row")
-
-
-@dataclass(frozen=True)
-class _Mapping:
-    """``x = (value - centre) / half``, into [-1, 1]; `half` is a power of two, so that dividing is exact."""
-
-    centre: float
-    half: float
-
-    @classmethod
-    def of(cls, values: Values) -> _Mapping:
-        low, high = float(values.min()), float(values.max())
-        centre = low + (high - low) / 2
-        return cls(centre, 2.0 ** math.ceil(math.log2(max(high - centre, centre - low))))
-
-    def __call__(self, values: Values) -> Values:
-        return (values - self.centre) / self.half
-
-    def power(self, exponent: int) -> Iterator[tuple[int, Fraction]]:
-        """Powers and exact coefficients of ``x**exponent`` as a polynomial of the value."""
-        centre, half = Fraction(self.centre), Fraction(self.half)
-        for k in range(exponent + 1):
-            yield k, math.comb(exponent, k) * (-centre) ** (exponent - k) / half**exponent
-
-
-def _least_squares(x: Values, y: Values, d: Values, terms: tuple[tuple[int, int], ...]) -> Values | None:
-    """Coefficients of `terms` in the mapped variables, or None if they are not determined."""
-    matrix = np.stack([x**i * y**j for i, j in terms], axis=1)
-    length = np.linalg.norm(matrix, axis=0)
-    if not length.all():
-        return None
-    solution, _, rank, _ = np.linalg.lstsq(matrix / length, d, rcond=RANK_TOLERANCE)
-    return np.asarray(solution / length) if rank == len(terms) else None
-
-
-def _unscale(scaled: dict[tuple[int, int], float], voltage: _Mapping, temperature: _Mapping) -> Polynomial:
-    """Polynomial of volts and degC, expanded exactly; then each coefficient rounded once, to a double."""
-    m, n = (max(term[axis] for term in scaled) for axis in (0, 1))
-    sums = [[Fraction(0)] * (n + 1) for _ in range(m + 1)]
-    for (i, j), value in scaled.items():
-        for p, v in voltage.power(i):
-            for q, t in temperature.power(j):
-                sums[p][q] += Fraction(value) * v * t
-    widths = [max(j for i, j in scaled if i == p) + 1 for p in range(m + 1)]
-    return Polynomial.from_numbers([[float(a) for a in row[:width]] for row, width in zip(sums, widths, strict=True)])
-
-
-def _adjusted_r_squared(d: Values, residual: Values, terms: int) -> float:
-    rss = float(np.sum(residual**2))
-    tss = float(np.sum((d - d.mean()) ** 2))
-    return 1.0 - (rss / (len(d) - terms)) / (tss / (len(d) - 1))

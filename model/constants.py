@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from sosmith.model.datapath import Datapath, Stage
 from sosmith.model.graph import Graph, Node, Op
 from sosmith.model.horner import HornerStep
+from sosmith.model.port import Port
 
 SPARE_BITS = 1
 """Bits that a constant has more than its value takes with its sign."""
@@ -74,7 +75,8 @@ def with_room(datapath: Datapath) -> Datapath:
     """Return `datapath` with ranges for hardware whose constants can be loaded.
 
     Products and sums hold whatever a constant of its width may make. Ranges that are proven, not computed, have
-    `SPARE_BITS` more bits: a set whose own proven ranges are wider is not to be loaded.
+    `SPARE_BITS` more bits: a set whose own proven ranges are wider is not to be loaded, nor one whose output leaves
+    its port's range where nothing limits it.
     """
     widths = {(constant.stage, constant.node): constant.bits for constant in constants(datapath)}
     stages: list[Stage] = []
@@ -83,18 +85,74 @@ def with_room(datapath: Datapath) -> Datapath:
         bits = {node: width for (number, node), width in widths.items() if number == place}
         graph = _roomy(stage.graph, ends, bits)
         ends = [(graph.nodes[i].low, graph.nodes[i].high) for i in graph.outputs]
-        stages.append(RoomyStage(stage.name, graph))
+        stages.append(_with_graph(stage, graph))
+    stages[-1] = _with_graph(stages[-1], _ending(stages[-1].graph, datapath.output))
     return replace(datapath, stages=tuple(stages))
 
 
-def _roomy(graph: Graph, inputs: Sequence[tuple[int, int]], bits: Mapping[int, int]) -> Graph:
-    """Compute all ranges anew; once more for each delay in a row, as a delay comes before what it remembers."""
+def _ending(graph: Graph, port: Port) -> Graph:
+    """Return the last stage with a result no wider than its port: where nothing limits it, sets must keep to that."""
+    (output,) = graph.outputs
+    nodes = list(graph.nodes)
+    node = nodes[output]
+    nodes[output] = replace(node, low=max(node.low, port.lowest), high=min(node.high, port.highest))
+    return replace(graph, nodes=tuple(nodes))
+
+
+def with_ranges(datapath: Datapath, ranges: Sequence[Mapping[str, tuple[int, int]]]) -> Datapath:
+    """Return `datapath` with other ranges for what is proven, not computed, and all others made anew from these.
+
+    Parameters
+    ----------
+    datapath : Datapath
+        What is computed.
+    ranges : sequence of mapping of str to (int, int)
+        For each stage the smallest and largest codes of its inputs and BOUND nodes, by name, as far as they change.
+        An input's range is at least that of the output before it, and may be wider: delays hold what came earlier.
+
+    Raises
+    ------
+    ValueError
+        If the output's range leaves that of its port.
+    """
+    stages: list[Stage] = []
+    ends = [(port.lowest, port.highest) for port in datapath.inputs]
+    for stage, given in zip(datapath.stages, ranges, strict=True):
+        nodes = stage.graph.nodes
+        wide = [
+            (min(low, given.get(nodes[i].name, (low, high))[0]), max(high, given.get(nodes[i].name, (low, high))[1]))
+            for i, (low, high) in zip(stage.graph.inputs, ends, strict=True)
+        ]
+        stated = {i: given.get(node.name, (node.low, node.high)) for i, node in enumerate(nodes) if node.op is Op.BOUND}
+        graph = _roomy(stage.graph, wide, {}, stated)
+        ends = [(graph.nodes[i].low, graph.nodes[i].high) for i in graph.outputs]
+        stages.append(_with_graph(stage, graph))
+    return replace(datapath, stages=tuple(stages))
+
+
+def _with_graph(stage: Stage, graph: Graph) -> Stage:
+    """Return a stage with other ranges; one of the polynomial stays one, for its constants can be loaded."""
+    return replace(stage, graph=graph) if isinstance(stage, HornerStep) else RoomyStage(stage.name, graph)
+
+
+def _roomy(
+    graph: Graph,
+    inputs: Sequence[tuple[int, int]],
+    bits: Mapping[int, int],
+    stated: Mapping[int, tuple[int, int]] | None = None,
+) -> Graph:
+    """Compute all ranges but those that are `stated` anew; once more for each delay in a row.
+
+    A delay comes before what it remembers.
+    """
     nodes = list(graph.nodes)
     for _ in range(len(graph.delays) + 1):
         supply = iter(inputs)
         for index, node in enumerate(graph.nodes):
             if node.op is Op.INPUT:
                 low, high = next(supply)
+            elif stated is not None and index in stated:
+                low, high = stated[index]
             else:
                 low, high = _ends(node, [nodes[i] for i in node.operands], bits.get(index))
             nodes[index] = replace(node, low=low, high=high)
@@ -119,7 +177,8 @@ def _ends(node: Node, operands: Sequence[Node], bits: int | None) -> tuple[int, 
         return min(products), max(products)
     if node.op in {Op.FLOOR, Op.TRUNCATE}:
         shift = operands[0].frac - node.frac
-        return first[0] >> shift, first[1] >> shift
+        up = (1 << shift) - 1 if node.op is Op.TRUNCATE else 0
+        return first[0] >> shift, max(first[1] >> shift, min(first[1] + up >> shift, 0))
     return first if node.op is not Op.DELAY else (min(first[0], 0), max(first[1], 0))
 
 

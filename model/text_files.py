@@ -1,4 +1,4 @@
-"""Writes text files so that an interruption leaves each of them old or new, never half."""
+"""Writes files so that an interruption leaves each of them old or new, never half."""
 
 from __future__ import annotations
 
@@ -24,16 +24,21 @@ def write_files(directory: Path, texts: Mapping[str, str]) -> list[Path]:
     SpecificationError
         If the folder cannot be made or written, or a file's name is taken by a folder; nothing is written then.
     """
+    return write_contents(directory, {name: text.encode() for name, text in texts.items()})
+
+
+def write_contents(directory: Path, contents: Mapping[str, bytes]) -> list[Path]:
+    """Write bytes as `write_files` does texts."""
     try:
         directory.mkdir(parents=True, exist_ok=True)
         # Files in a scratch folder get the permissions that the user's umask gives any new file.
         with tempfile.TemporaryDirectory(prefix=".sosmith-", dir=directory) as scratch:
-            for name, text in texts.items():
-                (Path(scratch) / name).write_text(text, encoding="utf-8", newline="\n")
-            for name in texts:
+            for name, content in contents.items():
+                (Path(scratch) / name).write_bytes(content)
+            for name in contents:
                 if (directory / name).is_dir():
                     raise SpecificationError(f"{directory / name}: the output file must be a file, not a folder")
-            return [(Path(scratch) / name).replace(directory / name) for name in texts]
+            return [(Path(scratch) / name).replace(directory / name) for name in contents]
     except OSError as error:
         raise SpecificationError(
             f"{directory}: the output folder must be a folder that can be written, not: {error.strerror}"

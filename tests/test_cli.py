@@ -110,6 +110,7 @@ NEEDED = {
     "design": ("SPEC", "--core", "--realization", "--widths-of", "--json"),
     "generate": ("SPEC", "SystemVerilog", "-o, --output", "build/<name>"),
     "verify": ("CERTIFICATE", "sosmith generate", "--json"),
+    "reload": ("SPEC OTHER", "max_error", "--active", "--reset", "--version", "docs/registers.md", "reload.json"),
     "simulate": (
         "SPEC",
         "--trace FILE.csv|SCENARIO",
@@ -121,6 +122,7 @@ NEEDED = {
     ),
     "emulate": ("SPEC", "[SCENARIO]", "CSV", "--seconds", "--seed", "stdout"),
     "compare": ("REPORT REPORT...", "--json", "HTML"),
+    "calibrate": ("clearance_mm", "sosmith calibrate add", "export"),
     "demo": ("build/demo", "--seed"),
 }
 
@@ -145,7 +147,7 @@ def test_version(sosmith: Command) -> None:
     assert sosmith("--version").stdout == f"sosmith, version {__version__}\n"
 
 
-@pytest.mark.parametrize("command", ["build", "explore", "calibrate", "monitor", "board"])
+@pytest.mark.parametrize("command", ["build", "explore", "monitor", "board"])
 def test_commands_of_the_contract_that_are_still_to_come(command: str, sosmith: Command) -> None:
     outcome = sosmith(command, "something")
     assert outcome.status == 2
@@ -479,6 +481,53 @@ def test_generate_prints_the_paths_of_its_files(sosmith: Command) -> None:
     assert sorted(Path("build/plain").iterdir()) == sorted(paths)
     elsewhere = sosmith("generate", "plain.toml", "-o", "else where/[b]")
     assert {Path(line).parent for line in elsewhere.stdout.splitlines()} == {Path("else where/[b]")}
+
+
+def reloadable(cutoff: str) -> str:
+    """Return the filter in hardware that can be reloaded, with another cutoff."""
+    hardware = '[hardware]\nrealization = "df1_ef2"\narchitecture = "folded"\nreload = true\n'
+    return FILTER.replace("cutoff = 100.0", f"cutoff = {cutoff}") + hardware
+
+
+def test_reload_proves_a_set_and_writes_what_loads_it(sosmith: Command) -> None:
+    Path("core.toml").write_text(reloadable("100.0"), encoding="utf-8")
+    Path("next.toml").write_text(reloadable("105.0").replace('"faithful"', "0.0006"), encoding="utf-8")
+    outcome = sosmith("reload", "core.toml", "next.toml", "--version", "7")
+    assert outcome.status == 0
+    assert outcome.messages == ["sosmith: wrote build/plain/next.reload.json"]
+    for phrase in ("the set may be loaded", "105 Hz", "error bound", "headroom", "samples", "version 7", "CRC 0x"):
+        assert phrase in outcome.stdout
+    written = json.loads(Path("build/plain/next.reload.json").read_text(encoding="utf-8"))
+    assert (written["version"], len(written["writes"])) == (7, written["words"] + 2)
+    assert 0 < written["transient_samples"] < 1000
+    sosmith("generate", "core.toml")
+    manifest = json.loads(Path("build/plain/plain.json").read_text(encoding="utf-8"))
+    assert {key: manifest["reload"][key] for key in ("design", "words")} == {
+        key: written[key] for key in ("design", "words")
+    }
+    assert all(Path("build/plain", name).is_file() for name in manifest["reload"]["registers"])
+    again = sosmith("reload", "core.toml", "core.toml", "--active", "next.toml", "--reset", "--json", "-o", "back.json")
+    assert json.loads(again.stdout) == json.loads(Path("back.json").read_text(encoding="utf-8"))
+    assert json.loads(again.stdout)["transient_samples"] == 0
+
+
+def test_reload_refuses_a_set_that_breaks_the_bound(sosmith: Command) -> None:
+    Path("core.toml").write_text(reloadable("100.0"), encoding="utf-8")
+    Path("next.toml").write_text(reloadable("105.0").replace('"faithful"', "0.00025"), encoding="utf-8")
+    outcome = sosmith("reload", "core.toml", "next.toml")
+    assert (outcome.status, outcome.stdout) == (1, "")
+    (message,) = outcome.messages
+    assert re.fullmatch(
+        r"sosmith: error: the set must keep its error within 250 × 10⁻⁶, and is proven to [\d.]+ × 10⁻⁶ only: "
+        "nothing is to be loaded",
+        message,
+    )
+    assert not Path("build").exists()
+
+
+def test_reload_needs_hardware_that_can_be_reloaded(sosmith: Command) -> None:
+    message = "plain.toml: hardware.reload must be true for a set to be loaded, not false"
+    refused(sosmith("reload", "plain.toml", "plain.toml"), message)
 
 
 def test_emulate_lists_prints_and_writes(sosmith: Command) -> None:

@@ -1,7 +1,7 @@
 """The documents: what the README shows is what the commands print, and the maps of the code are true.
 
 Run as a script, it renews what is generated in them: the output in the README, the file table of the
-architecture, the register map.
+architecture, the register map, the commands and the schema of the calibration.
 """
 
 import ast
@@ -9,6 +9,7 @@ import contextlib
 import re
 import shlex
 import tempfile
+import textwrap
 from pathlib import Path
 
 import pytest
@@ -16,10 +17,12 @@ from click.testing import CliRunner
 
 from sosmith.cli import cli
 from sosmith.gen.register_map import markdown
+from sosmith.model.measurement_store import SCHEMA
 
 ROOT = Path(__file__).parents[1]
 README = ROOT / "README.md"
 ARCHITECTURE = ROOT / "docs" / "architecture.md"
+CALIBRATION = ROOT / "docs" / "calibration.md"
 REGISTERS = ROOT / "docs" / "registers.md"
 DOCUMENTS = [README, ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").glob("*.md"))]
 ROOMS = ("model", "hdl", "gen", "sim")
@@ -30,6 +33,9 @@ NEEDS_SIMULATION = ("./run simulate ", "./run compare ")
 
 _OUTPUT = re.compile(r"(?<=```text\n).*?(?=```)", re.DOTALL)
 _REGISTERS = re.compile(r"(?<=<!-- registers -->\n).*?(?=<!-- end of registers -->)", re.DOTALL)
+_SCHEMA = re.compile(r"(?<=<!-- schema -->\n).*?(?=<!-- end of schema -->)", re.DOTALL)
+_SHOWN = re.compile(r"```sh\n(?P<lines>[^`]*)```\n\n```text\n(?P<output>[^`]*)```")
+"""Lines of a shell, directly followed by what they print."""
 _TABLE = re.compile(r"(?<=\| file \| holds \|\n\|---\|---\|\n).*?(?=\n## )", re.DOTALL)
 
 
@@ -60,6 +66,28 @@ def worked_example(folder: Path) -> str:
     return "".join(f"{line.rstrip()}\n" for line in printed.strip().splitlines())
 
 
+def with_output(text: str, folder: Path) -> str:
+    """Renew what the lines of a document's shell blocks print, one block after another in the same folder."""
+
+    def renewed(block: re.Match[str]) -> str:
+        printed = "".join(run(line, folder) for line in block["lines"].splitlines())
+        shown = "".join(f"{line.rstrip()}\n" for line in printed.strip().splitlines())
+        return f"```sh\n{block['lines']}```\n\n```text\n{shown}```"
+
+    return _SHOWN.sub(renewed, text)
+
+
+def schema() -> str:
+    """Statements that make the store of measurements, as SQL."""
+    return "```sql\n" + "".join(f"{textwrap.dedent('    ' + statement)};\n" for statement in SCHEMA) + "```\n"
+
+
+def furnish(folder: Path) -> Path:
+    """Put the examples where a clone of the repository has them."""
+    (folder / "examples").symlink_to(ROOT / "examples")
+    return folder
+
+
 def file_table() -> str:
     """One row for each module of the rooms: its path, and the first line of its docstring."""
     rows = []
@@ -73,7 +101,7 @@ def file_table() -> str:
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
-    return tmp_path
+    return furnish(tmp_path)
 
 
 def test_the_output_shown_is_what_the_command_prints(folder: Path) -> None:
@@ -108,6 +136,16 @@ def test_the_register_map_is_up_to_date() -> None:
     assert _REGISTERS.findall(REGISTERS.read_text(encoding="utf-8")) == [markdown()]
 
 
+def test_calibration_prints_what_is_shown(folder: Path) -> None:
+    shown = CALIBRATION.read_text(encoding="utf-8")
+    assert len(_SHOWN.findall(shown)) == 2
+    assert shown == with_output(shown, folder)
+
+
+def test_the_schema_is_the_one_of_the_store() -> None:
+    assert _SCHEMA.findall(CALIBRATION.read_text(encoding="utf-8")) == [schema()]
+
+
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
 def test_links_and_paths_lead_somewhere(document: Path) -> None:
     text = document.read_text(encoding="utf-8")
@@ -134,5 +172,8 @@ def renew(document: Path, part: re.Pattern[str], text: str) -> None:
 if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as scratch, contextlib.chdir(scratch):
         renew(README, _OUTPUT, worked_example(Path(scratch)))
+        text = CALIBRATION.read_text(encoding="utf-8")
+        CALIBRATION.write_text(with_output(text, furnish(Path(scratch))), encoding="utf-8")
     renew(ARCHITECTURE, _TABLE, file_table())
     renew(REGISTERS, _REGISTERS, markdown())
+    renew(CALIBRATION, _SCHEMA, schema())

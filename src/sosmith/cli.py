@@ -6,26 +6,20 @@ failed; 130 interrupted.
 
 from __future__ import annotations
 
-import json
 import math
-import os
 import signal
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from fractions import Fraction
 from pathlib import Path
 from types import FrameType
 from typing import Any
 
 import click
-from rich import box
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
-from rich.table import Table
 
 import sosmith
+from sosmith.calibrate_cli import calibrate
 from sosmith.gen.architecture import Architecture
 from sosmith.gen.boards import BOARDS, Board, find_board
 from sosmith.gen.certificate_file import Certificate, read_certificate
@@ -37,17 +31,31 @@ from sosmith.gen.generate import generate as generate_files
 from sosmith.gen.limit_cycles import limit_cycles, recursions
 from sosmith.gen.manifest import manifest, section_entries
 from sosmith.gen.realizations import ERROR_FEEDBACK, REALIZATIONS
+from sosmith.gen.reload import Swap, check_swap, own_set, set_for
+from sosmith.gen.reload_file import reload_json
 from sosmith.gen.report import write_report
-from sosmith.gen.specification import example, load
+from sosmith.gen.specification import Specification, example, load
 from sosmith.gen.verification import RejectedError, Verdict
 from sosmith.gen.verification import verify as verify_certificate
 from sosmith.model.errors import SosmithError, SpecificationError, ToolError
 from sosmith.model.program import Program
 from sosmith.model.scenarios import SCENARIOS
-from sosmith.model.text_files import write_files
+from sosmith.model.text_files import to_json, write_files
 from sosmith.sim.simulation import bench_of, default_scenario, simulate, traces_for
+from sosmith.terminal import (
+    JSON_OPTION,
+    Step,
+    TableConsole,
+    new_table,
+    note,
+    output_option,
+    print_json,
+    reader_may_leave,
+    show_progress,
+    silence_stdout,
+)
 
-_LATER = ("build", "explore", "calibrate", "monitor", "board")
+_LATER = ("build", "explore", "monitor", "board")
 """Commands that this version does not have yet."""
 
 _INTERRUPTED = 130
@@ -66,7 +74,7 @@ class _Commands(click.Group):
         return super().get_command(ctx, cmd_name)
 
     def invoke(self, ctx: click.Context) -> Any:
-        with _reader_may_leave():
+        with reader_may_leave():
             return super().invoke(ctx)
 
 
@@ -81,13 +89,6 @@ class _Share(click.FloatRange):
         if math.isnan(share):
             self.fail(f"{value} is not in the range {self._describe_range()}.", param, ctx)
         return share
-
-
-class _Console(Console):
-    """Leaves it to `_reader_may_leave` when the reader of its output has gone."""
-
-    def on_broken_pipe(self) -> None:
-        raise BrokenPipeError
 
 
 _HELP = """From a filter specification and calibration data to FPGA hardware that is checked bit for bit.
@@ -124,7 +125,7 @@ _WIDTHS_OF = click.option(
     type=click.Choice(ERROR_FEEDBACK),
     help="Keep the word lengths chosen for this realization, to compare structures at equal width.",
 )
-_JSON = click.option("--json", "as_json", is_flag=True, help="Print JSON instead of tables.")
+
 _BOARD = click.option(
     "--board",
     metavar="BOARD",
@@ -140,10 +141,6 @@ _SECONDS = click.option(
 )
 
 
-def _output_option(text: str) -> Callable[[Any], Any]:
-    return click.option("-o", "--output", type=click.Path(path_type=Path), help=text)
-
-
 @cli.command()
 @click.argument("file", type=click.Path(path_type=Path), default=Path("flange_wear.toml"))
 @click.option("--force", is_flag=True, help="Overwrite an existing file.")
@@ -152,7 +149,7 @@ def init(file: Path, force: bool) -> None:
     if file.exists() and not force:
         raise SpecificationError(f"{file}: the file must not exist yet; use --force to overwrite it")
     write_files(file.parent, {file.name: example()})
-    _note(f"wrote {file}; next: sosmith design {file}")
+    note(f"wrote {file}; next: sosmith design {file}")
 
 
 @cli.command()
@@ -161,18 +158,18 @@ def init(file: Path, force: bool) -> None:
 @_REALIZATION
 @_WIDTHS_OF
 @_BOARD
-@_JSON
+@JSON_OPTION
 def design(
     spec: Path, core: str | None, realization: str | None, widths_of: str | None, board: str | None, as_json: bool
 ) -> None:
     """Show the design of SPEC: order, sections, realization, formats, error budget, cost."""
     target = _board(board)
-    with _progress() as step:
+    with show_progress() as step:
         made = design_core(
             load(spec), core=core, realization=realization, widths_of=widths_of, board=target, progress=step
         )
     if as_json:
-        _print_json(manifest(made))
+        print_json(manifest(made))
     else:
         _print_design(made)
 
@@ -183,7 +180,7 @@ def design(
 @_REALIZATION
 @_WIDTHS_OF
 @_BOARD
-@_output_option("Folder for the files.  [default: build/<name>]")
+@output_option("Folder for the files.  [default: build/<name>]")
 def generate(
     spec: Path,
     core: str | None,
@@ -197,7 +194,7 @@ def generate(
     The paths of the files go to stdout, one a line. Two runs write the same bytes.
     """
     target = _board(board)
-    with _progress() as step:
+    with show_progress() as step:
         made = design_core(
             load(spec), core=core, realization=realization, widths_of=widths_of, board=target, progress=step
         )
@@ -208,7 +205,7 @@ def generate(
 
 @cli.command()
 @click.argument("certificate", type=click.Path(path_type=Path))
-@_JSON
+@JSON_OPTION
 def verify(certificate: Path, as_json: bool) -> None:
     """Prove CERTIFICATE again: the error bound, and that nothing inside can overflow.
 
@@ -216,15 +213,89 @@ def verify(certificate: Path, as_json: bool) -> None:
     method than the one it was made with. Exits with 1 and the reason if anything claimed is not exactly what follows.
     """
     read = read_certificate(certificate)
-    with _progress() as step:
+    with show_progress() as step:
         try:
             verdict = verify_certificate(read, step)
         except RejectedError as error:
             raise RejectedError(f"{certificate}: {error}") from None
     if as_json:
-        _print_json(_verdict_json(read, verdict))
+        print_json(_verdict_json(read, verdict))
     else:
         _print_verdict(read, verdict)
+
+
+@cli.command("reload")
+@_SPEC
+@click.argument("other", type=click.Path(path_type=Path))
+@_CORE
+@_REALIZATION
+@_WIDTHS_OF
+@_BOARD
+@click.option(
+    "--active",
+    type=click.Path(path_type=Path),
+    help="Specification of the set that the core runs when it is loaded.  [default: SPEC]",
+)
+@click.option(
+    "--reset",
+    is_flag=True,
+    help="The core will be reset between the swap and its next sample: no transient then, and more sets fit.",
+)
+@click.option(
+    "--version",
+    type=click.IntRange(0, (1 << 32) - 1),
+    default=1,
+    show_default=True,
+    help="What the register VERSION is to read once the set is active.",
+)
+@JSON_OPTION
+@output_option("JSON file for the register writes.  [default: build/<name>/<stem of OTHER>.reload.json]")
+def reload_command(
+    spec: Path,
+    other: Path,
+    core: str | None,
+    realization: str | None,
+    widths_of: str | None,
+    board: str | None,
+    active: Path | None,
+    reset: bool,
+    version: int,
+    as_json: bool,
+    output: Path | None,
+) -> None:
+    """Prove a set of constants for a core that runs, and write what loads it.
+
+    SPEC is what the core was generated from, with `reload = true` under [hardware], and with the same options. OTHER is
+    a specification with another [calibration], [filter] or max_error, all else as in SPEC; its [hardware] does not
+    count.
+
+    The hardware keeps its word lengths, so not every set fits. This proves that the new set keeps its error within
+    OTHER's max_error, and that nothing inside can wrap while the filter still remembers the set before. The table says
+    after how many samples the bound holds again; no other swap may follow before. Exits with 1 and the reason if the
+    set is refused: then do not load it.
+
+    The file's `writes` are pairs of a byte address and a word for the AXI4-Lite port, in order. Before, compare
+    `design` with the register DESIGN. docs/registers.md has the registers.
+    """
+    target = _board(board)
+    with show_progress() as step:
+        made = design_core(
+            load(spec), core=core, realization=realization, widths_of=widths_of, board=target, progress=step
+        )
+        step("set")
+        wanted = load(other)
+        new = set_for(made, wanted)
+        before = own_set(made) if active is None else set_for(made, load(active))
+        step("swap")
+        swap = check_swap(made, None if reset else before, new)
+    tree = reload_json(made, swap, version)
+    path = output or _default_folder(made) / f"{other.stem}.reload.json"
+    write_files(path.parent, {path.name: to_json(tree)})
+    if as_json:
+        print_json(tree)
+    else:
+        _print_swap(made, wanted, swap, tree)
+    note(f"wrote {path}")
 
 
 @cli.command("simulate")
@@ -268,8 +339,8 @@ def verify(certificate: Path, as_json: bool) -> None:
 @click.option("--waves", is_flag=True, help="Write a waveform (VCD) too.")
 @_SECONDS
 @_SEED
-@_JSON
-@_output_option("Folder for the files.  [default: build/<name>]")
+@JSON_OPTION
+@output_option("Folder for the files.  [default: build/<name>]")
 def simulate_command(
     spec: Path,
     core: str | None,
@@ -298,7 +369,7 @@ def simulate_command(
     """
     netlist_for = _board(gates)
     target = _board(board) or netlist_for
-    with _progress() as step:
+    with show_progress() as step:
         made = design_core(
             load(spec), core=core, realization=realization, widths_of=widths_of, board=target, progress=step
         )
@@ -324,12 +395,12 @@ def simulate_command(
 @_CORE
 @_SECONDS
 @_SEED
-@_output_option("CSV file to write.  [default: stdout]")
+@output_option("CSV file to write.  [default: stdout]")
 def emulate_command(
     spec: Path, scenario: str | None, core: str | None, seconds: float | None, seed: int, output: Path | None
 ) -> None:
     """Write an emulated sensor trace for SPEC as CSV; without SCENARIO, list the scenarios that fit."""
-    with _progress() as step:
+    with show_progress() as step:
         made = design_core(load(spec), core=core, progress=step)
         if scenario is None:
             _list_scenarios(made)
@@ -341,33 +412,36 @@ def emulate_command(
     if output is None:
         click.echo(trace.to_csv(), nl=False)
     else:
-        _note(f"wrote {output}: {len(trace)} samples at {float(trace.sample_rate):g} Hz")
+        note(f"wrote {output}: {len(trace)} samples at {float(trace.sample_rate):g} Hz")
 
 
 @cli.command("compare")
 @click.argument("reports", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="REPORT REPORT...")
-@_JSON
-@_output_option("Write a page with the comparison to this HTML file too.")
+@JSON_OPTION
+@output_option("Write a page with the comparison to this HTML file too.")
 def compare_command(reports: tuple[Path, ...], as_json: bool, output: Path | None) -> None:
     """Set accuracy reports side by side; each REPORT is a report.json or the folder that holds it."""
     loaded = [load_report(path) for path in reports]
     if output is not None:
         write_files(output.parent, {output.name: comparison_page(loaded)})
-        _note(f"wrote {output}")
+        note(f"wrote {output}")
     if as_json:
-        _print_json(comparison_json(loaded))
+        print_json(comparison_json(loaded))
         return
-    table = _table("Accuracy reports", ["", *map(escape, column_names(loaded))])
+    table = new_table("Accuracy reports", ["", *map(escape, column_names(loaded))])
     for row in compare_reports(loaded):
         cells = [
             f"[bold green]{escape(cell)}[/]" if k in row.best else escape(cell) for k, cell in enumerate(row.cells)
         ]
         table.add_row(escape(row.title), *cells)
-    _Console().print(table)
+    TableConsole().print(table)
+
+
+cli.add_command(calibrate)
 
 
 @cli.command()
-@_output_option("Folder for the files.  [default: build/demo]")
+@output_option("Folder for the files.  [default: build/demo]")
 @_SEED
 def demo(output: Path | None, seed: int) -> None:
     """Walk the whole road on the built-in example: a locomotive's flange wear at 100 Hz.
@@ -376,7 +450,7 @@ def demo(output: Path | None, seed: int) -> None:
     report.
     """
     folder = output or Path("build/demo")
-    with _progress() as step:
+    with show_progress() as step:
         step("writing the example specification")
         (spec,) = write_files(folder, {"flange_wear.toml": example()})
         made = design_core(load(spec), progress=step)
@@ -395,18 +469,18 @@ def main() -> None:
     try:
         status = cli.main(prog_name="sosmith", standalone_mode=False)
     except SosmithError as error:
-        _note(f"error: {error}")
+        note(f"error: {error}")
         status = error.exit_status
     except click.ClickException as error:
         error.show()
         status = error.exit_code
     except (KeyboardInterrupt, click.Abort):
-        _note("interrupted")
+        note("interrupted")
         status = _INTERRUPTED
     except OSError as error:
-        _note(f"error: {error.filename or 'the output'} must be readable and writable, not: {error.strerror}")
+        note(f"error: {error.filename or 'the output'} must be readable and writable, not: {error.strerror}")
         status = ToolError.exit_status
-        _silence_stdout()
+        silence_stdout()
     sys.exit(status)
 
 
@@ -415,24 +489,9 @@ def _stop(number: int, frame: FrameType | None) -> None:
     sys.exit(128 + number)
 
 
-@contextmanager
-def _reader_may_leave() -> Iterator[None]:
-    """Take it for no error if the reader of our output, such as ``head``, leaves before its end."""
-    try:
-        yield
-        sys.stdout.flush()
-    except BrokenPipeError:
-        _silence_stdout()
-
-
-def _silence_stdout() -> None:
-    """Let what is still in the buffer go nowhere: flushing it at exit would fail again."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-
-
 def _simulate(
     made: CoreDesign,
-    step: _Step,
+    step: Step,
     source: str | None,
     output: Path | None,
     seconds: float | None,
@@ -448,12 +507,12 @@ def _simulate(
 
 
 def _finish(summary: dict[str, Any], folder: Path, *, as_json: bool) -> None:
-    with _reader_may_leave():
+    with reader_may_leave():
         if as_json:
-            _print_json(summary)
+            print_json(summary)
         else:
             _print_summary(summary)
-    _note(f"report: {(folder / 'report.html').resolve().as_uri()}")
+    note(f"report: {(folder / 'report.html').resolve().as_uri()}")
     if not summary["passed"]:
         sys.exit(1)
 
@@ -480,74 +539,18 @@ def _fitting(made: CoreDesign) -> list[str]:
 
 def _list_scenarios(made: CoreDesign) -> None:
     bench = bench_of(made)
-    table = _table(f"Scenarios for {made.spec.name}", ["name", "seconds", "what it is"])
+    table = new_table(f"Scenarios for {made.spec.name}", ["name", "seconds", "what it is"])
     for name in _fitting(made):
         table.add_row(name, f"{SCENARIOS[name].default_seconds(bench):.4g}", SCENARIOS[name].description)
-    _Console().print(table)
-
-
-class _Step:
-    """Shows one step after another on stderr; called with a name, and with what is done of how much."""
-
-    def __init__(self, progress: Progress) -> None:
-        self._progress = progress
-        self._task = progress.add_task("", total=None)
-        self._name = ""
-
-    def __call__(self, name: str, done: int = 0, total: int = 0) -> None:
-        if name != self._name:
-            self._finish()
-            self._name = name
-            self._task = self._progress.add_task(name, total=None)
-        if total:
-            self._progress.update(self._task, completed=done, total=total)
-
-    def _finish(self) -> None:
-        if self._name:
-            self._progress.update(self._task, total=1, completed=1)
-        else:
-            self._progress.remove_task(self._task)
-
-    def close(self) -> None:
-        self._finish()
-
-
-@contextmanager
-def _progress() -> Iterator[_Step]:
-    columns = (
-        SpinnerColumn(finished_text="[green]✓[/]"),
-        TextColumn("{task.description}", markup=False),
-        BarColumn(bar_width=30),
-        TextColumn("{task.percentage:>3.0f} %"),
-        TimeElapsedColumn(),
-    )
-    with Progress(*columns, console=Console(stderr=True)) as progress:
-        step = _Step(progress)
-        yield step
-        step.close()
-
-
-def _note(text: str) -> None:
-    click.echo(f"sosmith: {text}", err=True)
-
-
-def _print_json(tree: Any) -> None:
-    click.echo(json.dumps(tree, indent=2, ensure_ascii=False, allow_nan=False))
-
-
-def _table(title: str, columns: list[str]) -> Table:
-    table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left", title_style="bold", show_header=any(columns))
-    for column in columns:
-        table.add_column(column, overflow="fold")
-    return table
+    TableConsole().print(table)
 
 
 def _print_design(made: CoreDesign, *, brief: bool = False) -> None:
-    console = _Console()
+    console = TableConsole()
     quantized, datapath = made.quantized, made.datapath
     unit = escape(f" {datapath.output.unit}") if datapath.output.unit else ""
     lsb = float(datapath.output.lsb)
-    overview = _table(f"{made.spec.name}: {made.core}", ["", ""])
+    overview = new_table(f"{made.spec.name}: {made.core}", ["", ""])
     if quantized.filter is not None:
         overview.add_row("filter", quantized.filter.describe)
         aliasing = quantized.filter.aliasing
@@ -574,7 +577,7 @@ def _print_design(made: CoreDesign, *, brief: bool = False) -> None:
     _print_budget(console, quantized.budget, datapath.output.lsb, datapath.output.unit, made.spec.max_error)
     if brief:
         return
-    sections = _table("Sections", ["section", "coefficients", "input", "states", "output"])
+    sections = new_table("Sections", ["section", "coefficients", "input", "states", "output"])
     for entry in (entry for section in quantized.sections for entry in section_entries(section)):
         coefficients = "\n".join(f"{c['name']} = {c['integer']} * 2^-{c['frac']}" for c in entry["coefficients"])
         states = "\n".join(f"{name} {form}" for name, form in entry["states"].items())
@@ -607,7 +610,7 @@ def _hardware_rows(architecture: Architecture) -> list[tuple[str, str]]:
 def _print_schedule(console: Console, program: Program | None) -> None:
     if program is None:
         return
-    table = _table(
+    table = new_table(
         f"Schedule: {len(program.instructions)} instructions for each sample of each channel",
         ["from", "clocks", "value", "words"],
     )
@@ -618,7 +621,7 @@ def _print_schedule(console: Console, program: Program | None) -> None:
 
 
 def _print_limit_cycles(console: Console, made: CoreDesign) -> None:
-    table = _table(
+    table = new_table(
         "Limit cycles: what a section's own rounding can sustain, in output LSB",
         ["section", "without input", "dead band", "Lyapunov weights"],
     )
@@ -631,7 +634,7 @@ def _print_limit_cycles(console: Console, made: CoreDesign) -> None:
 
 
 def _print_budget(console: Console, parts: dict[str, Fraction], lsb: Fraction, unit: str, max_error: Fraction) -> None:
-    budget = _table(
+    budget = new_table(
         "Error budget, proven for all inputs in range", ["part", escape(unit) or "full scale 1", "output LSB"]
     )
     bound = sum(parts.values(), Fraction(0))
@@ -639,6 +642,28 @@ def _print_budget(console: Console, parts: dict[str, Fraction], lsb: Fraction, u
         budget.add_row(part, f"{float(value * lsb):.3g}", f"{float(value):.4f}")
     budget.add_row("allowed", f"{float(max_error):.3g}", f"{float(max_error / lsb):.4f}")
     console.print(budget)
+
+
+def _print_swap(made: CoreDesign, wanted: Specification, swap: Swap, tree: dict[str, Any]) -> None:
+    console = TableConsole()
+    output, quantized = made.datapath.output, swap.made.quantized
+    unit = escape(f" {output.unit}".rstrip())
+    bound, allowed = quantized.bound * output.lsb, wanted.max_error
+    table = new_table(f"{made.spec.name}: the set may be loaded", ["", ""])
+    if quantized.filter is not None:
+        table.add_row("filter", quantized.filter.describe)
+    table.add_row("error bound", f"{float(bound):.3g}{unit} of {float(allowed):.3g}{unit} allowed")
+    table.add_row("headroom", f"{float(allowed - bound):.3g}{unit}, {float(100 * (1 - bound / allowed)):.1f} %")
+    if swap.samples:
+        seconds = swap.samples / float(made.spec.sample_rate)
+        table.add_row("transient", f"{swap.samples:,} samples, {seconds:.3g} s, until the bound holds")
+    else:
+        table.add_row("transient", "none, the bound holds from the first sample on")
+    table.add_row("states", f"take at most {100 * float(swap.use):.3g} % of what their words hold")
+    crc = tree["writes"][-1][1]
+    table.add_row("load", f"version {tree['version']}, {tree['words']:,} words, CRC 0x{crc:08X}")
+    table.add_row("for the design", f"0x{tree['design']:08X}")
+    console.print(table)
 
 
 def _verdict_json(certificate: Certificate, verdict: Verdict) -> dict[str, Any]:
@@ -656,7 +681,7 @@ def _verdict_json(certificate: Certificate, verdict: Verdict) -> dict[str, Any]:
 
 
 def _print_verdict(certificate: Certificate, verdict: Verdict) -> None:
-    console = _Console()
+    console = TableConsole()
     ranges = f"{verdict.nodes} nodes within their ranges, {verdict.ranges} by peak gains: nothing inside overflows"
     _print_budget(console, verdict.budget, certificate.output.lsb, certificate.output.unit, certificate.max_error)
     console.print(f"[bold green]proven[/]: {escape(certificate.name)}, {ranges}")
@@ -665,7 +690,7 @@ def _print_verdict(certificate: Certificate, verdict: Verdict) -> None:
 def _print_summary(summary: dict[str, Any]) -> None:
     unit = escape(f" {summary['error']['unit']}".rstrip())
     verdict = "[bold green]passed[/]" if summary["passed"] else "[bold red]fell short[/]"
-    table = _table(f"{summary['name']}: {verdict}", ["", ""])
+    table = new_table(f"{summary['name']}: {verdict}", ["", ""])
     exact = (
         "yes, every one"
         if summary["bit_exact"]
@@ -690,7 +715,7 @@ def _print_summary(summary: dict[str, Any]) -> None:
     gates = "" if summary["gates"] is None else f", the netlist for {summary['gates']}"
     speed = f"{summary['simulator']}{gates}, {summary['cycles']} clocks at {summary['cycles_per_second']:.3g} a second"
     table.add_row("simulated in", speed)
-    _Console().print(table)
+    TableConsole().print(table)
 
 
 if __name__ == "__main__":

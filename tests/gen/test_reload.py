@@ -1,23 +1,30 @@
 """Sets for hardware that exists: proven anew, loadable, and refused where they are not."""
 
+import zlib
 from dataclasses import replace
 from fractions import Fraction
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
 from tests.gen.designs import EXAMPLES, example_design
+from tests.gen.swaps import during, moved, worst_input
 
+from sosmith.gen import reload
 from sosmith.gen.core import CoreDesign, design_core
-from sosmith.gen.design import Filter, design
-from sosmith.gen.quantize import with_constants
+from sosmith.gen.design import design
+from sosmith.gen.quantize import Quantized, with_constants
 from sosmith.gen.realizations import REALIZATIONS
-from sosmith.gen.reload import OtherSet, other_set, parallel_bank, room_of
+from sosmith.gen.reload import ADVICE, OtherSet, check_swap, other_set, own_set, parallel_bank, room_of, set_for
+from sosmith.gen.reload_file import bank_size, register_writes, reload_json
 from sosmith.gen.specification import load
+from sosmith.hdl.folded import encoded
 from sosmith.model.constants import constants, unpacked
-from sosmith.model.errors import ShortfallError
+from sosmith.model.errors import ShortfallError, SpecificationError
 from sosmith.model.polynomial import Polynomial
-from sosmith.model.program import Program
+from sosmith.model.program import Do, Program
+from sosmith.model.reload_registers import CRC, DATA, VERSION
 from sosmith.model.swapping import compute_swapping
 
 EXACT = [name for name in REALIZATIONS if name != "state_space"]  # that one rounds its coefficients together
@@ -31,14 +38,6 @@ def hardware_in(architecture: str, example: str = "audio_lowpass.toml", *, clock
         spec.hardware, architecture=architecture, clock=Fraction(clock), realization="df1_ef2", reload=True
     )
     return design_core(replace(spec, hardware=hardware))
-
-
-def moved(hardware: CoreDesign, ratio: str) -> Filter:
-    """Design the hardware's filter with another cutoff."""
-    wanted = hardware.spec.filter
-    assert wanted.cutoff is not None
-    cutoff = tuple(value * Fraction(ratio) for value in wanted.cutoff)
-    return design(replace(wanted, cutoff=cutoff), float(hardware.spec.sample_rate))
 
 
 @pytest.mark.parametrize("realization", EXACT)
@@ -165,3 +164,173 @@ def test_fingerprints_tell_hardware_apart_and_not_constants() -> None:
     parallel = hardware_in("parallel").architecture
     other = other_set(hardware_in("parallel"), ideal=moved(hardware, "0.95")).quantized.datapath
     assert replace(parallel, datapath=other).fingerprint == parallel.fingerprint
+
+
+# Swaps.
+
+
+@pytest.mark.parametrize("ratio", ["0.8", "1.2"])
+@pytest.mark.parametrize("example", ["audio_lowpass.toml", "flange_wear_bench.toml"])
+def test_a_cutoff_a_fifth_away_may_be_swapped_to(example: str, ratio: str) -> None:
+    hardware = hardware_in("folded", example)
+    made = other_set(hardware, ideal=moved(hardware, ratio))
+    swap = check_swap(hardware, own_set(hardware), made)
+    assert 0 < swap.use < Fraction(1, 100)
+    assert 50 < swap.samples < 1000
+    assert swap.made.quantized is made.quantized
+    back = check_swap(hardware, made, own_set(hardware))
+    assert back.made.program is not None
+    assert hardware.architecture.program is not None
+    assert back.made.program.instructions == hardware.architecture.program.instructions
+
+
+def test_a_program_takes_over_under_the_worst_input() -> None:
+    """The interpreter, which minds the widths of words and accumulator, against the graphs with the swap's ranges."""
+    hardware = hardware_in("folded")
+    first, own = hardware.architecture.program, own_set(hardware)
+    made = other_set(hardware, ideal=moved(hardware, "0.5"))
+    swap = check_swap(hardware, own, made)
+    assert first is not None
+    assert swap.made.program is not None
+    codes = worst_input(own.quantized, made.quantized, 250, 300)
+    expected = compute_swapping(own.quantized.datapath, [(250, during(own.quantized, made.quantized))], codes)
+    assert interpreted(hardware, [(0, first), (250, swap.made.program)], codes) == expected
+    narrow = replace(swap.made.program, accumulator_bits=swap.made.program.accumulator_bits - 4)
+    with pytest.raises(OverflowError):
+        interpreted(hardware, [(0, first), (250, narrow)], codes)
+
+
+def test_a_realization_that_changes_its_coefficients_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    hardware = hardware_in("folded")
+    changed = with_constants(hardware.quantized, moved(hardware, "1.2"), None, room=room_of(hardware))
+    monkeypatch.setattr(reload, "with_constants", lambda *arguments, **options: changed)
+    monkeypatch.setattr(reload, "room_of", lambda hardware: 0)
+    with pytest.raises(
+        ShortfallError,
+        match=r"^the realization must keep its coefficients to be loaded anew, and df1_ef2 does not$",
+    ):
+        own_set(hardware)
+
+
+def test_a_swap_in_the_parallel_architecture_has_one_bit_of_room() -> None:
+    hardware = hardware_in("parallel")
+    own, wide = own_set(hardware), 4 * hardware.spec.max_error
+    assert check_swap(hardware, own, other_set(hardware, ideal=moved(hardware, "0.8"), max_error=wide)).use < 1
+    far = other_set(hardware, ideal=moved(hardware, "0.5"), max_error=wide)
+    with pytest.raises(
+        ShortfallError,
+        match=r"^the swap must fit the hardware: section1\.v1 must stay in -(\d+)\.\.\d+, not -\d+\.\.\d+; " + ADVICE,
+    ):
+        check_swap(hardware, own, far)
+    assert check_swap(hardware, None, far).samples == 0
+
+
+def test_a_swap_that_overflows_the_accumulator_is_refused() -> None:
+    """The same hardware with not one bit to spare."""
+    hardware = hardware_in("folded")
+    made = hardware.architecture.program
+    assert made is not None
+    tight = replace(hardware, architecture=replace(hardware.architecture))
+    tight.architecture.__dict__["program"] = replace(made, accumulator_bits=made.accumulator_bits - 2)
+    with pytest.raises(
+        ShortfallError,
+        match=r"^the swap must fit the hardware: to take over, bits of the accumulator must be at most \d+, not \d+; ",
+    ):
+        check_swap(tight, own_set(tight), replace(own_set(tight), quantized=far_from(hardware)))
+
+
+def far_from(hardware: CoreDesign) -> Quantized:
+    """Make a set with a cutoff that is much lower, without a look at the hardware."""
+    return with_constants(hardware.quantized, moved(hardware, "0.1"), None, finer=2, room=room_of(hardware))
+
+
+def test_writes_of_a_program() -> None:
+    hardware = hardware_in("folded")
+    swap = check_swap(hardware, own_set(hardware), other_set(hardware, ideal=moved(hardware, "1.2")))
+    version, *data, crc = register_writes(hardware, swap.made, 7)
+    words, bits = bank_size(hardware.architecture)
+    made = swap.made.program
+    assert made is not None
+    assert version == (VERSION, 7)
+    assert data == [(DATA, encoded(instruction, made)) for instruction in made.instructions]
+    assert len(data) == words
+    assert all(0 <= word < 1 << bits for _, word in data)
+    assert crc == (CRC, zlib.crc32(np.array([7, *(word for _, word in data)], dtype="<u4").tobytes()))
+    tree = reload_json(hardware, swap, 7)
+    assert tree["writes"][0] == [VERSION.address, 7]
+    assert (tree["words"], tree["design"]) == (words, hardware.architecture.fingerprint)
+    assert tree["error_bound"] < tree["error_after_transient"] <= float(hardware.spec.max_error)
+    with pytest.raises(ValueError, match=r"^version must be in 0\.\.4294967295, not -1$"):
+        register_writes(hardware, swap.made, -1)
+
+
+def test_writes_of_the_parallel_architecture() -> None:
+    hardware = hardware_in("parallel")
+    own = own_set(hardware)
+    _, *data, _ = register_writes(hardware, own, 0)
+    assert bank_size(hardware.architecture) == (len(data), 32)
+    loadable = constants(hardware.datapath)
+    assert unpacked([word for _, word in data], loadable) == [
+        hardware.datapath.stages[c.stage].graph.nodes[c.node].parameter for c in loadable
+    ]
+
+
+# Sets by specification.
+
+
+def measured(hardware: CoreDesign, path: Path, low: float, high: float) -> None:
+    """Write measurements of a sensor close to the example's, for voltages from `low` to `high`."""
+    assert hardware.quantized.polynomial is not None
+    rows = []
+    for voltage in np.linspace(low, high, 8):
+        for temperature in (0.0, 20.0, 100.0):
+            clearance = 1.16 - 0.0036 * temperature + (0.3672 + 0.0006618 * temperature) * voltage
+            rows.append(f"{clearance + 0.058 * voltage**2},{voltage},{temperature}\n")
+    path.write_text("clearance_mm,voltage_V,temperature_C\n" + "".join(rows), encoding="utf-8")
+
+
+def test_a_calibration_brings_its_range_along(tmp_path: Path) -> None:
+    hardware = hardware_in("folded", "flange_wear_bench.toml")
+    assert hardware.spec.calibration is not None
+    measured(hardware, tmp_path / "new.csv", 2, 8)
+    calibration = replace(hardware.spec.calibration, coefficients=None, data=tmp_path / "new.csv")
+    wanted = replace(hardware.spec, calibration=calibration, max_error=2 * hardware.spec.max_error)
+    made = set_for(hardware, wanted)
+    assert made.quantized.datapath.calibrated == ((13107, 52429), (0, 51200))
+    assert made.program is not None
+    assert sum(do is Do.JUDGE for do, _, _ in made.program.instructions) == 3
+    assert check_swap(hardware, own_set(hardware), made).samples > 0
+
+
+def test_the_parallel_architecture_judges_by_its_own_range(tmp_path: Path) -> None:
+    hardware = hardware_in("parallel", "flange_wear_bench.toml")
+    assert hardware.spec.calibration is not None
+    measured(hardware, tmp_path / "new.csv", 2, 8)
+    calibration = replace(hardware.spec.calibration, coefficients=None, data=tmp_path / "new.csv")
+    wanted = replace(hardware.spec, calibration=calibration, max_error=4 * hardware.spec.max_error)
+    with pytest.raises(
+        ShortfallError,
+        match=r"^the measurements must cover all codes that the hardware's did, 0\.\.65535 and 0\.\.65535, not "
+        r"13107\.\.52429 and 0\.\.51200: the parallel architecture goes on to flag samples by those$",
+    ):
+        set_for(hardware, wanted)
+
+
+def test_a_specification_that_differs_in_more_is_refused() -> None:
+    hardware = hardware_in("folded")
+    spec = replace(hardware.spec, path=Path("other.toml"))
+    for changed, sentence in (
+        ({"sample_rate": Fraction(1)}, f"sample_rate must be as in {hardware.spec.path} for a set to be loaded there"),
+        ({"inputs": ()}, f"inputs must be as in {hardware.spec.path} for a set to be loaded there"),
+        (
+            {"calibration": hardware_in("folded", "flange_wear_bench.toml").spec.calibration},
+            f"there must be no [calibration], as in {hardware.spec.path}",
+        ),
+    ):
+        with pytest.raises(SpecificationError) as refusal:
+            set_for(hardware, replace(spec, **changed))
+        assert str(refusal.value) == f"other.toml: {sentence}"
+    fixed = replace(hardware, spec=replace(hardware.spec, hardware=replace(hardware.spec.hardware, reload=False)))
+    with pytest.raises(SpecificationError) as refusal:
+        set_for(fixed, spec)
+    assert str(refusal.value) == f"{fixed.spec.path}: hardware.reload must be true for a set to be loaded, not false"

@@ -661,7 +661,12 @@ def test_a_page_that_fails_leaves_the_old_report(tmp_path: Path, monkeypatch: py
         ({"bound": math.nan}, "bound must be positive and finite, not nan"),
         ({"max_error": math.inf}, "max_error must be positive and finite, not inf"),
         ({"samples": 0}, "samples must be at least 1, not 0"),
-        ({"hardware": np.zeros((2, 2))}, "hardware must have the shape (n,) with n >= 1, not (2, 2)"),
+        (
+            {"hardware": np.zeros((2, 2, 2))},
+            "hardware must have the shape (n,) or (n, channels) with n >= 1, not (2, 2, 2)",
+        ),
+        ({"hardware": np.zeros((2, 2))}, "time must have the shape (2,), not (3000,)"),
+        ({"hardware": np.zeros((3000, 2))}, "golden must have the shape (3000, 2), not (3000,)"),
         ({"truth": np.zeros(2)}, "truth must have the shape (3000,), not (2,)"),
         ({"golden": np.full(3000, np.nan)}, "golden must be finite, not NaN or infinite"),
     ],
@@ -714,3 +719,25 @@ def test_examples_in_docstrings(module: Any) -> None:
 )
 def test_quantities(value: float | None, unit: str, words: str) -> None:
     assert quantity.quantity(value, unit) == words
+
+
+def test_several_channels_are_measured_together_and_the_worst_is_shown() -> None:
+    one = evidence()
+    arrays = {
+        name: np.stack([getattr(one, name)] * 3, axis=1)
+        for name in ("golden", "truth", "reading", "unfiltered")
+        if getattr(one, name) is not None
+    }
+    hardware = np.stack([one.hardware] * 3, axis=1)
+    hardware[100, 1] += 2 * one.lsb
+    several = replace(one, hardware=hardware, channels=3, samples=hardware.size, **arrays)
+    assert several.worst_channel == 1
+    shown = several.of_channel(1)
+    assert shown.shown_channel == 1
+    assert shown.hardware.tolist() == hardware[:, 1].tolist()
+    summary = summarise(several)
+    assert summary["error"]["max_abs"] == np.abs(several.error).max() > summarise(one)["error"]["max_abs"]
+    assert summary["error"]["rms"] == pytest.approx(np.sqrt(np.mean(several.error**2)))
+    page = render_page(several, summary)
+    assert "All pictures show channel 1, the one of 3 with the largest error" in page
+    assert "All pictures show" not in render_page(one, summarise(one))

@@ -55,3 +55,16 @@ def test_room_holds_every_constant_that_fits(example: str) -> None:
                     x * c for x in (operand.low, operand.high) for c in (-1 << (bits - 1), (1 << (bits - 1)) - 1)
                 ]
                 assert (node.low, node.high) == (min(extremes), max(extremes))
+
+
+@pytest.mark.parametrize("core", ["instrument", "calibration"])
+def test_hardware_with_room_has_the_same_constants(core: str) -> None:
+    datapath = example_design("flange_wear_bench.toml", core=core, realization="df1_ef2").datapath
+    assert constants(with_room(datapath)) == constants(datapath)
+
+
+def test_an_output_that_nothing_limits_keeps_its_width() -> None:
+    datapath = example_design("flange_wear_bench.toml", core="calibration").datapath
+    graph = with_room(datapath).stages[-1].graph
+    assert graph.nodes[graph.outputs[0]].op is not Op.CLAMP
+    assert graph.nodes[graph.outputs[0]].width <= datapath.output.bits

@@ -1,0 +1,107 @@
+"""What all commands share: tables and JSON on stdout, progress and messages on stderr."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import click
+from rich import box
+from rich.console import Console
+from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+JSON_OPTION = click.option("--json", "as_json", is_flag=True, help="Print JSON instead of tables.")
+
+
+def output_option(text: str) -> Callable[[Any], Any]:
+    """Make the option ``-o`` with this help."""
+    return click.option("-o", "--output", type=click.Path(path_type=Path), help=text)
+
+
+class TableConsole(Console):
+    """Leaves it to `reader_may_leave` when the reader of its output has gone."""
+
+    def on_broken_pipe(self) -> None:
+        raise BrokenPipeError
+
+
+@contextmanager
+def reader_may_leave() -> Iterator[None]:
+    """Take it for no error if the reader of our output, such as ``head``, leaves before its end."""
+    try:
+        yield
+        sys.stdout.flush()
+    except BrokenPipeError:
+        silence_stdout()
+
+
+def silence_stdout() -> None:
+    """Let what is still in the buffer go nowhere: flushing it at exit would fail again."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+class Step:
+    """Shows one step after another on stderr; called with a name, and with what is done of how much."""
+
+    def __init__(self, progress: Progress) -> None:
+        self._progress = progress
+        self._task = progress.add_task("", total=None)
+        self._name = ""
+
+    def __call__(self, name: str, done: int = 0, total: int = 0) -> None:
+        if name != self._name:
+            self._finish()
+            self._name = name
+            self._task = self._progress.add_task(name, total=None)
+        if total:
+            self._progress.update(self._task, completed=done, total=total)
+
+    def _finish(self) -> None:
+        if self._name:
+            self._progress.update(self._task, total=1, completed=1)
+        else:
+            self._progress.remove_task(self._task)
+
+    def close(self) -> None:
+        """Mark the last step as done."""
+        self._finish()
+
+
+@contextmanager
+def show_progress() -> Iterator[Step]:
+    """Show steps on stderr while they are carried out."""
+    columns = (
+        SpinnerColumn(finished_text="[green]✓[/]"),
+        TextColumn("{task.description}", markup=False),
+        BarColumn(bar_width=30),
+        TextColumn("{task.percentage:>3.0f} %"),
+        TimeElapsedColumn(),
+    )
+    with Progress(*columns, console=Console(stderr=True)) as progress:
+        step = Step(progress)
+        yield step
+        step.close()
+
+
+def note(text: str) -> None:
+    """Print a message on stderr."""
+    click.echo(f"sosmith: {text}", err=True)
+
+
+def print_json(tree: Any) -> None:
+    """Print JSON on stdout."""
+    click.echo(json.dumps(tree, indent=2, ensure_ascii=False, allow_nan=False))
+
+
+def new_table(title: str, columns: list[str]) -> Table:
+    """Make a table without rows; without names of columns it has no header."""
+    table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left", title_style="bold", show_header=any(columns))
+    for column in columns:
+        table.add_column(column, overflow="fold")
+    return table

@@ -1,0 +1,199 @@
+"""`sosmith calibrate` as a user meets it: what it prints, what it refuses, what it writes."""
+
+from __future__ import annotations
+
+import json
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from sosmith.calibrate_cli import calibrate
+from sosmith.cli import cli
+from sosmith.gen.core import design_core
+from sosmith.gen.specification import example, load
+from sosmith.model.calibration import fit, read_measurements
+from sosmith.model.errors import ShortfallError, SpecificationError
+from tests.model.measuring import readings, write_csv
+
+DAY = ("--date", "2024-03-01")
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Start in an empty folder with the measurements a.csv and b.csv."""
+    monkeypatch.chdir(tmp_path)
+    write_csv(Path("a.csv"), readings(60))
+    write_csv(Path("b.csv"), readings(60, seed=2))
+    return tmp_path
+
+
+def run(*arguments: str) -> Result:
+    return CliRunner(env={"COLUMNS": "100"}).invoke(cli, ["calibrate", *arguments])
+
+
+def good(*arguments: str) -> Result:
+    result = run(*arguments)
+    assert (result.exit_code, result.exception) == (0, None)
+    return result
+
+
+def refused(message: str, *arguments: str, kind: type[Exception] = SpecificationError) -> Result:
+    result = run(*arguments)
+    assert isinstance(result.exception, kind)
+    assert str(result.exception) == message
+    return result
+
+
+def test_add_reports_the_fit() -> None:
+    printed = good("add", "a.csv", *DAY, "--required-r", "0.999")
+    assert "sosmith: kept 60 measurements of a.csv in calibration.db\n" in printed.stderr
+    shown = re.sub(r" {2,}", "  ", printed.stdout)
+    for row in (
+        "Sensor sensor, version 1 of 2024-03-01: new",
+        "  measurements  60",
+        "  orders  2 in voltage, 1 in temperature, to reach r = 0.999",
+    ):
+        assert row in shown
+    for row in ("adjusted r", "residual, rms", "cross-validated error", "covered", "leverage", "Largest residuals"):
+        assert row in shown
+    assert "drift" not in shown
+    assert "drift from version 1" in good("add", "b.csv", *DAY, "--required-r", "0.999").stdout
+
+
+def test_add_as_json() -> None:
+    added = json.loads(good("add", "a.csv", *DAY, "--json").stdout)
+    assert (added["file"], added["kept"], added["refused"], added["shortfall"]) == ("a.csv", 60, [], "")
+    made = added["calibration"]
+    assert (made["version"], made["measurements"], made["new"], made["orders"]) == (1, 60, True, [1, 1])
+    expected = fit(read_measurements(Path("a.csv")))
+    assert made["coefficients"] == [[float(a) for a in row] for row in expected.polynomial.coefficients]
+    assert made["rms_mm"] == expected.rms
+    assert made["rms_mm"] < made["cross_validated_mm"]
+    assert 0.3 < made["coverage"]["share_of_range"] < 0.6
+    assert made["leverage"]["mean"] == 3 / 60
+    assert len(made["largest_residuals"]) == 5
+
+
+def test_bad_rows_are_listed_and_only_kept_out_on_request() -> None:
+    with Path("a.csv").open("a") as file:
+        file.write("1,2 V,20\n" + "1,2,300\n" * 25)
+    message = "a.csv: every row must be right, or left out with --keep-good, not 26 of 86 refused"
+    lines = [line for line in refused(message, "add", "a.csv", *DAY).stderr.splitlines() if line.startswith("sosmith:")]
+    assert lines[:2] == [
+        "sosmith: a.csv, line 62: voltage_V must be a finite number, not the text '2 V'",
+        "sosmith: a.csv, line 63: temperature_C must be 0 to 128 C, not 300 (in kelvins?)",
+    ]
+    assert lines[20:] == ["sosmith: ... and 6 more lines; --json lists all"]
+    listed = json.loads(run("add", "a.csv", *DAY, "--json").stdout)
+    assert (listed["kept"], len(listed["refused"]), listed["calibration"]) == (0, 26, None)
+    note = good("add", "a.csv", "--keep-good", *DAY).stderr
+    assert "sosmith: kept 60 measurements of a.csv in calibration.db, 26 rows left out\n" in note
+
+
+def test_a_shortfall_keeps_the_measurements_and_says_so() -> None:
+    message = (
+        "calibration.db, sensor sensor: adjusted r must reach 0.99999 with a polynomial up to order 6, not at most "
+    )
+    result = run("add", "a.csv", *DAY, "--required-r", "0.99999")
+    assert isinstance(result.exception, ShortfallError)
+    assert str(result.exception).startswith(message)
+    assert "sosmith: kept 60 measurements" in result.stderr
+    assert json.loads(good("fit", *DAY, "--json").stdout)["measurements"] == 60
+
+
+def test_history_lists_and_verifies() -> None:
+    good("add", "a.csv", *DAY)
+    good("add", "b.csv", "--date", "2024-03-08", "--robust", "--required-r", "0.999")
+    result = good("history", "--verify")
+    assert "sosmith: every version comes out the same, bit for bit: 2 of 2\n" in result.stderr
+    assert re.search(r"1 +2024-03-01 +60 +1, 1 +0\.\d{5} ", result.stdout)
+    assert re.search(r"2 +2024-03-08 +120 +2, 1 robust +0\.999\d\d ", result.stdout)
+    listed = json.loads(good("history", "--json").stdout)
+    assert [(one["version"], one["robust"], one["required_r"]) for one in listed] == [
+        (1, False, 0.975),
+        (2, True, 0.999),
+    ]
+    assert listed[0]["drift_from_previous_mm"] is None
+    assert listed[1]["drift_from_previous_mm"] > 0
+
+
+def test_exports_feed_a_specification_and_give_the_same_polynomial() -> None:
+    for name in ("a.csv", "b.csv"):
+        good("add", name, "--sensor", "left", *DAY)
+    good("export", "--sensor", "left", "-o", "left.toml")
+    good("export", "--sensor", "left", "--format", "csv", "-o", "left.csv")
+    table = good("export", "--sensor", "left").stdout
+    assert table == Path("left.toml").read_text()
+    assert table.startswith("# Sensor left, version 2 of 2024-03-01: 120 measurements.\n# Hash over them: ")
+    coefficients = json.loads(good("history", "--sensor", "left", "--json").stdout)[-1]["coefficients"]
+    assert tomllib.loads(table) == {"calibration": {"coefficients": coefficients}}
+    fitted = fit(read_measurements(Path("left.csv"))).polynomial
+    assert [[float(a) for a in row] for row in fitted.coefficients] == coefficients
+
+    (given,) = re.findall(r"^\[calibration\]\n.*?^coefficients = .*?\n(?=#|\n|\[)", example(), flags=re.M | re.S)
+    Path("spec.toml").write_text(example().replace(given, table))
+    made = design_core(load(Path("spec.toml")), core="calibration")
+    assert made.quantized.polynomial is not None
+    assert [[float(a) for a in row] for row in made.quantized.polynomial.coefficients] == coefficients
+
+
+def test_an_older_version_can_be_exported() -> None:
+    good("add", "a.csv", *DAY)
+    before = good("export").stdout
+    good("add", "b.csv", *DAY)
+    assert good("export", "--version", "1").stdout == before != good("export").stdout
+    refused("the version of sensor sensor must be 1 to 2, not 3", "export", "--version", "3")
+
+
+@pytest.mark.parametrize(("name", "start"), [("p.svg", b"<?xml"), ("p.png", b"\x89PNG")])
+def test_plots_are_the_same_bytes_twice(name: str, start: bytes) -> None:
+    good("add", "a.csv", *DAY, "--robust")
+    good("add", "b.csv", *DAY)
+    drawn = []
+    for _ in range(2):
+        good("plot", "-o", name)
+        drawn.append(Path(name).read_bytes())
+    assert drawn[0] == drawn[1]
+    assert drawn[0].startswith(start)
+    if name == "p.svg":
+        for text in ("Coverage: ", "Residuals: ", "Leverage: ", "History", "version 2 of 2024-03-01"):
+            assert text in drawn[0].decode()
+
+
+UNFIT = {
+    "no store": (("history",), "calibration.db must be a store of measurements; sosmith calibrate add makes one"),
+    "no file": (("add", "none.csv"), "none.csv must be a readable CSV or XLSX file (no such file or directory)"),
+    "no day": (("add", "a.csv", "--date", "yesterday"), "date must be a day as in 2024-03-01, not 'yesterday'"),
+    "range upside down": (
+        ("add", "a.csv", "--voltage-range", "10", "0"),
+        "--voltage-range must be two numbers, the lower one first, not 10 0",
+    ),
+    "r that is none": (("fit", "--required-r", "nan"), "--required-r must be 0 or more and less than 1, not nan"),
+    "r that nothing reaches": (("fit", "--required-r", "1"), "--required-r must be 0 or more and less than 1, not 1"),
+    "sensor without a name": (("add", "a.csv", "--sensor", " "), "the sensor's name must be printable text, not ' '"),
+    "kind of plot": (("plot", "-o", "p.pdf"), "p.pdf: the plot's name must end in .svg or .png, not .pdf"),
+}
+
+
+@pytest.mark.parametrize(("arguments", "message"), UNFIT.values(), ids=UNFIT)
+def test_refusals(arguments: tuple[str, ...], message: str) -> None:
+    refused(message, *arguments)
+
+
+def test_an_unknown_sensor_is_told_which_there_are() -> None:
+    for sensor in ("left", "right"):
+        good("add", "a.csv", "--sensor", sensor, *DAY)
+    for command in ("fit", "history", "export", "plot"):
+        refused("calibration.db: the sensor must be one of left, right, not up", command, "--sensor", "up")
+
+
+def test_help_shows_every_command_and_its_options() -> None:
+    assert list(calibrate.commands) == ["add", "fit", "history", "export", "plot"]
+    for command in calibrate.commands:
+        shown = good(command, "--help").stdout
+        for option in ("--store", "--sensor"):
+            assert option in shown
+    assert "--keep-good" in good("add", "--help").stdout
