@@ -448,7 +448,7 @@ def plot(record: Figures) -> str:
     with matplotlib.rc_context({"svg.hashsalt": "sosmith", "svg.fonttype": "none"}):
         figure = Figure(figsize=(12, 8), layout="constrained")
         FigureCanvasSVG(figure)
-        rows = figure.subplots(2, len(panels))
+        rows = figure.subplots(2, len(panels), sharey=True)
         for (rates, channels), key in zip(rows.T, panels, strict=True):
             lines: dict[Core, list[tuple[int, int]]] = {}
             for core, _, figures in recorded(record, [key]):
@@ -466,9 +466,11 @@ def plot(record: Figures) -> str:
             rates.set_xlabel("samples a second at fmax, one channel")
             channels.set_xlabel("channels")
             channels.set_xticks(CHANNELS, [str(count) for count in CHANNELS])
+            channels.xaxis.minorticks_off()
             for axes in (rates, channels):
                 axes.set_ylabel("all LUT4" if key == "ecp5" else "logic cells")
                 axes.grid(visible=True, which="both", alpha=0.3)
+        rows[0, 0].set_ylim(bottom=100)
         handles = {
             label: handle for axes in rows[1] for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
         }
