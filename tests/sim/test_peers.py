@@ -11,6 +11,7 @@ from unittest.mock import patch
 
 import numpy as np
 import pytest
+from amaranth.hdl import Module, Value
 from cocotb_tools.runner import Icarus
 from tests.gen.designs import EXAMPLES
 
@@ -19,6 +20,7 @@ from sosmith.gen.realizations import REALIZATIONS
 from sosmith.gen.specification import load
 from sosmith.gen.verilog import to_rtlil, to_verilog
 from sosmith.hdl.axi_stream import fields
+from sosmith.hdl.folded import FoldedCore
 
 UNFOLDABLE = {"normal", "lattice_wdf"}
 SAMPLES = {"parallel": 120, "folded": 24, "serial": 8}
@@ -133,11 +135,19 @@ def run_some(folder: Path, source: str, name: str, sent: list[list[int]], wanted
     return run(folder, source, name, {"words": sent, "dest": True, "seed": 1, "wanted": wanted})
 
 
+class OneMemory(FoldedCore):
+    """A core whose channels all have the same words."""
+
+    def _memory(self, m: Module, read: tuple[Value, Value], write: tuple[Value, Value, Value]) -> Value:
+        bits = (self.program.words - 1).bit_length()
+        return super()._memory(m, (read[0][:bits], read[1]), (write[0][:bits], *write[1:]))
+
+
 def test_a_mixed_up_channel_is_noticed(tmp_path: Path) -> None:
     made = made_of("folded", "delta", 3)
     codes, order = stimulus(made, 6)
-    broken = replace(made.architecture, channels=3).component()
-    broken._addresses = replace(broken._addresses, channels=1)  # type: ignore[attr-defined]
+    assert made.architecture.program is not None
+    broken = OneMemory(made.datapath, made.architecture.program, serial=False, channels=3)
     source = to_verilog(to_rtlil(broken, made.datapath.name))
     job = {"words": words(made, codes, order), "dest": True, "seed": 1}
     assert run(tmp_path, source, made.datapath.name, job) != expected(made, codes, order)

@@ -1,0 +1,55 @@
+"""What was tried for goals of benchmarks/cost.py that are missed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Tried:
+    """Attempts at one goal.
+
+    Attributes
+    ----------
+    goal : str
+        What was to be reached.
+    ways : tuple of str
+        What was tried, and what came of it.
+    obstacle : str
+        What stands in the way.
+    """
+
+    goal: str
+    ways: tuple[str, ...]
+    obstacle: str
+
+
+TRIES = (
+    Tried(
+        goal="audio_lowpass parallel, all LUT4, at most 500 on an ECP5, by synthesis alone:",
+        ways=(
+            "Realizations: df1_ef2, which `auto` takes, 726; df1_ef1 876; df1 942; delta 1,023; df2t 1,379; "
+            "state_space 1,807.",
+            "Sums from LUT4 instead of carry cells (`synth_ecp5 -noccu2`): 2,151.",
+            "More optimization by ABC (`-abc2`), retiming (`-retime`): 726 as without.",
+        ),
+        obstacle="520 of the 726 are 260 carry cells, counted as two LUT4 each: the sums are long, for the proven "
+        "bound, and each bit of a sum is half a carry cell.",
+    ),
+    Tried(
+        goal="flange_wear_locomotive folded on iCE40 UP5K, at most 10 % more logic cells for 64 channels than for one: "
+        "319 for one and 355 for 64. What it would take is 350.",
+        ways=(
+            "The end of clearing told by a carry bit of the address counter instead of a comparison: 319 and 353, but "
+            "up to twice as many clocks after a reset.",
+            "The same, and one register for samples taken and samples dropped: 317 and 353.",
+            "Two memories chosen by the channel's top bit, instead of a choice that Yosys makes from the address: 353 "
+            "for 64 channels.",
+            "A data register outside of the multiplier block: 334 for one channel, which makes the growth smaller and "
+            "the core larger.",
+        ),
+        obstacle="64 channels of 64 words each are two groups of block RAMs. To choose between their outputs takes 16 "
+        "cells, the channel's number 6, the longer address counter 3. Before the memory's collisions were declared "
+        "unused, and the data register became the multiplier block's own, it was 375 and 422.",
+    ),
+)
