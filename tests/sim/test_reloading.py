@@ -3,7 +3,6 @@
 import json
 import random
 import sys
-import zlib
 from dataclasses import replace
 from fractions import Fraction
 from functools import cache
@@ -20,12 +19,14 @@ from tests.gen.designs import EXAMPLES
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.design import design
 from sosmith.gen.quantize import with_constants
-from sosmith.gen.reload import OtherSet, other_set, parallel_bank, room_of
+from sosmith.gen.reload import OtherSet, other_set, room_of
+from sosmith.gen.reload_file import register_writes
 from sosmith.gen.specification import load
 from sosmith.gen.verilog import to_rtlil, to_verilog
-from sosmith.hdl.folded import FoldedCore, encoded
+from sosmith.hdl.axi_stream import fields
+from sosmith.hdl.folded import FoldedCore
 from sosmith.hdl.reload import ReloadPort
-from sosmith.model.reload_registers import CRC, DATA, VERSION
+from sosmith.model.polynomial import Polynomial
 from sosmith.model.swapping import compute_swapping
 
 RATIOS = ("0.8", "0.9", "1.1", "1.2")
@@ -35,8 +36,8 @@ ARCHITECTURES = ("parallel", "folded", "serial")
 
 
 @cache
-def hardware_in(architecture: str) -> CoreDesign:
-    spec = load(EXAMPLES / "audio_lowpass.toml")
+def hardware_in(architecture: str, example: str) -> CoreDesign:
+    spec = load(EXAMPLES / f"{example}.toml")
     hardware = replace(
         spec.hardware, architecture=architecture, realization="df1_ef2", clock=Fraction(10**9), reload=True
     )
@@ -44,44 +45,47 @@ def hardware_in(architecture: str) -> CoreDesign:
 
 
 @cache
-def sets_for(architecture: str) -> list[OtherSet]:
-    made = hardware_in(architecture)
+def sets_for(architecture: str, example: str) -> list[OtherSet]:
+    """Make other sets for the hardware: of filters, or of polynomials where it has one."""
+    made = hardware_in(architecture, example)
+    allowed = 4 * made.spec.max_error
+    if made.quantized.polynomial is not None:
+        rows = made.quantized.polynomial.coefficients
+        scaled = [Polynomial(tuple(tuple(Fraction(ratio) * c for c in row) for row in rows)) for ratio in RATIOS]
+        return [other_set(made, polynomial=polynomial, max_error=allowed) for polynomial in scaled]
     wanted = made.spec.filter
     assert wanted.cutoff is not None
     filters = [
         design(replace(wanted, cutoff=tuple(f * Fraction(ratio) for f in wanted.cutoff)), float(made.spec.sample_rate))
         for ratio in RATIOS
     ]
-    return [other_set(made, ideal=ideal, max_error=4 * made.spec.max_error) for ideal in filters]
+    return [other_set(made, ideal=ideal, max_error=allowed) for ideal in filters]
 
 
 def writes_of(made: CoreDesign, other: OtherSet, version: int, *, wrong: bool) -> list[tuple[int, int]]:
-    if other.program is None:
-        words = parallel_bank(made, other)
-    else:
-        words = [encoded(instruction, other.program) for instruction in other.program.instructions]
-    crc = zlib.crc32(b"".join(word.to_bytes(4, "little") for word in (version, *words)))
-    return [
-        (VERSION.address, version),
-        *((DATA.address, word) for word in words),
-        (CRC.address, crc ^ (wrong << version % 32)),
-    ]
+    *writes, (register, crc) = register_writes(made, other, version)
+    pairs = [(register.address, word) for register, word in writes]
+    return [*pairs, (register.address, crc ^ (wrong << version % 32))]
 
 
 def run(folder: Path, made: CoreDesign, source: str, count: int, seed: int) -> tuple[dict[str, Any], list[int]]:
     """Simulate `count` loads, one in eight with a wrong CRC; return the outcome and which set each load has."""
     pace = random.Random(seed)
-    sets = sets_for(made.architecture.name)
+    sets = sets_for(made.architecture.name, made.spec.name)
     chosen = [pace.randrange(len(sets)) for _ in range(count)]
     wrong = [pace.randrange(8) == 0 for _ in range(count)]
     loads = [
         [writes_of(made, sets[kind], version + 1, wrong=bad), not bad]
         for version, (kind, bad) in enumerate(zip(chosen, wrong, strict=True))
     ]
-    port = made.datapath.inputs[0]
-    codes = np.random.default_rng(seed).integers(port.lowest // 2, port.highest // 2, 256).tolist()
+    rng = np.random.default_rng(seed)
+    ports = fields(made.datapath.inputs)
+    columns = [rng.integers(f.port.lowest // 2, f.port.highest // 2, 256).tolist() for f in ports]
+    codes = list(zip(*columns, strict=True))
     job = {
-        "words": [code % (1 << 8 * port.bytes) for code in codes],
+        "words": [
+            sum(code % (1 << f.padded) << f.offset for f, code in zip(ports, sample, strict=True)) for sample in codes
+        ],
         "loads": loads,
         "seed": seed,
         "folded": made.architecture.program is not None,
@@ -113,7 +117,7 @@ def run(folder: Path, made: CoreDesign, source: str, count: int, seed: int) -> t
 
 
 def expected(made: CoreDesign, outcome: dict[str, Any], chosen: list[int]) -> list[int]:
-    sets = sets_for(made.architecture.name)
+    sets = sets_for(made.architecture.name, made.spec.name)
     swaps, before = [], 0
     for number, swapped in enumerate(outcome["swaps"]):
         if swapped != before:
@@ -121,7 +125,7 @@ def expected(made: CoreDesign, outcome: dict[str, Any], chosen: list[int]) -> li
             before = swapped
     # A program keeps states with more fraction bits than the datapath has; in these, others take over.
     first = with_constants(made.quantized, None, None, room=room_of(made)).datapath
-    codes = np.array(outcome["samples"])[:, np.newaxis]
+    codes = np.array(outcome["samples"])
     bits = 8 * made.datapath.output.bytes
     return [code % (1 << bits) for code in compute_swapping(first, swaps, codes)]
 
@@ -131,14 +135,18 @@ def verilog(made: CoreDesign) -> str:
 
 
 COUNTS = [
-    *(pytest.param(name, 60, id=f"{name}-60") for name in ARCHITECTURES),
-    *(pytest.param(name, 10_000, id=f"{name}-10000", marks=pytest.mark.slow) for name in ARCHITECTURES),
+    *(pytest.param(name, "audio_lowpass", 60, id=f"{name}-60") for name in ARCHITECTURES),
+    *(pytest.param(name, "flange_wear_bench", 20, id=f"{name}-calibration") for name in ("parallel", "folded")),
+    *(
+        pytest.param(name, "audio_lowpass", 10_000, id=f"{name}-10000", marks=pytest.mark.slow)
+        for name in ARCHITECTURES
+    ),
 ]
 
 
-@pytest.mark.parametrize(("architecture", "count"), COUNTS)
-def test_reloads_at_any_moment(architecture: str, count: int, tmp_path: Path) -> None:
-    made = hardware_in(architecture)
+@pytest.mark.parametrize(("architecture", "example", "count"), COUNTS)
+def test_reloads_at_any_moment(architecture: str, example: str, count: int, tmp_path: Path) -> None:
+    made = hardware_in(architecture, example)
     outcome, chosen = run(tmp_path, made, verilog(made), count, seed=count)
     assert outcome["swaps"][-1] == len(outcome["accepted"])
     assert len(set(outcome["swaps"])) > count // 2  # most sets were used by a sample
@@ -155,7 +163,7 @@ def test_a_sample_that_sees_two_banks_is_noticed(tmp_path: Path) -> None:
         return port, port.bank
 
     original = FoldedCore._reload
-    made = hardware_in("folded")
+    made = hardware_in("folded", "audio_lowpass")
     with patch.object(FoldedCore, "_reload", careless):
         source = verilog(made)
     outcome, chosen = run(tmp_path, made, source, 60, seed=60)
