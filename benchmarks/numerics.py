@@ -29,7 +29,7 @@ from sosmith.model.errors import ShortfallError
 from sosmith.model.golden import calibrated, filtered
 from sosmith.model.graph import Op
 from sosmith.model.port import Codes
-from sosmith.sim.simulation import trace_for
+from sosmith.sim.simulation import traces_for
 
 ROOT = Path(__file__).resolve().parent.parent
 SPECIFICATIONS = ("audio_lowpass", "flange_wear_locomotive")
@@ -63,8 +63,8 @@ def stimulus(design: CoreDesign) -> Codes:
     parts = [
         np.random.default_rng(SEED).integers(port.lowest, port.highest + 1, NOISE_SAMPLES),
         *(np.full(settle, level) for level in levels),
-        trace_for(design, "worst_case", seed=SEED).codes[:, 0],
-        trace_for(design, "worst_case_errors", seed=SEED).codes[:, 0],
+        traces_for(design, "worst_case", seed=SEED)[0].codes[:, 0],
+        traces_for(design, "worst_case_errors", seed=SEED)[0].codes[:, 0],
     ]
     return np.concatenate(parts).reshape(-1, 1)
 

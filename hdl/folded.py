@@ -109,7 +109,7 @@ class FoldedCore(wiring.Component):
         self._remember(m, (advance, clearing), (counter, total, read, channel), ranks)
         self._hand_out(m, (advance, start), (total, read), ranks)
         taken = Signal()
-        last_digit = ranks[-1].constant[:8] == sum(place.digits for place in self.program.inputs) - 1
+        last_digit = ranks[-1].counts(sum(place.digits for place in self.program.inputs) - 1)
         m.d.sync += taken.eq(advance & ranks[-1].valid & ranks[-1].does(Do.TAKE) & last_digit)
         m.d.comb += self.s_axis_tready.eq(taken | dropped)
         return m
@@ -250,7 +250,7 @@ class FoldedCore(wiring.Component):
         first, last = ranks[0 if self.serial else 1], ranks[-1]
         take = last.does(Do.TAKE)
         top = total[self._word - 1] & last.does(Do.FINISH)
-        digit = Mux(take, self._input_digit(last.constant), Cat(total[: self._word - 1], top))
+        digit = Mux(take, self._input_digit(last), Cat(total[: self._word - 1], top))
         stores = take | last.does(Do.STORE) | last.does(Do.FINISH)
         address_bits = _address_bits(self.program)
         word = self._memory(
@@ -301,7 +301,7 @@ class FoldedCore(wiring.Component):
         reading = self._reading(ranks)
         given = [Signal(self._word, name=f"given{k}", reset_less=True) for k in range(self.program.output.digits)]
         for k, digit in enumerate(given):
-            with m.If(advance & reading.valid & reading.does(Do.GIVE) & (reading.constant[:8] == k)):
+            with m.If(advance & reading.valid & reading.does(Do.GIVE) & reading.counts(k)):
                 m.d.sync += digit.eq(read)
         with m.If(advance & present.valid & ~following.valid):
             m.d.sync += self.m_axis_tvalid.eq(1)
@@ -338,7 +338,7 @@ class FoldedCore(wiring.Component):
         with m.If(advance):
             m.d.sync += [shifted.eq(factors[0]), left.eq(factors[1])]
 
-    def _input_digit(self, index: Value) -> Value:
+    def _input_digit(self, rank: _Rank) -> Value:
         """Digit of the input sample, counted through all ports in the order in which the program takes them."""
         graph = self.datapath.stages[0].graph
         digits: list[Value] = []
@@ -349,7 +349,7 @@ class FoldedCore(wiring.Component):
             digits += self._split(padded, place, sign=padded[-1] if field.port.signed else Const(0, 1))
         found = digits[-1]
         for k, digit in enumerate(digits[:-1]):
-            found = Mux(index[:8] == k, digit, found)
+            found = Mux(rank.counts(k), digit, found)
         return found
 
     def _split(self, value: Value, place: Place, sign: Value) -> list[Value]:
@@ -389,6 +389,11 @@ class _Rank:
     def does(self, do: Do) -> Value:
         """Whether it does `do`."""
         return self.word[:_DO_BITS] == list(Do).index(do)
+
+    def counts(self, digit: int) -> Value:
+        """Whether its constant is the number of a digit."""
+        number = self.constant[:8]
+        return number == digit if digit else ~number.any()  # as a comparison with 0, Verilator warns of it
 
 
 def _address_bits(program: Program) -> int:

@@ -88,12 +88,18 @@ def c_source(datapath: Datapath) -> str:
 
 #include <string.h>
 
+#ifdef __GNUC__
+#define ALWAYS_INLINE inline __attribute__((always_inline)) /* else the state of a loop goes through memory */
+#else
+#define ALWAYS_INLINE inline
+#endif
+
 void {name}_reset({name}_state *state)
 {{
     memset(state, 0, sizeof *state);
 }}
 
-static inline int64_t step({name}_state *state{parameters}, uint8_t *status)
+static ALWAYS_INLINE int64_t step({name}_state *state{parameters}, uint8_t *status)
 {{
 {_body(datapath)}}}
 
@@ -107,8 +113,12 @@ void {name}_block({name}_state *states, size_t samples, size_t channels, const i
 {{
     for (size_t c = 0; c < channels; c++) {{
         {name}_state state = states[c]; /* a local copy stays in registers */
-        for (size_t n = 0; n < samples; n++)
-            out[n * channels + c] = step(&state{arguments}, status ? &status[n * channels + c] : 0);
+        if (status)
+            for (size_t n = 0; n < samples; n++)
+                out[n * channels + c] = step(&state{arguments}, &status[n * channels + c]);
+        else
+            for (size_t n = 0; n < samples; n++)
+                out[n * channels + c] = step(&state{arguments}, NULL);
         states[c] = state;
     }}
 }}

@@ -83,12 +83,11 @@ def test_every_waiver_is_needed(name: str, locomotive: Path, tmp_path: Path) -> 
 
 def test_a_fault_that_only_the_linter_sees_is_reported(locomotive: Path, tmp_path: Path) -> None:
     text = locomotive.read_text(encoding="utf-8")
-    text, count = re.subn(r"assign m_axis_tdata = .*;|\.o_data\(m_axis_tdata\),", "", text, count=1)
+    text, count = re.subn(r"assign m_axis_tdata = .*;", "", text, count=1)
     assert count
     sv = tmp_path / locomotive.name
     sv.write_text(text, encoding="utf-8")
-    (pin, undriven) = lint(sv, sv.stem, tmp_path)
-    assert pin.startswith("%Warning-PINMISSING: ")
+    (undriven,) = lint(sv, sv.stem, tmp_path)
     assert undriven.startswith("%Warning-UNDRIVEN: ")
 
 
