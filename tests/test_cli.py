@@ -89,10 +89,15 @@ def sosmith(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capt
 
 
 def process(*arguments: str, folder: Path, **options: Any) -> subprocess.Popen[str]:
-    """Start a command as a process of its own."""
+    """Start a command as a process of its own; it heeds Ctrl-C, even if a shell keeps the tests in the background."""
     command = [sys.executable, "-m", "sosmith.cli", *arguments]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE} | options
-    return subprocess.Popen(command, cwd=folder, text=True, **pipes)
+    before = signal.getsignal(signal.SIGINT)
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # what is ignored here is ignored by children
+    try:
+        return subprocess.Popen(command, cwd=folder, text=True, **pipes)
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def refused(outcome: Outcome, message: str, status: int = 2) -> None:
