@@ -133,28 +133,29 @@ def design_core(
     def select(accept: Accept) -> tuple[Quantized, str]:
         return selection.cheapest(accept) if given is None else given
 
+    def in_hardware(name: str, datapath: Datapath) -> Architecture:
+        """With the calibrated range, which a program judges and takes time for."""
+        codes = () if fitted is None else calibrated_codes(datapath.inputs, fitted)
+        return fitting(name, budget, replace(datapath, calibrated=codes))
+
     hardware = spec.hardware
     budget = Budget(clock=hardware.clock, sample_rate=spec.sample_rate, channels=spec.channels, reload=hardware.reload)
     names = candidates(hardware.architecture, board)
     refused = ""
     for name in names:
         try:
-            quantized, reason = select(partial(fitting, name, budget))
-            architecture = fitting(name, budget, quantized.datapath)
+            quantized, reason = select(partial(in_hardware, name))
+            architecture = in_hardware(name, quantized.datapath)
             break
         except ShortfallError as error:
             if name == names[-1]:
                 raise
             refused = str(error)
-    if fitted is not None:
-        codes = calibrated_codes(quantized.datapath.inputs, fitted)
-        quantized = replace(quantized, datapath=replace(quantized.datapath, calibrated=codes))
-        architecture = replace(architecture, datapath=quantized.datapath)
     why = reason_for(architecture, budget, asked=len(names) == 1, board=board, refused=refused)
     return CoreDesign(
         spec=spec,
         core=kind,
-        quantized=quantized,
+        quantized=replace(quantized, datapath=architecture.datapath),
         architecture=architecture,
         reasons={"realization": reason, "architecture": why},
         fit=fitted,

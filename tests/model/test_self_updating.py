@@ -298,9 +298,9 @@ def test_a_writer_that_waits_in_vain_says_so(
 ) -> None:
     monkeypatch.setattr("sosmith.model.measurement_store.PATIENCE", 0.05)
     message = f"{store.path}: the store must be free within a minute, not locked by another program"
-    with store.transaction(), pytest.raises(ToolError, match=f"^{re.escape(message)}$"):  # noqa: SIM117
-        with open_store(store.path) as other:
-            add(other, "left", batch(tmp_path, "a.csv"), DAY)
+    refused = pytest.raises(ToolError, match=f"^{re.escape(message)}$")
+    with store.transaction(), refused, open_store(store.path) as other:
+        add(other, "left", batch(tmp_path, "a.csv"), DAY)
 
 
 def test_concurrent_writers_lose_nothing(tmp_path: Path) -> None:
