@@ -1,5 +1,6 @@
 """Status flags in simulation, of a core whose calibration comes from measurements."""
 
+from contextlib import nullcontext
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -10,6 +11,7 @@ from tests.gen.designs import EXAMPLES
 
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.specification import load
+from sosmith.model.errors import ShortfallError
 from sosmith.model.status import Flag
 from sosmith.sim.simulation import simulate, traces_for
 
@@ -44,6 +46,18 @@ def test_the_range_is_that_of_the_measurements(tmp_path: Path) -> None:
         first, last = (float(port.zero + port.lsb * code) for code in (low, high))
         assert first <= least < first + float(port.lsb)
         assert last - float(port.lsb) < most <= last
+
+
+def test_judging_the_range_takes_clocks_that_count(tmp_path: Path) -> None:
+    made = made_in(tmp_path, "folded")
+    needed = made.architecture.cycles_per_sample
+    for cycles, refused in ((needed, False), (needed - 1, True)):
+        hardware = replace(made.spec.hardware, clock=cycles * made.spec.sample_rate)
+        expected = (
+            pytest.raises(ShortfallError, match=f"takes {needed:,} clocks a sample") if refused else nullcontext()
+        )
+        with expected:
+            design_core(replace(made.spec, hardware=hardware))
 
 
 @pytest.mark.parametrize("architecture", ["parallel", "folded", "serial"])
