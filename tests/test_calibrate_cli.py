@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
-from sosmith.calibrate_cli import calibrate
 from sosmith.cli import cli
+from sosmith.commands.calibrate import calibrate
 from sosmith.gen.core import design_core
 from sosmith.gen.specification import example, load
 from sosmith.model.calibration import fit, read_measurements

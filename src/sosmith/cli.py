@@ -19,7 +19,7 @@ from rich.console import Console
 from rich.markup import escape
 
 import sosmith
-from sosmith.calibrate_cli import calibrate
+from sosmith.commands.calibrate import calibrate
 from sosmith.gen.architecture import Architecture
 from sosmith.gen.boards import BOARDS, Board, find_board
 from sosmith.gen.certificate_file import Certificate, read_certificate
