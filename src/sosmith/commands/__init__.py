@@ -1,0 +1,1 @@
+"""The commands of `sosmith`, one file for what belongs together; `sosmith.cli` gathers them."""
