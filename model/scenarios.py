@@ -18,7 +18,8 @@ import numpy.typing as npt
 from sosmith.model.errors import SpecificationError
 from sosmith.model.polynomial import Polynomial
 from sosmith.model.port import Codes, Port, Values
-from sosmith.model.sensors import TEMPERATURE_NOISE, VOLTAGE_NOISE, sensor_voltage
+from sosmith.model.random_streams import one_stream
+from sosmith.model.sensors import Sensors
 from sosmith.model.trace import Trace
 
 TABLE_1_STEPS = tuple(float(d) for d in range(1, 11))
@@ -261,10 +262,7 @@ def _samples(bench: Bench, seconds: float) -> int:
 
 def _sense(run: _Run, clearance: Values, temperature: Values) -> Codes:
     """Codes of the noisy sensors; the ADC saturates."""
-    voltage = sensor_voltage(clearance, temperature) + run.rng.normal(0.0, VOLTAGE_NOISE, run.samples)
-    shown = temperature + run.rng.normal(0.0, TEMPERATURE_NOISE, run.samples)
-    columns = (voltage, shown)[: len(run.bench.ports)]
-    return np.stack([port.encode(values) for port, values in zip(run.bench.ports, columns, strict=True)], axis=1)
+    return Sensors().codes(clearance, temperature, run.time, run.bench.ports, one_stream(run.rng))
 
 
 def _settled(run: _Run, step: float) -> npt.NDArray[np.bool_]:
