@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import signal
 import sys
+from collections.abc import Sequence
 from fractions import Fraction
 from pathlib import Path
 from types import FrameType
@@ -37,7 +38,9 @@ from sosmith.gen.report import write_report
 from sosmith.gen.specification import Specification, example, load
 from sosmith.gen.verification import RejectedError, Verdict
 from sosmith.gen.verification import verify as verify_certificate
+from sosmith.gen.wear_limits import WearSpec
 from sosmith.model.errors import SosmithError, SpecificationError, ToolError
+from sosmith.model.port import Port
 from sosmith.model.program import Program
 from sosmith.model.scenarios import SCENARIOS
 from sosmith.model.text_files import to_json, write_files
@@ -569,6 +572,8 @@ def _print_design(made: CoreDesign, *, brief: bool = False) -> None:
     for subject, reason in made.reasons.items():
         overview.add_row(subject, reason)
     overview.add_row("output", f"{datapath.output.bits} bits, one LSB = {lsb:.6g}{unit}")
+    if made.spec.wear is not None:
+        overview.add_row("wear flags", _wear_text(made.spec.wear, datapath.output))
     for name, value in _hardware_rows(made.architecture):
         overview.add_row(name, value)
     if made.spec.channels > 1:
@@ -586,6 +591,18 @@ def _print_design(made: CoreDesign, *, brief: bool = False) -> None:
         console.print(sections)
         _print_limit_cycles(console, made)
     _print_schedule(console, made.architecture.program)
+
+
+def _wear_text(wear: WearSpec, output: Port) -> str:
+    """Say from which clearances on the flags of wear rise: one for all channels, or from the least to the largest."""
+    unit = f" {output.unit}".rstrip()
+
+    def span(values: Sequence[Fraction]) -> str:
+        low, high = float(min(values)), float(max(values))
+        return f"{low:g}{unit}" if low == high else f"{low:g} to {high:g}{unit}, by channel,"
+
+    warning, critical = (span(values) for values in zip(*wear.clearances(), strict=True))
+    return escape(f"warning from {warning} on, critical from {critical} on")
 
 
 def _hardware_rows(architecture: Architecture) -> list[tuple[str, str]]:
