@@ -93,7 +93,7 @@ def _read_toml(path: Path) -> dict[str, Any]:
 
 
 def _own(findings: list[ErrorDetails]) -> list[ErrorDetails]:
-    """Put unknown keys first, often the slip behind missing ones.
+    """Put unknown keys first, often the slip behind missing ones, and keys before those of tables inside.
 
     Leave out that a list is too short where it is so only because items of it do not fit.
     """
@@ -103,7 +103,7 @@ def _own(findings: list[ErrorDetails]) -> list[ErrorDetails]:
         if finding["type"] != "too_short"
         or not any(other["loc"][: len(finding["loc"])] == finding["loc"] for other in findings if other is not finding)
     ]
-    return sorted(own, key=lambda finding: finding["type"] != "extra_forbidden")
+    return sorted(own, key=lambda finding: (finding["type"] != "extra_forbidden", len(finding["loc"])))
 
 
 def _sentence(shape: type[Table], finding: ErrorDetails) -> str:

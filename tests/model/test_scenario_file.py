@@ -294,3 +294,34 @@ def test_a_note_on_what_the_temperature_input_cannot_show(tmp_path: Path) -> Non
     assert range_notes(hot, BENCH.ports[:1]) == ()
     trace = emulate_file(hot, BENCH, seed=1)
     assert trace.codes[-1, 1] == 65535
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "channel"),
+    [
+        ("noise = 0.01", "noise = 0.02", 0),
+        ("noise = 0.01", 'noise = 0.01\nmodel = "equation_4"', 0),
+        ("noise = 0.01", "noise = 0.01\noutput_range = [0.0, 1.0]", 0),
+        ("noise = 0.01", "noise = 0.01\nageing = { gain_per_day = 0.01 }", 0),
+        ("noise = 0.01", "noise = 0.01\nageing = { offset_walk = 0.01 }", 0),
+        ("noise = 0.01", "noise = 0.01\nageing = { gain_walk = 0.01 }", 0),
+        ("noise = 0.01", "noise = 0.01\nsystematic_error = { rms = 0.1, correlation = 1.0 }", 0),
+        ("noise = 0.01", "noise = 0.01\nmains = { frequency = 60.0, amplitudes = [0.0, 0.1] }", 0),
+        ("noise = 0.01", "noise = 0.01\ndigitizer = { gain_error = 0.01 }", 0),
+        ("noise = 0.01", "noise = 0.01\ndigitizer = { inl = 50.0 }", 0),
+        ("noise = 4.0", "noise = 5.0", 1),
+        ("noise = 4.0", "noise = 4.0\ncold_junction = -20.0", 1),
+        ("noise = 4.0", "noise = 4.0\ncold_junction_error = 0.5", 1),
+        ("noise = 4.0", "noise = 4.0\ndigitizer = { bits = 12 }", 1),
+        ("noise = 4.0", "noise = 4.0\ndigitizer = { range = 0.5e2 }", 1),
+        ("noise = 4.0", "noise = 4.0\ndigitizer = { offset = 50.0 }", 1),
+        ("noise = 4.0", "noise = 4.0\ndigitizer = { gain_error = 0.5 }", 1),
+        ("noise = 4.0", "noise = 4.0\ndigitizer = { inl = 1e6 }", 1),
+    ],
+)
+def test_every_key_of_a_sensor_changes_its_codes_and_not_those_of_the_other(
+    tmp_path: Path, old: str, new: str, channel: int
+) -> None:
+    before, after = made(tmp_path, PLAIN), made(tmp_path, PLAIN.replace(old, new))
+    assert np.any(before.codes[:, channel] != after.codes[:, channel])
+    np.testing.assert_array_equal(before.codes[:, 1 - channel], after.codes[:, 1 - channel])
