@@ -13,8 +13,9 @@ from fractions import Fraction
 from sosmith.gen.architecture import Budget, structure
 from sosmith.gen.core import CoreDesign, calibrated_codes, filter_of, polynomial_of
 from sosmith.gen.design import Filter
+from sosmith.gen.other_constants import with_constants
 from sosmith.gen.quantity import quantity
-from sosmith.gen.quantize import Quantized, with_constants
+from sosmith.gen.quantize import Quantized
 from sosmith.gen.specification import Specification
 from sosmith.gen.transient import transient
 from sosmith.hdl import folded
