@@ -22,9 +22,10 @@ from sosmith.hdl import folded
 from sosmith.model.constants import constants, packed, values_of, with_ranges, with_room
 from sosmith.model.datapath import Datapath
 from sosmith.model.errors import ShortfallError, SpecificationError
+from sosmith.model.folding import program
 from sosmith.model.graph import Node, Op
 from sosmith.model.polynomial import Polynomial
-from sosmith.model.program import Program, program
+from sosmith.model.program import Program
 
 ADVICE = (
     "go there in smaller steps, each after the one before has faded, or stop the samples and reset the core before "
