@@ -1,7 +1,7 @@
 """The documents: what the README shows is what the commands print, and the maps of the code are true.
 
 Run as a script, it renews what is generated in them: the output in the README, the file table of the
-architecture, the register map, the commands and the schema of the calibration.
+architecture, the register map, the commands and the schema of the calibration, the commands of the sensors.
 """
 
 import ast
@@ -23,6 +23,7 @@ ROOT = Path(__file__).parents[1]
 README = ROOT / "README.md"
 ARCHITECTURE = ROOT / "docs" / "architecture.md"
 CALIBRATION = ROOT / "docs" / "calibration.md"
+SENSORS = ROOT / "docs" / "sensors.md"
 REGISTERS = ROOT / "docs" / "registers.md"
 DOCUMENTS = [README, ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").glob("*.md"))]
 ROOMS = ("model", "hdl", "gen", "sim")
@@ -142,6 +143,12 @@ def test_calibration_prints_what_is_shown(folder: Path) -> None:
     assert shown == with_output(shown, folder)
 
 
+def test_sensors_print_what_is_shown(folder: Path) -> None:
+    shown = SENSORS.read_text(encoding="utf-8")
+    assert len(_SHOWN.findall(shown)) == 1
+    assert shown == with_output(shown, folder)
+
+
 def test_the_schema_is_the_one_of_the_store() -> None:
     assert _SCHEMA.findall(CALIBRATION.read_text(encoding="utf-8")) == [schema()]
 
@@ -174,6 +181,9 @@ if __name__ == "__main__":
         renew(README, _OUTPUT, worked_example(Path(scratch)))
         text = CALIBRATION.read_text(encoding="utf-8")
         CALIBRATION.write_text(with_output(text, furnish(Path(scratch))), encoding="utf-8")
+    with tempfile.TemporaryDirectory() as scratch, contextlib.chdir(scratch):
+        text = SENSORS.read_text(encoding="utf-8")
+        SENSORS.write_text(with_output(text, furnish(Path(scratch))), encoding="utf-8")
     renew(ARCHITECTURE, _TABLE, file_table())
     renew(REGISTERS, _REGISTERS, markdown())
     renew(CALIBRATION, _SCHEMA, schema())
