@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 
@@ -129,3 +130,16 @@ def test_every_channel_has_noise_of_its_own_and_its_own_wear(folder: Path) -> No
     (folder / "two.toml").write_text(two, encoding="utf-8")
     clearances = [trace.truth for trace in traces_for(made, "two.toml", seed=1)]
     assert [float(truth[-1]) for truth in clearances if truth is not None] == [3.0, 4.0]
+
+
+@pytest.mark.slow
+def test_the_bench_of_the_paper_in_hardware(folder: Path) -> None:
+    examples = Path(__file__).parents[1] / "examples"
+    scenario = examples / "scenarios" / "bench_43_50.toml"
+    result = run("simulate", str(examples / "flange_wear_bench.toml"), "--trace", str(scenario), "--json", "-o", "out")
+    assert result.exit_code == 0, result.output
+    report = json.loads((folder / "out" / "report.json").read_text(encoding="utf-8"))
+    assert (report["bit_exact"], report["passed"], report["samples"]) == (True, True, 630)
+    accuracy = report["accuracy_percent"]
+    assert accuracy["hardware"] == pytest.approx(accuracy["golden"], abs=0.01)
+    assert 80 < accuracy["unfiltered"] < 100
