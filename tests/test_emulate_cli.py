@@ -13,6 +13,7 @@ from sosmith.cli import cli
 from sosmith.gen.core import design_core
 from sosmith.gen.specification import load
 from sosmith.model.errors import SpecificationError
+from sosmith.model.scenario_file import load_scenario, range_notes
 from sosmith.sim.simulation import traces_for
 from tests.model.scenario_texts import CALIBRATION, PLAIN
 from tests.test_cli import FILTER, INSTRUMENT
@@ -91,6 +92,10 @@ def test_the_list_tells_about_files(folder: Path) -> None:
             "day.toml: calibration must be a table with the depot's measurements, not missing",
         ),
         (
+            ("emulate", "spec.toml", "depot.toml", "--measurements", "--seconds", "5"),
+            "--seconds must come with a scenario's name, not with --measurements",
+        ),
+        (
             ("emulate", "spec.toml", "--measurements"),
             "--measurements must come with a scenario file (TOML), not without one",
         ),
@@ -143,3 +148,12 @@ def test_the_bench_of_the_paper_in_hardware(folder: Path) -> None:
     accuracy = report["accuracy_percent"]
     assert accuracy["hardware"] == pytest.approx(accuracy["golden"], abs=0.01)
     assert 80 < accuracy["unfiltered"] < 100
+
+
+def test_a_specification_for_tread_braking_shows_all_of_its_temperatures() -> None:
+    examples = Path(__file__).parents[1] / "examples" / "scenarios"
+    spec = load(examples / "specifications" / "flange_wear_tread_braking.toml")
+    assert spec.name == "flange_wear_tread_braking"
+    scenario = load_scenario(examples / "tread_braking_200.toml")
+    assert range_notes(scenario, spec.inputs) == ()
+    assert range_notes(scenario, load(examples.parent / "flange_wear_locomotive.toml").inputs) != ()

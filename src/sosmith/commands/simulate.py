@@ -176,6 +176,8 @@ def emulate_command(
     and docs/sensors.md says what can be in them.
     """
     if measurements:
+        if seconds is not None:
+            raise SpecificationError("--seconds must come with a scenario's name, not with --measurements")
         _write_measurements(spec, scenario, seed, output)
         return
     with show_progress() as step:
