@@ -22,6 +22,9 @@ NEAR = 2.0
 STOP_FREQUENCY = 50.0
 """In Hz; section 5.3 reads the ripple delta there and prints -20 log10(delta)."""
 
+SMALLEST_RIPPLE = 1e-9
+"""Ripples below count as this one, 180 dB: less is the rounding of doubles."""
+
 TABLE_5 = ((1.2, 0.2), (1.135, 0.1672), (0.188, 0.9322))
 """Largest vertical displacement in mm of the right and left wheel of wheelsets 1 to 3."""
 
@@ -49,8 +52,8 @@ TABLE_8 = (
 _CONE = "a cone lifts one wheel as much as it lowers the other; real profiles, and the flange, do not"
 _CANT = "ours is half the cant, as the inner rail keeps its height; how the paper's track is canted is not told"
 _TWO = "the paper prints two lateral displacements for the wheels of one rigid wheelset; and ours has no flange"
-_YAW = "depends on the links' stiffness, the radius and the flange force, none of which the paper gives"
-_SCALE = "the paper does not tell the scale of its transform: a yaw ripple of 0.1 exceeds its largest yaw, 0.0126 rad"
+_YAW = "hangs on the links' stiffness, radius and flange force, which the paper does not give; ours has no flange"
+_SCALE = "the scale of the paper's transform is not told: its yaw ripple of 0.1 exceeds its largest yaw, 0.0126 rad"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,7 +101,7 @@ def _vertical(motion: Motion) -> Iterator[Row]:
         for side, paper, rise in (("right", right, motion.right_wheel_rise), ("left", left, motion.left_wheel_rise)):
             yield Row(
                 table="5",
-                what=f"vertical, {side} wheel of wheelset {k + 1}",
+                what=f"vertical, wheelset {k + 1}, {side} wheel",
                 unit="mm",
                 paper=paper,
                 ours=1e3 * float(rise[:, k].max()),
@@ -156,13 +159,13 @@ def _attenuations(motion: Motion) -> Iterator[Row]:
         scales = (1e3, 1e3, 1.0)
         for name, paper, values, scale in zip(("vertical", "lateral", "yaw"), papers, motions, scales, strict=True):
             if paper is not None:
-                ours = attenuation(ripple(scale * values[:, k], round(rate, 6), STOP_FREQUENCY))
+                delta = ripple(scale * values[:, k], round(rate, 6), STOP_FREQUENCY)
                 yield Row(
                     table="8",
-                    what=f"attenuation at 50 Hz, {name}, {part}",
+                    what=f"{name} at 50 Hz, {part}",
                     unit="dB",
                     paper=paper,
-                    ours=ours,
+                    ours=attenuation(max(delta, SMALLEST_RIPPLE)),
                     same_quantity=False,
                     why=_SCALE,
                 )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import math
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -116,7 +115,7 @@ def vehicle_json(made: VehicleRun) -> dict[str, Any]:
                 "what": row.what,
                 "unit": row.unit,
                 "paper": row.paper,
-                "ours": row.ours if math.isfinite(row.ours) else None,
+                "ours": row.ours,
                 "label": row.label,
                 "why": row.why,
             }
@@ -159,3 +158,13 @@ def vehicle_csv(motion: Motion) -> str:
     # adding 0.0 makes a negative zero positive, so that it is written the same everywhere
     np.savetxt(stream, np.round(np.stack(list(columns.values()), axis=1), 6) + 0.0, fmt="%.6f", delimiter=",")
     return stream.getvalue()
+
+
+def parameters_markdown(parameters: Parameters) -> str:
+    """Table of all parameters with unit and source, in Markdown."""
+    rows = [
+        f"| `{path}` | {entry['value']:g} {entry['unit'] if entry['unit'] != '1' else ''}".rstrip()
+        + f" | {entry['source']} |\n"
+        for path, entry in _parameters(parameters).items()
+    ]
+    return "| parameter | value | source |\n|---|---|---|\n" + "".join(rows)

@@ -51,7 +51,7 @@ def test_it_prints_modes_motions_and_the_paper() -> None:
         "Largest motion of the wheelsets",
         "Largest motion of frames and body",
         "Beside the paper's tables 5 to 8",
-        "5: the paper does not tell the scale of its transform",
+        "5: the scale of the paper's transform is not told",
     ):
         assert row in shown
     assert re.search(r"7  yaw, wheelset 1 to bogie 1  rad  0.01258  0.0\d+  (near|not comparable)  4", shown)

@@ -58,14 +58,15 @@ def test_figures_are_those_of_the_motion(motion: Motion) -> None:
     lateral = motion.wheelset_lateral
     assert ours["lateral, wheelset 2 to the right"] == pytest.approx(-1e3 * lateral[:, 1].min())
     assert ours["lateral, wheelset 3 to the left"] == pytest.approx(1e3 * lateral[:, 2].max())
-    assert ours["vertical, right wheel of wheelset 1"] == pytest.approx(150 * -motion.lateral_to_rails[:, 0].min())
+    assert ours["vertical, wheelset 1, right wheel"] == pytest.approx(150 * -motion.lateral_to_rails[:, 0].min())
     assert ours["vertical, bogie"] == pytest.approx(1e3 * motion.frame_vertical.max())
     yaw = motion.wheelset_yaw_to_frame
     assert ours["yaw, wheelset 1 to bogie 2"] == pytest.approx(np.abs(yaw[:, 3]).max())
     _, amplitude = amplitude_spectrum(1e3 * motion.frame_lateral[:3050, 1], 100.0)
     shorter = Motion(**{name: getattr(motion, name)[:3050] for name in motion.__dataclass_fields__})
     again = {one.what: one.ours for one in comparison(shorter)}
-    assert again["attenuation at 50 Hz, lateral, bogie 2"] == pytest.approx(attenuation(amplitude[-1]), abs=1e-6)
+    assert max(again.values()) == ours["vertical at 50 Hz, wheelset 1"] == 180  # no more than rounding
+    assert again["lateral at 50 Hz, bogie 2"] == pytest.approx(attenuation(amplitude[-1]), abs=1e-6)
 
 
 def test_the_printed_attenuations_are_those_of_the_printed_ripples() -> None:

@@ -233,6 +233,14 @@ def test_limits_tell_where_flanges_and_friction_would_act(motion: Motion) -> Non
     assert -0.009 < small.beyond_flange[0] < 0
 
 
+@pytest.mark.parametrize("level", ["low", "high"])
+def test_the_model_holds_over_random_irregularities_of_a_straight_track(level: str) -> None:
+    straight = tangent_track(replace(GIVEN.track, irregularity=0.0))
+    found = run(GIVEN, straight, speed=20.0, sample_rate=100.0, irregularity=level)
+    assert limits(GIVEN, straight, found).kept
+    assert np.std(found.clearance_mm) > 0.1
+
+
 def test_widening_moves_the_flange() -> None:
     still = Motion(**{one.name: np.zeros((2, 6)) for one in fields(Motion) if one.name not in ("time", "distance")},
                    time=np.array([0.0, 0.01]), distance=np.array([0.0, 200.0]))  # fmt: skip
