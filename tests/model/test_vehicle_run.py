@@ -311,3 +311,16 @@ def test_a_track_goes_on_as_it_ends() -> None:
     bend = Track(corners=np.array([0.0, 10.0, 60.0]), curvature=np.array([0, 0, 0.002]), cant=np.array([0, 0, 0.05]))
     assert bend.curvature_at(np.array([-5.0, 35, 61, 80])) == pytest.approx([0, 0.001, 0.002, 0.002])
     assert bend.length == 60
+    circle = Track(corners=np.array([0.0, 100.0]), curvature=np.full(2, 0.002), cant=np.zeros(2))
+    s = np.array([-10.0, 0, 50, 200])
+    assert circle.heading_at(s) == pytest.approx(0.002 * s, abs=1e-9)
+    assert circle.offset_at(s) == pytest.approx(0.001 * s**2, abs=1e-6)
+
+
+def test_position_on_the_rails_is_that_on_the_track_less_the_irregularity() -> None:
+    straight = tangent_track(GIVEN.track)
+    found = run(GIVEN, straight, speed=20.0, sample_rate=100.0)
+    assert found.lateral_to_rails[25, 0] == pytest.approx(found.wheelset_lateral[25, 0] - 0.02)  # at 5 m
+    place = found.distance - (wheelset_positions(GIVEN.layout)[0] - wheelset_positions(GIVEN.layout)[4])
+    expected = found.wheelset_lateral[:, 4] - straight.irregularity_at(place)
+    assert found.lateral_to_rails[:, 4] == pytest.approx(expected, abs=1e-12)
