@@ -29,6 +29,7 @@ from sosmith.model.scenario_file import emulate_file, load_scenario, range_notes
 from sosmith.model.scenarios import SCENARIOS, Bench, emulate
 from sosmith.model.text_files import write_files
 from sosmith.model.trace import Trace, read_csv
+from sosmith.model.vehicle_clearance import vehicle_clearance
 from sosmith.sim.cosimulate import CosimulationResult, cosimulate
 from sosmith.sim.gate_level import with_cell_models
 from sosmith.sim.simulators import check_name
@@ -72,7 +73,7 @@ def traces_for(design: CoreDesign, source: str, *, seed: int, seconds: float | N
         if seconds is not None:
             raise SpecificationError(f"--seconds must come with a scenario's name, not with the file {source}")
         scenario, bench = load_scenario(Path(source)), bench_of(design)
-        traces = [emulate_file(scenario, bench, seed=seed + k, channel=k) for k in channels]
+        traces = [emulate_file(scenario, bench, seed=seed + k, channel=k, vehicle=vehicle_clearance) for k in channels]
         return tuple(trace.delayed(k) for k, trace in enumerate(traces))
     if source not in SCENARIOS and (source.lower().endswith(".csv") or Path(source).exists()):
         if seconds is not None:

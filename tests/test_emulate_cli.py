@@ -6,6 +6,7 @@ import json
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
@@ -14,6 +15,7 @@ from sosmith.gen.core import design_core
 from sosmith.gen.specification import load
 from sosmith.model.errors import SpecificationError
 from sosmith.model.scenario_file import load_scenario, range_notes
+from sosmith.model.vehicle_clearance import vehicle_clearance
 from sosmith.sim.simulation import traces_for
 from tests.model.scenario_texts import CALIBRATION, PLAIN
 from tests.test_cli import FILTER, INSTRUMENT
@@ -157,3 +159,16 @@ def test_a_specification_for_tread_braking_shows_all_of_its_temperatures() -> No
     scenario = load_scenario(examples / "tread_braking_200.toml")
     assert range_notes(scenario, spec.inputs) == ()
     assert range_notes(scenario, load(examples.parent / "flange_wear_locomotive.toml").inputs) != ()
+
+
+def test_the_vehicles_motion_reaches_the_trace(folder: Path) -> None:
+    ride = SHORT.replace('"depot"', '"curve"\nmotion_from = "vehicle"')
+    (folder / "ride.toml").write_text(ride, encoding="utf-8")
+    made = design_core(load(folder / "spec.toml"))
+    (moving,) = traces_for(made, "ride.toml", seed=1)
+    (at_rest,) = traces_for(made, "day.toml", seed=1)
+    difference = moving.values()[:, 0] - at_rest.values()[:, 0]
+    motion = vehicle_clearance("paper", moving.time, 1)
+    # Noise and truth are the same, so that the voltages differ by the motion alone, at some 1.3 V/mm.
+    assert np.corrcoef(difference, motion)[0, 1] > 0.98
+    assert np.std(difference) > 0.2

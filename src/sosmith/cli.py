@@ -19,6 +19,7 @@ from sosmith.commands.compare import compare_command
 from sosmith.commands.design import design, generate, init
 from sosmith.commands.reload import reload_command
 from sosmith.commands.simulate import demo, emulate_command, simulate_command
+from sosmith.commands.vehicle import vehicle
 from sosmith.commands.verify import verify
 from sosmith.model.errors import SosmithError, ToolError
 from sosmith.terminal import note, reader_may_leave, silence_stdout
@@ -76,6 +77,7 @@ for _command in (
     emulate_command,
     compare_command,
     calibrate,
+    vehicle,
     demo,
 ):
     cli.add_command(_command)

@@ -54,16 +54,21 @@ def shown(trace: Trace) -> Values:
     return EQUATION_5A(values[:, 0], values[:, 1])
 
 
+def swaying(track: str, time: Values, seed: int) -> Values:
+    """Stand in for the vehicle, which takes longer."""
+    return np.sin(time + seed) * (1 if track == "paper" else 0.5)
+
+
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
 def test_examples(path: Path) -> None:
     example = load_scenario(path)
-    trace = emulate_file(example, BENCH, seed=1)
+    trace = emulate_file(example, BENCH, seed=1, vehicle=swaying)
     truth, reading = parts(trace)
     assert trace.name == path.stem
     assert reading.mean() > 0.05
     assert 1.0 <= truth.min() <= truth.max() <= 10.0
-    np.testing.assert_array_equal(trace.codes, emulate_file(example, BENCH, seed=1).codes)
-    assert np.any(trace.codes != emulate_file(example, BENCH, seed=2).codes)
+    np.testing.assert_array_equal(trace.codes, emulate_file(example, BENCH, seed=1, vehicle=swaying).codes)
+    assert np.any(trace.codes != emulate_file(example, BENCH, seed=2, vehicle=swaying).codes)
     assert bool(range_notes(example, BENCH.ports)) == (path.stem == "tread_braking_200")
 
 
