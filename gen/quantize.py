@@ -425,7 +425,7 @@ def with_constants(
         sections,
         proof,
     )
-    return replace(found, datapath=replace(found.datapath, calibrated=datapath.calibrated))
+    return replace(found, datapath=replace(found.datapath, calibrated=datapath.calibrated, wear=datapath.wear))
 
 
 def _entry_with(made: Quantized, polynomial: Polynomial | None) -> _Entry:

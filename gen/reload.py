@@ -111,6 +111,7 @@ def set_for(hardware: CoreDesign, wanted: Specification) -> OtherSet:
         ("sample_rate", spec.sample_rate, wanted.sample_rate),
         ("inputs", spec.inputs, wanted.inputs),
         ("output", spec.output, wanted.output),
+        ("wear", spec.wear, wanted.wear),
     ):
         if have != other:
             raise SpecificationError(f"{wanted.path}: {name} must be as in {spec.path} for a set to be loaded there")
