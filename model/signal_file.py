@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from sosmith.model.csv_table import CsvTable, check_rows, read_csv_table
+from sosmith.model.csv_table import CsvTable, check_rows, csv_header, read_csv_table
 from sosmith.model.errors import SpecificationError
 from sosmith.model.polynomial import Polynomial
 from sosmith.model.port import Values
@@ -117,7 +116,7 @@ def read_signal_file(
         As `read_csv_table`; if a column asked for is not there or a name tells no unit; if there are too few rows; if
         time does not rise in even steps; if reading is neither 0 nor 1. One sentence with the file and the line.
     """
-    header = _header(path)
+    header = csv_header(path)
     for name in (*columns, *([truth] if truth else [])):
         if name not in header:
             raise SpecificationError(f"{path} must have the column {name}, not only {', '.join(header)}")
@@ -142,18 +141,6 @@ def unit_of(column: str) -> tuple[str, float]:
     (('mm', 0.001), ('', 1.0))
     """
     return _UNITS.get(column.rpartition("_")[2], ("", 1.0)) if "_" in column else ("", 1.0)
-
-
-def _header(path: Path) -> list[str]:
-    """Names in the first line that is not blank; whatever is wrong with the file is for `read_csv_table` to say."""
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            for cells in csv.reader(file):
-                if any(cell.strip() for cell in cells):
-                    return [cell.strip() for cell in cells]
-    except (OSError, UnicodeDecodeError, csv.Error):
-        pass
-    return []
 
 
 def _sample_rate(table: CsvTable) -> float:

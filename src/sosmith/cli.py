@@ -21,6 +21,7 @@ from sosmith.commands.reload import reload_command
 from sosmith.commands.simulate import demo, emulate_command, simulate_command
 from sosmith.commands.spectrum import spectrum_command
 from sosmith.commands.verify import verify
+from sosmith.commands.wear import wear_command
 from sosmith.model.errors import SosmithError, ToolError
 from sosmith.terminal import note, reader_may_leave, silence_stdout
 
@@ -78,6 +79,7 @@ for _command in (
     compare_command,
     calibrate,
     spectrum_command,
+    wear_command,
     demo,
 ):
     cli.add_command(_command)
