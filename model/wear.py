@@ -26,6 +26,9 @@ ROUNDING = 1e-9
 """So far below a limit, in mm, a reading has reached it: doubles of decimal numbers are off by less, and a step of an
 output code is more."""
 
+MOST_CORRELATION = 0.95
+"""Beyond this the deviations are no scatter about a line: an interval can hardly be wide enough."""
+
 DAY = 1.0
 """Length of a block unless said otherwise, days: longer than anything a filter or a journey keeps for itself."""
 
@@ -266,8 +269,7 @@ def rate_of(time: Values, clearance: Values, block: float, confidence: float) ->
     slope, intercept, low, high = stats.theilslopes(clearance, time, alpha=confidence)
     deviation = clearance - intercept - slope * time
     deviation = deviation - np.median(deviation)
-    energy = float(np.sum(deviation**2))
-    correlation = float(np.sum(deviation[1:] * deviation[:-1])) / energy if energy > 0 else 0.0
+    correlation = _correlation(deviation)
     wider = math.sqrt((1 + correlation) / (1 - correlation)) if correlation > 0 else 1.0
     return WearRate(
         rate=float(slope),
@@ -279,6 +281,19 @@ def rate_of(time: Values, clearance: Values, block: float, confidence: float) ->
         scatter=1.4826 * float(np.median(np.abs(deviation))),
         correlation=correlation,
     )
+
+
+def _correlation(deviation: Values) -> float:
+    """Estimate the correlation of neighbours from deviations about a fitted line.
+
+    A fit to n values takes a part of it along, with a line about ``(2 + 4 r) / n`` on average (for a mean see M. G.
+    Kendall, Biometrika 41, 1954), which is given back. The tests count how often the interval then holds the truth.
+    """
+    energy, count = float(np.sum(deviation**2)), len(deviation)
+    if energy == 0:
+        return 0.0
+    found = float(np.sum(deviation[1:] * deviation[:-1])) / energy
+    return min((found + 2 / count) / (1 - 4 / count), MOST_CORRELATION)
 
 
 def judge(

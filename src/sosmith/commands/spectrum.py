@@ -11,22 +11,15 @@ import click
 from rich.markup import escape
 
 from sosmith.gen.core import polynomial_of
-from sosmith.gen.filter_proposal import (
-    COVERAGE,
-    PASSBAND_LOSS,
-    TOLERANCE,
-    Content,
-    Proposal,
-    Wish,
-    propose,
-    told_apart,
-)
+from sosmith.gen.filter_prediction import Content, told_apart
+from sosmith.gen.filter_proposal import COVERAGE, PASSBAND_LOSS, TOLERANCE, Proposal, Wish, propose
 from sosmith.gen.filter_table import filter_table, replace_filter
 from sosmith.gen.filter_trial import Trial, try_filter
 from sosmith.gen.specification import load
 from sosmith.gen.spectra import DETRENDS, WINDOWS, Spectrum, SpectrumSettings, spectrum
 from sosmith.gen.spectrum_plot import FORMATS, Curve, spectrum_plot
 from sosmith.gen.spectrum_report import peaks, proposal_json, provenance, ripple, signal_json
+from sosmith.model.csv_table import csv_header
 from sosmith.model.errors import SpecificationError
 from sosmith.model.polynomial import EQUATION_5A, Polynomial
 from sosmith.model.signal_file import Signal, SignalFile, read_signal_file
@@ -76,7 +69,9 @@ class _Spectra:
 
 @click.command("spectrum", help=_HELP)
 @click.argument("traces", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="TRACE...")
-@click.option("--column", "columns", multiple=True, help="Take this column of values; may be given again.")
+@click.option(
+    "--column", "columns", multiple=True, help="Take this column of values, where a trace has it; may be given again."
+)
 @click.option("--truth", help="Column with the true signal.  [default: clearance_mm of an emulated trace, truth]")
 @click.option(
     "--calibration",
@@ -138,8 +133,9 @@ def spectrum_command(
     with show_progress() as step:
         step("reading")
         polynomial, origin = _polynomial(calibration or into)
-        files = [read_signal_file(path, polynomial, columns, truth) for path in traces]
+        files = _read(traces, polynomial, columns, truth)
         rate = _sample_rate(files, into)
+        _check_data(into, output)
         step("spectra")
         signals = [_spectra_of(file, one, settings) for file in files for one in file.signals]
         obstacle = _obstacle(signals, edge, motion=motion)
@@ -213,6 +209,22 @@ def _polynomial(path: Path | None) -> tuple[Polynomial, str]:
     return polynomial_of(spec)[0], f"that of {path.name}"
 
 
+def _read(
+    traces: Sequence[Path], polynomial: Polynomial, columns: Sequence[str], truth: str | None
+) -> list[SignalFile]:
+    """Read each file with those of the columns asked for that it has; each must be in one of the files."""
+    headers = [csv_header(path) for path in traces]
+    for name in (*columns, *([truth] if truth else [])):
+        if not any(name in header for header in headers):
+            raise SpecificationError(f"column {name} must be in one of {', '.join(map(str, traces))}, not in none")
+    return [
+        read_signal_file(
+            path, polynomial, [name for name in columns if name in header], truth if truth in header else None
+        )
+        for path, header in zip(traces, headers, strict=True)
+    ]
+
+
 def _sample_rate(files: Sequence[SignalFile], into: Path | None) -> float:
     """Sample rate of the filter, Hz: that of the traces, or of the specification that they have to agree with."""
     first = files[0]
@@ -226,6 +238,17 @@ def _sample_rate(files: Sequence[SignalFile], into: Path | None) -> float:
                 f"{file.path}: the sample rate must be the {rate:g} Hz of {owner}, not {file.sample_rate:g} Hz"
             )
     return rate
+
+
+def _check_data(into: Path | None, output: Path | None) -> None:
+    """Refuse a copy that would look for its measurements in another folder."""
+    if into is None or output is None:
+        return
+    calibration = load(into).calibration
+    if calibration is not None and calibration.data is not None and into.parent.resolve() != output.parent.resolve():
+        raise SpecificationError(
+            f"{output}: the copy must be in the folder of {into}, whose calibration.data is found from there"
+        )
 
 
 def _spectra_of(file: SignalFile, one: Signal, settings: SpectrumSettings) -> _Spectra:
