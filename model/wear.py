@@ -159,8 +159,8 @@ class WearReport:
     rate : WearRate
         Rate of wear.
     life, life_low, life_high : float or None
-        Days until the critical clearance at the rate, at the upper end of its interval and at the lower; None where
-        that rate is not above zero, so that no end is in sight.
+        Days from the last reading until the critical clearance at the rate, at the upper end of its interval and at the
+        lower; None where that rate is not above zero, so that no end is in sight.
     last : float
         The last reading, mm.
     state : WearState
@@ -347,6 +347,7 @@ def judge(
     rate = rate_of(times, medians, length, confidence)
     now, last_block = float(medians[-1]), int(counts[-1])
     remaining = max(limits.critical_clearance - now, 0.0)
+    gone = float(time[-1] - times[-1])
     off = float(stats.norm.ppf((1 + confidence) / 2)) * rate.scatter
     states = [limits.state(value) for value in clearance.tolist()]
     end = states[-last_block:]
@@ -360,9 +361,9 @@ def judge(
         wear=now - limits.initial,
         remaining=remaining,
         rate=rate,
-        life=_life(remaining, rate.rate),
-        life_low=_life(max(remaining - off, 0.0), rate.high),
-        life_high=_life(remaining + off, rate.low),
+        life=_life(remaining, rate.rate, gone),
+        life_low=_life(max(remaining - off, 0.0), rate.high, gone),
+        life_high=_life(remaining + off if remaining else 0.0, rate.low, gone),
         last=float(clearance[-1]),
         state=states[-1],
         first_warning=float(time[warned.index(True)]) if any(warned) and limits.warning is not None else None,
@@ -373,9 +374,9 @@ def judge(
     )
 
 
-def _life(remaining: float, rate: float) -> float | None:
-    """Days until what remains is worn at a rate in mm a day; None if it never is."""
+def _life(remaining: float, rate: float, gone: float) -> float | None:
+    """Days until what remains is worn at a rate in mm a day, less the days `gone` already; None if it never is."""
     if remaining == 0:
         return 0.0
     life = remaining / rate if rate > 0 else math.inf
-    return life if life < math.inf else None
+    return max(life - gone, 0.0) if life < math.inf else None
