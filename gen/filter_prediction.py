@@ -27,12 +27,15 @@ class Content:
         Of what is not.
     has_truth : bool
         Whether the two were told apart by a true signal, not by frequency.
+    slow : float
+        Rms of the disturbance that is slower than the spectra resolve; a low-pass filter lets it through.
     """
 
     name: str
     wanted: Spectrum | None
     disturbance: Spectrum
     has_truth: bool
+    slow: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,6 +50,8 @@ class Prediction:
         Rms of what the filter does to the wanted signal, its delay at zero frequency set aside.
     disturbance : float
         Rms of what is left of the disturbance.
+    slow : float
+        Rms of the disturbance that is slower than the spectra resolve, all of which is left.
     unfiltered : float
         Rms of the disturbance before the filter.
     """
@@ -54,12 +59,13 @@ class Prediction:
     name: str
     wanted: float
     disturbance: float
+    slow: float
     unfiltered: float
 
     @property
     def rms(self) -> float:
-        """Of both, taken as uncorrelated."""
-        return math.hypot(self.wanted, self.disturbance)
+        """Of all three, taken as uncorrelated."""
+        return math.hypot(self.wanted, self.disturbance, self.slow)
 
 
 def told_apart(name: str, measured: Spectrum, passband: float) -> Content:
@@ -96,5 +102,6 @@ def predict(content: Content, made: Filter, delay: float) -> Prediction:
         name=content.name,
         wanted=rms(content.wanted, delayed=True),
         disturbance=rms(content.disturbance, delayed=False),
+        slow=content.slow,
         unfiltered=content.disturbance.rms,
     )

@@ -163,6 +163,13 @@ def propose(contents: Sequence[Content], wish: Wish, sample_rate: float) -> Prop
         If no filter is needed, or none is enough.
     """
     passband = _pass_edge(contents, wish, sample_rate)
+    slowest = max(contents, key=lambda one: one.slow)
+    if wish.coverage * slowest.slow > wish.tolerance:
+        raise ShortfallError(
+            f"tolerance must be above {wish.coverage:g} times the {slowest.slow:.3g} rms of the disturbance that is "
+            f"slower than segments of {1 / slowest.disturbance.step:.3g} s and passes any low-pass filter, "
+            f"not {wish.tolerance:g}{_of(slowest.name, contents)}"
+        )
     if _harmless(contents, wish):
         most = max(band_rms(one.disturbance, 0) for one in contents)
         raise ShortfallError(
@@ -191,11 +198,11 @@ def _best(contents: Sequence[Content], wish: Wish, sample_rate: float, passband:
         return None
     least, _ = minimum_order(passband.value, stopband.value, losses[0].value, losses[1].value, sample_rate)
     if wish.passband is not None:
-        return (
-            _made(contents, wish, sample_rate, (passband, stopband, *losses), passband.value)
-            if least <= MAX_ORDER
-            else None
-        )
+        if least > MAX_ORDER:
+            return None
+        made = _made(contents, wish, sample_rate, (passband, stopband, *losses), passband.value)
+        left = [math.hypot(one.disturbance, one.slow) for one in made.predictions]
+        return made if wish.coverage * max(left) <= wish.tolerance else None
     for order in range(least, MAX_ORDER + 1):
         edge = _highest_pass_edge(order, stopband.value, losses[0].value, losses[1].value, sample_rate)
         reason = (

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -80,6 +81,22 @@ def test_the_papers_table_8_is_the_ripple_in_decibels(delta: float, loss: float)
     found, attenuation = ripple(spectrum(motion, 100, SETTINGS), 45.0)
     assert found == pytest.approx(delta, rel=0.01)
     assert attenuation == pytest.approx(loss, abs=0.1)
+
+
+def test_both_edges_are_the_outermost_that_leave_their_shares() -> None:
+    rate, noise = 20.0, np.random.default_rng(1).normal(size=(2, 16_000))
+    one = content(0.006 * np.cumsum(noise[0]), 0.1 * noise[1], rate)  # both fall or stay over all frequencies
+    made = propose([one], Wish(tolerance=0.12), rate)
+    share = 0.12 / 4
+    assert one.wanted is not None
+    step = one.wanted.step
+    needed, stop = round(made.needed / step), round(made["stopband_edge"] / step)
+
+    def rms(density: Array) -> float:
+        return math.sqrt(float(np.sum(density)) * step)
+
+    assert rms(one.wanted.density[needed + 1 :]) <= share < rms(one.wanted.density[needed:])
+    assert rms(one.disturbance.density[1 : stop + 1]) <= share < rms(one.disturbance.density[1 : stop + 2])
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
@@ -195,6 +212,26 @@ def test_the_pass_loss_must_be_below_the_stop_loss() -> None:
         SpecificationError, match=r"^passband-loss must be below the (39\.9|40\.0)\d+ dB of the stop band, not 60$"
     ):
         propose([one], Wish(tolerance=0.004, passband_loss=60.0), BENCH_RATE)
+
+
+def test_what_is_slower_than_the_spectra_is_part_of_the_error() -> None:
+    one = content(*paper_bench(), BENCH_RATE)
+    wish = Wish(tolerance=0.004)
+    quick = propose([one], wish, BENCH_RATE)
+    room = math.sqrt(0.002**2 - quick.predictions[0].rms ** 2)
+    some = propose([replace(one, slow=0.9 * room)], wish, BENCH_RATE)
+    assert some.predictions[0].rms == pytest.approx(math.hypot(quick.predictions[0].rms, 0.9 * room))
+    more = propose([replace(one, slow=1.05 * room)], wish, BENCH_RATE)
+    assert more.filter.order > quick.filter.order  # what is left of the rest has to be less
+    assert 2 * more.predictions[0].rms <= 0.004
+    with pytest.raises(ShortfallError, match=r"^tolerance must be at least about 0\.00\d+ for a Butterworth"):
+        propose([replace(one, slow=0.0019999)], wish, BENCH_RATE)
+    message = (
+        "tolerance must be above 2 times the 0.003 rms of the disturbance that is slower than segments of 500 s and "
+        "passes any low-pass filter, not 0.004"
+    )
+    with pytest.raises(ShortfallError, match=f"^{re.escape(message)}$"):
+        propose([replace(one, slow=0.003)], wish, BENCH_RATE)
 
 
 def test_motion_alone_needs_a_pass_edge() -> None:

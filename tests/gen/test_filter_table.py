@@ -47,6 +47,7 @@ def test_only_the_table_changes() -> None:
     ("before", "after"),
     [
         ("[filter]\norder = 1", TABLE),
+        ("[filter]\norder = 1\n# of the filter\n[b]\n", f"{TABLE}\n[b]\n"),
         ("[a]\nx = 1\n[filter] # old\norder = 1\n[b]\n", f"[a]\nx = 1\n{TABLE}\n[b]\n"),
         ("[filter]\nsos = [\n[1, 2],\n  [3, 4],\n]\n# mine\n\n# of b\n[b]\n", f"{TABLE}\n# of b\n[b]\n"),
         (

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sosmith.gen.spectra import WINDOWS, SpectrumSettings, degrees_of_freedom, spectrum
+from sosmith.gen.spectra import WINDOWS, SpectrumSettings, degrees_of_freedom, slow_rms, spectrum
 from sosmith.model.errors import SpecificationError
 
 RATE = 50.0
@@ -49,6 +49,17 @@ def test_degrees_of_freedom_and_interval_are_those_of_the_estimates(overlap: flo
     assert 2 * truth**2 / np.var(density) == pytest.approx(first.degrees_of_freedom, rel=0.1)
     inside = (first.lower * density < truth) & (truth < first.upper * density)
     assert np.mean(inside) == pytest.approx(0.9, abs=0.012)
+
+
+def test_what_is_slower_than_a_segment_is_counted_apart() -> None:
+    time = np.arange(10_000) / RATE
+    slow, fast = np.sin(2 * np.pi * time / 200), np.sin(2 * np.pi * 3 * time)
+    assert slow_rms(5 + slow, 500) == pytest.approx(np.sqrt(0.5), rel=0.01)
+    assert slow_rms(fast, 500) < 0.05
+    assert slow_rms(np.random.default_rng(1).normal(size=10_000), 500) == pytest.approx(np.sqrt(2 / 500), rel=0.3)
+    # together they are all of the signal but its mean
+    rest = spectrum(slow + fast, RATE, SpectrumSettings(segment=10.0, window="boxcar", overlap=0.0))
+    assert np.hypot(slow_rms(slow + fast, 500), rest.rms) == pytest.approx(1, rel=0.01)
 
 
 def test_degrees_of_freedom_of_percival_and_walden() -> None:

@@ -41,7 +41,7 @@ def test_the_calibration_makes_the_clearance_of_an_emulated_trace(tmp_path: Path
 
 
 def test_units_come_from_the_names_and_the_truth_goes_with_its_own(tmp_path: Path) -> None:
-    path = write(tmp_path / "t.csv", "time_s,a_um,b_m,c_deg,truth_mm", lambda k: f"{k},{k},{k},180,{k}")
+    path = write(tmp_path / "t.csv", "time_s,a_um,b_m,c_deg,truth_mm,distance_m", lambda k: f"{k},{k},{k},180,{k},{k}")
     signals = {one.name: one for one in read(path).signals}
     assert {name: one.unit for name, one in signals.items()} == {"a_um": "mm", "b_m": "mm", "c_deg": "mrad"}
     assert signals["a_um"].values[50] == pytest.approx(0.05)

@@ -16,12 +16,13 @@ from sosmith.gen.filter_proposal import COVERAGE, PASSBAND_LOSS, TOLERANCE, Prop
 from sosmith.gen.filter_table import filter_table, replace_filter
 from sosmith.gen.filter_trial import Trial, try_filter
 from sosmith.gen.specification import load
-from sosmith.gen.spectra import DETRENDS, WINDOWS, Spectrum, SpectrumSettings, spectrum
+from sosmith.gen.spectra import DETRENDS, WINDOWS, Spectrum, SpectrumSettings, slow_rms, spectrum
 from sosmith.gen.spectrum_plot import FORMATS, Curve, spectrum_plot
 from sosmith.gen.spectrum_report import peaks, proposal_json, provenance, ripple, signal_json
 from sosmith.model.csv_table import csv_header
 from sosmith.model.errors import SpecificationError
 from sosmith.model.polynomial import EQUATION_5A, Polynomial
+from sosmith.model.port import Values
 from sosmith.model.signal_file import Signal, SignalFile, read_signal_file
 from sosmith.model.text_files import write_contents
 from sosmith.model.trace import TIME_TOLERANCE
@@ -274,11 +275,17 @@ def _content(one: _Spectra, edge: float | None, *, motion: bool) -> Content:
     measured = one.spectra["measured"]
     if one.signal.truth is not None:
         wanted, disturbance = one.spectra["true"], one.spectra["disturbance"]
-        return Content(name=one.name, wanted=wanted, disturbance=disturbance, has_truth=True)
+        slow = _slow(one.signal.values - one.signal.truth, disturbance, one.file.sample_rate)
+        return Content(name=one.name, wanted=wanted, disturbance=disturbance, has_truth=True, slow=slow)
     if motion:
-        return Content(name=one.name, wanted=None, disturbance=measured, has_truth=False)
+        slow = _slow(one.signal.values, measured, one.file.sample_rate)
+        return Content(name=one.name, wanted=None, disturbance=measured, has_truth=False, slow=slow)
     assert edge is not None
     return told_apart(one.name, measured, edge)
+
+
+def _slow(disturbance: Values, found: Spectrum, sample_rate: float) -> float:
+    return slow_rms(disturbance, round(sample_rate / found.step))
 
 
 def _trial(one: _Spectra, proposal: Proposal) -> Trial | None:
@@ -327,7 +334,7 @@ def _print_proposal(proposal: Proposal, signals: Sequence[_Spectra], trials: Seq
     console.print(table)
     checks = new_table(
         f"Error at the output, rms in {unit or 'the unit of the signal'}",
-        ["signal", "disturbance", "filtered", "of the truth", "tried on the trace", "paper's -20 log10(delta)"],
+        ["signal", "disturbance", "filtered", "slow", "of the truth", "tried on the trace", "paper's -20 log10(delta)"],
     )
     for one, prediction, trial in zip(signals, proposal.predictions, trials, strict=True):
         disturbing = one.spectra.get("disturbance", one.spectra["measured"])
@@ -340,6 +347,7 @@ def _print_proposal(proposal: Proposal, signals: Sequence[_Spectra], trials: Seq
             escape(one.name),
             f"{prediction.unfiltered:.3g}",
             f"{prediction.disturbance:.3g}",
+            f"{prediction.slow:.2g}" if prediction.slow > _NOTHING else "0",
             f"{prediction.wanted:.3g}" if prediction.wanted > _NOTHING else "0",
             tried,
             f"{loss:.1f} dB ({delta:.2g})",
