@@ -147,9 +147,9 @@ def test_blocks_of_short_records_and_gaps() -> None:
     assert block == pytest.approx(1 / 40)
     assert (len(times), int(counts.sum())) == (41, 101)
     assert np.all(np.diff(medians) > 0)
-    time = np.array([0.0, 0.1, 5.0, 9.0, 9.4])
-    times, medians, counts, _ = block_medians(time, np.array([1.0, 3.0, 4.0, 5.0, 7.0]), 1.0)
-    assert (times.tolist(), medians.tolist(), counts.tolist()) == ([0.05, 5.0, 9.2], [2.0, 4.0, 6.0], [2, 1, 2])
+    time = np.array([0.0, 0.1, 5.0, 9.0, 9.4, 9.5])
+    times, medians, counts, _ = block_medians(time, np.array([1.0, 3.0, 4.0, 5.0, 16.0, 7.0]), 1.0)
+    assert (times.tolist(), medians.tolist(), counts.tolist()) == ([0.05, 5.0, 9.4], [2.0, 4.0, 7.0], [2, 1, 3])
 
 
 @pytest.mark.parametrize(
