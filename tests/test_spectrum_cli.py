@@ -160,3 +160,12 @@ def test_no_filter_needed_is_a_shortfall() -> None:
     result = run("ramp.csv", "--tolerance", "5")
     assert isinstance(result.exception, ShortfallError)
     assert str(result.exception).startswith("the disturbance must be worth a filter: ")
+
+
+def test_a_shift_that_lasts_is_not_taken_for_nothing() -> None:
+    time = np.arange(8000) / RATE
+    write("curve.csv", {"time_s": time, "clearance1_mm": np.where((time > 20) & (time < 60), 1.0, 0.0)})
+    result = run("curve.csv", "--motion", "--passband", "0.05", "--tolerance", "0.5")
+    assert isinstance(result.exception, ShortfallError)
+    assert str(result.exception).startswith("tolerance must be above 2 times the 0.5 rms of the disturbance")
+    assert "rms of the disturbance that is slower than segments of 10 s" in str(result.exception)
