@@ -28,7 +28,7 @@ class Content:
     has_truth : bool
         Whether the two were told apart by a true signal, not by frequency.
     slow : float
-        Rms of the disturbance that is slower than the spectra resolve; a low-pass filter lets it through.
+        Rms of the disturbance that is slower than the spectra resolve; it counts as let through.
     """
 
     name: str
@@ -51,7 +51,7 @@ class Prediction:
     disturbance : float
         Rms of what is left of the disturbance.
     slow : float
-        Rms of the disturbance that is slower than the spectra resolve, all of which is left.
+        Rms of the disturbance that is slower than the spectra resolve, taken as left.
     unfiltered : float
         Rms of the disturbance before the filter.
     """

@@ -167,8 +167,8 @@ def propose(contents: Sequence[Content], wish: Wish, sample_rate: float) -> Prop
     if wish.coverage * slowest.slow > wish.tolerance:
         raise ShortfallError(
             f"tolerance must be above {wish.coverage:g} times the {slowest.slow:.3g} rms of the disturbance that is "
-            f"slower than segments of {1 / slowest.disturbance.step:.3g} s and passes any low-pass filter, "
-            f"not {wish.tolerance:g}{_of(slowest.name, contents)}"
+            f"slower than segments of {1 / slowest.disturbance.step:.3g} s, which counts as let through, not "
+            f"{wish.tolerance:g}: longer segments may tell it apart{_of(slowest.name, contents)}"
         )
     if _harmless(contents, wish):
         most = max(band_rms(one.disturbance, 0) for one in contents)

@@ -157,7 +157,9 @@ def test_a_specification_with_measurements_is_copied_beside_them_only() -> None:
 
 
 def test_no_filter_needed_is_a_shortfall() -> None:
-    result = run("ramp.csv", "--tolerance", "5")
+    result = run("ramp.csv", "--tolerance", "5", "-o", "none.toml")
+    assert "0.4 mm at 1.5 Hz" in result.stdout
+    assert (Path("none.toml").exists(), Path("none.svg").exists()) == (False, True)
     assert isinstance(result.exception, ShortfallError)
     assert str(result.exception).startswith("the disturbance must be worth a filter: ")
 

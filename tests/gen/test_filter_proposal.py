@@ -227,8 +227,8 @@ def test_what_is_slower_than_the_spectra_is_part_of_the_error() -> None:
     with pytest.raises(ShortfallError, match=r"^tolerance must be at least about 0\.00\d+ for a Butterworth"):
         propose([replace(one, slow=0.0019999)], wish, BENCH_RATE)
     message = (
-        "tolerance must be above 2 times the 0.003 rms of the disturbance that is slower than segments of 500 s and "
-        "passes any low-pass filter, not 0.004"
+        "tolerance must be above 2 times the 0.003 rms of the disturbance that is slower than segments of 500 s, "
+        "which counts as let through, not 0.004: longer segments may tell it apart"
     )
     with pytest.raises(ShortfallError, match=f"^{re.escape(message)}$"):
         propose([replace(one, slow=0.003)], wish, BENCH_RATE)

@@ -20,7 +20,7 @@ from sosmith.gen.spectra import DETRENDS, WINDOWS, Spectrum, SpectrumSettings, s
 from sosmith.gen.spectrum_plot import FORMATS, Curve, spectrum_plot
 from sosmith.gen.spectrum_report import peaks, proposal_json, provenance, ripple, signal_json
 from sosmith.model.csv_table import csv_header
-from sosmith.model.errors import SpecificationError
+from sosmith.model.errors import ShortfallError, SpecificationError
 from sosmith.model.polynomial import EQUATION_5A, Polynomial
 from sosmith.model.port import Values
 from sosmith.model.signal_file import Signal, SignalFile, read_signal_file
@@ -142,10 +142,10 @@ def spectrum_command(
         obstacle = _obstacle(signals, edge, motion=motion)
         if obstacle and (output or into):
             raise SpecificationError(obstacle)
-        proposal = None
+        proposal, shortfall = None, None
         if not obstacle:
             step("proposing")
-            proposal = propose([_content(one, edge, motion=motion) for one in signals], wish, rate)
+            proposal, shortfall = _proposed([_content(one, edge, motion=motion) for one in signals], wish, rate)
         drawn = None
         if picture is not None:
             step("drawing")
@@ -172,14 +172,31 @@ def spectrum_command(
         _print_signals(signals)
         if proposal is not None:
             _print_proposal(proposal, signals, trials)
-    if table is None:
+    if table is not None:
+        _hand_over(table, output, as_json=as_json)
+    if picture is not None and drawn is not None:
+        _write(picture, drawn)
+    if obstacle:
         note(f"no filter is proposed: {obstacle}")
-    elif output is not None:
+    if shortfall is not None:
+        raise shortfall
+
+
+def _proposed(
+    contents: Sequence[Content], wish: Wish, sample_rate: float
+) -> tuple[Proposal | None, ShortfallError | None]:
+    """Propose a filter, or tell why there is none: the spectra are shown either way."""
+    try:
+        return propose(contents, wish, sample_rate), None
+    except ShortfallError as shortfall:
+        return None, shortfall
+
+
+def _hand_over(table: str, output: Path | None, *, as_json: bool) -> None:
+    if output is not None:
         _write(output, table.encode())
     elif not as_json:
         click.echo(table, nl=False)
-    if picture is not None and drawn is not None:
-        _write(picture, drawn)
 
 
 def _pass_edge(passband: float | None, time_constant: float | None) -> float | None:
