@@ -128,6 +128,9 @@ NEEDED = {
     "emulate": ("SPEC", "[SCENARIO]", "CSV", "--seconds", "--seed", "stdout"),
     "compare": ("REPORT REPORT...", "--json", "HTML"),
     "calibrate": ("clearance_mm", "sosmith calibrate add", "export"),
+    "spectrum": ("TRACE", "--tolerance", "--passband", "--motion", "--into SPEC", "--json"),
+    "vehicle": ("--speed", "--track", "--irregularities", "--plot", "--json"),
+    "wear": ("TRACE", "--initial", "--limit", "--warning", "--json"),
     "demo": ("build/demo", "--seed"),
 }
 

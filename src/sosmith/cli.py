@@ -19,8 +19,8 @@ from sosmith.commands.compare import compare_command
 from sosmith.commands.design import design, generate, init
 from sosmith.commands.reload import reload_command
 from sosmith.commands.simulate import demo, emulate_command, simulate_command
-from sosmith.commands.vehicle import vehicle
 from sosmith.commands.spectrum import spectrum_command
+from sosmith.commands.vehicle import vehicle
 from sosmith.commands.verify import verify
 from sosmith.commands.wear import wear_command
 from sosmith.model.errors import SosmithError, ToolError
@@ -79,8 +79,8 @@ for _command in (
     emulate_command,
     compare_command,
     calibrate,
-    vehicle,
     spectrum_command,
+    vehicle,
     wear_command,
     demo,
 ):
