@@ -20,6 +20,7 @@ from rich.markup import escape
 
 import sosmith
 from sosmith.commands.calibrate import calibrate
+from sosmith.commands.paper import paper
 from sosmith.gen.architecture import Architecture
 from sosmith.gen.boards import BOARDS, Board, find_board
 from sosmith.gen.certificate_file import Certificate, read_certificate
@@ -438,6 +439,7 @@ def compare_command(reports: tuple[Path, ...], as_json: bool, output: Path | Non
 
 
 cli.add_command(calibrate)
+cli.add_command(paper)
 
 
 @cli.command()
