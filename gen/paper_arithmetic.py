@@ -62,6 +62,12 @@ def scaled(polynomial: Coefficients, cutoff: Fraction) -> Coefficients:
     return tuple(value / cutoff ** (degree - k) for k, value in enumerate(polynomial))
 
 
+def cutoffs_of(polynomial: Coefficients, printed: Sequence[Decimal]) -> list[float]:
+    """Cutoff in rad/s with which each coefficient of ``polynomial(s / cutoff)`` but the last, 1, is the printed one."""
+    degree = len(printed) - 1
+    return [math.pow(polynomial[k] / Fraction(printed[k]), 1 / (degree - k)) for k in range(degree)]
+
+
 def bilinear(denominator: Coefficients, period: Fraction) -> tuple[Coefficients, Coefficients]:
     """Numerator and denominator of ``1 / denominator(s)`` at ``s = 2 / period * (1 - 1/z) / (1 + 1/z)``, equation 17.
 

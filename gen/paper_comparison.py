@@ -88,15 +88,19 @@ class Comparison:
 
     @property
     def shown(self) -> str:
-        """Our figure with one digit more than printed, unless it ends there; six digits where nothing is printed."""
+        """Our figure with a digit more than printed and at least four, unless it ends before; else six."""
         if self.ours is None:
             return "-"
         if self.printed is None:
             return plain(self.ours, 6)
         with localcontext(prec=_PRECISION):
             unit = last_digit(self.printed)
-            ends = self.ours.quantize(unit) == self.ours
-            return _text(self.ours.quantize(unit if ends else unit / 10), like=self.printed)
+            finer = min(unit / 10, Decimal(1).scaleb(self.ours.adjusted() - 3)) if self.ours else unit
+            written = self.ours.quantize(finer)
+            if written == self.ours:
+                shortest = written.normalize()
+                written = written.quantize(min(unit, last_digit(shortest)))
+            return _text(written, like=self.printed)
 
     @property
     def shown_printed(self) -> str:

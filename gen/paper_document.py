@@ -18,12 +18,23 @@ from sosmith.gen.paper_comparison import (
     Part,
     table,
 )
+from sosmith.gen.paper_difference_equation import difference_equation_parts
 from sosmith.gen.paper_fifth_order import fifth_order_parts
 from sosmith.gen.paper_plots import plots
 from sosmith.gen.paper_regression import regression_parts
+from sosmith.gen.paper_seventh_order import seventh_order_parts
+from sosmith.gen.paper_vehicle import vehicle_parts
+from sosmith.gen.paper_wear import wear_part
 from sosmith.model.paper_figures import PaperFigures
 
-_CHAPTERS = ("Calibration", "Accuracy", "The 5th-order filter", "Conclusions of the paper")
+_CHAPTERS = (
+    "Calibration",
+    "Accuracy",
+    "The 5th-order filter",
+    "The vehicle",
+    "The 7th-order filter",
+    "Wear and conclusions",
+)
 
 _HEAD = """# The paper beside its tables
 
@@ -39,7 +50,9 @@ def paper_parts(figures: PaperFigures) -> dict[str, list[Part]]:
         regression_parts(figures),
         unfiltered_parts(figures),
         [*fifth_order_parts(figures), filtered_part(figures)],
-        [stated_part(figures)],
+        vehicle_parts(figures),
+        [*seventh_order_parts(figures), *difference_equation_parts(figures)],
+        [wear_part(figures), stated_part(figures)],
     ]
     return dict(zip(_CHAPTERS, parts, strict=True))
 
@@ -110,9 +123,9 @@ def _rule() -> list[str]:
 
 def _summary(chapters: dict[str, list[Part]]) -> list[str]:
     parts = [part for group in chapters.values() for part in group]
-    rows = [_summary_row(part) for part in parts]
-    total = ["all", *(str(sum(part.count(label) for part in parts)) for label in LABELS), ""]
-    return [table(["", *LABELS, "what came out"], [*rows, total])]
+    counts = {label: sum(part.count(label) for part in parts) for label in LABELS}
+    total = f"Of {sum(counts.values())} comparisons " + ", ".join(f"{count} {label}" for label, count in counts.items())
+    return [f"{total}.", table(["", *LABELS, "what came out"], map(_summary_row, parts))]
 
 
 def _summary_row(part: Part) -> list[str]:

@@ -10,6 +10,7 @@ from sosmith.gen.paper_arithmetic import (
     bilinear,
     butterworth_polynomial,
     cutoff_for,
+    cutoffs_of,
     dc_gain,
     gain_db,
     order_needed,
@@ -126,7 +127,7 @@ def _prewarping(figures: PaperFigures) -> Part:
                 compare(
                     rf"$\Omega_{letter} / 2\pi$ by table 3", named[band],
                     float(figures.number("table_3", f"prewarped_{band}_edge")) / (2 * math.pi), "Hz",
-                    note="where the printed figure comes from",
+                    note="which is how the printed figures can be meant",
                 )
                 for letter, band in (("p", "passband"), ("a", "stopband"))
             ),
@@ -268,7 +269,7 @@ def _equation_16(figures: PaperFigures) -> Part:
         ),
         before=(
             r"Each coefficient gives the cutoff it was made with, $\Omega_c = (c_k / \text{printed})^{1/k}$: "
-            + ", ".join(f"{(float(polynomial[k]) / float(printed[k])) ** (1 / (ORDER - k)):.4f}" for k in range(ORDER))
+            + ", ".join(f"{cutoff:.4f}" for cutoff in cutoffs_of(polynomial, printed))
             + f" rad/s. The mean of {edges[0]} and {edges[1]} Hz is {mean:.4f} rad/s. "
             r"In table 3 the mean stands for $\omega_c$ too.",
         ),

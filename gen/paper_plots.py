@@ -12,8 +12,18 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sosmith.gen.paper_accuracy import TABLES, errors_in_mm
-from sosmith.gen.paper_arithmetic import Coefficients, gain_db
+from sosmith.gen.paper_arithmetic import Coefficients, gain_db, poles
+from sosmith.gen.paper_difference_equation import printed_filter, step_response
 from sosmith.gen.paper_fifth_order import equation_16_filter, exact, table_3_filter
+from sosmith.gen.paper_seventh_order import (
+    HUNTING,
+    delay,
+    irregularity_frequency,
+    proper_cutoff,
+    proper_filter,
+    stated_cutoff,
+    table_9_filter,
+)
 from sosmith.model.paper_figures import PaperFigures
 
 _BLUE, _RED, _GREEN, _GREY = "#2563a8", "#b4432f", "#2f8a57", "#8a8a8a"
@@ -38,6 +48,8 @@ def plots(figures: PaperFigures) -> dict[str, str]:
     return {
         "paper_errors.svg": _draw(lambda figure: _errors(figure, figures)),
         "paper_fifth_order.svg": _draw(lambda figure: _fifth_order(figure, figures)),
+        "paper_seventh_order.svg": _draw(lambda figure: _seventh_order(figure, figures)),
+        "paper_poles.svg": _draw(lambda figure: _poles(figure, figures), height=4.4),
     }
 
 
@@ -85,6 +97,52 @@ def _fifth_order(figure: Figure, figures: PaperFigures) -> None:
         _mask(axes, edges, losses, 0.03, rate / 2, limits)
     whole.legend()
     close.set_title("pass band, close", loc="left", fontsize=9)
+
+
+def _seventh_order(figure: Figure, figures: PaperFigures) -> None:
+    rate = float(figures.number("table_9", "sample_rate"))
+    stated, proper = float(stated_cutoff(figures)), proper_cutoff(figures)
+    responses: list[tuple[str, Digital, float]] = [
+        (f"table 9, $\\Omega_c$ = {stated:g} rad/s", table_9_filter(figures), rate),
+        (
+            f"{figures.number('table_9', 'passband_edge')} Hz pre-warped, $\\Omega_c$ = {proper:.4g} rad/s",
+            proper_filter(figures),
+            rate,
+        ),
+    ]
+    edges = [float(figures.number("table_9", f"{band}_edge")) for band in ("passband", "stopband")]
+    losses = [float(figures.number("table_9", f"{band}_loss")) for band in ("passband", "stopband")]
+    magnitude, step = figure.subplots(1, 2)
+    _responses(magnitude, responses, 0.05)
+    _mask(magnitude, edges, losses, 0.05, rate / 2, (-260.0, 10.0))
+    for frequency, what in ((HUNTING, "hunting"), (irregularity_frequency(figures), "irregularity")):
+        magnitude.axvline(frequency, color=_GREY, lw=0.8)
+        magnitude.annotate(what, (frequency, -5), rotation=90, ha="right", va="top", color=_GREY)
+    magnitude.legend(loc="lower left")
+    step.plot(*step_response(figures), color=_BLUE)
+    step.axhline(1, color=_GREY, lw=0.8)
+    step.axvline(delay(stated), color=_RED, lw=0.8, ls="--", label=f"delay at 0 Hz, {delay(stated):.2f} s")
+    step.set(xlabel="time (s)", ylabel="output for a step", xlim=(0, 15))
+    step.legend()
+
+
+def _poles(figure: Figure, figures: PaperFigures) -> None:
+    """Draw the poles of table 10 as printed, and exactly; the latter close up as well."""
+    whole, close = figure.subplots(1, 2)
+    circle = np.exp(1j * np.linspace(0, 2 * np.pi, 721))
+    printed = np.array(poles(printed_filter(figures)[1]))
+    exactly = np.array(poles(table_9_filter(figures)[1]))
+    for axes in (whole, close):
+        axes.plot(circle.real, circle.imag, color=_GREY, lw=0.8)
+        axes.plot(exactly.real, exactly.imag, "x", color=_BLUE, ms=6, label="exact")
+        axes.plot(printed.real, printed.imag, "o", mfc="none", color=_RED, ms=6, label="as printed")
+        axes.set_aspect("equal")
+        axes.set(xlabel="real part of z", ylabel="imaginary part of z")
+    whole.legend(loc="lower left")
+    arc = np.exp(1j * np.linspace(-0.02, 0.02, 101))
+    close.plot(arc.real, arc.imag, color=_GREY, lw=0.8)
+    close.set(xlim=(0.98, 1.004), ylim=(-0.018, 0.018))
+    close.set_title("close to z = 1", loc="left", fontsize=9)
 
 
 def _responses(axes: Axes, responses: list[tuple[str, Digital, float]], lowest: float) -> None:
