@@ -10,6 +10,7 @@ import math
 from collections.abc import Sequence
 from decimal import Context, Decimal
 from fractions import Fraction
+from functools import cache
 from typing import cast
 
 from flint import acb, arb, ctx, fmpz_poly
@@ -33,6 +34,7 @@ def butterworth_polynomial(order: int) -> Coefficients:
     return product
 
 
+@cache
 def butterworth_factors(order: int) -> tuple[Coefficients, ...]:
     """Real factors of `butterworth_polynomial` by falling powers: ``s^2 + 2 sin(theta) s + 1``, and s + 1 if it is odd.
 
@@ -121,7 +123,8 @@ def rounded(values: Sequence[Fraction], digits: int) -> Coefficients:
     return tuple(Fraction(context.create_decimal(decimal_of(value))) for value in values)
 
 
-def digits_for_stability(denominator: Sequence[Fraction], most: int = 40) -> int:
+@cache
+def digits_for_stability(denominator: Coefficients, most: int = 40) -> int:
     """Fewest significant digits from which on, up to `most`, the denominator stays stable when rounded to them."""
     fewest = most
     while fewest > 1 and pole_radii(rounded(denominator, fewest - 1))[0] < 1:

@@ -151,8 +151,7 @@ def _shape(figures: PaperFigures, equation: str, polynomial: Polynomial) -> list
         f"below {turn:.3f} V and rises above; there, at {at_turn:.2f} mm, the temperature has no effect. At 0 V it is "
         f"{cold:.3f} mm at {lowest:g} °C and {hot:.3f} mm at {highest:g} °C: no voltage stands for anything below."
     ]
-    if equation == "4":
-        text.append(_unreachable(figures, polynomial))
+    text.append(_unreachable(figures, polynomial) if equation == "4" else _reachable(figures, polynomial))
     return text
 
 
@@ -168,6 +167,16 @@ def _unreachable(figures: PaperFigures, polynomial: Polynomial) -> str:
         f"{100 * (least - first) / first:.0f} %, and not the {plain(figures.numbers('table_1', 'percent')[0])} % "
         f"printed: "
         "the table must come from another regression than the one printed."
+    )
+
+
+def _reachable(figures: PaperFigures, polynomial: Polynomial) -> str:
+    """Table 2's first row is one that equation 5a can give."""
+    cool, warm = (float(value) for value in figures.numbers("table_2", "temperature"))
+    least = float(polynomial(0.0, cool))
+    return (
+        f"At the {cool:g} to {warm:g} °C of table 2 it gives {least:.3f} mm and more, so the table's first clearance, "
+        f"{figures.numbers('table_2', 'clearance')[0]} mm, can be read."
     )
 
 

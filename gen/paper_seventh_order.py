@@ -237,7 +237,7 @@ def _equation_22(figures: PaperFigures) -> Part:
     return Part(
         title="Equation 22",
         where=figures.where("equation_22"),
-        finding=f"it has a cutoff of {min(made_with):.4f} to {max(made_with):.4f} rad/s, table 9 {float(stated):g} rad/s",
+        finding=f"its cutoff is {min(made_with):.4f} to {max(made_with):.4f} rad/s, table 9's {float(stated):g} rad/s",
         before=(
             r"Each coefficient gives the cutoff it was made with, $\Omega_c = (c_k / \text{printed})^{1/k}$: "
             + ", ".join(f"{cutoff:.4f}" for cutoff in made_with)
@@ -248,6 +248,6 @@ def _equation_22(figures: PaperFigures) -> Part:
                 f"coefficient of $s^{ORDER - k}$", printed[k], ours[k], f"$\\text{{s}}^{ORDER - k}$",
                 note="with the cutoff of table 9",
             )
-            for k in range(ORDER)
+            for k in range(ORDER + 1)
         ),
     )  # fmt: skip
