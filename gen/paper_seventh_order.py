@@ -137,9 +137,8 @@ def _table_9(figures: PaperFigures) -> Part:
         ),
         comparisons=tuple(comparisons),
         after=(
-            f"The bilinear transformation takes all that is above {stopband:g} Hz away, so the stop band needs no "
-            f"order at "
-            "all with that edge.",
+            f"The bilinear transformation puts the zeros of a low-pass at half the sample rate: at {stopband:g} Hz the loss is "
+            "infinite whatever the order, so that edge asks for none.",
             *_what_the_cutoff_does(figures),
         ),
     )
