@@ -14,8 +14,9 @@ from sosmith.hdl import core, folded
 from sosmith.model.constants import with_room
 from sosmith.model.datapath import Datapath
 from sosmith.model.errors import ShortfallError
+from sosmith.model.folding import FoldingError, program
 from sosmith.model.graph import Node, Op
-from sosmith.model.program import FoldingError, Program, program
+from sosmith.model.program import Program
 
 DIGIT_BITS = 15
 """Of a digit: products of 16 bits, signed, fit one block of an iCE40 UltraPlus as well as one of an ECP5."""

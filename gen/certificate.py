@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import accumulate
 
+from sosmith.gen.cascade import ideal_sections
 from sosmith.gen.certificate_file import (
     FORMAT,
     Certificate,
@@ -33,7 +34,7 @@ from sosmith.gen.proof import (
     made_response,
     through,
 )
-from sosmith.gen.quantize import Quantized, ideal_sections
+from sosmith.gen.quantize import Quantized
 from sosmith.model.datapath import Stage
 from sosmith.model.graph import Node
 from sosmith.model.horner import HornerStep

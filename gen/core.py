@@ -134,9 +134,10 @@ def design_core(
         return selection.cheapest(accept) if given is None else given
 
     def in_hardware(name: str, datapath: Datapath) -> Architecture:
-        """With the calibrated range, which a program judges and takes time for."""
+        """With the calibrated range, which a program judges and takes time for, and the limits of wear."""
         codes = () if fitted is None else calibrated_codes(datapath.inputs, fitted)
-        return fitting(name, budget, replace(datapath, calibrated=codes))
+        wear = () if spec.wear is None else spec.wear.codes(spec.output)
+        return fitting(name, budget, replace(datapath, calibrated=codes, wear=wear))
 
     hardware = spec.hardware
     budget = Budget(clock=hardware.clock, sample_rate=spec.sample_rate, channels=spec.channels, reload=hardware.reload)

@@ -36,6 +36,7 @@ def manifest(design: CoreDesign) -> dict[str, Any]:
             "m_axis": _stream((datapath.output,), channels)
             | {"tuser": {"width": STATUS_BITS, "flags": {flag.name.lower(): flag.value for flag in Flag}}},
         },
+        "wear": _wear(design),
         "reset_cycles": design.architecture.reset_cycles,
         "latency_cycles": design.architecture.latency_cycles,
         "cycles_per_sample": design.architecture.cycles_per_sample,
@@ -58,6 +59,17 @@ def manifest(design: CoreDesign) -> dict[str, Any]:
         "aliasing": _aliasing(design),
         "cost": _cost(design),
     }
+
+
+def _wear(design: CoreDesign) -> list[dict[str, Any]] | None:
+    """Clearances in the output's unit at which the flags of wear rise, and the codes, for all channels or for each."""
+    if design.spec.wear is None:
+        return None
+    clearances = design.spec.wear.clearances()[: len(design.datapath.wear)]
+    return [
+        {"warning": float(warning), "critical": float(critical), "codes": list(codes)}
+        for (warning, critical), codes in zip(clearances, design.datapath.wear, strict=True)
+    ]
 
 
 def section_entries(section: Stage) -> list[dict[str, Any]]:

@@ -137,7 +137,8 @@ def _table_9(figures: PaperFigures) -> Part:
         ),
         comparisons=tuple(comparisons),
         after=(
-            f"The bilinear transformation puts the zeros of a low-pass at half the sample rate: at {stopband:g} Hz the loss is "
+            f"The bilinear transformation puts the zeros of a low-pass at half the sample rate: at {stopband:g} Hz the "
+            f"loss is "
             "infinite whatever the order, so that edge asks for none.",
             *_what_the_cutoff_does(figures),
         ),

@@ -13,17 +13,19 @@ from fractions import Fraction
 from sosmith.gen.architecture import Budget, structure
 from sosmith.gen.core import CoreDesign, calibrated_codes, filter_of, polynomial_of
 from sosmith.gen.design import Filter
+from sosmith.gen.other_constants import with_constants
 from sosmith.gen.quantity import quantity
-from sosmith.gen.quantize import Quantized, with_constants
+from sosmith.gen.quantize import Quantized
 from sosmith.gen.specification import Specification
 from sosmith.gen.transient import transient
 from sosmith.hdl import folded
 from sosmith.model.constants import constants, packed, values_of, with_ranges, with_room
 from sosmith.model.datapath import Datapath
 from sosmith.model.errors import ShortfallError, SpecificationError
+from sosmith.model.folding import program
 from sosmith.model.graph import Node, Op
 from sosmith.model.polynomial import Polynomial
-from sosmith.model.program import Program, program
+from sosmith.model.program import Program
 
 ADVICE = (
     "go there in smaller steps, each after the one before has faded, or stop the samples and reset the core before "
@@ -111,6 +113,7 @@ def set_for(hardware: CoreDesign, wanted: Specification) -> OtherSet:
         ("sample_rate", spec.sample_rate, wanted.sample_rate),
         ("inputs", spec.inputs, wanted.inputs),
         ("output", spec.output, wanted.output),
+        ("wear", spec.wear, wanted.wear),
     ):
         if have != other:
             raise SpecificationError(f"{wanted.path}: {name} must be as in {spec.path} for a set to be loaded there")

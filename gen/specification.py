@@ -16,6 +16,7 @@ from typing import Any
 from sosmith.gen.specification_rules import CALIBRATION_INPUTS, check
 from sosmith.gen.specification_schema import Document, FilterTable, InputTable, OutputTable, parse
 from sosmith.gen.specification_values import UnfitError
+from sosmith.gen.wear_limits import WearSpec
 from sosmith.model.errors import SpecificationError
 from sosmith.model.port import Port
 
@@ -127,6 +128,8 @@ class Specification:
         The result, "clearance" with `calibration` and "y" without.
     max_error : Fraction
         Largest allowed |hardware - exact|, in the unit of the output, more than half an LSB of the output.
+    wear : WearSpec or None
+        What the output means for a wheel.
     hardware : HardwareSpec
         The hardware.
     """
@@ -141,6 +144,7 @@ class Specification:
     filter: FilterSpec
     output: Port
     max_error: Fraction
+    wear: WearSpec | None
     hardware: HardwareSpec
 
 
@@ -213,7 +217,7 @@ def _specification(path: Path, tree: dict[str, Any], document: Document) -> Spec
     output = document.output
     calibrated = document.calibration is not None
     output_port = _port("clearance" if calibrated else "y", output, output.unit)
-    hardware = document.hardware
+    hardware, wear = document.hardware, document.wear
     return Specification(
         path=path,
         source={key: _to_json(value) for key, value in tree.items()},
@@ -228,6 +232,9 @@ def _specification(path: Path, tree: dict[str, Any], document: Document) -> Spec
         filter=_filter(document.filter),
         output=output_port,
         max_error=output_port.lsb if output.max_error is None else output.max_error,
+        wear=None
+        if wear is None
+        else WearSpec(initial=wear.initial, warning=wear.warning, limit=wear.limit, sensor_range=wear.sensor_range),
         hardware=HardwareSpec(
             realization=hardware.realization,
             architecture=hardware.architecture,

@@ -5,6 +5,7 @@ Each function checks one subject and raises `UnfitError` with the path of the ke
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from fractions import Fraction
 
@@ -42,6 +43,7 @@ def check(document: Document) -> None:
     _check_calibration(document)
     _check_filter(document.filter, document.sample_rate)
     _check_output(document)
+    _check_wear(document)
     if document.hardware.clock < document.sample_rate:
         raise UnfitError(
             f"at least the sample_rate ({literal(document.sample_rate)} Hz)",
@@ -260,3 +262,41 @@ def _check_output(document: Document) -> None:
             literal(output.max_error),
             where="output.max_error",
         )
+
+
+def _check_wear(document: Document) -> None:
+    wear, output = document.wear, document.output
+    if wear is None:
+        return
+    if len(wear.initial) not in {1, document.channels}:
+        expected = "one number" if document.channels == 1 else f"one number, or a list of {document.channels}"
+        raise UnfitError(expected, literal(wear.initial), where="wear.initial")
+    if wear.warning >= wear.limit:
+        raise UnfitError(f"below limit ({literal(wear.limit)})", literal(wear.warning), where="wear.warning")
+    low, high = output.range
+    last = high - (high - low) / 2**output.bits  # of the highest code
+    for initial in wear.initial:
+        if initial < low:
+            raise UnfitError(
+                f"in the range of the output, {literal(output.range)}", literal(initial), where="wear.initial"
+            )
+        end = initial + wear.limit if wear.sensor_range is None else min(initial + wear.limit, wear.sensor_range)
+        if wear.sensor_range is not None and initial + wear.warning >= wear.sensor_range:
+            raise UnfitError(
+                f"above the clearance of the warning ({literal(initial + wear.warning)})",
+                literal(wear.sensor_range),
+                where="wear.sensor_range",
+            )
+        if end > last:
+            raise UnfitError(
+                f"at most {literal(last - initial)}, so that the output can show it",
+                literal(wear.limit),
+                where="wear.limit",
+            )
+        step = (high - low) / 2**output.bits
+        if math.ceil((initial + wear.warning - low) / step) >= math.ceil((end - low) / step):
+            raise UnfitError(
+                f"at least an LSB of the output ({literal(step)}) below limit",
+                literal(wear.warning),
+                where="wear.warning",
+            )

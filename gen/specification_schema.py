@@ -14,8 +14,10 @@ from pydantic import BaseModel, ConfigDict, Field, PlainValidator, ValidationErr
 from pydantic_core import ErrorDetails
 
 from sosmith.gen.specification_values import (
+    ABOVE_ZERO,
     IDENTIFIER,
     UnfitError,
+    above_zero,
     between,
     choice,
     edges,
@@ -26,6 +28,7 @@ from sosmith.gen.specification_values import (
     list_of,
     literal,
     number,
+    one_or_more,
     positive,
     rising_pair,
     text,
@@ -113,6 +116,17 @@ class FilterTable(Table):
     ] = None
 
 
+class WearTable(Table):
+    """``[wear]``: what the output means for a wheel, for the flags of wear."""
+
+    initial: Annotated[tuple[Fraction, ...], PlainValidator(one_or_more)] = Field(
+        description="a number in the unit of the output, or a list of one for each channel"
+    )
+    warning: Annotated[Fraction, PlainValidator(above_zero)] = Field(description=ABOVE_ZERO)
+    limit: Annotated[Fraction, PlainValidator(above_zero)] = Field(description=ABOVE_ZERO)
+    sensor_range: Annotated[Fraction | None, PlainValidator(number)] = None
+
+
 class HardwareTable(Table):
     """``[hardware]``: how the datapath is built."""
 
@@ -132,6 +146,7 @@ class Document(Table):
     calibration: CalibrationTable | None = Field(default=None, description="a table [calibration]")
     filter: FilterTable = Field(description="a table [filter]")
     output: OutputTable = Field(description="a table [output]")
+    wear: WearTable | None = Field(default=None, description="a table [wear]")
     hardware: HardwareTable = Field(default=HardwareTable(), description="a table [hardware]")
 
 
@@ -139,6 +154,7 @@ _TABLES: dict[str, type[Table]] = {
     "calibration": CalibrationTable,
     "filter": FilterTable,
     "output": OutputTable,
+    "wear": WearTable,
     "hardware": HardwareTable,
 }
 

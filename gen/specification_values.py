@@ -221,6 +221,25 @@ def _read_item(read: Callable[[object], Item], values: Sequence[object], k: int)
         raise unfit.inside(f"[{k}]") from None
 
 
+ABOVE_ZERO = "a positive number in the unit of the output"
+"""What `above_zero` reads."""
+
+
+def above_zero(value: object) -> Fraction:
+    """Read a positive number in the unit of the output."""
+    exact = number(value, ABOVE_ZERO)
+    if exact <= 0:
+        raise UnfitError(ABOVE_ZERO, literal(value))
+    return exact
+
+
+def one_or_more(value: object) -> tuple[Fraction, ...]:
+    """Read one number for all channels, or a list of one for each."""
+    if isinstance(value, list):
+        return list_of(number, 1, len(value) or 1)(value)
+    return (number(value, "a number in the unit of the output, or a list of one for each channel"),)
+
+
 def rising_pair(value: object) -> tuple[Fraction, Fraction]:
     """Read two rising numbers ``[low, high]``."""
     low, high = list_of(number, 2, 2)(value)

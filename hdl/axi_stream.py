@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from amaranth.hdl import Cat, Const, Module, Signal, Value
+from amaranth.hdl import Cat, Module, Signal, Value
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
-from sosmith.model.datapath import Datapath
 from sosmith.model.port import Port
 from sosmith.model.status import STATUS_BITS
 
@@ -68,31 +67,6 @@ def core_members(inputs: Sequence[Port], output: Port, channels: int = 1) -> dic
     if channels > 1:
         members |= {"s_axis_tdest": In(dest_width(channels)), "m_axis_tdest": Out(dest_width(channels))}
     return members
-
-
-def at_rail(inputs: Sequence[Port], tdata: Value) -> Value:
-    """Whether an input's code is the lowest or the highest there is, `Flag.INPUT_AT_RAIL`."""
-    found: Value = Const(0, 1)
-    for field in fields(inputs):
-        code = tdata[field.offset : field.offset + field.port.bits]
-        body = code[:-1]
-        # Both rails have equal bits below the top one; signed or not, the top bit says which of them can be.
-        ones, zeros = (code[-1], ~code[-1]) if not field.port.signed else (~code[-1], code[-1])
-        found = found | (body.all() & ones) | (~body.any() & zeros)
-    return found
-
-
-def outside_calibration(datapath: Datapath, tdata: Value) -> Value:
-    """Whether an input lies outside the range of the calibration, `Flag.OUTSIDE_CALIBRATION`."""
-    found: Value = Const(0, 1)
-    for field, (low, high) in zip(fields(datapath.inputs), datapath.calibrated, strict=True):
-        code = tdata[field.offset : field.offset + field.port.bits]
-        value = code.as_signed() if field.port.signed else code
-        if low > field.port.lowest:
-            found = found | (value < low)
-        if high < field.port.highest:
-            found = found | (value > high)
-    return found
 
 
 def extended(code: Value, bits: int) -> Value:

@@ -10,27 +10,25 @@ from amaranth.lib import wiring
 from sosmith.hdl.axi_lite import slave_members
 from sosmith.hdl.axi_stream import (
     StreamBuffer,
-    at_rail,
     channel_bits,
     core_members,
     extended,
     fields,
-    outside_calibration,
     width,
 )
 from sosmith.hdl.constant_banks import NO_CONSTANTS, ConstantBanks, Pair
 from sosmith.hdl.interleaved import InterleavedStage, schedule
 from sosmith.hdl.reload import ReloadPort
 from sosmith.hdl.stage import PipelineStage, banks_in_use, rank_count
+from sosmith.hdl.status import at_rail, flag_count, outside_calibration, worn
 from sosmith.model.constants import constants
 from sosmith.model.datapath import Datapath, Stage
 from sosmith.model.reload_registers import ADDRESS_BITS
-from sosmith.model.status import Flag
 
 
 def latency_cycles(datapath: Datapath, channels: int = 1) -> int:
     """Clocks from the edge that accepts a sample to the edge that can hand it on: all ranks, and the buffers."""
-    return sum(_ranks(datapath, channels)) + 1 + (channels > 1)
+    return sum(_ranks(datapath, channels)) + 1 + (channels > 1) + (len(datapath.wear) > 1)
 
 
 def _ranks(datapath: Datapath, channels: int) -> list[int]:
@@ -87,7 +85,7 @@ class Core(wiring.Component):
         m = Module()
         m.domains.sync = ClockDomain(local=True)
         m.d.comb += [ClockSignal("sync").eq(self.aclk), ResetSignal("sync").eq(~self.aresetn)]
-        live = len(Flag)
+        live = flag_count(self.datapath)
         buffer = m.submodules.output_buffer = StreamBuffer(
             width([self.datapath.output]) + live + channel_bits(self.channels)
         )
@@ -116,10 +114,17 @@ class Core(wiring.Component):
             with m.If(buffer.advance):
                 m.d.sync += held.eq(status)
             status = held
-        output = extended(codes[0], self.datapath.output.bytes * 8)
+        code, saturated = codes[0], stages[-1].o_saturated
+        coming = channel
+        if len(self.datapath.wear) > 1:  # a clock to find the limits of the channel
+            valid, code, status, saturated, channel = self._delayed(
+                m, buffer.advance, [valid, code, status, saturated, channel]
+            )
+        wear = worn(m, self.datapath, code, coming, buffer.advance)
+        output = extended(code, self.datapath.output.bytes * 8)
         m.d.comb += [
             buffer.i_valid.eq(valid),
-            buffer.i_data.eq(Cat(output, status, stages[-1].o_saturated, channel)),
+            buffer.i_data.eq(Cat(output, status, saturated, wear, channel)),
             self.m_axis_tvalid.eq(buffer.o_valid),
             buffer.o_ready.eq(self.m_axis_tready),
         ]
@@ -130,6 +135,13 @@ class Core(wiring.Component):
         if self.channels > 1:
             m.d.comb += self.m_axis_tdest.eq(buffer.o_data[len(output) + live :])
         return m
+
+    def _delayed(self, m: Module, advance: Value, values: list[Value]) -> list[Value]:
+        """Return the values, the first one valid or not, a clock of the pipeline later."""
+        later = [Signal(value.shape(), name=f"judged{k}", reset_less=k > 0) for k, value in enumerate(values)]
+        with m.If(advance):
+            m.d.sync += [register.eq(value) for register, value in zip(later, values, strict=True)]
+        return list(later)
 
     def _stage(
         self, m: Module, stage: Stage, constants: Mapping[int, Pair], advance: Value

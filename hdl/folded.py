@@ -13,9 +13,10 @@ from amaranth.lib import wiring
 from amaranth.lib.memory import Memory
 
 from sosmith.hdl.axi_lite import slave_members
-from sosmith.hdl.axi_stream import at_rail, channel_bits, core_members, extended, fields
+from sosmith.hdl.axi_stream import channel_bits, core_members, extended, fields
 from sosmith.hdl.reload import ReloadPort
 from sosmith.hdl.stage import limits
+from sosmith.hdl.status import at_rail, worn
 from sosmith.model.datapath import Datapath
 from sosmith.model.graph import Op
 from sosmith.model.program import Do, Instruction, Place, Program
@@ -107,7 +108,7 @@ class FoldedCore(wiring.Component):
         read = Signal(signed(self._word))
         total = self._accumulate(m, advance, ranks, read)
         self._remember(m, (advance, clearing), (counter, total, read, channel), ranks)
-        self._hand_out(m, (advance, start), (total, read), ranks)
+        self._hand_out(m, (advance, start), (total, read, channel), ranks)
         taken = Signal()
         last_digit = ranks[-1].counts(sum(place.digits for place in self.program.inputs) - 1)
         m.d.sync += taken.eq(advance & ranks[-1].valid & ranks[-1].does(Do.TAKE) & last_digit)
@@ -293,10 +294,10 @@ class FoldedCore(wiring.Component):
         return Cat(*slices)
 
     def _hand_out(
-        self, m: Module, control: tuple[Signal, Signal], values: tuple[Signal, Signal], ranks: list[_Rank]
+        self, m: Module, control: tuple[Signal, Signal], values: tuple[Signal, Signal, Signal], ranks: list[_Rank]
     ) -> None:
         """Collect the digits of the result, and what is said about it; the last instruction gives the last digit."""
-        (advance, start), (total, read) = control, values
+        (advance, start), (total, read, channel) = control, values
         *_, following, present, last = ranks
         reading = self._reading(ranks)
         given = [Signal(self._word, name=f"given{k}", reset_less=True) for k in range(self.program.output.digits)]
@@ -316,7 +317,7 @@ class FoldedCore(wiring.Component):
         code, saturated = self._limited(given)
         m.d.comb += [
             self.m_axis_tdata.eq(extended(code, self.datapath.output.bytes * 8)),
-            self.m_axis_tuser.eq(Cat(rail, outside, saturated)),
+            self.m_axis_tuser.eq(Cat(rail, outside, saturated, worn(m, self.datapath, code, channel, Const(1)))),
         ]
 
     def _multiply_serially(

@@ -56,9 +56,9 @@ typedef struct {{
 /* Put one channel into the state after reset. */
 void {name}_reset({name}_state *state);
 
-/* Compute one sample of one channel and advance its state; status may be NULL. */
+/* Compute one sample of one channel and advance its state; status may be NULL{_and_not_wear(datapath)}. */
 int64_t {name}_step({name}_state *state{inputs}, uint8_t *status);
-
+{_wear_declaration(datapath)}
 /* Compute samples x channels: in[sample][channel][input], out[sample][channel], status[sample][channel] or NULL;
  * states[channel]. */
 void {name}_block({name}_state *states, size_t samples, size_t channels, const int64_t *in, int64_t *out,
@@ -107,15 +107,16 @@ int64_t {name}_step({name}_state *state{parameters}, uint8_t *status)
 {{
     return step(state{"".join(f", {port.name}_code" for port in inputs)}, status);
 }}
-
+{_wear_definition(datapath)}
 void {name}_block({name}_state *states, size_t samples, size_t channels, const int64_t *in, int64_t *out,
 {" " * len(f"void {name}_block(")}uint8_t *status)
 {{
     for (size_t c = 0; c < channels; c++) {{
         {name}_state state = states[c]; /* a local copy stays in registers */
         if (status)
-            for (size_t n = 0; n < samples; n++)
-                out[n * channels + c] = step(&state{arguments}, &status[n * channels + c]);
+            for (size_t n = 0; n < samples; n++) {{
+                out[n * channels + c] = step(&state{arguments}, &status[n * channels + c]);{_judge_wear(datapath)}
+            }}
         else
             for (size_t n = 0; n < samples; n++)
                 out[n * channels + c] = step(&state{arguments}, NULL);
@@ -123,6 +124,43 @@ void {name}_block({name}_state *states, size_t samples, size_t channels, const i
     }}
 }}
 """
+
+
+def _and_not_wear(datapath: Datapath) -> str:
+    return f",\n * and has no flags of wear: those are of {datapath.name}_wear_flags" if datapath.wear else ""
+
+
+def _wear_declaration(datapath: Datapath) -> str:
+    if not datapath.wear:
+        return ""
+    return (
+        "\n/* Flags of the status that are about wear, for an output code of a channel. */\n"
+        f"uint8_t {datapath.name}_wear_flags(size_t channel, int64_t code);\n"
+    )
+
+
+def _wear_definition(datapath: Datapath) -> str:
+    """Return the function that judges wear, which alone depends on a channel's number."""
+    if not datapath.wear:
+        return ""
+    rows = ", ".join(f"{{{warning}, {critical}}}" for warning, critical in datapath.wear)
+    several = len(datapath.wear) > 1
+    flags = [f"(code >= limit[{k}]) << {flag.value}" for k, flag in enumerate((Flag.WEAR_WARNING, Flag.WEAR_CRITICAL))]
+    return f"""
+uint8_t {datapath.name}_wear_flags(size_t channel, int64_t code)
+{{
+    static const int64_t limits[{len(datapath.wear)}][2] = {{{rows}}};
+    const int64_t *const limit = limits[{"channel" if several else "0"}];
+{"" if several else "    (void)channel;" + chr(10)}    return (uint8_t)({" | ".join(flags)});
+}}
+"""
+
+
+def _judge_wear(datapath: Datapath) -> str:
+    if not datapath.wear:
+        return ""
+    at = "n * channels + c"
+    return f"\n                status[{at}] |= {datapath.name}_wear_flags(c, out[{at}]);"
 
 
 def state_count(datapath: Datapath) -> int:

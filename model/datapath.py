@@ -50,6 +50,9 @@ class Datapath:
         At least one; the outputs of each are the inputs of the next.
     calibrated : tuple of (int, int)
         Lowest and highest code of each input that the calibration's measurements covered; by default, all codes.
+    wear : tuple of (int, int)
+        Lowest output codes whose wear is a warning and is critical: one pair for all channels, or one for each; none if
+        wear is not judged.
     """
 
     name: str
@@ -57,6 +60,7 @@ class Datapath:
     output: Port
     stages: tuple[Stage, ...]
     calibrated: tuple[tuple[int, int], ...] = ()
+    wear: tuple[tuple[int, int], ...] = ()
 
     def __post_init__(self) -> None:
         if not self.calibrated:
@@ -73,6 +77,12 @@ class Datapath:
         node = last.nodes[last.outputs[0]]
         if node.frac != 0 or node.low < self.output.lowest or node.high > self.output.highest:
             raise ValueError(f"the last stage's output must fit the output port, not {node!r}")
+        for warning, critical in self.wear:
+            if not self.output.lowest < warning < critical <= self.output.highest:
+                raise ValueError(
+                    f"wear must be codes that rise within {self.output.lowest + 1}..{self.output.highest}, "
+                    f"not {warning}, {critical}"
+                )
 
     def compute(self, codes: Codes) -> Codes:
         """Compute the output codes for input codes, from reset, bit for bit as the hardware does.
@@ -104,11 +114,15 @@ class Datapath:
     def compute_status(self, codes: Codes) -> npt.NDArray[np.uint8]:
         """Compute the status of each sample, from reset, bit for bit as the hardware does.
 
-        Parameters, errors and shape of the result are those of `compute`; the bits are those of
-        `sosmith.model.status.Flag`.
+        Parameters, errors and shape of the result are those of `compute`, and the channels have to be as many as those
+        whose wear is judged; the bits are those of `sosmith.model.status.Flag`.
         """
         checked = self._checked(codes)
         block = checked[:, np.newaxis, :] if checked.ndim == 2 else checked
+        if len(self.wear) not in {0, 1, block.shape[1]}:
+            raise ValueError(
+                f"codes must be of {len(self.wear)} channels, for each of which wear is judged, not {block.shape[1]}"
+            )
         _, status = compile_block(self)(block, with_status=True)
         return status[:, 0] if checked.ndim == 2 else status
 

@@ -14,6 +14,8 @@ class Flag(IntEnum):
     INPUT_AT_RAIL = 0
     OUTSIDE_CALIBRATION = 1
     OUTPUT_SATURATED = 2
+    WEAR_WARNING = 3
+    WEAR_CRITICAL = 4
 
     @property
     def meaning(self) -> str:
@@ -25,4 +27,6 @@ _MEANINGS = {
     Flag.INPUT_AT_RAIL: "an input code is the lowest or the highest of its range",
     Flag.OUTSIDE_CALIBRATION: "an input is outside the range of the calibration's measurements",
     Flag.OUTPUT_SATURATED: "the output was limited to its range",
+    Flag.WEAR_WARNING: "the wear has reached the warning",
+    Flag.WEAR_CRITICAL: "the wear has reached its limit, or the end of the sensor's range",
 }

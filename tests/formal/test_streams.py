@@ -13,7 +13,7 @@ from tests.formal.small import leaky, limiter, reference, resonator
 
 from sosmith.hdl import axi_stream, core, folded
 from sosmith.model.datapath import Datapath
-from sosmith.model.program import program
+from sosmith.model.folding import program
 
 DIGIT_BITS = 3
 

@@ -57,7 +57,10 @@ KO = f"{KIND}\n{OC}"
 EDGES = "passband_edge = {}\nstopband_edge = {}\npassband_loss = {}\nstopband_loss = {}"
 
 # Phrases that stand in several sentences.
-TABLES = "one of the keys name, sample_rate, channels, input, calibration, filter, output, hardware, not an unknown one"
+TABLES = (
+    "one of the keys name, sample_rate, channels, input, calibration, filter, output, wear, hardware, not an unknown"
+    " one"
+)
 FILTER_KEYS = (
     "one of the keys family, kind, method, order, cutoff, passband_edge, stopband_edge, passband_loss,"
     " stopband_loss, sos, not an unknown one"
@@ -781,6 +784,60 @@ BAD = [
         "hardware.clock must be at least the sample_rate (100 Hz), not 99",
     ),
     ("clock zero", CLOCK, "clock = 0", "hardware.clock must be a positive number of Hz, not 0"),
+    (
+        "wear without its limit",
+        UNIT,
+        UNIT + "\n[wear]\ninitial = 1.5\nwarning = 7.0",
+        "wear.limit must be a positive number in the unit of the output, not missing",
+    ),
+    (
+        "no wear to warn of",
+        UNIT,
+        UNIT + "\n[wear]\ninitial = 1.5\nwarning = 0\nlimit = 9",
+        "wear.warning must be a positive number in the unit of the output, not 0",
+    ),
+    (
+        "initial clearance is a text",
+        UNIT,
+        UNIT + "\n[wear]\ninitial = '1.5'\nwarning = 7\nlimit = 9",
+        "wear.initial must be a number in the unit of the output, or a list of one for each channel, not '1.5'",
+    ),
+    (
+        "initial clearances of other channels",
+        UNIT,
+        UNIT + "\n[wear]\ninitial = [1.5, 1.6]\nwarning = 7\nlimit = 9",
+        "wear.initial must be one number, not [1.5, 1.6]",
+    ),
+    (
+        "initial clearance that the output cannot show",
+        UNIT,
+        UNIT + "\n[wear]\ninitial = -0.5\nwarning = 7\nlimit = 9",
+        "wear.initial must be in the range of the output, [0, 16], not -0.5",
+    ),
+    (
+        "warning at the limit",
+        UNIT,
+        UNIT + "\n[wear]\ninitial = 1.5\nwarning = 9\nlimit = 9",
+        "wear.warning must be below limit (9), not 9",
+    ),
+    (
+        "warning and limit at one code",
+        UNIT,
+        UNIT + "\n[wear]\ninitial = 1.5\nwarning = 8.99999\nlimit = 9",
+        "wear.warning must be at least an LSB of the output (0.000244140625) below limit, not 8.99999",
+    ),
+    (
+        "limit beyond the output",
+        UNIT,
+        UNIT + "\n[wear]\ninitial = 8\nwarning = 7\nlimit = 9",
+        "wear.limit must be at most 7.999755859375, so that the output can show it, not 9",
+    ),
+    (
+        "sensor blind before the warning",
+        UNIT,
+        UNIT + "\n[wear]\ninitial = 1.5\nwarning = 7\nlimit = 9\nsensor_range = 8.5",
+        "wear.sensor_range must be above the clearance of the warning (8.5), not 8.5",
+    ),
     (
         "filter is a list of tables",
         "[filter]",

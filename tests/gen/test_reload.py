@@ -14,7 +14,8 @@ from tests.gen.swaps import during, moved, worst_input
 from sosmith.gen import reload
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.design import design
-from sosmith.gen.quantize import Quantized, with_constants
+from sosmith.gen.other_constants import with_constants
+from sosmith.gen.quantize import Quantized
 from sosmith.gen.realizations import REALIZATIONS
 from sosmith.gen.reload import ADVICE, OtherSet, check_swap, other_set, own_set, parallel_bank, room_of, set_for
 from sosmith.gen.reload_file import bank_size, register_writes, reload_json

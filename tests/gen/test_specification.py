@@ -99,6 +99,7 @@ def test_example_is_the_contracts_and_is_read_exactly(tmp_path: Path) -> None:
         ),
         output=Port(name="clearance", bits=16, signed=False, lsb=Fraction(1, 4096), zero=Fraction(0), unit="mm"),
         max_error=Fraction(25, 10**5),
+        wear=None,
         hardware=HardwareSpec(realization="auto", architecture="auto", clock=Fraction(12_000_000), reload=False),
     )
 

@@ -8,7 +8,8 @@ from tests.gen.designs import example_design
 from tests.gen.swaps import during, moved, worst_input
 
 from sosmith.gen import transient as module
-from sosmith.gen.quantize import Quantized, with_constants
+from sosmith.gen.other_constants import with_constants
+from sosmith.gen.quantize import Quantized
 from sosmith.gen.transient import RESIDUE, transient
 from sosmith.model.datapath import Datapath
 from sosmith.model.errors import ShortfallError

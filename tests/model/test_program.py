@@ -11,7 +11,8 @@ from tests.formal.small import limiter
 from tests.gen.designs import ALL, example_design
 
 from sosmith.model.datapath import Datapath
-from sosmith.model.program import HAZARD, Do, FoldingError, Instruction, Program, digits_of, program
+from sosmith.model.folding import FoldingError, program
+from sosmith.model.program import HAZARD, Do, Instruction, Program, digits_of
 
 FOLDABLE = ("df1", "df1_ef1", "df1_ef2", "df2t", "delta", "state_space")
 READS = {Do.MULTIPLY, Do.OPERAND, Do.PRODUCT, Do.GIVE}

@@ -8,7 +8,7 @@ import pytest
 from tests.gen.designs import example_design
 
 from sosmith.gen.design import design
-from sosmith.gen.quantize import with_constants
+from sosmith.gen.other_constants import with_constants
 from sosmith.model.datapath import Datapath
 from sosmith.model.graph import RangeError
 from sosmith.model.swapping import compute_swapping

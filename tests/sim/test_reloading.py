@@ -18,7 +18,7 @@ from tests.gen.designs import EXAMPLES
 
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.design import design
-from sosmith.gen.quantize import with_constants
+from sosmith.gen.other_constants import with_constants
 from sosmith.gen.reload import OtherSet, other_set, room_of
 from sosmith.gen.reload_file import register_writes
 from sosmith.gen.specification import load

@@ -1,5 +1,6 @@
 """Status flags in simulation, of a core whose calibration comes from measurements."""
 
+import subprocess
 from contextlib import nullcontext
 from dataclasses import replace
 from fractions import Fraction
@@ -10,9 +11,14 @@ import pytest
 from tests.gen.designs import EXAMPLES
 
 from sosmith.gen.core import CoreDesign, design_core
+from sosmith.gen.generate import generate
+from sosmith.gen.manifest import manifest
 from sosmith.gen.specification import load
+from sosmith.gen.wear_limits import WearSpec
 from sosmith.model.errors import ShortfallError
+from sosmith.model.port import Port
 from sosmith.model.status import Flag
+from sosmith.sim.lint import icarus_check, lint
 from sosmith.sim.simulation import simulate, traces_for
 
 
@@ -73,7 +79,7 @@ def test_every_flag_is_seen_and_right(architecture: str, tmp_path: Path) -> None
         ]
     trace = replace(trace, codes=codes, truth=None, reading=None)
     flags = made.datapath.compute_status(codes)
-    for flag in Flag:
+    for flag in (Flag.INPUT_AT_RAIL, Flag.OUTSIDE_CALIBRATION, Flag.OUTPUT_SATURATED):
         assert {int(value) >> flag & 1 for value in flags} == {0, 1}
     assert simulate(made, [trace], tmp_path, simulator="icarus").mismatches == 0
 
@@ -89,3 +95,64 @@ def test_a_wrong_flag_is_noticed(tmp_path: Path) -> None:
     codes[:, 0] = high + np.arange(32) - 16
     trace = replace(trace, codes=codes, truth=None, reading=None)
     assert simulate(broken, [trace], tmp_path, simulator="icarus").mismatches == 15
+
+
+def worn(architecture: str, channels: int, initial: tuple[str, ...], *, signed: bool = False) -> CoreDesign:
+    """Design the bench's instrument with limits of wear."""
+    spec = load(EXAMPLES / "flange_wear_bench.toml")
+    output = spec.output
+    if signed:
+        output = Port.from_range("clearance", 16, Fraction(-16), Fraction(16), signed=True, unit="mm")
+    hardware = replace(spec.hardware, architecture=architecture, realization="df1_ef2", clock=Fraction(10**8))
+    wear = WearSpec(initial=tuple(map(Fraction, initial)), warning=Fraction(2), limit=Fraction(4))
+    return design_core(
+        replace(spec, output=output, max_error=output.lsb, channels=channels, hardware=hardware, wear=wear)
+    )
+
+
+@pytest.mark.parametrize("architecture", ["parallel", "folded", "serial"])
+@pytest.mark.parametrize(
+    ("channels", "initial"), [(1, ("1.5",)), (3, ("1.5",)), (3, ("1.5", "2", "0.5"))], ids=["1", "3", "3-different"]
+)
+def test_wear(architecture: str, channels: int, initial: tuple[str, ...], tmp_path: Path) -> None:
+    made = worn(architecture, channels, initial, signed=architecture == "folded")
+    traces = traces_for(made, "wear_ramp", seed=1)
+    keep = np.linspace(0, len(traces[0]) - 1, 200).astype(int)
+    traces = [replace(trace, codes=trace.codes[keep], truth=None, reading=None) for trace in traces]
+    flags = made.datapath.compute_status(np.stack([trace.codes for trace in traces], axis=1))
+    for column in flags.T:
+        assert {int(value) >> Flag.WEAR_WARNING for value in column} == {0, 1, 3}
+    assert simulate(made, traces, tmp_path, simulator="icarus").mismatches == 0
+
+
+def test_limits_of_another_channel_are_noticed(tmp_path: Path) -> None:
+    made = worn("parallel", 3, ("1.5", "2", "0.5"))
+    datapath = made.datapath
+    broken = replace(
+        made,
+        architecture=replace(made.architecture, datapath=replace(datapath, wear=datapath.wear[1:] + datapath.wear[:1])),
+    )
+    traces = traces_for(made, "wear_ramp", seed=1)
+    keep = np.linspace(0, len(traces[0]) - 1, 200).astype(int)
+    traces = [replace(trace, codes=trace.codes[keep], truth=None, reading=None) for trace in traces]
+    assert simulate(broken, traces, tmp_path, simulator="icarus").mismatches > 0
+
+
+@pytest.mark.parametrize("architecture", ["parallel", "folded", "serial"])
+@pytest.mark.parametrize(("channels", "initial"), [(1, ("1.5",)), (3, ("1.5", "2", "0.5"))], ids=["1", "3-different"])
+def test_wear_leaves_nothing_for_a_linter_or_a_compiler(
+    architecture: str, channels: int, initial: tuple[str, ...], tmp_path: Path
+) -> None:
+    made = worn(architecture, channels, initial, signed=True)
+    generate(made, tmp_path)
+    name = made.spec.name
+    assert lint(tmp_path / f"{name}.sv", name, tmp_path) == []
+    assert icarus_check(tmp_path / f"{name}.sv", name) == []
+    flags = ["-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror", "-c"]
+    subprocess.run(["cc", *flags, f"{name}.c"], cwd=tmp_path, check=True)
+    (first, *_) = made.spec.wear.clearances() if made.spec.wear is not None else ()
+    entries = manifest(made)["wear"]
+    assert len(entries) == len(made.datapath.wear) == len(initial)
+    assert (entries[0]["warning"], entries[0]["critical"]) == first == (3.5, 5.5)
+    for entry, codes in zip(entries, made.datapath.wear, strict=True):
+        assert tuple(entry["codes"]) == codes

@@ -1,0 +1,134 @@
+"""The tables that show a design."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+
+from rich.console import Console
+from rich.markup import escape
+
+from sosmith.gen.architecture import Architecture
+from sosmith.gen.core import CoreDesign
+from sosmith.gen.cost import cost_of
+from sosmith.gen.limit_cycles import limit_cycles, recursions
+from sosmith.gen.manifest import section_entries
+from sosmith.gen.wear_limits import WearSpec
+from sosmith.model.port import Port
+from sosmith.model.program import Program
+from sosmith.terminal import TableConsole, new_table
+
+
+def print_design(made: CoreDesign, *, brief: bool = False) -> None:
+    """Print what follows from a specification; `brief` leaves out sections, limit cycles and schedule."""
+    console = TableConsole()
+    quantized, datapath = made.quantized, made.datapath
+    unit = escape(f" {datapath.output.unit}") if datapath.output.unit else ""
+    lsb = float(datapath.output.lsb)
+    overview = new_table(f"{made.spec.name}: {made.core}", ["", ""])
+    if quantized.filter is not None:
+        overview.add_row("filter", quantized.filter.describe)
+        aliasing = quantized.filter.aliasing
+        if aliasing is not None:
+            deviation, dc = 100 * aliasing.max_deviation, 100 * aliasing.dc_error
+            overview.add_row("aliasing", f"at most {deviation:.3g} % of the gain, {dc:.3g} % at zero frequency")
+    if made.fit is not None:
+        m, n = made.fit.orders
+        overview.add_row(
+            "calibration",
+            f"fitted: orders {m} in voltage, {n} in temperature, adjusted r {made.fit.adjusted_r:.4f}",
+        )
+    elif quantized.polynomial is not None:
+        m, n = quantized.polynomial.orders
+        overview.add_row("calibration", f"given: orders {m} in voltage, {n} in temperature")
+    for subject, reason in made.reasons.items():
+        overview.add_row(subject, reason)
+    overview.add_row("output", f"{datapath.output.bits} bits, one LSB = {lsb:.6g}{unit}")
+    if made.spec.wear is not None:
+        overview.add_row("wear flags", _wear_text(made.spec.wear, datapath.output))
+    for name, value in _hardware_rows(made.architecture):
+        overview.add_row(name, value)
+    if made.spec.channels > 1:
+        overview.add_row("channels", f"{made.spec.channels:,}, each at {float(made.spec.sample_rate):,.6g} Hz")
+    console.print(overview)
+    print_budget(console, quantized.budget, datapath.output.lsb, datapath.output.unit, made.spec.max_error)
+    if brief:
+        return
+    sections = new_table("Sections", ["section", "coefficients", "input", "states", "output"])
+    for entry in (entry for section in quantized.sections for entry in section_entries(section)):
+        coefficients = "\n".join(f"{c['name']} = {c['integer']} * 2^-{c['frac']}" for c in entry["coefficients"])
+        states = "\n".join(f"{name} {form}" for name, form in entry["states"].items())
+        sections.add_row(entry["name"], coefficients, entry["input"], states, entry["output"])
+    if quantized.sections:
+        console.print(sections)
+        _print_limit_cycles(console, made)
+    _print_schedule(console, made.architecture.program)
+
+
+def _wear_text(wear: WearSpec, output: Port) -> str:
+    """Say from which clearances on the flags of wear rise: one for all channels, or from the least to the largest."""
+    unit = f" {output.unit}".rstrip()
+
+    def span(values: Sequence[Fraction]) -> str:
+        low, high = float(min(values)), float(max(values))
+        return f"{low:g}{unit}" if low == high else f"{low:g} to {high:g}{unit}, by channel,"
+
+    warning, critical = (span(values) for values in zip(*wear.clearances(), strict=True))
+    return escape(f"warning from {warning} on, critical from {critical} on")
+
+
+def _hardware_rows(architecture: Architecture) -> list[tuple[str, str]]:
+    """Say what the hardware has, before synthesis."""
+    program, cost = architecture.program, cost_of(architecture.datapath)
+    latency = ("latency", f"{architecture.latency_cycles:,} clocks")
+    if program is None:
+        sizes = f"{cost.adder_bits}, {cost.register_bits}"
+        return [latency, ("multipliers", cost.multiplier_sizes), ("adder bits, state and register bits", sizes)]
+    word = program.digit_bits + 1
+    multiplier = "none, shifts and additions" if architecture.name == "serial" else f"1 of {word} x {word}"
+    memory = f"{program.words:,} words of {word} bits a channel, {program.states:,} of them states"
+    accumulator = f"{program.accumulator_bits} bits"
+    return [
+        latency,
+        ("multipliers", multiplier),
+        ("accumulator", accumulator),
+        ("memory", memory),
+    ]
+
+
+def _print_schedule(console: Console, program: Program | None) -> None:
+    if program is None:
+        return
+    table = new_table(
+        f"Schedule: {len(program.instructions)} instructions for each sample of each channel",
+        ["from", "clocks", "value", "words"],
+    )
+    places = {place.name: f"{place.address}..{place.address + place.digits - 1}" for place in program.places}
+    for name, start, count in program.schedule:
+        table.add_row(str(start), str(count), escape(name), places.get(name, ""))
+    console.print(table)
+
+
+def _print_limit_cycles(console: Console, made: CoreDesign) -> None:
+    table = new_table(
+        "Limit cycles: what a section's own rounding can sustain, in output LSB",
+        ["section", "without input", "dead band", "Lyapunov weights"],
+    )
+    for name, graph in (pair for section in made.quantized.sections for pair in recursions(section).items()):
+        found = limit_cycles(graph)
+        largest = "none, proven" if found.none else f"up to {float(found.largest):.4g}"
+        weights = ", ".join(f"{float(weight):.4g}" for weight in found.lyapunov or ())
+        table.add_row(name, largest, f"{float(found.dead_band):.4g}", weights or "none exist")
+    console.print(table)
+
+
+def print_budget(console: Console, parts: dict[str, Fraction], lsb: Fraction, unit: str, max_error: Fraction) -> None:
+    """Print the parts of an error bound, in output LSBs, and what is allowed."""
+    budget = new_table(
+        "Error budget, proven for all inputs in range", ["part", escape(unit) or "full scale 1", "output LSB"]
+    )
+    bound = sum(parts.values(), Fraction(0))
+    for part, value in [*parts.items(), ("[bold]sum[/]", bound)]:
+        budget.add_row(part, f"{float(value * lsb):.3g}", f"{float(value):.4f}")
+    budget.add_row("allowed", f"{float(max_error):.3g}", f"{float(max_error / lsb):.4f}")
+    console.print(budget)

@@ -1,0 +1,49 @@
+"""Arguments and options that several commands take, and what they stand for."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from sosmith.gen.boards import BOARDS, Board, find_board
+from sosmith.gen.core import CORES, CoreDesign
+from sosmith.gen.realizations import ERROR_FEEDBACK, REALIZATIONS
+
+SPEC = click.argument("spec", type=click.Path(path_type=Path))
+CORE = click.option(
+    "--core", type=click.Choice(CORES), help="The part to make.  [default: all that the specification has]"
+)
+REALIZATION = click.option(
+    "--realization",
+    type=click.Choice(["auto", *REALIZATIONS]),
+    help="Use this one, whatever the specification says.",
+)
+WIDTHS_OF = click.option(
+    "--widths-of",
+    type=click.Choice(ERROR_FEEDBACK),
+    help="Keep the word lengths chosen for this realization, to compare structures at equal width.",
+)
+BOARD = click.option(
+    "--board",
+    metavar="BOARD",
+    help=f"What it is meant for: an automatic choice of the architecture heeds its multipliers. {', '.join(BOARDS)}.",
+)
+SEED = click.option(
+    "--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Seed of noise and handshakes."
+)
+SECONDS = click.option(
+    "--seconds",
+    type=click.FloatRange(min=0, min_open=True),
+    help="Length of a scenario, in seconds of its own time.",
+)
+
+
+def default_folder(made: CoreDesign) -> Path:
+    """Return the folder for what is made of a core, if none is named."""
+    return Path("build") / made.spec.name
+
+
+def board_named(name: str | None) -> Board | None:
+    """Return the board of an option, None if it is not given."""
+    return None if name is None else find_board(name)

@@ -1,0 +1,121 @@
+"""The command `reload`: prove a set of constants for a core that runs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+from rich.markup import escape
+
+from sosmith.commands.options import (
+    BOARD,
+    CORE,
+    REALIZATION,
+    SPEC,
+    WIDTHS_OF,
+    board_named,
+    default_folder,
+)
+from sosmith.gen.core import CoreDesign, design_core
+from sosmith.gen.reload import Swap, check_swap, own_set, set_for
+from sosmith.gen.reload_file import reload_json
+from sosmith.gen.specification import Specification, load
+from sosmith.model.text_files import to_json, write_files
+from sosmith.terminal import JSON_OPTION, TableConsole, new_table, note, output_option, print_json, show_progress
+
+
+@click.command("reload")
+@SPEC
+@click.argument("other", type=click.Path(path_type=Path))
+@CORE
+@REALIZATION
+@WIDTHS_OF
+@BOARD
+@click.option(
+    "--active",
+    type=click.Path(path_type=Path),
+    help="Specification of the set that the core runs when it is loaded.  [default: SPEC]",
+)
+@click.option(
+    "--reset",
+    is_flag=True,
+    help="The core will be reset between the swap and its next sample: no transient then, and more sets fit.",
+)
+@click.option(
+    "--version",
+    type=click.IntRange(0, (1 << 32) - 1),
+    default=1,
+    show_default=True,
+    help="What the register VERSION is to read once the set is active.",
+)
+@JSON_OPTION
+@output_option("JSON file for the register writes.  [default: build/<name>/<stem of OTHER>.reload.json]")
+def reload_command(
+    spec: Path,
+    other: Path,
+    core: str | None,
+    realization: str | None,
+    widths_of: str | None,
+    board: str | None,
+    active: Path | None,
+    reset: bool,
+    version: int,
+    as_json: bool,
+    output: Path | None,
+) -> None:
+    """Prove a set of constants for a core that runs, and write what loads it.
+
+    SPEC is what the core was generated from, with `reload = true` under [hardware], and with the same options. OTHER is
+    a specification with another [calibration], [filter] or max_error, all else as in SPEC; its [hardware] does not
+    count.
+
+    The hardware keeps its word lengths, so not every set fits. This proves that the new set keeps its error within
+    OTHER's max_error, and that nothing inside can wrap while the filter still remembers the set before. The table says
+    after how many samples the bound holds again; no other swap may follow before. Exits with 1 and the reason if the
+    set is refused: then do not load it.
+
+    The file's `writes` are pairs of a byte address and a word for the AXI4-Lite port, in order. Before, compare
+    `design` with the register DESIGN. docs/registers.md has the registers.
+    """
+    target = board_named(board)
+    with show_progress() as step:
+        made = design_core(
+            load(spec), core=core, realization=realization, widths_of=widths_of, board=target, progress=step
+        )
+        step("set")
+        wanted = load(other)
+        new = set_for(made, wanted)
+        before = own_set(made) if active is None else set_for(made, load(active))
+        step("swap")
+        swap = check_swap(made, None if reset else before, new)
+    tree = reload_json(made, swap, version)
+    path = output or default_folder(made) / f"{other.stem}.reload.json"
+    write_files(path.parent, {path.name: to_json(tree)})
+    if as_json:
+        print_json(tree)
+    else:
+        _print_swap(made, wanted, swap, tree)
+    note(f"wrote {path}")
+
+
+def _print_swap(made: CoreDesign, wanted: Specification, swap: Swap, tree: dict[str, Any]) -> None:
+    console = TableConsole()
+    output, quantized = made.datapath.output, swap.made.quantized
+    unit = escape(f" {output.unit}".rstrip())
+    bound, allowed = quantized.bound * output.lsb, wanted.max_error
+    table = new_table(f"{made.spec.name}: the set may be loaded", ["", ""])
+    if quantized.filter is not None:
+        table.add_row("filter", quantized.filter.describe)
+    table.add_row("error bound", f"{float(bound):.3g}{unit} of {float(allowed):.3g}{unit} allowed")
+    table.add_row("headroom", f"{float(allowed - bound):.3g}{unit}, {float(100 * (1 - bound / allowed)):.1f} %")
+    if swap.samples:
+        seconds = swap.samples / float(made.spec.sample_rate)
+        table.add_row("transient", f"{swap.samples:,} samples, {seconds:.3g} s, until the bound holds")
+    else:
+        table.add_row("transient", "none, the bound holds from the first sample on")
+    table.add_row("states", f"take at most {100 * float(swap.use):.3g} % of what their words hold")
+    crc = tree["writes"][-1][1]
+    table.add_row("load", f"version {tree['version']}, {tree['words']:,} words, CRC 0x{crc:08X}")
+    table.add_row("for the design", f"0x{tree['design']:08X}")
+    console.print(table)
