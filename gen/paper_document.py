@@ -50,7 +50,7 @@ def paper_parts(figures: PaperFigures) -> dict[str, list[Part]]:
         regression_parts(figures),
         unfiltered_parts(figures),
         [*fifth_order_parts(figures), filtered_part(figures)],
-        vehicle_parts(figures),
+        vehicle_parts(figures, {}),
         [*seventh_order_parts(figures), *difference_equation_parts(figures)],
         [wear_part(figures), stated_part(figures)],
     ]

@@ -3,45 +3,66 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from decimal import Decimal
 
 from sosmith.gen.paper_comparison import Comparison, Part, compare
 from sosmith.model.paper_figures import PaperFigures
 
-_WHEELS = ("right", "left")
-_BOGIES = ("bogie 1", "bogie 2")
-
-Row = tuple[str, str, Decimal]
-"""Quantity, unit and printed figure."""
+_WHEELSETS = 6
+_MOTIONS = ("vertical", "lateral", "yaw")
+_NOT_DESCRIBED = "the paper's vehicle of 106 degrees of freedom is not described by figures"
 
 
-def vehicle_parts(figures: PaperFigures) -> list[Part]:
-    """Equation 20 and tables 5 to 8."""
-    return [_equation_20(), *(_table(figures, number) for number in (5, 6, 7)), _table_8(figures)]
+@dataclass(frozen=True, kw_only=True)
+class Simulated:
+    """A figure of a vehicle of ours.
+
+    Attributes
+    ----------
+    value : float
+        In the unit of the table.
+    same_quantity : bool
+        Whether it is what the paper's figure is.
+    why : str
+        What stands between the two.
+    """
+
+    value: float
+    same_quantity: bool
+    why: str
 
 
-def printed_rows(figures: PaperFigures, number: int) -> list[Row]:
-    """Figures of table 5, 6, 7 or 8 in the order printed, right wheels and bogie 1 first."""
-    rows: list[Row] = []
+Run = Mapping[str, Simulated]
+"""Figures of a run by the quantities of `printed_rows`; empty without a run."""
+
+
+def vehicle_parts(figures: PaperFigures, run: Run) -> list[Part]:
+    """Equation 20 and tables 5 to 8, with the figures of a run of our vehicle over the paper's track."""
+    return [_equation_20(), *(_table(figures, number, run) for number in (5, 6, 7)), _table_8(figures, run)]
+
+
+def printed_rows(figures: PaperFigures, number: int) -> Iterator[tuple[str, str, Decimal]]:
+    """Quantity, unit and figure of each cell of table 5, 6, 7 or 8, column by column of a row."""
     if number == 8:
-        for motion in ("vertical", "lateral", "yaw"):
-            for k, value in enumerate(figures.numbers("table_8", motion)):
-                body = f"wheelset {k + 1}" if k < 6 else f"bogie {k - 5}"
-                rows.append((f"{motion}, {body}", "dB", value))
-        return rows
-    name, columns, unit = {
-        5: ("vertical", _WHEELS, "mm"),
-        6: ("lateral", _WHEELS, "mm"),
-        7: ("yaw", _BOGIES, "rad"),
+        columns = [figures.numbers("table_8", motion) for motion in _MOTIONS]
+        for k in range(len(columns[0])):
+            body = f"wheelset {k + 1}" if k < _WHEELSETS else f"bogie {k + 1 - _WHEELSETS}"
+            for motion, column in zip(_MOTIONS, columns, strict=True):
+                if k < len(column):
+                    yield f"{motion} at 50 Hz, {body}", "dB", column[k]
+        return
+    name, sides, unit = {
+        5: ("vertical", ("right wheel", "left wheel"), "mm"),
+        6: ("lateral", ("right wheel", "left wheel"), "mm"),
+        7: ("yaw", ("bogie 1", "bogie 2"), "rad"),
     }[number]
     for k, values in enumerate(figures.rows(f"table_{number}", name)):
-        for column, value in zip(columns, values, strict=True):
-            body = f"wheelset {k + 1}, {column} wheel" if number < 7 else f"{column}, wheelset {k + 1}"
-            rows.append((body, unit, value))
+        for side, value in zip(sides, values, strict=True):
+            yield f"{name}, wheelset {k + 1}, {side}", unit, value
     if number == 5:
-        rows.append(("bogie frame, in the text", "mm", figures.number("table_5", "frame")))
-    return rows
+        yield "vertical, bogie (in the text)", "mm", figures.number("table_5", "frame")
 
 
 def _equation_20() -> Part:
@@ -52,52 +73,51 @@ def _equation_20() -> Part:
     )
 
 
-def _table(figures: PaperFigures, number: int) -> Part:
+def _table(figures: PaperFigures, number: int, run: Run) -> Part:
     return Part(
         title=f"Table {number}",
         where=figures.where(f"table_{number}"),
         finding="maxima of the paper's multi-body simulation, whose parameters are not printed",
-        comparisons=tuple(_not_modelled(row) for row in printed_rows(figures, number)),
+        comparisons=tuple(_rows(figures, number, run)),
     )
 
 
-def _not_modelled(row: Row) -> Comparison:
-    quantity, unit, printed = row
-    return compare(
-        quantity, printed, None, unit, note="the paper's vehicle of 106 degrees of freedom is not described by figures"
-    )
+def _rows(figures: PaperFigures, number: int, run: Run) -> Iterator[Comparison]:
+    for quantity, unit, printed in printed_rows(figures, number):
+        if quantity in run:
+            ours = run[quantity]
+            yield compare(quantity, printed, ours.value, unit, note=ours.why, comparable=ours.same_quantity)
+        else:
+            yield compare(quantity, printed, None, unit, note=_NOT_DESCRIBED)
 
 
-def _table_8(figures: PaperFigures) -> Part:
-    table = {motion: figures.numbers("table_8", motion) for motion in ("vertical", "lateral", "yaw")}
-    wheelsets = {motion: values[:6] for motion, values in table.items()}
+def _table_8(figures: PaperFigures, run: Run) -> Part:
+    table = {motion: figures.numbers("table_8", motion) for motion in _MOTIONS}
 
-    def ripples(motion: str, pick: Callable[[tuple[Decimal, ...]], Decimal], which: int) -> Comparison:
+    def ripples(motion: str, pick: Callable[[tuple[Decimal, ...]], Decimal], name: str, which: int) -> Comparison:
         ripple = figures.numbers("table_8", f"{motion}_wheelsets")[which]
-        return _from_ripple(
-            f"{motion}, {'largest' if which == 0 else 'smallest'} of the wheelsets", pick(wheelsets[motion]), ripple
-        )
+        return _from_ripple(f"{motion}, {name} of the wheelsets", pick(table[motion][:_WHEELSETS]), ripple)
 
     comparisons = [
-        comparison for motion in wheelsets for comparison in (ripples(motion, max, 0), ripples(motion, min, 1))
+        comparison
+        for motion in _MOTIONS
+        for comparison in (ripples(motion, max, "largest", 0), ripples(motion, min, "smallest", 1))
     ]
     comparisons += [
-        _from_ripple(f"{motion}, bogies", table[motion][6], figures.number("table_8", f"{motion}_frame"))
+        _from_ripple(f"{motion}, bogies", table[motion][_WHEELSETS], figures.number("table_8", f"{motion}_frame"))
         for motion in ("vertical", "lateral")
     ]
-    comparisons += [_not_modelled(row) for row in printed_rows(figures, 8)]
     return Part(
         title="Table 8",
         where=figures.where("table_8"),
         finding=r"the attenuations are $-20 \log_{10} \delta$ of the ripples in the text, but for one end of a range",
-        comparisons=tuple(comparisons),
+        comparisons=(*comparisons, *_rows(figures, 8, run)),
     )
 
 
 def _from_ripple(quantity: str, printed: Decimal, ripple: Decimal) -> Comparison:
-    ours = -20 * math.log10(ripple)
-    needed = 10 ** (-float(printed) / 20)
+    needed = math.pow(10, -float(printed) / 20)
     return compare(
-        quantity, printed, ours, "dB",
+        quantity, printed, -20 * math.log10(ripple), "dB",
         note=f"$\\delta$ = {ripple} in the text; the printed figure is that of {needed:.4f}",
     )  # fmt: skip
