@@ -1,7 +1,7 @@
 """The documents: what the README shows is what the commands print, and the maps of the code are true.
 
 Run as a script, it renews what is generated in them: the output in the README, the file table of the
-architecture, the register map, the commands and the schema of the calibration.
+architecture, the register map, the commands and the schema of the calibration, the vehicle and its parameters.
 """
 
 import ast
@@ -17,13 +17,16 @@ from click.testing import CliRunner
 
 from sosmith.cli import cli
 from sosmith.gen.register_map import markdown
+from sosmith.gen.vehicle_report import parameters_markdown
 from sosmith.model.measurement_store import SCHEMA
+from sosmith.model.vehicle_parameters import built_in
 
 ROOT = Path(__file__).parents[1]
 README = ROOT / "README.md"
 ARCHITECTURE = ROOT / "docs" / "architecture.md"
 CALIBRATION = ROOT / "docs" / "calibration.md"
 REGISTERS = ROOT / "docs" / "registers.md"
+VEHICLE = ROOT / "docs" / "vehicle.md"
 DOCUMENTS = [README, ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").glob("*.md"))]
 ROOMS = ("model", "hdl", "gen", "sim")
 BY_CI = {"./run demo", "./run test"}
@@ -32,6 +35,7 @@ NEEDS_SIMULATION = ("./run simulate ", "./run compare ")
 """Beginnings of the lines that only the longer test carries out."""
 
 _OUTPUT = re.compile(r"(?<=```text\n).*?(?=```)", re.DOTALL)
+_PARAMETERS = re.compile(r"(?<=<!-- parameters -->\n).*?(?=<!-- end of parameters -->)", re.DOTALL)
 _REGISTERS = re.compile(r"(?<=<!-- registers -->\n).*?(?=<!-- end of registers -->)", re.DOTALL)
 _SCHEMA = re.compile(r"(?<=<!-- schema -->\n).*?(?=<!-- end of schema -->)", re.DOTALL)
 _SHOWN = re.compile(r"```sh\n(?P<lines>[^`]*)```\n\n```text\n(?P<output>[^`]*)```")
@@ -146,6 +150,16 @@ def test_the_schema_is_the_one_of_the_store() -> None:
     assert _SCHEMA.findall(CALIBRATION.read_text(encoding="utf-8")) == [schema()]
 
 
+def test_vehicle_prints_what_is_shown(folder: Path) -> None:
+    shown = VEHICLE.read_text(encoding="utf-8")
+    assert len(_SHOWN.findall(shown)) == 1
+    assert shown == with_output(shown, folder)
+
+
+def test_the_parameters_of_the_vehicle_are_those_of_its_file() -> None:
+    assert _PARAMETERS.findall(VEHICLE.read_text(encoding="utf-8")) == [parameters_markdown(built_in())]
+
+
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
 def test_links_and_paths_lead_somewhere(document: Path) -> None:
     text = document.read_text(encoding="utf-8")
@@ -174,6 +188,9 @@ if __name__ == "__main__":
         renew(README, _OUTPUT, worked_example(Path(scratch)))
         text = CALIBRATION.read_text(encoding="utf-8")
         CALIBRATION.write_text(with_output(text, furnish(Path(scratch))), encoding="utf-8")
+        text = VEHICLE.read_text(encoding="utf-8")
+        VEHICLE.write_text(with_output(text, Path(scratch)), encoding="utf-8")
     renew(ARCHITECTURE, _TABLE, file_table())
     renew(REGISTERS, _REGISTERS, markdown())
     renew(CALIBRATION, _SCHEMA, schema())
+    renew(VEHICLE, _PARAMETERS, parameters_markdown(built_in()))

@@ -20,6 +20,7 @@ from sosmith.commands.design import design, generate, init
 from sosmith.commands.paper import paper
 from sosmith.commands.reload import reload_command
 from sosmith.commands.simulate import demo, emulate_command, simulate_command
+from sosmith.commands.vehicle import vehicle
 from sosmith.commands.verify import verify
 from sosmith.model.errors import SosmithError, ToolError
 from sosmith.terminal import note, reader_may_leave, silence_stdout
@@ -77,6 +78,7 @@ for _command in (
     emulate_command,
     compare_command,
     calibrate,
+    vehicle,
     paper,
     demo,
 ):
