@@ -104,10 +104,9 @@ def _equation_7(figures: PaperFigures) -> Part:
         before=(
             r"$$\text{percent error} = \frac{|d_o - d_a|}{d_a} \cdot 100\,\%$$",
             "In tables 1, 2 and 4 the percentage is 100 times the error beside it, at every clearance. So either the "
-            "column "
-            '"error" is relative already, $|d_o - d_a| / d_a$, or it is in mm and the division is missing. The '
-            "averages that the paper states use the percentages as printed, which is right under the first reading "
-            "only.",
+            'column "error" is relative already, $|d_o - d_a| / d_a$, or it is in mm and the division is missing. '
+            "The averages that the paper states use the percentages as printed, which is right under the first "
+            "reading only.",
         ),
         after=(
             table(head, rows),

@@ -153,9 +153,8 @@ def _sections(figures: PaperFigures) -> Part:
         ),
         before=(
             "What `sosmith` builds for the cutoff of table 9: sections of second order, "
-            r"$b_0 (1 + z^{-1})^2 / (1 + a_1 z^{-1} + a_2 z^{-2})$, and one of first. In fractions their product is "
-            r"the "
-            "filter above, coefficient by coefficient. How many bits each needs follows from the error allowed: "
+            r"$b_0 (1 + z^{-1})^2 / (1 + a_1 z^{-1} + a_2 z^{-2})$, and one of first. In fractions their product "
+            "is the filter above, coefficient by coefficient. How many bits each needs follows from the error allowed: "
             "`sosmith design`.",
         ),
         after=(
