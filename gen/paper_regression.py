@@ -162,8 +162,8 @@ def _unreachable(figures: PaperFigures, polynomial: Polynomial) -> str:
     least = float(polynomial(0.0, warm))
     return (
         f"Table 1 was measured at up to {warm:g} °C, before equation 5a was there. At that temperature equation 4 "
-        f"gives {least:.3f} mm or more from 0 V on, so at the table's first clearance, {first:g} mm, its error would be "
-        f"at least {100 * (least - first) / first:.0f} %, and not the "
+        f"gives {least:.3f} mm or more from 0 V on, so at the table's first clearance, {first:g} mm, its error would "
+        f"be at least {100 * (least - first) / first:.0f} %, and not the "
         f"{plain(figures.numbers('table_1', 'percent')[0])} % printed. So the table comes from another regression, or "
         "from voltages below zero."
     )
