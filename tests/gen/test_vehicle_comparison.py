@@ -9,7 +9,7 @@ import pytest
 
 from sosmith.gen.amplitude_spectrum import amplitude_spectrum, attenuation, ripple
 from sosmith.gen.vehicle_comparison import TABLE_8, Row, comparison
-from sosmith.gen.vehicle_report import vehicle_run
+from sosmith.gen.vehicle_report import vehicle_csv, vehicle_run
 from sosmith.model.vehicle_motion import Motion
 from sosmith.model.vehicle_parameters import built_in
 
@@ -43,6 +43,14 @@ def test_labels_follow_the_rule(ours: float, label: str) -> None:
     assert row(1.0, ours).label == label
     assert row(0.004, 0.004 * ours).label == label
     assert row(1.0, ours, same_quantity=False).label == "not comparable"
+
+
+def test_zero_is_written_without_a_sign(motion: Motion) -> None:
+    values = {name: getattr(motion, name)[:1] for name in motion.__dataclass_fields__}
+    text = vehicle_csv(Motion(**values | {"body_lateral": np.array([-1e-12]), "body_yaw": np.array([-2e-6])}))
+    header, row = (line.split(",") for line in text.splitlines())
+    assert row[header.index("body_lateral_mm")] == "0.000000"
+    assert row[header.index("body_yaw_mrad")] == "-0.002000"
 
 
 def test_every_figure_of_the_tables_is_there_once(motion: Motion) -> None:

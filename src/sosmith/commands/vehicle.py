@@ -140,7 +140,7 @@ def _modes_table(title: str, modes: tuple[Mode, ...]) -> Table:
             table.add_row(f"{mode.frequency:.3f}", f"{mode.damping:.3f}", f"{mode.growth:.3f}", mode.coordinate)
     still = [mode.growth for mode in modes if mode.damping >= SWINGING]
     if still:
-        table.add_row("-", "1", f"{min(still):.1f} to {max(still):.1f}", f"{len(still)} that do not swing")
+        table.add_row("-", "1", f"{min(still):.1f} to {max(still):.1f}", "others, which do not swing")
     return table
 
 
