@@ -6,7 +6,7 @@ import math
 from functools import cache
 
 from sosmith.gen.paper_vehicle import Simulated, SimulatedRun
-from sosmith.gen.vehicle_comparison import PAPER_SPEED, SMALLEST_RIPPLE
+from sosmith.gen.vehicle_comparison import NEAR, PAPER_SPEED, SMALLEST_RIPPLE
 from sosmith.gen.vehicle_report import VehicleRun, vehicle_run
 from sosmith.model.vehicle_parameters import built_in
 
@@ -33,7 +33,9 @@ def simulated() -> SimulatedRun:
         f"flanges: a wheelset goes up to {beyond:.1f} mm beyond its flange there, and creep takes up to {friction:.2f} "
         "times the friction there is. Beyond these limits its figures are not those of a real vehicle, and none is "
         "claimed to be the paper's.",
-        f"Attenuations of {-20 * math.log10(SMALLEST_RIPPLE):.0f} dB stand for no motion at 50 Hz but rounding.",
+        "[vehicle.md](vehicle.md) has the model; its table of the same figures calls near what is within a factor of "
+        f"{NEAR:g}, and has no label for what differs. Attenuations of {-20 * math.log10(SMALLEST_RIPPLE):.0f} dB "
+        "stand for no motion at 50 Hz but rounding.",
     )
     rows = {
         row.what: Simulated(value=row.ours, same_quantity=row.same_quantity, why=row.why) for row in made.comparison

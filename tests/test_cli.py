@@ -128,6 +128,9 @@ NEEDED = {
     "emulate": ("SPEC", "[SCENARIO]", "CSV", "--seconds", "--seed", "stdout"),
     "compare": ("REPORT REPORT...", "--json", "HTML"),
     "calibrate": ("clearance_mm", "sosmith calibrate add", "export"),
+    "vehicle": ("PARAMETERS.toml", "--speed", "tables 5 to 8", "--json"),
+    "spectrum": ("TRACE.csv", "--tolerance", "--passband", "--motion", "--into my.toml"),
+    "wear": ("TRACE.csv", "--initial", "--limit", "--warning", "--spec"),
     "paper": ("docs/paper.md", "-o, --output", "--json"),
     "demo": ("build/demo", "--seed"),
 }

@@ -25,6 +25,8 @@ ROOT = Path(__file__).parents[1]
 README = ROOT / "README.md"
 ARCHITECTURE = ROOT / "docs" / "architecture.md"
 CALIBRATION = ROOT / "docs" / "calibration.md"
+PRINTING = [CALIBRATION, *(ROOT / "docs" / f"{name}.md" for name in ("spectrum", "wear", "vehicle"))]
+"""Documents whose shell blocks stand above what they print."""
 REGISTERS = ROOT / "docs" / "registers.md"
 VEHICLE = ROOT / "docs" / "vehicle.md"
 DOCUMENTS = [README, ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -140,20 +142,15 @@ def test_the_register_map_is_up_to_date() -> None:
     assert _REGISTERS.findall(REGISTERS.read_text(encoding="utf-8")) == [markdown()]
 
 
-def test_calibration_prints_what_is_shown(folder: Path) -> None:
-    shown = CALIBRATION.read_text(encoding="utf-8")
-    assert len(_SHOWN.findall(shown)) == 2
+@pytest.mark.parametrize("document", PRINTING, ids=lambda path: path.name)
+def test_commands_print_what_is_shown(document: Path, folder: Path) -> None:
+    shown = document.read_text(encoding="utf-8")
+    assert _SHOWN.search(shown)
     assert shown == with_output(shown, folder)
 
 
 def test_the_schema_is_the_one_of_the_store() -> None:
     assert _SCHEMA.findall(CALIBRATION.read_text(encoding="utf-8")) == [schema()]
-
-
-def test_vehicle_prints_what_is_shown(folder: Path) -> None:
-    shown = VEHICLE.read_text(encoding="utf-8")
-    assert len(_SHOWN.findall(shown)) == 1
-    assert shown == with_output(shown, folder)
 
 
 def test_the_parameters_of_the_vehicle_are_those_of_its_file() -> None:
@@ -185,11 +182,10 @@ def renew(document: Path, part: re.Pattern[str], text: str) -> None:
 
 if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as scratch, contextlib.chdir(scratch):
-        renew(README, _OUTPUT, worked_example(Path(scratch)))
-        text = CALIBRATION.read_text(encoding="utf-8")
-        CALIBRATION.write_text(with_output(text, furnish(Path(scratch))), encoding="utf-8")
-        text = VEHICLE.read_text(encoding="utf-8")
-        VEHICLE.write_text(with_output(text, Path(scratch)), encoding="utf-8")
+        renew(README, _OUTPUT, worked_example(furnish(Path(scratch))))
+        for document in PRINTING:
+            text = document.read_text(encoding="utf-8")
+            document.write_text(with_output(text, Path(scratch)), encoding="utf-8")
     renew(ARCHITECTURE, _TABLE, file_table())
     renew(REGISTERS, _REGISTERS, markdown())
     renew(CALIBRATION, _SCHEMA, schema())

@@ -20,8 +20,10 @@ from sosmith.commands.design import design, generate, init
 from sosmith.commands.paper import paper
 from sosmith.commands.reload import reload_command
 from sosmith.commands.simulate import demo, emulate_command, simulate_command
+from sosmith.commands.spectrum import spectrum_command
 from sosmith.commands.vehicle import vehicle
 from sosmith.commands.verify import verify
+from sosmith.commands.wear import wear_command
 from sosmith.model.errors import SosmithError, ToolError
 from sosmith.terminal import note, reader_may_leave, silence_stdout
 
@@ -79,6 +81,8 @@ for _command in (
     compare_command,
     calibrate,
     vehicle,
+    spectrum_command,
+    wear_command,
     paper,
     demo,
 ):
