@@ -259,7 +259,9 @@ def _changed(value: Any) -> Any:
 
 def test_the_vehicle_has_a_figure_for_each_printed_one() -> None:
     printed = {quantity: value for number in (5, 6, 7, 8) for quantity, _, value in printed_rows(FIGURES, number)}
-    assert {row.what: Decimal(str(row.paper)) for row in run_of_ours().comparison} == printed
+    rows = run_of_ours().comparison
+    assert {row.what: Decimal(str(row.paper)) for row in rows} == printed
+    assert {row.what: row.ours for row in rows} == {name: one.value for name, one in simulated().rows.items()}
 
 
 def test_what_is_not_the_same_quantity_is_not_compared(parts: dict[str, Part]) -> None:
