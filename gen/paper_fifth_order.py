@@ -261,8 +261,7 @@ def _equation_16(figures: PaperFigures) -> Part:
         title="Equation 16",
         where=figures.where("equation_16"),
         finding=(
-            f"made with $\\Omega_c$ = {mean:.4g} rad/s, the mean of the two pre-warped edges, not with table 3's "
-            f"{stated:g}"
+            f"its $\\Omega_c$ is the mean of both pre-warped edges, {mean:.4g} rad/s, not table 3's {stated:g} rad/s"
         ),
         before=(
             r"Each coefficient gives the cutoff it was made with, $\Omega_c = (c_k / \text{printed})^{1/k}$: "

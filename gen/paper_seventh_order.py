@@ -132,8 +132,8 @@ def _table_9(figures: PaperFigures) -> Part:
         title="Table 9",
         where=figures.where("table_9"),
         finding=(
-            f"two pairs of labels swapped; edges pre-warped in degrees, so that {passband:g} Hz became "
-            f"{of('prewarped_a') / (2 * math.pi):.3f} Hz; the order by its own figures is {_order(figures)}"
+            f"two pairs of labels swapped; the pre-warped edges are those of a tangent of degrees, {passband:g} Hz "
+            f"becoming {of('prewarped_a') / (2 * math.pi):.3f} Hz; the order by its own figures is {_order(figures)}"
         ),
         comparisons=tuple(comparisons),
         after=(
