@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sosmith.gen.amplitude_spectrum import attenuation, ripple
+from sosmith.model.paper_figures import PaperFigures, read_paper_figures
 from sosmith.model.vehicle_motion import Motion
 
 PAPER_SPEED = 20.0
@@ -25,29 +26,8 @@ STOP_FREQUENCY = 50.0
 SMALLEST_RIPPLE = 1e-9
 """Ripples below count as this one, 180 dB: less is the rounding of doubles."""
 
-TABLE_5 = ((1.2, 0.2), (1.135, 0.1672), (0.188, 0.9322))
-"""Largest vertical displacement in mm of the right and left wheel of wheelsets 1 to 3."""
-
-BOGIE_VERTICAL = 34.0
-"""Vertical displacement in mm of the bogie in the curve, by the text before figure 16."""
-
-TABLE_6 = ((21.41, 6.0), (19.4, 6.0), (5.92, 14.64))
-"""Largest lateral displacement in mm of the right and left wheel of wheelsets 1 to 3."""
-
-TABLE_7 = ((0.012578, 0.00608, 0.00116), (0.012, 0.0037137, 0.001577))
-"""Largest yaw in rad of the three wheelsets relative to bogie 1 and to bogie 2."""
-
-TABLE_8 = (
-    ("wheelset 1", 47.69, 27.81, 20.0),
-    ("wheelset 2", 60.0, 24.0, 21.0),
-    ("wheelset 3", 60.0, 30.75, 21.22),
-    ("wheelset 4", 52.69, 30.18, 23.0),
-    ("wheelset 5", 53.97, 20.94, 21.87),
-    ("wheelset 6", 49.77, 17.78, 23.5),
-    ("bogie 1", 23.769, 35.65, None),
-    ("bogie 2", 23.769, 35.65, None),
-)
-"""Stop-band attenuation in dB of the vertical, lateral and yaw displacement."""
+_WHEELSETS = 6
+_BOGIES = 2
 
 _CONE = "a cone lifts one wheel as much as it lowers the other; real profiles, and the flange, do not"
 _CANT = "ours is half the cant, as the inner rail keeps its height; how the paper's track is canted is not told"
@@ -93,17 +73,19 @@ class Row:
 
 def comparison(motion: Motion) -> tuple[Row, ...]:
     """Set a run over the paper's track at `PAPER_SPEED` beside the paper's tables; at least 100 samples per second."""
-    return (*_vertical(motion), *_lateral(motion), *_yaw(motion), *_attenuations(motion))
+    figures = read_paper_figures()
+    tables = (_vertical, _lateral, _yaw, _attenuations)
+    return tuple(row for table in tables for row in table(motion, figures))
 
 
-def _vertical(motion: Motion) -> Iterator[Row]:
-    for k, (right, left) in enumerate(TABLE_5):
+def _vertical(motion: Motion, figures: PaperFigures) -> Iterator[Row]:
+    for k, (right, left) in enumerate(figures.rows("table_5", "vertical")):
         for side, paper, rise in (("right", right, motion.right_wheel_rise), ("left", left, motion.left_wheel_rise)):
             yield Row(
                 table="5",
                 what=f"vertical, wheelset {k + 1}, {side} wheel",
                 unit="mm",
-                paper=paper,
+                paper=float(paper),
                 ours=1e3 * float(rise[:, k].max()),
                 same_quantity=True,
                 why=_CONE,
@@ -112,59 +94,63 @@ def _vertical(motion: Motion) -> Iterator[Row]:
         table="text",
         what="vertical, bogie",
         unit="mm",
-        paper=BOGIE_VERTICAL,
+        paper=float(figures.number("table_5", "frame")),
         ours=1e3 * float(motion.frame_vertical.max()),
         same_quantity=True,
         why=_CANT,
     )
 
 
-def _lateral(motion: Motion) -> Iterator[Row]:
-    for k, (right, left) in enumerate(TABLE_6):
+def _lateral(motion: Motion, figures: PaperFigures) -> Iterator[Row]:
+    for k, (right, left) in enumerate(figures.rows("table_6", "lateral")):
         for side, paper, sign in (("right", right, -1), ("left", left, 1)):
             yield Row(
                 table="6",
                 what=f"lateral, wheelset {k + 1} to the {side}",
                 unit="mm",
-                paper=paper,
+                paper=float(paper),
                 ours=1e3 * float((sign * motion.wheelset_lateral[:, k]).max()),
                 same_quantity=False,
                 why=_TWO,
             )
 
 
-def _yaw(motion: Motion) -> Iterator[Row]:
-    for bogie, row in enumerate(TABLE_7):
-        for k, paper in enumerate(row):
+def _yaw(motion: Motion, figures: PaperFigures) -> Iterator[Row]:
+    printed = figures.rows("table_7", "yaw")
+    for bogie in range(_BOGIES):
+        for k, row in enumerate(printed):
             yaw = motion.wheelset_yaw_to_frame[:, 3 * bogie + k]
             yield Row(
                 table="7",
                 what=f"yaw, wheelset {k + 1} to bogie {bogie + 1}",
                 unit="rad",
-                paper=paper,
+                paper=float(row[bogie]),
                 ours=float(np.abs(yaw).max()),
                 same_quantity=True,
                 why=_YAW,
             )
 
 
-def _attenuations(motion: Motion) -> Iterator[Row]:
+def _attenuations(motion: Motion, figures: PaperFigures) -> Iterator[Row]:
     """Ripples in the units of the paper's own tables: mm, mm and rad."""
     rate = (len(motion.time) - 1) / float(motion.time[-1])
-    for index, (part, *papers) in enumerate(TABLE_8):
-        if index < 6:
-            k, motions = index, (motion.wheelset_vertical, motion.wheelset_lateral, motion.wheelset_yaw)
+    names = ("vertical", "lateral", "yaw")
+    printed = {name: figures.numbers("table_8", name) for name in names}
+    for index in range(_WHEELSETS + _BOGIES):
+        if index < _WHEELSETS:
+            k, part = index, f"wheelset {index + 1}"
+            motions = (motion.wheelset_vertical, motion.wheelset_lateral, motion.wheelset_yaw)
         else:
-            k, motions = index - 6, (motion.frame_vertical, motion.frame_lateral, motion.frame_yaw)
-        scales = (1e3, 1e3, 1.0)
-        for name, paper, values, scale in zip(("vertical", "lateral", "yaw"), papers, motions, scales, strict=True):
-            if paper is not None:
+            k = index - _WHEELSETS
+            part, motions = f"bogie {k + 1}", (motion.frame_vertical, motion.frame_lateral, motion.frame_yaw)
+        for name, values, scale in zip(names, motions, (1e3, 1e3, 1.0), strict=True):
+            if index < len(printed[name]):
                 delta = ripple(scale * values[:, k], round(rate, 6), STOP_FREQUENCY)
                 yield Row(
                     table="8",
                     what=f"{name} at 50 Hz, {part}",
                     unit="dB",
-                    paper=paper,
+                    paper=float(printed[name][index]),
                     ours=attenuation(max(delta, SMALLEST_RIPPLE)),
                     same_quantity=False,
                     why=_SCALE,

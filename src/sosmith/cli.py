@@ -17,10 +17,11 @@ import sosmith
 from sosmith.commands.calibrate import calibrate
 from sosmith.commands.compare import compare_command
 from sosmith.commands.design import design, generate, init
+from sosmith.commands.paper import paper
 from sosmith.commands.reload import reload_command
 from sosmith.commands.simulate import demo, emulate_command, simulate_command
-from sosmith.commands.vehicle import vehicle
 from sosmith.commands.spectrum import spectrum_command
+from sosmith.commands.vehicle import vehicle
 from sosmith.commands.verify import verify
 from sosmith.commands.wear import wear_command
 from sosmith.model.errors import SosmithError, ToolError
@@ -79,9 +80,10 @@ for _command in (
     emulate_command,
     compare_command,
     calibrate,
-    vehicle,
     spectrum_command,
+    vehicle,
     wear_command,
+    paper,
     demo,
 ):
     cli.add_command(_command)
