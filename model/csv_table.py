@@ -20,6 +20,12 @@ from sosmith.model.port import Values
 # float() would also take "nan", "1_000" and digits of other scripts.
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
+LARGEST = 1e100
+"""Largest magnitude of a number: sums of squares of such numbers are still doubles, and none has a physical meaning."""
+
+LONGEST_SHOWN = 60
+"""Characters of a wrong cell that a message shows."""
+
 
 @dataclass(frozen=True, eq=False)
 class CsvTable:
@@ -82,7 +88,7 @@ def read_csv_table(
     SpecificationError
         If the file cannot be read or is no UTF-8 text; if it is empty or has a header only; if a
         column is unknown, missing or there twice; if a row has too few or too many cells; if a cell
-        is no finite number. One sentence with the file and, where there is one, the line.
+        is no finite number, or one beyond `LARGEST`. One sentence with the file and, where there is one, the line.
     """
     reader = csv.reader(io.StringIO(_read_text(path), newline=""), strict=True)
     rows: list[list[float]] = []
@@ -170,5 +176,11 @@ def _number(where: str, column: str, cell: str, readers: Mapping[str, Reader]) -
         except ValueError as error:
             raise SpecificationError(f"{where}: {column} must be {error}, not {text!r}") from None
     if not NUMBER.fullmatch(text) or math.isinf(float(text)):
-        raise SpecificationError(f"{where}: {column} must be a finite number, not {text!r}")
+        raise SpecificationError(f"{where}: {column} must be a finite number, not {_short(text)}")
+    if abs(float(text)) > LARGEST:
+        raise SpecificationError(f"{where}: {column} must be from -{LARGEST:g} to {LARGEST:g}, not {_short(text)}")
     return float(text)
+
+
+def _short(text: str) -> str:
+    return repr(text) if len(text) <= LONGEST_SHOWN else f"{text[: LONGEST_SHOWN - 4]!r} ..."

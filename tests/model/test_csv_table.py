@@ -39,6 +39,8 @@ def test_reads_numbers_in_any_column_order(tmp_path: Path) -> None:
         (b"a,b\n1,nan\n", ", line 2: b must be a finite number, not 'nan'"),
         (b"a,b\n1,2\n-inf,2\n", ", line 3: a must be a finite number, not '-inf'"),
         (b"a,b\n1,1e999\n", ", line 2: b must be a finite number, not '1e999'"),
+        (b"a,b\n1,1e101\n", ", line 2: b must be from -1e+100 to 1e+100, not '1e101'"),
+        (b"a,b\n1," + b"9" * 400 + b"\n", f", line 2: b must be a finite number, not '{'9' * 56}' ..."),
         (b"a,b\n1_0,2\n", ", line 2: a must be a finite number, not '1_0'"),
         ("a,b\n1,٣\n".encode(), ", line 2: b must be a finite number, not '٣'"),
         (b"a,b\n1;5,2\n", ", line 2: a must be a finite number, not '1;5'"),
