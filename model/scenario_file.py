@@ -191,7 +191,7 @@ def range_notes(scenario: ScenarioFile, ports: Sequence[Port]) -> tuple[str, ...
 
 @dataclass(frozen=True, eq=False)
 class _Plan:
-    """One excerpt: its place in the file, the true clearance, where it is read, and samples until the filter settles."""
+    """One excerpt: its place in the file, the true clearance, where it is read, samples until the filter settles."""
 
     index: int
     excerpt: ExcerptTable

@@ -91,13 +91,16 @@ def read_wear_record(path: Path, column: str | None = None) -> WearRecord:
     Raises
     ------
     SpecificationError
-        As `read_csv_table`; if there is no such column, its name ends in another unit, or times go back. One sentence with the file and the line.
+        As `read_csv_table`; if there is no such column, its name ends in another unit, or times go back. One sentence
+        with the file and the line.
     """
     header = csv_header(path)
     time_column = _first(path, header, ("time_s", *TIMES), "a column of times")
     clearance_column = _first(path, header, CLEARANCES if column is None else (column,), "a column of clearances")
     if clearance_column == time_column:
-        raise SpecificationError(f"{path}: the column of clearances must be another than that of the time, {time_column}")
+        raise SpecificationError(
+            f"{path}: the column of clearances must be another than that of the time, {time_column}"
+        )
     unit, factor = unit_of(clearance_column)
     if unit and (unit, factor) != ("mm", 1.0):
         raise SpecificationError(f"{path}: the column of clearances must be in mm, not {clearance_column}")

@@ -98,6 +98,14 @@ def test_the_list_tells_about_files(folder: Path) -> None:
             "--seconds must come with a scenario's name, not with --measurements",
         ),
         (
+            ("emulate", "spec.toml", "depot.toml", "--measurements", "--channel", "1"),
+            "--channel must come with a trace, not with --measurements",
+        ),
+        (
+            ("emulate", "spec.toml", "day.toml", "--channel", "1"),
+            "--channel must be below 1, the count of channels, not 1",
+        ),
+        (
             ("emulate", "spec.toml", "--measurements"),
             "--measurements must come with a scenario file (TOML), not without one",
         ),
@@ -137,6 +145,10 @@ def test_every_channel_has_noise_of_its_own_and_its_own_wear(folder: Path) -> No
     (folder / "two.toml").write_text(two, encoding="utf-8")
     clearances = [trace.truth for trace in traces_for(made, "two.toml", seed=1)]
     assert [float(truth[-1]) for truth in clearances if truth is not None] == [3.0, 4.0]
+    for k, clearance in enumerate(("3.0", "4.0")):
+        written = run("emulate", "spec.toml", "two.toml", "--channel", str(k), "-o", f"{k}.csv")
+        assert written.exit_code == 0
+        assert (folder / f"{k}.csv").read_text().splitlines()[-1].split(",")[-2] == clearance
 
 
 @pytest.mark.slow

@@ -264,7 +264,12 @@ def test_refusals_while_a_trace_is_made(tmp_path: Path) -> None:
     late = FAULT.replace("start = 20", "start = 80")
     for text, bench, seed, message in (
         (PLAIN, replace(BENCH, polynomial=None, ports=(VOLTAGE,)), 1, "the core must be an instrument with a voltage "),
-        (PLAIN.replace("seconds = 60", "seconds = 0.5"), BENCH, 1, "some excerpt must be longer without a fault than the filter takes to settle, "),
+        (
+            PLAIN.replace("seconds = 60", "seconds = 0.5"),
+            BENCH,
+            1,
+            "some excerpt must be longer without a fault than the filter takes to settle, ",
+        ),
         (
             PLAIN.replace("seconds = 60", "seconds = 0.001"),
             BENCH,

@@ -55,7 +55,8 @@ def changed(old: str, new: str, text: str = PLAIN) -> str:
         ),
         (
             changed("noise = 0.01", "noise = 0.01\nmains = { amplitudes = [0.1, -0.1] }"),
-            "sensors.inductive.mains.amplitudes must be a list of 0 to 40 numbers of V from 0 to 10, not one with -0.1 at [1]",
+            "sensors.inductive.mains.amplitudes must be a list of 0 to 40 numbers of V from 0 to 10, "
+            "not one with -0.1 at [1]",
         ),
         (
             changed("noise = 4.0", "noise = 4.0\ndigitizer = { bits = 16.5 }"),

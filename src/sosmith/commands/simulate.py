@@ -159,6 +159,13 @@ def simulate_command(
     is_flag=True,
     help="Write the depot's measurements of FILE.toml instead, for `sosmith calibrate add`.",
 )
+@click.option(
+    "--channel",
+    type=click.IntRange(min=0),
+    default=0,
+    show_default=True,
+    help="Channel of SPEC, each of which has its own noise and wear.",
+)
 @SEED
 @output_option("CSV file to write.  [default: stdout]")
 def emulate_command(
@@ -167,6 +174,7 @@ def emulate_command(
     core: str | None,
     seconds: float | None,
     measurements: bool,
+    channel: int,
     seed: int,
     output: Path | None,
 ) -> None:
@@ -178,6 +186,8 @@ def emulate_command(
     if measurements:
         if seconds is not None:
             raise SpecificationError("--seconds must come with a scenario's name, not with --measurements")
+        if channel:
+            raise SpecificationError("--channel must come with a trace, not with --measurements")
         _write_measurements(spec, scenario, seed, output)
         return
     with show_progress() as step:
@@ -186,7 +196,10 @@ def emulate_command(
             _list_scenarios(made)
             return
         step(f"emulating {scenario}")
-        trace, *_ = traces_for(made, _known_scenario(made, scenario), seed=seed, seconds=seconds)
+        traces = traces_for(made, _known_scenario(made, scenario), seed=seed, seconds=seconds)
+        if channel >= len(traces):
+            raise SpecificationError(f"--channel must be below {len(traces)}, the count of channels, not {channel}")
+        trace = traces[channel]
         notes = notes_on(made, scenario)
         if output is not None:
             trace.write_csv(output)
