@@ -119,15 +119,31 @@ def read_csv_table(
 
 
 def csv_header(path: Path) -> list[str]:
-    """Names in the first line that is not blank; none if the file cannot be read, which `read_csv_table` then says."""
+    """Names in the first line that is not blank; none if it cannot be read, as `read_csv_table` then says."""
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
             for cells in csv.reader(file, strict=True):
                 if any(cell.strip() for cell in cells):
+                    check_separator(str(path), cells)
                     return [cell.strip() for cell in cells]
-    except (OSError, UnicodeDecodeError, csv.Error):
+    except (OSError, UnicodeDecodeError, csv.Error, SpecificationError):
         pass
     return []
+
+
+def check_separator(where: str, header: Sequence[str]) -> None:
+    """Refuse a header that holds a single cell because other characters than commas separate the names.
+
+    Raises
+    ------
+    SpecificationError
+        If it does; `where` begins the sentence.
+    """
+    for separator, name in ((";", "semicolons"), ("\t", "tabs")):
+        if len(header) == 1 and separator in header[0]:
+            raise SpecificationError(
+                f"{where}: cells must be separated by commas, with points in decimal numbers, not by {name}"
+            )
 
 
 def check_rows(table: CsvTable, bad: npt.NDArray[np.bool_], what: Callable[[int], str]) -> None:
@@ -158,6 +174,7 @@ def _read_text(path: Path) -> str:
 
 
 def _check_header(where: str, header: Sequence[str], known: Sequence[str], required: Sequence[str]) -> None:
+    check_separator(where, header)
     for name, count in Counter(header).items():
         if name not in known:
             raise SpecificationError(f"{where}: column must be one of {', '.join(known)}, not {name!r}")

@@ -142,6 +142,10 @@ def test_refusals() -> None:
             " must have a column of times (time_s, date, days, time_days, time_d, hours, time_h), not only when, "
             "clearance_mm",
         ),
+        (
+            "days;clearance_mm\n1;2\n",
+            ", line 1: cells must be separated by commas, with points in decimal numbers, not by semicolons",
+        ),
         ("days,clearance_mm\n1,2\n0.5,2\n", ", line 3: days must not be before that of the row before"),
         ("days,clearance_mm\n1,worn\n", ", line 2: clearance_mm must be a finite number, not 'worn'"),
         (

@@ -29,6 +29,11 @@ def test_reads_numbers_in_any_column_order(tmp_path: Path) -> None:
         (b"\n\n", " must hold a header line and rows of numbers, not nothing"),
         (b"a,b\n", " must hold rows of numbers below its header, not the header only"),
         (b"a,x\n1,2\n", ", line 1: column must be one of a, b, c, not 'x'"),
+        (
+            b"a;b\n1,5;2\n",
+            ", line 1: cells must be separated by commas, with points in decimal numbers, not by semicolons",
+        ),
+        (b"a\tb\n1\t2\n", ", line 1: cells must be separated by commas, with points in decimal numbers, not by tabs"),
         (b"a,\n1,2\n", ", line 1: column must be one of a, b, c, not ''"),
         (b"a,b,a\n1,2,3\n", ", line 1: column a must be there once, not 2 times"),
         (b"b\n1\n", ", line 1: column a must be there, not missing among b"),
