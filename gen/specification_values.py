@@ -233,11 +233,17 @@ def above_zero(value: object) -> Fraction:
     return exact
 
 
+ONE_OR_MORE = "a number in the unit of the output, or a list of one for each channel"
+"""What `one_or_more` reads, after "must be"."""
+
+
 def one_or_more(value: object) -> tuple[Fraction, ...]:
     """Read one number for all channels, or a list of one for each."""
     if isinstance(value, list):
-        return list_of(number, 1, len(value) or 1)(value)
-    return (number(value, "a number in the unit of the output, or a list of one for each channel"),)
+        if not value:
+            raise UnfitError(ONE_OR_MORE, literal(value))
+        return list_of(number, 1, len(value))(value)
+    return (number(value, ONE_OR_MORE),)
 
 
 def rising_pair(value: object) -> tuple[Fraction, Fraction]:

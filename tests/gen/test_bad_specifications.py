@@ -815,6 +815,12 @@ BAD = [
         "wear.initial must be in the range of the output, [0, 16], not -0.5",
     ),
     (
+        "no initial clearance in the list",
+        UNIT,
+        UNIT + "\n[wear]\ninitial = []\nwarning = 7\nlimit = 9",
+        "wear.initial must be a number in the unit of the output, or a list of one for each channel, not []",
+    ),
+    (
         "initial clearance beyond the output",
         UNIT,
         UNIT + "\n[wear]\ninitial = 16\nwarning = 7\nlimit = 9",
