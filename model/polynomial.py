@@ -86,5 +86,8 @@ class Polynomial:
         )
 
 
+EQUATION_4 = Polynomial.from_numbers([["1.373", "-0.005041"], ["0.2082", "0.002771"], ["0.06928"]])
+"""The paper's earlier regression, over 19.8 to 73 degC: clearance in mm from volts and degrees Celsius."""
+
 EQUATION_5A = Polynomial.from_numbers([["1.16", "-0.0036"], ["0.3672", "0.0006618"], ["0.05812"]])
 """The paper's regression over 19.8 to 98 degC: clearance in mm from volts and degrees Celsius."""

@@ -18,7 +18,8 @@ import numpy.typing as npt
 from sosmith.model.errors import SpecificationError
 from sosmith.model.polynomial import Polynomial
 from sosmith.model.port import Codes, Port, Values
-from sosmith.model.sensors import TEMPERATURE_NOISE, VOLTAGE_NOISE, sensor_voltage
+from sosmith.model.random_streams import one_stream
+from sosmith.model.sensors import Sensors
 from sosmith.model.trace import Trace
 
 TABLE_1_STEPS = tuple(float(d) for d in range(1, 11))
@@ -261,10 +262,7 @@ def _samples(bench: Bench, seconds: float) -> int:
 
 def _sense(run: _Run, clearance: Values, temperature: Values) -> Codes:
     """Codes of the noisy sensors; the ADC saturates."""
-    voltage = sensor_voltage(clearance, temperature) + run.rng.normal(0.0, VOLTAGE_NOISE, run.samples)
-    shown = temperature + run.rng.normal(0.0, TEMPERATURE_NOISE, run.samples)
-    columns = (voltage, shown)[: len(run.bench.ports)]
-    return np.stack([port.encode(values) for port, values in zip(run.bench.ports, columns, strict=True)], axis=1)
+    return Sensors().codes(clearance, temperature, run.time, run.bench.ports, one_stream(run.rng))
 
 
 def _settled(run: _Run, step: float) -> npt.NDArray[np.bool_]:
@@ -275,7 +273,7 @@ def _settled(run: _Run, step: float) -> npt.NDArray[np.bool_]:
     return np.arange(run.samples) >= settling
 
 
-def _plateau_samples(bench: Bench, levels: tuple[float, ...]) -> int:
+def plateau_samples(bench: Bench, levels: tuple[float, ...]) -> int:
     """Count the samples of a plateau in whose last part the filter has settled."""
     step = float(np.max(np.abs(np.diff(levels, prepend=0.0))))
     return math.ceil((bench.settling(step) + 1) / (1 - READING_PART))
@@ -284,7 +282,7 @@ def _plateau_samples(bench: Bench, levels: tuple[float, ...]) -> int:
 def _plateaus(run: _Run, levels: tuple[float, ...], heights: tuple[float, ...]) -> _Plateaus:
     """Hold each of `levels` equally long; `heights` are the levels in the output's unit."""
     length = run.samples // len(levels)
-    least = _plateau_samples(run.bench, heights)
+    least = plateau_samples(run.bench, heights)
     if length < least:
         raise run.refuse_length(least * len(levels), f"the filter has to settle on {len(levels)} plateaus")
     index = np.minimum(np.arange(run.samples) // length, len(levels) - 1)
@@ -302,7 +300,7 @@ class _Plateaus:
 def _stepped_samples(levels: tuple[float, ...]) -> Callable[[Bench], int]:
     def samples(bench: Bench) -> int:
         least = math.ceil(LEAST_SAMPLES / len(levels))
-        return min(max(_plateau_samples(bench, levels), least) * len(levels), MOST_SAMPLES)
+        return min(max(plateau_samples(bench, levels), least) * len(levels), MOST_SAMPLES)
 
     return samples
 

@@ -1,47 +1,95 @@
-"""Emulated sensors: what the paper's inductive sensor and thermocouple show at a given clearance."""
+"""The instrument's sensors as one object: inductive sensor, thermometer, and what digitizes them."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
 import numpy as np
-import numpy.typing as npt
 
-from sosmith.model.polynomial import EQUATION_5A
-from sosmith.model.port import Values
+from sosmith.model.digitizer import CodeFault, Digitizer, with_faults
+from sosmith.model.inductive_sensor import VOLTAGE_NOISE, InductiveSensor, InductiveState, sensor_voltage
+from sosmith.model.port import Codes, Port, Values
+from sosmith.model.random_streams import Streams
+from sosmith.model.thermometer import TEMPERATURE_NOISE, IdealThermometer, Thermometer
 
-VOLTAGE_NOISE = 0.01
-"""Broadband noise of the inductive sensor's voltage, V rms.
-
-From the paper: its errors before (table 1) and after (table 4) the low-pass filter differ by 8.8 um rms.
-Divided by the slope of equation 5a at each of the ten clearances (46.5 degC), this is 10.5 mV.
-"""
-
-TEMPERATURE_NOISE = 0.1
-"""Broadband noise of the thermocouple channel, degC rms.
-
-Assumed: about 4 uV at the 41.4 uV/degC of a type K thermocouple near 60 degC (ITS-90), after the
-averaging of a slow channel. It moves equation 5a by less than 0.4 um, well below the voltage's noise.
-"""
+__all__ = ["TEMPERATURE_NOISE", "VOLTAGE_NOISE", "SensorFaults", "Sensors", "sensor_voltage"]
 
 
-def sensor_voltage(clearance: npt.ArrayLike, temperature: npt.ArrayLike) -> Values:
-    """Voltage of the inductive sensor in V, without noise.
+@dataclass(frozen=True, kw_only=True)
+class SensorFaults:
+    """Faults during a measurement.
 
-    Equation 5a of the paper solved for V, the root on its rising branch (positive for every clearance
-    that the paper measured). Where the clearance is below the least one that equation 5a can take at
-    that temperature, the voltage of that least one.
-
-    Parameters
+    Attributes
     ----------
-    clearance : array_like
-        Clearance in mm.
-    temperature : array_like
-        Temperature in degC.
+    voltage, temperature : tuple of CodeFault
+        Faults of the codes of each channel.
+    open_thermocouple : tuple of slice
+        Samples during which the thermocouple is disconnected.
     """
-    c, b, a = (_row(index, temperature) for index in range(3))
-    discriminant = b * b - 4 * a * (c - np.asarray(clearance, dtype=np.float64))
-    return np.asarray((np.sqrt(np.maximum(discriminant, 0.0)) - b) / (2 * a))
+
+    voltage: tuple[CodeFault, ...] = ()
+    temperature: tuple[CodeFault, ...] = ()
+    open_thermocouple: tuple[slice, ...] = ()
+
+    def marks(self, samples: int) -> np.typing.NDArray[np.bool_]:
+        """Mark the samples, shape (samples,), at which any fault is on."""
+        index = np.arange(samples)
+        spans = [(fault.start, fault.stop) for fault in (*self.voltage, *self.temperature)]
+        spans += [(span.start, span.stop) for span in self.open_thermocouple]
+        marks = np.zeros(samples, dtype=np.bool_)
+        for start, stop in spans:
+            marks |= (index >= start) & (index < stop)
+        return marks
 
 
-def _row(index: int, temperature: npt.ArrayLike) -> Values:
-    row = [float(value) for value in EQUATION_5A.coefficients[index]]
-    return np.asarray(np.polynomial.polynomial.polyval(np.asarray(temperature, dtype=np.float64), row))
+@dataclass(frozen=True, kw_only=True)
+class Sensors:
+    """What turns clearance and temperature into the codes of a core.
+
+    Attributes
+    ----------
+    inductive : InductiveSensor
+    thermometer : Thermometer
+    voltage_digitizer : Digitizer
+        Errors of the converter whose codes the voltage port takes.
+    """
+
+    inductive: InductiveSensor = field(default_factory=InductiveSensor)
+    thermometer: Thermometer = field(default_factory=IdealThermometer)
+    voltage_digitizer: Digitizer = field(default_factory=Digitizer)
+
+    def codes(
+        self,
+        clearance: Values,
+        temperature: Values,
+        time: Values,
+        ports: Sequence[Port],
+        chance: Streams,
+        *,
+        state: InductiveState | None = None,
+        faults: SensorFaults | None = None,
+    ) -> Codes:
+        """Codes of the ports, shape (n, n_ports).
+
+        Parameters
+        ----------
+        clearance, temperature, time : ndarray, shape (n,)
+            Clearance in mm with all motion, temperature in degC, time in s.
+        ports : sequence of Port
+            Voltage in V and, if there are two, temperature in degC.
+        chance : Streams
+            Source of noise; without faults the inductive sensor draws first.
+        state : InductiveState, optional
+            What the days have made of the inductive sensor; by default it is new.
+        faults : SensorFaults, optional
+        """
+        faults = faults or SensorFaults()
+        voltage = self.inductive.voltage(clearance, temperature, time, state or InductiveState(), chance)
+        codes = self.voltage_digitizer.codes(ports[0], voltage)
+        columns = [with_faults(codes, ports[0], faults.voltage, chance)]
+        if len(ports) > 1:
+            columns.append(
+                self.thermometer.codes(temperature, ports[1], chance, faults.temperature, faults.open_thermocouple)
+            )
+        return np.stack(columns, axis=1)

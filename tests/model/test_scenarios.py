@@ -13,6 +13,7 @@ from scipy import signal
 
 from sosmith.model.accuracy import accuracy_percent
 from sosmith.model.errors import SpecificationError
+from sosmith.model.inductive_sensor import VOLTAGE_NOISE
 from sosmith.model.polynomial import EQUATION_5A, Polynomial
 from sosmith.model.port import Port, Values
 from sosmith.model.scenarios import (
@@ -24,7 +25,6 @@ from sosmith.model.scenarios import (
     Bench,
     emulate,
 )
-from sosmith.model.sensors import VOLTAGE_NOISE
 from sosmith.model.trace import Trace
 
 VOLTAGE = Port.from_range("voltage", 16, Fraction(0), Fraction(10), unit="V")
