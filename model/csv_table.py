@@ -7,7 +7,7 @@ import io
 import math
 import re
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -55,7 +55,13 @@ class CsvTable:
         return SpecificationError(f"{self.path}, line {self.lines[row]}: {what}")
 
 
-def read_csv_table(path: Path, known: Sequence[str], required: Sequence[str] = ()) -> CsvTable:
+Reader = Callable[[str], float]
+"""Makes a number of a cell; raises ValueError with what the cell must be."""
+
+
+def read_csv_table(
+    path: Path, known: Sequence[str], required: Sequence[str] = (), readers: Mapping[str, Reader] | None = None
+) -> CsvTable:
     """Read a CSV file of numbers with one header line.
 
     Blank lines are skipped, spaces around a cell and a byte order mark do not matter.
@@ -68,6 +74,8 @@ def read_csv_table(path: Path, known: Sequence[str], required: Sequence[str] = (
         Names that a column may have.
     required : sequence of str
         Names that must be there.
+    readers : mapping of str to Reader, optional
+        How to read the cells of a column that holds something else than plain numbers.
 
     Raises
     ------
@@ -91,7 +99,7 @@ def read_csv_table(path: Path, known: Sequence[str], required: Sequence[str] = (
                 continue
             if len(cells) != len(header):
                 raise SpecificationError(f"{where}: row must have {len(header)} cells, not {len(cells)}")
-            rows.append([_number(where, name, cell) for name, cell in zip(header, cells, strict=True)])
+            rows.append([_number(where, name, cell, readers or {}) for name, cell in zip(header, cells, strict=True)])
             lines.append(reader.line_num)
     except csv.Error as error:
         raise SpecificationError(
@@ -102,6 +110,18 @@ def read_csv_table(path: Path, known: Sequence[str], required: Sequence[str] = (
     if not rows:
         raise SpecificationError(f"{path} must hold rows of numbers below its header, not the header only")
     return CsvTable(path, header, np.array(rows, dtype=np.float64), tuple(lines))
+
+
+def csv_header(path: Path) -> list[str]:
+    """Names in the first line that is not blank; none if the file cannot be read, which `read_csv_table` then says."""
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            for cells in csv.reader(file, strict=True):
+                if any(cell.strip() for cell in cells):
+                    return [cell.strip() for cell in cells]
+    except (OSError, UnicodeDecodeError, csv.Error):
+        pass
+    return []
 
 
 def check_rows(table: CsvTable, bad: npt.NDArray[np.bool_], what: Callable[[int], str]) -> None:
@@ -142,8 +162,13 @@ def _check_header(where: str, header: Sequence[str], known: Sequence[str], requi
             raise SpecificationError(f"{where}: column {name} must be there, not missing among {', '.join(header)}")
 
 
-def _number(where: str, column: str, cell: str) -> float:
+def _number(where: str, column: str, cell: str, readers: Mapping[str, Reader]) -> float:
     text = cell.strip()
+    if column in readers:
+        try:
+            return readers[column](text)
+        except ValueError as error:
+            raise SpecificationError(f"{where}: {column} must be {error}, not {text!r}") from None
     if not NUMBER.fullmatch(text) or math.isinf(float(text)):
         raise SpecificationError(f"{where}: {column} must be a finite number, not {text!r}")
     return float(text)

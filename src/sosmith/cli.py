@@ -19,7 +19,9 @@ from sosmith.commands.compare import compare_command
 from sosmith.commands.design import design, generate, init
 from sosmith.commands.reload import reload_command
 from sosmith.commands.simulate import demo, emulate_command, simulate_command
+from sosmith.commands.spectrum import spectrum_command
 from sosmith.commands.verify import verify
+from sosmith.commands.wear import wear_command
 from sosmith.model.errors import SosmithError, ToolError
 from sosmith.terminal import note, reader_may_leave, silence_stdout
 
@@ -76,6 +78,8 @@ for _command in (
     emulate_command,
     compare_command,
     calibrate,
+    spectrum_command,
+    wear_command,
     demo,
 ):
     cli.add_command(_command)

@@ -1,0 +1,180 @@
+"""`sosmith wear`: depth, rate and remaining life of a wheel flange from a record of clearances."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import click
+from rich.markup import escape
+
+from sosmith.gen.calibration_plot import FORMATS
+from sosmith.gen.specification import load
+from sosmith.gen.wear_plot import wear_plot
+from sosmith.model.errors import SpecificationError
+from sosmith.model.text_files import write_contents
+from sosmith.model.wear import WearLimits, WearReport, judge
+from sosmith.model.wear_file import CLEARANCES, TIMES, WearRecord, moment_text, read_wear_record
+from sosmith.terminal import JSON_OPTION, TableConsole, new_table, note, print_json, show_progress
+
+_HELP = f"""Tell from TRACE.csv how far a wheel flange is worn, how fast it wears, and how long it will last.
+
+TRACE.csv holds a time ({", ".join(("time_s", *TIMES))}) and a clearance in mm ({", ".join(CLEARANCES)}, or --column).
+Wear is the clearance minus the initial one. The rate is the median slope between the medians of blocks of a day, with
+an interval that heeds how they correlate. The state is that of the last reading, by the comparisons that the hardware's
+flags of wear make.
+
+\b
+    sosmith wear days.csv --initial 1.5 --limit 9 --warning 7
+    sosmith wear days.csv --spec my.toml --plot wear.svg
+"""
+
+
+@click.command("wear", help=_HELP)
+@click.argument("trace", type=click.Path(path_type=Path), metavar="TRACE.csv")
+@click.option("--initial", type=float, help="Clearance without wear, in mm.")
+@click.option("--limit", type=float, help="Wear from which on it is critical, in mm.")
+@click.option("--warning", type=float, help="Wear from which on there is a warning, in mm.  [default: no warning]")
+@click.option("--sensor-range", type=float, help="Clearance up to which the sensor can be trusted, in mm.")
+@click.option(
+    "--spec", type=click.Path(path_type=Path), metavar="SPEC", help="Take all four from [wear] of this specification."
+)
+@click.option("--channel", type=click.IntRange(min=0), default=0, show_default=True, help="Channel of SPEC.")
+@click.option("--column", help="Column of the clearance.")
+@click.option("--block", type=float, help="Days whose readings count as one.  [default: 1, less in a short record]")
+@click.option("--window", type=float, help="Take the rate from so many days at the end.  [default: all]")
+@click.option("--confidence", type=float, default=0.95, show_default=True, help="Of the intervals.")
+@click.option("--plot", type=click.Path(path_type=Path), help="SVG or PNG file for a plot.")
+@JSON_OPTION
+def wear_command(
+    trace: Path,
+    initial: float | None,
+    limit: float | None,
+    warning: float | None,
+    sensor_range: float | None,
+    spec: Path | None,
+    channel: int,
+    column: str | None,
+    block: float | None,
+    window: float | None,
+    confidence: float,
+    plot: Path | None,
+    as_json: bool,
+) -> None:
+    """Carry out `sosmith wear`."""
+    if plot is not None and plot.suffix.lower().removeprefix(".") not in FORMATS:
+        raise SpecificationError(f"{plot}: the plot's name must end in .svg or .png, not {plot.suffix or 'neither'}")
+    if spec is not None:
+        if any(value is not None for value in (initial, limit, warning, sensor_range)):
+            raise SpecificationError("the limits must be given by --spec or one by one, not both")
+        limits = _limits_of(spec, channel)
+    elif initial is None or limit is None:
+        raise SpecificationError("the limits must be given by --initial and --limit, or by --spec, not left out")
+    else:
+        limits = WearLimits(initial=initial, limit=limit, warning=warning, sensor_range=sensor_range)
+    with show_progress() as step:
+        step(f"reading {trace}")
+        record = read_wear_record(trace, column)
+        step("rate of wear")
+        report = judge(record.time, record.clearance, limits, block=block, window=window, confidence=confidence)
+        drawn = None
+        if plot is not None:
+            step("drawing")
+            drawn = wear_plot(record.time, record.clearance, report, plot.suffix.lower().removeprefix("."))
+    if as_json:
+        print_json(_json(record, report))
+    else:
+        _print(record, report)
+    if plot is not None and drawn is not None:
+        write_contents(plot.parent, {plot.name: drawn})
+        note(f"wrote {plot}")
+
+
+def _limits_of(path: Path, channel: int) -> WearLimits:
+    wear = load(path).wear
+    if wear is None:
+        raise SpecificationError(f"{path}: the specification must have a table [wear] for --spec, not none")
+    if channel and channel >= len(wear.initial):
+        raise SpecificationError(
+            f"{path}: channel must be below {len(wear.initial)}, the count in wear.initial, not {channel}"
+        )
+    return WearLimits(
+        initial=float(wear.initial[channel]),
+        limit=float(wear.limit),
+        warning=float(wear.warning),
+        sensor_range=None if wear.sensor_range is None else float(wear.sensor_range),
+    )
+
+
+def _json(record: WearRecord, report: WearReport) -> dict[str, Any]:
+    """Everything, with the unit in each name."""
+    rate = report.rate
+    return {
+        "file": str(record.path),
+        "column": record.column,
+        "samples": report.samples,
+        "duration_days": report.duration,
+        "limits_mm": asdict(report.limits) | {"critical_clearance": report.limits.critical_clearance},
+        "clearance_mm": report.clearance,
+        "wear_mm": report.wear,
+        "remaining_mm": report.remaining,
+        "rate_mm_per_day": {"value": rate.rate, "low": rate.low, "high": rate.high, "confidence": rate.confidence},
+        "blocks": {
+            "count": rate.blocks,
+            "days": rate.block,
+            "scatter_mm": rate.scatter,
+            "correlation": rate.correlation,
+        },
+        "life_days": {"value": report.life, "low": report.life_low, "high": report.life_high},
+        "last_reading_mm": report.last,
+        "state": str(report.state),
+        "first_warning_days": report.first_warning,
+        "first_critical_days": report.first_critical,
+        "last_block": {
+            "samples": report.last_block,
+            "at_warning_or_beyond": report.warnings,
+            "critical": report.criticals,
+        },
+    }
+
+
+def _print(record: WearRecord, report: WearReport) -> None:
+    rate, limits = report.rate, report.limits
+    table = new_table(f"Wear by {escape(record.path.name)}: {report.state}", ["", ""])
+    table.add_row("record", f"{report.samples:,} readings over {report.duration:.4g} days")
+    table.add_row(
+        "clearance", f"{report.clearance:.4g} mm, the median of the last {rate.block:.3g} days ({limits.initial:g} new)"
+    )
+    table.add_row("wear", f"{report.wear:.4g} mm")
+    table.add_row("remaining", f"{report.remaining:.4g} mm {_end(limits)}")
+    interval = f"{rate.low:.3g} to {rate.high:.3g} at {100 * rate.confidence:g} %"
+    table.add_row("rate", f"{rate.rate:.3g} mm a day ({interval}), {_yearly(rate.rate)} mm a year")
+    table.add_row(
+        "taken from",
+        f"{rate.blocks} blocks that scatter by {rate.scatter:.2g} mm, neighbours correlated by {rate.correlation:.2f}",
+    )
+    table.add_row("remaining life", f"{_days(report.life)} ({_days(report.life_low)} to {_days(report.life_high)})")
+    table.add_row("state", f"{report.state}: the last reading is {report.last:.4g} mm")
+    for name, first, count in (
+        ("warning", report.first_warning, report.warnings),
+        ("critical", report.first_critical, report.criticals),
+    ):
+        if first is not None:
+            when = moment_text(first) if record.dated else f"day {first:.4g}"
+            table.add_row(f"first {name}", f"{when}; {count} of the {report.last_block} readings of the last block")
+    TableConsole().print(table)
+
+
+def _end(limits: WearLimits) -> str:
+    if limits.critical_clearance < limits.initial + limits.limit:
+        return f"to the end of the sensor's range, {limits.critical_clearance:g} mm, which comes before the limit"
+    return f"to the limit of {limits.limit:g} mm"
+
+
+def _yearly(rate: float) -> str:
+    return f"{rate * 365.25:.3g}"
+
+
+def _days(days: float | None) -> str:
+    return "no end in sight" if days is None else f"{days:.4g} days"
