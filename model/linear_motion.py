@@ -1,0 +1,165 @@
+"""Linear mechanical systems: assembled from springs and dampers, their modes, their exact response."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy import linalg
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mode:
+    """A mode of free motion, exp(growth t) cos(2 pi frequency t).
+
+    Attributes
+    ----------
+    frequency : float
+        In Hz; 0 for a motion that dies away or grows without swinging.
+    growth : float
+        Real part of the eigenvalue in 1/s; below 0 if the motion dies away.
+    coordinate : str
+        The coordinate with the most of the kinetic energy.
+    """
+
+    frequency: float
+    growth: float
+    coordinate: str
+
+    @property
+    def damping(self) -> float:
+        """Damping ratio: minus the real part over the magnitude of the eigenvalue, 1 without swinging."""
+        size = float(np.hypot(self.growth, 2 * np.pi * self.frequency))
+        return -self.growth / size if size else 0.0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LinearSystem:
+    """The equations mass q'' + damping q' + stiffness q = force.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Names of the n coordinates.
+    mass, damping, stiffness : ndarray, shape (n, n)
+        Matrices in SI units; the mass is symmetric and positive definite.
+    """
+
+    names: tuple[str, ...]
+    mass: Array
+    damping: Array
+    stiffness: Array
+
+    def state_matrix(self) -> Array:
+        """Matrix A of x' = A x + (0, mass^-1 force) for the state x = (q, q'), shape (2 n, 2 n)."""
+        n = len(self.names)
+        inverse = np.linalg.inv(self.mass)
+        return np.block([[np.zeros((n, n)), np.eye(n)], [-inverse @ self.stiffness, -inverse @ self.damping]])
+
+    def modes(self) -> tuple[Mode, ...]:
+        """All modes by rising frequency and growth; of each conjugate pair one, so n to 2 n of them."""
+        values, vectors = np.linalg.eig(self.state_matrix())
+        weight = np.sqrt(np.diag(self.mass))
+        found = []
+        for value, vector in zip(values, vectors.T, strict=True):
+            if value.imag >= 0:
+                # displacements stand first; their rates of change are only a factor off
+                most = int(np.argmax(weight * np.abs(vector[: len(self.names)])))
+                mode = Mode(
+                    frequency=float(value.imag / (2 * np.pi)), growth=float(value.real), coordinate=self.names[most]
+                )
+                found.append(mode)
+        return tuple(sorted(found, key=lambda mode: (mode.frequency, mode.growth)))
+
+    def energy(self, displacement: Array, velocity: Array) -> Array:
+        """Kinetic and elastic energy in J over time, shape (m,), of motions of shape (m, n).
+
+        An energy only if the stiffness is symmetric.
+        """
+        kinetic = np.einsum("ti,ij,tj->t", velocity, self.mass, velocity)
+        elastic = np.einsum("ti,ij,tj->t", displacement, self.stiffness, displacement)
+        return np.asarray((kinetic + elastic) / 2)
+
+    def respond(self, force: Array, step: float, start: tuple[Array, Array] | None = None) -> tuple[Array, Array]:
+        """Motion under a force that is linear between its samples: exact but for rounding.
+
+        Parameters
+        ----------
+        force : ndarray, shape (m, n)
+            Force on each coordinate at times 0, step, 2 step, ...
+        step : float
+            In s.
+        start : pair of ndarray, shape (n,), optional
+            Displacements and velocities at time 0; otherwise rest.
+
+        Returns
+        -------
+        displacement, velocity : ndarray, shape (m, n)
+        """
+        n = len(self.names)
+        inputs = np.vstack([np.zeros((n, n)), np.linalg.inv(self.mass)])
+        # x' = A x + B u with u' = constant over a step: Van Loan's block exponential holds all three factors
+        block = np.zeros((4 * n, 4 * n))
+        block[: 2 * n, : 2 * n] = self.state_matrix() * step
+        block[: 2 * n, 2 * n : 3 * n] = inputs * step
+        block[2 * n : 3 * n, 3 * n :] = np.eye(n)
+        exponential = linalg.expm(block)
+        move, hold, ramp = (exponential[: 2 * n, part] for part in _thirds(n))
+        push = force[:-1] @ hold.T + np.diff(force, axis=0) @ ramp.T
+        first = np.zeros(2 * n) if start is None else np.concatenate(start)
+        states = _accumulate(move, push, first)
+        return states[:, :n], states[:, n:]
+
+
+def _accumulate(move: Array, push: Array, first: Array) -> Array:
+    """States of x[k + 1] = move x[k] + push[k] from x[0] = first, shape (m + 1, d) for pushes of shape (m, d).
+
+    All of about sqrt(m) blocks step along side by side from zero; then each gets what the end of the one before adds.
+    """
+    count, width = push.shape
+    size = max(1, math.isqrt(count))
+    blocks = max(1, -(-count // size))
+    own = np.zeros((blocks, size, width))
+    own.reshape(-1, width)[:count] = push
+    for k in range(1, size):
+        own[:, k] += own[:, k - 1] @ move.T
+    over = np.linalg.matrix_power(move, size)
+    starts = np.zeros((blocks, width))
+    starts[0] = first
+    for k in range(1, blocks):
+        starts[k] = over @ starts[k - 1] + own[k - 1, -1]
+    for k in range(size):
+        starts = starts @ move.T
+        own[:, k] += starts
+    return np.vstack([first, own.reshape(-1, width)[:count]])
+
+
+def _thirds(n: int) -> tuple[slice, slice, slice]:
+    return slice(0, 2 * n), slice(2 * n, 3 * n), slice(3 * n, 4 * n)
+
+
+class Suspension:
+    """Matrices of springs and dampers between named coordinates, built element by element.
+
+    An element with the elongation u = sum of factor * coordinate adds k u^2 / 2 to the elastic energy and c u'^2 / 2
+    to the dissipation, so the matrices are symmetric and take no energy out of nothing, whatever the elements.
+    """
+
+    def __init__(self, names: Sequence[str]) -> None:
+        self.names = tuple(names)
+        self._index = {name: k for k, name in enumerate(self.names)}
+        self.stiffness: Array = np.zeros((len(self.names), len(self.names)))
+        self.damping: Array = np.zeros_like(self.stiffness)
+
+    def add(self, elongation: Mapping[str, float], stiffness: float, damping: float = 0.0, count: int = 1) -> None:
+        """Add `count` equal springs in N/m and dampers in N s/m with this elongation."""
+        for (one, a), (other, b) in itertools.product(elongation.items(), repeat=2):
+            place = self._index[one], self._index[other]
+            self.stiffness[place] += count * stiffness * a * b
+            self.damping[place] += count * damping * a * b
