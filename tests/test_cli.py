@@ -128,6 +128,7 @@ NEEDED = {
     "emulate": ("SPEC", "[SCENARIO]", "CSV", "--seconds", "--seed", "stdout"),
     "compare": ("REPORT REPORT...", "--json", "HTML"),
     "calibrate": ("clearance_mm", "sosmith calibrate add", "export"),
+    "paper": ("docs/paper.md", "-o, --output", "--json"),
     "demo": ("build/demo", "--seed"),
 }
 

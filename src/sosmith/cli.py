@@ -17,6 +17,7 @@ import sosmith
 from sosmith.commands.calibrate import calibrate
 from sosmith.commands.compare import compare_command
 from sosmith.commands.design import design, generate, init
+from sosmith.commands.paper import paper
 from sosmith.commands.reload import reload_command
 from sosmith.commands.simulate import demo, emulate_command, simulate_command
 from sosmith.commands.spectrum import spectrum_command
@@ -80,6 +81,7 @@ for _command in (
     calibrate,
     spectrum_command,
     wear_command,
+    paper,
     demo,
 ):
     cli.add_command(_command)

@@ -1,0 +1,42 @@
+"""The command `sosmith paper`: the paper's equations and tables computed again, beside the printed figures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from sosmith.gen.paper_comparison import LABELS
+from sosmith.gen.paper_document import paper_files, paper_json, summary_rows
+from sosmith.model.paper_figures import read_paper_figures
+from sosmith.model.text_files import write_files
+from sosmith.terminal import JSON_OPTION, TableConsole, new_table, note, output_option, print_json, show_progress
+
+
+@click.command("paper")
+@output_option("Markdown file to write, with its pictures in images/ beside it.")
+@JSON_OPTION
+def paper(output: Path | None, as_json: bool) -> None:
+    """Compute the paper's equations and tables again, and set ours beside the printed figures.
+
+    Prints how many figures of each are reproduced, near, different or not comparable. With -o docs/paper.md it writes
+    the whole comparison with its explanations and pictures; --json prints all its figures.
+    """
+    with show_progress() as step:
+        figures = read_paper_figures()
+        step("computing")
+        rows = summary_rows(figures)
+        if output is not None:
+            step("drawing")
+            files = paper_files(figures)
+            write_files(output.parent, {output.name: files.pop("paper.md")})
+            write_files(output.parent / "images", {name.removeprefix("images/"): text for name, text in files.items()})
+    if as_json:
+        print_json(paper_json(figures))
+    elif output is None:
+        listing = new_table("The paper's figures, ours beside them", ["", *LABELS])
+        for row in rows:
+            listing.add_row(*row[:-1])
+        TableConsole().print(listing)
+    if output is not None:
+        note(f"wrote {output} and its pictures in {output.parent / 'images'}")
