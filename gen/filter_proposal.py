@@ -14,10 +14,9 @@ from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 from fractions import Fraction
 
 import numpy as np
-import numpy.typing as npt
-from scipy import signal
 
 from sosmith.gen.design import Filter, design, minimum_order, prewarp, unwarp
+from sosmith.gen.filter_prediction import Content, Prediction, band_rms, predict
 from sosmith.gen.response import group_delay
 from sosmith.gen.specification import FilterSpec
 from sosmith.gen.specification_rules import MARGIN
@@ -86,28 +85,6 @@ class Wish:
         return self.tolerance / (self.coverage * math.sqrt(PARTS))
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Content:
-    """What one signal holds: what is wanted of it, and what disturbs.
-
-    Attributes
-    ----------
-    name : str
-        File and signal.
-    wanted : Spectrum or None
-        Of what is to pass; None for motion, of which nothing is wanted.
-    disturbance : Spectrum
-        Of what is not.
-    has_truth : bool
-        Whether the two were told apart by a true signal, not by frequency.
-    """
-
-    name: str
-    wanted: Spectrum | None
-    disturbance: Spectrum
-    has_truth: bool
-
-
 @dataclass(frozen=True, kw_only=True)
 class Choice:
     """One number of the proposal and where it comes from.
@@ -130,33 +107,6 @@ class Choice:
     reason: str
 
 
-@dataclass(frozen=True, kw_only=True)
-class Prediction:
-    """Error at the filter's output by its response and the spectra of one signal, in the signal's unit.
-
-    Attributes
-    ----------
-    name : str
-        File and signal.
-    wanted : float
-        Rms of what the filter does to the wanted signal, its delay at zero frequency set aside.
-    disturbance : float
-        Rms of what is left of the disturbance.
-    unfiltered : float
-        Rms of the disturbance before the filter.
-    """
-
-    name: str
-    wanted: float
-    disturbance: float
-    unfiltered: float
-
-    @property
-    def rms(self) -> float:
-        """Of both, taken as uncorrelated."""
-        return math.hypot(self.wanted, self.disturbance)
-
-
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Proposal:
     """A proposed filter.
@@ -169,6 +119,8 @@ class Proposal:
         passband_edge, stopband_edge (Hz), passband_loss, stopband_loss (dB).
     filter : Filter
         The Butterworth low-pass of minimum order that `sosmith design` makes of them.
+    needed : float
+        Pass edge that the true signals need, or that was asked for, Hz; at most the one chosen.
     delay : float
         Group delay at zero frequency, s.
     predictions : tuple of Prediction
@@ -178,20 +130,13 @@ class Proposal:
     wish: Wish
     choices: tuple[Choice, ...]
     filter: Filter
+    needed: float
     delay: float
     predictions: tuple[Prediction, ...]
 
     def __getitem__(self, key: str) -> float:
         """Value of the choice `key`."""
         return next(choice.value for choice in self.choices if choice.key == key)
-
-
-def told_apart(name: str, measured: Spectrum, passband: float) -> Content:
-    """Content of a measured signal without truth: all up to `passband` in Hz is wanted, all above disturbs."""
-    below = measured.frequency <= passband
-    wanted = replace(measured, density=np.where(below, measured.density, 0.0))
-    disturbance = replace(measured, density=np.where(below, 0.0, measured.density))
-    return Content(name=name, wanted=wanted, disturbance=disturbance, has_truth=False)
 
 
 def propose(contents: Sequence[Content], wish: Wish, sample_rate: float) -> Proposal:
@@ -218,8 +163,15 @@ def propose(contents: Sequence[Content], wish: Wish, sample_rate: float) -> Prop
         If no filter is needed, or none is enough.
     """
     passband = _pass_edge(contents, wish, sample_rate)
+    slowest = max(contents, key=lambda one: one.slow)
+    if wish.coverage * slowest.slow > wish.tolerance:
+        raise ShortfallError(
+            f"tolerance must be above {wish.coverage:g} times the {slowest.slow:.3g} rms of the disturbance that is "
+            f"slower than segments of {1 / slowest.disturbance.step:.3g} s, which counts as let through, not "
+            f"{wish.tolerance:g}: longer segments may tell it apart{_of(slowest.name, contents)}"
+        )
     if _harmless(contents, wish):
-        most = max(_rms(one.disturbance, 0) for one in contents)
+        most = max(band_rms(one.disturbance, 0) for one in contents)
         raise ShortfallError(
             f"the disturbance must be worth a filter: without one, {wish.coverage:g} times its {most:.3g} rms is well "
             f"within the tolerance of {wish.tolerance:g}"
@@ -231,7 +183,7 @@ def propose(contents: Sequence[Content], wish: Wish, sample_rate: float) -> Prop
 
 
 def _harmless(contents: Sequence[Content], wish: Wish) -> bool:
-    return all(_rms(one.disturbance, 0) <= wish.share for one in contents)
+    return all(band_rms(one.disturbance, 0) <= wish.share for one in contents)
 
 
 def _best(contents: Sequence[Content], wish: Wish, sample_rate: float, passband: Choice) -> Proposal | None:
@@ -246,13 +198,23 @@ def _best(contents: Sequence[Content], wish: Wish, sample_rate: float, passband:
         return None
     least, _ = minimum_order(passband.value, stopband.value, losses[0].value, losses[1].value, sample_rate)
     if wish.passband is not None:
-        return _made(contents, wish, sample_rate, (passband, stopband, *losses)) if least <= MAX_ORDER else None
+        if least > MAX_ORDER:
+            return None
+        made = _made(contents, wish, sample_rate, (passband, stopband, *losses), passband.value)
+        left = [math.hypot(one.disturbance, one.slow) for one in made.predictions]
+        return made if wish.coverage * max(left) <= wish.tolerance else None
     for order in range(least, MAX_ORDER + 1):
         edge = _highest_pass_edge(order, stopband.value, losses[0].value, losses[1].value, sample_rate)
         reason = (
             f"as high as order {order} allows, for the least delay; at least {passband.value:.5g} Hz: {passband.reason}"
         )
-        made = _made(contents, wish, sample_rate, (replace(passband, value=edge, reason=reason), stopband, *losses))
+        made = _made(
+            contents,
+            wish,
+            sample_rate,
+            (replace(passband, value=edge, reason=reason), stopband, *losses),
+            passband.value,
+        )
         if all(wish.coverage * one.rms <= wish.tolerance for one in made.predictions):
             return made
     return None
@@ -264,7 +226,9 @@ def _highest_pass_edge(order: int, stop_edge: float, pass_loss: float, stop_loss
     return _down(unwarp(prewarp(stop_edge, sample_rate) * ratio ** (1 / (2 * order)), sample_rate))
 
 
-def _made(contents: Sequence[Content], wish: Wish, sample_rate: float, choices: tuple[Choice, ...]) -> Proposal:
+def _made(
+    contents: Sequence[Content], wish: Wish, sample_rate: float, choices: tuple[Choice, ...], needed: float
+) -> Proposal:
     value = {choice.key: Fraction(repr(choice.value)) for choice in choices}
     spec = FilterSpec(
         family="butterworth",
@@ -280,13 +244,8 @@ def _made(contents: Sequence[Content], wish: Wish, sample_rate: float, choices: 
     )
     made = design(spec, sample_rate)
     delay = float(group_delay(made.sos, np.zeros(1), sample_rate)[0])
-    predictions = tuple(_predict(one, made, delay) for one in contents)
-    return Proposal(wish=wish, choices=choices, filter=made, delay=delay, predictions=predictions)
-
-
-def _rms(spectrum: Spectrum, first: int, last: int | None = None) -> float:
-    """Root mean square of the frequencies of index `first` up to, not with, `last`; never with zero frequency."""
-    return float(np.sqrt(np.sum(spectrum.density[max(first, 1) : last]) * spectrum.step))
+    predictions = tuple(predict(one, made, delay) for one in contents)
+    return Proposal(wish=wish, choices=choices, filter=made, needed=needed, delay=delay, predictions=predictions)
 
 
 def _pass_edge(contents: Sequence[Content], wish: Wish, sample_rate: float) -> Choice:
@@ -305,7 +264,7 @@ def _pass_edge(contents: Sequence[Content], wish: Wish, sample_rate: float) -> C
             "the pass edge must be given, by --passband in Hz or --time-constant in s, where no trace has its truth"
         )
     edge, lost, name = max(
-        (found.frequency[index], _rms(found, index + 1), name)
+        (found.frequency[index], band_rms(found, index + 1), name)
         for name, found in known
         for index in [max(1, int(np.argmax(_above(found) <= wish.share)))]
     )
@@ -326,9 +285,9 @@ def _up_to(spectrum: Spectrum) -> Array:
 def _stop_edge(contents: Sequence[Content], wish: Wish) -> Choice:
     """Choose the greatest frequency up to which no disturbance has more than its share; 0 if there is none."""
     edge, kept, name = min(
-        (one.disturbance.frequency[index], _rms(one.disturbance, 0, index + 1), one.name)
+        (one.disturbance.frequency[index], band_rms(one.disturbance, 0, index + 1), one.name)
         for one in contents
-        if _rms(one.disturbance, 0) > wish.share
+        if band_rms(one.disturbance, 0) > wish.share
         for index in [int(np.argmax(_up_to(one.disturbance) > wish.share)) - 1]
     )
     reason = f"up to it the disturbance has {kept:.3g} rms, at most {wish.share:.3g}{_of(name, contents)}"
@@ -339,7 +298,7 @@ def _pass_loss(contents: Sequence[Content], wish: Wish) -> Choice:
     """Choose the loss that costs the wanted signal its share if all of it had that loss."""
     if wish.passband_loss is not None:
         return Choice(key="passband_loss", value=wish.passband_loss, unit="dB", reason="as asked")
-    known = [(_rms(one.wanted, 0), one.name) for one in contents if one.wanted is not None]
+    known = [(band_rms(one.wanted, 0), one.name) for one in contents if one.wanted is not None]
     amplitude, name = max(known, default=(0.0, ""))
     loss = -20 * math.log10(1 - wish.share / amplitude) if amplitude > wish.share else math.inf
     if loss >= PASSBAND_LOSS:
@@ -352,7 +311,7 @@ def _pass_loss(contents: Sequence[Content], wish: Wish) -> Choice:
 def _stop_loss(contents: Sequence[Content], wish: Wish, edge: float) -> Choice:
     """Choose the loss that leaves of the worst disturbance above the stop edge its share."""
     above, name = max(
-        (_rms(one.disturbance, int(np.searchsorted(one.disturbance.frequency, edge, "right"))), one.name)
+        (band_rms(one.disturbance, int(np.searchsorted(one.disturbance.frequency, edge, "right"))), one.name)
         for one in contents
     )
     loss = 20 * math.log10(above / wish.share) if above > 0 else -math.inf
@@ -383,31 +342,6 @@ def _up(value: float) -> float:
 def _down(value: float) -> float:
     """Round down to five digits."""
     return float(Context(prec=5, rounding=ROUND_FLOOR).create_decimal_from_float(value))
-
-
-def response(made: Filter, frequency: Array) -> npt.NDArray[np.complex128]:
-    """Frequency response of a filter at `frequency` in Hz, shape (n,)."""
-    _, values = signal.sosfreqz(made.sos, worN=2 * np.pi * frequency / made.sample_rate)
-    return np.asarray(values, dtype=np.complex128)
-
-
-def _predict(content: Content, made: Filter, delay: float) -> Prediction:
-    """Integrate what the response makes of the spectra; the wanted signal is held against itself, delayed."""
-
-    def rms(spectrum: Spectrum | None, delayed: bool) -> float:
-        if spectrum is None:
-            return 0.0
-        gain = response(made, spectrum.frequency)
-        if delayed:
-            gain = gain * np.exp(2j * np.pi * spectrum.frequency * delay) - 1
-        return _rms(replace(spectrum, density=spectrum.density * np.abs(gain) ** 2), 0)
-
-    return Prediction(
-        name=content.name,
-        wanted=rms(content.wanted, delayed=True),
-        disturbance=rms(content.disturbance, delayed=False),
-        unfiltered=content.disturbance.rms,
-    )
 
 
 def _too_tight(contents: Sequence[Content], wish: Wish, sample_rate: float) -> ShortfallError:

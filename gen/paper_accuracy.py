@@ -46,8 +46,7 @@ def stated_part(figures: PaperFigures) -> Part:
         after=(
             table(head, rows),
             "The abstract sets one run without the filter beside another with it. The same run without and with it is "
-            "in "
-            f"tables 1 and 4: {every['table_1'][0]:.2f} % and {every['table_4'][0]:.2f} %.",
+            f"in tables 1 and 4: {every['table_1'][0]:.2f} % and {every['table_4'][0]:.2f} %.",
         ),
     )  # fmt: skip
 
@@ -105,18 +104,15 @@ def _equation_7(figures: PaperFigures) -> Part:
         before=(
             r"$$\text{percent error} = \frac{|d_o - d_a|}{d_a} \cdot 100\,\%$$",
             "In tables 1, 2 and 4 the percentage is 100 times the error beside it, at every clearance. So either the "
-            "column "
-            '"error" is relative already, $|d_o - d_a| / d_a$, or it is in mm and the division is missing. The '
-            "averages that "
-            "the paper states use the percentages as printed, which is right under the first reading only.",
+            'column "error" is relative already, $|d_o - d_a| / d_a$, or it is in mm and the division is missing. '
+            "The averages that the paper states use the percentages as printed, which is right under the first "
+            "reading only.",
         ),
         after=(
             table(head, rows),
             f"Which reading holds the paper does not say. A scatter of {plain(expected, 2)} mm, which its adjusted $r$ "
-            f"means, "
-            f"speaks for the first: under the second, readings would be {times:.0f} times better than the regression "
-            f"that makes them. "
-            "`accuracy_percent` in our reports follows equation 7 as written.",
+            f"means, speaks for the first: under the second, readings would be {times:.0f} times better than the "
+            "regression that makes them. `accuracy_percent` in our reports follows equation 7 as written.",
         ),
     )
 
@@ -171,9 +167,8 @@ def _what_the_filter_leaves(figures: PaperFigures) -> str:
     where = ", ".join(str(figures.numbers("table_1", "clearance")[k]) for k in sorted(largest))
     return (
         "Tables 1 and 4 have the same positions, and errors that rise and fall together: they seem to be of one run, "
-        "without "
-        f"and with the filter. Of the largest errors, at {where} mm, the filter leaves {100 * left:.0f} %: they are "
-        "systematic, of the regression or of the sensor, and no low-pass removes that."
+        f"without and with the filter. Of the largest errors, at {where} mm, the filter leaves {100 * left:.0f} %: "
+        "they are systematic, of the regression or of the sensor, and no low-pass removes that."
     )
 
 

@@ -80,10 +80,9 @@ def _table_10(figures: PaperFigures) -> Part:
         comparisons=tuple(comparisons),
         after=(
             f"As printed, the output grows tenfold every {tenfold:.1f} samples. The poles lie so close to $z = 1$ that "
-            f"the "
-            f"denominator there is the {float(sum(stated[1])):.2g} left over from terms of up to "
+            f"the denominator there is the {float(sum(stated[1])):.2g} left over from terms of up to "
             f"{max(abs(float(b)) for b in stated[1]):.0f}, so each of its digits counts. The filter by table 9's "
-            f"cutoff, exactly:",
+            "cutoff, exactly:",
             table(head, rows),
             _digit_table(stated),
             "![Poles of table 10](images/paper_poles.svg)",
@@ -150,15 +149,12 @@ def _sections(figures: PaperFigures) -> Part:
         where="not in the paper",
         finding=(
             f"in sections the same filter is stable with {max(int(row[-1]) for row in rows)} digits of each "
-            f"coefficient, and its gain at 0 "
-            f"Hz is "
-            f"{gain} exactly"
+            f"coefficient, and its gain at 0 Hz is {gain} exactly"
         ),
         before=(
             "What `sosmith` builds for the cutoff of table 9: sections of second order, "
-            r"$b_0 (1 + z^{-1})^2 / (1 + a_1 z^{-1} + a_2 z^{-2})$, and one of first. In fractions their product is "
-            r"the "
-            "filter above, coefficient by coefficient. How many bits each needs follows from the error allowed: "
+            r"$b_0 (1 + z^{-1})^2 / (1 + a_1 z^{-1} + a_2 z^{-2})$, and one of first. In fractions their product "
+            "is the filter above, coefficient by coefficient. How many bits each needs follows from the error allowed: "
             "`sosmith design`.",
         ),
         after=(

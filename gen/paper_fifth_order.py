@@ -235,12 +235,9 @@ def _equation_14() -> Part:
         finding="as printed it is not a Butterworth filter: the square is missing",
         before=(
             f"$H(jP) = 1 / (1 + (jP)^N)$ has its $N$ poles all around the unit circle; for $N = {ORDER}$, {len(right)} "
-            f"of "
-            r"them lie in the right half, so it would be unstable. Equation 9 asks for $|H|^2 = 1 / (1 + P^{2N})$: "
-            r"with "
-            r"$s = jP$ that is $H(s) H(-s) = 1 / (1 + (s/j)^{2N})$, of whose $2N$ poles $H(s)$ takes the $N$ in the "
-            r"left half. "
-            "Equations 15 and 21 are made that way.",
+            "of them lie in the right half, so it would be unstable. Equation 9 asks for "
+            r"$|H|^2 = 1 / (1 + P^{2N})$: with $s = jP$ that is $H(s) H(-s) = 1 / (1 + (s/j)^{2N})$, of whose $2N$ "
+            "poles $H(s)$ takes the $N$ in the left half. Equations 15 and 21 are made that way.",
         ),
     )
 
@@ -264,8 +261,7 @@ def _equation_16(figures: PaperFigures) -> Part:
         title="Equation 16",
         where=figures.where("equation_16"),
         finding=(
-            f"made with $\\Omega_c$ = {mean:.4g} rad/s, the mean of the two pre-warped edges, not with table 3's "
-            f"{stated:g}"
+            f"its $\\Omega_c$ is the mean of both pre-warped edges, {mean:.4g} rad/s, not table 3's {stated:g} rad/s"
         ),
         before=(
             r"Each coefficient gives the cutoff it was made with, $\Omega_c = (c_k / \text{printed})^{1/k}$: "

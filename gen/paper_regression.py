@@ -146,10 +146,10 @@ def _shape(figures: PaperFigures, equation: str, polynomial: Polynomial) -> list
     lowest, highest = (float(value) for value in figures.numbers(name, "temperature"))
     cold, hot = (float(polynomial(0.0, temperature)) for temperature in (lowest, highest))
     text = [
-        f"The clearance rises with the voltage at every voltage and temperature above zero. With the temperature it "
-        f"falls "
-        f"below {turn:.3f} V and rises above; there, at {at_turn:.2f} mm, the temperature has no effect. At 0 V it is "
-        f"{cold:.3f} mm at {lowest:g} °C and {hot:.3f} mm at {highest:g} °C: no voltage stands for anything below."
+        "The clearance rises with the voltage at every voltage and temperature above zero. With the temperature it "
+        f"falls below {turn:.3f} V and rises above; there, at {at_turn:.2f} mm, the temperature has no effect. At 0 V "
+        f"it is {cold:.3f} mm at {lowest:g} °C and {hot:.3f} mm at {highest:g} °C: no voltage stands for anything "
+        "below."
     ]
     text.append(_unreachable(figures, polynomial) if equation == "4" else _reachable(figures, polynomial))
     return text
@@ -162,11 +162,10 @@ def _unreachable(figures: PaperFigures, polynomial: Polynomial) -> str:
     least = float(polynomial(0.0, warm))
     return (
         f"Table 1 was measured at up to {warm:g} °C, before equation 5a was there. At that temperature equation 4 "
-        f"gives "
-        f"{least:.3f} mm or more, so at the table's first clearance, {first:g} mm, its error would be at least "
-        f"{100 * (least - first) / first:.0f} %, and not the {plain(figures.numbers('table_1', 'percent')[0])} % "
-        f"printed: "
-        "the table must come from another regression than the one printed."
+        f"gives {least:.3f} mm or more from 0 V on, so at the table's first clearance, {first:g} mm, its error would "
+        f"be at least {100 * (least - first) / first:.0f} %, and not the "
+        f"{plain(figures.numbers('table_1', 'percent')[0])} % printed. So the table comes from another regression, or "
+        "from voltages below zero."
     )
 
 
@@ -207,18 +206,15 @@ def _drift(figures: PaperFigures) -> Part:
         ),
         before=(
             "Figures 4 to 7 of the paper are pictures without numbers, so there is nothing to set ours beside. What "
-            "the "
-            f"sensor's voltage does from {reference:g} °C on follows from the regressions, solved for the voltage; "
+            f"the sensor's voltage does from {reference:g} °C on follows from the regressions, solved for the voltage; "
             "equation 6 is its magnitude.",
         ),
         after=(
             *blocks,
             "The paper says that the voltage falls as it gets warmer, little from 0 to 5 mm and much from 5 to 10 mm. "
             f"So does equation 4: from {reference:g} to {_HOTTEST:g} °C the voltage changes by {changes[0]}. Equation "
-            f"5a, "
-            f"which took its place, says so only above its turning point: {changes[1]}, so most at small clearances, "
-            f"and "
-            "upwards.",
+            f"5a, which took its place, says so only above its turning point: {changes[1]}, so most at small "
+            "clearances, and upwards.",
         ),
     )
 

@@ -132,14 +132,13 @@ def _table_9(figures: PaperFigures) -> Part:
         title="Table 9",
         where=figures.where("table_9"),
         finding=(
-            f"two pairs of labels swapped; edges pre-warped in degrees, so that {passband:g} Hz became "
-            f"{of('prewarped_a') / (2 * math.pi):.3f} Hz; the order by its own figures is {_order(figures)}"
+            f"two pairs of labels swapped; the pre-warped edges are those of a tangent of degrees, {passband:g} Hz "
+            f"becoming {of('prewarped_a') / (2 * math.pi):.3f} Hz; the order by its own figures is {_order(figures)}"
         ),
         comparisons=tuple(comparisons),
         after=(
             f"The bilinear transformation puts the zeros of a low-pass at half the sample rate: at {stopband:g} Hz the "
-            f"loss is "
-            "infinite whatever the order, so that edge asks for none.",
+            "loss is infinite whatever the order, so that edge asks for none.",
             *_what_the_cutoff_does(figures),
         ),
     )
@@ -172,10 +171,8 @@ def _order_and_cutoff(figures: PaperFigures) -> list[Comparison]:
         _one(
             figures, "order", "$N$", _order(figures), "",
             f"equation 12 with the table's figures gives {needed:.3f}. With the edge that the printed $\\Omega_c$ "
-            f"means, "
-            f"{meant:.4f} rad/s, which would be rounded to {edge:g}, it gives "
-            f"{order_needed(meant, other, loss, stop):.4f}, "
-            f"just above",
+            f"means, {meant:.4f} rad/s, which would be rounded to {edge:g}, it gives "
+            f"{order_needed(meant, other, loss, stop):.4f}, just above",
         ),
         _one(
             figures, "prewarped_cutoff", r"$\Omega_c$", cutoff_for(edge, loss, order), "rad/s",
@@ -213,14 +210,10 @@ def _what_the_cutoff_does(figures: PaperFigures) -> list[str]:
         table(head, rows),
         f"At its own stated pass-band edge the filter so made loses {at_edge:.0f} dB instead of "
         f"{figures.number('table_9', 'passband_loss')} dB. It does remove the motions of the vehicle at {speed:g} m/s: "
-        f"hunting "
-        f"is near {HUNTING:g} Hz (Cooperrider's bogie; Klingel's formula gives {klingel_frequency(speed):.2f} Hz), and "
-        f"the "
-        f"track's irregularity is met at {irregularity_frequency(figures):g} Hz. A filter with its edge at {edge:g} "
-        f"Hz, as "
-        "stated, would pass both. So the printed figures do what the stated specification would not, at the price of "
-        "the "
-        "delay.",
+        f"hunting is near {HUNTING:g} Hz (Cooperrider's bogie; Klingel's formula gives {klingel_frequency(speed):.2f} "
+        f"Hz), and the track's irregularity is met at {irregularity_frequency(figures):g} Hz. A filter with its edge "
+        f"at {edge:g} Hz, as stated, would pass both. So the printed figures do what the stated specification would "
+        "not, at the price of the delay.",
         "![Responses of the 7th-order filter](images/paper_seventh_order.svg)",
     ]
 

@@ -34,13 +34,25 @@ class Simulated:
     why: str
 
 
-Run = Mapping[str, Simulated]
-"""Figures of a run by the quantities of `printed_rows`; empty without a run."""
+@dataclass(frozen=True, kw_only=True)
+class SimulatedRun:
+    """A run of our vehicle over the paper's track.
+
+    Attributes
+    ----------
+    rows : mapping
+        Figures by the quantities of `printed_rows`.
+    remarks : tuple of str
+        What must be known of the run. Markdown.
+    """
+
+    rows: Mapping[str, Simulated]
+    remarks: tuple[str, ...]
 
 
-def vehicle_parts(figures: PaperFigures, run: Run) -> list[Part]:
-    """Equation 20 and tables 5 to 8, with the figures of a run of our vehicle over the paper's track."""
-    return [_equation_20(), *(_table(figures, number, run) for number in (5, 6, 7)), _table_8(figures, run)]
+def vehicle_parts(figures: PaperFigures, run: SimulatedRun) -> list[Part]:
+    """Equation 20 and tables 5 to 8, with the figures of a run of ours where it has them."""
+    return [_equation_20(run), *(_table(figures, number, run) for number in (5, 6, 7)), _table_8(figures, run)]
 
 
 def printed_rows(figures: PaperFigures, number: int) -> Iterator[tuple[str, str, Decimal]]:
@@ -54,44 +66,52 @@ def printed_rows(figures: PaperFigures, number: int) -> Iterator[tuple[str, str,
                     yield f"{motion} at 50 Hz, {body}", "dB", column[k]
         return
     name, sides, unit = {
-        5: ("vertical", ("right wheel", "left wheel"), "mm"),
-        6: ("lateral", ("right wheel", "left wheel"), "mm"),
-        7: ("yaw", ("bogie 1", "bogie 2"), "rad"),
+        5: ("vertical", (", right wheel", ", left wheel"), "mm"),
+        6: ("lateral", (" to the right", " to the left"), "mm"),
+        7: ("yaw", (" to bogie 1", " to bogie 2"), "rad"),
     }[number]
     for k, values in enumerate(figures.rows(f"table_{number}", name)):
         for side, value in zip(sides, values, strict=True):
-            yield f"{name}, wheelset {k + 1}, {side}", unit, value
+            yield f"{name}, wheelset {k + 1}{side}", unit, value
     if number == 5:
-        yield "vertical, bogie (in the text)", "mm", figures.number("table_5", "frame")
+        yield "vertical, bogie", "mm", figures.number("table_5", "frame")
 
 
-def _equation_20() -> Part:
+def _equation_20(run: SimulatedRun) -> Part:
     return Part(
         title="Equation 20",
         where="section 5.1",
         finding="the general equation of motion, without figures; masses, stiffnesses and dampings are not printed",
+        before=run.remarks,
     )
 
 
-def _table(figures: PaperFigures, number: int, run: Run) -> Part:
+def _table(figures: PaperFigures, number: int, run: SimulatedRun) -> Part:
+    comparisons = tuple(_rows(figures, number, run))
     return Part(
         title=f"Table {number}",
         where=figures.where(f"table_{number}"),
-        finding="maxima of the paper's multi-body simulation, whose parameters are not printed",
-        comparisons=tuple(_rows(figures, number, run)),
+        finding=f"maxima of a multi-body simulation whose parameters are not printed{_compared(comparisons)}",
+        comparisons=comparisons,
     )
 
 
-def _rows(figures: PaperFigures, number: int, run: Run) -> Iterator[Comparison]:
+def _compared(comparisons: tuple[Comparison, ...]) -> str:
+    """Say between which factors ours lie."""
+    ratios = [float(one.ours / one.printed) for one in comparisons if one.ours is not None and one.printed]
+    return f"; ours are {min(ratios):.2g} to {max(ratios):.2g} times these" if ratios else ""
+
+
+def _rows(figures: PaperFigures, number: int, run: SimulatedRun) -> Iterator[Comparison]:
     for quantity, unit, printed in printed_rows(figures, number):
-        if quantity in run:
-            ours = run[quantity]
+        if quantity in run.rows:
+            ours = run.rows[quantity]
             yield compare(quantity, printed, ours.value, unit, note=ours.why, comparable=ours.same_quantity)
         else:
             yield compare(quantity, printed, None, unit, note=_NOT_DESCRIBED)
 
 
-def _table_8(figures: PaperFigures, run: Run) -> Part:
+def _table_8(figures: PaperFigures, run: SimulatedRun) -> Part:
     table = {motion: figures.numbers("table_8", motion) for motion in _MOTIONS}
 
     def ripples(motion: str, pick: Callable[[tuple[Decimal, ...]], Decimal], name: str, which: int) -> Comparison:

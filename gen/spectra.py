@@ -156,6 +156,16 @@ def spectrum(values: Array, sample_rate: float, settings: SpectrumSettings) -> S
     )
 
 
+def slow_rms(values: Array, length: int) -> float:
+    """Root mean square of the straight lines through segments of `length` samples of `values`, about the mean of all.
+
+    It is what `values`, shape (n,), hold slower than spectra of such segments resolve: detrending takes it from them.
+    """
+    count = len(values) // length
+    cut = (values - np.mean(values))[: count * length].reshape(count, length)
+    return float(np.sqrt(np.mean((cut - signal.detrend(cut, axis=1)) ** 2)))
+
+
 def degrees_of_freedom(window: Array, step: int, averages: int) -> float:
     """Equivalent degrees of freedom of a mean of `averages` periodograms, `step` samples apart.
 

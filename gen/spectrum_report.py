@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from sosmith.gen.filter_proposal import Prediction, Proposal, Wish
+from sosmith.gen.filter_prediction import Prediction
+from sosmith.gen.filter_proposal import Proposal, Wish
 from sosmith.gen.filter_trial import Trial
 from sosmith.gen.spectra import Spectrum, SpectrumSettings
 from sosmith.model.signal_file import SignalFile
@@ -92,6 +93,7 @@ def proposal_json(proposal: Proposal) -> dict[str, Any]:
         "filter": {"family": made.family, "kind": made.kind, "method": "bilinear"}
         | {choice.key: choice.value for choice in proposal.choices},
         "reasons": {choice.key: choice.reason for choice in proposal.choices},
+        "needed_passband_edge_hz": proposal.needed,
         "order": made.order,
         "cutoff_hz": None if made.cutoff is None else made.cutoff[0],
         "group_delay_s": proposal.delay,

@@ -25,7 +25,8 @@ class Mode:
     growth : float
         Real part of the eigenvalue in 1/s; below 0 if the motion dies away.
     coordinate : str
-        The coordinate with the most of the kinetic energy.
+        The kind of coordinate with the most of the kinetic energy: its name without numbers, since in a symmetric
+        system rounding alone would decide between twins.
     """
 
     frequency: float
@@ -65,16 +66,16 @@ class LinearSystem:
     def modes(self) -> tuple[Mode, ...]:
         """All modes by rising frequency and growth; of each conjugate pair one, so n to 2 n of them."""
         values, vectors = np.linalg.eig(self.state_matrix())
-        weight = np.sqrt(np.diag(self.mass))
+        kinds = [" ".join(word for word in name.split(" ") if not word.isdigit()) for name in self.names]
         found = []
         for value, vector in zip(values, vectors.T, strict=True):
             if value.imag >= 0:
                 # displacements stand first; their rates of change are only a factor off
-                most = int(np.argmax(weight * np.abs(vector[: len(self.names)])))
-                mode = Mode(
-                    frequency=float(value.imag / (2 * np.pi)), growth=float(value.real), coordinate=self.names[most]
-                )
-                found.append(mode)
+                energy = dict.fromkeys(kinds, 0.0)
+                for kind, mass, moved in zip(kinds, np.diag(self.mass), vector[: len(kinds)], strict=True):
+                    energy[kind] += float(mass * abs(moved) ** 2)
+                most = max(kinds, key=lambda kind: energy[kind])
+                found.append(Mode(frequency=float(value.imag / (2 * np.pi)), growth=float(value.real), coordinate=most))
         return tuple(sorted(found, key=lambda mode: (mode.frequency, mode.growth)))
 
     def energy(self, displacement: Array, velocity: Array) -> Array:

@@ -18,6 +18,8 @@ from sosmith.model.trace import PHYSICAL_COLUMNS, TIME_TOLERANCE
 
 TIME = "time_s"
 READING = "reading"
+DISTANCE = "distance_m"
+"""Where the vehicle is, which rises all the time: no signal unless it is chosen."""
 CALIBRATED = "calibrated clearance"
 """Name of the signal that the calibration polynomial makes of voltage and temperature."""
 
@@ -96,8 +98,8 @@ def read_signal_file(
 
     A trace with voltage_V and temperature_C holds one signal, the clearance that `polynomial` makes of them, with
     clearance_mm as its truth where that is there. Any other file holds one signal for each column whose name ends in a
-    unit (_mm, _um, _m, _V, _mV, _C, _rad, _mrad, _deg), with the truth in one of `TRUTHS`. Columns of codes are left
-    alone.
+    unit (_mm, _um, _m, _V, _mV, _C, _rad, _mrad, _deg), with the truth in one of `TRUTHS`. Columns of codes and
+    `DISTANCE` are left alone.
 
     Parameters
     ----------
@@ -170,7 +172,7 @@ def _signals(table: CsvTable, polynomial: Polynomial, columns: Sequence[str], tr
     if not columns and emulated:
         values = polynomial(table.column(voltage), table.column(temperature))
         return (_with_truth(table, Signal(name=CALIBRATED, unit="mm", values=values), truth),)
-    aside = {TIME, READING, truth}
+    aside = {TIME, READING, DISTANCE, truth}
     chosen = columns or [name for name in table.header if name not in aside and not name.endswith("_code")]
     if not chosen:
         raise SpecificationError(

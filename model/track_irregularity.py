@@ -22,8 +22,9 @@ POINTS = 16
 class Spectrum:
     """One-sided power spectral density S = A Oc^2 / ((O^2 + Or^2)(O^2 + Oc^2)) between two wavenumbers.
 
-    The form is that of ERRI B176 (Claus and Schiehlen, Modeling and simulation of railway bogie structural vibrations,
-    1997; from memory). With Or = 0 it is the American formula of the Federal Railroad Administration.
+    The form is that of the German spectra of ERRI B176 (Guo, Xia, De Roeck and Liu 2012, as quoted in the program
+    TTB-2D, which takes it as one-sided too; Claus and Schiehlen 1997, from memory). With Or = 0 it is the American
+    formula of the Federal Railroad Administration for level and alignment.
 
     Attributes
     ----------

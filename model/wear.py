@@ -26,6 +26,9 @@ ROUNDING = 1e-9
 """So far below a limit, in mm, a reading has reached it: doubles of decimal numbers are off by less, and a step of an
 output code is more."""
 
+MOST_CORRELATION = 0.95
+"""Beyond this the deviations are no scatter about a line: an interval can hardly be wide enough."""
+
 DAY = 1.0
 """Length of a block unless said otherwise, days: longer than anything a filter or a journey keeps for itself."""
 
@@ -156,8 +159,8 @@ class WearReport:
     rate : WearRate
         Rate of wear.
     life, life_low, life_high : float or None
-        Days until the critical clearance at the rate, at the upper end of its interval and at the lower; None where
-        that rate is not above zero, so that no end is in sight.
+        Days from the last reading until the critical clearance at the rate, at the upper end of its interval and at the
+        lower; None where that rate is not above zero, so that no end is in sight.
     last : float
         The last reading, mm.
     state : WearState
@@ -266,8 +269,7 @@ def rate_of(time: Values, clearance: Values, block: float, confidence: float) ->
     slope, intercept, low, high = stats.theilslopes(clearance, time, alpha=confidence)
     deviation = clearance - intercept - slope * time
     deviation = deviation - np.median(deviation)
-    energy = float(np.sum(deviation**2))
-    correlation = float(np.sum(deviation[1:] * deviation[:-1])) / energy if energy > 0 else 0.0
+    correlation = _correlation(deviation)
     wider = math.sqrt((1 + correlation) / (1 - correlation)) if correlation > 0 else 1.0
     return WearRate(
         rate=float(slope),
@@ -279,6 +281,19 @@ def rate_of(time: Values, clearance: Values, block: float, confidence: float) ->
         scatter=1.4826 * float(np.median(np.abs(deviation))),
         correlation=correlation,
     )
+
+
+def _correlation(deviation: Values) -> float:
+    """Estimate the correlation of neighbours from deviations about a fitted line.
+
+    A fit to n values takes a part of it along, with a line about ``(2 + 4 r) / n`` on average (for a mean see M. G.
+    Kendall, Biometrika 41, 1954), which is given back. The tests count how often the interval then holds the truth.
+    """
+    energy, count = float(np.sum(deviation**2)), len(deviation)
+    if energy == 0:
+        return 0.0
+    found = float(np.sum(deviation[1:] * deviation[:-1])) / energy
+    return min((found + 2 / count) / (1 - 4 / count), MOST_CORRELATION)
 
 
 def judge(
@@ -332,6 +347,7 @@ def judge(
     rate = rate_of(times, medians, length, confidence)
     now, last_block = float(medians[-1]), int(counts[-1])
     remaining = max(limits.critical_clearance - now, 0.0)
+    gone = float(time[-1] - times[-1])
     off = float(stats.norm.ppf((1 + confidence) / 2)) * rate.scatter
     states = [limits.state(value) for value in clearance.tolist()]
     end = states[-last_block:]
@@ -345,9 +361,9 @@ def judge(
         wear=now - limits.initial,
         remaining=remaining,
         rate=rate,
-        life=_life(remaining, rate.rate),
-        life_low=_life(max(remaining - off, 0.0), rate.high),
-        life_high=_life(remaining + off, rate.low),
+        life=_life(remaining, rate.rate, gone),
+        life_low=_life(max(remaining - off, 0.0), rate.high, gone),
+        life_high=_life(remaining + off if remaining else 0.0, rate.low, gone),
         last=float(clearance[-1]),
         state=states[-1],
         first_warning=float(time[warned.index(True)]) if any(warned) and limits.warning is not None else None,
@@ -358,9 +374,9 @@ def judge(
     )
 
 
-def _life(remaining: float, rate: float) -> float | None:
-    """Days until what remains is worn at a rate in mm a day; None if it never is."""
+def _life(remaining: float, rate: float, gone: float) -> float | None:
+    """Days until what remains is worn at a rate in mm a day, less the days `gone` already; None if it never is."""
     if remaining == 0:
         return 0.0
     life = remaining / rate if rate > 0 else math.inf
-    return life if life < math.inf else None
+    return max(life - gone, 0.0) if life < math.inf else None

@@ -1,7 +1,7 @@
 """The documents: what the README shows is what the commands print, and the maps of the code are true.
 
 Run as a script, it renews what is generated in them: the output in the README, the file table of the
-architecture, the register map, the commands and the schema of the calibration.
+architecture, the register map, the commands and the schema of the calibration, the vehicle and its parameters.
 """
 
 import ast
@@ -17,13 +17,18 @@ from click.testing import CliRunner
 
 from sosmith.cli import cli
 from sosmith.gen.register_map import markdown
+from sosmith.gen.vehicle_report import parameters_markdown
 from sosmith.model.measurement_store import SCHEMA
+from sosmith.model.vehicle_parameters import built_in
 
 ROOT = Path(__file__).parents[1]
 README = ROOT / "README.md"
 ARCHITECTURE = ROOT / "docs" / "architecture.md"
 CALIBRATION = ROOT / "docs" / "calibration.md"
+PRINTING = [CALIBRATION, *(ROOT / "docs" / f"{name}.md" for name in ("spectrum", "wear", "vehicle"))]
+"""Documents whose shell blocks stand above what they print."""
 REGISTERS = ROOT / "docs" / "registers.md"
+VEHICLE = ROOT / "docs" / "vehicle.md"
 DOCUMENTS = [README, ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").glob("*.md"))]
 ROOMS = ("model", "hdl", "gen", "sim")
 BY_CI = {"./run demo", "./run test"}
@@ -32,6 +37,7 @@ NEEDS_SIMULATION = ("./run simulate ", "./run compare ")
 """Beginnings of the lines that only the longer test carries out."""
 
 _OUTPUT = re.compile(r"(?<=```text\n).*?(?=```)", re.DOTALL)
+_PARAMETERS = re.compile(r"(?<=<!-- parameters -->\n).*?(?=<!-- end of parameters -->)", re.DOTALL)
 _REGISTERS = re.compile(r"(?<=<!-- registers -->\n).*?(?=<!-- end of registers -->)", re.DOTALL)
 _SCHEMA = re.compile(r"(?<=<!-- schema -->\n).*?(?=<!-- end of schema -->)", re.DOTALL)
 _SHOWN = re.compile(r"```sh\n(?P<lines>[^`]*)```\n\n```text\n(?P<output>[^`]*)```")
@@ -136,14 +142,19 @@ def test_the_register_map_is_up_to_date() -> None:
     assert _REGISTERS.findall(REGISTERS.read_text(encoding="utf-8")) == [markdown()]
 
 
-def test_calibration_prints_what_is_shown(folder: Path) -> None:
-    shown = CALIBRATION.read_text(encoding="utf-8")
-    assert len(_SHOWN.findall(shown)) == 2
+@pytest.mark.parametrize("document", PRINTING, ids=lambda path: path.name)
+def test_commands_print_what_is_shown(document: Path, folder: Path) -> None:
+    shown = document.read_text(encoding="utf-8")
+    assert _SHOWN.search(shown)
     assert shown == with_output(shown, folder)
 
 
 def test_the_schema_is_the_one_of_the_store() -> None:
     assert _SCHEMA.findall(CALIBRATION.read_text(encoding="utf-8")) == [schema()]
+
+
+def test_the_parameters_of_the_vehicle_are_those_of_its_file() -> None:
+    assert _PARAMETERS.findall(VEHICLE.read_text(encoding="utf-8")) == [parameters_markdown(built_in())]
 
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
@@ -171,9 +182,11 @@ def renew(document: Path, part: re.Pattern[str], text: str) -> None:
 
 if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as scratch, contextlib.chdir(scratch):
-        renew(README, _OUTPUT, worked_example(Path(scratch)))
-        text = CALIBRATION.read_text(encoding="utf-8")
-        CALIBRATION.write_text(with_output(text, furnish(Path(scratch))), encoding="utf-8")
+        renew(README, _OUTPUT, worked_example(furnish(Path(scratch))))
+        for document in PRINTING:
+            text = document.read_text(encoding="utf-8")
+            document.write_text(with_output(text, Path(scratch)), encoding="utf-8")
     renew(ARCHITECTURE, _TABLE, file_table())
     renew(REGISTERS, _REGISTERS, markdown())
     renew(CALIBRATION, _SCHEMA, schema())
+    renew(VEHICLE, _PARAMETERS, parameters_markdown(built_in()))

@@ -21,6 +21,7 @@ from sosmith.commands.paper import paper
 from sosmith.commands.reload import reload_command
 from sosmith.commands.simulate import demo, emulate_command, simulate_command
 from sosmith.commands.spectrum import spectrum_command
+from sosmith.commands.vehicle import vehicle
 from sosmith.commands.verify import verify
 from sosmith.commands.wear import wear_command
 from sosmith.model.errors import SosmithError, ToolError
@@ -80,6 +81,7 @@ for _command in (
     compare_command,
     calibrate,
     spectrum_command,
+    vehicle,
     wear_command,
     paper,
     demo,

@@ -27,6 +27,8 @@ from sosmith.gen.paper_difference_equation import section_filters, step_response
 from sosmith.gen.paper_document import markdown, paper_parts
 from sosmith.gen.paper_regression import polynomial_of, scatter, voltage_for
 from sosmith.gen.paper_seventh_order import proper_cutoff
+from sosmith.gen.paper_vehicle import SimulatedRun, printed_rows, vehicle_parts
+from sosmith.gen.paper_vehicle_run import run_of_ours, simulated
 from sosmith.gen.response import group_delay
 from sosmith.gen.specification import example, load
 from sosmith.model.accuracy import accuracy_percent
@@ -253,3 +255,24 @@ def _changed(value: Any) -> Any:
     if isinstance(value, list):
         return [*value[:-1], _changed(value[-1])]
     return value + 1 if isinstance(value, int) else value * Decimal("1.01")
+
+
+def test_the_vehicle_has_a_figure_for_each_printed_one() -> None:
+    printed = {quantity: value for number in (5, 6, 7, 8) for quantity, _, value in printed_rows(FIGURES, number)}
+    rows = run_of_ours().comparison
+    assert {row.what: Decimal(str(row.paper)) for row in rows} == printed
+    assert {row.what: row.ours for row in rows} == {name: one.value for name, one in simulated().rows.items()}
+
+
+def test_what_is_not_the_same_quantity_is_not_compared(parts: dict[str, Part]) -> None:
+    for title in ("Table 5", "Table 6", "Table 7", "Table 8"):
+        for comparison in parts[title].comparisons:
+            row = simulated().rows.get(comparison.quantity)
+            if row is not None:
+                assert (comparison.label == NOT_COMPARABLE) == (not row.same_quantity)
+                assert (float(comparison.ours or 0), comparison.note) == (row.value, row.why)
+
+
+def test_without_a_run_tables_5_to_8_are_not_comparable() -> None:
+    parts = {part.title: part for part in vehicle_parts(FIGURES, SimulatedRun(rows={}, remarks=()))}
+    assert labels(parts["Table 5"]) == labels(parts["Table 7"]) == {NOT_COMPARABLE}

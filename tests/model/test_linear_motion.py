@@ -35,6 +35,18 @@ def test_one_mass_swings_as_the_textbook_says() -> None:
     assert mode.coordinate == "x"
 
 
+def test_twins_share_their_energy() -> None:
+    """Two masses of 1 kg in step hold more energy than one of 1.5 kg that moves as much as either."""
+    suspension = Suspension(("mass 1 up", "mass 2 up", "beam up"))
+    for name in ("mass 1 up", "mass 2 up"):
+        suspension.add({name: 1.0, "beam up": -1.0}, 1e6)
+    suspension.add({"beam up": 1.0}, 1.0)
+    system = LinearSystem(
+        names=suspension.names, mass=np.diag([1.0, 1.0, 1.5]), damping=np.zeros((3, 3)), stiffness=suspension.stiffness
+    )
+    assert system.modes()[0].coordinate == "mass up"
+
+
 def test_overdamped_motion_has_two_modes_without_frequency() -> None:
     slow = LinearSystem(names=("x",), mass=np.eye(1), damping=np.array([[5.0]]), stiffness=np.array([[4.0]]))
     first, second = slow.modes()

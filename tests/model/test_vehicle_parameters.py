@@ -80,6 +80,10 @@ def test_a_file_is_read_as_the_text(tmp_path: Path) -> None:
             "loco.toml: contact.friction must be a number of more than 0 and less than 1e+12, not -0.3",
         ),
         (
+            changed(r"value = 0\.3,", "value = 0.0,"),
+            "loco.toml: contact.friction must be a number of more than 0 and less than 1e+12, not 0.0",
+        ),
+        (
             changed(r"value = 0\.15,", "value = 1.0,"),
             "loco.toml: wheelset.conicity must be a number of more than 0 and less than 1, not 1.0",
         ),

@@ -10,7 +10,13 @@ import pytest
 
 from sosmith.model.errors import SpecificationError
 from sosmith.model.track import Track, curved_track, tangent_track
-from sosmith.model.vehicle_lateral import wheelset_load, wheelset_positions
+from sosmith.model.vehicle_lateral import (
+    COORDINATES,
+    frame_positions,
+    lateral_dynamics,
+    wheelset_load,
+    wheelset_positions,
+)
 from sosmith.model.vehicle_limits import limits
 from sosmith.model.vehicle_motion import Motion, clearance_change
 from sosmith.model.vehicle_parameters import Parameters, built_in
@@ -42,6 +48,51 @@ def test_motion_begins_and_ends_at_rest(motion: Motion) -> None:
         assert not values[0].any()
         assert np.abs(values[-1]).max() < 5e-5
         assert np.abs(values).max() > 5e-3
+
+
+def test_motion_is_the_same_in_coordinates_that_go_with_the_track() -> None:
+    """Seen from the moving track, inertia and springs feel its course, and the contacts do not: solved that way too."""
+    speed, step = 20.0, 2.5e-4
+    table = replace(GIVEN.track, curve=10.0, run_out=10.0)
+    track = curved_track(table)
+    found = run(GIVEN, track, speed=speed, sample_rate=1 / step)
+    lateral = lateral_dynamics(GIVEN, speed)
+    system, suspension = lateral.system, lateral.suspension
+    ahead = wheelset_positions(GIVEN.layout)
+    clock = step * np.arange(-1, len(found.time) + 1)
+    centre = speed * clock - ahead[0]
+    roll = np.stack([track.cant_at(centre + x) / (2 * 0.7465) for x in ahead], axis=1)
+    course = np.hstack([lateral.track_pose(track, centre), roll])
+    rate = (course[2:] - course[:-2]) / (2 * step)
+    acceleration = (course[2:] - 2 * course[1:-1] + course[:-2]) / step**2
+    course = course[1:-1]
+    force = -(course @ suspension.stiffness[:21].T + rate @ suspension.damping[:21].T)
+    force -= acceleration[:, :21] @ system.mass
+    heights = {"wheelset": 0.625, "frame": 0.8, "body": 2.2}
+    contact_damping = system.damping - suspension.damping[:21, :21]
+    contact_stiffness = system.stiffness - suspension.stiffness[:21, :21]
+    for k, name in enumerate(COORDINATES):
+        if name.endswith("lateral"):
+            # what the pose subtracts for the height comes back as the cant
+            part = name.split(" ")[0]
+            x = {"wheelset": ahead, "frame": frame_positions(GIVEN.layout), "body": np.zeros(1)}[part]
+            place = centre[1:-1] + x[0 if part == "body" else int(name.split(" ")[1]) - 1]
+            cant = track.cant_at(place) / (2 * 0.7465)
+            assert course[:, k] == pytest.approx(track.offset_at(place) - heights[part] * cant, abs=1e-12)
+            force[:, k] += system.mass[k, k] * GRAVITY * cant
+        if name.startswith("wheelset") and name.endswith("yaw"):
+            force -= np.outer(rate[:, k], contact_damping[:, k])  # creep along the rails knows the curve
+            irregularity = track.irregularity_at(speed * clock[1:-1] + ahead[k // 2] - ahead[0])
+            force += np.outer(irregularity, contact_stiffness[:, k - 1])
+    moved, _ = system.respond(force, step)
+    together = {
+        "wheelset_lateral": moved[:, 0:12:2], "wheelset_yaw": moved[:, 1:12:2], "frame_lateral": moved[:, 12:18:3],
+        "frame_yaw": moved[:, 13:18:3], "frame_roll": moved[:, 14:18:3], "body_lateral": moved[:, 18],
+        "body_yaw": moved[:, 19], "body_roll": moved[:, 20],
+    }  # fmt: skip
+    for name, values in together.items():
+        difference = np.abs(values - getattr(found, name)).max()
+        assert difference < 5e-4 * np.abs(values).max(), name
 
 
 def in_a_long_curve(speed: float) -> tuple[Motion, int]:
@@ -233,6 +284,14 @@ def test_limits_tell_where_flanges_and_friction_would_act(motion: Motion) -> Non
     assert -0.009 < small.beyond_flange[0] < 0
 
 
+@pytest.mark.parametrize("level", ["low", "high"])
+def test_the_model_holds_over_random_irregularities_of_a_straight_track(level: str) -> None:
+    straight = tangent_track(replace(GIVEN.track, irregularity=0.0))
+    found = run(GIVEN, straight, speed=20.0, sample_rate=100.0, irregularity=level)
+    assert limits(GIVEN, straight, found).kept
+    assert np.std(found.clearance_mm) > 0.1
+
+
 def test_widening_moves_the_flange() -> None:
     still = Motion(**{one.name: np.zeros((2, 6)) for one in fields(Motion) if one.name not in ("time", "distance")},
                    time=np.array([0.0, 0.01]), distance=np.array([0.0, 200.0]))  # fmt: skip
@@ -303,3 +362,16 @@ def test_a_track_goes_on_as_it_ends() -> None:
     bend = Track(corners=np.array([0.0, 10.0, 60.0]), curvature=np.array([0, 0, 0.002]), cant=np.array([0, 0, 0.05]))
     assert bend.curvature_at(np.array([-5.0, 35, 61, 80])) == pytest.approx([0, 0.001, 0.002, 0.002])
     assert bend.length == 60
+    circle = Track(corners=np.array([0.0, 100.0]), curvature=np.full(2, 0.002), cant=np.zeros(2))
+    s = np.array([-10.0, 0, 50, 200])
+    assert circle.heading_at(s) == pytest.approx(0.002 * s, abs=1e-9)
+    assert circle.offset_at(s) == pytest.approx(0.001 * s**2, abs=1e-6)
+
+
+def test_position_on_the_rails_is_that_on_the_track_less_the_irregularity() -> None:
+    straight = tangent_track(GIVEN.track)
+    found = run(GIVEN, straight, speed=20.0, sample_rate=100.0)
+    assert found.lateral_to_rails[25, 0] == pytest.approx(found.wheelset_lateral[25, 0] - 0.02)  # at 5 m
+    place = found.distance - (wheelset_positions(GIVEN.layout)[0] - wheelset_positions(GIVEN.layout)[4])
+    expected = found.wheelset_lateral[:, 4] - straight.irregularity_at(place)
+    assert found.lateral_to_rails[:, 4] == pytest.approx(expected, abs=1e-12)

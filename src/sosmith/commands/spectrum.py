@@ -11,24 +11,18 @@ import click
 from rich.markup import escape
 
 from sosmith.gen.core import polynomial_of
-from sosmith.gen.filter_proposal import (
-    COVERAGE,
-    PASSBAND_LOSS,
-    TOLERANCE,
-    Content,
-    Proposal,
-    Wish,
-    propose,
-    told_apart,
-)
+from sosmith.gen.filter_prediction import Content, told_apart
+from sosmith.gen.filter_proposal import COVERAGE, PASSBAND_LOSS, TOLERANCE, Proposal, Wish, propose
 from sosmith.gen.filter_table import filter_table, replace_filter
 from sosmith.gen.filter_trial import Trial, try_filter
 from sosmith.gen.specification import load
-from sosmith.gen.spectra import DETRENDS, WINDOWS, Spectrum, SpectrumSettings, spectrum
+from sosmith.gen.spectra import DETRENDS, WINDOWS, Spectrum, SpectrumSettings, slow_rms, spectrum
 from sosmith.gen.spectrum_plot import FORMATS, Curve, spectrum_plot
 from sosmith.gen.spectrum_report import peaks, proposal_json, provenance, ripple, signal_json
-from sosmith.model.errors import SpecificationError
+from sosmith.model.csv_table import csv_header
+from sosmith.model.errors import ShortfallError, SpecificationError
 from sosmith.model.polynomial import EQUATION_5A, Polynomial
+from sosmith.model.port import Values
 from sosmith.model.signal_file import Signal, SignalFile, read_signal_file
 from sosmith.model.text_files import write_contents
 from sosmith.model.trace import TIME_TOLERANCE
@@ -76,7 +70,9 @@ class _Spectra:
 
 @click.command("spectrum", help=_HELP)
 @click.argument("traces", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="TRACE...")
-@click.option("--column", "columns", multiple=True, help="Take this column of values; may be given again.")
+@click.option(
+    "--column", "columns", multiple=True, help="Take this column of values, where a trace has it; may be given again."
+)
 @click.option("--truth", help="Column with the true signal.  [default: clearance_mm of an emulated trace, truth]")
 @click.option(
     "--calibration",
@@ -138,17 +134,18 @@ def spectrum_command(
     with show_progress() as step:
         step("reading")
         polynomial, origin = _polynomial(calibration or into)
-        files = [read_signal_file(path, polynomial, columns, truth) for path in traces]
+        files = _read(traces, polynomial, columns, truth)
         rate = _sample_rate(files, into)
+        _check_data(into, output)
         step("spectra")
         signals = [_spectra_of(file, one, settings) for file in files for one in file.signals]
         obstacle = _obstacle(signals, edge, motion=motion)
         if obstacle and (output or into):
             raise SpecificationError(obstacle)
-        proposal = None
+        proposal, shortfall = None, None
         if not obstacle:
             step("proposing")
-            proposal = propose([_content(one, edge, motion=motion) for one in signals], wish, rate)
+            proposal, shortfall = _proposed([_content(one, edge, motion=motion) for one in signals], wish, rate)
         drawn = None
         if picture is not None:
             step("drawing")
@@ -175,14 +172,31 @@ def spectrum_command(
         _print_signals(signals)
         if proposal is not None:
             _print_proposal(proposal, signals, trials)
-    if table is None:
+    if table is not None:
+        _hand_over(table, output, as_json=as_json)
+    if picture is not None and drawn is not None:
+        _write(picture, drawn)
+    if obstacle:
         note(f"no filter is proposed: {obstacle}")
-    elif output is not None:
+    if shortfall is not None:
+        raise shortfall
+
+
+def _proposed(
+    contents: Sequence[Content], wish: Wish, sample_rate: float
+) -> tuple[Proposal | None, ShortfallError | None]:
+    """Propose a filter, or tell why there is none: the spectra are shown either way."""
+    try:
+        return propose(contents, wish, sample_rate), None
+    except ShortfallError as shortfall:
+        return None, shortfall
+
+
+def _hand_over(table: str, output: Path | None, *, as_json: bool) -> None:
+    if output is not None:
         _write(output, table.encode())
     elif not as_json:
         click.echo(table, nl=False)
-    if picture is not None and drawn is not None:
-        _write(picture, drawn)
 
 
 def _pass_edge(passband: float | None, time_constant: float | None) -> float | None:
@@ -213,6 +227,22 @@ def _polynomial(path: Path | None) -> tuple[Polynomial, str]:
     return polynomial_of(spec)[0], f"that of {path.name}"
 
 
+def _read(
+    traces: Sequence[Path], polynomial: Polynomial, columns: Sequence[str], truth: str | None
+) -> list[SignalFile]:
+    """Read each file with those of the columns asked for that it has; each must be in one of the files."""
+    headers = [csv_header(path) for path in traces]
+    for name in (*columns, *([truth] if truth else [])):
+        if not any(name in header for header in headers):
+            raise SpecificationError(f"column {name} must be in one of {', '.join(map(str, traces))}, not in none")
+    return [
+        read_signal_file(
+            path, polynomial, [name for name in columns if name in header], truth if truth in header else None
+        )
+        for path, header in zip(traces, headers, strict=True)
+    ]
+
+
 def _sample_rate(files: Sequence[SignalFile], into: Path | None) -> float:
     """Sample rate of the filter, Hz: that of the traces, or of the specification that they have to agree with."""
     first = files[0]
@@ -226,6 +256,17 @@ def _sample_rate(files: Sequence[SignalFile], into: Path | None) -> float:
                 f"{file.path}: the sample rate must be the {rate:g} Hz of {owner}, not {file.sample_rate:g} Hz"
             )
     return rate
+
+
+def _check_data(into: Path | None, output: Path | None) -> None:
+    """Refuse a copy that would look for its measurements in another folder."""
+    if into is None or output is None:
+        return
+    calibration = load(into).calibration
+    if calibration is not None and calibration.data is not None and into.parent.resolve() != output.parent.resolve():
+        raise SpecificationError(
+            f"{output}: the copy must be in the folder of {into}, whose calibration.data is found from there"
+        )
 
 
 def _spectra_of(file: SignalFile, one: Signal, settings: SpectrumSettings) -> _Spectra:
@@ -251,11 +292,17 @@ def _content(one: _Spectra, edge: float | None, *, motion: bool) -> Content:
     measured = one.spectra["measured"]
     if one.signal.truth is not None:
         wanted, disturbance = one.spectra["true"], one.spectra["disturbance"]
-        return Content(name=one.name, wanted=wanted, disturbance=disturbance, has_truth=True)
+        slow = _slow(one.signal.values - one.signal.truth, disturbance, one.file.sample_rate)
+        return Content(name=one.name, wanted=wanted, disturbance=disturbance, has_truth=True, slow=slow)
     if motion:
-        return Content(name=one.name, wanted=None, disturbance=measured, has_truth=False)
+        slow = _slow(one.signal.values, measured, one.file.sample_rate)
+        return Content(name=one.name, wanted=None, disturbance=measured, has_truth=False, slow=slow)
     assert edge is not None
     return told_apart(one.name, measured, edge)
+
+
+def _slow(disturbance: Values, found: Spectrum, sample_rate: float) -> float:
+    return slow_rms(disturbance, round(sample_rate / found.step))
 
 
 def _trial(one: _Spectra, proposal: Proposal) -> Trial | None:
@@ -304,7 +351,7 @@ def _print_proposal(proposal: Proposal, signals: Sequence[_Spectra], trials: Seq
     console.print(table)
     checks = new_table(
         f"Error at the output, rms in {unit or 'the unit of the signal'}",
-        ["signal", "disturbance", "filtered", "of the truth", "tried on the trace", "paper's -20 log10(delta)"],
+        ["signal", "disturbance", "filtered", "slow", "of the truth", "tried on the trace", "paper's -20 log10(delta)"],
     )
     for one, prediction, trial in zip(signals, proposal.predictions, trials, strict=True):
         disturbing = one.spectra.get("disturbance", one.spectra["measured"])
@@ -317,6 +364,7 @@ def _print_proposal(proposal: Proposal, signals: Sequence[_Spectra], trials: Seq
             escape(one.name),
             f"{prediction.unfiltered:.3g}",
             f"{prediction.disturbance:.3g}",
+            f"{prediction.slow:.2g}" if prediction.slow > _NOTHING else "0",
             f"{prediction.wanted:.3g}" if prediction.wanted > _NOTHING else "0",
             tried,
             f"{loss:.1f} dB ({delta:.2g})",

@@ -144,7 +144,8 @@ def _print(record: WearRecord, report: WearReport) -> None:
     table = new_table(f"Wear by {escape(record.path.name)}: {report.state}", ["", ""])
     table.add_row("record", f"{report.samples:,} readings over {report.duration:.4g} days")
     table.add_row(
-        "clearance", f"{report.clearance:.4g} mm, the median of the last {rate.block:.3g} days ({limits.initial:g} new)"
+        "clearance",
+        f"{report.clearance:.4g} mm, the median of the last {_length(rate.block)} ({limits.initial:g} mm new)",
     )
     table.add_row("wear", f"{report.wear:.4g} mm")
     table.add_row("remaining", f"{report.remaining:.4g} mm {_end(limits)}")
@@ -154,7 +155,7 @@ def _print(record: WearRecord, report: WearReport) -> None:
         "taken from",
         f"{rate.blocks} blocks that scatter by {rate.scatter:.2g} mm, neighbours correlated by {rate.correlation:.2f}",
     )
-    table.add_row("remaining life", f"{_days(report.life)} ({_days(report.life_low)} to {_days(report.life_high)})")
+    table.add_row("remaining life", _life(report))
     table.add_row("state", f"{report.state}: the last reading is {report.last:.4g} mm")
     for name, first, count in (
         ("warning", report.first_warning, report.warnings),
@@ -172,9 +173,18 @@ def _end(limits: WearLimits) -> str:
     return f"to the limit of {limits.limit:g} mm"
 
 
+def _length(block: float) -> str:
+    return "day" if block == 1 else f"{block:.3g} days"
+
+
 def _yearly(rate: float) -> str:
     return f"{rate * 365.25:.3g}"
 
 
-def _days(days: float | None) -> str:
-    return "no end in sight" if days is None else f"{days:.4g} days"
+def _life(report: WearReport) -> str:
+    if report.life is None:
+        least = f"; at least {report.life_low:.4g} days" if report.life_low is not None else ""
+        return f"no end in sight{least}"
+    low = "0" if report.life_low is None else f"{report.life_low:.4g}"
+    high = "no end in sight" if report.life_high is None else f"{report.life_high:.4g}"
+    return f"{report.life:.4g} days ({low} to {high}), if wear goes on so"

@@ -1,0 +1,170 @@
+"""What is told of a run of the vehicle: its figures as JSON, its motion as CSV."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from sosmith.gen.vehicle_comparison import PAPER_SPEED, Row, comparison
+from sosmith.model.linear_motion import Mode
+from sosmith.model.track import curved_track, tangent_track
+from sosmith.model.vehicle_lateral import lateral_dynamics
+from sosmith.model.vehicle_limits import Limits, limits
+from sosmith.model.vehicle_motion import Motion
+from sosmith.model.vehicle_parameters import Parameters
+from sosmith.model.vehicle_run import run
+from sosmith.model.vehicle_vertical import vertical_dynamics
+
+TRACKS = {"paper": curved_track, "tangent": tangent_track}
+"""Tracks by name."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class VehicleRun:
+    """A run and all that is told of it.
+
+    Attributes
+    ----------
+    parameters : Parameters
+    track : str
+        One of `TRACKS`.
+    speed, sample_rate : float
+        In m/s and Hz.
+    irregularities : str
+        "none", "low" or "high".
+    seed : int
+    motion : Motion
+    limits : Limits
+    lateral_modes, vertical_modes : tuple of Mode
+    comparison : tuple of Row
+        With the paper; empty unless track, speed and sample rate allow it.
+    """
+
+    parameters: Parameters
+    track: str
+    speed: float
+    sample_rate: float
+    irregularities: str
+    seed: int
+    motion: Motion
+    limits: Limits
+    lateral_modes: tuple[Mode, ...]
+    vertical_modes: tuple[Mode, ...]
+    comparison: tuple[Row, ...]
+
+
+def vehicle_run(
+    parameters: Parameters, *, track: str, speed: float, sample_rate: float, irregularities: str, seed: int
+) -> VehicleRun:
+    """Carry out a run; refuses as `sosmith.model.vehicle_run.run` does."""
+    made = TRACKS[track](parameters.track)
+    level = None if irregularities == "none" else irregularities
+    motion = run(parameters, made, speed=speed, sample_rate=sample_rate, irregularity=level, seed=seed)
+    comparable = track == "paper" and speed == PAPER_SPEED and sample_rate >= 100
+    return VehicleRun(
+        parameters=parameters,
+        track=track,
+        speed=speed,
+        sample_rate=sample_rate,
+        irregularities=irregularities,
+        seed=seed,
+        motion=motion,
+        limits=limits(parameters, made, motion),
+        lateral_modes=lateral_dynamics(parameters, speed).system.modes(),
+        vertical_modes=vertical_dynamics(parameters).system.modes(),
+        comparison=comparison(motion) if comparable else (),
+    )
+
+
+def largest(motion: Motion) -> dict[str, float]:
+    """Largest magnitude of every motion, by the names of the columns."""
+    return {
+        name: float(np.abs(values).max()) for name, values in motion.columns() if name not in ("time_s", "distance_m")
+    }
+
+
+def vehicle_json(made: VehicleRun) -> dict[str, Any]:
+    """All figures of a run; units are in the names."""
+    found = made.limits
+    return {
+        "track": made.track,
+        "speed_m_s": made.speed,
+        "sample_rate_Hz": made.sample_rate,
+        "irregularities": made.irregularities,
+        "seed": made.seed,
+        "samples": len(made.motion.time),
+        "modes": {"lateral": _modes(made.lateral_modes), "vertical": _modes(made.vertical_modes)},
+        "largest": largest(made.motion),
+        "limits": [
+            {
+                "wheelset": k + 1,
+                "beyond_flange_mm": 1e3 * float(found.beyond_flange[k]),
+                "beyond_flange_share": float(found.beyond_flange_share[k]),
+                "friction_used": float(found.friction_used[k]),
+                "friction_exceeded_share": float(found.friction_exceeded_share[k]),
+            }
+            for k in range(6)
+        ],
+        "within_limits": found.kept,
+        "comparison": [
+            {
+                "table": row.table,
+                "what": row.what,
+                "unit": row.unit,
+                "paper": row.paper,
+                "ours": row.ours,
+                "label": row.label,
+                "why": row.why,
+            }
+            for row in made.comparison
+        ],
+        "parameters": _parameters(made.parameters),
+    }
+
+
+def _modes(modes: tuple[Mode, ...]) -> list[dict[str, Any]]:
+    return [
+        {
+            "frequency_Hz": mode.frequency,
+            "damping_ratio": mode.damping,
+            "growth_per_s": mode.growth,
+            "coordinate": mode.coordinate,
+        }
+        for mode in modes
+    ]
+
+
+def _parameters(parameters: Parameters) -> dict[str, Any]:
+    """Values with unit and source by their paths."""
+    found: dict[str, Any] = {}
+    for table in fields(parameters):
+        if table.name != "sources":
+            part = getattr(parameters, table.name)
+            for one in fields(part):
+                path = f"{table.name}.{one.name}"
+                value, unit = getattr(part, one.name), one.metadata["unit"]
+                found[path] = {"value": value, "unit": unit, "source": parameters.sources[path]}
+    return found
+
+
+def vehicle_csv(motion: Motion) -> str:
+    """Motion as CSV with one header line and six digits after the point, nanometres and nanoradians."""
+    columns = dict(motion.columns())
+    stream = io.StringIO()
+    stream.write(",".join(columns) + "\n")
+    # adding 0.0 makes a negative zero positive, so that it is written the same everywhere
+    np.savetxt(stream, np.round(np.stack(list(columns.values()), axis=1), 6) + 0.0, fmt="%.6f", delimiter=",")
+    return stream.getvalue()
+
+
+def parameters_markdown(parameters: Parameters) -> str:
+    """Table of all parameters with unit and source, in Markdown."""
+    rows = [
+        f"| `{path}` | {entry['value']:g} {entry['unit'] if entry['unit'] != '1' else ''}".rstrip()
+        + f" | {entry['source']} |\n"
+        for path, entry in _parameters(parameters).items()
+    ]
+    return "| parameter | value | source |\n|---|---|---|\n" + "".join(rows)

@@ -1,0 +1,131 @@
+"""`sosmith vehicle` as a user meets it: what it prints, what it refuses, what it writes."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+
+from sosmith.cli import cli
+from sosmith.model.errors import SpecificationError
+from sosmith.model.vehicle_parameters import built_in, built_in_text
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Start in an empty folder with the parameters of a short track in short.toml."""
+    monkeypatch.chdir(tmp_path)
+    text = built_in_text().replace("curve = { value = 300.0", "curve = { value = 20.0")
+    Path("short.toml").write_text(text.replace("run_out = { value = 200.0", "run_out = { value = 0.0"))
+    return tmp_path
+
+
+def run(*arguments: str) -> Result:
+    return CliRunner(env={"COLUMNS": "110"}).invoke(cli, ["vehicle", *arguments])
+
+
+def good(*arguments: str) -> Result:
+    result = run(*arguments)
+    assert (result.exit_code, result.exception) == (0, None)
+    return result
+
+
+def refused(message: str, *arguments: str) -> None:
+    result = run(*arguments)
+    assert isinstance(result.exception, SpecificationError)
+    assert str(result.exception) == message
+
+
+def test_it_prints_modes_motions_and_the_paper() -> None:
+    result = good()
+    shown = re.sub(r" {2,}", "  ", result.stdout)
+    for row in (
+        "Lateral modes at 20 m/s",
+        "  0.538  0.154  -0.525  body lateral",
+        "Vertical modes at 20 m/s",
+        "Largest motion of the wheelsets",
+        "Largest motion of frames and body",
+        "Beside the paper's tables 5 to 8",
+        "5: the scale of the paper's transform is not told",
+    ):
+        assert row in shown
+    assert re.search(r"7  yaw, wheelset 1 to bogie 1  rad  0.01258  0.0\d+  (near|not comparable)  4", shown)
+    assert re.search(
+        r"^sosmith: this run leaves what a linear model can tell: wheelset 1 goes [\d.]+ mm beyond its flange and "
+        r"creep of wheelset 1 takes [\d.]+ times the friction there is$",
+        result.stderr,
+        flags=re.MULTILINE,
+    )
+
+
+def test_json_holds_figures_limits_and_sources() -> None:
+    printed = good("short.toml", "--json").stdout
+    found = json.loads(printed)
+    assert (found["track"], found["speed_m_s"], found["irregularities"], found["seed"]) == ("paper", 20.0, "none", 1)
+    assert found["samples"] == 651
+    assert all(mode["growth_per_s"] < 0 for mode in found["modes"]["lateral"] + found["modes"]["vertical"])
+    assert found["largest"]["wheelset1_lateral_mm"] > 20
+    assert len(found["limits"]) == 6
+    assert found["within_limits"] is False
+    assert len(found["comparison"]) == 41
+    radius = found["parameters"]["track.radius"]
+    assert (radius["value"], radius["unit"]) == (350.0, "m")
+    assert radius["source"].startswith("[assumed]")
+    assert found["parameters"]["track.curve"]["value"] == 20.0
+    assert len(found["parameters"]) == len(built_in().sources)
+    assert good("short.toml", "--json").stdout == printed
+
+
+def test_motion_goes_to_a_csv_file() -> None:
+    good("short.toml", "-o", "out/motion.csv", "--irregularities", "low", "--seed", "3", "--sample-rate", "50")
+    with Path("out/motion.csv").open(newline="") as stream:
+        header, *rows = csv.reader(stream)
+    assert header[:3] == ["time_s", "distance_m", "wheelset1_lateral_mm"]
+    assert header[-1] == "clearance6_mm"
+    values = np.array(rows, dtype=float)
+    assert values.shape == (326, 47)
+    assert values[:, 0] == pytest.approx(np.arange(326) / 50)
+    assert values[:, 1] == pytest.approx(0.4 * np.arange(326))
+    assert "-0.000000" not in Path("out/motion.csv").read_text()
+    first = Path("out/motion.csv").read_bytes()
+    good("short.toml", "-o", "out/motion.csv", "--irregularities", "low", "--seed", "3", "--sample-rate", "50")
+    assert Path("out/motion.csv").read_bytes() == first
+
+
+@pytest.mark.parametrize("name", ["motion.svg", "motion.PNG"])
+def test_a_plot_is_the_same_bytes_every_time(name: str) -> None:
+    arguments = ("short.toml", "--plot", name, "--irregularities", "high")
+    assert f"sosmith: wrote {name}\n" in good(*arguments).stderr
+    first = Path(name).read_bytes()
+    assert first.startswith(b"\x89PNG" if name.endswith("PNG") else b"<?xml")
+    good(*arguments)
+    assert Path(name).read_bytes() == first
+
+
+def test_a_tangent_track_can_be_within_the_limits() -> None:
+    text = Path("short.toml").read_text().replace("irregularity = { value = 0.02,", "irregularity = { value = 0.002,")
+    Path("calm.toml").write_text(text)
+    result = good("calm.toml", "--track", "tangent")
+    assert "this run leaves" not in result.stderr
+    assert "Beside the paper" not in result.stdout
+
+
+def test_the_built_in_parameters_can_be_written_and_changed() -> None:
+    assert "sosmith: wrote mine.toml\n" in good("--write-parameters", "mine.toml").stderr
+    assert Path("mine.toml").read_text() == built_in_text()
+
+
+def test_slips_are_refused() -> None:
+    refused("the speed must be from 1 to 100 m/s, not 0", "--speed", "0")
+    refused("the seed must be 0 or more, not -1", "--seed", "-1", "--irregularities", "low")
+    refused("a.pdf: the plot's name must end in .svg or .png, not .pdf", "--plot", "a.pdf")
+    refused("a: the plot's name must end in .svg or .png, not neither", "--plot", "a")
+    refused("none.toml must be a readable TOML file (no such file or directory)", "none.toml")
+    Path("broken.toml").write_text(built_in_text().replace('unit = "kg"', 'unit = "t"', 1))
+    refused("broken.toml: wheelset.mass must be in the unit 'kg', not 't'", "broken.toml")
+    assert run("--irregularities", "medium").exit_code == 2

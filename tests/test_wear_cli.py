@@ -1,0 +1,138 @@
+"""`sosmith wear` and its files as a user meets them."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from sosmith.cli import cli
+from sosmith.gen.specification import example
+from sosmith.model.errors import SpecificationError
+from sosmith.model.wear_file import moment_text, parse_moment, read_wear_record
+
+LIMITS = ("--initial", "1.5", "--limit", "9")
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Start in a folder with records of 0.1 mm a day in several times."""
+    monkeypatch.chdir(tmp_path)
+    clearances = [f"{1.5 + 0.1 * k:.6g}" for k in range(80)]
+    for name, header, times in (
+        ("days", "days", [str(k) for k in range(80)]),
+        ("seconds", "time_s", [str(86400 * k) for k in range(80)]),
+        ("hours", "hours", [str(24 * k) for k in range(80)]),
+        ("dates", "date", [moment_text(19_783 + k)[:10] for k in range(80)]),
+    ):
+        rows = [f"{time},{clearance},driver {time}" for time, clearance in zip(times, clearances, strict=True)]
+        Path(f"{name}.csv").write_text("\n".join([f"{header},clearance_mm,remark", *rows]) + "\n")
+    return tmp_path
+
+
+def run(*arguments: str) -> Result:
+    return CliRunner(env={"COLUMNS": "100"}).invoke(cli, ["wear", *arguments])
+
+
+def good(*arguments: str) -> Result:
+    result = run(*arguments)
+    assert (result.exit_code, result.exception) == (0, None)
+    return result
+
+
+def refused(message: str, *arguments: str) -> None:
+    result = run(*arguments)
+    assert isinstance(result.exception, SpecificationError)
+    assert str(result.exception) == message
+
+
+@pytest.mark.parametrize("name", ["days", "seconds", "hours", "dates"])
+def test_times_of_all_kinds_give_the_same(name: str) -> None:
+    tree = json.loads(good(f"{name}.csv", *LIMITS, "--warning", "7", "--json").stdout)
+    assert tree["rate_mm_per_day"]["value"] == pytest.approx(0.1)
+    assert tree["duration_days"] == pytest.approx(79)
+    assert tree["wear_mm"] == pytest.approx(7.9)
+    assert tree["life_days"]["value"] == pytest.approx(11)
+    assert tree["state"] == "warning"
+    assert tree["first_warning_days"] - tree["duration_days"] in (pytest.approx(-9), pytest.approx(19_783 - 9))
+
+
+def test_the_table_names_units_and_dates() -> None:
+    shown = re.sub(r" {2,}", "  ", good("dates.csv", *LIMITS, "--warning", "7").stdout)
+    for row in (
+        "Wear by dates.csv: warning",
+        "  record  80 readings over 79 days",
+        "  wear  7.9 mm",
+        "  remaining  1.1 mm to the limit of 9 mm",
+        "  rate  0.1 mm a day (0.1 to 0.1 at 95 %), 36.5 mm a year",
+        "  first warning  2024-05-10 00:00; 1 of the 1 readings of the last block",
+    ):
+        assert row in shown
+
+
+def test_the_limits_of_a_specification() -> None:
+    Path("my.toml").write_text(
+        example().replace("channels = 1", "channels = 2")
+        + "\n[wear]\ninitial = [1.5, 2.5]\nwarning = 6.0\nlimit = 9.0\nsensor_range = 10.5\n"
+    )
+    first, second = (
+        json.loads(good("days.csv", "--spec", "my.toml", "--channel", channel, "--json").stdout)
+        for channel in ("0", "1")
+    )
+    assert (first["wear_mm"], second["wear_mm"]) == (pytest.approx(7.9), pytest.approx(6.9))
+    assert second["limits_mm"]["critical_clearance"] == 10.5
+    end = good("days.csv", "--spec", "my.toml", "--channel", "1").stdout
+    assert "to the end of the sensor's range, 10.5 mm, which comes before the limit" in end
+    refused("my.toml: channel must be below 2, the count in wear.initial, not 2", "days.csv", "--spec", "my.toml",
+            "--channel", "2")  # fmt: skip
+    refused("the limits must be given by --spec or one by one, not both", "days.csv", "--spec", "my.toml", *LIMITS)
+
+
+def test_plots() -> None:
+    for name in ("a.svg", "b.svg", "c.png"):
+        assert f"sosmith: wrote {name}\n" in good("days.csv", *LIMITS, "--plot", name).stderr
+    assert Path("a.svg").read_bytes() == Path("b.svg").read_bytes()
+    assert Path("c.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_refusals() -> None:
+    refused("the limits must be given by --initial and --limit, or by --spec, not left out", "days.csv")
+    refused("f.pdf: the plot's name must end in .svg or .png, not .pdf", "days.csv", *LIMITS, "--plot", "f.pdf")
+    Path("plain.toml").write_text(example())
+    refused("plain.toml: the specification must have a table [wear] for --spec, not none", "days.csv", "--spec",
+            "plain.toml")  # fmt: skip
+    refused("days.csv must have a column of clearances (z_mm), not only days, clearance_mm, remark", "days.csv",
+            *LIMITS, "--column", "z_mm")  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", " must hold a header line and rows of numbers, not nothing"),
+        (
+            "when,clearance_mm\n1,2\n",
+            " must have a column of times (time_s, date, days, time_days, time_d, hours, time_h), not only when, "
+            "clearance_mm",
+        ),
+        ("days,clearance_mm\n1,2\n0.5,2\n", ", line 3: days must not be before that of the row before"),
+        ("days,clearance_mm\n1,worn\n", ", line 2: clearance_mm must be a finite number, not 'worn'"),
+        (
+            "date,clearance_mm\n2024-13-01,2\n",
+            ", line 2: date must be a date as 2024-03-01 or 2024-03-01T06:30, not '2024-13-01'",
+        ),
+    ],
+)
+def test_files_that_are_refused(text: str, message: str) -> None:
+    path = Path("bad.csv")
+    path.write_text(text)
+    with pytest.raises(SpecificationError, match=f"^{re.escape(str(path) + message)}$"):
+        read_wear_record(path)
+
+
+def test_moments() -> None:
+    assert parse_moment("2024-03-01") == 19_783
+    assert parse_moment("2024-03-01T12:00+01:00") == pytest.approx(19_783 + 11 / 24)
+    assert moment_text(parse_moment("2024-03-01T06:30")) == "2024-03-01 06:30"
