@@ -28,7 +28,7 @@ COPPER = 0.00393
 FIT_CLEARANCES = (1.5, 10.0)
 """Clearances in mm over which the fitted parameters were fitted.
 
-From 1.5 mm, the least initial clearance that the paper allows; below 1.4 mm at 20 degC equation 5a has no positive
+From 1.5 mm, the least initial clearance that the paper allows; below 1.09 mm at 20 degC equation 5a has no positive
 voltage.
 """
 

@@ -60,7 +60,7 @@ class InverseRegression:
 
 
 sensor_voltage = InverseRegression(EQUATION_5A)
-"""The sensor as equation 5a of the paper describes it, without noise; positive from 1.4 mm on at 20 degC."""
+"""The sensor as equation 5a of the paper describes it, without noise; positive from 1.09 mm on at 20 degC."""
 
 FORWARD_MODELS: dict[str, ForwardModel] = {
     "equation_4": InverseRegression(EQUATION_4),

@@ -64,9 +64,9 @@ def read_tables(path: Path, shape: type[Document]) -> Document:
     try:
         return shape.model_validate(_read_toml(path))
     except ValidationError as error:
-        finding = error.errors(include_url=False)[0]
-        more = f" (and {error.error_count() - 1} more)" if error.error_count() > 1 else ""
-        raise SpecificationError(f"{path}: {_sentence(shape, finding)}{more}") from None
+        findings = _own(error.errors(include_url=False))
+        more = f" (and {len(findings) - 1} more)" if len(findings) > 1 else ""
+        raise SpecificationError(f"{path}: {_sentence(shape, findings[0])}{more}") from None
 
 
 def _read_toml(path: Path) -> dict[str, Any]:
@@ -90,6 +90,20 @@ def _read_toml(path: Path) -> dict[str, Any]:
         ) from None
     except (ValueError, RecursionError):
         raise SpecificationError(f"{path}: the file must be TOML within reason, not nested or long numbers") from None
+
+
+def _own(findings: list[ErrorDetails]) -> list[ErrorDetails]:
+    """Put unknown keys first, often the slip behind missing ones, and keys before those of tables inside.
+
+    Leave out that a list is too short where it is so only because items of it do not fit.
+    """
+    own = [
+        finding
+        for finding in findings
+        if finding["type"] != "too_short"
+        or not any(other["loc"][: len(finding["loc"])] == finding["loc"] for other in findings if other is not finding)
+    ]
+    return sorted(own, key=lambda finding: (finding["type"] != "extra_forbidden", len(finding["loc"])))
 
 
 def _sentence(shape: type[Table], finding: ErrorDetails) -> str:
@@ -147,7 +161,7 @@ def shown(value: object) -> str:
             text = "true" if value else "false"
         case dict() | Table():
             text = "a table"
-        case list() | tuple() if len(value) > 6 or any(isinstance(item, list | tuple | dict) for item in value):
+        case list() | tuple() if len(value) > 6 or any(isinstance(item, list | tuple | dict | Table) for item in value):
             text = f"a list of {len(value)} values"
         case list() | tuple():
             text = f"[{', '.join(map(shown, value))}]"

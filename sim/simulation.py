@@ -25,9 +25,11 @@ from sosmith.gen.synthesis import Netlist, synthesize
 from sosmith.model.errors import SpecificationError
 from sosmith.model.golden import calibrated, filtered
 from sosmith.model.port import Codes, Values
+from sosmith.model.scenario_file import emulate_file, load_scenario, range_notes
 from sosmith.model.scenarios import SCENARIOS, Bench, emulate
 from sosmith.model.text_files import write_files
 from sosmith.model.trace import Trace, read_csv
+from sosmith.model.vehicle_clearance import vehicle_clearance
 from sosmith.sim.cosimulate import CosimulationResult, cosimulate
 from sosmith.sim.gate_level import with_cell_models
 from sosmith.sim.simulators import check_name
@@ -57,7 +59,7 @@ def default_scenario(design: CoreDesign) -> str:
 
 
 def traces_for(design: CoreDesign, source: str, *, seed: int, seconds: float | None = None) -> tuple[Trace, ...]:
-    """Make a trace for every channel from a CSV file or a scenario's name.
+    """Make a trace for every channel from a CSV file, a scenario file (TOML) or a scenario's name.
 
     Each channel begins a sample later than the one before, and has noise of its own, so that none looks like another.
 
@@ -67,6 +69,12 @@ def traces_for(design: CoreDesign, source: str, *, seed: int, seconds: float | N
         If the file is unfit or the scenario does not exist for this core.
     """
     channels = range(design.spec.channels)
+    if is_scenario_file(source):
+        if seconds is not None:
+            raise SpecificationError(f"--seconds must come with a scenario's name, not with the file {source}")
+        scenario, bench = load_scenario(Path(source)), bench_of(design)
+        traces = [emulate_file(scenario, bench, seed=seed + k, channel=k, vehicle=vehicle_clearance) for k in channels]
+        return tuple(trace.delayed(k) for k, trace in enumerate(traces))
     if source not in SCENARIOS and (source.lower().endswith(".csv") or Path(source).exists()):
         if seconds is not None:
             raise SpecificationError(f"--seconds must come with a scenario, not with the file {source}")
@@ -74,6 +82,24 @@ def traces_for(design: CoreDesign, source: str, *, seed: int, seconds: float | N
         return tuple(trace.delayed(channel) for channel in channels)
     bench = bench_of(design)  # an unknown scenario is refused there, with a list of those that fit
     return tuple(emulate(source, bench, seed=seed + k, seconds=seconds).delayed(k) for k in channels)
+
+
+def is_scenario_file(source: str) -> bool:
+    """Tell whether `source` is the path of a scenario file, and no built-in scenario or trace."""
+    return source not in SCENARIOS and source.lower().endswith(".toml")
+
+
+def notes_on(design: CoreDesign, source: str) -> tuple[str, ...]:
+    """Sentences about what the core's inputs cannot show of a scenario file; none for other sources.
+
+    Raises
+    ------
+    SpecificationError
+        If the file is unfit.
+    """
+    if not is_scenario_file(source):
+        return ()
+    return range_notes(load_scenario(Path(source)), design.datapath.inputs)
 
 
 def simulate(

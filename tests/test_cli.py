@@ -118,14 +118,14 @@ NEEDED = {
     "reload": ("SPEC OTHER", "max_error", "--active", "--reset", "--version", "docs/registers.md", "reload.json"),
     "simulate": (
         "SPEC",
-        "--trace FILE.csv|SCENARIO",
+        "--trace FILE.csv|FILE.toml|SCENARIO",
         "report.json",
         "report.html",
         "[default: verilator]",
         "--gates BOARD",
         "--seed",
     ),
-    "emulate": ("SPEC", "[SCENARIO]", "CSV", "--seconds", "--seed", "stdout"),
+    "emulate": ("SPEC", "[SCENARIO|FILE.toml]", "CSV", "--seconds", "--measurements", "--seed", "stdout"),
     "compare": ("REPORT REPORT...", "--json", "HTML"),
     "calibrate": ("clearance_mm", "sosmith calibrate add", "export"),
     "spectrum": ("TRACE", "--tolerance", "--passband", "--motion", "--into SPEC", "--json"),
@@ -224,7 +224,8 @@ UNFIT = {
     ),
     "unknown scenario to emulate": (
         ("emulate", "plain.toml", "drive"),
-        "the scenario must be one of worst_case, worst_case_errors, step, sweep, noise, not drive",
+        "the scenario must be one of worst_case, worst_case_errors, step, sweep, noise, or a file whose name ends in "
+        ".toml, not drive",
     ),
     "simulator to come": (
         ("simulate", "plain.toml", "--simulator", "cxxrtl"),

@@ -25,7 +25,7 @@ ROOT = Path(__file__).parents[1]
 README = ROOT / "README.md"
 ARCHITECTURE = ROOT / "docs" / "architecture.md"
 CALIBRATION = ROOT / "docs" / "calibration.md"
-PRINTING = [CALIBRATION, *(ROOT / "docs" / f"{name}.md" for name in ("spectrum", "wear", "vehicle"))]
+PRINTING = [CALIBRATION, *(ROOT / "docs" / f"{name}.md" for name in ("spectrum", "wear", "vehicle", "sensors"))]
 """Documents whose shell blocks stand above what they print."""
 REGISTERS = ROOT / "docs" / "registers.md"
 VEHICLE = ROOT / "docs" / "vehicle.md"

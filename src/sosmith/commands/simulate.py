@@ -26,10 +26,12 @@ from sosmith.gen.boards import BOARDS
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.report import write_report
 from sosmith.gen.specification import example, load
+from sosmith.model.depot_measurements import measurements_csv, measurements_of
 from sosmith.model.errors import SpecificationError
+from sosmith.model.scenario_file import load_scenario
 from sosmith.model.scenarios import SCENARIOS
 from sosmith.model.text_files import write_files
-from sosmith.sim.simulation import bench_of, default_scenario, simulate, traces_for
+from sosmith.sim.simulation import bench_of, default_scenario, is_scenario_file, notes_on, simulate, traces_for
 from sosmith.terminal import (
     JSON_OPTION,
     Step,
@@ -65,7 +67,7 @@ class _Share(click.FloatRange):
 @click.option(
     "--trace",
     "source",
-    metavar="FILE.csv|SCENARIO",
+    metavar="FILE.csv|FILE.toml|SCENARIO",
     help="What drives the inputs.  [default: wear_ramp, or sweep without a calibration]",
 )
 @click.option(
@@ -149,15 +151,35 @@ def simulate_command(
 
 @click.command("emulate")
 @SPEC
-@click.argument("scenario", required=False)
+@click.argument("scenario", required=False, metavar="[SCENARIO|FILE.toml]")
 @CORE
 @SECONDS
+@click.option(
+    "--measurements",
+    is_flag=True,
+    help="Write the depot's measurements of FILE.toml instead, for `sosmith calibrate add`.",
+)
 @SEED
 @output_option("CSV file to write.  [default: stdout]")
 def emulate_command(
-    spec: Path, scenario: str | None, core: str | None, seconds: float | None, seed: int, output: Path | None
+    spec: Path,
+    scenario: str | None,
+    core: str | None,
+    seconds: float | None,
+    measurements: bool,
+    seed: int,
+    output: Path | None,
 ) -> None:
-    """Write an emulated sensor trace for SPEC as CSV; without SCENARIO, list the scenarios that fit."""
+    """Write an emulated sensor trace for SPEC as CSV; without SCENARIO, list the scenarios that fit.
+
+    A scenario is a built-in one by name, or a file that describes days of operation: examples/scenarios/ holds some,
+    and docs/sensors.md says what can be in them.
+    """
+    if measurements:
+        if seconds is not None:
+            raise SpecificationError("--seconds must come with a scenario's name, not with --measurements")
+        _write_measurements(spec, scenario, seed, output)
+        return
     with show_progress() as step:
         made = design_core(load(spec), core=core, progress=step)
         if scenario is None:
@@ -165,12 +187,15 @@ def emulate_command(
             return
         step(f"emulating {scenario}")
         trace, *_ = traces_for(made, _known_scenario(made, scenario), seed=seed, seconds=seconds)
+        notes = notes_on(made, scenario)
         if output is not None:
             trace.write_csv(output)
     if output is None:
         click.echo(trace.to_csv(), nl=False)
     else:
         note(f"wrote {output}: {len(trace)} samples at {float(trace.sample_rate):g} Hz")
+    for sentence in notes:
+        note(f"note: {sentence}")
 
 
 @click.command()
@@ -207,6 +232,8 @@ def _simulate(
     step(f"trace {chosen}")
     traces = traces_for(made, chosen, seed=options["seed"], seconds=seconds)
     evidence = simulate(made, traces, folder, progress=step, **options)
+    for sentence in notes_on(made, chosen):
+        note(f"note: {sentence}")
     step("writing the report")
     return write_report(evidence, folder), folder
 
@@ -223,9 +250,11 @@ def _finish(summary: dict[str, Any], folder: Path, *, as_json: bool) -> None:
 
 
 def _known_scenario(made: CoreDesign, name: str) -> str:
-    if name not in SCENARIOS:
+    if name not in SCENARIOS and not is_scenario_file(name):
         fitting = ", ".join(_fitting(made))
-        raise SpecificationError(f"the scenario must be one of {fitting}, not {name}")
+        raise SpecificationError(
+            f"the scenario must be one of {fitting}, or a file whose name ends in .toml, not {name}"
+        )
     return name
 
 
@@ -240,6 +269,21 @@ def _list_scenarios(made: CoreDesign) -> None:
     for name in _fitting(made):
         table.add_row(name, f"{SCENARIOS[name].default_seconds(bench):.4g}", SCENARIOS[name].description)
     TableConsole().print(table)
+    note("a file can take a name's place: examples/scenarios/ holds some, docs/sensors.md says what can be in them")
+
+
+def _write_measurements(spec: Path, source: str | None, seed: int, output: Path | None) -> None:
+    """Write what is measured by hand in a scenario file's depot, as CSV."""
+    if source is None or not is_scenario_file(source):
+        raise SpecificationError(f"--measurements must come with a scenario file (TOML), not {source or 'without one'}")
+    load(spec)  # so that a slip in it is not found out later
+    rows = measurements_of(load_scenario(Path(source)), seed)
+    text = measurements_csv(rows)
+    if output is None:
+        click.echo(text, nl=False)
+        return
+    write_files(output.parent, {output.name: text})
+    note(f"wrote {output}: {len(rows)} measurements")
 
 
 def _print_summary(summary: dict[str, Any]) -> None:
