@@ -1,8 +1,8 @@
 """From measurements in the depot to wear on the instrument's screen: `python -m examples.wear_campaign`.
 
-Emulated measurements go into the store and are fitted; filters follow from spectra; hardware is generated and runs in the
-simulator; and the accuracy stands beside the paper's. Some ten minutes. Writes campaign.md, campaign.json, pictures,
-specifications, hardware and reports. With --document, docs/campaign.md and its pictures too.
+Emulated measurements go into the store and are fitted; filters follow from spectra; hardware is generated and runs
+in the simulator; and the accuracy stands beside the paper's. Some ten minutes. Writes campaign.md, campaign.json,
+pictures, specifications, hardware and reports. With --document, docs/campaign.md and its pictures too.
 """
 
 from __future__ import annotations
@@ -44,9 +44,11 @@ def main() -> None:
         drawn = pictures(results, series)
         text = document(results)
         files = {"campaign.md": text.encode(), "campaign.json": (json.dumps(results, indent=1) + "\n").encode()}
-        write_contents(arguments.output, files | {f"images/{name}": content for name, content in drawn.items()})
+        write_contents(arguments.output, files)
+        write_contents(arguments.output / "images", drawn)
     if arguments.document:
-        write_contents(DOCS, {"campaign.md": text.encode()} | {f"images/{n}": c for n, c in drawn.items()})
+        write_contents(DOCS, {"campaign.md": text.encode()})
+        write_contents(DOCS / "images", drawn)
     note(f"report: {(arguments.output / 'campaign.md').resolve()}")
 
 

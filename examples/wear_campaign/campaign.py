@@ -46,7 +46,7 @@ def bench_campaign(settings: dict[str, Any], folder: Path, progress: Progress) -
         table = specification_table("bench", versions[-1].version)
         paper = hardware.instrument(folder / name, f"{name}_paper", own["sample_rate"], table, bench.PAPER_FILTER)
         progress(f"{name}: filter from spectra", 0, 0)
-        proposal, proposed = bench.from_spectra(scenario, paper, seed, own["tolerance"], own["passband_edge"])
+        _, proposed = bench.from_spectra(scenario, paper, seed, own["tolerance"], own["passband_edge"])
         spectra = hardware.instrument(folder / name, f"{name}_spectra", own["sample_rate"], table, proposed)
         for title, made, filter_table in (
             ("the paper's", paper, bench.PAPER_FILTER),
@@ -55,9 +55,9 @@ def bench_campaign(settings: dict[str, Any], folder: Path, progress: Progress) -
             label = f"{name}, {title} filter"
             summary = bench.through_hardware(scenario, made, seed, folder / name, settings["simulator"], progress)
 
-            def design_for(polynomial: Polynomial, table: str = filter_table, folder: Path = folder / name) -> CoreDesign:
+            def design_for(polynomial: Polynomial, table: str = filter_table, own_name: str = name) -> CoreDesign:
                 calibration = hardware.calibration_table(polynomial)
-                path = hardware.specification(folder, "one_of_many", own["sample_rate"], calibration, table)
+                path = hardware.specification(folder / own_name, "one_of_many", own["sample_rate"], calibration, table)
                 return design_core(load(path), realization=REALIZATION)
 
             runs = bench.over_seeds(
@@ -112,7 +112,7 @@ def ride_campaign(settings: dict[str, Any], folder: Path, progress: Progress) ->
     calibration, rate = hardware.calibration_table(EQUATION_5A), own["sample_rate"]
     progress("ride: vehicle and spectra", 0, 0)
     paper = hardware.instrument(folder, "ride_paper", rate, calibration, ride.PAPER_FILTER)
-    proposal, table = ride.from_spectra(scenarios, bench_of(paper), seed, own["tolerance"])
+    _, table = ride.from_spectra(scenarios, bench_of(paper), seed, own["lead_in"], own["tolerance"])
     exact = ride.prewarped(own["order"], own["passband_edge"], own["passband_loss"], rate)
     made = [
         ("the paper's 7th order", ride.PAPER_FILTER, paper),
@@ -120,7 +120,7 @@ def ride_campaign(settings: dict[str, Any], folder: Path, progress: Progress) ->
         ("from spectra", table, hardware.instrument(folder, "ride_spectra", rate, calibration, table)),
     ]
     results = [
-        ride.ride(title, scenario, core, seed, folder, settings["simulator"], progress)
+        ride.ride(title, scenario, core, seed, own["lead_in"], folder, settings["simulator"], progress)
         for scenario in scenarios
         for title, _, core in made
     ]
@@ -142,7 +142,7 @@ def ride_campaign(settings: dict[str, Any], folder: Path, progress: Progress) ->
         }
         for (title, table, core), result in zip(made, results, strict=False)
     ]
-    return {"filters": filters, "runs": rows}, {"results": results, "clearance": 5.0}
+    return {"filters": filters, "runs": rows, "validity": ride.validity(rate)}, {"results": results, "clearance": 5.0}
 
 
 def week_campaign(

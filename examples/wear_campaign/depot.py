@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sosmith.model.calibration import Fit, Measurements, fit
+from sosmith.model.calibration import COLUMNS, Fit, Measurements, fit
 from sosmith.model.depot_measurements import DepotMeasurement, measurements_csv, measurements_of
 from sosmith.model.measurement_store import open_store
 from sosmith.model.scenario_file import ScenarioFile
@@ -33,6 +33,5 @@ def into_store(scenario: ScenarioFile, seed: int, folder: Path, sensor: str) -> 
 
 def fitted(rows: tuple[DepotMeasurement, ...]) -> Fit:
     """Fit to the measurements of all days at once, as the store does after the last."""
-    columns = [np.array([getattr(row, name) for row in rows]) for name in ("clearance_mm", "voltage_V", "temperature_C")]
-    clearance, voltage, temperature = columns
+    clearance, voltage, temperature = (np.array([getattr(row, name) for row in rows]) for name in COLUMNS)
     return fit(Measurements(clearance=clearance, voltage=voltage, temperature=temperature, source="the depot"))

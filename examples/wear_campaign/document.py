@@ -26,7 +26,8 @@ def document(results: dict[str, Any]) -> str:
         "# The wear campaign",
         "Made by `python -m examples.wear_campaign --document`; every figure comes out of that run. All errors of the "
         "sensors stand in `examples/scenarios/` and `examples/wear_campaign/`, each with the figure of the paper it "
-        "follows from or marked as assumed; none was fitted to a result. Accuracy is the paper's equation 7: 100 % minus "
+        "follows from or marked as assumed; none was fitted to a result. Accuracy is the paper's equation 7: 100 % "
+        "minus "
         "the mean of |measured - true| / true over the readings.",
         _bench(results["bench"], settings),
         _ride(results["ride"], settings),
@@ -65,19 +66,21 @@ def _bench(found: dict[str, Any], settings: dict[str, Any]) -> str:
     )
     lines = [
         "## On the bench",
-        f"The paper's section 3.3: clearance in steps, at 43 to 50 and at 92 to 96 degC, 6 samples a second. For each of "
+        "The paper's section 3.3: clearance in steps, at 43 to 50 and at 92 to 96 degC, 6 samples a second. For "
+        "each of "
         f"{count} seeds the depot measures for ten days, the calibration is fitted by equation 3, and the run goes "
         f"through it and the filter. The paper states {unfiltered:g} % without and {filtered:g} % with its filter. "
         f"Ours: the mean over seeds with its {share:.0f} % interval, and between which accuracies {share:.0f} % of "
         "single runs lie; the last column is the largest difference between hardware and golden chain, in points.",
         _table(["run", "filter", "unfiltered, %", "filtered, %", "single runs, filtered, %", "hardware off"], rows),
-        f"![Accuracy of every seed, with means and the paper's figures](images/campaign_bench.svg)",
+        "![Accuracy of every seed, with means and the paper's figures](images/campaign_bench.svg)",
         f"Through the generated hardware in the simulator (seed {settings['seed']}): "
         + ("every sample is that of the integer model" if exact else "NOT EVERY SAMPLE IS THAT OF THE INTEGER MODEL")
         + f". Over all seeds the hardware's integers are within {worst:.4f} points of the golden chain.",
         "![Errors of one run of each scenario](images/campaign_runs.svg)",
         "### Where the error comes from",
-        "The same runs and the paper's filter, with one source of error after another taken away. The first two columns "
+        "The same runs and the paper's filter, with one source of error after another taken away. The first two "
+        "columns "
         "read the paper's tables as fractions, as equation 7 has them, the last two as millimetres "
         "(`examples/scenarios/bench_43_50.toml` says what follows from either).",
         _table(["filtered, %", *(_short(name) for name in names)], cause_rows),
@@ -142,28 +145,46 @@ def _ride(found: dict[str, Any], settings: dict[str, Any]) -> str:
         ]
         for row in found["runs"]
     ]
+    valid = found["validity"]
     paper, spectra = found["filters"][0], found["filters"][-1]
     attenuated, ratio = paper["attenuation"]["the paper's pass edge"], spectra["delay"] / paper["delay"]
     offsets = {row["scenario"]: row["mean_after"] for row in found["runs"] if row["filter"] == "from spectra"}
     told = " and ".join(f"{value:+.3f} mm on the {name.removeprefix('ride_')}" for name, value in offsets.items())
     lines = [
         "## Under vehicle motion",
-        "The linear model of a Co-Co locomotive ([vehicle.md](vehicle.md)) runs at 20 m/s over tangent track and over the "
-        "paper's curve, each with the paper's single irregularity and random ones of the low level; true clearance 5 mm, "
+        "The linear model of a Co-Co locomotive ([vehicle.md](vehicle.md)) runs at 20 m/s over tangent track and "
+        "over the "
+        "paper's curve with its single irregularity, both with random irregularities of the low level; true "
+        "clearance 5 mm, "
         "noise of the sensor, and an exact calibration, so that what is left is what motion does. Three filters at "
-        f"{settings['ride']['sample_rate']:g} Hz: the paper's of tables 9 and 10; one with the paper's 0.02 dB at 10 Hz, "
+        f"{settings['ride']['sample_rate']:g} Hz: the paper's of tables 9 and 10; one with the paper's 0.02 dB at 10 "
+        "Hz, "
         "correctly pre-warped; and one that `sosmith spectrum` would propose from these rides "
         f"for a tolerance of {settings['ride']['tolerance']:g} mm.",
         _table(["filter", "", "delay, s", "step to 1 %, s", *heads], filters),
         _table(
-            ["ride", "filter", "rms error, mm", "largest error, mm", "before, %", "accuracy, %", "hardware off, points"],
+            [
+                "ride",
+                "filter",
+                "rms error, mm",
+                "largest error, mm",
+                "before, %",
+                "accuracy, %",
+                "hardware off, points",
+            ],
             runs,
         ),
         "![Clearance over both rides, measured and behind each filter](images/campaign_ride.svg)",
-        "A filter at the paper's stated pass edge lets the motion of the vehicle through: hunting and the irregularity lie "
+        "A filter at the paper's stated pass edge lets the motion of the vehicle through: hunting and the "
+        "irregularity lie "
         f"far below 10 Hz. The paper's own coefficients remove it, with {attenuated:.0f} dB at that very edge, and pay "
         f"with their delay. The filter from spectra has {100 * ratio:.0f} % of that delay. "
         f"What no filter removes is the steady offset of a curve: behind the last filter the mean error is {told}.",
+        "The model is linear. On the paper's curve, with its irregularity of 20 mm, the leading wheelset goes "
+        f"{valid['beyond_flange']:.0f} mm beyond where its flange would have stopped it, for "
+        f"{100 * valid['beyond_share']:.0f} % of the ride, and asks for {valid['friction_used']:.1f} times the "
+        "friction "
+        "that there is: take the numbers of the curve as those of the model. On the tangent track it keeps its limits.",
     ]
     return "\n\n".join(lines)
 
@@ -195,8 +216,10 @@ def _week(found: dict[str, Any], settings: dict[str, Any]) -> str:
     rate, low, high = told["rate"]
     lines = [
         "## A week in service",
-        f"`examples/scenarios/{settings['week']['scenario']}.toml`: an ageing sensor, every morning measurements in the "
-        "depot, a refit of the store, the proof of the error with the new coefficients, and their load into the running "
+        f"`examples/scenarios/{settings['week']['scenario']}.toml`: an ageing sensor, every morning measurements in "
+        "the "
+        "depot, a refit of the store, the proof of the error with the new coefficients, and their load into the "
+        "running "
         "hardware (`sosmith reload`); then journeys with motion and tread braking. Accuracies are of the hardware's "
         "integers; the last column is the share of readings with the flag `wear_warning`, which stands for "
         f"{told['warning']:g} mm of wear.",
@@ -216,12 +239,15 @@ def _week(found: dict[str, Any], settings: dict[str, Any]) -> str:
             rows,
         ),
         "![Wear over the week, and accuracy by calibration](images/campaign_week.svg)",
-        f"Mean accuracy over the days: {mean['first']:.2f} % with the calibration of day 0, {mean['updated']:.2f} % with "
+        f"Mean accuracy over the days: {mean['first']:.2f} % with the calibration of day 0, {mean['updated']:.2f} % "
+        "with "
         f"the one that is updated, {mean['factory']:.2f} % with equation 5a. The last is what the emulated sensor was "
-        f"before it aged, which nobody knows of a real one. A day of {found['days'][0]['measurements']} measurements with the scatter that follows from the "
+        f"before it aged, which nobody knows of a real one. A day of {found['days'][0]['measurements']} measurements "
+        "with the scatter that follows from the "
         "paper's adjusted r makes an uncertain calibration: more of them help more than a filter does.",
         f"At the end the wear reads {told['wear']:.3f} mm, its rate is {rate:.3f} mm a day ({low:.3f} to {high:.3f}), "
-        f"state {told['state']}; at that rate the limit of {told['limit']:g} mm is {_days(told['life'])} away. The true "
+        f"state {told['state']}; at that rate the limit of {told['limit']:g} mm is {_days(told['life'])} away. The "
+        "true "
         f"rate over the week was {_true_rate(found):.3f} mm a day.",
         f"The first day ran in the simulator: {found['simulated']['samples']:,} samples, "
         + ("all" if found["simulated"]["bit_exact"] else "NOT ALL")

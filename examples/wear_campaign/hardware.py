@@ -90,7 +90,7 @@ def run(made: CoreDesign, traces: Sequence[Trace], folder: Path, simulator: str,
 
 
 def told(summary: dict[str, Any]) -> dict[str, Any]:
-    """What the campaign's document tells of a run in the simulator."""
+    """Pick what the campaign's document tells of a run in the simulator."""
     return {
         "samples": summary["samples"],
         "bit_exact": summary["bit_exact"],

@@ -69,7 +69,9 @@ def bench(figure: Figure, results: dict[str, Any]) -> None:
             axes.plot([mean["mean"]], [y], "o", color=INK, ms=4)
             ticks.append(y)
             reading = ", as mm" if "millimetres" in row["scenario"] else ""
-            names.append(f"{row['scenario'][6:11].replace('_', ' to ')} degC{reading}, {'filtered' if j else 'unfiltered'}")
+            names.append(
+                f"{row['scenario'][6:11].replace('_', ' to ')} degC{reading}, {'filtered' if j else 'unfiltered'}"
+            )
     unfiltered, filtered = stated(figures)
     axes.axvline(unfiltered, color=RED, ls="--", lw=1.2, label=f"the paper, unfiltered: {unfiltered:g} %")
     axes.axvline(filtered, color=RED, ls="-", lw=1.2, label=f"the paper, filtered: {filtered:g} %")

@@ -23,7 +23,11 @@ from sosmith.model.polynomial import EQUATION_5A
 from sosmith.model.scenario_file import ScenarioFile, emulate_file
 from sosmith.model.scenarios import Bench
 from sosmith.model.trace import Trace
-from sosmith.model.vehicle_ride import VehicleRide
+from sosmith.model.track import curved_track
+from sosmith.model.vehicle_clearance import IRREGULARITY, SPEED, WHEELSET, vehicle_clearance
+from sosmith.model.vehicle_limits import limits
+from sosmith.model.vehicle_parameters import built_in
+from sosmith.model.vehicle_run import run
 from sosmith.sim.simulation import Progress, bench_of
 
 Values = npt.NDArray[np.float64]
@@ -68,27 +72,20 @@ def prewarped(order: int, edge: float, loss: float, sample_rate: float) -> str:
     return hardware.filter_by_order(order, float(f"{unwarp(analog, sample_rate):.9g}"))
 
 
-def lead_in(scenario: ScenarioFile, bench: Bench) -> int:
-    """Samples of the first excerpt, which is there for the filters to settle."""
-    seconds = scenario.document.excerpt[0].seconds
-    assert seconds is not None
-    return round(seconds * float(bench.sample_rate))
-
-
-def trace_of(scenario: ScenarioFile, bench: Bench, seed: int) -> Trace:
-    """Make the trace, every sample behind the lead-in a reading."""
-    trace = emulate_file(scenario, bench, seed=seed, vehicle=VehicleRide())
-    return replace(trace, reading=np.arange(len(trace)) >= lead_in(scenario, bench))
+def trace_of(scenario: ScenarioFile, bench: Bench, seed: int, lead_in: float) -> Trace:
+    """Make the trace; every sample behind the first `lead_in` seconds, in which filters settle, is a reading."""
+    trace = emulate_file(scenario, bench, seed=seed, vehicle=vehicle_clearance)
+    return replace(trace, reading=trace.time >= lead_in)
 
 
 def from_spectra(
-    scenarios: list[ScenarioFile], bench: Bench, seed: int, tolerance: float
+    scenarios: list[ScenarioFile], bench: Bench, seed: int, lead_in: float, tolerance: float
 ) -> tuple[Proposal, str]:
     """Propose a filter from the spectra of the rides, true and measured; return it with its table."""
     contents, rate, settings = [], float(bench.sample_rate), SpectrumSettings()
     for scenario in scenarios:
-        trace = trace_of(scenario, bench, seed)
-        ride = slice(lead_in(scenario, bench), None)
+        trace = trace_of(scenario, bench, seed, lead_in)
+        ride = trace.reading
         measured = calibrated(trace.codes, bench.ports, EQUATION_5A)
         contents.append(
             Content(
@@ -108,13 +105,14 @@ def ride(
     scenario: ScenarioFile,
     made: CoreDesign,
     seed: int,
+    lead_in: float,
     folder: Path,
     simulator: str,
     progress: Progress,
 ) -> Result:
     """Run one filter through one ride: in double precision, and in the generated hardware."""
     bench = bench_of(made)
-    trace, ideal = trace_of(scenario, bench, seed), made.quantized.filter
+    trace, ideal = trace_of(scenario, bench, seed, lead_in), made.quantized.filter
     before = calibrated(trace.codes, bench.ports, EQUATION_5A)
     after = filtered(before, ideal.sos, bench.output)
     summary = hardware.run(made, [trace], folder / scenario.path.stem, simulator, progress)
@@ -144,3 +142,16 @@ def ride(
         before=before,
         after=after,
     )
+
+
+def validity(sample_rate: float) -> dict[str, float]:
+    """Tell how far the leading wheelset leaves the linear model on the curve: mm beyond its flange, friction."""
+    parameters = built_in()
+    track = curved_track(parameters.track)
+    motion = run(parameters, track, speed=SPEED, sample_rate=sample_rate, irregularity=IRREGULARITY, seed=1)
+    found = limits(parameters, track, motion)
+    return {
+        "beyond_flange": 1e3 * float(found.beyond_flange[WHEELSET]),
+        "beyond_share": float(found.beyond_flange_share[WHEELSET]),
+        "friction_used": float(found.friction_used[WHEELSET]),
+    }
