@@ -20,12 +20,13 @@ from sosmith.model.inductive_sensor import (
     SystematicError,
     sensor_voltage,
 )
+from sosmith.model.paper_figures import read_paper_figures
 from sosmith.model.polynomial import EQUATION_4, EQUATION_5A, Polynomial
 from sosmith.model.port import Values
 from sosmith.model.random_streams import streams
 
-TABLE_1 = np.array([25.95, 20.736, 24.471, 78.376, 81.988, 56.695, 14.52, 29.22, 27.095, 22.6914]) / 1000
-TABLE_4 = np.array([15.534, 19.077, 21.802, 70.238, 78.392, 52.738, 4.391, 11.14, 27.036, 11.554]) / 1000
+PAPER = read_paper_figures()
+TABLE_1, TABLE_4 = (np.array(PAPER.numbers(table, "error"), dtype=np.float64) for table in ("table_1", "table_4"))
 
 
 @pytest.mark.parametrize(
