@@ -2,27 +2,24 @@
 
 Emulated measurements go into the store and are fitted; filters follow from spectra; hardware is generated and runs
 in the simulator; and the accuracy stands beside the paper's. Some ten minutes. Writes campaign.md, campaign.json,
-pictures, specifications, hardware and reports. With --document, docs/campaign.md and its pictures too.
+pictures, specifications, hardware and reports. With --document, docs/campaign.md, its pictures and outcome.json too.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-import sys
 import tomllib
 from pathlib import Path
 
+from examples.wear_campaign.campaign import carry_out
+from examples.wear_campaign.document import document
+from examples.wear_campaign.pictures import pictures
+
+from sosmith.model.text_files import write_contents
+from sosmith.terminal import note, show_progress
+
 HERE = Path(__file__).parent
-sys.path.insert(0, str(HERE))
-
-from campaign import carry_out  # noqa: E402 - the folder is no package that is installed
-from document import document  # noqa: E402
-from pictures import pictures  # noqa: E402
-
-from sosmith.model.text_files import write_contents  # noqa: E402
-from sosmith.terminal import note, show_progress  # noqa: E402
-
 DOCS = HERE.parents[1] / "docs"
 
 
@@ -49,6 +46,7 @@ def main() -> None:
     if arguments.document:
         write_contents(DOCS, {"campaign.md": text.encode()})
         write_contents(DOCS / "images", drawn)
+        write_contents(HERE, {"outcome.json": files["campaign.json"]})
     note(f"report: {(arguments.output / 'campaign.md').resolve()}")
 
 

@@ -7,10 +7,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import depot
-import hardware
 import numpy as np
 import numpy.typing as npt
+from examples.wear_campaign import depot, hardware
 
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.filter_proposal import Content, Proposal, Wish, propose

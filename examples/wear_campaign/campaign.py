@@ -5,12 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import bench
-import depot
-import hardware
-import ride
-import week
-from spread import spread
+from examples.wear_campaign import bench, depot, hardware, ride, week
+from examples.wear_campaign.spread import spread
 
 from sosmith.gen.calibration_report import specification_table
 from sosmith.gen.core import CoreDesign, design_core
@@ -99,7 +95,11 @@ def _bench_row(
         "hardware": spread(integers, confidence) if integers else None,
         "hardware_off": max(abs(run.hardware - run.golden) for run in runs) if integers else None,
         "adjusted_r": spread([run.adjusted_r for run in runs], confidence),
-        "orders": {str(list(o)): sum(run.orders == o for run in runs) for o in sorted({run.orders for run in runs})},
+        "by_orders": [
+            {"orders": list(orders), "seeds": len(some), "golden": sum(run.golden for run in some) / len(some)}
+            for orders in sorted({run.orders for run in runs})
+            for some in [[run for run in runs if run.orders == orders]]
+        ],
         "values": [[run.unfiltered, run.golden] for run in runs],
         "simulated": None if summary is None else hardware.told(summary),
     }

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import hardware
 import numpy as np
 import numpy.typing as npt
+from examples.wear_campaign import hardware
 from scipy import signal
 
 from sosmith.gen.core import CoreDesign

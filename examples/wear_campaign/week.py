@@ -6,10 +6,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import depot
-import hardware
 import numpy as np
 import numpy.typing as npt
+from examples.wear_campaign import depot, hardware
 
 from sosmith.gen.calibration_report import specification_table
 from sosmith.gen.reload import check_swap, own_set, set_for
