@@ -29,6 +29,9 @@ STYLE: dict[Any, Any] = {
     "text.parse_math": False,
 }
 
+SETTLED_FROM = 20.0
+"""Time in s from which the rides are drawn."""
+
 POINTS = 900
 """Points that a long curve is thinned to."""
 
@@ -78,7 +81,7 @@ def bench(figure: Figure, results: dict[str, Any]) -> None:
     axes.set_yticks(ticks, names)
     axes.set_xlim(max(80.0, float(min(np.min(row["values"]) for row in rows)) - 1), 100)
     axes.set_xlabel("accuracy by equation 7, %: a bar for each seed, mean and its interval in black")
-    axes.legend(loc="upper left")
+    figure.legend(loc="outside upper center", ncols=2)
 
 
 def stated(figures: PaperFigures) -> tuple[float, float]:
@@ -93,10 +96,10 @@ def runs(figure: Figure, series: dict[str, Any]) -> None:
         axes.plot(time, 1000 * (signals["measured"] - signals["true"]), color=GREY, lw=0.6, label="before the filter")
         axes.plot(time, 1000 * (signals["filtered"] - signals["true"]), color=BLUE, lw=1.0, label="behind it")
         axes.set_title(name, fontsize=9, loc="left")
-        axes.set_ylim(-900, 900)
+        axes.set_ylim(-600, 400)
         axes.set_xlabel("time, s")
         axes.set_ylabel("measured minus true clearance, µm")
-        axes.legend(loc="upper right")
+        axes.legend(loc="lower right", framealpha=1.0, frameon=True)
 
 
 def ride(figure: Figure, results: dict[str, Any], series: dict[str, Any]) -> None:
@@ -106,19 +109,21 @@ def ride(figure: Figure, results: dict[str, Any], series: dict[str, Any]) -> Non
     for axes, name in zip(np.atleast_1d(all_axes), rides, strict=True):
         found = [result for result in series["results"] if result.scenario == name]
         time, before = envelope(found[0].time, found[0].before, POINTS)
-        axes.plot(time, before, color=GREY, lw=0.5, alpha=0.7, label="measured")
+        axes.plot(time, before, color=GREY, lw=0.7, label="measured")
         for result, colour in zip(found, (BLUE, GREEN, RED), strict=True):
             if result.filter == "pre-warped 10 Hz":
                 thin_time, thin = envelope(result.time, result.after, POINTS)
-                axes.plot(thin_time, thin, color=colour, lw=0.5, alpha=0.6, label=result.filter)
+                axes.plot(thin_time, thin, color=colour, lw=0.7, label=result.filter)
             else:
                 axes.plot(result.time[::20], result.after[::20], color=colour, lw=1.6, label=result.filter)
         axes.axhline(series["clearance"], color=INK, lw=0.8, ls=":", label="true")
         axes.set_title(name, fontsize=9, loc="left")
-        axes.set_ylim(2, 8)
+        axes.set_xlim(SETTLED_FROM, None)
+        axes.set_ylim(3, 7)
         axes.set_ylabel("clearance, mm")
-    axes.set_xlabel("time, s; the ride begins at 40 s, before it the filters settle")
-    np.atleast_1d(all_axes)[0].legend(loc="upper left", ncols=5, fontsize=8)
+    axes.set_xlabel("time, s; what is read begins at 40 s")
+    handles, labels = np.atleast_1d(all_axes)[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=5)
 
 
 def week(figure: Figure, results: dict[str, Any], series: dict[str, Any]) -> None:
@@ -141,4 +146,5 @@ def week(figure: Figure, results: dict[str, Any], series: dict[str, Any]) -> Non
         right.plot(days, [day["accuracy"][name] for day in results["days"]], "o-", color=colour, ms=4, label=label)
     right.set_xlabel("day")
     right.set_ylabel("accuracy by equation 7, %")
-    right.legend(loc="lower right")
+    right.legend(loc="lower right", fontsize=8)
+    right.set_ylim(right.get_ylim()[0] - 6, None)
