@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 from typing import Any
 
 from examples.wear_campaign.pictures import stated
 
 from sosmith.model.paper_figures import read_paper_figures
+
+WIDTH = 120
+"""Characters of a line."""
 
 CAUSES = {
     "all errors": "everything",
@@ -33,7 +37,23 @@ def document(results: dict[str, Any]) -> str:
         _ride(results["ride"], settings),
         _week(results["week"], settings),
     ]
-    return "\n\n".join(parts) + "\n"
+    return "\n\n".join(map(_wrapped, "\n\n".join(parts).split("\n\n"))) + "\n"
+
+
+def _wrapped(block: str) -> str:
+    """Break the lines of a paragraph, or of each point of a list; tables, pictures and headings stay as they are."""
+    if block.startswith(("|", "!", "#")):
+        return block
+    return "\n".join(
+        textwrap.fill(
+            line,
+            WIDTH,
+            subsequent_indent="  " * line.startswith("- "),
+            break_long_words=False,
+            break_on_hyphens=False,
+        )
+        for line in block.splitlines()
+    )
 
 
 def _bench(found: dict[str, Any], settings: dict[str, Any]) -> str:
@@ -177,6 +197,7 @@ def _ride(found: dict[str, Any], settings: dict[str, Any]) -> str:
         for row in found["runs"]
     ]
     valid = found["validity"]
+    kept = "keeps the model within its limits" if valid["tangent_kept"] else "leads beyond its limits as well"
     paper, spectra = found["filters"][0], found["filters"][-1]
     attenuated, ratio = paper["attenuation"]["the paper's pass edge"], spectra["delay"] / paper["delay"]
     offsets = {row["scenario"]: row["mean_after"] for row in found["runs"] if row["filter"] == "from spectra"}
@@ -215,7 +236,7 @@ def _ride(found: dict[str, Any], settings: dict[str, Any]) -> str:
         f"{valid['beyond_flange']:.0f} mm beyond where its flange would have stopped it, for "
         f"{100 * valid['beyond_share']:.0f} % of the ride, and asks for {valid['friction_used']:.1f} times the "
         "friction "
-        "that there is: take the numbers of the curve as those of the model. On the tangent track it keeps its limits.",
+        f"that there is: take the numbers of the curve as those of the model. Tangent track {kept}.",
     ]
     return "\n\n".join(lines)
 

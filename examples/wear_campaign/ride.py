@@ -23,7 +23,7 @@ from sosmith.model.polynomial import EQUATION_5A
 from sosmith.model.scenario_file import ScenarioFile, emulate_file
 from sosmith.model.scenarios import Bench
 from sosmith.model.trace import Trace
-from sosmith.model.track import curved_track
+from sosmith.model.track import curved_track, tangent_track
 from sosmith.model.vehicle_clearance import IRREGULARITY, SPEED, WHEELSET, vehicle_clearance
 from sosmith.model.vehicle_limits import limits
 from sosmith.model.vehicle_parameters import built_in
@@ -144,13 +144,16 @@ def ride(
     )
 
 
-def validity(sample_rate: float) -> dict[str, float]:
+def validity(sample_rate: float) -> dict[str, float | bool]:
     """Tell how far the leading wheelset leaves the linear model on the curve: mm beyond its flange, friction."""
     parameters = built_in()
     track = curved_track(parameters.track)
     motion = run(parameters, track, speed=SPEED, sample_rate=sample_rate, irregularity=IRREGULARITY, seed=1)
     found = limits(parameters, track, motion)
+    straight = tangent_track(replace(parameters.track, irregularity=0.0))
+    tangent = run(parameters, straight, speed=SPEED, sample_rate=sample_rate, irregularity=IRREGULARITY, seed=1)
     return {
+        "tangent_kept": limits(parameters, straight, tangent).kept,
         "beyond_flange": 1e3 * float(found.beyond_flange[WHEELSET]),
         "beyond_share": float(found.beyond_flange_share[WHEELSET]),
         "friction_used": float(found.friction_used[WHEELSET]),
