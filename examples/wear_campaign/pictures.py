@@ -2,32 +2,17 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Callable
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
+from sosmith.gen.picture import picture
 from sosmith.gen.plots import envelope
 from sosmith.model.paper_figures import PaperFigures, read_paper_figures
 
 BLUE, RED, GREEN, GREY, INK = "#2563a8", "#b4432f", "#2f7d4f", "#9a9a9a", "#222222"
-
-STYLE: dict[Any, Any] = {
-    "svg.fonttype": "none",
-    "svg.hashsalt": "campaign",
-    "font.family": "DejaVu Sans",
-    "font.size": 9.0,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "grid.color": "#e2e2e2",
-    "legend.frameon": False,
-    "text.parse_math": False,
-}
 
 SETTLED_FROM = 20.0
 """Time in s from which the rides are drawn."""
@@ -38,22 +23,16 @@ POINTS = 900
 
 def pictures(results: dict[str, Any], series: dict[str, Any]) -> dict[str, bytes]:
     """Draw all pictures; return the files by name."""
-    return {
-        "campaign_bench.svg": drawn(8.6, 3.4, lambda figure: bench(figure, results["bench"])),
-        "campaign_runs.svg": drawn(8.6, 3.4, lambda figure: runs(figure, series["bench"])),
-        "campaign_ride.svg": drawn(8.6, 5.4, lambda figure: ride(figure, results["ride"], series["ride"])),
-        "campaign_week.svg": drawn(8.6, 3.4, lambda figure: week(figure, results["week"], series["week"])),
+    painted: dict[str, tuple[float, Callable[[Figure], None]]] = {
+        "bench": (3.4, lambda figure: bench(figure, results["bench"])),
+        "runs": (3.4, lambda figure: runs(figure, series["bench"])),
+        "ride": (5.4, lambda figure: ride(figure, results["ride"], series["ride"])),
+        "week": (3.4, lambda figure: week(figure, results["week"], series["week"])),
     }
-
-
-def drawn(width: float, height: float, paint: Callable[[Figure], None]) -> bytes:
-    """Paint a figure of so many inches."""
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(width, height), layout="constrained")
-        paint(figure)
-        stream = io.BytesIO()
-        figure.savefig(stream, format="svg", metadata={"Date": None})
-    return stream.getvalue()
+    return {
+        f"campaign_{name}.svg": picture("campaign", (8.6, height), paint, style={"legend.frameon": False})
+        for name, (height, paint) in painted.items()
+    }
 
 
 def bench(figure: Figure, results: dict[str, Any]) -> None:

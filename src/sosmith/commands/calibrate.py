@@ -10,7 +10,7 @@ from typing import Any
 import click
 from rich.markup import escape
 
-from sosmith.gen.calibration_plot import FORMATS, calibration_plot
+from sosmith.gen.calibration_plot import calibration_plot
 from sosmith.gen.calibration_report import (
     CALLED_OUT,
     addition_json,
@@ -19,6 +19,7 @@ from sosmith.gen.calibration_report import (
     specification_table,
     version_json,
 )
+from sosmith.gen.picture import FORMATS
 from sosmith.model.calibration import REQUIRED_R, terms_of
 from sosmith.model.errors import ShortfallError, SpecificationError
 from sosmith.model.fit_quality import CELLS
