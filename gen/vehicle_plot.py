@@ -46,9 +46,8 @@ def vehicle_plot(made: VehicleRun, file_format: str) -> bytes:
         _draw_spectra(axes[2, 1], made, motion.clearance_mm, "Spectrum of the clearance")
         axes[0, 0].legend(loc="upper right", ncols=2)
 
-    return picture(
-        "vehicle", (11, 10), paint, file_format, style={"path.simplify": True, "path.simplify_threshold": 0.3}
-    )
+    style = {"path.simplify": True, "path.simplify_threshold": 0.3, "text.parse_math": True}  # powers of ten
+    return picture("vehicle", (11, 10), paint, file_format, style=style)
 
 
 def _draw(axes: Axes, made: VehicleRun, values: Array, label: str, title: str) -> None:
