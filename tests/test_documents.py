@@ -151,7 +151,8 @@ def test_commands_print_what_is_shown(document: Path, folder: Path) -> None:
 
 PICTURES = {
     "vehicle.svg": "./run vehicle --plot vehicle.svg",
-    "wear.svg": "./run wear examples/wear/wheel.csv --initial 1.5 --warning 7 --limit 9 --sensor-range 10.5 --plot wear.svg",
+    "wear.svg": "./run wear examples/wear/wheel.csv --initial 1.5 --warning 7 --limit 9 --sensor-range 10.5"
+    " --plot wear.svg",
 }
 """Pictures that a command of a document draws; the other ones are checked where they are made."""
 
