@@ -26,7 +26,8 @@ from sosmith.model.errors import SpecificationError
 from sosmith.model.golden import calibrated, filtered
 from sosmith.model.port import Codes, Values
 from sosmith.model.scenario_file import emulate_file, load_scenario, range_notes
-from sosmith.model.scenarios import SCENARIOS, Bench, emulate
+from sosmith.model.scenario_run import Bench
+from sosmith.model.scenarios import SCENARIOS, emulate
 from sosmith.model.text_files import write_files
 from sosmith.model.trace import Trace
 from sosmith.model.trace_file import read_traces
