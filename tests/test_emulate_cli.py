@@ -172,3 +172,26 @@ def test_the_vehicles_motion_reaches_the_trace(folder: Path) -> None:
     # Noise and truth are the same, so that the voltages differ by the motion alone, at some 1.3 V/mm.
     assert np.corrcoef(difference, motion)[0, 1] > 0.98
     assert np.std(difference) > 0.2
+
+
+def test_a_trace_of_several_channels_is_run_as_it_was_written(folder: Path) -> None:
+    spec = INSTRUMENT.replace("[input.voltage]", "channels = 3\n[input.voltage]", 1)
+    (folder / "spec.toml").write_text(spec, encoding="utf-8")
+    written = run("emulate", "spec.toml", "day.toml", "--seed", "3", "-o", "day.csv")
+    assert re.search(r"wrote day.csv: \d+ samples of each of 3 channels at [\d.]+ Hz\n", written.stderr)
+    made = design_core(load(folder / "spec.toml"))
+    given, again = traces_for(made, "day.toml", seed=3), traces_for(made, "day.csv", seed=1)
+    assert len(given) == len(again) == 3
+    for one, other in zip(given, again, strict=True):
+        assert np.array_equal(one.codes, other.codes)
+        assert one.truth is not None
+        assert np.array_equal(one.truth, np.array(other.truth))
+
+
+def test_a_trace_without_channels_goes_to_all_of_them(folder: Path) -> None:
+    assert run("emulate", "spec.toml", "day.toml", "-o", "day.csv").exit_code == 0
+    spec = INSTRUMENT.replace("[input.voltage]", "channels = 3\n[input.voltage]", 1)
+    (folder / "spec.toml").write_text(spec, encoding="utf-8")
+    first, second, third = traces_for(design_core(load(folder / "spec.toml")), "day.csv", seed=1)
+    assert np.array_equal(first.codes[:-1], second.codes[1:])
+    assert np.array_equal(first.codes[:-2], third.codes[2:])

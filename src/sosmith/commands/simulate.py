@@ -31,6 +31,7 @@ from sosmith.model.errors import SpecificationError
 from sosmith.model.scenario_file import load_scenario
 from sosmith.model.scenarios import SCENARIOS
 from sosmith.model.text_files import write_files
+from sosmith.model.trace_file import traces_csv, write_traces
 from sosmith.sim.simulation import bench_of, default_scenario, is_scenario_file, notes_on, simulate, traces_for
 from sosmith.terminal import (
     JSON_OPTION,
@@ -172,6 +173,8 @@ def emulate_command(
 ) -> None:
     """Write an emulated sensor trace for SPEC as CSV; without SCENARIO, list the scenarios that fit.
 
+    A core with several channels gets the rows of all of them, by the column channel.
+
     A scenario is a built-in one by name, or a file that describes days of operation: examples/scenarios/ holds some,
     and docs/sensors.md says what can be in them.
     """
@@ -186,14 +189,15 @@ def emulate_command(
             _list_scenarios(made)
             return
         step(f"emulating {scenario}")
-        trace, *_ = traces_for(made, _known_scenario(made, scenario), seed=seed, seconds=seconds)
+        traces = traces_for(made, _known_scenario(made, scenario), seed=seed, seconds=seconds)
         notes = notes_on(made, scenario)
         if output is not None:
-            trace.write_csv(output)
+            write_traces(output, traces)
     if output is None:
-        click.echo(trace.to_csv(), nl=False)
+        click.echo(traces_csv(traces), nl=False)
     else:
-        note(f"wrote {output}: {len(trace)} samples at {float(trace.sample_rate):g} Hz")
+        channels = f" of each of {len(traces)} channels" if len(traces) > 1 else ""
+        note(f"wrote {output}: {len(traces[0])} samples{channels} at {float(traces[0].sample_rate):g} Hz")
     for sentence in notes:
         note(f"note: {sentence}")
 

@@ -26,7 +26,7 @@ from sosmith.model.polynomial import EQUATION_5A, Polynomial
 from sosmith.model.port import Values
 from sosmith.model.signal_file import Signal, SignalFile, read_signal_file
 from sosmith.model.text_files import write_contents
-from sosmith.model.trace import TIME_TOLERANCE
+from sosmith.model.trace_file import TIME_TOLERANCE
 from sosmith.terminal import (
     JSON_OPTION,
     TableConsole,
