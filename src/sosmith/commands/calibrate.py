@@ -170,8 +170,8 @@ def add_command(
         rows = len(refusals) + good
         way = ", or left out with --keep-good" if good else ""
         raise SpecificationError(f"{file}: every row must be right{way}, not {len(refusals):,} of {rows:,} refused")
-    left_out = f", {len(refusals):,} rows left out" if refusals else ""
-    note(f"kept {good:,} measurements of {file} in {store}{left_out}")
+    left_out = f", {_counted(len(refusals), 'row')} left out" if refusals else ""
+    note(f"kept {_counted(good, 'measurement')} of {file} in {store}{left_out}")
     if addition.calibration is None:
         raise ShortfallError(addition.shortfall)
     if not as_json:
@@ -288,6 +288,10 @@ def plot_command(store: Path, sensor: str, number: int | None, output: Path | No
         drawn = calibration_plot(made, versions, file_format)
     write_contents(path.parent, {path.name: drawn})
     note(f"wrote {path}: version {made.version.number} of sensor {sensor}")
+
+
+def _counted(count: int, what: str) -> str:
+    return f"{count:,} {what}{'' if count == 1 else 's'}"
 
 
 def _note_refusals(file: Path, refusals: tuple[Refusal, ...]) -> None:
