@@ -24,13 +24,13 @@ from sosmith.model.calibration import Fit, Measurements, fit
 from sosmith.model.depot_measurements import measurements_of
 from sosmith.model.golden import calibrated, filtered
 from sosmith.model.inductive_sensor import FORWARD_MODELS, SystematicError, sensor_voltage
+from sosmith.model.instrument_signals import TABLE_1_STEPS, TABLE_2_STEPS
 from sosmith.model.paper_figures import read_paper_figures
 from sosmith.model.polynomial import EQUATION_5A, Polynomial
 from sosmith.model.port import Values
 from sosmith.model.random_streams import streams
 from sosmith.model.scenario_file import ScenarioFile, emulate_file, load_scenario
 from sosmith.model.scenario_schema import ScenarioDocument
-from sosmith.model.scenarios import TABLE_1_STEPS, TABLE_2_STEPS
 from sosmith.model.thermocouple import thermocouple_emf, thermocouple_temperature
 from sosmith.model.toml_tables import Table, shown
 from sosmith.model.trace import Trace

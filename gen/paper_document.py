@@ -24,7 +24,6 @@ from sosmith.gen.paper_plots import plots
 from sosmith.gen.paper_regression import regression_parts
 from sosmith.gen.paper_seventh_order import seventh_order_parts
 from sosmith.gen.paper_vehicle import vehicle_parts
-from sosmith.gen.paper_vehicle_run import simulated
 from sosmith.gen.paper_wear import wear_part
 from sosmith.model.paper_figures import PaperFigures
 
@@ -51,7 +50,7 @@ def paper_parts(figures: PaperFigures) -> dict[str, list[Part]]:
         regression_parts(figures),
         unfiltered_parts(figures),
         [*fifth_order_parts(figures), filtered_part(figures)],
-        vehicle_parts(figures, simulated()),
+        vehicle_parts(figures),
         [*seventh_order_parts(figures), *difference_equation_parts(figures)],
         [wear_part(figures), stated_part(figures)],
     ]

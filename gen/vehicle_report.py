@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
 
-from sosmith.gen.vehicle_comparison import PAPER_SPEED, Row, comparison
+from sosmith.gen.paper_comparison import Comparison
+from sosmith.gen.vehicle_comparison import PAPER_SPEED, comparison
 from sosmith.model.linear_motion import Mode
+from sosmith.model.paper_figures import read_paper_figures
 from sosmith.model.track import curved_track, tangent_track
 from sosmith.model.vehicle_lateral import lateral_dynamics
 from sosmith.model.vehicle_limits import Limits, limits
@@ -39,8 +42,8 @@ class VehicleRun:
     motion : Motion
     limits : Limits
     lateral_modes, vertical_modes : tuple of Mode
-    comparison : tuple of Row
-        With the paper; empty unless track, speed and sample rate allow it.
+    comparison : mapping of table number to tuple of Comparison
+        With the paper's tables; empty unless track, speed and sample rate allow it.
     """
 
     parameters: Parameters
@@ -53,7 +56,7 @@ class VehicleRun:
     limits: Limits
     lateral_modes: tuple[Mode, ...]
     vertical_modes: tuple[Mode, ...]
-    comparison: tuple[Row, ...]
+    comparison: Mapping[int, tuple[Comparison, ...]]
 
 
 def vehicle_run(
@@ -75,7 +78,7 @@ def vehicle_run(
         limits=limits(parameters, made, motion),
         lateral_modes=lateral_dynamics(parameters, speed).system.modes(),
         vertical_modes=vertical_dynamics(parameters).system.modes(),
-        comparison=comparison(motion) if comparable else (),
+        comparison=comparison(motion, read_paper_figures()) if comparable else {},
     )
 
 
@@ -111,15 +114,16 @@ def vehicle_json(made: VehicleRun) -> dict[str, Any]:
         "within_limits": found.kept,
         "comparison": [
             {
-                "table": row.table,
-                "what": row.what,
-                "unit": row.unit,
-                "paper": row.paper,
-                "ours": row.ours,
-                "label": row.label,
-                "why": row.why,
+                "table": str(number),
+                "what": one.quantity,
+                "unit": one.unit,
+                "paper": None if one.printed is None else float(one.printed),
+                "ours": None if one.ours is None else float(one.ours),
+                "label": one.label,
+                "why": one.explanation,
             }
-            for row in made.comparison
+            for number, rows in made.comparison.items()
+            for one in rows
         ],
         "parameters": _parameters(made.parameters),
     }

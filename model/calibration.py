@@ -51,6 +51,14 @@ MOST_ROUNDS = 25
 """Rounds of weighting after which the weights are taken as they are; some ten are usual, but steps can alternate."""
 
 
+Progress = Callable[[int, int], None]
+"""Is told how much is done, and of how much."""
+
+
+def untold(done: int, total: int) -> None:
+    """Take progress and tell nobody."""
+
+
 @dataclass(frozen=True, eq=False)
 class Measurements:
     """Reference measurements, one element of every array per measurement.
@@ -183,7 +191,13 @@ def _refuse_repeated_row(table: CsvTable) -> None:
             raise table.refuse(index, f"row must be a measurement of its own, not a duplicate of line {line}")
 
 
-def fit(measurements: Measurements, required_r: float = REQUIRED_R, *, robust: bool = False) -> Fit:
+def fit(
+    measurements: Measurements,
+    required_r: float = REQUIRED_R,
+    *,
+    robust: bool = False,
+    progress: Progress = untold,
+) -> Fit:
     """Find the smallest polynomial whose adjusted r reaches `required_r`.
 
     1. Orders (m, n) are tried by rising count of terms from (1, 1) on; among equals the lower total
@@ -201,6 +215,8 @@ def fit(measurements: Measurements, required_r: float = REQUIRED_R, *, robust: b
     RSS and TSS are weighted likewise. A measurement that is far off both in clearance and in voltage or temperature
     can still pull the fit towards itself: its leverage tells.
 
+    `progress` is called with how many of how many orders have been tried.
+
     Raises
     ------
     SpecificationError
@@ -211,7 +227,9 @@ def fit(measurements: Measurements, required_r: float = REQUIRED_R, *, robust: b
     count = len(measurements)
     rejected: list[Trial] = []
     minimize = _huber(measurements) if robust else _least_squares(measurements)
-    for orders in candidate_orders():
+    every = candidate_orders()
+    for tried, orders in enumerate(every):
+        progress(tried, len(every))
         terms = terms_of(orders)
         found = minimize(terms) if len(terms) < count else None
         if found is None:
@@ -261,21 +279,28 @@ def _least_squares(measurements: Measurements) -> _Minimize:
 
 
 def _huber(measurements: Measurements) -> _Minimize:
+    equal = np.ones(len(measurements))
+    unweighted = Sums(measurements.clearance, measurements.voltage, measurements.temperature, equal)
+
     def minimize(terms: tuple[Term, ...]) -> tuple[Solution, tuple[float, ...]] | None:
-        weights = np.ones(len(measurements))
-        round_number = 0
+        sums, weights = unweighted, equal
+        rounds: list[tuple[Solution, Values]] = []
         while True:
-            round_number += 1
-            sums = Sums(measurements.clearance, measurements.voltage, measurements.temperature, weights)
             solution = sums.solve(terms)
             if solution is None:
                 return None
+            rounds.append((solution, weights))
             off = np.abs(residuals(measurements, solution.polynomial))
             allowed = HUBER * max(NORMAL_CONSISTENCY * float(np.median(off)), LEAST_SCATTER)
             exact = allowed / np.maximum(off, allowed)
-            before, weights = weights, np.maximum(np.rint(exact * WEIGHT_STEPS), 1.0) / WEIGHT_STEPS
-            if round_number == MOST_ROUNDS or np.array_equal(before, weights):
-                return solution, tuple(before.tolist())
+            weights = np.maximum(np.rint(exact * WEIGHT_STEPS), 1.0) / WEIGHT_STEPS
+            again = [k for k, (_, earlier) in enumerate(rounds) if np.array_equal(weights, earlier)]
+            if again or len(rounds) == MOST_ROUNDS:
+                # Once weights come again, so do the rounds from there on; weights that stay are a turn of one round.
+                last = again[0] + (MOST_ROUNDS - 1 - again[0]) % (len(rounds) - again[0]) if again else -1
+                solution, weights = rounds[last]
+                return solution, tuple(weights.tolist())
+            sums = sums.reweighted(weights)
 
     return minimize
 

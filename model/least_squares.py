@@ -8,13 +8,14 @@ up: that is why squaring it does no harm here. Only finished coefficients become
 
 from __future__ import annotations
 
+import copy
 import decimal
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
-from operator import mul
+from operator import mul, sub
 
 import numpy as np
 
@@ -82,29 +83,50 @@ class Sums:
 
     def __init__(self, d: Values, V: Values, T: Values, weights: Values | None = None) -> None:
         self._x, self._y = _Centred.of(V), _Centred.of(T)
-        d_integers, d_bits = _integers(d)
-        self._scale_d = Fraction(1, 1 << d_bits)
-        weight_integers, weight_bits = _integers(np.ones(len(d)) if weights is None else weights)
-        self._scale_w = Fraction(1, 1 << weight_bits)
-        weighted_d = list(map(mul, d_integers, weight_integers))
-        self._squares = Fraction(sum(map(mul, weighted_d, d_integers))) * self._scale_d**2 * self._scale_w
-        # Powers of the first variable, already times the weight or times weight and d.
-        self._left = {"": [weight_integers], "d": [weighted_d]}
-        self._right = [[1] * len(d), self._y.integers]
-        self._moments: dict[tuple[str, Term], Fraction] = {}
+        self._d, self._bits_d = _integers(d)
+        self._weights = np.ones(len(d)) if weights is None else weights
+        integers, self._bits_w = _integers(self._weights)
+        self._part = _Part(integers, self._d, self._x.integers, self._y.integers)
+        self._before: Sums | None = None
+        self._moments: dict[tuple[int, Term], tuple[int, int]] = {}
 
-    def _moment(self, kind: str, term: Term) -> Fraction:
-        if (kind, term) not in self._moments:
+    def reweighted(self, weights: Values) -> Sums:
+        """Give the measurements other weights, shape (n,); only rows whose weight differs are added up, exactly too."""
+        rows = np.flatnonzero(weights != self._weights)
+        if not len(rows):
+            return self
+        other = copy.copy(self)
+        integers, other._bits_w = _integers(np.concatenate((weights[rows], self._weights[rows])))
+        change = list(map(sub, integers[: len(rows)], integers[len(rows) :]))
+        some = ([values[row] for row in rows.tolist()] for values in (self._d, self._x.integers, self._y.integers))
+        other._weights = weights
+        other._part = _Part(change, *some)
+        other._before = self
+        other._moments = {}
+        return other
+
+    def _moment(self, power: int, term: Term) -> tuple[int, int]:
+        """Sum of ``w d**power V**i T**j``, V and T centred, as an integer over two to so many bits."""
+        if (power, term) not in self._moments:
             i, j = term
-            left, right = self._left[kind], self._right
-            while len(left) <= i:
-                left.append(list(map(mul, left[-1], self._x.integers)))
-            while len(right) <= j:
-                right.append(list(map(mul, right[-1], self._y.integers)))
-            exact = sum(left[i]) if j == 0 else sum(map(mul, left[i], right[j]))
-            scale = self._scale_w * self._x.unit**i * self._y.unit**j * (self._scale_d if kind else 1)
-            self._moments[kind, term] = exact * scale
-        return self._moments[kind, term]
+            total = self._part.sum(power, i, j)
+            bits = self._bits_w + power * self._bits_d + i * self._x.bits + j * self._y.bits
+            if self._before is not None:
+                before, bits_before = self._before._moment(power, term)
+                finest = max(bits, bits_before)
+                total, bits = (total << (finest - bits)) + (before << (finest - bits_before)), finest
+            self._moments[power, term] = total, bits
+        return self._moments[power, term]
+
+    def _decimal(self, power: int, term: Term) -> Decimal:
+        """Return the sum, rounded once."""
+        total, bits = self._moment(power, term)
+        return Decimal(total) / Decimal(1 << bits)
+
+    def _fraction(self, power: int) -> Fraction:
+        """Return the sum of ``w d**power``, exactly."""
+        total, bits = self._moment(power, (0, 0))
+        return Fraction(total, 1 << bits)
 
     def centred(self, V: Values, T: Values) -> tuple[Values, Values]:
         """Variables in [-1, 1] for the range of the measurements, correct to a rounding."""
@@ -113,8 +135,10 @@ class Sums:
     def solve(self, terms: Sequence[Term]) -> Solution | None:
         """Minimize over the coefficients of `terms`; None if the measurements do not determine them."""
         with decimal.localcontext(_CONTEXT):
-            matrix = [[_decimal(self._moment("", (a[0] + b[0], a[1] + b[1]))) for b in terms] for a in terms]
-            right = [_decimal(self._moment("d", term)) for term in terms]
+            products = [[(a[0] + b[0], a[1] + b[1]) for b in terms] for a in terms]
+            sums = {term: self._decimal(0, term) for term in {term for row in products for term in row}}
+            matrix = [[sums[term] for term in row] for row in products]
+            right = [self._decimal(1, term) for term in terms]
             factored = _factor(matrix)
             if factored is None:
                 return None
@@ -127,12 +151,13 @@ class Sums:
             for k in reversed(range(len(terms))):
                 scaled[k] -= sum((lower[q][k] * scaled[q] for q in range(k + 1, len(terms))), Decimal(0))
             polynomial = self._expand(dict(zip(terms, scaled, strict=True)))
-            mean_part = self._moment("d", (0, 0)) ** 2 / self._moment("", (0, 0))
+            squares = self._fraction(2)
+            mean_part = self._fraction(1) ** 2 / self._fraction(0)
             return Solution(
                 terms=tuple(terms),
                 polynomial=polynomial,
-                residual_squares=max(_decimal(self._squares) - explained, Decimal(0)),
-                total_squares=_decimal(self._squares - mean_part),
+                residual_squares=max(_decimal(squares) - explained, Decimal(0)),
+                total_squares=_decimal(squares - mean_part),
                 factor=tuple(tuple(map(float, row)) for row in lower),
                 pivots=tuple(map(float, pivots)),
             )
@@ -141,31 +166,52 @@ class Sums:
         """Polynomial of V and T themselves."""
         m, n = (max(term[axis] for term in scaled) for axis in (0, 1))
         sums = [[Fraction(0)] * (n + 1) for _ in range(m + 1)]
+        powers_x, powers_y = [self._x.power(i) for i in range(m + 1)], [self._y.power(j) for j in range(n + 1)]
         for (i, j), value in scaled.items():
-            for p, v in enumerate(self._x.power(i)):
-                for q, t in enumerate(self._y.power(j)):
-                    sums[p][q] += Fraction(value) * v * t
+            for p, v in enumerate(powers_x[i]):
+                part = Fraction(value) * v
+                for q, t in enumerate(powers_y[j]):
+                    sums[p][q] += part * t
         widths = [max(j for i, j in scaled if i == p) + 1 for p in range(m + 1)]
         rounded = [[float(a) for a in row[:width]] for row, width in zip(sums, widths, strict=True)]
         return Polynomial.from_numbers(rounded)
 
 
+class _Part:
+    """Sums of ``w d**k x**i y**j`` over some rows; all of them integers, w of either sign."""
+
+    def __init__(self, w: list[int], d: list[int], x: list[int], y: list[int]) -> None:
+        self._x, self._y = x, y
+        with_d = list(map(mul, w, d))
+        self._left = [[w], [with_d], [list(map(mul, with_d, d))]]  # [k][i]
+        self._right = [[1] * len(y), y]  # [j]
+
+    def sum(self, k: int, i: int, j: int) -> int:
+        left, right = self._left[k], self._right
+        while len(left) <= i:
+            left.append(list(map(mul, left[-1], self._x)))
+        while len(right) <= j:
+            right.append(list(map(mul, right[-1], self._y)))
+        return sum(left[i]) if j == 0 else sum(map(mul, left[i], right[j]))
+
+
 @dataclass(frozen=True)
 class _Centred:
-    """``x = (value - centre) / half`` as ``integers * unit``, in [-1, 1]; `half` is a power of two."""
+    """``x = (value - centre) / half`` as ``integers / 2**bits``, in [-1, 1]; `half` is a power of two."""
 
     centre: float
     half: float
     integers: list[int]
-    unit: Fraction
+    bits: int
 
     @classmethod
     def of(cls, values: Values) -> _Centred:
         low, high = float(values.min()), float(values.max())
         centre = low + (high - low) / 2
-        half = 2.0 ** math.ceil(math.log2(max(high - centre, centre - low))) if high > low else 1.0
+        exponent = math.ceil(math.log2(max(high - centre, centre - low))) if high > low else 0
         (middle, *integers), bits = _integers(np.concatenate(([centre], values)))
-        return cls(centre, half, [value - middle for value in integers], 1 / (Fraction(half) * 2**bits))
+        # no value is nearer to the centre than 2**-bits, so that bits + exponent is not negative
+        return cls(centre, 2.0**exponent, [value - middle for value in integers], bits + exponent)
 
     def __call__(self, values: Values) -> Values:
         return (values - self.centre) / self.half

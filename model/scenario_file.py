@@ -26,10 +26,12 @@ from sosmith.model.inductive_sensor import (
     Mains,
     SystematicError,
 )
+from sosmith.model.plateaus import READING_PART, plateau_samples
 from sosmith.model.port import Port, Values
 from sosmith.model.random_streams import Streams, streams
+from sosmith.model.scenario_run import Bench
 from sosmith.model.scenario_schema import DigitizerTable, ExcerptTable, FaultTable, ScenarioDocument, WearTable
-from sosmith.model.scenarios import LIMIT_SAMPLES, READING_PART, Bench, plateau_samples
+from sosmith.model.scenarios import LIMIT_SAMPLES
 from sosmith.model.sensors import SensorFaults, Sensors
 from sosmith.model.thermometer import ThermocoupleChain
 from sosmith.model.toml_tables import read_tables

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sosmith.model.calibration import REQUIRED_R, Fit, Measurements, fit, root_mean_square
+from sosmith.model.calibration import REQUIRED_R, Fit, Measurements, Progress, fit, root_mean_square, untold
 from sosmith.model.covered_region import CoveredRegion
 from sosmith.model.errors import ShortfallError, SpecificationError
 from sosmith.model.fit_quality import FitQuality, assess
@@ -101,6 +101,7 @@ def add(
     keep_good: bool = False,
     required_r: float = REQUIRED_R,
     robust: bool = False,
+    progress: Progress = untold,
 ) -> Addition:
     """Read a file into the store and fit anew, in one transaction.
 
@@ -118,7 +119,7 @@ def add(
         Ranges of clearance in mm, voltage in V and temperature in degC, from now on; None leaves one as it was.
     keep_good : bool
         Whether to keep the good rows of a file that has others.
-    required_r, robust
+    required_r, robust, progress
         As in `fit`.
 
     Raises
@@ -130,26 +131,53 @@ def add(
     with store.transaction():
         before = store.ranges(sensor)
         usual = before or DEFAULT_RANGES
-        first, second, third = (given or old for given, old in zip(ranges, usual, strict=True))
-        now = (first, second, third)
+        now = _ranges_from_now_on(ranges, usual)
         file = read_measurement_file(path, date, now)
         earlier = store.source_of(sensor, file.sha256)
         if earlier is not None:
             raise SpecificationError(f"{path} must be a file of new measurements, not what was added as {earlier}")
         file = _sift(store, sensor, file)
-        if not file.readings or (file.refusals and not keep_good):
+        if not _keeps(file, keep_good=keep_good):
             return Addition(file, False, None, "")
         if now != before:
             store.set_ranges(sensor, now)
         store.insert(sensor, file)
         try:
-            return Addition(file, True, _fit(store, sensor, date, required_r, robust=robust), "")
+            return Addition(file, True, _fit(store, sensor, date, required_r, progress, robust=robust), "")
         except SpecificationError as error:
             return Addition(file, True, None, str(error))
 
 
+def refused_first_file(
+    sensor: str,
+    path: Path,
+    date: str,
+    *,
+    ranges: tuple[Range | None, Range | None, Range | None] = (None, None, None),
+    keep_good: bool = False,
+) -> Addition | None:
+    """Read what would be the first file of a store; return what became of it if nothing of it is kept, else None.
+
+    To be asked before `open_store` makes a store that is not there yet: a file that is refused then leaves none.
+
+    Raises
+    ------
+    SpecificationError
+        As `read_measurement_file`.
+    """
+    _check_sensor(sensor)
+    file = read_measurement_file(path, date, _ranges_from_now_on(ranges, DEFAULT_RANGES))
+    return None if _keeps(file, keep_good=keep_good) else Addition(file, False, None, "")
+
+
 def refit(
-    store: MeasurementStore, sensor: str, date: str, *, required_r: float = REQUIRED_R, robust: bool = False
+    store: MeasurementStore,
+    sensor: str,
+    date: str,
+    *,
+    required_r: float = REQUIRED_R,
+    robust: bool = False,
+    progress: Progress = untold,
 ) -> Calibration:
     """Fit to all measurements of a sensor; a new version is made only if anything has changed.
 
@@ -163,7 +191,7 @@ def refit(
     with store.transaction():
         _known(store, sensor)
         try:
-            return _fit(store, sensor, date, required_r, robust=robust)
+            return _fit(store, sensor, date, required_r, progress, robust=robust)
         except SpecificationError as error:
             raise ShortfallError(str(error)) from None
 
@@ -225,6 +253,18 @@ def _check_sensor(sensor: str) -> None:
         raise SpecificationError(f"the sensor's name must be printable text, not {sensor!r}")
 
 
+def _ranges_from_now_on(
+    given: tuple[Range | None, Range | None, Range | None], usual: tuple[Range, Range, Range]
+) -> tuple[Range, Range, Range]:
+    first, second, third = (one or old for one, old in zip(given, usual, strict=True))
+    return first, second, third
+
+
+def _keeps(file: MeasurementFile, *, keep_good: bool) -> bool:
+    """Whether the good rows of a file are to go into the store."""
+    return bool(file.readings) and (keep_good or not file.refusals)
+
+
 def _sift(store: MeasurementStore, sensor: str, file: MeasurementFile) -> MeasurementFile:
     """Move what is in the store already to the refusals, and everything if two columns are exchanged."""
     known = {one.reading.values: one for one in store.measurements(sensor)}
@@ -260,10 +300,12 @@ def _swapped(file: MeasurementFile, version: Version) -> str:
     )
 
 
-def _fit(store: MeasurementStore, sensor: str, date: str, required_r: float, *, robust: bool) -> Calibration:
+def _fit(
+    store: MeasurementStore, sensor: str, date: str, required_r: float, progress: Progress, *, robust: bool
+) -> Calibration:
     versions = store.versions(sensor)
     stored = store.measurements(sensor)
-    made = _calibration(store, sensor, stored, date, required_r, robust, len(versions) + 1)
+    made = _calibration(store, sensor, stored, date, required_r, robust, len(versions) + 1, progress)
     if versions:
         newest = versions[-1]
         if replace(made.version, number=newest.number, date=newest.date, drift=newest.drift) == newest:
@@ -280,10 +322,11 @@ def _calibration(
     required_r: float,
     robust: bool,
     number: int,
+    progress: Progress = untold,
 ) -> Calibration:
     """Fit and compare with the versions before `number`."""
     measurements: Measurements = as_measurements(stored, f"{store.path}, sensor {sensor}")
-    fitted = fit(measurements, required_r, robust=robust)
+    fitted = fit(measurements, required_r, robust=robust, progress=progress)
     quality = assess(measurements, fitted)
     region: CoveredRegion = quality.region
     drift = {

@@ -14,7 +14,7 @@ from sosmith.model.csv_table import CsvTable, check_rows, csv_header, read_csv_t
 from sosmith.model.errors import SpecificationError
 from sosmith.model.polynomial import Polynomial
 from sosmith.model.port import Values
-from sosmith.model.trace import PHYSICAL_COLUMNS, TIME_TOLERANCE
+from sosmith.model.trace_file import CHANNEL, PHYSICAL_COLUMNS, TIME_TOLERANCE
 
 TIME = "time_s"
 READING = "reading"
@@ -115,13 +115,16 @@ def read_signal_file(
     Raises
     ------
     SpecificationError
-        As `read_csv_table`; if a column asked for is not there or a name tells no unit; if there are too few rows; if
-        time does not rise in even steps; if reading is neither 0 nor 1. One sentence with the file and the line.
+        As `read_csv_table`; if there are several channels; if a column asked for is not there or a name tells no unit;
+        if there are too few rows; if time does not rise in even steps; if reading is neither 0 nor 1. One sentence with
+        the file and the line.
     """
     header = csv_header(path)
     for name in (*columns, *([truth] if truth else [])):
         if name not in header:
             raise SpecificationError(f"{path} must have the column {name}, not only {', '.join(header)}")
+    if CHANNEL in header:
+        raise SpecificationError(f"{path} must hold a trace of one channel, not have the column {CHANNEL}")
     table = read_csv_table(path, header, required=[TIME])
     if len(table.lines) < LEAST_ROWS:
         raise SpecificationError(f"{path} must hold at least {LEAST_ROWS} rows, not {len(table.lines)}")

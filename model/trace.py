@@ -1,25 +1,14 @@
-"""Traces: the input codes of a core over time, with the truth behind them, and their CSV files."""
+"""Traces: the input codes of a core over time, with the truth behind them."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
-from sosmith.model.csv_table import CsvTable, check_rows, read_csv_table
-from sosmith.model.errors import SpecificationError
 from sosmith.model.port import Codes, Port, Values
-from sosmith.model.text_files import write_files
-
-PHYSICAL_COLUMNS = {"voltage": "voltage_V", "temperature": "temperature_C"}
-"""Columns of the paper's sensors; those of every other input have the input's name."""
-
-TIME_TOLERANCE = 0.01
-"""Relative deviation of a time step from the sample period that a file may have."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -107,143 +96,3 @@ class Trace:
         """Physical values of the codes in the ports' units, shape (n, n_inputs)."""
         decoded = [port.decode(column) for port, column in zip(self.ports, self.codes.T, strict=True)]
         return np.stack(decoded, axis=1)
-
-    def to_csv(self) -> str:
-        """Text of the trace as CSV, the same on every run.
-
-        Columns: time_s; for each input its physical value (voltage_V, temperature_C, or the input's
-        name); for each input its code (``<input>_code``); clearance_mm, called truth unless the core has
-        two inputs, and reading (0 or 1), where the trace has them. Numbers read back to the same doubles.
-
-        Raises
-        ------
-        SpecificationError
-            If an input has the name of another column.
-        """
-        header = _Columns.of(self.ports)
-        columns: list[list[str]] = [[repr(value) for value in self.time.tolist()]]
-        names = [header.time, *header.physical, *header.codes]
-        columns += [[repr(value) for value in column] for column in self.values().T.tolist()]
-        columns += [[str(code) for code in column] for column in self.codes.T.tolist()]
-        if self.truth is not None:
-            names.append(header.truth)
-            columns.append([repr(value) for value in self.truth.tolist()])
-        if self.reading is not None:
-            names.append(header.reading)
-            columns.append(["1" if value else "0" for value in self.reading.tolist()])
-        lines = [",".join(names), *map(",".join, zip(*columns, strict=True))]
-        return "\n".join(lines) + "\n"
-
-    def write_csv(self, path: Path) -> None:
-        """Write `to_csv` to `path`; the file appears complete or not at all.
-
-        Raises
-        ------
-        SpecificationError
-            As `to_csv`, or if the file cannot be written.
-        """
-        write_files(path.parent, {path.name: self.to_csv()})
-
-
-@dataclass(frozen=True)
-class _Columns:
-    """Names of the columns of a trace file."""
-
-    physical: tuple[str, ...]
-    codes: tuple[str, ...]
-    truth: str
-    time: str = "time_s"
-    reading: str = "reading"
-
-    @classmethod
-    def of(cls, ports: Sequence[Port]) -> _Columns:
-        columns = cls(
-            physical=tuple(PHYSICAL_COLUMNS.get(port.name, port.name) for port in ports),
-            codes=tuple(f"{port.name}_code" for port in ports),
-            truth="clearance_mm" if len(ports) == 2 else "truth",
-        )
-        for index, name in enumerate(columns.all):
-            if name in columns.all[:index]:
-                raise SpecificationError(
-                    f"input names must differ from the other columns of a trace file, not give {name!r} twice"
-                )
-        return columns
-
-    @property
-    def all(self) -> tuple[str, ...]:
-        return (self.time, self.truth, self.reading, *self.physical, *self.codes)
-
-
-def read_csv(path: Path, ports: tuple[Port, ...], sample_rate: Fraction) -> Trace:
-    """Read a trace file for a core with the inputs `ports`, running at `sample_rate` in Hz.
-
-    Every input needs its code column or its physical column (see `Trace.write_csv`). Where only the
-    physical column is there, the port's format quantizes it as an ADC does: nearest code, saturating at
-    the ends of the range. Where both are there, the code counts and the other must agree with it.
-    time_s, the truth and reading are optional; the trace has the file's name without its extension.
-
-    Raises
-    ------
-    SpecificationError
-        As `read_csv_table`; if an input has no column; if a code is no integer or out of range, or
-        contradicts the physical value; if time_s does not increase by one sample period from row to
-        row within `TIME_TOLERANCE`; if reading is neither 0 nor 1.
-    """
-    columns = _Columns.of(ports)
-    table = read_csv_table(path, columns.all)
-    if columns.time in table:
-        _check_time(table, table.column(columns.time), sample_rate)
-    codes = [
-        _read_codes(table, port, physical, code)
-        for port, physical, code in zip(ports, columns.physical, columns.codes, strict=True)
-    ]
-    return Trace(
-        name=path.stem,
-        ports=ports,
-        sample_rate=sample_rate,
-        codes=np.stack(codes, axis=1),
-        truth=table.column(columns.truth) if columns.truth in table else None,
-        reading=_read_flags(table, columns.reading) if columns.reading in table else None,
-    )
-
-
-def _check_time(table: CsvTable, time: Values, sample_rate: Fraction) -> None:
-    period = 1 / float(sample_rate)
-    step = np.concatenate([[period], np.diff(time)])
-    check_rows(table, step <= 0, lambda k: f"time_s must be above {time[k - 1]}, the row before, not {time[k]}")
-    check_rows(
-        table,
-        np.abs(step - period) > TIME_TOLERANCE * period,
-        lambda k: f"time_s must be {period:.6g} s after the row before, not {step[k]:.6g} s",
-    )
-
-
-def _read_codes(table: CsvTable, port: Port, physical: str, code: str) -> Codes:
-    if code not in table:
-        if physical not in table:
-            raise SpecificationError(
-                f"{table.path} must have the column {code} or {physical}, not only {', '.join(table.header)}"
-            )
-        return port.encode(table.column(physical))
-    values = table.column(code)
-    check_rows(table, values % 1 != 0, lambda k: f"{code} must be an integer, not {values[k]}")
-    check_rows(
-        table,
-        (values < port.lowest) | (values > port.highest),
-        lambda k: f"{code} must be in {port.lowest}..{port.highest}, not {values[k]:.0f}",
-    )
-    codes = values.astype(np.int64)
-    if physical in table:
-        encoded = port.encode(table.column(physical))
-        check_rows(
-            table,
-            np.abs(encoded - codes) > 1,
-            lambda k: f"{code} must be {encoded[k]} to agree with {physical}, not {codes[k]}",
-        )
-    return codes
-
-
-def _read_flags(table: CsvTable, name: str) -> npt.NDArray[np.bool_]:
-    values = table.column(name)
-    check_rows(table, (values != 0) & (values != 1), lambda k: f"{name} must be 0 or 1, not {values[k]:g}")
-    return np.asarray(values != 0)

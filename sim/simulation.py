@@ -26,9 +26,11 @@ from sosmith.model.errors import SpecificationError
 from sosmith.model.golden import calibrated, filtered
 from sosmith.model.port import Codes, Values
 from sosmith.model.scenario_file import emulate_file, load_scenario, range_notes
-from sosmith.model.scenarios import SCENARIOS, Bench, emulate
+from sosmith.model.scenario_run import Bench
+from sosmith.model.scenarios import SCENARIOS, emulate
 from sosmith.model.text_files import write_files
-from sosmith.model.trace import Trace, read_csv
+from sosmith.model.trace import Trace
+from sosmith.model.trace_file import read_traces
 from sosmith.model.vehicle_clearance import vehicle_clearance
 from sosmith.sim.cosimulate import CosimulationResult, cosimulate
 from sosmith.sim.gate_level import with_cell_models
@@ -62,6 +64,7 @@ def traces_for(design: CoreDesign, source: str, *, seed: int, seconds: float | N
     """Make a trace for every channel from a CSV file, a scenario file (TOML) or a scenario's name.
 
     Each channel begins a sample later than the one before, and has noise of its own, so that none looks like another.
+    A CSV file with the column channel has each channel's rows as they are; one without goes to all channels.
 
     Raises
     ------
@@ -78,8 +81,8 @@ def traces_for(design: CoreDesign, source: str, *, seed: int, seconds: float | N
     if source not in SCENARIOS and (source.lower().endswith(".csv") or Path(source).exists()):
         if seconds is not None:
             raise SpecificationError(f"--seconds must come with a scenario, not with the file {source}")
-        trace = read_csv(Path(source), design.datapath.inputs, design.spec.sample_rate)
-        return tuple(trace.delayed(channel) for channel in channels)
+        given = read_traces(Path(source), design.datapath.inputs, design.spec.sample_rate, len(channels))
+        return given if len(given) == len(channels) else tuple(given[0].delayed(k) for k in channels)
     bench = bench_of(design)  # an unknown scenario is refused there, with a list of those that fit
     return tuple(emulate(source, bench, seed=seed + k, seconds=seconds).delayed(k) for k in channels)
 

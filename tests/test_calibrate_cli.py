@@ -6,6 +6,7 @@ import json
 import re
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import pytest
 from click.testing import CliRunner, Result
@@ -16,6 +17,8 @@ from sosmith.gen.core import design_core
 from sosmith.gen.specification import example, load
 from sosmith.model.calibration import fit, read_measurements
 from sosmith.model.errors import ShortfallError, SpecificationError
+from sosmith.model.measurement_store import open_store
+from sosmith.model.self_updating import Addition, add, refused_first_file
 from tests.model.measuring import readings, write_csv
 
 DAY = ("--date", "2024-03-01")
@@ -91,6 +94,39 @@ def test_bad_rows_are_listed_and_only_kept_out_on_request() -> None:
     assert (listed["kept"], len(listed["refused"]), listed["calibration"]) == (0, 26, None)
     note = good("add", "a.csv", "--keep-good", *DAY).stderr
     assert "sosmith: kept 60 measurements of a.csv in calibration.db, 26 rows left out\n" in note
+
+
+def test_a_refused_first_file_leaves_no_store() -> None:
+    Path("bad.csv").write_text(Path("a.csv").read_text() + "1,2 V,20\n")
+    Path("header.csv").write_text("mm,voltage_V,temperature_C\n1,2,20\n")
+    refused("bad.csv: every row must be right, or left out with --keep-good, not 1 of 61 refused", "add", "bad.csv")
+    for arguments in (("header.csv",), ("none.csv",), ("a.csv", "--sensor", ""), ("a.csv", "--date", "today")):
+        assert isinstance(run("add", *arguments).exception, SpecificationError)
+    assert not Path("calibration.db").exists()
+    good("add", "bad.csv", "--keep-good")
+    with open_store(Path("calibration.db")) as opened:
+        assert len(opened.measurements("sensor")) == 60
+
+
+def test_a_store_that_another_process_makes_meanwhile_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The file is read before the store is opened, and checked against it again once it is."""
+
+    def meanwhile(*arguments: Any, **options: Any) -> Addition | None:
+        with open_store(Path("calibration.db"), create=True) as opened:
+            add(opened, "sensor", Path("a.csv"), "2024-03-01")
+        return refused_first_file(*arguments, **options)
+
+    monkeypatch.setattr("sosmith.commands.calibrate.refused_first_file", meanwhile)
+    refused("a.csv must be a file of new measurements, not what was added as a.csv", "add", "a.csv")
+    Path("calibration.db").unlink()
+    good("add", "b.csv")
+    with open_store(Path("calibration.db")) as opened:
+        assert len(opened.measurements("sensor")) == 120
+    Path("calibration.db").unlink()
+    Path("b.csv").write_text("1,2,3\n")
+    assert isinstance(run("add", "b.csv").exception, SpecificationError)
+    with open_store(Path("calibration.db")) as opened:
+        assert len(opened.measurements("sensor")) == 60
 
 
 def test_one_of_them_is_no_plural() -> None:

@@ -98,14 +98,6 @@ def test_the_list_tells_about_files(folder: Path) -> None:
             "--seconds must come with a scenario's name, not with --measurements",
         ),
         (
-            ("emulate", "spec.toml", "depot.toml", "--measurements", "--channel", "1"),
-            "--channel must come with a trace, not with --measurements",
-        ),
-        (
-            ("emulate", "spec.toml", "day.toml", "--channel", "1"),
-            "--channel must be below 1, the count of channels, not 1",
-        ),
-        (
             ("emulate", "spec.toml", "--measurements"),
             "--measurements must come with a scenario file (TOML), not without one",
         ),
@@ -145,10 +137,6 @@ def test_every_channel_has_noise_of_its_own_and_its_own_wear(folder: Path) -> No
     (folder / "two.toml").write_text(two, encoding="utf-8")
     clearances = [trace.truth for trace in traces_for(made, "two.toml", seed=1)]
     assert [float(truth[-1]) for truth in clearances if truth is not None] == [3.0, 4.0]
-    for k, clearance in enumerate(("3.0", "4.0")):
-        written = run("emulate", "spec.toml", "two.toml", "--channel", str(k), "-o", f"{k}.csv")
-        assert written.exit_code == 0
-        assert (folder / f"{k}.csv").read_text().splitlines()[-1].split(",")[-2] == clearance
 
 
 @pytest.mark.slow
@@ -184,3 +172,26 @@ def test_the_vehicles_motion_reaches_the_trace(folder: Path) -> None:
     # Noise and truth are the same, so that the voltages differ by the motion alone, at some 1.3 V/mm.
     assert np.corrcoef(difference, motion)[0, 1] > 0.98
     assert np.std(difference) > 0.2
+
+
+def test_a_trace_of_several_channels_is_run_as_it_was_written(folder: Path) -> None:
+    spec = INSTRUMENT.replace("[input.voltage]", "channels = 3\n[input.voltage]", 1)
+    (folder / "spec.toml").write_text(spec, encoding="utf-8")
+    written = run("emulate", "spec.toml", "day.toml", "--seed", "3", "-o", "day.csv")
+    assert re.search(r"wrote day.csv: \d+ samples of each of 3 channels at [\d.]+ Hz\n", written.stderr)
+    made = design_core(load(folder / "spec.toml"))
+    given, again = traces_for(made, "day.toml", seed=3), traces_for(made, "day.csv", seed=1)
+    assert len(given) == len(again) == 3
+    for one, other in zip(given, again, strict=True):
+        assert np.array_equal(one.codes, other.codes)
+        assert one.truth is not None
+        assert np.array_equal(one.truth, np.array(other.truth))
+
+
+def test_a_trace_without_channels_goes_to_all_of_them(folder: Path) -> None:
+    assert run("emulate", "spec.toml", "day.toml", "-o", "day.csv").exit_code == 0
+    spec = INSTRUMENT.replace("[input.voltage]", "channels = 3\n[input.voltage]", 1)
+    (folder / "spec.toml").write_text(spec, encoding="utf-8")
+    first, second, third = traces_for(design_core(load(folder / "spec.toml")), "day.csv", seed=1)
+    assert np.array_equal(first.codes[:-1], second.codes[1:])
+    assert np.array_equal(first.codes[:-2], third.codes[2:])

@@ -27,8 +27,7 @@ from sosmith.gen.paper_difference_equation import section_filters, step_response
 from sosmith.gen.paper_document import markdown, paper_parts
 from sosmith.gen.paper_regression import polynomial_of, scatter, voltage_for
 from sosmith.gen.paper_seventh_order import proper_cutoff
-from sosmith.gen.paper_vehicle import SimulatedRun, printed_rows, vehicle_parts
-from sosmith.gen.paper_vehicle_run import run_of_ours, simulated
+from sosmith.gen.paper_vehicle import run_of_ours
 from sosmith.gen.response import group_delay
 from sosmith.gen.specification import example, load
 from sosmith.model.accuracy import accuracy_percent
@@ -257,22 +256,23 @@ def _changed(value: Any) -> Any:
     return value + 1 if isinstance(value, int) else value * Decimal("1.01")
 
 
-def test_the_vehicle_has_a_figure_for_each_printed_one() -> None:
-    printed = {quantity: value for number in (5, 6, 7, 8) for quantity, _, value in printed_rows(FIGURES, number)}
+def test_the_vehicle_has_a_figure_for_each_printed_one(parts: dict[str, Part]) -> None:
+    for number, motions in ((5, ("vertical",)), (6, ("lateral",)), (7, ("yaw",)), (8, ("vertical", "lateral", "yaw"))):
+        part, name = parts[f"Table {number}"], f"table_{number}"
+        if number == 8:
+            printed = [value for motion in motions for value in FIGURES.numbers(name, motion)]
+        else:
+            printed = [value for motion in motions for row in FIGURES.rows(name, motion) for value in row]
+        printed += [FIGURES.number(name, "frame")] if number == 5 else []
+        simulated = part.comparisons[-len(printed) :]
+        assert sorted(one.printed for one in simulated if one.printed is not None) == sorted(printed)
+        assert all(one.ours is not None for one in simulated)
+
+
+def test_the_command_and_the_document_label_the_vehicle_alike(parts: dict[str, Part]) -> None:
+    """One rule and one place: `sosmith vehicle` shows the rows of the document."""
     rows = run_of_ours().comparison
-    assert {row.what: Decimal(str(row.paper)) for row in rows} == printed
-    assert {row.what: row.ours for row in rows} == {name: one.value for name, one in simulated().rows.items()}
-
-
-def test_what_is_not_the_same_quantity_is_not_compared(parts: dict[str, Part]) -> None:
-    for title in ("Table 5", "Table 6", "Table 7", "Table 8"):
-        for comparison in parts[title].comparisons:
-            row = simulated().rows.get(comparison.quantity)
-            if row is not None:
-                assert (comparison.label == NOT_COMPARABLE) == (not row.same_quantity)
-                assert (float(comparison.ours or 0), comparison.note) == (row.value, row.why)
-
-
-def test_without_a_run_tables_5_to_8_are_not_comparable() -> None:
-    parts = {part.title: part for part in vehicle_parts(FIGURES, SimulatedRun(rows={}, remarks=()))}
-    assert labels(parts["Table 5"]) == labels(parts["Table 7"]) == {NOT_COMPARABLE}
+    for number, comparisons in rows.items():
+        assert parts[f"Table {number}"].comparisons[-len(comparisons) :] == comparisons
+    assert {one.label for one in (*rows[5], *rows[7])} == {DIFFERS}
+    assert {one.label for one in (*rows[6], *rows[8])} == {NOT_COMPARABLE}

@@ -22,7 +22,7 @@ from sosmith.gen.specification import FilterSpec
 from sosmith.model.errors import ShortfallError
 from sosmith.model.golden import calibrated, filtered
 from sosmith.model.port import Port
-from sosmith.model.scenarios import sign_matched
+from sosmith.model.worst_case_inputs import sign_matched
 
 RANDOM_SAMPLES = 1_000_000
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +11,9 @@ from tests.model.measuring import as_arrays, readings
 
 from sosmith.model.calibration import Measurements, fit, residuals, terms_of
 from sosmith.model.covered_region import CoveredRegion
+from sosmith.model.errors import SpecificationError
 from sosmith.model.fit_quality import assess
+from sosmith.model.least_squares import Solution, Sums
 from sosmith.model.polynomial import EQUATION_5A, Polynomial
 
 
@@ -116,3 +119,49 @@ def test_a_robust_fit_to_data_without_scatter_ends() -> None:
     data = as_arrays(readings(50, scatter=0.0))
     exact = replace(data, clearance=EQUATION_5A(data.voltage, data.temperature))
     assert fit(exact, 0.9999999, robust=True).weights == (1.0,) * 50
+
+
+def weighted_to_the_end(data: Measurements, orders: tuple[int, int]) -> tuple[Solution, int]:
+    """Carry every round of weighting out; returns the solution, and how often weights came again before the end."""
+    weights, seen, again = np.ones(len(data)), set(), 0
+    for number in range(1, 26):
+        solution = Sums(data.clearance, data.voltage, data.temperature, weights).solve(terms_of(orders))
+        assert solution is not None
+        off = np.abs(residuals(data, solution.polynomial))
+        allowed = 1.345 * max(1.4826 * float(np.median(off)), 1e-6)
+        before = weights
+        weights = np.maximum(np.rint(allowed / np.maximum(off, allowed) * 1024), 1) / 1024
+        if np.array_equal(weights, before) or number == 25:
+            break
+        again += weights.tobytes() in seen
+        seen.add(weights.tobytes())
+    return solution, again
+
+
+def test_weights_that_come_again_end_where_all_rounds_would() -> None:
+    turned = 0
+    for seed in range(4):
+        generator = np.random.default_rng(seed)
+        V, T = np.round(generator.uniform(0, 10, 200), 3), np.round(generator.uniform(20, 98, 200), 1)
+        data = Measurements(np.round(np.abs(2 + 0.8 * V + 0.5 * generator.standard_t(1, 200)), 3), V, T)
+        expected, again = weighted_to_the_end(data, (1, 1))
+        turned += again > 0
+        made = fit(data, 0, robust=True)
+        assert made.polynomial == expected.polynomial
+        unexplained = (expected.residual_squares / 197) / (expected.total_squares / 199)
+        assert made.adjusted_r_squared == 1 - float(unexplained)
+    assert turned == 2
+
+
+@pytest.mark.slow
+def test_10000_measurements_that_no_robust_fit_satisfies_take_seconds() -> None:
+    start = time.process_time()
+    with pytest.raises(SpecificationError, match=r"^measurements: adjusted r must reach 0\.9999 "):
+        fit(as_arrays(readings(10_000, scatter=0.3)), 0.9999, robust=True)
+    assert time.process_time() - start < 5
+
+
+def test_progress_tells_how_many_orders_were_tried() -> None:
+    told: list[tuple[int, int]] = []
+    fit(as_arrays(readings(50)), 0.999, progress=lambda tried, count: told.append((tried, count)))
+    assert told == [(0, 36), (1, 36)]

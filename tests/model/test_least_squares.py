@@ -69,3 +69,16 @@ def test_dependent_terms_are_not_determined() -> None:
     d, V, _ = np.array(readings(50)).T
     assert Sums(d, V, 20 + 8.1 * V).solve(terms_of((1, 1))) is None  # but for rounding, on a line
     assert Sums(d, V, 20 + 8.1 * V + 1e-6 * (V - 5) ** 2).solve(terms_of((1, 1))) is not None
+
+
+def test_other_weights_give_what_they_give_from_the_start() -> None:
+    d, V, T = np.array(readings(60)).T
+    first, second = (np.random.default_rng(seed).integers(1, 1025, 60) / 1024 for seed in (1, 2))
+    second[::2] = first[::2]
+    third = np.where(np.arange(60) < 5, second / 3, second)  # not on the grid of the others
+    sums = Sums(d, V, T)
+    for weights in (first, second, third, third, np.ones(60)):
+        sums = sums.reweighted(weights)
+        for orders in ((1, 1), (4, 3)):  # the second asks for sums that no turn before was asked for
+            if orders == (1, 1) or weights is third:
+                assert sums.solve(terms_of(orders)) == Sums(d, V, T, weights).solve(terms_of(orders))

@@ -13,10 +13,11 @@ from tests.model.scenario_texts import FAULT, PLAIN
 
 from sosmith.model.errors import SpecificationError
 from sosmith.model.inductive_sensor import sensor_voltage
+from sosmith.model.instrument_signals import TABLE_1_STEPS, TABLE_2_STEPS
 from sosmith.model.polynomial import EQUATION_5A
 from sosmith.model.port import Port, Values
 from sosmith.model.scenario_file import ScenarioFile, emulate_file, load_scenario, range_notes
-from sosmith.model.scenarios import TABLE_1_STEPS, TABLE_2_STEPS, Bench
+from sosmith.model.scenario_run import Bench
 from sosmith.model.trace import Trace
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples" / "scenarios").glob("*.toml"))

@@ -14,17 +14,11 @@ from scipy import signal
 from sosmith.model.accuracy import accuracy_percent
 from sosmith.model.errors import SpecificationError
 from sosmith.model.inductive_sensor import VOLTAGE_NOISE
+from sosmith.model.instrument_signals import TABLE_1_STEPS, TABLE_2_STEPS
 from sosmith.model.polynomial import EQUATION_5A, Polynomial
 from sosmith.model.port import Port, Values
-from sosmith.model.scenarios import (
-    LEAST_SAMPLES,
-    MOST_SAMPLES,
-    SCENARIOS,
-    TABLE_1_STEPS,
-    TABLE_2_STEPS,
-    Bench,
-    emulate,
-)
+from sosmith.model.scenario_run import LEAST_SAMPLES, MOST_SAMPLES, Bench
+from sosmith.model.scenarios import SCENARIOS, emulate
 from sosmith.model.trace import Trace
 
 VOLTAGE = Port.from_range("voltage", 16, Fraction(0), Fraction(10), unit="V")

@@ -87,6 +87,12 @@ def test_columns_can_be_chosen(tmp_path: Path) -> None:
             ": column must end in its unit (_mm, _um, _m, _V, _mV, _C, _degC, _rad, _mrad, _deg) or be chosen by "
             "--column, not 'speed'",
         ),
+        (
+            "time_s,channel,a_mm",
+            lambda k: f"{k},0,1",
+            100,
+            " must hold a trace of one channel, not have the column channel",
+        ),
         ("time_s,a_mm,reading", lambda k: f"{k},1,2", 100, ", line 2: reading must be 0 or 1, not 2"),
     ],
 )

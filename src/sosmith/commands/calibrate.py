@@ -10,7 +10,7 @@ from typing import Any
 import click
 from rich.markup import escape
 
-from sosmith.gen.calibration_plot import FORMATS, calibration_plot
+from sosmith.gen.calibration_plot import calibration_plot
 from sosmith.gen.calibration_report import (
     CALLED_OUT,
     addition_json,
@@ -19,12 +19,13 @@ from sosmith.gen.calibration_report import (
     specification_table,
     version_json,
 )
+from sosmith.gen.picture import FORMATS
 from sosmith.model.calibration import REQUIRED_R, terms_of
 from sosmith.model.errors import ShortfallError, SpecificationError
 from sosmith.model.fit_quality import CELLS
 from sosmith.model.measurement_files import DEFAULT_RANGES, Range, Refusal, parse_date
 from sosmith.model.measurement_store import Version, open_store
-from sosmith.model.self_updating import Calibration, add, calibration_of, find_version, refit
+from sosmith.model.self_updating import Calibration, add, calibration_of, find_version, refit, refused_first_file
 from sosmith.model.text_files import write_contents, write_files
 from sosmith.terminal import (
     JSON_OPTION,
@@ -145,10 +146,22 @@ def add_command(
     ranges = (clearance_range, voltage_range, temperature_range)
     with show_progress() as step:
         step(f"adding {file}")
-        with open_store(store, create=True) as opened:
-            addition = add(
-                opened, sensor, file, date, ranges=ranges, keep_good=keep_good, required_r=required_r, robust=robust
-            )
+        addition = None
+        if not store.exists():
+            addition = refused_first_file(sensor, file, date, ranges=ranges, keep_good=keep_good)
+        if addition is None:
+            with open_store(store, create=True) as opened:
+                addition = add(
+                    opened,
+                    sensor,
+                    file,
+                    date,
+                    ranges=ranges,
+                    keep_good=keep_good,
+                    required_r=required_r,
+                    robust=robust,
+                    progress=lambda tried, count: step("fitting", tried, count),
+                )
     if as_json:
         print_json(addition_json(addition))
     refusals, good = addition.file.refusals, len(addition.file.readings)
@@ -180,7 +193,14 @@ def fit_command(store: Path, sensor: str, date: str, required_r: float, robust: 
     """
     with show_progress() as step, open_store(store) as opened:
         step(f"fitting {sensor}")
-        made = refit(opened, sensor, date, required_r=required_r, robust=robust)
+        made = refit(
+            opened,
+            sensor,
+            date,
+            required_r=required_r,
+            robust=robust,
+            progress=lambda tried, count: step(f"fitting {sensor}", tried, count),
+        )
     if as_json:
         print_json(calibration_json(made))
     else:

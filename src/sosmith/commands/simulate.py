@@ -31,6 +31,7 @@ from sosmith.model.errors import SpecificationError
 from sosmith.model.scenario_file import load_scenario
 from sosmith.model.scenarios import SCENARIOS
 from sosmith.model.text_files import write_files
+from sosmith.model.trace_file import traces_csv, write_traces
 from sosmith.sim.simulation import bench_of, default_scenario, is_scenario_file, notes_on, simulate, traces_for
 from sosmith.terminal import (
     JSON_OPTION,
@@ -159,13 +160,6 @@ def simulate_command(
     is_flag=True,
     help="Write the depot's measurements of FILE.toml instead, for `sosmith calibrate add`.",
 )
-@click.option(
-    "--channel",
-    type=click.IntRange(min=0),
-    default=0,
-    show_default=True,
-    help="Channel of SPEC, each of which has its own noise and wear.",
-)
 @SEED
 @output_option("CSV file to write.  [default: stdout]")
 def emulate_command(
@@ -174,11 +168,12 @@ def emulate_command(
     core: str | None,
     seconds: float | None,
     measurements: bool,
-    channel: int,
     seed: int,
     output: Path | None,
 ) -> None:
     """Write an emulated sensor trace for SPEC as CSV; without SCENARIO, list the scenarios that fit.
+
+    A core with several channels gets the rows of all of them, by the column channel.
 
     A scenario is a built-in one by name, or a file that describes days of operation: examples/scenarios/ holds some,
     and docs/sensors.md says what can be in them.
@@ -186,8 +181,6 @@ def emulate_command(
     if measurements:
         if seconds is not None:
             raise SpecificationError("--seconds must come with a scenario's name, not with --measurements")
-        if channel:
-            raise SpecificationError("--channel must come with a trace, not with --measurements")
         _write_measurements(spec, scenario, seed, output)
         return
     with show_progress() as step:
@@ -197,16 +190,14 @@ def emulate_command(
             return
         step(f"emulating {scenario}")
         traces = traces_for(made, _known_scenario(made, scenario), seed=seed, seconds=seconds)
-        if channel >= len(traces):
-            raise SpecificationError(f"--channel must be below {len(traces)}, the count of channels, not {channel}")
-        trace = traces[channel]
         notes = notes_on(made, scenario)
         if output is not None:
-            trace.write_csv(output)
+            write_traces(output, traces)
     if output is None:
-        click.echo(trace.to_csv(), nl=False)
+        click.echo(traces_csv(traces), nl=False)
     else:
-        note(f"wrote {output}: {len(trace)} samples at {float(trace.sample_rate):g} Hz")
+        channels = f" of each of {len(traces)} channels" if len(traces) > 1 else ""
+        note(f"wrote {output}: {len(traces[0])} samples{channels} at {float(traces[0].sample_rate):g} Hz")
     for sentence in notes:
         note(f"note: {sentence}")
 

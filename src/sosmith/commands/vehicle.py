@@ -7,7 +7,8 @@ from pathlib import Path
 import click
 from rich.table import Table
 
-from sosmith.gen.vehicle_plot import FORMATS, vehicle_plot
+from sosmith.gen.picture import FORMATS
+from sosmith.gen.vehicle_plot import vehicle_plot
 from sosmith.gen.vehicle_report import TRACKS, VehicleRun, largest, vehicle_csv, vehicle_json, vehicle_run
 from sosmith.model.errors import SpecificationError
 from sosmith.model.linear_motion import Mode
@@ -177,11 +178,12 @@ def _bodies_table(made: VehicleRun) -> Table:
 
 def _comparison_table(made: VehicleRun) -> Table:
     """Figures of the paper and ours, and below them the reasons."""
-    reasons = list(dict.fromkeys(row.why for row in made.comparison))
+    reasons = list(dict.fromkeys(one.explanation for rows in made.comparison.values() for one in rows))
     table = new_table("Beside the paper's tables 5 to 8", ["table", "", "unit", "paper", "ours", "label", "why"])
-    for row in made.comparison:
-        number = str(reasons.index(row.why) + 1)
-        table.add_row(row.table, row.what, row.unit, f"{row.paper:.4g}", f"{row.ours:.4g}", row.label, number)
+    for number, rows in made.comparison.items():
+        for one in rows:
+            why = str(reasons.index(one.explanation) + 1)
+            table.add_row(str(number), one.quantity, one.unit, one.shown_printed, one.shown, one.label, why)
     table.caption = "\n".join(f"{number}: {reason}" for number, reason in enumerate(reasons, start=1))
     table.caption_justify = "left"
     return table

@@ -9,7 +9,7 @@ from typing import Any
 import click
 from rich.markup import escape
 
-from sosmith.gen.calibration_plot import FORMATS
+from sosmith.gen.picture import FORMATS
 from sosmith.gen.specification import load
 from sosmith.gen.wear_plot import wear_plot
 from sosmith.model.errors import SpecificationError
