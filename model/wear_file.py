@@ -9,10 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
-from sosmith.model.csv_table import check_rows, csv_header, read_csv_table
+from sosmith.model.csv_table import CsvTable, check_rows, csv_header, read_csv_table
 from sosmith.model.errors import SpecificationError
 from sosmith.model.port import Values
 from sosmith.model.signal_file import unit_of
+from sosmith.model.trace_file import CHANNEL
 
 SECONDS_A_DAY = 86400.0
 
@@ -41,6 +42,8 @@ class WearRecord:
         mm.
     dated : bool
         Whether the file has dates.
+    channels : bool
+        Whether the file tells channels apart.
     """
 
     path: Path
@@ -48,6 +51,7 @@ class WearRecord:
     time: Values
     clearance: Values
     dated: bool
+    channels: bool
 
 
 def parse_moment(text: str) -> float:
@@ -78,7 +82,7 @@ def moment_text(days: float) -> str:
     return moment.strftime("%Y-%m-%d %H:%M")
 
 
-def read_wear_record(path: Path, column: str | None = None) -> WearRecord:
+def read_wear_record(path: Path, column: str | None = None, channel: int = 0) -> WearRecord:
     """Read a CSV file with one column of times and one of clearances; other columns do not matter.
 
     Parameters
@@ -87,12 +91,14 @@ def read_wear_record(path: Path, column: str | None = None) -> WearRecord:
         The file, UTF-8.
     column : str, optional
         Column of the clearance in mm; without it the first of `CLEARANCES` that is there.
+    channel : int
+        Channel whose rows count in a file with the column channel; in any other all count.
 
     Raises
     ------
     SpecificationError
-        As `read_csv_table`; if there is no such column, its name ends in another unit, or times go back. One sentence
-        with the file and the line.
+        As `read_csv_table`; if there is no such column, its name ends in another unit, or times go back; if no row is
+        of the channel. One sentence with the file and the line.
     """
     header = csv_header(path)
     time_column = _first(path, header, ("time_s", *TIMES), "a column of times")
@@ -104,9 +110,9 @@ def read_wear_record(path: Path, column: str | None = None) -> WearRecord:
     unit, factor = unit_of(clearance_column)
     if unit and (unit, factor) != ("mm", 1.0):
         raise SpecificationError(f"{path}: the column of clearances must be in mm, not {clearance_column}")
-    ignored = {name: _nothing for name in header if name not in {time_column, clearance_column}}
+    ignored = {name: _nothing for name in header if name not in {time_column, clearance_column, CHANNEL}}
     readers = ignored | ({time_column: parse_moment} if time_column == "date" else {})
-    table = read_csv_table(path, header, readers=readers)
+    table = _rows_of(read_csv_table(path, header, readers=readers), channel)
     raw = table.column(time_column)
     check_rows(
         table,
@@ -119,7 +125,19 @@ def read_wear_record(path: Path, column: str | None = None) -> WearRecord:
         time=raw / SECONDS_A_DAY if time_column == "time_s" else raw * TIMES[time_column],
         clearance=table.column(clearance_column),
         dated=time_column == "date",
+        channels=CHANNEL in header,
     )
+
+
+def _rows_of(table: CsvTable, channel: int) -> CsvTable:
+    if CHANNEL not in table:
+        return table
+    own = table.column(CHANNEL) == channel
+    if not own.any():
+        others = ", ".join(f"{other:g}" for other in np.unique(table.column(CHANNEL))[:8])
+        raise SpecificationError(f"{table.path} must have rows of channel {channel}, not only of {others}")
+    lines = tuple(line for line, kept in zip(table.lines, own, strict=True) if kept)
+    return CsvTable(table.path, table.header, table.values[own], lines)
 
 
 def _first(path: Path, header: Sequence[str], names: Sequence[str], what: str) -> str:

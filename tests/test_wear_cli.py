@@ -99,7 +99,18 @@ def test_limits_of_all_channels_hold_for_each() -> None:
     assert first == second
     refused("all.toml: channel must be below 2, the count of channels, not 2", "days.csv", "--spec", "all.toml",
             "--channel", "2")  # fmt: skip
-    refused("--channel must come with --spec, not without it", "days.csv", *LIMITS, "--channel", "1")
+    refused("--channel must come with --spec or with a column channel, not without both", "days.csv", *LIMITS,
+            "--channel", "1")  # fmt: skip
+
+
+def test_the_channels_of_a_record_are_told_apart() -> None:
+    rows = [f"{day},{channel},{1.5 + (channel + 1) * 0.1 * day:.6g}" for day in range(20) for channel in (0, 1)]
+    Path("two.csv").write_text("\n".join(["days,channel,clearance_mm", *rows]) + "\n")
+    for channel in (0, 1):
+        tree = json.loads(good("two.csv", *LIMITS, "--channel", str(channel), "--json").stdout)
+        assert tree["samples"] == 20
+        assert tree["rate_mm_per_day"]["value"] == pytest.approx(0.1 * (channel + 1))
+    refused("two.csv must have rows of channel 2, not only of 0, 1", "two.csv", *LIMITS, "--channel", "2")
 
 
 def test_a_specification_in_another_unit_is_refused() -> None:

@@ -40,7 +40,13 @@ flags of wear make.
 @click.option(
     "--spec", type=click.Path(path_type=Path), metavar="SPEC", help="Take all four from [wear] of this specification."
 )
-@click.option("--channel", type=click.IntRange(min=0), default=0, show_default=True, help="Channel of SPEC.")
+@click.option(
+    "--channel",
+    type=click.IntRange(min=0),
+    default=0,
+    show_default=True,
+    help="Channel of SPEC, and of TRACE.csv if it has the column channel.",
+)
 @click.option("--column", help="Column of the clearance.")
 @click.option("--block", type=float, help="Days whose readings count as one.  [default: 1, less in a short record]")
 @click.option("--window", type=float, help="Take the rate from so many days at the end.  [default: all]")
@@ -71,13 +77,13 @@ def wear_command(
         limits = _limits_of(spec, channel)
     elif initial is None or limit is None:
         raise SpecificationError("the limits must be given by --initial and --limit, or by --spec, not left out")
-    elif channel:
-        raise SpecificationError("--channel must come with --spec, not without it")
     else:
         limits = WearLimits(initial=initial, limit=limit, warning=warning, sensor_range=sensor_range)
     with show_progress() as step:
         step(f"reading {trace}")
-        record = read_wear_record(trace, column)
+        record = read_wear_record(trace, column, channel)
+        if channel and spec is None and not record.channels:
+            raise SpecificationError("--channel must come with --spec or with a column channel, not without both")
         step("rate of wear")
         report = judge(record.time, record.clearance, limits, block=block, window=window, confidence=confidence)
         drawn = None
