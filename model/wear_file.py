@@ -92,8 +92,8 @@ def read_wear_record(path: Path, column: str | None = None) -> WearRecord:
     Raises
     ------
     SpecificationError
-        As `read_csv_table`; if there are several channels, no such column, its name ends in another unit, or times go back. One sentence
-        with the file and the line.
+        As `read_csv_table`; if there are several channels or no such column, its name ends in another unit, or times
+        go back. One sentence with the file and the line.
     """
     header = csv_header(path)
     if CHANNEL in header:
