@@ -110,6 +110,7 @@ def test_the_channels_of_a_record_are_told_apart() -> None:
         tree = json.loads(good("two.csv", *LIMITS, "--channel", str(channel), "--json").stdout)
         assert tree["samples"] == 20
         assert tree["rate_mm_per_day"]["value"] == pytest.approx(0.1 * (channel + 1))
+    assert "20 readings of channel 0 over 19 days" in good("two.csv", *LIMITS).stdout
     refused("two.csv must have rows of channel 2, not only of 0, 1", "two.csv", *LIMITS, "--channel", "2")
 
 

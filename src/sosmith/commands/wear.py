@@ -93,7 +93,7 @@ def wear_command(
     if as_json:
         print_json(_json(record, report))
     else:
-        _print(record, report)
+        _print(record, report, channel)
     if plot is not None and drawn is not None:
         write_contents(plot.parent, {plot.name: drawn})
         note(f"wrote {plot}")
@@ -148,10 +148,11 @@ def _json(record: WearRecord, report: WearReport) -> dict[str, Any]:
     }
 
 
-def _print(record: WearRecord, report: WearReport) -> None:
+def _print(record: WearRecord, report: WearReport, channel: int) -> None:
     rate, limits = report.rate, report.limits
     table = new_table(f"Wear by {escape(record.path.name)}: {report.state}", ["", ""])
-    table.add_row("record", f"{report.samples:,} readings over {report.duration:.4g} days")
+    of_channel = f" of channel {channel}" if record.channels else ""
+    table.add_row("record", f"{report.samples:,} readings{of_channel} over {report.duration:.4g} days")
     table.add_row(
         "clearance",
         f"{report.clearance:.4g} mm, the median of the last {_length(rate.block)} ({limits.initial:g} mm new)",
