@@ -2,34 +2,19 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from sosmith.gen.picture import picture
 from sosmith.model.fit_quality import HIGH_LEVERAGE
 from sosmith.model.measurement_store import Version
 from sosmith.model.self_updating import Calibration
 
-FORMATS = ("svg", "png")
-
 _BLUE, _RED, _GREY = "#2563a8", "#b4432f", "#8a8a8a"
-_STYLE = {
-    "svg.fonttype": "none",
-    "svg.hashsalt": "calibration",
-    "font.family": "DejaVu Sans",
-    "font.size": 9.0,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "grid.color": "#e2e2e2",
-    "text.parse_math": False,  # a dollar sign in a name is a dollar sign
-}
 
 
 def calibration_plot(made: Calibration, versions: Sequence[Version], file_format: str) -> bytes:
@@ -42,10 +27,10 @@ def calibration_plot(made: Calibration, versions: Sequence[Version], file_format
     versions : sequence of Version
         All versions up to it.
     file_format : str
-        One of `FORMATS`.
+        One of `sosmith.gen.picture.FORMATS`.
     """
-    with mpl.rc_context(_STYLE):  # type: ignore[arg-type]
-        figure = Figure(figsize=(11, 8), dpi=110, layout="constrained")
+
+    def paint(figure: Figure) -> None:
         axes = figure.subplots(2, 2)
         version = made.version
         figure.suptitle(f"Sensor {made.sensor}, version {version.number} of {version.date}")
@@ -53,9 +38,8 @@ def calibration_plot(made: Calibration, versions: Sequence[Version], file_format
         _draw_residuals(axes[0, 1], made)
         _draw_leverage(axes[1, 0], made)
         _draw_history(axes[1, 1], versions)
-        stream = io.BytesIO()
-        figure.savefig(stream, format=file_format, metadata={"Date": None} if file_format == "svg" else {})
-        return stream.getvalue()
+
+    return picture("calibration", (11, 8), paint, file_format)
 
 
 def _draw_coverage(figure: Figure, axes: Axes, made: Calibration) -> None:

@@ -334,9 +334,9 @@ def _brief(rms: float, wish: Wish) -> str:
     return f"{rms:.3g}" if rms > 1e-9 * wish.tolerance else "0"
 
 
-def _up(value: float) -> float:
-    """Round up to five digits: the number in the file is the number that was used."""
-    return float(Context(prec=5, rounding=ROUND_CEILING).create_decimal_from_float(value))
+def _up(value: float, digits: int = 5) -> float:
+    """Round up to so many digits."""
+    return float(Context(prec=digits, rounding=ROUND_CEILING).create_decimal_from_float(value))
 
 
 def _down(value: float) -> float:
@@ -345,7 +345,7 @@ def _down(value: float) -> float:
 
 
 def _too_tight(contents: Sequence[Content], wish: Wish, sample_rate: float) -> ShortfallError:
-    """Say which tolerance would do, to two digits."""
+    """Say which tolerance would do, to three digits."""
 
     def feasible(tolerance: float) -> bool:
         asked = replace(wish, tolerance=tolerance)
@@ -354,13 +354,13 @@ def _too_tight(contents: Sequence[Content], wish: Wish, sample_rate: float) -> S
         return _best(contents, asked, sample_rate, _pass_edge(contents, asked, sample_rate)) is not None
 
     low, high = wish.tolerance, 2 * wish.tolerance
-    while not feasible(high) and high < 1e6 * wish.tolerance:
+    while not feasible(high):  # it is in the end: without a filter, where the disturbance is within the tolerance
         low, high = high, 2 * high
     while high > 1.01 * low:
         middle = math.sqrt(low * high)
         low, high = (low, middle) if feasible(middle) else (middle, high)
     advice = "; a true signal with steps takes a --passband that gives up their edges" if wish.passband is None else ""
     return ShortfallError(
-        f"tolerance must be at least about {_up(high):.2g} for a Butterworth low-pass of order {MAX_ORDER} at most, "
+        f"tolerance must be at least about {_up(high, 3):g} for a Butterworth low-pass of order {MAX_ORDER} at most, "
         f"not {wish.tolerance:g}, as the disturbance comes too close to what is to pass{advice}"
     )

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Callable
 from fractions import Fraction
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -24,21 +22,11 @@ from sosmith.gen.paper_seventh_order import (
     stated_cutoff,
     table_9_filter,
 )
+from sosmith.gen.picture import picture
 from sosmith.model.paper_figures import PaperFigures
 
 _BLUE, _RED, _GREEN, _GREY = "#2563a8", "#b4432f", "#2f8a57", "#8a8a8a"
 _COLOURS = (_BLUE, _RED, _GREEN)
-_STYLE = {
-    "svg.fonttype": "none",
-    "svg.hashsalt": "paper",
-    "font.family": "DejaVu Sans",
-    "font.size": 9.0,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "grid.color": "#e2e2e2",
-}
 
 Digital = tuple[Coefficients, Coefficients]
 
@@ -54,12 +42,7 @@ def plots(figures: PaperFigures) -> dict[str, str]:
 
 
 def _draw(paint: Callable[[Figure], None], height: float = 3.4) -> str:
-    with mpl.rc_context(_STYLE):  # type: ignore[arg-type]
-        figure = Figure(figsize=(9, height), layout="constrained")
-        paint(figure)
-        stream = io.StringIO()
-        figure.savefig(stream, format="svg", metadata={"Date": None})
-    return "\n".join(line.rstrip() for line in stream.getvalue().splitlines()) + "\n"
+    return picture("paper", (9, height), paint, style={"text.parse_math": True}).decode()
 
 
 def _errors(figure: Figure, figures: PaperFigures) -> None:

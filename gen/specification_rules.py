@@ -276,7 +276,7 @@ def _check_wear(document: Document) -> None:
     low, high = output.range
     last = high - (high - low) / 2**output.bits  # of the highest code
     for initial in wear.initial:
-        if initial < low:
+        if not low <= initial <= last:
             raise UnfitError(
                 f"in the range of the output, {literal(output.range)}", literal(initial), where="wear.initial"
             )

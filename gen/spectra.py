@@ -76,8 +76,11 @@ class Spectrum:
     density : ndarray
         One-sided power spectral density, U**2/Hz; 0 at zero frequency if a mean or a line was taken away. The sum
         over a band times `step` is the mean square there.
+    sides : ndarray of int
+        2 where a wave has a half at the negative frequency as well, 1 at zero and at half the sample rate.
     amplitude : ndarray
-        Amplitude of a sine wave of that frequency, U.
+        Amplitude of a sine wave of that frequency, U; at half the sample rate that of samples of alternating sign, and
+        at zero frequency the mean.
     averages : int
         Count of segments.
     degrees_of_freedom : float
@@ -88,6 +91,7 @@ class Spectrum:
 
     frequency: Array
     density: Array
+    sides: npt.NDArray[np.int64]
     amplitude: Array
     averages: int
     degrees_of_freedom: float
@@ -141,6 +145,8 @@ def spectrum(values: Array, sample_rate: float, settings: SpectrumSettings) -> S
     common = {"fs": sample_rate, "window": settings.window, "nperseg": length, "noverlap": overlap, "detrend": detrend}
     frequency, density = signal.welch(values, scaling="density", **common)
     _, power = signal.welch(values, scaling="spectrum", **common)
+    sides = np.full(len(frequency), 2)
+    sides[[0, -1] if length % 2 == 0 else [0]] = 1
     averages = 1 + (len(values) - length) // (length - overlap)
     window = signal.get_window(settings.window, length)
     freedom = degrees_of_freedom(window, length - overlap, averages)
@@ -148,7 +154,8 @@ def spectrum(values: Array, sample_rate: float, settings: SpectrumSettings) -> S
     return Spectrum(
         frequency=frequency,
         density=density,
-        amplitude=np.sqrt(2 * power),
+        sides=sides,
+        amplitude=np.sqrt(sides * power),
         averages=averages,
         degrees_of_freedom=freedom,
         lower=float(freedom / stats.chi2.ppf(1 - tail, freedom)),

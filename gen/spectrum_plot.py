@@ -2,36 +2,19 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
-from sosmith.gen.calibration_plot import FORMATS
 from sosmith.gen.filter_proposal import Proposal
+from sosmith.gen.picture import picture
 from sosmith.gen.response import magnitude_db
 from sosmith.gen.spectra import Array, Spectrum
 
-__all__ = ["FORMATS", "Curve", "spectrum_plot"]
-
-_STYLE = {
-    "svg.fonttype": "none",
-    "svg.hashsalt": "spectrum",
-    "font.family": "DejaVu Sans",
-    "font.size": 9.0,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "grid.color": "#e2e2e2",
-    "lines.linewidth": 1.1,
-    "text.parse_math": False,  # a dollar sign in a name is a dollar sign
-}
 _COLOURS = ("#2563a8", "#b4432f", "#2f8f4e", "#8a5fb0", "#c08a1e", "#4a9aa8")
 _RED, _GREY = "#b4432f", "#8a8a8a"
 _PLAIN = FuncFormatter(lambda value, _: f"{value:g}")
@@ -68,14 +51,14 @@ def spectrum_plot(curves: Sequence[Curve], proposal: Proposal | None, file_forma
     proposal : Proposal or None
         Filter whose bands are shaded in the panel of the first unit.
     file_format : str
-        One of `FORMATS`.
+        One of `sosmith.gen.picture.FORMATS`.
     """
     units = list(dict.fromkeys(curve.unit for curve in curves))
     panels = len(units) + (proposal is not None)
     lowest = min(curve.spectrum.step for curve in curves)
     highest = max(float(curve.spectrum.frequency[-1]) for curve in curves)
-    with mpl.rc_context(_STYLE):  # type: ignore[arg-type]
-        figure = Figure(figsize=(9, 1 + 3 * panels), dpi=110, layout="constrained")
+
+    def paint(figure: Figure) -> None:
         all_axes = figure.subplots(panels, 1, sharex=True, squeeze=False)[:, 0]
         for axes, unit in zip(all_axes, units, strict=False):
             _draw_density(axes, [curve for curve in curves if curve.unit == unit], unit)
@@ -85,9 +68,8 @@ def spectrum_plot(curves: Sequence[Curve], proposal: Proposal | None, file_forma
             _draw_response(all_axes[-1], proposal, lowest, highest)
         all_axes[-1].set(xscale="log", xlim=(lowest, highest), xlabel="frequency (Hz)")
         all_axes[-1].xaxis.set_major_formatter(_PLAIN)
-        stream = io.BytesIO()
-        figure.savefig(stream, format=file_format, metadata={"Date": None} if file_format == "svg" else {})
-        return stream.getvalue()
+
+    return picture("spectrum", (9, 1 + 3 * panels), paint, file_format, style={"lines.linewidth": 1.1})
 
 
 def _draw_density(axes: Axes, curves: Sequence[Curve], unit: str) -> None:

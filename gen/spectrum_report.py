@@ -21,8 +21,9 @@ PEAKS = 3
 
 def peaks(found: Spectrum, count: int = PEAKS) -> list[tuple[float, float]]:
     """Frequency (Hz) and amplitude of the largest local maxima of the amplitude spectrum, the largest first."""
-    inner = found.amplitude[1:-1]
-    local = np.flatnonzero((inner > found.amplitude[:-2]) & (inner >= found.amplitude[2:])) + 1
+    height = found.amplitude / found.sides  # of one side, so that a line at half the sample rate is a maximum there
+    after = np.append(height[2:], -np.inf)
+    local = np.flatnonzero((height[1:] > height[:-1]) & (height[1:] >= after)) + 1
     largest = sorted(local, key=lambda k: (-found.amplitude[k], k))[:count]
     return [(float(found.frequency[k]), float(found.amplitude[k])) for k in largest]
 

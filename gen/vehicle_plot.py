@@ -2,36 +2,19 @@
 
 from __future__ import annotations
 
-import io
-
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sosmith.gen.amplitude_spectrum import Array, amplitude_spectrum
+from sosmith.gen.picture import picture
 from sosmith.gen.vehicle_report import TRACKS, VehicleRun
-
-FORMATS = ("svg", "png")
 
 SMALLEST = 1e-6
 """Smallest amplitude drawn, in mm: a nanometre."""
 
 _COLOURS = ("#2563a8", "#b4432f", "#3f7f4f")
 _GREY = "#8a8a8a"
-_STYLE = {
-    "svg.fonttype": "none",
-    "svg.hashsalt": "vehicle",
-    "font.family": "DejaVu Sans",
-    "font.size": 9.0,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "grid.color": "#e2e2e2",
-    "path.simplify": True,
-    "path.simplify_threshold": 0.3,
-}
 
 
 def vehicle_plot(made: VehicleRun, file_format: str) -> bytes:
@@ -42,11 +25,11 @@ def vehicle_plot(made: VehicleRun, file_format: str) -> bytes:
     made : VehicleRun
         What to draw.
     file_format : str
-        One of `FORMATS`.
+        One of `sosmith.gen.picture.FORMATS`.
     """
     motion = made.motion
-    with mpl.rc_context(_STYLE):  # type: ignore[arg-type]
-        figure = Figure(figsize=(11, 10), dpi=110, layout="constrained")
+
+    def paint(figure: Figure) -> None:
         axes = figure.subplots(3, 2)
         random = "" if made.irregularities == "none" else f", irregularities {made.irregularities}, seed {made.seed}"
         figure.suptitle(f"Co-Co locomotive, {made.track} track, {made.speed:g} m/s{random}")
@@ -62,9 +45,9 @@ def vehicle_plot(made: VehicleRun, file_format: str) -> bytes:
         _draw_spectra(axes[2, 0], made, 1e3 * motion.wheelset_lateral, "Spectrum of the lateral motion")
         _draw_spectra(axes[2, 1], made, motion.clearance_mm, "Spectrum of the clearance")
         axes[0, 0].legend(loc="upper right", ncols=2)
-        stream = io.BytesIO()
-        figure.savefig(stream, format=file_format, metadata={"Date": None} if file_format == "svg" else {})
-        return stream.getvalue()
+
+    style = {"path.simplify": True, "path.simplify_threshold": 0.3, "text.parse_math": True}  # powers of ten
+    return picture("vehicle", (11, 10), paint, file_format, style=style)
 
 
 def _draw(axes: Axes, made: VehicleRun, values: Array, label: str, title: str) -> None:

@@ -2,30 +2,16 @@
 
 from __future__ import annotations
 
-import io
-
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from sosmith.gen.picture import picture
 from sosmith.gen.plots import envelope
 from sosmith.model.port import Values
 from sosmith.model.wear import WearReport, block_medians
 
 _BLUE, _RED, _AMBER, _GREY = "#2563a8", "#b4432f", "#c08a1e", "#8a8a8a"
-_STYLE = {
-    "svg.fonttype": "none",
-    "svg.hashsalt": "wear",
-    "font.family": "DejaVu Sans",
-    "font.size": 9.0,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "grid.color": "#e2e2e2",
-    "text.parse_math": False,
-}
 _AHEAD = 2.0
 """How far the axis may reach beyond the record, in its lengths."""
 
@@ -40,14 +26,13 @@ def wear_plot(time: Values, clearance: Values, report: WearReport, file_format: 
     report : WearReport
         The judgement.
     file_format : str
-        "svg" or "png".
+        One of `sosmith.gen.picture.FORMATS`.
     """
-    with mpl.rc_context(_STYLE):  # type: ignore[arg-type]
-        figure = Figure(figsize=(9, 4.5), dpi=110, layout="constrained")
+
+    def paint(figure: Figure) -> None:
         _draw(figure.subplots(), time - time[0], clearance, report)
-        stream = io.BytesIO()
-        figure.savefig(stream, format=file_format, metadata={"Date": None} if file_format == "svg" else {})
-        return stream.getvalue()
+
+    return picture("wear", (9, 4.5), paint, file_format)
 
 
 def _draw(axes: Axes, time: Values, clearance: Values, report: WearReport) -> None:

@@ -79,11 +79,16 @@ class ConstantBanks(wiring.Component):
             for low in range(0, constant.bits, _WORD):
                 high = min(low + _WORD, constant.bits)
                 for bank, register in enumerate(pair):
-                    writes = self.write_enable & (self.write_bank == bank) & (self.write_address == word)
+                    writes = self.write_enable & (self.write_bank == bank) & _is(self.write_address, word)
                     with m.If(writes):
                         m.d.sync += register.eq(Cat(register[:low], self.write_data[: high - low], register[high:]))
                 word += 1
         return m
+
+
+def _is(address: Value, word: int) -> Value:
+    """Whether `address` is `word`; not by ``==``, as Yosys writes ``== 0`` as ``!``, to which Verilator objects."""
+    return Cat(bit if word >> k & 1 else ~bit for k, bit in enumerate(address)).all()
 
 
 def chosen(pair: Pair, bank: Value) -> Value:

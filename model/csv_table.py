@@ -20,6 +20,12 @@ from sosmith.model.port import Values
 # float() would also take "nan", "1_000" and digits of other scripts.
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
+LARGEST = 1e100
+"""Largest magnitude of a number: sums of squares of such numbers are still doubles, and none has a physical meaning."""
+
+LONGEST_SHOWN = 60
+"""Characters of a wrong cell that a message shows."""
+
 
 @dataclass(frozen=True, eq=False)
 class CsvTable:
@@ -82,7 +88,7 @@ def read_csv_table(
     SpecificationError
         If the file cannot be read or is no UTF-8 text; if it is empty or has a header only; if a
         column is unknown, missing or there twice; if a row has too few or too many cells; if a cell
-        is no finite number. One sentence with the file and, where there is one, the line.
+        is no finite number, or one beyond `LARGEST`. One sentence with the file and, where there is one, the line.
     """
     reader = csv.reader(io.StringIO(_read_text(path), newline=""), strict=True)
     rows: list[list[float]] = []
@@ -113,15 +119,31 @@ def read_csv_table(
 
 
 def csv_header(path: Path) -> list[str]:
-    """Names in the first line that is not blank; none if the file cannot be read, which `read_csv_table` then says."""
+    """Names in the first line that is not blank; none if it cannot be read, as `read_csv_table` then says."""
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
             for cells in csv.reader(file, strict=True):
                 if any(cell.strip() for cell in cells):
+                    check_separator(str(path), cells)
                     return [cell.strip() for cell in cells]
-    except (OSError, UnicodeDecodeError, csv.Error):
+    except (OSError, UnicodeDecodeError, csv.Error, SpecificationError):
         pass
     return []
+
+
+def check_separator(where: str, header: Sequence[str]) -> None:
+    """Refuse a header that holds a single cell because other characters than commas separate the names.
+
+    Raises
+    ------
+    SpecificationError
+        If it does; `where` begins the sentence.
+    """
+    for separator, name in ((";", "semicolons"), ("\t", "tabs")):
+        if len(header) == 1 and separator in header[0]:
+            raise SpecificationError(
+                f"{where}: cells must be separated by commas, with points in decimal numbers, not by {name}"
+            )
 
 
 def check_rows(table: CsvTable, bad: npt.NDArray[np.bool_], what: Callable[[int], str]) -> None:
@@ -152,6 +174,7 @@ def _read_text(path: Path) -> str:
 
 
 def _check_header(where: str, header: Sequence[str], known: Sequence[str], required: Sequence[str]) -> None:
+    check_separator(where, header)
     for name, count in Counter(header).items():
         if name not in known:
             raise SpecificationError(f"{where}: column must be one of {', '.join(known)}, not {name!r}")
@@ -170,5 +193,11 @@ def _number(where: str, column: str, cell: str, readers: Mapping[str, Reader]) -
         except ValueError as error:
             raise SpecificationError(f"{where}: {column} must be {error}, not {text!r}") from None
     if not NUMBER.fullmatch(text) or math.isinf(float(text)):
-        raise SpecificationError(f"{where}: {column} must be a finite number, not {text!r}")
+        raise SpecificationError(f"{where}: {column} must be a finite number, not {_short(text)}")
+    if abs(float(text)) > LARGEST:
+        raise SpecificationError(f"{where}: {column} must be from -{LARGEST:g} to {LARGEST:g}, not {_short(text)}")
     return float(text)
+
+
+def _short(text: str) -> str:
+    return repr(text) if len(text) <= LONGEST_SHOWN else f"{text[: LONGEST_SHOWN - 4]!r} ..."

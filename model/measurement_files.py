@@ -19,7 +19,7 @@ from typing import Any
 import openpyxl
 
 from sosmith.model.calibration import COLUMNS
-from sosmith.model.csv_table import NUMBER
+from sosmith.model.csv_table import NUMBER, check_separator
 from sosmith.model.errors import SpecificationError
 
 DATE_COLUMN = "date"
@@ -196,6 +196,8 @@ def _check_header(where: str, names: Sequence[Any]) -> None:
     known = (*COLUMNS, DATE_COLUMN)
     if not names:
         raise SpecificationError(f"{where}: header must be {','.join(COLUMNS)}, not empty")
+    if isinstance(names[0], str):
+        check_separator(where, names)
     for name in names:
         if name not in known:
             raise SpecificationError(

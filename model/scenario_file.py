@@ -16,7 +16,7 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from sosmith.model.csv_table import read_csv_table
+from sosmith.model.csv_table import check_rows, read_csv_table
 from sosmith.model.digitizer import CodeFault, Digitizer
 from sosmith.model.errors import SpecificationError
 from sosmith.model.inductive_sensor import (
@@ -156,7 +156,11 @@ def emulate_file(
     parts = [_part(scenario, bench, plan, seed, vehicle) for plan in plans]
     reading = np.concatenate([part.reading for part in parts])
     if not reading.any():
-        raise scenario.refuse("some excerpt must be long enough for the filter to settle without a fault, not none")
+        least = min(plan.settling for plan in plans) / float(bench.sample_rate)
+        raise scenario.refuse(
+            "some excerpt must be longer without a fault than the filter takes to settle, "
+            f"{least:.6g} s or more, not none"
+        )
     return Trace(
         name=scenario.path.stem,
         ports=bench.ports,
@@ -189,12 +193,13 @@ def range_notes(scenario: ScenarioFile, ports: Sequence[Port]) -> tuple[str, ...
 
 @dataclass(frozen=True, eq=False)
 class _Plan:
-    """One excerpt: its place in the file, its length, the true clearance and where it is read."""
+    """One excerpt: its place in the file, the true clearance, where it is read, samples until the filter settles."""
 
     index: int
     excerpt: ExcerptTable
     truth: Values
     reading: npt.NDArray[np.bool_]
+    settling: int
 
     @property
     def samples(self) -> int:
@@ -221,11 +226,11 @@ def _plan(scenario: ScenarioFile, bench: Bench, index: int, channel: int) -> _Pl
     if not 1 <= samples <= LIMIT_SAMPLES:
         raise scenario.refuse(
             f"excerpt[{index}].seconds must be from {1 / rate:.6g} to {LIMIT_SAMPLES / rate:.6g}, one sample to "
-            f"{LIMIT_SAMPLES} of them, not {samples / rate:.6g}"
+            f"{LIMIT_SAMPLES} of them, not {excerpt.seconds or samples / rate:g}"
         )
     position = np.arange(samples)
     if len(levels) == 1:
-        return _Plan(index, excerpt, np.full(samples, levels[0]), position >= settling)
+        return _Plan(index, excerpt, np.full(samples, levels[0]), position >= settling, settling)
     if samples < least:
         raise scenario.refuse(
             f"excerpt[{index}].seconds must be at least {least / rate:.6g} (the filter has to settle on "
@@ -235,7 +240,7 @@ def _plan(scenario: ScenarioFile, bench: Bench, index: int, channel: int) -> _Pl
     plateau = np.minimum(position // length, len(levels) - 1)
     within = position - plateau * length
     last = within >= math.floor(length * (1 - READING_PART))
-    return _Plan(index, excerpt, np.array(levels)[plateau], last & (within < length))
+    return _Plan(index, excerpt, np.array(levels)[plateau], last & (within < length), settling)
 
 
 def _part(scenario: ScenarioFile, bench: Bench, plan: _Plan, seed: int, vehicle: VehicleMotion | None) -> _Part:
@@ -296,8 +301,11 @@ def _motion(
         scenario.path.parent / excerpt.motion_from, ("time_s", "clearance_mm"), ("time_s", "clearance_mm")
     )
     clock = table.column("time_s")
-    if np.any(np.diff(clock) <= 0):
-        raise SpecificationError(f"{table.path}: time_s must rise from row to row")
+    check_rows(
+        table,
+        np.concatenate([[False], np.diff(clock) <= 0]),
+        lambda k: f"time_s must be above {clock[k - 1]:g} s, the row before, not {clock[k]:g} s",
+    )
     if clock[0] > 0 or clock[-1] < time[-1]:
         raise SpecificationError(
             f"{table.path}: time_s must reach from 0 to the {time[-1]:.6g} s of excerpt[{plan.index}], "

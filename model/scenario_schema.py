@@ -149,7 +149,7 @@ class WearTable(Table):
             found = ", ".join(ways) or "none of them"
             raise UnfitKeyError("", "given by one of rate, rate_per_1000_km and history", found)
         if (self.rate_per_1000_km is None) != (self.km_per_day is None):
-            raise UnfitKeyError("km_per_day", "there just beside rate_per_1000_km", shown(self.km_per_day))
+            raise UnfitKeyError("km_per_day", "given beside rate_per_1000_km, and only there", shown(self.km_per_day))
         days = [day for day, _ in self.history or ()]
         if sorted(set(days)) != days:
             raise UnfitKeyError("history", "a list whose days rise", shown(days))
@@ -193,7 +193,7 @@ class FaultTable(Table):
         if self.kind == "open" and self.sensor != "thermocouple":
             raise UnfitKeyError("kind", "missing or stuck for the inductive sensor", "'open'")
         if (self.kind == "missing") != (self.share is not None):
-            raise UnfitKeyError("share", "there just where kind is missing", shown(self.share))
+            raise UnfitKeyError("share", 'given if kind is "missing", and only then', shown(self.share))
         if self.code is not None and self.kind != "stuck":
             raise UnfitKeyError("code", "there only where kind is stuck", shown(self.code))
         return self
@@ -255,6 +255,9 @@ class ScenarioDocument(Table):
     def _check(self) -> Self:
         if self.wear is not None and self.channel:
             raise UnfitKeyError("channel", "missing where [wear] is given", shown(self.channel))
+        if self.start.toordinal() + LAST_DAY > datetime.date.max.toordinal():
+            latest = datetime.date.fromordinal(datetime.date.max.toordinal() - int(LAST_DAY))
+            raise UnfitKeyError("start", f"a date until {latest}, so that the last day is one too", shown(self.start))
         wearing = [k for k, excerpt in enumerate(self.excerpt) if excerpt.clearances is None]
         if wearing and self.wear is None and not self.channel:
             raise UnfitKeyError(f"excerpt[{wearing[0]}].clearances", "there where there is no [wear]", "missing")

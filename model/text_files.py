@@ -1,4 +1,4 @@
-"""Writes files so that an interruption leaves each of them old or new, never half."""
+"""Writes files so that an interruption leaves each of them old or new, never half; devices and pipes as they come."""
 
 from __future__ import annotations
 
@@ -28,21 +28,35 @@ def write_files(directory: Path, texts: Mapping[str, str]) -> list[Path]:
 
 
 def write_contents(directory: Path, contents: Mapping[str, bytes]) -> list[Path]:
-    """Write bytes as `write_files` does texts."""
+    """Write bytes as `write_files` does texts.
+
+    What is no file of its own is not replaced: a link is followed, a device or a pipe is written into.
+    """
+    paths = [directory / name for name in contents]
     try:
         directory.mkdir(parents=True, exist_ok=True)
-        # Files in a scratch folder get the permissions that the user's umask gives any new file.
-        with tempfile.TemporaryDirectory(prefix=".sosmith-", dir=directory) as scratch:
-            for name, content in contents.items():
-                (Path(scratch) / name).write_bytes(content)
-            for name in contents:
-                if (directory / name).is_dir():
-                    raise SpecificationError(f"{directory / name}: the output file must be a file, not a folder")
-            return [(Path(scratch) / name).replace(directory / name) for name in contents]
+        for path in paths:
+            if path.is_dir():
+                raise SpecificationError(f"{path}: the output file must be a file, not a folder")
+        own = {path.name for path in paths if not path.is_symlink() and (path.is_file() or not path.exists())}
+        if own:
+            # Files in a scratch folder get the permissions that the user's umask gives any new file.
+            with tempfile.TemporaryDirectory(prefix=".sosmith-", dir=directory) as scratch:
+                for name in own:
+                    (Path(scratch) / name).write_bytes(contents[name])
+                for name in own:
+                    (Path(scratch) / name).replace(directory / name)
+        for path in paths:
+            target = path.resolve()
+            if path.is_symlink() and (target.is_file() or not target.exists()):
+                write_contents(target.parent, {target.name: contents[path.name]})
+            elif path.name not in own:
+                path.write_bytes(contents[path.name])
     except OSError as error:
         raise SpecificationError(
             f"{directory}: the output folder must be a folder that can be written, not: {error.strerror}"
         ) from None
+    return paths
 
 
 def to_json(tree: Any) -> str:

@@ -120,7 +120,15 @@ def _sentence(shape: type[Table], finding: ErrorDetails) -> str:
     assert field is not None
     assert field.description, f"{where} must have a description"
     found = "missing" if finding["type"] == "missing" else shown(finding["input"])
+    inside = _path_text(path[_last_name(path) + 1 :])
+    if inside:  # the description is that of the whole list
+        whole = _path_text(path[: _last_name(path) + 1])
+        return f"{whole} must be {field.description}, not one with {found} at {inside}"
     return f"{where} must be {field.description}, not {found}"
+
+
+def _last_name(path: tuple[int | str, ...]) -> int:
+    return max(k for k, key in enumerate(path) if isinstance(key, str))
 
 
 def _joined(first: str, second: str) -> str:

@@ -224,6 +224,8 @@ def parse(text: str, name: str) -> Parameters:
         tree = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise SpecificationError(f"{name} must be valid TOML, not broken ({error})") from None
+    except (ValueError, RecursionError):
+        raise SpecificationError(f"{name} must be TOML within reason, not nested or long numbers") from None
     _check_keys(name, "", tree, list(_TABLES))
     sources: dict[str, str] = {}
     tables = {key: _table(name, key, tree[key], kind, sources) for key, kind in _TABLES.items()}

@@ -343,6 +343,11 @@ def judge(
     if window is not None and not 0 < window < math.inf:
         raise SpecificationError(f"window must be a time above 0 days, not {window:g} days")
     recent = slice(0 if window is None else int(np.searchsorted(time, time[-1] - window)), None)
+    if not time[-1] > time[recent][0]:
+        before = float(time[-1] - time[time < time[-1]][-1])
+        raise SpecificationError(
+            f"window must be at least {before:.4g} days, from the last reading to one before it, not {window:g} days"
+        )
     times, medians, counts, length = block_medians(time[recent], clearance[recent], block)
     rate = rate_of(times, medians, length, confidence)
     now, last_block = float(medians[-1]), int(counts[-1])

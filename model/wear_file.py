@@ -12,6 +12,7 @@ import numpy as np
 from sosmith.model.csv_table import check_rows, csv_header, read_csv_table
 from sosmith.model.errors import SpecificationError
 from sosmith.model.port import Values
+from sosmith.model.signal_file import unit_of
 
 SECONDS_A_DAY = 86400.0
 
@@ -90,11 +91,19 @@ def read_wear_record(path: Path, column: str | None = None) -> WearRecord:
     Raises
     ------
     SpecificationError
-        As `read_csv_table`; if there is no such column, or times go back. One sentence with the file and the line.
+        As `read_csv_table`; if there is no such column, its name ends in another unit, or times go back. One sentence
+        with the file and the line.
     """
     header = csv_header(path)
     time_column = _first(path, header, ("time_s", *TIMES), "a column of times")
     clearance_column = _first(path, header, CLEARANCES if column is None else (column,), "a column of clearances")
+    if clearance_column == time_column:
+        raise SpecificationError(
+            f"{path}: the column of clearances must be another than that of the time, {time_column}"
+        )
+    unit, factor = unit_of(clearance_column)
+    if unit and (unit, factor) != ("mm", 1.0):
+        raise SpecificationError(f"{path}: the column of clearances must be in mm, not {clearance_column}")
     ignored = {name: _nothing for name in header if name not in {time_column, clearance_column}}
     readers = ignored | ({time_column: parse_moment} if time_column == "date" else {})
     table = read_csv_table(path, header, readers=readers)

@@ -129,6 +129,12 @@ def test_a_store_that_another_process_makes_meanwhile_is_kept(monkeypatch: pytes
         assert len(opened.measurements("sensor")) == 60
 
 
+def test_one_of_them_is_no_plural() -> None:
+    Path("one.csv").write_text("clearance_mm,voltage_V,temperature_C\n1,2,30\n1,x,30\n")
+    result = run("add", "one.csv", "--keep-good", *DAY)
+    assert "sosmith: kept 1 measurement of one.csv in calibration.db, 1 row left out\n" in result.stderr
+
+
 def test_a_shortfall_keeps_the_measurements_and_says_so() -> None:
     message = (
         "calibration.db, sensor sensor: adjusted r must reach 0.99999 with a polynomial up to order 6, not at most "

@@ -149,6 +149,20 @@ def test_commands_print_what_is_shown(document: Path, folder: Path) -> None:
     assert shown == with_output(shown, folder)
 
 
+PICTURES = {
+    "vehicle.svg": "./run vehicle --plot vehicle.svg",
+    "wear.svg": "./run wear examples/wear/wheel.csv --initial 1.5 --warning 7 --limit 9 --sensor-range 10.5"
+    " --plot wear.svg",
+}
+"""Pictures that a command of a document draws; the other ones are checked where they are made."""
+
+
+@pytest.mark.parametrize("name", PICTURES)
+def test_pictures_are_what_the_commands_draw(name: str, folder: Path) -> None:
+    run(PICTURES[name], folder)
+    assert (folder / name).read_bytes() == (ROOT / "docs" / "images" / name).read_bytes()
+
+
 def test_the_schema_is_the_one_of_the_store() -> None:
     assert _SCHEMA.findall(CALIBRATION.read_text(encoding="utf-8")) == [schema()]
 

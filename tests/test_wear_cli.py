@@ -86,9 +86,27 @@ def test_the_limits_of_a_specification() -> None:
     assert second["limits_mm"]["critical_clearance"] == 10.5
     end = good("days.csv", "--spec", "my.toml", "--channel", "1").stdout
     assert "to the end of the sensor's range, 10.5 mm, which comes before the limit" in end
-    refused("my.toml: channel must be below 2, the count in wear.initial, not 2", "days.csv", "--spec", "my.toml",
+    refused("my.toml: channel must be below 2, the count of channels, not 2", "days.csv", "--spec", "my.toml",
             "--channel", "2")  # fmt: skip
     refused("the limits must be given by --spec or one by one, not both", "days.csv", "--spec", "my.toml", *LIMITS)
+
+
+def test_limits_of_all_channels_hold_for_each() -> None:
+    Path("all.toml").write_text(
+        example().replace("channels = 1", "channels = 2") + "\n[wear]\ninitial = 1.5\nwarning = 6.0\nlimit = 9.0\n"
+    )
+    first, second = (good("days.csv", "--spec", "all.toml", "--channel", channel).stdout for channel in ("0", "1"))
+    assert first == second
+    refused("all.toml: channel must be below 2, the count of channels, not 2", "days.csv", "--spec", "all.toml",
+            "--channel", "2")  # fmt: skip
+    refused("--channel must come with --spec, not without it", "days.csv", *LIMITS, "--channel", "1")
+
+
+def test_a_specification_in_another_unit_is_refused() -> None:
+    Path("um.toml").write_text(
+        example().replace('unit = "mm"', 'unit = "um"') + "\n[wear]\ninitial = 1.5\nwarning = 6.0\nlimit = 9.0\n"
+    )
+    refused("um.toml: output.unit must be 'mm' for --spec, not 'um'", "days.csv", "--spec", "um.toml")
 
 
 def test_plots() -> None:
@@ -106,6 +124,13 @@ def test_refusals() -> None:
             "plain.toml")  # fmt: skip
     refused("days.csv must have a column of clearances (z_mm), not only days, clearance_mm, remark", "days.csv",
             *LIMITS, "--column", "z_mm")  # fmt: skip
+    refused("days.csv: the column of clearances must be another than that of the time, days", "days.csv", *LIMITS,
+            "--column", "days")  # fmt: skip
+    Path("um.csv").write_text("days,clearance_um\n0,1500\n1,1501\n")
+    refused("um.csv: the column of clearances must be in mm, not clearance_um", "um.csv", *LIMITS, "--column",
+            "clearance_um")  # fmt: skip
+    refused("window must be at least 1 days, from the last reading to one before it, not 0.5 days", "days.csv", *LIMITS,
+            "--window", "0.5")  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -116,6 +141,10 @@ def test_refusals() -> None:
             "when,clearance_mm\n1,2\n",
             " must have a column of times (time_s, date, days, time_days, time_d, hours, time_h), not only when, "
             "clearance_mm",
+        ),
+        (
+            "days;clearance_mm\n1;2\n",
+            ", line 1: cells must be separated by commas, with points in decimal numbers, not by semicolons",
         ),
         ("days,clearance_mm\n1,2\n0.5,2\n", ", line 3: days must not be before that of the row before"),
         ("days,clearance_mm\n1,worn\n", ", line 2: clearance_mm must be a finite number, not 'worn'"),

@@ -815,6 +815,12 @@ BAD = [
         "wear.initial must be in the range of the output, [0, 16], not -0.5",
     ),
     (
+        "initial clearance beyond the output",
+        UNIT,
+        UNIT + "\n[wear]\ninitial = 16\nwarning = 7\nlimit = 9",
+        "wear.initial must be in the range of the output, [0, 16], not 16",
+    ),
+    (
         "warning at the limit",
         UNIT,
         UNIT + "\n[wear]\ninitial = 1.5\nwarning = 9\nlimit = 9",

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from sosmith.gen.spectra import WINDOWS, SpectrumSettings, degrees_of_freedom, slow_rms, spectrum
+from sosmith.gen.spectrum_report import peaks
 from sosmith.model.errors import SpecificationError
 
 RATE = 50.0
@@ -31,6 +32,20 @@ def test_the_amplitude_of_a_sine_wave_is_read_off(window: str) -> None:
     assert found.frequency[int(np.argmax(found.amplitude))] == pytest.approx(4.0)
     assert np.max(found.amplitude) == pytest.approx(0.3, rel=1e-3)
     assert found.rms == pytest.approx(0.3 / np.sqrt(2), rel=1e-3)
+
+
+@pytest.mark.parametrize("window", WINDOWS)
+def test_a_wave_at_half_the_sample_rate_has_its_amplitude_and_is_called_out(window: str) -> None:
+    alternating = 0.3 * np.cos(np.pi * np.arange(5000))
+    found = spectrum(alternating, RATE, SpectrumSettings(window=window, segment=10.0))
+    assert found.amplitude[-1] == pytest.approx(0.3, rel=1e-3)
+    assert peaks(found)[0] == (RATE / 2, found.amplitude[-1])
+    assert found.rms == pytest.approx(0.3, rel=1e-3)
+
+
+def test_at_zero_frequency_the_amplitude_is_the_mean() -> None:
+    found = spectrum(np.full(1000, -2.0), RATE, SpectrumSettings(detrend="none"))
+    assert found.amplitude[0] == pytest.approx(2)
 
 
 def test_a_line_is_no_part_of_the_spectrum() -> None:

@@ -141,6 +141,10 @@ HEADERS = {
         ", line 1: column must be one of clearance_mm, voltage_V, temperature_C, date, with the unit in its name, "
         "not 'voltage_mV'",
     ),
+    "semicolons": (
+        ("clearance_mm;voltage_V;temperature_C",),
+        ", line 1: cells must be separated by commas, with points in decimal numbers, not by semicolons",
+    ),
     "missing": (
         ("clearance_mm", "voltage_V"),
         ", line 1: column temperature_C must be there, not missing among clearance_mm, voltage_V",

@@ -55,7 +55,8 @@ def changed(old: str, new: str, text: str = PLAIN) -> str:
         ),
         (
             changed("noise = 0.01", "noise = 0.01\nmains = { amplitudes = [0.1, -0.1] }"),
-            "sensors.inductive.mains.amplitudes[1] must be a list of 0 to 40 numbers of V from 0 to 10, not -0.1",
+            "sensors.inductive.mains.amplitudes must be a list of 0 to 40 numbers of V from 0 to 10, "
+            "not one with -0.1 at [1]",
         ),
         (
             changed("noise = 4.0", "noise = 4.0\ndigitizer = { bits = 16.5 }"),
@@ -71,7 +72,7 @@ def changed(old: str, new: str, text: str = PLAIN) -> str:
         ),
         (
             changed("temperature = 20.0", "temperature = 20.0\nclearances = [1, 0]"),
-            "excerpt[0].clearances[1] must be a list of 1 to 1000 numbers of mm from 0.01 to 25, not 0",
+            "excerpt[0].clearances must be a list of 1 to 1000 numbers of mm from 0.01 to 25, not one with 0 at [1]",
         ),
         (
             changed("temperature = 20.0", "temperature = 20.0\ntime_constant = 5.0"),
@@ -91,7 +92,7 @@ def changed(old: str, new: str, text: str = PLAIN) -> str:
         ),
         (
             changed('"depot"', '"curve"\nmotion = [[1, 2], [0, 1]]'),
-            "excerpt[0].motion[1][0] must be a list of pairs [frequency in Hz, amplitude in mm], not 0",
+            "excerpt[0].motion must be a list of pairs [frequency in Hz, amplitude in mm], not one with 0 at [1][0]",
         ),
         (
             changed("rate = 0.1", ""),
@@ -103,7 +104,7 @@ def changed(old: str, new: str, text: str = PLAIN) -> str:
         ),
         (
             changed("rate = 0.1", "rate_per_1000_km = 0.1"),
-            "wear.km_per_day must be there just beside rate_per_1000_km, not missing",
+            "wear.km_per_day must be given beside rate_per_1000_km, and only there, not missing",
         ),
         (
             changed("rate = 0.1", "history = [[1, 1], [1, 2]]"),
@@ -117,6 +118,10 @@ def changed(old: str, new: str, text: str = PLAIN) -> str:
             changed("[[excerpt]]", "[[channel]]\ninitial_clearance = 1.0\nrate = 0\n[[excerpt]]"),
             "channel must be missing where [wear] is given, not a list of 1 values",
         ),
+        (
+            changed("[sensors", "start = 9999-01-01\n[sensors"),
+            "start must be a date until 9900-01-24, so that the last day is one too, not 9999-01-01",
+        ),
         (PLAIN.partition("[[excerpt]]")[0], "excerpt must be at least one table [[excerpt]], not missing"),
         (changed('"a test"', '""'), "description must be a text of 1 to 200 characters, not ''"),
         (
@@ -129,11 +134,11 @@ def changed(old: str, new: str, text: str = PLAIN) -> str:
         ),
         (
             PLAIN + FAULT.replace('"stuck"', '"missing"'),
-            "excerpt[0].fault[0].share must be there just where kind is missing, not missing",
+            'excerpt[0].fault[0].share must be given if kind is "missing", and only then, not missing',
         ),
         (
             PLAIN + FAULT + "share = 0.5\n",
-            "excerpt[0].fault[0].share must be there just where kind is missing, not 0.5",
+            'excerpt[0].fault[0].share must be given if kind is "missing", and only then, not 0.5',
         ),
         (
             PLAIN + FAULT.replace('"stuck"', '"missing"\nshare = 0.5\ncode = 3'),

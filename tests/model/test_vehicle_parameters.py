@@ -126,6 +126,8 @@ def test_slips_are_refused(text: str, message: str) -> None:
 
 def test_broken_text_is_refused() -> None:
     assert refusal("[layout").startswith("loco.toml must be valid TOML, not broken (")
+    for text in ("a = " + 5000 * "[", "a = " + 5000 * "1"):
+        assert refusal(text) == "loco.toml must be TOML within reason, not nested or long numbers"
 
 
 def test_what_is_no_readable_text_is_refused(tmp_path: Path) -> None:

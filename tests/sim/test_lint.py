@@ -4,6 +4,7 @@ import re
 import subprocess
 import sysconfig
 from dataclasses import replace
+from fractions import Fraction
 from functools import cache
 from pathlib import Path
 
@@ -11,7 +12,7 @@ import pytest
 from tests.gen.designs import ALL, example_design
 
 from sosmith.gen.architecture import Architecture
-from sosmith.gen.core import CORES
+from sosmith.gen.core import CORES, design_core
 from sosmith.gen.generate import generate
 from sosmith.model.errors import ShortfallError
 from sosmith.sim.lint import WAIVERS, icarus_check, lint
@@ -134,3 +135,15 @@ def test_a_wrong_top_is_refused(locomotive: Path, tmp_path: Path) -> None:
         lint(locomotive, "elsewhere", tmp_path)
     with pytest.raises(ShortfallError, match=r" must be taken by Icarus, not refused: .*elsewhere"):
         icarus_check(locomotive, "elsewhere")
+
+
+@pytest.mark.parametrize("architecture", ["parallel", "folded", "serial"])
+def test_reload_leaves_nothing_for_a_linter(architecture: str, tmp_path: Path) -> None:
+    spec = example_design("flange_wear_bench.toml").spec
+    hardware = replace(
+        spec.hardware, architecture=architecture, realization="df1_ef2", clock=Fraction(10**8), reload=True
+    )
+    made = design_core(replace(spec, hardware=hardware))
+    sv = generate(made, tmp_path)[0]
+    assert lint(sv, sv.stem, tmp_path) == []
+    assert icarus_check(sv, sv.stem) == []

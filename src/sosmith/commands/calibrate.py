@@ -10,7 +10,7 @@ from typing import Any
 import click
 from rich.markup import escape
 
-from sosmith.gen.calibration_plot import FORMATS, calibration_plot
+from sosmith.gen.calibration_plot import calibration_plot
 from sosmith.gen.calibration_report import (
     CALLED_OUT,
     addition_json,
@@ -19,6 +19,7 @@ from sosmith.gen.calibration_report import (
     specification_table,
     version_json,
 )
+from sosmith.gen.picture import FORMATS
 from sosmith.model.calibration import REQUIRED_R, terms_of
 from sosmith.model.errors import ShortfallError, SpecificationError
 from sosmith.model.fit_quality import CELLS
@@ -169,8 +170,8 @@ def add_command(
         rows = len(refusals) + good
         way = ", or left out with --keep-good" if good else ""
         raise SpecificationError(f"{file}: every row must be right{way}, not {len(refusals):,} of {rows:,} refused")
-    left_out = f", {len(refusals):,} rows left out" if refusals else ""
-    note(f"kept {good:,} measurements of {file} in {store}{left_out}")
+    left_out = f", {_counted(len(refusals), 'row')} left out" if refusals else ""
+    note(f"kept {_counted(good, 'measurement')} of {file} in {store}{left_out}")
     if addition.calibration is None:
         raise ShortfallError(addition.shortfall)
     if not as_json:
@@ -287,6 +288,10 @@ def plot_command(store: Path, sensor: str, number: int | None, output: Path | No
         drawn = calibration_plot(made, versions, file_format)
     write_contents(path.parent, {path.name: drawn})
     note(f"wrote {path}: version {made.version.number} of sensor {sensor}")
+
+
+def _counted(count: int, what: str) -> str:
+    return f"{count:,} {what}{'' if count == 1 else 's'}"
 
 
 def _note_refusals(file: Path, refusals: tuple[Refusal, ...]) -> None:

@@ -15,9 +15,10 @@ from sosmith.gen.filter_prediction import Content, told_apart
 from sosmith.gen.filter_proposal import COVERAGE, PASSBAND_LOSS, TOLERANCE, Proposal, Wish, propose
 from sosmith.gen.filter_table import filter_table, replace_filter
 from sosmith.gen.filter_trial import Trial, try_filter
+from sosmith.gen.picture import FORMATS
 from sosmith.gen.specification import load
 from sosmith.gen.spectra import DETRENDS, WINDOWS, Spectrum, SpectrumSettings, slow_rms, spectrum
-from sosmith.gen.spectrum_plot import FORMATS, Curve, spectrum_plot
+from sosmith.gen.spectrum_plot import Curve, spectrum_plot
 from sosmith.gen.spectrum_report import peaks, proposal_json, provenance, ripple, signal_json
 from sosmith.model.csv_table import csv_header
 from sosmith.model.errors import ShortfallError, SpecificationError

@@ -7,7 +7,8 @@ from pathlib import Path
 import click
 from rich.table import Table
 
-from sosmith.gen.vehicle_plot import FORMATS, vehicle_plot
+from sosmith.gen.picture import FORMATS
+from sosmith.gen.vehicle_plot import vehicle_plot
 from sosmith.gen.vehicle_report import TRACKS, VehicleRun, largest, vehicle_csv, vehicle_json, vehicle_run
 from sosmith.model.errors import SpecificationError
 from sosmith.model.linear_motion import Mode

@@ -9,7 +9,7 @@ from typing import Any
 import click
 from rich.markup import escape
 
-from sosmith.gen.calibration_plot import FORMATS
+from sosmith.gen.picture import FORMATS
 from sosmith.gen.specification import load
 from sosmith.gen.wear_plot import wear_plot
 from sosmith.model.errors import SpecificationError
@@ -71,6 +71,8 @@ def wear_command(
         limits = _limits_of(spec, channel)
     elif initial is None or limit is None:
         raise SpecificationError("the limits must be given by --initial and --limit, or by --spec, not left out")
+    elif channel:
+        raise SpecificationError("--channel must come with --spec, not without it")
     else:
         limits = WearLimits(initial=initial, limit=limit, warning=warning, sensor_range=sensor_range)
     with show_progress() as step:
@@ -92,15 +94,16 @@ def wear_command(
 
 
 def _limits_of(path: Path, channel: int) -> WearLimits:
-    wear = load(path).wear
+    spec = load(path)
+    wear = spec.wear
     if wear is None:
         raise SpecificationError(f"{path}: the specification must have a table [wear] for --spec, not none")
-    if channel and channel >= len(wear.initial):
-        raise SpecificationError(
-            f"{path}: channel must be below {len(wear.initial)}, the count in wear.initial, not {channel}"
-        )
+    if spec.output.unit != "mm":
+        raise SpecificationError(f"{path}: output.unit must be 'mm' for --spec, not {spec.output.unit!r}")
+    if channel >= spec.channels:
+        raise SpecificationError(f"{path}: channel must be below {spec.channels}, the count of channels, not {channel}")
     return WearLimits(
-        initial=float(wear.initial[channel]),
+        initial=float(wear.initial[channel if len(wear.initial) > 1 else 0]),
         limit=float(wear.limit),
         warning=float(wear.warning),
         sensor_range=None if wear.sensor_range is None else float(wear.sensor_range),

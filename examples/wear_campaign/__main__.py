@@ -1,0 +1,54 @@
+"""From measurements in the depot to wear on the instrument's screen: `python -m examples.wear_campaign`.
+
+Emulated measurements go into the store and are fitted; filters follow from spectra; hardware is generated and runs
+in the simulator; and the accuracy stands beside the paper's. Some ten minutes. Writes campaign.md, campaign.json,
+pictures, specifications, hardware and reports. With --document, docs/campaign.md, its pictures and outcome.json too.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import tomllib
+from pathlib import Path
+
+from examples.wear_campaign.campaign import carry_out
+from examples.wear_campaign.document import document
+from examples.wear_campaign.pictures import pictures
+
+from sosmith.model.text_files import write_contents
+from sosmith.terminal import note, show_progress
+
+HERE = Path(__file__).parent
+DOCS = HERE.parents[1] / "docs"
+
+
+def main() -> None:
+    """Run the campaign."""
+    parser = argparse.ArgumentParser(prog="python -m examples.wear_campaign", description=__doc__)
+    parser.add_argument("-o", "--output", type=Path, default=Path("build/wear_campaign"), help="folder for all files")
+    parser.add_argument("--seeds", type=int, help="count of seeds, at least 2, instead of that in campaign.toml")
+    parser.add_argument("--simulator", choices=("verilator", "icarus"), help="instead of that in campaign.toml")
+    parser.add_argument("--document", action="store_true", help="write docs/campaign.md and its pictures too")
+    arguments = parser.parse_args()
+    settings = tomllib.loads((HERE / "campaign.toml").read_text(encoding="utf-8"))
+    settings |= {name: value for name, value in vars(arguments).items() if name in settings and value is not None}
+    if settings["seeds"] < 2:
+        parser.error(f"--seeds must be at least 2, not {settings['seeds']}")
+    with show_progress() as step:
+        results, series = carry_out(settings, arguments.output, step)
+        step("pictures and document")
+        drawn = pictures(results, series)
+        text = document(results)
+        files = {"campaign.md": text.encode(), "campaign.json": (json.dumps(results, indent=1) + "\n").encode()}
+        write_contents(arguments.output, files)
+        write_contents(arguments.output / "images", drawn)
+    if arguments.document:
+        write_contents(DOCS, {"campaign.md": text.encode()})
+        write_contents(DOCS / "images", drawn)
+        write_contents(HERE, {"outcome.json": files["campaign.json"]})
+    note(f"report: {(arguments.output / 'campaign.md').resolve()}")
+
+
+if __name__ == "__main__":
+    main()

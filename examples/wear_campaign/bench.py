@@ -1,0 +1,139 @@
+"""The paper's runs on the bench (section 3.3), over many seeds and through the hardware."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from examples.wear_campaign import depot, hardware
+
+from sosmith.gen.core import CoreDesign
+from sosmith.gen.filter_proposal import Content, Proposal, Wish, propose
+from sosmith.gen.filter_table import filter_table
+from sosmith.gen.spectra import SpectrumSettings, spectrum
+from sosmith.model.accuracy import accuracy_percent
+from sosmith.model.depot_measurements import measurements_of
+from sosmith.model.golden import calibrated, filtered
+from sosmith.model.inductive_sensor import SystematicError
+from sosmith.model.polynomial import EQUATION_5A, Polynomial
+from sosmith.model.scenario_file import ScenarioFile, emulate_file
+from sosmith.model.scenarios import Bench
+from sosmith.model.trace import Trace
+from sosmith.sim.simulation import Progress, bench_of
+
+Values = npt.NDArray[np.float64]
+
+PAPER_FILTER = hardware.filter_by_order(5, 0.5751308)
+"""Filter of the paper's equations 16 to 19 (examples/flange_wear_bench.toml says where its cutoff comes from)."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """Accuracies in per cent by equation 7 of one run on the bench."""
+
+    seed: int
+    unfiltered: float
+    golden: float
+    hardware: float | None
+    adjusted_r: float
+    orders: tuple[int, int]
+
+
+def without(scenario: ScenarioFile, *what: str) -> ScenarioFile:
+    """Return the scenario without some of ``noise`` (of both sensors), ``systematic``."""
+    sensors = scenario.sensors
+    if "noise" in what:
+        quiet = replace(sensors.thermometer, noise=0.0)
+        sensors = replace(sensors, inductive=replace(sensors.inductive, noise=0.0), thermometer=quiet)
+    if "systematic" in what:
+        sensors = replace(sensors, inductive=replace(sensors.inductive, systematic_error=SystematicError()))
+    return replace(scenario, sensors=sensors)
+
+
+def accuracies(
+    scenario: ScenarioFile, bench: Bench, sos: Values, seed: int, polynomial: Polynomial
+) -> tuple[float, float]:
+    """Accuracy before and after the ideal filter."""
+    trace = emulate_file(scenario, bench, seed=seed)
+    raw = calibrated(trace.codes, bench.ports, polynomial)
+    smooth = filtered(raw, sos, bench.output)
+    return accuracy_percent(raw, trace.truth, trace.reading), accuracy_percent(smooth, trace.truth, trace.reading)
+
+
+def over_seeds(
+    scenario: ScenarioFile,
+    made: CoreDesign,
+    seeds: range,
+    progress: Callable[[int], None],
+    design_for: Callable[[Polynomial], CoreDesign] | None = None,
+) -> list[Run]:
+    """Run the bench once for each seed: depot, fit, trace, filter, and the hardware's integers if asked for."""
+    bench, runs = bench_of(made), []
+    sos = made.quantized.filter.sos
+    for seed in seeds:
+        fit = depot.fitted(measurements_of(scenario, seed))
+        raw, golden = accuracies(scenario, bench, sos, seed, fit.polynomial)
+        integers = None
+        if design_for is not None:
+            datapath = design_for(fit.polynomial).datapath
+            trace = emulate_file(scenario, bench, seed=seed)
+            clearance = datapath.output.decode(datapath.compute(trace.codes))
+            integers = accuracy_percent(clearance, trace.truth, trace.reading)
+        runs.append(Run(seed, raw, golden, integers, fit.adjusted_r, fit.orders))
+        progress(len(runs))
+    return runs
+
+
+def sources(scenario: ScenarioFile, made: CoreDesign, seeds: range) -> dict[str, list[float]]:
+    """Accuracy behind the filter if one source of error after another is taken away, for each seed."""
+    bench, sos = bench_of(made), made.quantized.filter.sos
+    found: dict[str, list[float]] = {}
+    for seed in seeds:
+        fit = depot.fitted(measurements_of(scenario, seed)).polynomial
+        for name, changed, polynomial in (
+            ("all errors", scenario, fit),
+            ("no noise", without(scenario, "noise"), fit),
+            ("no systematic error of the run", without(scenario, "systematic"), fit),
+            ("equation 5a instead of the fit", scenario, EQUATION_5A),
+            ("noise alone", without(scenario, "systematic"), EQUATION_5A),
+            ("converters alone", without(scenario, "noise", "systematic"), EQUATION_5A),
+        ):
+            found.setdefault(name, []).append(accuracies(changed, bench, sos, seed, polynomial)[1])
+    return found
+
+
+def from_spectra(
+    scenario: ScenarioFile, made: CoreDesign, seed: int, tolerance: float, passband: float
+) -> tuple[Proposal, str]:
+    """Propose a filter from the spectra of a run before any filter; return it with its table."""
+    bench = bench_of(made)
+    trace = emulate_file(scenario, bench, seed=seed)
+    raw = calibrated(trace.codes, bench.ports, made.quantized.polynomial)
+    rate, settings = float(bench.sample_rate), SpectrumSettings()
+    content = Content(
+        name=trace.name,
+        wanted=spectrum(trace.truth, rate, settings),
+        disturbance=spectrum(raw - trace.truth, rate, settings),
+        has_truth=True,
+    )
+    proposal = propose([content], Wish(tolerance=tolerance, passband=passband), rate)
+    return proposal, filter_table(proposal, [f"{scenario.path.name}, seed {seed}", f"tolerance {tolerance} mm"])
+
+
+def through_hardware(
+    scenario: ScenarioFile, made: CoreDesign, seed: int, folder: Path, simulator: str, progress: Progress
+) -> dict[str, Any]:
+    """Run one seed through the generated hardware."""
+    return hardware.run(made, [emulate_file(scenario, bench_of(made), seed=seed)], folder, simulator, progress)
+
+
+def signals(trace: Trace, made: CoreDesign) -> dict[str, Values]:
+    """Time in s and clearances in mm of a run: true, measured, and behind the filter."""
+    bench = bench_of(made)
+    raw = calibrated(trace.codes, bench.ports, made.quantized.polynomial)
+    smooth = filtered(raw, made.quantized.filter.sos, bench.output)
+    return {"time": trace.time, "true": trace.truth, "measured": raw, "filtered": smooth}

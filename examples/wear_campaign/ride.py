@@ -1,0 +1,160 @@
+"""The vehicle on track: what its motion does to the measurement, and what each of three filters leaves of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from examples.wear_campaign import hardware
+from scipy import signal
+
+from sosmith.gen.core import CoreDesign
+from sosmith.gen.design import prewarp, unwarp
+from sosmith.gen.filter_proposal import Content, Proposal, Wish, propose
+from sosmith.gen.filter_table import filter_table
+from sosmith.gen.response import group_delay, magnitude_db
+from sosmith.gen.spectra import SpectrumSettings, spectrum
+from sosmith.model.accuracy import accuracy_percent
+from sosmith.model.golden import calibrated, filtered
+from sosmith.model.polynomial import EQUATION_5A
+from sosmith.model.scenario_file import ScenarioFile, emulate_file
+from sosmith.model.scenarios import Bench
+from sosmith.model.trace import Trace
+from sosmith.model.track import curved_track, tangent_track
+from sosmith.model.vehicle_clearance import IRREGULARITY, SPEED, WHEELSET, vehicle_clearance
+from sosmith.model.vehicle_limits import limits
+from sosmith.model.vehicle_parameters import built_in
+from sosmith.model.vehicle_run import run
+from sosmith.sim.simulation import Progress, bench_of
+
+Values = npt.NDArray[np.float64]
+
+PAPER_FILTER = hardware.filter_by_order(7, 0.2587802)
+"""Filter of the paper's tables 9 and 10 (examples/flange_wear_locomotive.toml says where its cutoff comes from)."""
+
+SETTLED = 0.01
+"""Part of a step that is left when the filter counts as settled."""
+
+NOTABLE = {"hunting": 1.2, "irregularity": 2.0, "the paper's pass edge": 10.0}
+"""Frequencies in Hz whose attenuation is shown: bogie mode and the paper's 10 m irregularity at 20 m/s."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Result:
+    """One filter on one ride. Errors in mm against the true clearance, over the ride without its lead-in."""
+
+    filter: str
+    describe: str
+    scenario: str
+    rms_before: float
+    rms_after: float
+    max_before: float
+    max_after: float
+    mean_after: float
+    accuracy_before: float
+    accuracy_golden: float
+    accuracy_hardware: float
+    delay: float
+    settling: float
+    attenuation: dict[str, float]
+    summary: dict[str, Any]
+    time: Values
+    before: Values
+    after: Values
+
+
+def prewarped(order: int, edge: float, loss: float, sample_rate: float) -> str:
+    """Table ``[filter]`` of the Butterworth low-pass that loses `loss` dB at `edge` Hz: equations 10 and 13."""
+    analog = prewarp(edge, sample_rate) / (10 ** (0.1 * loss) - 1) ** (1 / (2 * order))
+    return hardware.filter_by_order(order, float(f"{unwarp(analog, sample_rate):.9g}"))
+
+
+def trace_of(scenario: ScenarioFile, bench: Bench, seed: int, lead_in: float) -> Trace:
+    """Make the trace; every sample behind the first `lead_in` seconds, in which filters settle, is a reading."""
+    trace = emulate_file(scenario, bench, seed=seed, vehicle=vehicle_clearance)
+    return replace(trace, reading=trace.time >= lead_in)
+
+
+def from_spectra(
+    scenarios: list[ScenarioFile], bench: Bench, seed: int, lead_in: float, tolerance: float
+) -> tuple[Proposal, str]:
+    """Propose a filter from the spectra of the rides, true and measured; return it with its table."""
+    contents, rate, settings = [], float(bench.sample_rate), SpectrumSettings()
+    for scenario in scenarios:
+        trace = trace_of(scenario, bench, seed, lead_in)
+        ride = trace.reading
+        measured = calibrated(trace.codes, bench.ports, EQUATION_5A)
+        contents.append(
+            Content(
+                name=trace.name,
+                wanted=spectrum(trace.truth[ride], rate, settings),
+                disturbance=spectrum((measured - trace.truth)[ride], rate, settings),
+                has_truth=True,
+            )
+        )
+    proposal = propose(contents, Wish(tolerance=tolerance), rate)
+    names = [f"{scenario.path.name}, seed {seed}" for scenario in scenarios]
+    return proposal, filter_table(proposal, [*names, f"tolerance {tolerance} mm"])
+
+
+def ride(
+    name: str,
+    scenario: ScenarioFile,
+    made: CoreDesign,
+    seed: int,
+    lead_in: float,
+    folder: Path,
+    simulator: str,
+    progress: Progress,
+) -> Result:
+    """Run one filter through one ride: in double precision, and in the generated hardware."""
+    bench = bench_of(made)
+    trace, ideal = trace_of(scenario, bench, seed, lead_in), made.quantized.filter
+    before = calibrated(trace.codes, bench.ports, EQUATION_5A)
+    after = filtered(before, ideal.sos, bench.output)
+    summary = hardware.run(made, [trace], folder / scenario.path.stem, simulator, progress)
+    error = [(values - trace.truth)[trace.reading] for values in (before, after)]
+    rate = float(bench.sample_rate)
+    step = signal.sosfilt(ideal.sos, np.ones(round(200 * rate)))
+    late = np.flatnonzero(np.abs(step - 1) > SETTLED)
+    return Result(
+        filter=name,
+        describe=ideal.describe,
+        scenario=scenario.path.stem,
+        rms_before=float(np.sqrt(np.mean(error[0] ** 2))),
+        rms_after=float(np.sqrt(np.mean(error[1] ** 2))),
+        max_before=float(np.max(np.abs(error[0]))),
+        max_after=float(np.max(np.abs(error[1]))),
+        mean_after=float(np.mean(error[1])),
+        accuracy_before=accuracy_percent(before, trace.truth, trace.reading),
+        accuracy_golden=summary["accuracy_percent"]["golden"],
+        accuracy_hardware=summary["accuracy_percent"]["hardware"],
+        delay=float(group_delay(ideal.sos, np.zeros(1), rate)[0]),
+        settling=(int(late[-1]) + 1) / rate,
+        attenuation={
+            what: -float(magnitude_db(ideal.sos, np.array([frequency]), rate)[0]) for what, frequency in NOTABLE.items()
+        },
+        summary=summary,
+        time=trace.time,
+        before=before,
+        after=after,
+    )
+
+
+def validity(sample_rate: float) -> dict[str, float | bool]:
+    """Tell how far the leading wheelset leaves the linear model on the curve: mm beyond its flange, friction."""
+    parameters = built_in()
+    track = curved_track(parameters.track)
+    motion = run(parameters, track, speed=SPEED, sample_rate=sample_rate, irregularity=IRREGULARITY, seed=1)
+    found = limits(parameters, track, motion)
+    straight = tangent_track(replace(parameters.track, irregularity=0.0))
+    tangent = run(parameters, straight, speed=SPEED, sample_rate=sample_rate, irregularity=IRREGULARITY, seed=1)
+    return {
+        "tangent_kept": limits(parameters, straight, tangent).kept,
+        "beyond_flange": 1e3 * float(found.beyond_flange[WHEELSET]),
+        "beyond_share": float(found.beyond_flange_share[WHEELSET]),
+        "friction_used": float(found.friction_used[WHEELSET]),
+    }

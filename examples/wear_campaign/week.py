@@ -1,0 +1,142 @@
+"""A week in service: the sensor ages, the calibration follows, and the wear is told from what the hardware reads."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from examples.wear_campaign import depot, hardware
+
+from sosmith.gen.calibration_report import specification_table
+from sosmith.gen.reload import check_swap, own_set, set_for
+from sosmith.gen.specification import load
+from sosmith.model.accuracy import accuracy_percent
+from sosmith.model.datapath import Datapath
+from sosmith.model.errors import ShortfallError
+from sosmith.model.polynomial import EQUATION_5A
+from sosmith.model.scenario_file import ScenarioFile, emulate_file
+from sosmith.model.self_updating import Calibration
+from sosmith.model.status import Flag
+from sosmith.model.trace import Trace
+from sosmith.model.wear import WearLimits, WearReport, judge
+from sosmith.sim.simulation import Progress, bench_of
+
+Values = npt.NDArray[np.float64]
+
+RATE = 100.0
+"""Sample rate in Hz, the paper's section 5.4."""
+
+MAX_ERROR = 0.0005
+"""Of hardware that calibrations are loaded into, in mm: two LSB, which leaves room for other coefficients."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Day:
+    """One day. Accuracies in per cent by equation 7, of the hardware's integers at the readings of the day."""
+
+    day: int
+    calibration: Calibration
+    factory: float
+    first: float
+    updated: float
+    loaded: str
+    true_wear: float
+    wear: float
+    warnings: int
+    readings: int
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Week:
+    """The week, and what is told of the wheel at its end."""
+
+    days: list[Day]
+    report: WearReport
+    limits: WearLimits
+    time: Values
+    clearance: Values
+    truth: Values
+    simulated: dict[str, Any]
+
+
+def live(
+    scenario: ScenarioFile,
+    filter_table: str,
+    settings: dict[str, Any],
+    seed: int,
+    folder: Path,
+    simulator: str,
+    progress: Progress,
+) -> Week:
+    """Go through the week: each morning depot, refit, proof and reload; then the day's journeys."""
+    calibrations = depot.into_store(scenario, seed, folder, settings["sensor"])
+    initial = scenario.document.wear.initial_clearance
+    wear = hardware.Wear(initial=initial, warning=settings["warning"], limit=settings["limit"])
+
+    options: dict[str, Any] = {"wear": wear, "reload": True, "max_error": MAX_ERROR}
+    factory = hardware.instrument(
+        folder, "week_factory", RATE, hardware.calibration_table(EQUATION_5A), filter_table, **options
+    )
+    trace = emulate_file(scenario, bench_of(factory), seed=seed)
+    excerpts = scenario.document.excerpt
+    lengths = [round((excerpt.seconds or 0) * RATE) for excerpt in excerpts]
+    starts = np.cumsum([0, *lengths])
+    days_of = np.repeat([excerpt.day for excerpt in excerpts], lengths)
+    within = np.concatenate([np.arange(length) for length in lengths]) / RATE / 86400
+    time = days_of + within
+    before, days, clearance = own_set(factory), list[Day](), np.zeros(len(trace))
+    loaded: list[Datapath] = []
+    for number, calibration in enumerate(calibrations):
+        table = specification_table(calibration.sensor, calibration.version)
+        wanted = hardware.specification(folder, f"week_day_{number}", RATE, table, filter_table, **options)
+        progress("week: prove and reload", number, len(calibrations))
+        try:
+            swap = check_swap(factory, before, set_for(factory, load(wanted)))
+            before, verdict = swap.made, f"proven, {float(swap.made.quantized.bound):.2f} LSB"
+            loaded.append(swap.made.quantized.datapath)
+        except ShortfallError as error:
+            verdict = f"refused: {error}"
+            loaded.append(loaded[-1] if loaded else factory.datapath)  # goes on with what it has
+        own = [k for k, excerpt in enumerate(excerpts) if int(excerpt.day) == number]
+        span = slice(starts[own[0]], starts[own[-1] + 1])
+        part = replace(trace, codes=trace.codes[span], truth=trace.truth[span], reading=trace.reading[span])
+        if number == 0:  # a day is enough for the simulator: the others run the same hardware
+            summary = hardware.run(factory, [part], folder, simulator, progress)
+
+        def accuracy(datapath: Datapath, part: Trace = part) -> float:
+            values = datapath.output.decode(datapath.compute(part.codes))
+            return accuracy_percent(values, part.truth, part.reading)
+
+        datapath = loaded[-1]
+        codes = datapath.compute(part.codes)
+        clearance[span] = datapath.output.decode(codes)
+        flags = datapath.compute_status(part.codes)[part.reading]
+        days.append(
+            Day(
+                day=number,
+                calibration=calibration,
+                factory=accuracy(factory.datapath),
+                first=accuracy(loaded[0]),
+                updated=accuracy(datapath),
+                loaded=verdict,
+                true_wear=float(part.truth[-1]) - initial,
+                wear=float(np.median(clearance[span][part.reading])) - initial,
+                warnings=int(np.count_nonzero(flags >> Flag.WEAR_WARNING & 1)),
+                readings=int(np.count_nonzero(part.reading)),
+            )
+        )
+    limits = WearLimits(initial=initial, limit=wear.limit, warning=wear.warning)
+    kept = trace.reading
+    report = judge(time[kept], clearance[kept], limits, block=0.25)
+    return Week(
+        days=days,
+        report=report,
+        limits=limits,
+        time=time[kept],
+        clearance=clearance[kept],
+        truth=trace.truth[kept],
+        simulated=hardware.told(summary),
+    )

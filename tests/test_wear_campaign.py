@@ -1,0 +1,115 @@
+"""The wear campaign: its document is what its run gave, and the hardware in it is as exact as it says."""
+
+import json
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from examples.wear_campaign import bench, campaign, ride
+from examples.wear_campaign.document import document
+from examples.wear_campaign.spread import spread
+from scipy import signal
+
+from sosmith.gen.specification import load
+from sosmith.model.scenario_file import load_scenario
+
+ROOT = Path(__file__).parents[1]
+HERE = ROOT / "examples" / "wear_campaign"
+OFF = 0.01
+"""Points of accuracy that the hardware may be off the golden chain."""
+
+
+def outcome() -> dict[str, Any]:
+    result: dict[str, Any] = json.loads((HERE / "outcome.json").read_text(encoding="utf-8"))
+    return result
+
+
+def test_the_document_says_what_came_out() -> None:
+    assert (ROOT / "docs" / "campaign.md").read_text(encoding="utf-8") == document(outcome())
+
+
+def test_what_came_out_is_of_these_settings() -> None:
+    assert outcome()["settings"] == tomllib.loads((HERE / "campaign.toml").read_text(encoding="utf-8"))
+
+
+def test_every_run_in_the_simulator_was_exact_and_within_its_bound() -> None:
+    found = outcome()
+    simulated = [row["simulated"] for row in (*found["bench"]["runs"], *found["ride"]["runs"], found["week"])]
+    assert len(simulated) == 4 + 6 + 1
+    for run in simulated:
+        assert run["bit_exact"]
+        assert 0 < run["error_max"] <= run["error_bound"]
+        assert abs(run["accuracy"]["hardware"] - run["accuracy"]["golden"]) < OFF
+    assert all(row["hardware_off"] < OFF for row in found["bench"]["runs"])
+
+
+def test_a_filter_that_is_not_exact_is_called_so() -> None:
+    found = outcome()
+    found["bench"]["runs"][0]["simulated"]["bit_exact"] = False
+    assert "NOT EVERY SAMPLE" in document(found)
+    assert "NOT" not in document(outcome())
+
+
+def test_the_bench_from_depot_to_hardware(tmp_path: Path) -> None:
+    settings = tomllib.loads((HERE / "campaign.toml").read_text(encoding="utf-8"))
+    settings |= {"seeds": 2, "simulator": "icarus"}
+    settings["bench"] |= {"scenarios": ["bench_43_50"], "others": []}
+    told: list[tuple[str, int, int]] = []
+    found, series = campaign.bench_campaign(settings, tmp_path, lambda *what: told.append(what))
+    assert [row["filter"] for row in found["runs"]] == ["the paper's", "from spectra"]
+    for row in found["runs"]:
+        assert row["simulated"]["bit_exact"]
+        assert 0 < row["hardware_off"] < OFF
+        assert sum(some["seeds"] for some in row["by_orders"]) == 2
+    recorded = {row["filter"]: row for row in outcome()["bench"]["runs"] if row["scenario"] == "bench_43_50"}
+    for row in found["runs"]:
+        np.testing.assert_allclose(row["values"], recorded[row["filter"]]["values"][:2], rtol=1e-12)
+    assert load(tmp_path / "bench_43_50" / "bench_43_50_spectra.toml").filter.passband_edge is not None
+    assert len(series["bench_43_50"]["time"]) == found["runs"][0]["simulated"]["samples"]
+    assert any(total == 2 for _, _, total in told)
+
+
+def test_each_source_of_error_is_taken_away() -> None:
+    scenario = load_scenario(ROOT / "examples" / "scenarios" / "bench_43_50.toml")
+    quiet = bench.without(scenario, "noise", "systematic")
+    assert (quiet.sensors.inductive.noise, quiet.sensors.thermometer.noise) == (0.0, 0.0)
+    assert quiet.sensors.inductive.systematic_error.rms == 0.0
+    assert bench.without(scenario, "noise").sensors.inductive.systematic_error.rms > 0
+    assert bench.without(scenario, "systematic").sensors.inductive.noise > 0
+
+
+def test_the_exact_filter_loses_at_the_edge_what_it_is_to_lose() -> None:
+    (cutoff,) = re.findall(r"cutoff = (\S+)", ride.prewarped(7, 10.0, 0.02, 100.0))
+    sos = signal.butter(7, float(cutoff), fs=100.0, output="sos")
+    _, response = signal.sosfreqz(sos, [10.0], fs=100.0)
+    assert -20 * np.log10(np.abs(response[0])) == pytest.approx(0.02, rel=1e-6)
+
+
+def test_the_interval_of_a_mean_holds_it_as_often_as_it_says() -> None:
+    rng = np.random.default_rng(7)
+    held = [found["low"] <= 5 <= found["high"] for found in (spread(rng.normal(5, 2, 12), 0.9) for _ in range(2000))]
+    assert np.mean(held) == pytest.approx(0.9, abs=0.02)
+    runs = spread(list(range(101)), 0.9)
+    assert (runs["mean"], runs["run_low"], runs["run_high"]) == pytest.approx((50, 5, 95), abs=1e-12)
+
+
+def test_too_few_seeds_are_refused(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "examples.wear_campaign", "--seeds", "1", "-o", str(tmp_path / "out")]
+    result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert (result.returncode, result.stdout) == (2, "")
+    assert result.stderr.endswith("error: --seeds must be at least 2, not 1\n")
+
+
+@pytest.mark.slow
+def test_the_whole_campaign_gives_the_same_again(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "examples.wear_campaign", "-o", str(tmp_path)]
+    subprocess.run(command, cwd=ROOT, check=True)
+    assert (tmp_path / "campaign.md").read_bytes() == (ROOT / "docs" / "campaign.md").read_bytes()
+    for name in ("bench", "runs", "ride", "week"):
+        picture = f"campaign_{name}.svg"
+        assert (tmp_path / "images" / picture).read_bytes() == (ROOT / "docs" / "images" / picture).read_bytes()
