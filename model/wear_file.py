@@ -13,6 +13,7 @@ from sosmith.model.csv_table import check_rows, csv_header, read_csv_table
 from sosmith.model.errors import SpecificationError
 from sosmith.model.port import Values
 from sosmith.model.signal_file import unit_of
+from sosmith.model.trace_file import CHANNEL
 
 SECONDS_A_DAY = 86400.0
 
@@ -91,10 +92,12 @@ def read_wear_record(path: Path, column: str | None = None) -> WearRecord:
     Raises
     ------
     SpecificationError
-        As `read_csv_table`; if there is no such column, its name ends in another unit, or times go back. One sentence
-        with the file and the line.
+        As `read_csv_table`; if there are several channels or no such column, its name ends in another unit, or times
+        go back. One sentence with the file and the line.
     """
     header = csv_header(path)
+    if CHANNEL in header:
+        raise SpecificationError(f"{path} must hold a record of one channel, not have the column {CHANNEL}")
     time_column = _first(path, header, ("time_s", *TIMES), "a column of times")
     clearance_column = _first(path, header, CLEARANCES if column is None else (column,), "a column of clearances")
     if clearance_column == time_column:

@@ -146,6 +146,7 @@ def test_refusals() -> None:
             "days;clearance_mm\n1;2\n",
             ", line 1: cells must be separated by commas, with points in decimal numbers, not by semicolons",
         ),
+        ("days,channel,clearance_mm\n1,0,2\n", " must hold a record of one channel, not have the column channel"),
         ("days,clearance_mm\n1,2\n0.5,2\n", ", line 3: days must not be before that of the row before"),
         ("days,clearance_mm\n1,worn\n", ", line 2: clearance_mm must be a finite number, not 'worn'"),
         (
