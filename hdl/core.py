@@ -18,8 +18,9 @@ from sosmith.hdl.axi_stream import (
 )
 from sosmith.hdl.constant_banks import NO_CONSTANTS, ConstantBanks, Pair
 from sosmith.hdl.interleaved import InterleavedStage, schedule
+from sosmith.hdl.ranked_logic import banks_in_use
 from sosmith.hdl.reload import ReloadPort
-from sosmith.hdl.stage import PipelineStage, banks_in_use, rank_count
+from sosmith.hdl.stage import PipelineStage, rank_count
 from sosmith.hdl.status import at_rail, flag_count, outside_calibration, worn
 from sosmith.model.constants import constants
 from sosmith.model.datapath import Datapath, Stage

@@ -14,8 +14,8 @@ from amaranth.lib.memory import Memory
 
 from sosmith.hdl.axi_lite import slave_members
 from sosmith.hdl.axi_stream import channel_bits, core_members, extended, fields
+from sosmith.hdl.ranked_logic import limits
 from sosmith.hdl.reload import ReloadPort
-from sosmith.hdl.stage import limits
 from sosmith.hdl.status import at_rail, worn
 from sosmith.model.datapath import Datapath
 from sosmith.model.graph import Op

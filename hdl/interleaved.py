@@ -17,8 +17,9 @@ from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
 from sosmith.hdl.axi_stream import channel_bits
-from sosmith.hdl.constant_banks import NO_CONSTANTS, Pair, chosen
-from sosmith.hdl.stage import PLAIN, banks_in_use, limits, logic, shape_of, unique_names
+from sosmith.hdl.constant_banks import NO_CONSTANTS, Pair
+from sosmith.hdl.ranked_logic import RankedLogic, banks_in_use, limits, shape_of
+from sosmith.hdl.stage import PLAIN
 from sosmith.model.datapath import Stage
 from sosmith.model.graph import Graph, Node, Op
 
@@ -176,39 +177,18 @@ class InterleavedStage(wiring.Component):
         """Build the logic."""
         m = Module()
         graph, plan = self.stage.graph, self.schedule
-        names = unique_names(graph)
-        wires: list[Value] = []
-        passed: dict[tuple[int, int], Value] = {}
-
-        def at(index: int, rank: int) -> Value:
-            """Value of a node as a rank sees it that is no earlier than the node's own."""
-            node = graph.nodes[index]
-            if node.op is Op.CONSTANT and index in self.constants:
-                return chosen(self.constants[index], banks[rank])
-            if node.op is Op.CONSTANT or plan.ranks[index] == rank:
-                return wires[index]
-            if (index, rank) not in passed:
-                register = Signal(shape_of(node), name=f"{names[index]}_passed{rank}", reset_less=True)
-                passed[index, rank] = register
-                with m.If(self.advance):
-                    m.d.sync += register.eq(at(index, rank - 1))
-            return passed[index, rank]
-
         valid, channel, banks = self._travelling(m)
-        inputs = iter([getattr(self, f"i{k}") for k in range(len(graph.inputs))])
-        for index, (node, name) in enumerate(zip(graph.nodes, names, strict=True)):
-            own = plan.ranks[index]
-            if node.op is Op.INPUT:
-                wires.append(next(inputs))
-            elif node.op is Op.SHIFT:  # the same code
-                wires.append(at(node.operands[0], own))
-            else:
-                wire = Signal(shape_of(node), name=name)
-                if node.op is not Op.DELAY:
-                    pair = self.constants.get(index)
-                    factor = None if pair is None else chosen(pair, banks[own])
-                    m.d.comb += wire.eq(logic(graph, node, [at(i, own) for i in node.operands], factor))
-                wires.append(wire)
+        ranked = RankedLogic(
+            m,
+            graph,
+            plan.ranks,
+            constants=self.constants,
+            banks=banks,
+            takes=[self.advance] * plan.count,
+            valid=valid,
+        )
+        ranked.connect([getattr(self, f"i{k}") for k in range(len(graph.inputs))])
+        at, wires, names = ranked.at, ranked.wires, ranked.names
         for index in graph.delays:
             node, written = graph.nodes[index], plan.writes[index]
             m.submodules[f"{names[index]}_memory"] = memory = Memory(

@@ -1,4 +1,4 @@
-"""One stage of a datapath in hardware: its dataflow graph as logic, its state, and one to three register ranks.
+"""One stage of a datapath in hardware: its state, and its logic in one to three register ranks.
 
 Where a stage has a recursion, only what depends on the newest sample that it remembers has to be done within a clock.
 What depends on the input alone, and what depends on older samples, is done and registered a rank before; the delay
@@ -7,21 +7,16 @@ of the loop proper then is all that limits the clock.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 
-from amaranth.hdl import Cat, Const, Module, Mux, Shape, Signal, Value
+from amaranth.hdl import Cat, Module, Signal, Value
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
-from sosmith.hdl.constant_banks import NO_CONSTANTS, Pair, chosen
+from sosmith.hdl.constant_banks import NO_CONSTANTS, Pair
+from sosmith.hdl.ranked_logic import RankedLogic, banks_in_use, limits, shape_of
 from sosmith.model.datapath import Stage
 from sosmith.model.graph import Graph, Node, Op
-
-
-def shape_of(node: Node) -> Shape:
-    """Shape that holds the range of `node`: unsigned where it cannot be negative."""
-    return Shape(node.width, signed=node.signed)
-
 
 PLAIN = {Op.INPUT, Op.CONSTANT, Op.DELAY, Op.SHIFT, Op.FLOOR, Op.FRACTION, Op.BOUND}
 """What takes no time in hardware."""
@@ -151,42 +146,12 @@ class PipelineStage(wiring.Component):
         """Build the logic."""
         m = Module()
         graph = self.stage.graph
-        names, ranks = unique_names(graph), _ranks(graph)
+        ranks = _ranks(graph)
         valid, takes, banks = self._control(m, max(ranks) + 1)
         apart = _known_early(graph, ranks)
-        wires: list[Value] = []
-        passed: dict[tuple[int, int], Value] = {}
-
-        def at(index: int, rank: int) -> Value:
-            """Value of a node as a rank sees it that belongs to a sample at least as new."""
-            node, own = graph.nodes[index], ranks[index]
-            if node.op is Op.CONSTANT and index in self.constants:
-                return chosen(self.constants[index], banks[rank])
-            if own == rank or node.op is Op.CONSTANT:
-                return wires[index]
-            if own > rank:  # the loop may still be about the sample before, with all its states one sample behind
-                return Mux(valid[own], wires[node.operands[0]], wires[index])
-            if (index, rank) not in passed:
-                register = Signal(shape_of(node), name=f"{names[index]}_passed{rank}", reset_less=True)
-                passed[index, rank] = register
-                with m.If(takes[rank - 1]):
-                    m.d.sync += register.eq(at(index, rank - 1))
-            return passed[index, rank]
-
-        inputs = iter([getattr(self, f"i{k}") for k in range(len(graph.inputs))])
-        for index, (node, name) in enumerate(zip(graph.nodes, names, strict=True)):
-            if node.op is Op.INPUT:
-                wires.append(next(inputs))
-                continue
-            if node.op is Op.SHIFT:  # the same code
-                wires.append(at(node.operands[0], ranks[index]))
-                continue
-            wire = Signal(shape_of(node), name=name, attrs={"keep": 1} if index in apart else {})
-            if node.op is not Op.DELAY:
-                pair = self.constants.get(index)
-                factor = None if pair is None else chosen(pair, banks[ranks[index]])
-                m.d.comb += wire.eq(logic(graph, node, [at(i, ranks[index]) for i in node.operands], factor))
-            wires.append(wire)
+        ranked = RankedLogic(m, graph, ranks, constants=self.constants, banks=banks, takes=takes, valid=valid)
+        ranked.connect([getattr(self, f"i{k}") for k in range(len(graph.inputs))], apart)
+        at, wires, names = ranked.at, ranked.wires, ranked.names
         for i in graph.delays:
             with m.If(takes[ranks[i]]):
                 m.d.sync += wires[i].eq(at(graph.nodes[i].operands[0], ranks[i]))
@@ -223,24 +188,6 @@ class PipelineStage(wiring.Component):
         return valid, takes, banks
 
 
-def banks_in_use(valid: Sequence[Value], banks: Sequence[Value]) -> Value:
-    """Return for each bank whether a sample that is there uses it."""
-    inside = list(zip(valid, banks, strict=True))
-    first, second = (Cat(*(there & (own == bank) for there, own in inside)).any() for bank in (0, 1))
-    return Cat(first, second)
-
-
-def unique_names(graph: Graph) -> list[str]:
-    """Name every node's signal: by its own name, with the index where that is missing or taken."""
-    seen: set[str] = set()
-    names = []
-    for index, node in enumerate(graph.nodes):
-        name = node.name if node.name and node.name not in seen else f"{node.name or node.op.value}_{index}"
-        seen.add(name)
-        names.append(name)
-    return names
-
-
 def _held(graph: Graph, output: int, wires: list[Value]) -> Value | None:
     """Output value of the sample before as a function of a state that already holds it, or None.
 
@@ -265,53 +212,3 @@ def _held(graph: Graph, output: int, wires: list[Value]) -> Value | None:
 def _drop(graph: Graph, node: Node, value: Value) -> Value:
     shift = graph.nodes[node.operands[0]].frac - node.frac if node.op is Op.FLOOR else 0
     return value.shift_right(shift)
-
-
-def logic(graph: Graph, node: Node, operands: list[Value], factor: Value | None = None) -> Value:
-    """Value of a node from those of its operands; every intermediate result is exact.
-
-    `factor` is what a SCALE multiplies by, where that is not its parameter.
-    """
-    fracs = [graph.nodes[i].frac for i in node.operands]
-    if node.op is Op.CONSTANT:
-        return Const(node.parameter, shape_of(node))
-    if node.op in {Op.ADD, Op.SUBTRACT}:
-        a, b = _aligned(operands, fracs, node.frac)
-        return a + b if node.op is Op.ADD else a - b
-    if node.op is Op.SCALE:
-        return operands[0] * (Const(node.parameter) if factor is None else factor)
-    if node.op is Op.MULTIPLY:
-        return operands[0] * operands[1]
-    if node.op is Op.FLOOR:
-        return operands[0].shift_right(fracs[0] - node.frac)
-    if node.op is Op.TRUNCATE:
-        shift = fracs[0] - node.frac
-        return (operands[0] + Mux(operands[0] < 0, (1 << shift) - 1, 0)).shift_right(shift)
-    if node.op is Op.FRACTION:
-        return operands[0].as_unsigned()[: fracs[0] - node.parameter]
-    if node.op is Op.CLAMP:
-        below, above = limits(node, operands[0])
-        return Mux(below, Const(node.low), Mux(above, Const(node.high), operands[0]))
-    return operands[0]  # BOUND drops bits that are known to repeat the sign
-
-
-def limits(node: Node, operand: Value) -> tuple[Value, Value]:
-    """Whether a CLAMP finds `operand` below its range, and above.
-
-    Where an end of the range is that of so many bits, the bits above them tell; else a comparison does.
-    """
-    low, high = node.low, node.high
-    bits = high.bit_length()
-    value = operand if operand.shape().signed else Cat(operand, Const(0, 1)).as_signed()
-    top = value[-1]
-    below: Value = value < Const(low)
-    above: Value = value > Const(high)
-    if len(value) > bits + 1 and high == (1 << bits) - 1:
-        above = ~top & value[bits:-1].any()
-        if low in {0, -high - 1}:
-            below = top if low == 0 else top & ~value[bits:-1].all()
-    return below, above
-
-
-def _aligned(operands: list[Value], fracs: list[int], frac: int) -> Iterator[Value]:
-    return (operand.shift_left(frac - own) for operand, own in zip(operands, fracs, strict=True))

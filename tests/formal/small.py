@@ -5,7 +5,7 @@ from fractions import Fraction
 
 from amaranth.hdl import Const, Module, Mux, Signal, Value
 
-from sosmith.hdl.stage import shape_of
+from sosmith.hdl.ranked_logic import shape_of
 from sosmith.model.datapath import Datapath
 from sosmith.model.graph import Graph, GraphBuilder, Node, Op
 from sosmith.model.horner import HornerStep

@@ -7,7 +7,7 @@ import pytest
 from amaranth.hdl import Assert, Assume, Const, Module, Signal, Value
 from tests.formal.prover import INDUCTION, Proof, broken, prove
 
-from sosmith.hdl import stage
+from sosmith.hdl import ranked_logic, stage
 from sosmith.model.graph import GraphBuilder
 from sosmith.model.horner import HornerStep
 
@@ -25,7 +25,7 @@ class Quantizers(Proof):
     Parameters
     ----------
     module : ModuleType
-        `sosmith.hdl.stage`, or a broken one.
+        `sosmith.hdl.stage`, or one on broken logic.
     low, high : int
         Range of the input code, which the stage before keeps.
     drop : int
@@ -84,6 +84,13 @@ def test_quantizers_are_what_they_are_called(
     assert prove(Quantizers(stage, low, high, drop, limits), tmp_path, INDUCTION) == "PASS"
 
 
+def on_broken_logic(right: str, wrong: str) -> ModuleType:
+    """Return the module of the stage on logic that has `wrong` in place of `right`."""
+    module = broken(stage, "class PipelineStage", "class PipelineStage")  # a copy
+    vars(module)["RankedLogic"] = vars(broken(ranked_logic, right, wrong))["RankedLogic"]
+    return module
+
+
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [
@@ -96,9 +103,9 @@ def test_quantizers_are_what_they_are_called(
     ],
 )
 def test_a_broken_quantizer_is_found_out(right: str, wrong: str, tmp_path: Path) -> None:
-    assert prove(Quantizers(broken(stage, right, wrong), *CASES[0]), tmp_path) == "FAIL"
+    assert prove(Quantizers(on_broken_logic(right, wrong), *CASES[0]), tmp_path) == "FAIL"
 
 
 def test_a_broken_limit_of_whole_bits_is_found_out(tmp_path: Path) -> None:
-    module = broken(stage, "top & ~value[bits:-1].all()", "top & ~value[bits + 1 : -1].all()")
+    module = on_broken_logic("top & ~value[bits:-1].all()", "top & ~value[bits + 1 : -1].all()")
     assert prove(Quantizers(module, *CASES[1]), tmp_path) == "FAIL"

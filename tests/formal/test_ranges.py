@@ -11,7 +11,8 @@ from tests.formal.small import port, resonator
 from tests.gen.proven_stages import Format, Ranges, proven_cascade
 
 from sosmith.gen.realizations import WIDE
-from sosmith.hdl.stage import PipelineStage, _ranks, unique_names
+from sosmith.hdl.ranked_logic import unique_names
+from sosmith.hdl.stage import PipelineStage, _ranks
 from sosmith.model.datapath import Stage
 from sosmith.model.direct_form import DirectForm1, Product
 from sosmith.model.graph import Op
