@@ -319,7 +319,7 @@ BAD_TRACES: dict[str, tuple[str, str | bytes, str]] = {
     "unknown column": (
         "plain",
         "x_code,colour\n1,2\n",
-        "trace.csv, line 1: column must be one of time_s, truth, reading, x, x_code, not 'colour'",
+        "trace.csv, line 1: column must be one of time_s, channel, truth, reading, x, x_code, not 'colour'",
     ),
     "column twice": ("plain", "x,x\n1,2\n", "trace.csv, line 1: column x must be there once, not 2 times"),
     "missing column": ("plain", "time_s\n0\n", "trace.csv must have the column x_code or x, not only time_s"),
