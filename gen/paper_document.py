@@ -124,7 +124,10 @@ def _summary(chapters: dict[str, list[Part]]) -> list[str]:
     parts = [part for group in chapters.values() for part in group]
     counts = {label: sum(part.count(label) for part in parts) for label in LABELS}
     total = ", ".join(f"{label} {count}" for label, count in counts.items())
-    return [f"Of {sum(counts.values())} comparisons: {total}.", table(["", *LABELS, "what came out"], map(_summary_row, parts))]
+    return [
+        f"Of {sum(counts.values())} comparisons: {total}.",
+        table(["", *LABELS, "what came out"], map(_summary_row, parts)),
+    ]
 
 
 def _summary_row(part: Part) -> list[str]:
