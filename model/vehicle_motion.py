@@ -121,7 +121,7 @@ def clearance_change(
     frame_lateral, frame_yaw, frame_roll : ndarray, shape (n, 2)
         In m and rad.
     """
-    sensor, l = parameters.sensor, parameters.wheelset.contact_half_spacing  # noqa: E741
+    sensor, half = parameters.sensor, parameters.wheelset.contact_half_spacing
     above = parameters.frame.centre_height - parameters.wheelset.rolling_radius
     axles = axle_positions(parameters.layout)
     change = np.zeros_like(wheelset_lateral)
@@ -129,5 +129,5 @@ def clearance_change(
         f = frame_of(k)
         yaw = wheelset_yaw[:, k] - frame_yaw[:, f]
         across = wheelset_lateral[:, k] - frame_lateral[:, f] - axles[k] * frame_yaw[:, f] - above * frame_roll[:, f]
-        change[:, k] = across + (sensor.arm - sensor.flank_slope * l) * yaw
+        change[:, k] = across + (sensor.arm - sensor.flank_slope * half) * yaw
     return 1e3 * change

@@ -156,11 +156,12 @@ def _findings(found: dict[str, Any], unfiltered: float, filtered: float) -> str:
         }
         largest = max(gains, key=lambda what: gains[what])
         filter_gain = row["golden"]["mean"] - row["unfiltered"]["mean"]
+        smaller = gains["no noise"] < gains["no systematic error of the run"]
+        why = ": it takes away noise only, which costs less than the systematic error" if smaller else ""
         lines.append(
             f"- {_scenario(row)}: unfiltered {_against(row['unfiltered'], unfiltered)}, filtered "
-            f"{_against(row['golden'], filtered)}. The filter changes the mean by {filter_gain:+.2f} points: noise is "
-            f"added to a systematic error that is larger, and a filter takes away the noise only. Most is gained "
-            f"{CAUSES[largest]}: {gains[largest]:+.2f} points."
+            f"{_against(row['golden'], filtered)}. The filter changes the mean by {filter_gain:+.2f} points{why}. "
+            f"Most is gained {CAUSES[largest]}: {gains[largest]:+.2f} points."
         )
     return "\n".join(lines)
 
@@ -269,11 +270,10 @@ def _week(found: dict[str, Any], settings: dict[str, Any]) -> str:
     lines = [
         "## A week in service",
         f"`examples/scenarios/{settings['week']['scenario']}.toml`: an ageing sensor, every morning measurements in "
-        "the "
-        "depot, a refit of the store, the proof of the error with the new coefficients, and their load into the "
-        "running "
-        "hardware (`sosmith reload`); then journeys with motion and tread braking. Accuracies are of the hardware's "
-        "integers; the last column is the share of readings with the flag `wear_warning`, which stands for "
+        "the depot, a refit of the store, and the proof that `sosmith reload` asks for before the new coefficients may "
+        "be loaded; then journeys with motion and tread braking. Accuracies are of the integer model with the day's "
+        "coefficients, from reset each day; the load itself is not simulated here; the last column is the share of "
+        "readings with the flag `wear_warning`, which stands for "
         f"{told['warning']:g} mm of wear.",
         _table(
             [
@@ -295,13 +295,12 @@ def _week(found: dict[str, Any], settings: dict[str, Any]) -> str:
         "with "
         f"the one that is updated, {mean['factory']:.2f} % with equation 5a. The last is what the emulated sensor was "
         f"before it aged, which nobody knows of a real one. A day of {found['days'][0]['measurements']} measurements "
-        "with the scatter that follows from the "
-        "paper's adjusted r makes an uncertain calibration: more of them help more than a filter does.",
+        "with the scatter that follows from the paper's adjusted r makes an uncertain calibration.",
         f"At the end the wear reads {told['wear']:.3f} mm, its rate is {rate:.3f} mm a day ({low:.3f} to {high:.3f}), "
         f"state {told['state']}; at that rate the limit of {told['limit']:g} mm is {_days(told['life'])} away. The "
         "true "
         f"rate over the week was {_true_rate(found):.3f} mm a day.",
-        f"The first day ran in the simulator: {found['simulated']['samples']:,} samples, "
+        f"The first day ran in the simulator with equation 5a: {found['simulated']['samples']:,} samples, "
         + ("all" if found["simulated"]["bit_exact"] else "NOT ALL")
         + " as the integer model has them.",
     ]
