@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -141,7 +142,7 @@ def _mask(
 ) -> None:
     """Shade where the response must not be: below the pass band's loss, above the stop band's."""
     axes.set_ylim(*limits)
-    shade = {"color": _GREY, "alpha": 0.25, "lw": 0}
-    axes.fill_between([lowest, edges[0]], limits[0], max(-losses[0], limits[0]), **shade)  # type: ignore[arg-type]
+    shade: dict[str, Any] = {"color": _GREY, "alpha": 0.25, "lw": 0}
+    axes.fill_between([lowest, edges[0]], limits[0], max(-losses[0], limits[0]), **shade)
     if edges[1] < highest:
-        axes.fill_between([edges[1], highest], max(-losses[1], limits[0]), limits[1], **shade)  # type: ignore[arg-type]
+        axes.fill_between([edges[1], highest], max(-losses[1], limits[0]), limits[1], **shade)
