@@ -82,7 +82,8 @@ def c_source(datapath: Datapath) -> str:
     """
     name, inputs = datapath.name, datapath.inputs
     parameters = "".join(f", int64_t {port.name}_code" for port in inputs)
-    arguments = "".join(f", in[(n * channels + c) * {len(inputs)} + {i}]" for i in range(len(inputs)))
+    supply = "".join(f"    w.{port.name}_code = {port.name}_code;\n" for port in inputs)
+    in_order = "".join(f"    stage{k}(state, &w);\n" for k in range(len(datapath.stages)))
     return f"""/* {name}: bit-true model of the generated hardware, made by sosmith. See {name}.h. */
 #include "{name}.h"
 
@@ -94,6 +95,10 @@ def c_source(datapath: Datapath) -> str:
 #define ALWAYS_INLINE inline
 #endif
 
+/* What goes into the stages, and what passes from one to the next. */
+typedef struct {{
+{_wires(datapath)}}} wires;
+{_stages(datapath)}
 void {name}_reset({name}_state *state)
 {{
     memset(state, 0, sizeof *state);
@@ -101,29 +106,17 @@ void {name}_reset({name}_state *state)
 
 static ALWAYS_INLINE int64_t step({name}_state *state{parameters}, uint8_t *status)
 {{
-{_body(datapath)}}}
+    wires w;
+{supply}{in_order}    if (status)
+        *status = {_status(datapath)};
+    return (int64_t)w.{_result(datapath)};
+}}
 
 int64_t {name}_step({name}_state *state{parameters}, uint8_t *status)
 {{
     return step(state{"".join(f", {port.name}_code" for port in inputs)}, status);
 }}
-{_wear_definition(datapath)}
-void {name}_block({name}_state *states, size_t samples, size_t channels, const int64_t *in, int64_t *out,
-{" " * len(f"void {name}_block(")}uint8_t *status)
-{{
-    for (size_t c = 0; c < channels; c++) {{
-        {name}_state state = states[c]; /* a local copy stays in registers */
-        if (status)
-            for (size_t n = 0; n < samples; n++) {{
-                out[n * channels + c] = step(&state{arguments}, &status[n * channels + c]);{_judge_wear(datapath)}
-            }}
-        else
-            for (size_t n = 0; n < samples; n++)
-                out[n * channels + c] = step(&state{arguments}, NULL);
-        states[c] = state;
-    }}
-}}
-"""
+{_wear_definition(datapath)}{_block(datapath)}"""
 
 
 def _and_not_wear(datapath: Datapath) -> str:
@@ -160,7 +153,7 @@ def _judge_wear(datapath: Datapath) -> str:
     if not datapath.wear:
         return ""
     at = "n * channels + c"
-    return f"\n                status[{at}] |= {datapath.name}_wear_flags(c, out[{at}]);"
+    return f"\n        status[{at}] |= {datapath.name}_wear_flags(c, out[{at}]);"
 
 
 def state_count(datapath: Datapath) -> int:
@@ -185,23 +178,73 @@ def _type(width: int) -> str:
     return "int64_t" if width <= _NARROW else "__int128"
 
 
-def _body(datapath: Datapath) -> str:
-    lines: list[str] = []
-    wires = [f"{port.name}_code" for port in datapath.inputs]
-    offset = 0
+def _wire(index: int, node: int) -> str:
+    return f"n{index}_{node}"
+
+
+def _result(datapath: Datapath) -> str:
+    last = datapath.stages[-1].graph
+    return _wire(len(datapath.stages) - 1, last.outputs[0])
+
+
+def _exported(datapath: Datapath, index: int) -> list[int]:
+    """Nodes of a stage that others need: its outputs and, of the last stage, what the output stage clamps."""
+    graph = datapath.stages[index].graph
+    exported = set(graph.outputs)
+    if index == len(datapath.stages) - 1 and (node := graph.nodes[graph.outputs[0]]).op is Op.CLAMP:
+        exported.add(node.operands[0])
+    return sorted(exported)
+
+
+def _wires(datapath: Datapath) -> str:
+    lines = [f"    int64_t {port.name}_code;\n" for port in datapath.inputs]
     for index, stage in enumerate(datapath.stages):
-        prefix = f"n{index}_"
-        lines.append(f"    /* {stage.name} */\n")
-        lines += _stage_lines(stage.graph, prefix, wires, offset)
-        wires = [f"{prefix}{i}" for i in stage.graph.outputs]
-        offset += len(stage.graph.delays)
-    lines += ["    if (status)\n", f"        *status = {_status(datapath, prefix)};\n"]
-    lines.append(f"    return (int64_t){wires[0]};\n")
+        lines += [f"    {_type(stage.graph.nodes[i].width)} {_wire(index, i)};\n" for i in _exported(datapath, index)]
     return "".join(lines)
 
 
-def _status(datapath: Datapath, prefix: str) -> str:
-    """Expression of the flags; `prefix` is that of the last stage's values."""
+def _stages(datapath: Datapath) -> str:
+    """One function for each stage."""
+    text = []
+    wires = [f"{port.name}_code" for port in datapath.inputs]
+    offset = 0
+    for index, stage in enumerate(datapath.stages):
+        lines = _stage_lines(stage.graph, index, [f"w->{wire}" for wire in wires], offset)
+        lines += [f"    w->{_wire(index, i)} = {_wire(index, i)};\n" for i in _exported(datapath, index)]
+        unused = "" if stage.graph.delays else "    (void)state;\n"
+        text.append(
+            f"\n/* {stage.name} */\n"
+            f"static ALWAYS_INLINE void stage{index}({datapath.name}_state *state, wires *w)\n"
+            f"{{\n{''.join(lines)}{unused}}}\n"
+        )
+        wires = [_wire(index, i) for i in stage.graph.outputs]
+        offset += len(stage.graph.delays)
+    return "".join(text)
+
+
+def _stage_lines(graph: Graph, index: int, wires: list[str], offset: int) -> list[str]:
+    lines = []
+    supply, memory = iter(wires), iter(range(offset, offset + len(graph.delays)))
+    for i, node in enumerate(graph.nodes):
+        if node.op is Op.INPUT:
+            expression = next(supply)
+        elif node.op is Op.DELAY:
+            expression = f"state->s[{next(memory)}]"
+        else:
+            expression = _expression(graph, node, f"n{index}_")
+        comment = f" /* {node.name}, {node.format} */" if node.name else ""
+        lines.append(f"    const {_type(node.width)} {_wire(index, i)} = {expression};{comment}\n")
+    lines += [
+        f"    state->s[{offset + k}] = {_wire(index, graph.nodes[i].operands[0])};\n"
+        for k, i in enumerate(graph.delays)
+    ]
+    used = {i for node in graph.nodes for i in node.operands} | set(graph.outputs)
+    lines += [f"    (void){_wire(index, i)};\n" for i in range(len(graph.nodes)) if i not in used]
+    return lines
+
+
+def _status(datapath: Datapath) -> str:
+    """Expression of the flags."""
     last = datapath.stages[-1].graph
     node = last.nodes[last.outputs[0]]
     conditions: dict[Flag, list[str]] = {flag: [] for flag in Flag}
@@ -213,30 +256,91 @@ def _status(datapath: Datapath, prefix: str) -> str:
         if high < port.highest:
             conditions[Flag.OUTSIDE_CALIBRATION].append(f"{code} > {high}")
     if node.op is Op.CLAMP:
-        before = f"{prefix}{node.operands[0]}"
+        before = f"w.{_wire(len(datapath.stages) - 1, node.operands[0])}"
         conditions[Flag.OUTPUT_SATURATED] += [f"{before} < {_literal(node.low)}", f"{before} > {_literal(node.high)}"]
     terms = [f"({' || '.join(found)}) << {flag.value}" for flag, found in conditions.items() if found]
     return f"(uint8_t)({' | '.join(terms)})"
 
 
-def _stage_lines(graph: Graph, prefix: str, wires: list[str], offset: int) -> list[str]:
-    lines = []
-    supply, memory = iter(wires), iter(range(offset, offset + len(graph.delays)))
-    for i, node in enumerate(graph.nodes):
-        if node.op is Op.INPUT:
-            expression = next(supply)
-        elif node.op is Op.DELAY:
-            expression = f"state->s[{next(memory)}]"
-        else:
-            expression = _expression(graph, node, prefix)
-        comment = f" /* {node.name}, {node.format} */" if node.name else ""
-        lines.append(f"    const {_type(node.width)} {prefix}{i} = {expression};{comment}\n")
-    lines += [
-        f"    state->s[{offset + k}] = {prefix}{graph.nodes[i].operands[0]};\n" for k, i in enumerate(graph.delays)
-    ]
-    used = {i for node in graph.nodes for i in node.operands} | set(graph.outputs)
-    lines += [f"    (void){prefix}{i};\n" for i in range(len(graph.nodes)) if i not in used]
-    return lines
+_UNROLLED = 4  # samples; four spare the processor the moves of x[n-1] to x[n-2], more gain nothing
+
+
+def _block(datapath: Datapath) -> str:
+    """Return the functions for many samples.
+
+    Without status, each stage works one sample behind the stage before it, as in a pipeline: then none waits for
+    another, which a processor hides only where its window of instructions is long enough for the whole chain.
+    """
+    name, inputs, behind = datapath.name, datapath.inputs, len(datapath.stages) - 1
+    codes = [f"in[(n * channels + c) * {len(inputs)} + {i}]" for i in range(len(inputs))]
+    work = []
+    for k in range(behind, -1, -1):
+        lines = [f"stage{k}(state, w);"]
+        if k == 0:
+            lines[:0] = [f"w->{port.name}_code = {code};" for port, code in zip(inputs, codes, strict=True)]
+        if k == behind:
+            lines.append(f"out[(n - behind) * channels + c] = (int64_t)w->{_result(datapath)};")
+        condition = f"first <= {k} && {k} <= last" if k else "first == 0"
+        work += [f"    if ({condition}) {{\n", *(f"        {line}\n" for line in lines), "    }\n"]
+    ticks = "".join(
+        f"        tick(&near, &passing, n{f' + {k}' if k else ''}, 0, behind, channels, c, in, out);\n"
+        for k in range(_UNROLLED)
+    )
+    return f"""
+static void with_status({name}_state *state, size_t samples, size_t channels, size_t c, const int64_t *in,
+                        int64_t *out, uint8_t *status)
+{{
+    {name}_state near = *state; /* a local copy stays in registers */
+    for (size_t n = 0; n < samples; n++) {{
+        out[n * channels + c] = step(&near, {", ".join(codes)}, &status[n * channels + c]);{_judge_wear(datapath)}
+    }}
+    *state = near;
+}}
+
+static const size_t behind = {behind}; /* samples, the last stage behind the first */
+
+/* Stages `first` to `last`, the last first, stage k with sample n - k: none waits for another. */
+static ALWAYS_INLINE void tick({name}_state *state, wires *w, size_t n, size_t first, size_t last, size_t channels,
+                               size_t c, const int64_t *in, int64_t *out)
+{{
+{"".join(work)}}}
+
+/* The same where some stages have no sample yet, or no more. */
+static void partial_tick({name}_state *state, wires *w, size_t n, size_t samples, size_t channels, size_t c,
+                         const int64_t *in, int64_t *out)
+{{
+    tick(state, w, n, n < samples ? 0 : n - samples + 1, n > behind ? behind : n, channels, c, in, out);
+}}
+
+static void without_status({name}_state *state, size_t samples, size_t channels, size_t c, const int64_t *in,
+                           int64_t *out)
+{{
+    {name}_state near;
+    wires w, passing;
+    size_t n;
+    memset(&w, 0, sizeof w);
+    for (n = 0; n != behind; n++)
+        partial_tick(state, &w, n, samples, channels, c, in, out);
+    near = *state; /* local copies stay in registers */
+    passing = w;
+    for (; n + {_UNROLLED} <= samples; n += {_UNROLLED}) {{
+{ticks}    }}
+    *state = near;
+    w = passing;
+    for (; n < samples + behind; n++)
+        partial_tick(state, &w, n, samples, channels, c, in, out);
+}}
+
+void {name}_block({name}_state *states, size_t samples, size_t channels, const int64_t *in, int64_t *out,
+{" " * len(f"void {name}_block(")}uint8_t *status)
+{{
+    for (size_t c = 0; c < channels; c++)
+        if (status)
+            with_status(&states[c], samples, channels, c, in, out, status);
+        else
+            without_status(&states[c], samples, channels, c, in, out);
+}}
+"""
 
 
 def _expression(graph: Graph, node: Node, prefix: str) -> str:

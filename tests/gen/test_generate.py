@@ -15,7 +15,7 @@ from tests.gen.designs import ALL, EXAMPLES, example_design
 from tests.gen.test_quantize import stimulus
 
 from sosmith.gen.generate import generate
-from sosmith.model.c_model import c_header
+from sosmith.model.c_model import c_header, state_bytes
 from sosmith.model.errors import SpecificationError
 from sosmith.model.text_files import write_files
 
@@ -87,6 +87,39 @@ def test_c_model_compiles_without_a_warning_and_computes(compiler: str, tmp_path
     codes = stimulus(design.datapath.inputs, 6, 2000)
     computed = [step(state.ctypes.data, *sample) for sample in codes.tolist()]
     assert computed == design.datapath.compute(codes).tolist()
+
+
+def test_c_model_of_many_samples_may_be_given_in_pieces(tmp_path: Path) -> None:
+    """Its stages work on different samples at a time: pieces shorter than there are stages, none among them."""
+    design = example_design("flange_wear_bench.toml")
+    generate(design, tmp_path)
+    name = design.spec.name
+    command = [
+        "cc",
+        "-O2",
+        "-std=c99",
+        "-Wall",
+        "-Wextra",
+        "-pedantic",
+        "-Werror",
+        "-shared",
+        "-fPIC",
+        "-o",
+        "model.so",
+    ]
+    subprocess.run([*command, f"{name}.c"], cwd=tmp_path, check=True)
+    block = ctypes.CDLL(str(tmp_path / "model.so"))[f"{name}_block"]
+    block.restype = None
+    block.argtypes = [ctypes.c_void_p, ctypes.c_size_t, ctypes.c_size_t, *[ctypes.c_void_p] * 3]
+    codes = stimulus(design.datapath.inputs, 7, 400).reshape(200, 2, 2)
+    states = np.zeros((2, state_bytes(design.datapath) // 8), dtype=np.int64)
+    result = np.empty((200, 2), dtype=np.int64)
+    start = 0
+    for length in (0, 1, 2, 3, 5, 8, 13, 21, 34, 113):
+        block(states.ctypes.data, length, 2, codes[start:].ctypes.data, result[start:].ctypes.data, None)
+        start += length
+    assert start == 200
+    assert np.array_equal(result, design.datapath.compute(codes))
 
 
 def test_a_unit_cannot_end_the_comment_in_the_header() -> None:

@@ -27,6 +27,14 @@ def test_compiled_model_equals_exact_integers(order: int, feedback: int) -> None
     assert datapath.compute(codes).tolist() == datapath.compute_exact(codes)
 
 
+def test_runs_shorter_than_the_chain_of_stages() -> None:
+    datapath = cascade(butterworth(7, 0.2))
+    codes = np.random.default_rng(4).integers(-32768, 32768, (14, 1))
+    expected = datapath.compute_exact(codes)
+    for samples in range(15):
+        assert datapath.compute(codes[:samples]).tolist() == expected[:samples]
+
+
 def test_channels_are_independent() -> None:
     datapath = cascade(butterworth(3, 0.05))
     codes = np.random.default_rng(5).integers(-32768, 32768, (500, 4, 1))
