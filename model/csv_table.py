@@ -56,6 +56,10 @@ class CsvTable:
         """Cells of the column `name`, shape (n_rows,)."""
         return np.asarray(self.values[:, self.header.index(name)])
 
+    def take(self, rows: npt.NDArray[np.intp]) -> CsvTable:
+        """Return the table of the rows of these indices, in their order."""
+        return CsvTable(self.path, self.header, self.values[rows], tuple(self.lines[row] for row in rows))
+
     def refuse(self, row: int, what: str) -> SpecificationError:
         """Error about the row of index `row`; `what` is a sentence from its subject on."""
         return SpecificationError(f"{self.path}, line {self.lines[row]}: {what}")

@@ -7,7 +7,7 @@ another, its truth the clearance without the vehicle's motion.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -45,6 +45,9 @@ TRACKS = {"tangent": "tangent", "braking": "tangent", "curve": "paper"}
 
 LEAST_STEADY = 200
 """Samples that an excerpt without a duration has at least."""
+
+_SENSORS = ("inductive", "thermocouple")
+"""What faults call the sensors, in the order of the core's inputs."""
 
 
 class VehicleMotion(Protocol):
@@ -173,22 +176,32 @@ def emulate_file(
 
 
 def range_notes(scenario: ScenarioFile, ports: Sequence[Port]) -> tuple[str, ...]:
-    """Sentences about temperatures in the file that an input of the core cannot show."""
-    if len(ports) < 2:
-        return ()
-    port = ports[1]
-    low, high = (float(port.zero + port.lsb * code) for code in (port.lowest, port.highest + 1))
+    """Sentences about temperatures and stuck codes in the file that an input of the core cannot show."""
     notes = []
     for k, excerpt in enumerate(scenario.document.excerpt):
-        ends = [excerpt.temperature, excerpt.temperature if excerpt.temperature_to is None else excerpt.temperature_to]
-        if min(ends) < low or max(ends) > high:
-            reached = max(ends) if max(ends) > high else min(ends)
-            notes.append(
-                f"{scenario.path}: excerpt[{k}] reaches {reached:g} degC, but the temperature input of the core "
-                f"ends at {high if reached > high else low:g} degC: there its code stands still, and the clearance is "
-                "calibrated for the wrong temperature; widen the range in [input.temperature]"
-            )
+        where = f"{scenario.path}: excerpt[{k}]"
+        notes += [f"{where} {text}" for port in ports[1:] for text in _temperature_notes(excerpt, port)]
+        for number, fault in enumerate(excerpt.fault):
+            port = dict(zip(_SENSORS, ports, strict=False)).get(fault.sensor)
+            if port is not None and fault.code is not None and not port.lowest <= fault.code <= port.highest:
+                end = port.lowest if fault.code < port.lowest else port.highest
+                notes.append(
+                    f"{where}.fault[{number}] is stuck at code {fault.code}, but the codes of {port.name} are "
+                    f"{port.lowest}..{port.highest}: it is stuck at {end} instead"
+                )
     return tuple(notes)
+
+
+def _temperature_notes(excerpt: ExcerptTable, port: Port) -> Iterator[str]:
+    low, high = (float(port.zero + port.lsb * code) for code in (port.lowest, port.highest + 1))
+    ends = [excerpt.temperature, excerpt.temperature if excerpt.temperature_to is None else excerpt.temperature_to]
+    if min(ends) < low or max(ends) > high:
+        reached = max(ends) if max(ends) > high else min(ends)
+        yield (
+            f"reaches {reached:g} degC, but the temperature input of the core ends at "
+            f"{high if reached > high else low:g} degC: there its code stands still, and the clearance is calibrated "
+            "for the wrong temperature; widen the range in [input.temperature]"
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -316,7 +329,7 @@ def _motion(
 
 def _faults(scenario: ScenarioFile, bench: Bench, plan: _Plan) -> SensorFaults:
     rate = float(bench.sample_rate)
-    by_sensor: dict[str, list[CodeFault]] = {"inductive": [], "thermocouple": []}
+    by_sensor: dict[str, list[CodeFault]] = {sensor: [] for sensor in _SENSORS}
     disconnected = []
     for k, fault in enumerate(plan.excerpt.fault):
         start, stop = (math.floor(at * rate + 0.5) for at in (fault.start, fault.start + fault.seconds))
@@ -330,8 +343,8 @@ def _faults(scenario: ScenarioFile, bench: Bench, plan: _Plan) -> SensorFaults:
         else:
             by_sensor[fault.sensor].append(_code_fault(fault, start, stop))
     return SensorFaults(
-        voltage=tuple(by_sensor["inductive"]),
-        temperature=tuple(by_sensor["thermocouple"]),
+        voltage=tuple(by_sensor[_SENSORS[0]]),
+        temperature=tuple(by_sensor[_SENSORS[1]]),
         open_thermocouple=tuple(disconnected),
     )
 

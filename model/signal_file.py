@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -51,19 +51,22 @@ class Signal:
     Attributes
     ----------
     name : str
-        Column, or `CALIBRATED`.
+        Column, or `CALIBRATED`; in a file of several channels with the channel's number.
     unit : str
         Unit of the values: mm, mrad, V or degC; empty where the column's name ends in none.
     values : ndarray, shape (n,)
         What was measured or simulated.
     truth : ndarray, shape (n,), optional
         What an ideal measurement would show, in the same unit.
+    reading : ndarray of bool, shape (n,), optional
+        Rows at which truth and measurement are compared.
     """
 
     name: str
     unit: str
     values: Values
     truth: Values | None = None
+    reading: npt.NDArray[np.bool_] | None = None
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -79,27 +82,28 @@ class SignalFile:
     sample_rate : float
         Rows per second, Hz, to nine digits.
     signals : tuple of Signal
-        At least one, all with the same count of at least `LEAST_ROWS` values.
-    reading : ndarray of bool, shape (n,), optional
-        Rows at which truth and measurement are compared.
+        At least one, each with at least `LEAST_ROWS` values.
     """
 
     path: Path
     sha256: str
     sample_rate: float
     signals: tuple[Signal, ...]
-    reading: npt.NDArray[np.bool_] | None
 
 
 def read_signal_file(
-    path: Path, polynomial: Polynomial, columns: Sequence[str] = (), truth: str | None = None
+    path: Path,
+    polynomial: Polynomial,
+    columns: Sequence[str] = (),
+    truth: str | None = None,
+    channels: Sequence[int] = (),
 ) -> SignalFile:
     """Read a CSV file with the column time_s and at least one column of values.
 
     A trace with voltage_V and temperature_C holds one signal, the clearance that `polynomial` makes of them, with
     clearance_mm as its truth where that is there. Any other file holds one signal for each column whose name ends in a
     unit (_mm, _um, _m, _V, _mV, _C, _rad, _mrad, _deg), with the truth in one of `TRUTHS`. Columns of codes and
-    `DISTANCE` are left alone.
+    `DISTANCE` are left alone. A file with the column channel holds all that for each of its channels.
 
     Parameters
     ----------
@@ -111,30 +115,64 @@ def read_signal_file(
         The columns to take as signals, whatever their names, instead of the above.
     truth : str, optional
         The column with the truth, likewise.
+    channels : sequence of int
+        The channels to take, instead of all; a file without the column channel holds channel 0.
 
     Raises
     ------
     SpecificationError
-        As `read_csv_table`; if there are several channels; if a column asked for is not there or a name tells no unit;
-        if there are too few rows; if time does not rise in even steps; if reading is neither 0 nor 1. One sentence with
-        the file and the line.
+        As `read_csv_table`; if a column or channel asked for is not there, a channel is no integer or a name tells no
+        unit; if a channel has too few rows; if its time does not rise in even steps, the same for all; if reading is
+        neither 0 nor 1. One sentence with the file and the line.
     """
     header = csv_header(path)
     for name in (*columns, *([truth] if truth else [])):
         if name not in header:
             raise SpecificationError(f"{path} must have the column {name}, not only {', '.join(header)}")
-    if CHANNEL in header:
-        raise SpecificationError(f"{path} must hold a trace of one channel, not have the column {CHANNEL}")
-    table = read_csv_table(path, header, required=[TIME])
-    if len(table.lines) < LEAST_ROWS:
-        raise SpecificationError(f"{path} must hold at least {LEAST_ROWS} rows, not {len(table.lines)}")
+    parts = _parts(read_csv_table(path, header, required=[TIME]), channels)
+    for of_channel, part in parts.items():
+        if len(part.lines) < LEAST_ROWS:
+            raise SpecificationError(f"{path} must hold at least {LEAST_ROWS} rows{of_channel}, not {len(part.lines)}")
+    rates = {of_channel: _sample_rate(part) for of_channel, part in parts.items()}
+    (first, rate), *others = rates.items()
+    for of_channel, other in others:
+        if abs(other - rate) > TIME_TOLERANCE * rate:
+            raise SpecificationError(
+                f"{path}: the sample rate{of_channel} must be the {rate:g} Hz{first}, not {other:g} Hz"
+            )
     return SignalFile(
         path=path,
         sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
-        sample_rate=_sample_rate(table),
-        signals=_signals(table, polynomial, columns, truth),
-        reading=_reading(table),
+        sample_rate=rate,
+        signals=tuple(
+            replace(signal, name=signal.name + of_channel, reading=_reading(part))
+            for of_channel, part in parts.items()
+            for signal in _signals(part, polynomial, columns, truth)
+        ),
     )
+
+
+def _parts(table: CsvTable, channels: Sequence[int]) -> dict[str, CsvTable]:
+    """Return the rows of each channel by " of channel N"; of a file without the column, all rows by nothing."""
+    if CHANNEL not in table:
+        if set(channels) - {0}:
+            raise SpecificationError(
+                f"{table.path} must have the column {CHANNEL}, not only {', '.join(table.header)}, for others than 0"
+            )
+        return {"": table}
+    number = table.column(CHANNEL)
+    check_rows(
+        table,
+        (number % 1 != 0) | (number < 0),
+        lambda k: f"{CHANNEL} must be an integer from 0 on, not {number[k]:g}",
+    )
+    present = np.unique(number)
+    for channel in channels:
+        if channel not in present:
+            given = ", ".join(f"{other:g}" for other in present[:8])
+            raise SpecificationError(f"{table.path} must have rows of channel {channel}, not only of {given}")
+    chosen = sorted(set(channels)) or present.astype(int).tolist()
+    return {f" of channel {channel}": table.take(np.flatnonzero(number == channel)) for channel in chosen}
 
 
 def unit_of(column: str) -> tuple[str, float]:
@@ -175,7 +213,7 @@ def _signals(table: CsvTable, polynomial: Polynomial, columns: Sequence[str], tr
     if not columns and emulated:
         values = polynomial(table.column(voltage), table.column(temperature))
         return (_with_truth(table, Signal(name=CALIBRATED, unit="mm", values=values), truth),)
-    aside = {TIME, READING, DISTANCE, truth}
+    aside = {TIME, CHANNEL, READING, DISTANCE, truth}
     chosen = columns or [name for name in table.header if name not in aside and not name.endswith("_code")]
     if not chosen:
         raise SpecificationError(
@@ -200,7 +238,7 @@ def _with_truth(table: CsvTable, signal: Signal, truth: str | None) -> Signal:
     unit, factor = unit_of(truth)
     if unit not in ("", signal.unit):
         return signal
-    return Signal(name=signal.name, unit=signal.unit, values=signal.values, truth=factor * table.column(truth))
+    return replace(signal, truth=factor * table.column(truth))
 
 
 def _reading(table: CsvTable) -> npt.NDArray[np.bool_] | None:

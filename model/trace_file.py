@@ -153,7 +153,7 @@ def _by_channel(table: CsvTable, channels: int) -> list[CsvTable]:
         beyond,
         lambda k: f"{CHANNEL} {number[k]:g} must end with its row {length}, as channel {shortest} does, not go on",
     )
-    return [CsvTable(table.path, table.header, table.values[k], tuple(table.lines[i] for i in k)) for k in rows]
+    return [table.take(some) for some in rows]
 
 
 def _allowed(channels: int) -> str:

@@ -132,12 +132,11 @@ def read_wear_record(path: Path, column: str | None = None, channel: int = 0) ->
 def _rows_of(table: CsvTable, channel: int) -> CsvTable:
     if CHANNEL not in table:
         return table
-    own = table.column(CHANNEL) == channel
-    if not own.any():
+    own = np.flatnonzero(table.column(CHANNEL) == channel)
+    if not len(own):
         others = ", ".join(f"{other:g}" for other in np.unique(table.column(CHANNEL))[:8])
         raise SpecificationError(f"{table.path} must have rows of channel {channel}, not only of {others}")
-    lines = tuple(line for line, kept in zip(table.lines, own, strict=True) if kept)
-    return CsvTable(table.path, table.header, table.values[own], lines)
+    return table.take(own)
 
 
 def _first(path: Path, header: Sequence[str], names: Sequence[str], what: str) -> str:

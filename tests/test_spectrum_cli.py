@@ -69,6 +69,24 @@ def test_stdout_has_the_tables_and_the_filter() -> None:
     assert table["passband_edge"] < table["stopband_edge"] < 1.5
 
 
+def test_a_filter_does_for_every_channel_of_a_trace_or_for_those_chosen() -> None:
+    time = np.repeat(np.arange(8000) / RATE, 2)
+    channel = np.tile([0.0, 1.0], 8000)
+    truth = 4 + time / 80
+    motion = np.where(channel == 1, 0.4, 0.2) * np.sin(2 * np.pi * 1.5 * time)
+    write("two.csv", {"time_s": time, "channel": channel, "measured_mm": truth + motion, "truth_mm": truth})
+    found = json.loads(good("two.csv", "--json").stdout)
+    names = ["two.csv: measured_mm of channel 0", "two.csv: measured_mm of channel 1"]
+    assert [one["name"] for one in found["signals"]] == names
+    assert [one["trial"] is not None for one in found["signals"]] == [True, True]
+    rms = {one["name"]: one["spectra"]["disturbance"]["rms"] for one in found["signals"]}
+    assert rms[names[0]] == pytest.approx(0.2 / 2**0.5, rel=0.01)
+    second = json.loads(good("two.csv", "--channel", "1", "--json").stdout)
+    assert [one["name"] for one in second["signals"]] == names[1:]
+    assert second["proposal"]["filter"] == found["proposal"]["filter"]
+    refused("two.csv must have rows of channel 2, not only of 0, 1", "two.csv", "--channel", "2")
+
+
 def test_the_copy_of_a_specification_designs_to_what_was_proposed() -> None:
     proposal = json.loads(good("ramp.csv", "--into", "my.toml", "--json").stdout)["proposal"]
     printed = good("ramp.csv", "--into", "my.toml", "-o", "out/new.toml")

@@ -307,6 +307,21 @@ def test_a_note_on_what_the_temperature_input_cannot_show(tmp_path: Path) -> Non
     assert trace.codes[-1, 1] == 65535
 
 
+def test_a_note_on_codes_that_an_input_does_not_have(tmp_path: Path) -> None:
+    stuck = '[[excerpt.fault]]\nsensor = "{}"\nkind = "stuck"\nstart = 0\nseconds = 9\ncode = {}\n'
+    within = scenario(tmp_path, PLAIN + stuck.format("inductive", 65535) + stuck.format("thermocouple", 0))
+    assert range_notes(within, BENCH.ports) == ()
+    beyond = scenario(tmp_path, PLAIN + stuck.format("inductive", 65536) + stuck.format("thermocouple", -1))
+    assert range_notes(beyond, BENCH.ports) == (
+        f"{tmp_path}/day.toml: excerpt[0].fault[0] is stuck at code 65536, but the codes of voltage are 0..65535: "
+        "it is stuck at 65535 instead",
+        f"{tmp_path}/day.toml: excerpt[0].fault[1] is stuck at code -1, but the codes of temperature are 0..65535: "
+        "it is stuck at 0 instead",
+    )
+    assert len(range_notes(beyond, BENCH.ports[:1])) == 1
+    assert emulate_file(beyond, BENCH, seed=1).codes[10].tolist() == [65535, 0]
+
+
 @pytest.mark.parametrize(
     ("old", "new", "channel"),
     [

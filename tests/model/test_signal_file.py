@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -20,8 +20,8 @@ def write(path: Path, header: str, row: Callable[[int], str], rows: int = 100) -
     return path
 
 
-def read(path: Path, *columns: str, truth: str | None = None) -> SignalFile:
-    return read_signal_file(path, EQUATION_5A, columns, truth)
+def read(path: Path, *columns: str, truth: str | None = None, channels: Sequence[int] = ()) -> SignalFile:
+    return read_signal_file(path, EQUATION_5A, columns, truth, channels)
 
 
 def test_the_calibration_makes_the_clearance_of_an_emulated_trace(tmp_path: Path) -> None:
@@ -36,8 +36,8 @@ def test_the_calibration_makes_the_clearance_of_an_emulated_trace(tmp_path: Path
     assert one.values[99] == pytest.approx(1.16 - 0.0036 * 20 + (0.3672 + 0.0006618 * 20) * v + 0.05812 * v * v)
     assert one.truth is not None
     assert one.truth[99] == 9.9
-    assert file.reading is not None
-    assert file.reading.tolist() == [k % 2 == 1 for k in range(100)]
+    assert one.reading is not None
+    assert one.reading.tolist() == [k % 2 == 1 for k in range(100)]
 
 
 def test_units_come_from_the_names_and_the_truth_goes_with_its_own(tmp_path: Path) -> None:
@@ -89,9 +89,21 @@ def test_columns_can_be_chosen(tmp_path: Path) -> None:
         ),
         (
             "time_s,channel,a_mm",
-            lambda k: f"{k},0,1",
+            lambda k: f"{k},{k % 2 / 2},1",
             100,
-            " must hold a trace of one channel, not have the column channel",
+            ", line 3: channel must be an integer from 0 on, not 0.5",
+        ),
+        (
+            "time_s,channel,a_mm",
+            lambda k: f"{k},{k // 64},1",
+            100,
+            " must hold at least 64 rows of channel 1, not 36",
+        ),
+        (
+            "time_s,channel,a_mm",
+            lambda k: f"{k if k < 64 else 2 * k},{k // 64},1",
+            128,
+            ": the sample rate of channel 1 must be the 1 Hz of channel 0, not 0.5 Hz",
         ),
         ("time_s,a_mm,reading", lambda k: f"{k},1,2", 100, ", line 2: reading must be 0 or 1, not 2"),
     ],
@@ -100,6 +112,40 @@ def test_refusals(tmp_path: Path, header: str, row: Callable[[int], str], rows: 
     path = write(tmp_path / "t.csv", header, row, rows)
     with pytest.raises(SpecificationError, match=f"^{re.escape(str(path) + message)}$"):
         read(path)
+
+
+@pytest.mark.parametrize(
+    ("header", "message"),
+    [
+        ("time_s,channel,a_mm", " must have rows of channel 4, not only of 0, 3"),
+        ("time_s,b_mm,a_mm", " must have the column channel, not only time_s, b_mm, a_mm, for others than 0"),
+    ],
+)
+def test_channels_asked_for_must_be_there(tmp_path: Path, header: str, message: str) -> None:
+    path = write(tmp_path / "t.csv", header, lambda k: f"{k // 2},{k % 2 * 3},1", 128)
+    with pytest.raises(SpecificationError, match=f"^{re.escape(str(path) + message)}$"):
+        read(path, channels=(4, 0))
+
+
+def test_each_channel_has_signals_of_its_own(tmp_path: Path) -> None:
+    header = "time_s,channel,a_mm,truth,reading"
+    path = write(tmp_path / "t.csv", header, lambda k: f"{k // 2},{k % 2 * 3},{k},{-k},{k % 2}", 128)
+    one, two = read(path).signals
+    assert [one.name, two.name] == ["a_mm of channel 0", "a_mm of channel 3"]
+    assert two.values.tolist() == list(range(1, 128, 2))
+    assert two.truth is not None
+    assert two.truth.tolist() == list(range(-1, -128, -2))
+    assert one.reading is None
+    assert two.reading is not None
+    assert two.reading.all()
+    (chosen,) = read(path, channels=(3, 3)).signals
+    assert chosen.values.tolist() == two.values.tolist()
+
+
+def test_a_file_without_the_column_holds_channel_0(tmp_path: Path) -> None:
+    path = write(tmp_path / "t.csv", "time_s,a_mm", lambda k: f"{k},1")
+    (one,) = read(path, channels=(0,)).signals
+    assert one.name == "a_mm"
 
 
 def test_columns_asked_for_must_be_there(tmp_path: Path) -> None:

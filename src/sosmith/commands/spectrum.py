@@ -43,8 +43,8 @@ A TRACE is what `sosmith emulate` writes, whose clearance the calibration comput
 time_s and columns of values in even steps. The error allowed (--tolerance) is shared among what the filter takes from
 the true signal and what it leaves of the disturbance; edges, losses, order and delay follow. A measured trace without
 its truth needs --passband or --time-constant: what lies below is wanted, what lies above disturbs. With --motion,
-traces without a truth are motion of the vehicle, and nothing of them is wanted. Several traces: the filter does for
-each of them. Begin with
+traces without a truth are motion of the vehicle, and nothing of them is wanted. Several traces, or channels of a trace:
+the filter does for each of them. Begin with
 
 \b
     sosmith emulate my.toml wear_ramp -o ramp.csv
@@ -75,6 +75,13 @@ class _Spectra:
     "--column", "columns", multiple=True, help="Take this column of values, where a trace has it; may be given again."
 )
 @click.option("--truth", help="Column with the true signal.  [default: clearance_mm of an emulated trace, truth]")
+@click.option(
+    "--channel",
+    "channels",
+    multiple=True,
+    type=click.IntRange(min=0),
+    help="Take this channel of traces that hold several; may be given again.  [default: all]",
+)
 @click.option(
     "--calibration",
     type=click.Path(path_type=Path),
@@ -110,6 +117,7 @@ def spectrum_command(
     traces: tuple[Path, ...],
     columns: tuple[str, ...],
     truth: str | None,
+    channels: tuple[int, ...],
     calibration: Path | None,
     motion: bool,
     tolerance: float,
@@ -135,7 +143,7 @@ def spectrum_command(
     with show_progress() as step:
         step("reading")
         polynomial, origin = _polynomial(calibration or into)
-        files = _read(traces, polynomial, columns, truth)
+        files = _read(traces, polynomial, columns, truth, channels)
         rate = _sample_rate(files, into)
         _check_data(into, output)
         step("spectra")
@@ -229,7 +237,11 @@ def _polynomial(path: Path | None) -> tuple[Polynomial, str]:
 
 
 def _read(
-    traces: Sequence[Path], polynomial: Polynomial, columns: Sequence[str], truth: str | None
+    traces: Sequence[Path],
+    polynomial: Polynomial,
+    columns: Sequence[str],
+    truth: str | None,
+    channels: Sequence[int],
 ) -> list[SignalFile]:
     """Read each file with those of the columns asked for that it has; each must be in one of the files."""
     headers = [csv_header(path) for path in traces]
@@ -238,7 +250,7 @@ def _read(
             raise SpecificationError(f"column {name} must be in one of {', '.join(map(str, traces))}, not in none")
     return [
         read_signal_file(
-            path, polynomial, [name for name in columns if name in header], truth if truth in header else None
+            path, polynomial, [name for name in columns if name in header], truth if truth in header else None, channels
         )
         for path, header in zip(traces, headers, strict=True)
     ]
@@ -308,7 +320,7 @@ def _slow(disturbance: Values, found: Spectrum, sample_rate: float) -> float:
 
 def _trial(one: _Spectra, proposal: Proposal) -> Trial | None:
     truth = one.signal.truth
-    return None if truth is None else try_filter(one.signal.values, truth, one.file.reading, proposal)
+    return None if truth is None else try_filter(one.signal.values, truth, one.signal.reading, proposal)
 
 
 def _text_of(path: Path) -> str:
