@@ -9,9 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from click.testing import CliRunner, Result
 
-from sosmith.cli import cli
 from sosmith.commands.calibrate import calibrate
 from sosmith.gen.core import design_core
 from sosmith.gen.specification import example, load
@@ -19,7 +17,11 @@ from sosmith.model.calibration import fit, read_measurements
 from sosmith.model.errors import ShortfallError, SpecificationError
 from sosmith.model.measurement_store import open_store
 from sosmith.model.self_updating import Addition, add, refused_first_file
+from tests.invocation import Invocation
 from tests.model.measuring import readings, write_csv
+
+INVOCATION = Invocation("calibrate", columns=100)
+run, good, refused = INVOCATION.run, INVOCATION.good, INVOCATION.refused
 
 DAY = ("--date", "2024-03-01")
 
@@ -31,23 +33,6 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     write_csv(Path("a.csv"), readings(60))
     write_csv(Path("b.csv"), readings(60, seed=2))
     return tmp_path
-
-
-def run(*arguments: str) -> Result:
-    return CliRunner(env={"COLUMNS": "100"}).invoke(cli, ["calibrate", *arguments])
-
-
-def good(*arguments: str) -> Result:
-    result = run(*arguments)
-    assert (result.exit_code, result.exception) == (0, None)
-    return result
-
-
-def refused(message: str, *arguments: str, kind: type[Exception] = SpecificationError) -> Result:
-    result = run(*arguments)
-    assert isinstance(result.exception, kind)
-    assert str(result.exception) == message
-    return result
 
 
 def test_add_reports_the_fit() -> None:

@@ -9,13 +9,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
 
-from sosmith.cli import cli
 from sosmith.gen.design import design
 from sosmith.gen.specification import example, load
-from sosmith.model.errors import ShortfallError, SpecificationError
+from sosmith.model.errors import ShortfallError
 from sosmith.model.sensors import sensor_voltage
+from tests.invocation import Invocation
+
+INVOCATION = Invocation("spectrum", columns=120)
+run, good, refused = INVOCATION.run, INVOCATION.good, INVOCATION.refused
 
 RATE = 100.0
 
@@ -42,22 +44,6 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     write("motion.csv", {"time_s": time, "lateral_mm": motion, "yaw_mrad": 3 * motion})
     Path("my.toml").write_text(example())
     return tmp_path
-
-
-def run(*arguments: str) -> Result:
-    return CliRunner(env={"COLUMNS": "120"}).invoke(cli, ["spectrum", *arguments])
-
-
-def good(*arguments: str) -> Result:
-    result = run(*arguments)
-    assert (result.exit_code, result.exception) == (0, None)
-    return result
-
-
-def refused(message: str, *arguments: str, kind: type[Exception] = SpecificationError) -> None:
-    result = run(*arguments)
-    assert isinstance(result.exception, kind)
-    assert str(result.exception) == message
 
 
 def test_stdout_has_the_tables_and_the_filter() -> None:

@@ -9,11 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
 
-from sosmith.cli import cli
-from sosmith.model.errors import SpecificationError
 from sosmith.model.vehicle_parameters import built_in, built_in_text
+from tests.invocation import Invocation
+
+INVOCATION = Invocation("vehicle", columns=110)
+run, good, refused = INVOCATION.run, INVOCATION.good, INVOCATION.refused
 
 
 @pytest.fixture(autouse=True)
@@ -23,22 +24,6 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     text = built_in_text().replace("curve = { value = 300.0", "curve = { value = 20.0")
     Path("short.toml").write_text(text.replace("run_out = { value = 200.0", "run_out = { value = 0.0"))
     return tmp_path
-
-
-def run(*arguments: str) -> Result:
-    return CliRunner(env={"COLUMNS": "110"}).invoke(cli, ["vehicle", *arguments])
-
-
-def good(*arguments: str) -> Result:
-    result = run(*arguments)
-    assert (result.exit_code, result.exception) == (0, None)
-    return result
-
-
-def refused(message: str, *arguments: str) -> None:
-    result = run(*arguments)
-    assert isinstance(result.exception, SpecificationError)
-    assert str(result.exception) == message
 
 
 def test_it_prints_modes_motions_and_the_paper() -> None:

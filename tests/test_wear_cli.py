@@ -7,12 +7,14 @@ import re
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner, Result
 
-from sosmith.cli import cli
 from sosmith.gen.specification import example
 from sosmith.model.errors import SpecificationError
 from sosmith.model.wear_file import moment_text, parse_moment, read_wear_record
+from tests.invocation import Invocation
+
+INVOCATION = Invocation("wear", columns=100)
+run, good, refused = INVOCATION.run, INVOCATION.good, INVOCATION.refused
 
 LIMITS = ("--initial", "1.5", "--limit", "9")
 
@@ -31,22 +33,6 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         rows = [f"{time},{clearance},driver {time}" for time, clearance in zip(times, clearances, strict=True)]
         Path(f"{name}.csv").write_text("\n".join([f"{header},clearance_mm,remark", *rows]) + "\n")
     return tmp_path
-
-
-def run(*arguments: str) -> Result:
-    return CliRunner(env={"COLUMNS": "100"}).invoke(cli, ["wear", *arguments])
-
-
-def good(*arguments: str) -> Result:
-    result = run(*arguments)
-    assert (result.exit_code, result.exception) == (0, None)
-    return result
-
-
-def refused(message: str, *arguments: str) -> None:
-    result = run(*arguments)
-    assert isinstance(result.exception, SpecificationError)
-    assert str(result.exception) == message
 
 
 @pytest.mark.parametrize("name", ["days", "seconds", "hours", "dates"])
