@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
@@ -28,6 +28,11 @@ output code is more."""
 
 MOST_CORRELATION = 0.95
 """Beyond this the deviations are no scatter about a line: an interval can hardly be wide enough."""
+
+LEAST_FALL = 1 / 20
+"""Part of the limit that a fall of the clearance has at least: what is less may be the season."""
+
+_FALL_SCATTERS, _FALL_BLOCKS, _LEAST_FALL_BLOCKS = 8, 4, 3
 
 DAY = 1.0
 """Length of a block unless said otherwise, days: longer than anything a filter or a journey keeps for itself."""
@@ -139,6 +144,22 @@ class WearRate:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Fall:
+    """A fall of the clearance. Wear makes none: the wheel was turned or changed, or the sensor mounted anew.
+
+    Attributes
+    ----------
+    size : float
+        By how much, mm.
+    window : float
+        Days from there to the last reading.
+    """
+
+    size: float
+    window: float
+
+
+@dataclass(frozen=True, kw_only=True)
 class WearReport:
     """Wear at the end of a record. Lengths in mm, times in days.
 
@@ -158,6 +179,8 @@ class WearReport:
         Wear from there to the critical clearance, mm; 0 beyond it.
     rate : WearRate
         Rate of wear.
+    fall : Fall or None
+        The last fall of the clearance among the blocks that the rate is from, which it makes too small.
     life, life_low, life_high : float or None
         Days from the last reading until the critical clearance at the rate, at the upper end of its interval and at the
         lower; None where that rate is not above zero, so that no end is in sight.
@@ -180,6 +203,7 @@ class WearReport:
     wear: float
     remaining: float
     rate: WearRate
+    fall: Fall | None
     life: float | None
     life_low: float | None
     life_high: float | None
@@ -296,6 +320,39 @@ def _correlation(deviation: Values) -> float:
     return min((found + 2 / count) / (1 - 4 / count), MOST_CORRELATION)
 
 
+def last_fall(time: Values, clearance: Values, least: float) -> Fall | None:
+    """Find the last place where the clearance falls and stays down, by the medians of the blocks before and after.
+
+    Parameters
+    ----------
+    time, clearance : ndarray, shape (blocks,)
+        Days and mm.
+    least : float
+        Size of the smallest fall that counts, mm; beside that it has to stand out of the scatter.
+
+    Returns
+    -------
+    Fall or None
+        Its window ends between the two blocks, so far before the last of `time`.
+    """
+    if len(time) < LEAST_BLOCKS:
+        return None
+    level = clearance - np.median(np.diff(clearance) / np.diff(time)) * time
+    steps = np.diff(level)
+    scatter = 1.4826 * float(np.median(np.abs(steps - np.median(steps))))
+    sizes = np.zeros(len(steps))
+    for k in range(_LEAST_FALL_BLOCKS, len(clearance) - _LEAST_FALL_BLOCKS + 1):
+        before, after = level[max(k - _FALL_BLOCKS, 0) : k], level[k : k + _FALL_BLOCKS]
+        sizes[k - 1] = np.median(before) - np.median(after)
+    found = np.flatnonzero(sizes > max(least, _FALL_SCATTERS * scatter))
+    if not len(found):
+        return None
+    # neighbouring places see the same fall: it is where the steepest step is
+    near = found[found > found[-1] - _FALL_BLOCKS]
+    place = int(near[np.argmin(steps[near])])
+    return Fall(size=float(sizes[place]), window=float(time[-1] - (time[place] + time[place + 1]) / 2))
+
+
 def judge(
     time: Values,
     clearance: Values,
@@ -350,6 +407,7 @@ def judge(
         )
     times, medians, counts, length = block_medians(time[recent], clearance[recent], block)
     rate = rate_of(times, medians, length, confidence)
+    fall = last_fall(times, medians, LEAST_FALL * limits.limit)
     now, last_block = float(medians[-1]), int(counts[-1])
     remaining = max(limits.critical_clearance - now, 0.0)
     gone = float(time[-1] - times[-1])
@@ -366,6 +424,7 @@ def judge(
         wear=now - limits.initial,
         remaining=remaining,
         rate=rate,
+        fall=None if fall is None else replace(fall, window=fall.window + gone),
         life=_life(remaining, rate.rate, gone),
         life_low=_life(max(remaining - off, 0.0), rate.high, gone),
         life_high=_life(remaining + off if remaining else 0.0, rate.low, gone),

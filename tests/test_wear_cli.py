@@ -89,6 +89,18 @@ def test_limits_of_all_channels_hold_for_each() -> None:
             "--channel", "1")  # fmt: skip
 
 
+def test_a_turned_wheel_is_told() -> None:
+    rows = [f"{day},{5 + 0.1 * day - 3 * (day >= 25):.6g}" for day in range(40)]
+    Path("turned.csv").write_text("\n".join(["days,clearance_mm", *rows]) + "\n")
+    shown = re.sub(r"\s+", " ", good("turned.csv", *LIMITS).stdout)
+    assert "fall 3 mm, 14.5 days ago, as when a wheel is turned or a sensor mounted anew" in shown
+    assert "take the rate from there on by --window 14.5" in shown
+    assert json.loads(good("turned.csv", *LIMITS, "--json").stdout)["fall"]["window_days"] == 14.5
+    after = json.loads(good("turned.csv", *LIMITS, "--window", "14.5", "--json").stdout)
+    assert after["fall"] is None
+    assert after["rate_mm_per_day"]["value"] == pytest.approx(0.1)
+
+
 def test_the_channels_of_a_record_are_told_apart() -> None:
     rows = [f"{day},{channel},{1.5 + (channel + 1) * 0.1 * day:.6g}" for day in range(20) for channel in (0, 1)]
     Path("two.csv").write_text("\n".join(["days,channel,clearance_mm", *rows]) + "\n")

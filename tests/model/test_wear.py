@@ -12,7 +12,7 @@ import pytest
 from sosmith.gen.wear_limits import WearSpec
 from sosmith.model.errors import SpecificationError
 from sosmith.model.port import Port, Values
-from sosmith.model.wear import WearLimits, WearState, block_medians, judge, rate_of
+from sosmith.model.wear import WearLimits, WearState, block_medians, judge, last_fall, rate_of
 
 LIMITS = WearLimits(initial=1.5, limit=9, warning=7)
 
@@ -140,6 +140,39 @@ def test_a_window_takes_the_recent_rate() -> None:
     clearance = 2 + 0.01 * time + 0.1 * np.maximum(time - 40, 0)
     assert judge(time, clearance, LIMITS, window=15).rate.rate == pytest.approx(0.11)
     assert judge(time, clearance, LIMITS).rate.rate < 0.08
+
+
+@pytest.mark.parametrize("scatter", [0.0, 0.05])
+@pytest.mark.parametrize("turned", [(60,), (25, 80), (96,)])
+def test_the_last_fall_is_where_the_wheel_was_turned(turned: tuple[int, ...], scatter: float) -> None:
+    time = np.arange(100) + 0.5
+    clearance = 4 + 0.02 * time + scatter * noise(100, 0.7, seed=3)
+    for day in turned:
+        clearance[time > day] -= 1.5
+    clearance[[10, 70]] -= 3  # wild blocks are no falls
+    report = judge(time, clearance, LIMITS)
+    assert report.fall is not None
+    assert report.fall.size == pytest.approx(1.5, abs=0.15)
+    assert report.fall.window == pytest.approx(99.5 - turned[-1])
+    if turned[-1] < 90:
+        after = judge(time, clearance, LIMITS, window=report.fall.window)
+        assert after.fall is None
+        assert after.rate.low < 0.02 < after.rate.high
+
+
+def test_noise_with_memory_has_no_fall() -> None:
+    time = np.arange(200.0)
+    for seed in range(200):
+        clearance = 0.01 * time + noise(200, 0.9, seed)
+        assert last_fall(time, clearance, 0.0) is None
+    assert last_fall(time, clearance - 6.0 * (time > 100), 0.0) is not None
+
+
+def test_a_small_fall_may_be_the_season() -> None:
+    time = np.arange(50.0)
+    for size, found in ((0.4, False), (0.5, True)):
+        report = judge(time, 4 + 0.001 * time - size * (time > 20), LIMITS)
+        assert (report.fall is not None) == found
 
 
 def test_blocks_of_short_records_and_gaps() -> None:

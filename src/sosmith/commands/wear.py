@@ -129,6 +129,7 @@ def _json(record: WearRecord, report: WearReport) -> dict[str, Any]:
         "wear_mm": report.wear,
         "remaining_mm": report.remaining,
         "rate_mm_per_day": {"value": rate.rate, "low": rate.low, "high": rate.high, "confidence": rate.confidence},
+        "fall": None if report.fall is None else {"mm": report.fall.size, "window_days": report.fall.window},
         "blocks": {
             "count": rate.blocks,
             "days": rate.block,
@@ -165,6 +166,12 @@ def _print(record: WearRecord, report: WearReport, channel: int) -> None:
         "taken from",
         f"{rate.blocks} blocks that scatter by {rate.scatter:.2g} mm, neighbours correlated by {rate.correlation:.2f}",
     )
+    if (fall := report.fall) is not None:
+        table.add_row(
+            "fall",
+            f"{fall.size:.3g} mm, {fall.window:.4g} days ago, as when a wheel is turned or a sensor mounted anew: take "
+            f"the rate from there on by --window {fall.window:.6g}",
+        )
     table.add_row("remaining life", _life(report))
     table.add_row("state", f"{report.state}: the last reading is {report.last:.4g} mm")
     for name, first, count in (
