@@ -150,6 +150,7 @@ def test_the_last_fall_is_where_the_wheel_was_turned(turned: tuple[int, ...], sc
     for day in turned:
         clearance[time > day] -= 1.5
     clearance[[10, 70]] -= 3  # wild blocks are no falls
+    clearance[[12, 90]] += 3
     report = judge(time, clearance, LIMITS)
     assert report.fall is not None
     assert report.fall.size == pytest.approx(1.5, abs=0.15)
