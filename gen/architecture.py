@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import decimal
 import zlib
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -164,13 +165,23 @@ class Budget:
         needed = architecture.cycles_per_sample
         if needed <= self.cycles:
             return
-        most = float(self.clock / (needed * self.channels))
+        most, wanted = _told_apart(self.clock / (needed * self.channels), self.sample_rate)
         many = f" with {self.channels:,} channels" if self.channels > 1 else ""
         raise ShortfallError(
             f"the {architecture.name} architecture takes {needed:,} clock{'s' * (needed > 1)} a sample: at a clock of "
-            f"{float(self.clock):,.0f} Hz{many} the sample rate must be at most {most:,.6g} Hz, "
-            f"not {float(self.sample_rate):,.6g} Hz"
+            f"{float(self.clock):,.0f} Hz{many} the sample rate must be at most {most} Hz, not {wanted} Hz"
         )
+
+
+def _told_apart(most: Fraction, wanted: Fraction) -> tuple[str, str]:
+    """Texts of two rates with the digits that it takes to tell them apart, `most` rounded down: that much will do."""
+    for digits in range(6, 17):
+        context = decimal.Context(prec=digits, rounding=decimal.ROUND_FLOOR)
+        floor = context.divide(decimal.Decimal(most.numerator), decimal.Decimal(most.denominator))
+        texts = f"{floor:,f}", f"{float(wanted):,.{digits}g}"
+        if texts[0] != texts[1]:
+            break
+    return texts
 
 
 def candidates(wanted: str, board: Board | None) -> tuple[str, ...]:

@@ -103,6 +103,22 @@ def test_an_architecture_that_cannot_keep_up_says_what_it_could_do(architecture:
     assert made.architecture.cycles_per_sample == needed
 
 
+@pytest.mark.parametrize(
+    ("clock", "rate", "most", "wanted"),
+    [
+        ("119999.99999999", "10000", "9,999.99", "10,000"),
+        ("60000", "10000", "5,000", "10,000"),
+        ("7", "10000", "0.583333", "10,000"),
+        ("11", "10000", "0.916666", "10,000"),
+        ("34156.9452", "2846.4123", "2,846.4121", "2,846.4123"),
+    ],
+)
+def test_the_rate_that_it_could_do_is_never_rounded_up(clock: str, rate: str, most: str, wanted: str) -> None:
+    architecture = design_in("parallel").architecture
+    with pytest.raises(ShortfallError, match=rf"must be at most {most} Hz, not {wanted} Hz$"):
+        Budget(clock=Fraction(clock), sample_rate=Fraction(rate), channels=12).check(architecture)
+
+
 def test_a_realization_that_cannot_be_folded_is_refused() -> None:
     datapath = example_design("audio_lowpass.toml", realization="normal").datapath
     with pytest.raises(
