@@ -448,7 +448,7 @@ def plot(record: Figures) -> str:
     with matplotlib.rc_context({"svg.hashsalt": "sosmith", "svg.fonttype": "none"}):
         figure = Figure(figsize=(12, 8), layout="constrained")
         FigureCanvasSVG(figure)
-        rows = figure.subplots(2, len(panels), sharey=True)
+        rows = figure.subplots(2, len(panels), sharex="row", sharey=True)
         for (rates, channels), key in zip(rows.T, panels, strict=True):
             lines: dict[Core, list[tuple[int, int]]] = {}
             for core, _, figures in recorded(record, [key]):
