@@ -29,6 +29,14 @@ _ADDITION, _MULTIPLICATION, _PARTIAL_PRODUCT = 5, 12, 2
 _BLOCK_BITS = 18
 """Bits of each operand of a multiplier block, with the sign."""
 
+_SHALLOW = 16
+"""Channels up to which a memory of states may be made of LUTs: those of an ECP5 have 16 words. Beyond it is block RAM,
+slow and far from the logic, so that registers stand before and behind it."""
+
+_BLOCK_RAM = {"ram_style": "block", "no_rw_check": 1}
+"""Of memories with those registers: a sample's states are read at least a clock before they are written, so that nobody
+uses what is read at the clock at which that very word is written."""
+
 _Moment = tuple[int, int]
 """Rank and time in it."""
 
@@ -43,18 +51,22 @@ class Schedule:
         Rank of each node; that of a DELAY is the one that finds it read from memory.
     writes : dict of int to int
         Rank at which each DELAY gets its next value.
+    reading : int
+        Ranks from the one that tells a memory the channel to the one that has the state: 2 with registers around it.
     count : int
         Register ranks of the stage.
     """
 
     ranks: tuple[int, ...]
     writes: dict[int, int]
+    reading: int
     count: int
 
     @property
     def distance(self) -> int:
         """Samples from one of a channel to the next of the same, at least, so that its states have been written."""
-        return max((written - self.ranks[delay] + 2 for delay, written in self.writes.items()), default=1)
+        told = {delay: self.ranks[delay] - self.reading for delay in self.writes}
+        return max((written - told[delay] + 1 for delay, written in self.writes.items()), default=1)
 
 
 def schedule(graph: Graph, channels: int) -> Schedule:
@@ -68,12 +80,12 @@ def schedule(graph: Graph, channels: int) -> Schedule:
         At least 2.
     """
     least = max((_time(graph, node) for node in graph.nodes), default=0)
-    return next(
-        found for period in itertools.count(max(least, 1)) if (found := _spread(graph, period)).distance <= channels
-    )
+    reading = 1 if channels <= _SHALLOW else 2
+    periods = itertools.count(max(least, 1))
+    return next(found for period in periods if (found := _spread(graph, period, reading)).distance <= channels)
 
 
-def _spread(graph: Graph, period: int) -> Schedule:
+def _spread(graph: Graph, period: int, reading: int) -> Schedule:
     """Compute every node as late as the earliest moments of outputs and states' next values allow."""
     nodes = graph.nodes
     early: list[_Moment] = []  # when a value is there
@@ -81,13 +93,14 @@ def _spread(graph: Graph, period: int) -> Schedule:
         if node.op in {Op.INPUT, Op.CONSTANT}:
             early.append((0, 0))
         elif node.op is Op.DELAY:
-            early.append((1, 0))  # the memory has been told the channel at rank 0
+            early.append((reading, 0))  # the memory has been told the channel at rank 0
         else:
             rank, time = max(early[i] for i in node.operands)
             took = _time(graph, node)
             early.append((rank, time + took) if time + took <= period else (rank + 1, took))
     sources = [nodes[i].operands[0] for i in graph.delays]
-    count = max(rank for rank, _ in early) + 1
+    behind = reading - 1  # ranks from a next value to its memory
+    count = max([rank for rank, _ in early] + [early[i][0] + behind for i in sources]) + 1
     late: list[_Moment] = [(count - 1, period)] * len(nodes)  # when it has to be there
     ranks = [0] * len(nodes)
     for index in reversed(range(len(nodes))):
@@ -106,8 +119,8 @@ def _spread(graph: Graph, period: int) -> Schedule:
             ranks[index] = 0
         elif node.op in PLAIN - {Op.DELAY}:  # what drops bits does so where there are any
             ranks[index] = ranks[node.operands[0]]
-    writes = {i: max(ranks[nodes[i].operands[0]], ranks[i] - 1) for i in graph.delays}
-    return Schedule(tuple(ranks), writes, count)
+    writes = {i: max(ranks[nodes[i].operands[0]] + behind, ranks[i] - 1) for i in graph.delays}
+    return Schedule(tuple(ranks), writes, reading, count)
 
 
 def _time(graph: Graph, node: Node) -> int:
@@ -192,13 +205,21 @@ class InterleavedStage(wiring.Component):
         for index in graph.delays:
             node, written = graph.nodes[index], plan.writes[index]
             m.submodules[f"{names[index]}_memory"] = memory = Memory(
-                shape=shape_of(node), depth=self.channels, init=[0] * self.channels
+                shape=shape_of(node),
+                depth=self.channels,
+                init=[0] * self.channels,
+                attrs=_BLOCK_RAM if plan.reading > 1 else {},
             )
             read, write = memory.read_port(), memory.write_port()
+            found = read.data
+            if plan.reading > 1:
+                found = Signal(shape_of(node), name=f"{names[index]}_read", reset_less=True)
+                with m.If(self.advance):
+                    m.d.sync += found.eq(read.data)
             m.d.comb += [
-                read.addr.eq(channel[plan.ranks[index] - 1]),
+                read.addr.eq(channel[plan.ranks[index] - plan.reading]),
                 read.en.eq(self.advance),
-                wires[index].eq(read.data),
+                wires[index].eq(found),
                 write.addr.eq(Mux(self.clear, self.clear_channel, channel[written])),
                 write.data.eq(Mux(self.clear, 0, at(node.operands[0], written))),
                 write.en.eq(self.clear | (self.advance & valid[written])),

@@ -16,18 +16,20 @@ def graphs(realization: str) -> list[Graph]:
     return [stage.graph for stage in example_design("flange_wear_bench.toml", realization=realization).datapath.stages]
 
 
-@pytest.mark.parametrize("channels", [2, 3, 5, 8, 64])
+@pytest.mark.parametrize("channels", [2, 3, 5, 8, 16, 17, 64])
 @pytest.mark.parametrize("realization", REALIZATIONS)
 def test_every_value_is_there_before_it_is_used(realization: str, channels: int) -> None:
     for graph in graphs(realization):
         plan = schedule(graph, channels)
         assert plan.distance <= channels
+        assert plan.reading == (1 if channels <= 16 else 2)
         for index, node in enumerate(graph.nodes):
             assert 0 <= plan.ranks[index] < plan.count
             if node.op is Op.DELAY:
-                assert plan.ranks[index] >= 1  # the memory is told the channel a rank before
-                assert plan.writes[index] >= plan.ranks[index] - 1  # never written before it is read
-                assert plan.writes[index] >= plan.ranks[node.operands[0]]
+                told = plan.ranks[index] - plan.reading  # the rank at which the memory is told the channel
+                assert told >= 0
+                assert plan.writes[index] >= told + plan.reading - 1  # block RAM: never written while it is read
+                assert plan.ranks[node.operands[0]] + plan.reading - 1 <= plan.writes[index] < plan.count
                 continue
             assert all(plan.ranks[i] <= plan.ranks[index] for i in node.operands)
         assert all(plan.ranks[i] < plan.count for i in graph.outputs)

@@ -26,12 +26,15 @@ UNFOLDABLE = {"normal", "lattice_wdf"}
 SAMPLES = {"parallel": 120, "folded": 24, "serial": 8}
 """Samples of each channel, fewer where each takes longer."""
 
-FAST = {("parallel", "df1_ef2", 12), ("parallel", "lattice_wdf", 3), ("folded", "delta", 3), ("serial", "df2t", 3)}
+FAST = {
+    *(("parallel", "df1_ef2", 12), ("parallel", "df1_ef2", 20), ("parallel", "lattice_wdf", 3)),
+    *(("folded", "delta", 3), ("serial", "df2t", 3)),
+}
 CASES = [
     pytest.param(*case, marks=[] if case in FAST else [pytest.mark.slow])
     for architecture in SAMPLES
     for realization in REALIZATIONS
-    for channels in (1, 3, 12)
+    for channels in (1, 3, 12, 20)
     for case in [(architecture, realization, channels)]
     if architecture == "parallel" or realization not in UNFOLDABLE
 ]
