@@ -1,7 +1,8 @@
 """Runs inside the simulator: samples stream through a core while sets of constants are loaded into it.
 
-Reads ``job.json`` of the folder named by RELOAD_BENCH: ``words`` of the input stream, ``loads`` (each a list of
-register writes [address, data], and whether it is right), ``seed``. Writes ``outcome.json``: ``received`` words,
+Reads ``job.json`` of the folder named by RELOAD_BENCH: ``words`` of the input stream, ``dests`` (their channels; empty
+if there is one channel only), ``loads`` (each a list of register writes [address, data], and whether it is right),
+``seed``. Writes ``outcome.json``: ``received`` (pairs of channel and word),
 ``swaps`` (number of swaps before each sample that was taken), ``accepted`` (numbers of the loads in the order in which
 they were accepted), ``refused`` (those whose last write was refused).
 """
@@ -27,7 +28,7 @@ class Bench:
         self.swaps = 0
         self.loading = True
         self.used: list[int] = []
-        self.received: list[int] = []
+        self.received: list[tuple[int, int]] = []
         self.accepted: list[int] = []
         self.refused: list[int] = []
 
@@ -48,6 +49,8 @@ class Bench:
         await RisingEdge(dut.aclk)
         while self.loading or number % len(words):
             dut.s_axis_tdata.value = words[number % len(words)]
+            if self.job["dests"]:
+                dut.s_axis_tdest.value = self.job["dests"][number % len(words)]
             dut.s_axis_tvalid.value = 1
             while True:
                 await self.falling  # outputs have settled, and the next edge takes what they say
@@ -74,7 +77,8 @@ class Bench:
             if not ready:
                 await ClockCycles(dut.aclk, self.pace.randrange(1, 12))
                 continue
-            self.received.append(int(dut.m_axis_tdata.value))
+            dest = int(dut.m_axis_tdest.value) if self.job["dests"] else 0
+            self.received.append((dest, int(dut.m_axis_tdata.value)))
             await RisingEdge(dut.aclk)
             await self.falling
             dut.m_axis_tready.value = 0

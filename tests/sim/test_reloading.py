@@ -36,12 +36,12 @@ ARCHITECTURES = ("parallel", "folded", "serial")
 
 
 @cache
-def hardware_in(architecture: str, example: str) -> CoreDesign:
+def hardware_in(architecture: str, example: str, channels: int = 1) -> CoreDesign:
     spec = load(EXAMPLES / f"{example}.toml")
     hardware = replace(
         spec.hardware, architecture=architecture, realization="df1_ef2", clock=Fraction(10**9), reload=True
     )
-    return design_core(replace(spec, filter=replace(spec.filter, order=2), hardware=hardware))
+    return design_core(replace(spec, filter=replace(spec.filter, order=2), channels=channels, hardware=hardware))
 
 
 @cache
@@ -82,7 +82,10 @@ def run(folder: Path, made: CoreDesign, source: str, count: int, seed: int) -> t
     ports = fields(made.datapath.inputs)
     columns = [rng.integers(f.port.lowest // 2, f.port.highest // 2, 256).tolist() for f in ports]
     codes = list(zip(*columns, strict=True))
+    channels = made.spec.channels
+    dests = rng.integers(channels, size=len(codes)).tolist() if channels > 1 else []
     job = {
+        "dests": dests,
         "words": [
             sum(code % (1 << f.padded) << f.offset for f, code in zip(ports, sample, strict=True)) for sample in codes
         ],
@@ -112,22 +115,33 @@ def run(folder: Path, made: CoreDesign, source: str, count: int, seed: int) -> t
     outcome: dict[str, Any] = json.loads((folder / "outcome.json").read_text())
     assert outcome["refused"] == [number for number, bad in enumerate(wrong) if bad]
     assert outcome["accepted"] == [number for number, bad in enumerate(wrong) if not bad]
-    samples = [codes[k % len(codes)] for k in range(len(outcome["swaps"]))]
-    return outcome | {"samples": samples}, chosen
+    taken = range(len(outcome["swaps"]))
+    samples = [codes[k % len(codes)] for k in taken]
+    sent = [dests[k % len(codes)] if dests else 0 for k in taken]
+    return outcome | {"samples": samples, "dests": sent}, chosen
 
 
 def expected(made: CoreDesign, outcome: dict[str, Any], chosen: list[int]) -> list[int]:
+    """Return the output words in the order of the samples; each channel has its own states, and all one bank."""
+    found = [0] * len(outcome["samples"])
+    for channel in range(made.spec.channels):
+        numbers = [number for number, dest in enumerate(outcome["dests"]) if dest == channel]
+        for number, code in zip(numbers, _of_channel(made, outcome, chosen, numbers), strict=True):
+            found[number] = code % (1 << 8 * made.datapath.output.bytes)
+    return found
+
+
+def _of_channel(made: CoreDesign, outcome: dict[str, Any], chosen: list[int], numbers: list[int]) -> list[int]:
     sets = sets_for(made.architecture.name, made.spec.name)
     swaps, before = [], 0
-    for number, swapped in enumerate(outcome["swaps"]):
+    for turn, number in enumerate(numbers):
+        swapped = outcome["swaps"][number]
         if swapped != before:
-            swaps.append((number, sets[chosen[outcome["accepted"][swapped - 1]]].quantized.datapath))
+            swaps.append((turn, sets[chosen[outcome["accepted"][swapped - 1]]].quantized.datapath))
             before = swapped
     # A program keeps states with more fraction bits than the datapath has; in these, others take over.
     first = with_constants(made.quantized, None, None, room=room_of(made)).datapath
-    codes = np.array(outcome["samples"])
-    bits = 8 * made.datapath.output.bytes
-    return [code % (1 << bits) for code in compute_swapping(first, swaps, codes)]
+    return compute_swapping(first, swaps, np.array([outcome["samples"][number] for number in numbers]))
 
 
 def verilog(made: CoreDesign) -> str:
@@ -135,22 +149,27 @@ def verilog(made: CoreDesign) -> str:
 
 
 COUNTS = [
-    *(pytest.param(name, "audio_lowpass", 60, id=f"{name}-60") for name in ARCHITECTURES),
-    *(pytest.param(name, "flange_wear_bench", 20, id=f"{name}-calibration") for name in ("parallel", "folded")),
+    *(pytest.param(name, "audio_lowpass", 1, 60, id=f"{name}-60") for name in ARCHITECTURES),
+    *(pytest.param(name, "audio_lowpass", 3, 40, id=f"{name}-3-channels") for name in ARCHITECTURES),
+    pytest.param("parallel", "audio_lowpass", 20, 40, id="parallel-20-channels"),
+    *(pytest.param(name, "flange_wear_bench", 1, 20, id=f"{name}-calibration") for name in ("parallel", "folded")),
+    pytest.param("parallel", "flange_wear_bench", 20, 20, id="parallel-calibration-20-channels"),
     *(
-        pytest.param(name, "audio_lowpass", 10_000, id=f"{name}-10000", marks=pytest.mark.slow)
+        pytest.param(name, "audio_lowpass", channels, count, id=f"{name}-{channels}-{count}", marks=pytest.mark.slow)
         for name in ARCHITECTURES
+        for channels, count in ((1, 10_000), (12, 500), (20, 500))
     ),
 ]
 
 
-@pytest.mark.parametrize(("architecture", "example", "count"), COUNTS)
-def test_reloads_at_any_moment(architecture: str, example: str, count: int, tmp_path: Path) -> None:
-    made = hardware_in(architecture, example)
+@pytest.mark.parametrize(("architecture", "example", "channels", "count"), COUNTS)
+def test_reloads_at_any_moment(architecture: str, example: str, channels: int, count: int, tmp_path: Path) -> None:
+    made = hardware_in(architecture, example, channels)
     outcome, chosen = run(tmp_path, made, verilog(made), count, seed=count)
     assert outcome["swaps"][-1] == len(outcome["accepted"])
     assert len(set(outcome["swaps"])) > count // 2  # most sets were used by a sample
-    assert outcome["received"] == expected(made, outcome, chosen)
+    assert [word for _, word in outcome["received"]] == expected(made, outcome, chosen)
+    assert [dest for dest, _ in outcome["received"]] == outcome["dests"]
 
 
 def test_a_sample_that_sees_two_banks_is_noticed(tmp_path: Path) -> None:
@@ -167,4 +186,4 @@ def test_a_sample_that_sees_two_banks_is_noticed(tmp_path: Path) -> None:
     with patch.object(FoldedCore, "_reload", careless):
         source = verilog(made)
     outcome, chosen = run(tmp_path, made, source, 60, seed=60)
-    assert outcome["received"] != expected(made, outcome, chosen)
+    assert [word for _, word in outcome["received"]] != expected(made, outcome, chosen)
