@@ -228,7 +228,7 @@ UNFIT = {
         ".toml, not drive",
     ),
     "simulator to come": (
-        ("simulate", "plain.toml", "--simulator", "cxxrtl"),
+        ("simulate", "missing.toml", "--simulator", "cxxrtl"),
         "simulator cxxrtl is not yet available: use verilator or icarus",
     ),
     "unknown board": (

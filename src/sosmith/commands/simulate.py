@@ -33,6 +33,7 @@ from sosmith.model.scenarios import SCENARIOS
 from sosmith.model.text_files import write_files
 from sosmith.model.trace_file import traces_csv, write_traces
 from sosmith.sim.simulation import bench_of, default_scenario, is_scenario_file, notes_on, simulate, traces_for
+from sosmith.sim.simulators import check_name
 from sosmith.terminal import (
     JSON_OPTION,
     Step,
@@ -128,6 +129,7 @@ def simulate_command(
     With --gates, the same bench runs the cells of an FPGA, their flip-flops at random when it starts, and an automatic
     choice of the architecture is made for that board.
     """
+    check_name(simulator)  # before anything takes time
     netlist_for = board_named(gates)
     target = board_named(board) or netlist_for
     with show_progress() as step:
