@@ -283,18 +283,18 @@ def _block(datapath: Datapath) -> str:
         condition = f"first <= {k} && {k} <= last" if k else "first == 0"
         work += [f"    if ({condition}) {{\n", *(f"        {line}\n" for line in lines), "    }\n"]
     ticks = "".join(
-        f"        tick(&near, &passing, n{f' + {k}' if k else ''}, 0, behind, channels, c, in, out);\n"
+        f"        tick(&local, &passing, n{f' + {k}' if k else ''}, 0, behind, channels, c, in, out);\n"
         for k in range(_UNROLLED)
     )
     return f"""
 static void with_status({name}_state *state, size_t samples, size_t channels, size_t c, const int64_t *in,
                         int64_t *out, uint8_t *status)
 {{
-    {name}_state near = *state; /* a local copy stays in registers */
+    {name}_state local = *state; /* a local copy stays in registers */
     for (size_t n = 0; n < samples; n++) {{
-        out[n * channels + c] = step(&near, {", ".join(codes)}, &status[n * channels + c]);{_judge_wear(datapath)}
+        out[n * channels + c] = step(&local, {", ".join(codes)}, &status[n * channels + c]);{_judge_wear(datapath)}
     }}
-    *state = near;
+    *state = local;
 }}
 
 static const size_t behind = {behind}; /* samples, the last stage behind the first */
@@ -315,17 +315,17 @@ static void partial_tick({name}_state *state, wires *w, size_t n, size_t samples
 static void without_status({name}_state *state, size_t samples, size_t channels, size_t c, const int64_t *in,
                            int64_t *out)
 {{
-    {name}_state near;
+    {name}_state local;
     wires w, passing;
     size_t n;
     memset(&w, 0, sizeof w);
     for (n = 0; n != behind; n++)
         partial_tick(state, &w, n, samples, channels, c, in, out);
-    near = *state; /* local copies stay in registers */
+    local = *state; /* local copies stay in registers */
     passing = w;
     for (; n + {_UNROLLED} <= samples; n += {_UNROLLED}) {{
 {ticks}    }}
-    *state = near;
+    *state = local;
     w = passing;
     for (; n < samples + behind; n++)
         partial_tick(state, &w, n, samples, channels, c, in, out);
