@@ -66,7 +66,9 @@ class Architecture:
         try:
             made = program(self.datapath, DIGIT_BITS)
         except FoldingError as error:
-            raise ShortfallError(f"the realization must suit the {self.name} architecture: {error}") from None
+            raise ShortfallError(
+                f"the realization must suit the {self.name} architecture: {error}; parallel takes every realization"
+            ) from None
         if not self.reload:
             return made
         roomy = replace(made, accumulator_bits=made.accumulator_bits + SPARE_ACCUMULATOR_BITS)

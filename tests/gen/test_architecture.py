@@ -124,6 +124,6 @@ def test_a_realization_that_cannot_be_folded_is_refused() -> None:
     with pytest.raises(
         ShortfallError,
         match=r"^the realization must suit the folded architecture: "
-        r"the datapath must not truncate inside to be folded$",
+        r"the datapath must not truncate inside to be folded; parallel takes every realization$",
     ):
         fitting("folded", Budget(clock=Fraction(10**8), sample_rate=Fraction(48_000)), datapath)
