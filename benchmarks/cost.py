@@ -221,7 +221,10 @@ def check() -> list[str]:
     same_tools = record["tools"] == tools()
     for core in CORES:
         recorded = targets_in(record, core)
-        if not recorded or (same_tools and record["cores"][core.key]["source"] == mark(verilog(core))):
+        if not recorded:
+            continue
+        if same_tools and record["cores"][core.key]["source"] == mark(verilog(core)):
+            print(f"{core.label}: as recorded", file=sys.stderr, flush=True)
             continue  # from the same text, the same tools make the same cells
         for key, figures in recorded.items():
             with tempfile.TemporaryDirectory() as scratch:
@@ -557,8 +560,10 @@ def main() -> None:
     parser.add_argument("--processes", type=int, default=2, help="so many placements at the same time (default 2)")
     options = parser.parse_args()
     if options.check:
-        faults = check()
-        sys.exit("\n".join(faults) if faults else 0)
+        if faults := check():
+            sys.exit("\n".join(faults))
+        print("nothing has grown")
+        return
     if not options.document:
         measure(options.processes)
     for path, text in document(json.loads(RECORD.read_text(encoding="utf-8"))).items():
