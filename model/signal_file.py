@@ -14,7 +14,7 @@ from sosmith.model.csv_table import CsvTable, check_rows, csv_header, read_csv_t
 from sosmith.model.errors import SpecificationError
 from sosmith.model.polynomial import Polynomial
 from sosmith.model.port import Values
-from sosmith.model.trace_file import CHANNEL, PHYSICAL_COLUMNS, TIME_TOLERANCE
+from sosmith.model.trace_file import CHANNEL, PHYSICAL_COLUMNS, TIME_TOLERANCE, rows_of_channel
 
 TIME = "time_s"
 READING = "reading"
@@ -166,13 +166,8 @@ def _parts(table: CsvTable, channels: Sequence[int]) -> dict[str, CsvTable]:
         (number % 1 != 0) | (number < 0),
         lambda k: f"{CHANNEL} must be an integer from 0 on, not {number[k]:g}",
     )
-    present = np.unique(number)
-    for channel in channels:
-        if channel not in present:
-            given = ", ".join(f"{other:g}" for other in present[:8])
-            raise SpecificationError(f"{table.path} must have rows of channel {channel}, not only of {given}")
-    chosen = sorted(set(channels)) or present.astype(int).tolist()
-    return {f" of channel {channel}": table.take(np.flatnonzero(number == channel)) for channel in chosen}
+    chosen = sorted(set(channels)) or np.unique(number).astype(int).tolist()
+    return {f" of channel {channel}": rows_of_channel(table, channel) for channel in chosen}
 
 
 def unit_of(column: str) -> tuple[str, float]:

@@ -134,6 +134,22 @@ def read_traces(path: Path, ports: tuple[Port, ...], sample_rate: Fraction, chan
     return tuple(_trace(part, columns, ports, sample_rate) for part in parts)
 
 
+def rows_of_channel(table: CsvTable, channel: int) -> CsvTable:
+    """Return the rows of one channel of a table with the column channel.
+
+    Raises
+    ------
+    SpecificationError
+        If it has none.
+    """
+    number = table.column(CHANNEL)
+    own = np.flatnonzero(number == channel)
+    if not len(own):
+        given = ", ".join(f"{other:g}" for other in np.unique(number)[:8])
+        raise SpecificationError(f"{table.path} must have rows of channel {channel}, not only of {given}")
+    return table.take(own)
+
+
 def _by_channel(table: CsvTable, channels: int) -> list[CsvTable]:
     number = table.column(CHANNEL)
     check_rows(

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
-from sosmith.model.csv_table import CsvTable, check_rows, csv_header, read_csv_table
+from sosmith.model.csv_table import check_rows, csv_header, read_csv_table
 from sosmith.model.errors import SpecificationError
 from sosmith.model.port import Values
 from sosmith.model.signal_file import unit_of
-from sosmith.model.trace_file import CHANNEL
+from sosmith.model.trace_file import CHANNEL, rows_of_channel
 
 SECONDS_A_DAY = 86400.0
 
@@ -112,7 +112,9 @@ def read_wear_record(path: Path, column: str | None = None, channel: int = 0) ->
         raise SpecificationError(f"{path}: the column of clearances must be in mm, not {clearance_column}")
     ignored = {name: _nothing for name in header if name not in {time_column, clearance_column, CHANNEL}}
     readers = ignored | ({time_column: parse_moment} if time_column == "date" else {})
-    table = _rows_of(read_csv_table(path, header, readers=readers), channel)
+    table = read_csv_table(path, header, readers=readers)
+    if CHANNEL in table:
+        table = rows_of_channel(table, channel)
     raw = table.column(time_column)
     check_rows(
         table,
@@ -127,16 +129,6 @@ def read_wear_record(path: Path, column: str | None = None, channel: int = 0) ->
         dated=time_column == "date",
         channels=CHANNEL in header,
     )
-
-
-def _rows_of(table: CsvTable, channel: int) -> CsvTable:
-    if CHANNEL not in table:
-        return table
-    own = np.flatnonzero(table.column(CHANNEL) == channel)
-    if not len(own):
-        others = ", ".join(f"{other:g}" for other in np.unique(table.column(CHANNEL))[:8])
-        raise SpecificationError(f"{table.path} must have rows of channel {channel}, not only of {others}")
-    return table.take(own)
 
 
 def _first(path: Path, header: Sequence[str], names: Sequence[str], what: str) -> str:
