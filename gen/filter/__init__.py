@@ -1,0 +1,1 @@
+"""Ideal filters: prototypes, transformations and sections, derived in ball arithmetic and rounded once."""
