@@ -1,7 +1,7 @@
 """Filter design in double precision: from the specification to second-order sections.
 
 Minimum order and cutoff of a Butterworth low-pass follow the paper's equations 10 to 13; poles, zeros and
-their pairing come from scipy, or from `sosmith.gen.impulse_invariance` where that method is asked for. Sign
+their pairing come from scipy, or from `sosmith.gen.filter.impulse_invariance` where that method is asked for. Sign
 convention of the sections: scipy's, ``a0 = 1``.
 """
 
@@ -17,13 +17,13 @@ import numpy as np
 import numpy.typing as npt
 from scipy import signal
 
-from sosmith.gen.impulse_invariance import Aliasing, analog_lowpass, impulse_invariant
-from sosmith.gen.specification import FilterSpec
+from sosmith.gen.filter.impulse_invariance import Aliasing, analog_lowpass, impulse_invariant
+from sosmith.gen.specification.specification import FilterSpec
 from sosmith.model.errors import ShortfallError, SpecificationError
 
 Array = npt.NDArray[np.float64]
 
-_LONGEST_RESPONSE = 1 << 24  # samples; poles closer to the unit circle than this resolves are refused
+_MAX_RESPONSE = 1 << 24  # samples; poles closer to the unit circle than this resolves are refused
 _DECAY = 1e-12  # where an impulse response counts as over, of its envelope
 _COMFORTABLE = 20  # samples per period of the band edge: word lengths hardly fall with fewer
 _SNAP = 1e-9  # relative distance at which a gain counts as one: rounding of the design, not intent
@@ -121,9 +121,9 @@ def decay_length(sos: Array) -> int:
     """Count the samples after which the slowest mode has decayed to 1e-12, with a margin for repeated poles."""
     radius = max((float(abs(pole)) for row in sos for pole in np.roots([1.0, *row[4:]])), default=0.0)
     samples = 64.0 if radius < 1e-3 else 64 + 1.5 * math.log(_DECAY) / math.log(min(radius, 1 - 1e-15))
-    if samples > _LONGEST_RESPONSE:
+    if samples > _MAX_RESPONSE:
         raise ShortfallError(
-            f"the impulse response must decay within {_LONGEST_RESPONSE} samples, not {samples:.3g}: a pole lies too "
+            f"the impulse response must decay within {_MAX_RESPONSE} samples, not {samples:.3g}: a pole lies too "
             "close to the unit circle"
         )
     return int(samples)
