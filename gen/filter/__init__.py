@@ -1,1 +1,1 @@
-"""Ideal filters: prototypes, transformations and sections, derived in ball arithmetic and rounded once."""
+"""Filter design, from the specification to second-order sections, correctly rounded, and their frequency response."""

@@ -24,12 +24,12 @@ from sosmith.gen.filter.minimum_order import least_order
 from sosmith.gen.filter.prototypes import Prototype, prototype
 from sosmith.gen.filter.sections import Row, rounded, sections
 from sosmith.gen.filter.transformations import bilinear, unwarped, warped
-from sosmith.gen.specification import FilterSpec
+from sosmith.gen.specification.specification import FilterSpec
 from sosmith.model.errors import ShortfallError, SpecificationError
 
 Array = npt.NDArray[np.float64]
 
-_LONGEST_RESPONSE = 1 << 24  # samples; poles closer to the unit circle than this resolves are refused
+_MAX_RESPONSE = 1 << 24  # samples; poles closer to the unit circle than this resolves are refused
 _DECAY = 1e-12  # where an impulse response counts as over, of its envelope
 _COMFORTABLE = 20  # samples per period of the band edge: word lengths hardly fall with fewer
 _UNITY = 1e-14  # relative distance at which the gain of given sections counts as one: their rounding, not intent
@@ -127,9 +127,9 @@ def decay_length(sos: Array) -> int:
     """Count the samples after which the slowest mode has decayed to 1e-12, with a margin for repeated poles."""
     radius = max((_radius(float(row[4]), float(row[5])) for row in sos), default=0.0)
     samples = 64.0 if radius < 1e-3 else 64 + 1.5 * math.log(_DECAY) / math.log(min(radius, 1 - 1e-15))
-    if samples > _LONGEST_RESPONSE:
+    if samples > _MAX_RESPONSE:
         raise ShortfallError(
-            f"the impulse response must decay within {_LONGEST_RESPONSE} samples, not {samples:.3g}: a pole lies too "
+            f"the impulse response must decay within {_MAX_RESPONSE} samples, not {samples:.3g}: a pole lies too "
             "close to the unit circle"
         )
     return int(samples)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from sosmith.gen.evidence import FilterFacts
+from sosmith.gen.report.evidence import FilterFacts
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]

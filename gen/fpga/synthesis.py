@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 
-from sosmith.gen.boards import Board
+from sosmith.gen.fpga.boards import Board
 from sosmith.model.errors import ToolError
 from sosmith.model.text_files import to_json, write_files
 

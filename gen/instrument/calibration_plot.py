@@ -10,9 +10,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from sosmith.gen.picture import picture
-from sosmith.model.fit_quality import HIGH_LEVERAGE
-from sosmith.model.measurement_store import Version
-from sosmith.model.self_updating import Calibration
+from sosmith.model.calibration.fit_quality import HIGH_LEVERAGE
+from sosmith.model.calibration.measurement_store import Version
+from sosmith.model.calibration.self_updating import Calibration
 
 _BLUE, _RED, _GREY = "#2563a8", "#b4432f", "#8a8a8a"
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from sosmith.model.calibration import COLUMNS, terms_of
-from sosmith.model.measurement_store import StoredMeasurement, Version
-from sosmith.model.self_updating import Addition, Calibration
+from sosmith.model.calibration.fit import COLUMNS, terms_of
+from sosmith.model.calibration.measurement_store import StoredMeasurement, Version
+from sosmith.model.calibration.self_updating import Addition, Calibration
 
 CALLED_OUT = 5
 """Count of measurements that the report lists by their residuals, and by their leverage."""

@@ -6,9 +6,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from sosmith.gen.amplitude_spectrum import Array, amplitude_spectrum
+from sosmith.gen.instrument.amplitude_spectrum import Array, amplitude_spectrum
+from sosmith.gen.instrument.vehicle_report import TRACKS, VehicleRun
 from sosmith.gen.picture import picture
-from sosmith.gen.vehicle_report import TRACKS, VehicleRun
 
 SMALLEST = 1e-6
 """Smallest amplitude drawn, in mm: a nanometre."""

@@ -9,17 +9,17 @@ from typing import Any
 
 import numpy as np
 
-from sosmith.gen.paper_comparison import Comparison
-from sosmith.gen.vehicle_comparison import PAPER_SPEED, comparison
-from sosmith.model.linear_motion import Mode
-from sosmith.model.paper_figures import read_paper_figures
-from sosmith.model.track import curved_track, tangent_track
-from sosmith.model.vehicle_lateral import lateral_dynamics
-from sosmith.model.vehicle_limits import Limits, limits
-from sosmith.model.vehicle_motion import Motion
-from sosmith.model.vehicle_parameters import Parameters
-from sosmith.model.vehicle_run import run
-from sosmith.model.vehicle_vertical import vertical_dynamics
+from sosmith.gen.paper.comparison import Comparison
+from sosmith.gen.paper.figures import read_paper_figures
+from sosmith.gen.paper.vehicle_comparison import PAPER_SPEED, comparison
+from sosmith.model.vehicle.lateral import lateral_dynamics
+from sosmith.model.vehicle.limits import Limits, limits
+from sosmith.model.vehicle.linear_motion import Mode
+from sosmith.model.vehicle.motion import Motion
+from sosmith.model.vehicle.parameters import Parameters
+from sosmith.model.vehicle.run import run
+from sosmith.model.vehicle.track import curved_track, tangent_track
+from sosmith.model.vehicle.vertical import vertical_dynamics
 
 TRACKS = {"paper": curved_track, "tangent": tangent_track}
 """Tracks by name."""
@@ -62,7 +62,7 @@ class VehicleRun:
 def vehicle_run(
     parameters: Parameters, *, track: str, speed: float, sample_rate: float, irregularities: str, seed: int
 ) -> VehicleRun:
-    """Carry out a run; refuses as `sosmith.model.vehicle_run.run` does."""
+    """Carry out a run; refuses as `sosmith.model.vehicle.run.run` does."""
     made = TRACKS[track](parameters.track)
     level = None if irregularities == "none" else irregularities
     motion = run(parameters, made, speed=speed, sample_rate=sample_rate, irregularity=level, seed=seed)

@@ -7,9 +7,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sosmith.gen.picture import picture
-from sosmith.gen.plots import envelope
+from sosmith.gen.report.plots import envelope
 from sosmith.model.port import Values
-from sosmith.model.wear import WearReport, block_medians
+from sosmith.model.wear.assessment import WearReport, block_medians
 
 _BLUE, _RED, _AMBER, _GREY = "#2563a8", "#b4432f", "#c08a1e", "#8a8a8a"
 _AHEAD = 2.0

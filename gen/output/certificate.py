@@ -1,6 +1,6 @@
 """Makes the certificate of a design: the datapath, what it stands for, and what is proven about it.
 
-Whoever reads it can prove the bound again and needs nothing else; `sosmith.gen.verification` does.
+Whoever reads it can prove the bound again and needs nothing else; `sosmith.gen.verifier.verification` does.
 """
 
 from __future__ import annotations
@@ -11,8 +11,17 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import accumulate
 
-from sosmith.gen.cascade import ideal_sections
-from sosmith.gen.certificate_file import (
+from sosmith.gen.proof.cascade_proof import (
+    StageModel,
+    TransferFunction,
+    cascade_horizon,
+    error_drives,
+    made_response,
+    through,
+)
+from sosmith.gen.proof.linear_model import linear_models
+from sosmith.gen.proof.peak_gain import Drive, Horizon, Response, horizon, impulse
+from sosmith.gen.verifier.certificate_file import (
     FORMAT,
     Certificate,
     ClaimsEntry,
@@ -24,22 +33,13 @@ from sosmith.gen.certificate_file import (
     StageEntry,
     on_grid,
 )
-from sosmith.gen.linear_model import linear_models
-from sosmith.gen.peak_gain import Drive, Horizon, Response, horizon, impulse
-from sosmith.gen.proof import (
-    StageModel,
-    TransferFunction,
-    cascade_horizon,
-    error_drives,
-    made_response,
-    through,
-)
-from sosmith.gen.quantize import Quantized
-from sosmith.model.datapath import Stage
-from sosmith.model.graph import Node
-from sosmith.model.horner import HornerStep
-from sosmith.model.output import OutputStage
+from sosmith.gen.word_lengths.cascade import ideal_sections
+from sosmith.gen.word_lengths.quantize import Quantized
+from sosmith.model.dataflow.datapath import Stage
+from sosmith.model.dataflow.graph import Node
 from sosmith.model.port import Port
+from sosmith.model.sections.horner import HornerStep
+from sosmith.model.sections.output import OutputStage
 
 _FINER_BITS = 88
 """By so many bits a claim is computed more closely than the search for word lengths needs, so that two ways of
@@ -151,7 +151,7 @@ def _gain(response: Response) -> Fraction:
 
 
 def _magnitude(drives: Sequence[Drive]) -> Fraction:
-    """Largest size of the sum of `drives`, as `sosmith.gen.peak_gain.extent` has it, without any rounding."""
+    """Largest size of the sum of `drives`, as `sosmith.gen.proof.peak_gain.extent` has it, without any rounding."""
     scale = math.lcm(*(end.denominator for drive in drives for end in (drive.low, drive.high)))
     length = max((len(drive.response.samples) for drive in drives), default=0)
     tops, bottoms = [0] * length, [0] * length

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from sosmith.gen.certificate import certificate
-from sosmith.gen.certificate_file import certificate_text
 from sosmith.gen.core import CoreDesign
-from sosmith.gen.manifest import manifest
-from sosmith.gen.register_map import c_registers, systemrdl
-from sosmith.gen.reload_file import bank_size
-from sosmith.gen.verilog import to_rtlil, to_verilog
-from sosmith.model.c_model import c_header, c_source
+from sosmith.gen.output.certificate import certificate
+from sosmith.gen.output.manifest import manifest
+from sosmith.gen.output.verilog import to_rtlil, to_verilog
+from sosmith.gen.reload.register_map import c_registers, systemrdl
+from sosmith.gen.reload.register_writes import bank_size
+from sosmith.gen.verifier.certificate_file import certificate_text
+from sosmith.model.dataflow.c_model import c_header, c_source
 from sosmith.model.text_files import to_json, write_files
 
 

@@ -6,19 +6,19 @@ from typing import Any
 
 import sosmith
 from sosmith.gen.core import CoreDesign
-from sosmith.gen.cost import cost_of
-from sosmith.gen.limit_cycles import limit_cycles, recursions
-from sosmith.gen.linear_model import linear_model
-from sosmith.gen.reload_file import bank_size
+from sosmith.gen.proof.limit_cycles import limit_cycles, recursions
+from sosmith.gen.proof.linear_model import linear_model
+from sosmith.gen.reload.register_writes import bank_size
+from sosmith.gen.word_lengths.cost import cost_of
 from sosmith.hdl.axi_stream import dest_width, fields, width
-from sosmith.model.datapath import Datapath, Stage
-from sosmith.model.direct_form import DirectForm1
-from sosmith.model.graph import Graph, Op
-from sosmith.model.horner import HornerStep
+from sosmith.model.dataflow.datapath import Datapath, Stage
+from sosmith.model.dataflow.graph import Graph, Op
+from sosmith.model.dataflow.program import Program
+from sosmith.model.dataflow.status import STATUS_BITS, Flag
 from sosmith.model.port import Port
-from sosmith.model.program import Program
-from sosmith.model.reload_registers import INTERFACE
-from sosmith.model.status import STATUS_BITS, Flag
+from sosmith.model.reload.registers import INTERFACE
+from sosmith.model.sections.direct_form import DirectForm1
+from sosmith.model.sections.horner import HornerStep
 
 
 def manifest(design: CoreDesign) -> dict[str, Any]:

@@ -7,9 +7,9 @@ from decimal import Decimal
 from fractions import Fraction
 from itertools import pairwise
 
-from sosmith.gen.paper_comparison import Comparison, Part, compare, compare_accuracy, plain, table
-from sosmith.gen.paper_regression import scatter
-from sosmith.model.paper_figures import PaperFigures
+from sosmith.gen.paper.comparison import Comparison, Part, compare, compare_accuracy, plain, table
+from sosmith.gen.paper.figures import PaperFigures
+from sosmith.gen.paper.regression import scatter
 
 TABLES = ("table_1", "table_2", "table_4")
 

@@ -15,7 +15,7 @@ from typing import cast
 
 from flint import acb, arb, ctx, fmpz_poly
 
-from sosmith.gen.paper_comparison import decimal_of
+from sosmith.gen.paper.comparison import decimal_of
 
 Coefficients = tuple[Fraction, ...]
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from scipy import signal
 
-from sosmith.gen.paper_arithmetic import (
+from sosmith.gen.paper.arithmetic import (
     Coefficients,
     bilinear,
     butterworth_factors,
@@ -17,9 +17,10 @@ from sosmith.gen.paper_arithmetic import (
     rounded,
     scaled,
 )
-from sosmith.gen.paper_comparison import Comparison, Part, compare, decimal_of, plain, table
-from sosmith.gen.paper_fifth_order import exact
-from sosmith.gen.paper_seventh_order import (
+from sosmith.gen.paper.comparison import Comparison, Part, compare, decimal_of, plain, table
+from sosmith.gen.paper.fifth_order import exact
+from sosmith.gen.paper.figures import PaperFigures
+from sosmith.gen.paper.seventh_order import (
     ORDER,
     delay,
     equation_22_filter,
@@ -27,7 +28,6 @@ from sosmith.gen.paper_seventh_order import (
     stated_cutoff,
     table_9_filter,
 )
-from sosmith.model.paper_figures import PaperFigures
 
 _SETTLED = 0.01  # of a step: how near the output must stay
 

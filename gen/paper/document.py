@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from sosmith.gen.paper_accuracy import filtered_part, stated_part, unfiltered_parts
-from sosmith.gen.paper_comparison import (
+from sosmith.gen.paper.accuracy import filtered_part, stated_part, unfiltered_parts
+from sosmith.gen.paper.comparison import (
     DIFFERS,
     LABELS,
     LAST_DIGIT_PART,
@@ -18,14 +18,14 @@ from sosmith.gen.paper_comparison import (
     Part,
     table,
 )
-from sosmith.gen.paper_difference_equation import difference_equation_parts
-from sosmith.gen.paper_fifth_order import fifth_order_parts
-from sosmith.gen.paper_plots import plots
-from sosmith.gen.paper_regression import regression_parts
-from sosmith.gen.paper_seventh_order import seventh_order_parts
-from sosmith.gen.paper_vehicle import vehicle_parts
-from sosmith.gen.paper_wear import wear_part
-from sosmith.model.paper_figures import PaperFigures
+from sosmith.gen.paper.difference_equation import difference_equation_parts
+from sosmith.gen.paper.fifth_order import fifth_order_parts
+from sosmith.gen.paper.figures import PaperFigures
+from sosmith.gen.paper.plots import plots
+from sosmith.gen.paper.regression import regression_parts
+from sosmith.gen.paper.seventh_order import seventh_order_parts
+from sosmith.gen.paper.vehicle import vehicle_parts
+from sosmith.gen.paper.wear import wear_part
 
 _CHAPTERS = (
     "Calibration",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from fractions import Fraction
 
-from sosmith.gen.paper_arithmetic import (
+from sosmith.gen.paper.arithmetic import (
     Coefficients,
     bilinear,
     butterworth_polynomial,
@@ -18,8 +18,8 @@ from sosmith.gen.paper_arithmetic import (
     prewarped,
     scaled,
 )
-from sosmith.gen.paper_comparison import Comparison, Part, compare, plain, table
-from sosmith.model.paper_figures import PaperFigures
+from sosmith.gen.paper.comparison import Comparison, Part, compare, plain, table
+from sosmith.gen.paper.figures import PaperFigures
 
 ORDER = 5
 

@@ -8,7 +8,7 @@ from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
-_PATH = Path(__file__).with_name("data") / "paper.toml"
+_PATH = Path(__file__).with_name("paper.toml")
 
 
 class PaperFigures:

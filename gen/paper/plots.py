@@ -10,11 +10,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from sosmith.gen.paper_accuracy import TABLES, errors_in_mm
-from sosmith.gen.paper_arithmetic import Coefficients, gain_db, poles
-from sosmith.gen.paper_difference_equation import printed_filter, step_response
-from sosmith.gen.paper_fifth_order import equation_16_filter, exact, table_3_filter
-from sosmith.gen.paper_seventh_order import (
+from sosmith.gen.paper.accuracy import TABLES, errors_in_mm
+from sosmith.gen.paper.arithmetic import Coefficients, gain_db, poles
+from sosmith.gen.paper.difference_equation import printed_filter, step_response
+from sosmith.gen.paper.fifth_order import equation_16_filter, exact, table_3_filter
+from sosmith.gen.paper.figures import PaperFigures
+from sosmith.gen.paper.seventh_order import (
     HUNTING,
     delay,
     irregularity_frequency,
@@ -24,7 +25,6 @@ from sosmith.gen.paper_seventh_order import (
     table_9_filter,
 )
 from sosmith.gen.picture import picture
-from sosmith.model.paper_figures import PaperFigures
 
 _BLUE, _RED, _GREEN, _GREY = "#2563a8", "#b4432f", "#2f8a57", "#8a8a8a"
 _COLOURS = (_BLUE, _RED, _GREEN)

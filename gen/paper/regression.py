@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from fractions import Fraction
 
-from sosmith.gen.paper_comparison import Comparison, Part, compare, plain, table
-from sosmith.model.calibration import REQUIRED_R
-from sosmith.model.paper_figures import PaperFigures
-from sosmith.model.polynomial import Polynomial
+from sosmith.gen.paper.comparison import Comparison, Part, compare, plain, table
+from sosmith.gen.paper.figures import PaperFigures
+from sosmith.model.calibration.fit import REQUIRED_R
+from sosmith.model.calibration.polynomial import Polynomial
 
 _VOLTAGES = (0.0, 2.0, 5.0, 8.0, 10.0)  # V
 _CLEARANCES = (1.0, 2.0, 3.0, 5.0, 8.0, 10.0)  # mm

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from fractions import Fraction
 
-from sosmith.gen.paper_arithmetic import (
+from sosmith.gen.paper.arithmetic import (
     Coefficients,
     bilinear,
     butterworth_polynomial,
@@ -17,9 +17,9 @@ from sosmith.gen.paper_arithmetic import (
     ripple,
     scaled,
 )
-from sosmith.gen.paper_comparison import Comparison, Part, compare, plain, table
-from sosmith.gen.paper_fifth_order import exact, normalised_part
-from sosmith.model.paper_figures import PaperFigures
+from sosmith.gen.paper.comparison import Comparison, Part, compare, plain, table
+from sosmith.gen.paper.fifth_order import exact, normalised_part
+from sosmith.gen.paper.figures import PaperFigures
 
 ORDER = 7
 

@@ -7,11 +7,11 @@ from collections.abc import Callable
 from decimal import Decimal
 from functools import cache
 
-from sosmith.gen.paper_comparison import Comparison, Part, compare
-from sosmith.gen.vehicle_comparison import PAPER_SPEED, SMALLEST_RIPPLE, WHEELSETS, comparison
-from sosmith.gen.vehicle_report import VehicleRun, vehicle_run
-from sosmith.model.paper_figures import PaperFigures
-from sosmith.model.vehicle_parameters import built_in
+from sosmith.gen.instrument.vehicle_report import VehicleRun, vehicle_run
+from sosmith.gen.paper.comparison import Comparison, Part, compare
+from sosmith.gen.paper.figures import PaperFigures
+from sosmith.gen.paper.vehicle_comparison import MIN_RIPPLE, PAPER_SPEED, WHEELSETS, comparison
+from sosmith.model.vehicle.parameters import built_in
 
 SAMPLE_RATE = 100.0
 """Hz, of section 5.4."""
@@ -46,7 +46,7 @@ def _equation_20() -> Part:
         f"flanges: a wheelset goes up to {beyond:.1f} mm beyond its flange there, and creep takes up to {friction:.2f} "
         "times the friction there is. Beyond these limits its figures are not those of a real vehicle, and none is "
         "claimed to be the paper's.",
-        f"[vehicle.md](vehicle.md) has the model. Attenuations of {-20 * math.log10(SMALLEST_RIPPLE):.0f} dB stand for "
+        f"[vehicle.md](vehicle.md) has the model. Attenuations of {-20 * math.log10(MIN_RIPPLE):.0f} dB stand for "
         "no motion at 50 Hz but rounding.",
     )
     return Part(

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from sosmith.gen.amplitude_spectrum import attenuation, ripple
-from sosmith.gen.paper_comparison import Comparison, compare
-from sosmith.model.paper_figures import PaperFigures
-from sosmith.model.vehicle_motion import Motion
+from sosmith.gen.instrument.amplitude_spectrum import attenuation, ripple
+from sosmith.gen.paper.comparison import Comparison, compare
+from sosmith.gen.paper.figures import PaperFigures
+from sosmith.model.vehicle.motion import Motion
 
 PAPER_SPEED = 20.0
 """Speed in m/s of section 5.1."""
@@ -17,7 +17,7 @@ PAPER_SPEED = 20.0
 STOP_FREQUENCY = 50.0
 """In Hz; section 5.3 reads the ripple delta there and prints -20 log10(delta)."""
 
-SMALLEST_RIPPLE = 1e-9
+MIN_RIPPLE = 1e-9
 """Ripples below count as this one, 180 dB: less is the rounding of doubles."""
 
 WHEELSETS = 6
@@ -80,6 +80,6 @@ def _attenuations(motion: Motion, figures: PaperFigures) -> Iterator[Comparison]
             if index < len(printed[name]):
                 values = wheelsets[:, index] if bogie < 0 else frames[:, bogie]
                 delta = ripple(scale * values, round(rate, 6), STOP_FREQUENCY)
-                ours = attenuation(max(delta, SMALLEST_RIPPLE))
+                ours = attenuation(max(delta, MIN_RIPPLE))
                 quantity = f"{name} at 50 Hz, {part}"
                 yield compare(quantity, printed[name][index], ours, "dB", note=_SCALE, comparable=False)

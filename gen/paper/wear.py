@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from sosmith.gen.paper_comparison import Part, compare
-from sosmith.model.paper_figures import PaperFigures
+from sosmith.gen.paper.comparison import Part, compare
+from sosmith.gen.paper.figures import PaperFigures
 
 
 def wear_part(figures: PaperFigures) -> Part:

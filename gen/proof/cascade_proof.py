@@ -15,8 +15,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-from sosmith.gen.linear_model import LinearModel, Polynomial
-from sosmith.gen.peak_gain import Drive, Extent, Horizon, Response, extent, horizon, impulse
+from sosmith.gen.proof.linear_model import LinearModel, Polynomial
+from sosmith.gen.proof.peak_gain import Drive, Extent, Horizon, Response, extent, horizon, impulse
 
 StageModel = Sequence[LinearModel]
 """Models of all outputs of a stage, in their order."""

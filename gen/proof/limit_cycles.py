@@ -25,15 +25,15 @@ from functools import lru_cache
 from itertools import product
 from math import prod
 
-from sosmith.gen.linear_model import LinearModel, cone, linear_model, state_matrix
-from sosmith.gen.peak_gain import Drive, extent, horizon, impulse
-from sosmith.model.datapath import Stage
-from sosmith.model.graph import Graph, Op, value
+from sosmith.gen.proof.linear_model import LinearModel, cone, linear_model, state_matrix
+from sosmith.gen.proof.peak_gain import Drive, extent, horizon, impulse
+from sosmith.model.dataflow.datapath import Stage
+from sosmith.model.dataflow.graph import Graph, Op, value
 
 Matrix = Sequence[Sequence[Fraction]]
 
-_MOST_STARTS = 1 << 20
-_SMALLEST_SHARE = 400  # of the weight of one state in a triangular matrix, as a power of two
+_MAX_STARTS = 1 << 20
+_MIN_SHARE = 400  # of the weight of one state in a triangular matrix, as a power of two
 
 
 def recursions(section: Stage) -> dict[str, Graph]:
@@ -168,7 +168,7 @@ def lyapunov_diagonal(matrix: Matrix) -> tuple[Fraction, ...] | None:
         if a12 and a21:
             candidates = [(Fraction(1), a12 / a21)]
         else:
-            shares = [Fraction(1, 1 << k) for k in range(_SMALLEST_SHARE if a12 or a21 else 1)]
+            shares = [Fraction(1, 1 << k) for k in range(_MIN_SHARE if a12 or a21 else 1)]
             candidates = [(share, Fraction(1)) if a12 else (Fraction(1), share) for share in shares]
     return next((diagonal for diagonal in candidates if proves_decay(diagonal, matrix)), None)
 
@@ -258,8 +258,8 @@ def search_cycles(graph: Graph, reach: int, *, fraction_bits: int | None = None)
         most = (reach << max(finer, 0)) // step
         starts.append([step * n for n in range(-most, most + 1)])
     count = prod(map(len, starts))
-    if count > _MOST_STARTS:
-        raise ValueError(f"starts must be at most {_MOST_STARTS}, not {count}")
+    if count > _MAX_STARTS:
+        raise ValueError(f"starts must be at most {_MAX_STARTS}, not {count}")
     known: set[tuple[int, ...]] = set()
     amplitude, longest = Fraction(0), 1
     for codes in product(*starts):

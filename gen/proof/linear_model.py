@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
 
-from sosmith.model.graph import Graph, Node, Op
+from sosmith.model.dataflow.graph import Graph, Node, Op
 
 Polynomial = tuple[Fraction, ...]
 """Coefficients of w**0, w**1, ..; the last one is not zero unless it is the only one."""

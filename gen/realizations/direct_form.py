@@ -11,10 +11,10 @@ from itertools import product as cartesian
 import numpy as np
 from scipy import signal
 
-from sosmith.gen.coefficients import Rounding
-from sosmith.gen.design import decay_length
-from sosmith.model.direct_form import DirectForm1, Product
+from sosmith.gen.filter.design import decay_length
+from sosmith.gen.realizations.coefficients import Rounding
 from sosmith.model.errors import ShortfallError
+from sosmith.model.sections.direct_form import DirectForm1, Product
 
 Row = Sequence[float]
 

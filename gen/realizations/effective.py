@@ -16,8 +16,8 @@ import numpy as np
 import numpy.typing as npt
 from flint import acb, fmpq, fmpq_poly, fmpz_poly
 
-from sosmith.gen.linear_model import LinearModel, Polynomial
-from sosmith.gen.proof import StageModel
+from sosmith.gen.proof.cascade_proof import StageModel
+from sosmith.gen.proof.linear_model import LinearModel, Polynomial
 
 Array = npt.NDArray[np.float64]
 

@@ -18,8 +18,8 @@ import numpy as np
 import numpy.typing as npt
 
 from sosmith.model.errors import ShortfallError
-from sosmith.model.lattice import LANES, Adaptor, Allpass, Format, LatticeJoin, LatticeStage
-from sosmith.model.state_space import Coefficient
+from sosmith.model.sections.lattice import LANES, Adaptor, Allpass, Format, LatticeJoin, LatticeStage
+from sosmith.model.sections.state_space import Coefficient
 
 Row = Sequence[float]
 Denominator = tuple[Fraction, ...]
@@ -30,10 +30,10 @@ Rounding = Callable[[str, float], tuple[int, int]]
 
 _CLOSE = 1e-8
 """How close a lattice must come to the filter at all frequencies, of a largest gain of one: well above what double
-precision leaves of the designs of tests/gen/test_sweep.py, well below what any other filter comes to. The proof takes
-account of what remains."""
+precision leaves of the designs of tests/gen/word_lengths/test_sweep.py, well below what any other filter comes to. The
+proof takes account of what remains."""
 
-_MOST_GROUPS = 16  # of poles; all ways to share these out are tried
+_MAX_GROUPS = 16  # of poles; all ways to share these out are tried
 _NOTHING = 1e-13  # a coefficient this small is but the rounding of the design
 _FREQUENCIES = 24
 
@@ -76,7 +76,7 @@ def lattice_parts(rows: Sequence[Row]) -> tuple[Part, ...]:
 @lru_cache(maxsize=64)
 def _parts(rows: tuple[tuple[float, ...], ...]) -> tuple[Part, ...]:
     groups = _groups(rows)
-    found = _shared_out(rows, groups) if 0 < len(groups) <= _MOST_GROUPS else None
+    found = _shared_out(rows, groups) if 0 < len(groups) <= _MAX_GROUPS else None
     if found is None:
         raise ShortfallError(
             "lattice_wdf must have a filter that is half the sum or difference of two allpass filters, as Butterworth, "

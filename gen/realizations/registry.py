@@ -9,12 +9,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
-from sosmith.gen.coefficients import Rounding
-from sosmith.gen.direct_form_design import direct_form
-from sosmith.gen.lattice_design import Part, lattice_parts, lattice_stage
-from sosmith.gen.state_space_design import StateDesign, minimum_noise, normal, state_space
-from sosmith.gen.transposed_design import transposed_form
-from sosmith.model.datapath import Stage
+from sosmith.gen.realizations.coefficients import Rounding
+from sosmith.gen.realizations.direct_form import direct_form
+from sosmith.gen.realizations.lattice import Part, lattice_parts, lattice_stage
+from sosmith.gen.realizations.state_space import StateDesign, minimum_noise, normal, state_space
+from sosmith.gen.realizations.transposed import transposed_form
+from sosmith.model.dataflow.datapath import Stage
 
 Row = Sequence[float]
 """b0, b1, b2, 1, a1, a2 of an ideal section."""

@@ -20,10 +20,10 @@ import numpy as np
 import numpy.typing as npt
 from scipy import linalg
 
-from sosmith.gen.coefficients import Rounding
-from sosmith.gen.noise import StateSystem, minimum_noise_coordinates
+from sosmith.gen.realizations.coefficients import Rounding
+from sosmith.gen.realizations.noise import StateSystem, minimum_noise_coordinates
 from sosmith.model.errors import ShortfallError
-from sosmith.model.state_space import Coefficient, StateSpace
+from sosmith.model.sections.state_space import Coefficient, StateSpace
 
 Array = npt.NDArray[np.float64]
 Row = Sequence[float]

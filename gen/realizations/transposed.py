@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from sosmith.gen.coefficients import Rounding
-from sosmith.gen.direct_form_design import pole_side, products
+from sosmith.gen.realizations.coefficients import Rounding
+from sosmith.gen.realizations.direct_form import pole_side, products
 from sosmith.model.errors import ShortfallError
-from sosmith.model.transposed_form import Limits, TransposedForm
+from sosmith.model.sections.transposed_form import Limits, TransposedForm
 
 Row = Sequence[float]
 

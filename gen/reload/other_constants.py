@@ -7,16 +7,16 @@ from dataclasses import replace
 from fractions import Fraction
 from typing import cast
 
-from sosmith.gen.cascade import cascade, format_of, formats_of, parts_of, stages_of
-from sosmith.gen.design import Filter
-from sosmith.gen.entry import EntryStages, horner_error, normalised
-from sosmith.gen.linear_model import linear_models
-from sosmith.gen.quantize import Plan, Quantized, assembled, gain_of
-from sosmith.gen.realizations import REALIZATIONS, WIDE, Section, SectionFormat
-from sosmith.gen.word_lengths import Signal, Words
+from sosmith.gen.filter.design import Filter
+from sosmith.gen.proof.linear_model import linear_models
+from sosmith.gen.realizations.registry import REALIZATIONS, WIDE, Section, SectionFormat
+from sosmith.gen.word_lengths.cascade import cascade, format_of, formats_of, parts_of, stages_of
+from sosmith.gen.word_lengths.input_stage import EntryStages, horner_error, normalised
+from sosmith.gen.word_lengths.quantize import Plan, Quantized, assembled, gain_of
+from sosmith.gen.word_lengths.search import Signal, Words
+from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.errors import ShortfallError
-from sosmith.model.horner import HornerPolynomial, HornerStep, Variable
-from sosmith.model.polynomial import Polynomial
+from sosmith.model.sections.horner import HornerPolynomial, HornerStep, Variable
 
 _DOUBLE = 53
 """Significant bits of a number in double precision."""

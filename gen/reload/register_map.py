@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from sosmith.hdl.axi_lite import BITS
-from sosmith.model.reload_registers import DESIGN, ID, INTERFACE, LAYOUT, MAGIC, REGISTERS, Register
+from sosmith.model.reload.registers import DESIGN, ID, INTERFACE, LAYOUT, MAGIC, REGISTERS, Register
 
 
 def markdown() -> str:

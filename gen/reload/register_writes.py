@@ -7,12 +7,12 @@ from typing import Any
 
 from sosmith.gen.architecture import Architecture
 from sosmith.gen.core import CoreDesign
-from sosmith.gen.reload import OtherSet, Swap, parallel_bank
-from sosmith.gen.transient import RESIDUE
+from sosmith.gen.reload.reload import OtherSet, Swap, parallel_bank
+from sosmith.gen.reload.transient import RESIDUE
 from sosmith.hdl import folded
 from sosmith.hdl.axi_lite import BITS
-from sosmith.model.constants import constants
-from sosmith.model.reload_registers import CRC, DATA, VERSION, Register
+from sosmith.model.reload.constants import constants
+from sosmith.model.reload.registers import CRC, DATA, VERSION, Register
 
 
 def bank_size(architecture: Architecture) -> tuple[int, int]:

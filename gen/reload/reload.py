@@ -2,7 +2,7 @@
 
 Ranges and bound of a set are proven for a core that runs from reset with it. What a swap hands on is a state that
 another set made, so a swap is proven too: that nothing wraps from the first sample on, whatever the input was and will
-be, and after how many samples the bound holds again (`sosmith.gen.transient`).
+be, and after how many samples the bound holds again (`sosmith.gen.reload.transient`).
 """
 
 from __future__ import annotations
@@ -12,20 +12,20 @@ from fractions import Fraction
 
 from sosmith.gen.architecture import Budget, structure
 from sosmith.gen.core import CoreDesign, calibrated_codes, filter_of, polynomial_of
-from sosmith.gen.design import Filter
-from sosmith.gen.other_constants import with_constants
+from sosmith.gen.filter.design import Filter
 from sosmith.gen.quantity import quantity
-from sosmith.gen.quantize import Quantized
-from sosmith.gen.specification import Specification
-from sosmith.gen.transient import transient
+from sosmith.gen.reload.other_constants import with_constants
+from sosmith.gen.reload.transient import transient
+from sosmith.gen.specification.specification import Specification
+from sosmith.gen.word_lengths.quantize import Quantized
 from sosmith.hdl import folded
-from sosmith.model.constants import constants, packed, values_of, with_ranges, with_room
-from sosmith.model.datapath import Datapath
+from sosmith.model.calibration.polynomial import Polynomial
+from sosmith.model.dataflow.datapath import Datapath
+from sosmith.model.dataflow.folding import program
+from sosmith.model.dataflow.graph import Node, Op
+from sosmith.model.dataflow.program import Program
 from sosmith.model.errors import ShortfallError, SpecificationError
-from sosmith.model.folding import program
-from sosmith.model.graph import Node, Op
-from sosmith.model.polynomial import Polynomial
-from sosmith.model.program import Program
+from sosmith.model.reload.constants import constants, packed, values_of, with_ranges, with_room
 
 ADVICE = (
     "go there in smaller steps, each after the one before has faded, or stop the samples and reset the core before "
@@ -59,8 +59,8 @@ class Swap:
     made : OtherSet
         The new set. Where there is a program, it is made for all values that the swap can cause.
     samples : int
-        Length of the transient: from then on the error is within the set's bound and `sosmith.gen.transient.RESIDUE`
-        output LSB, and another swap may follow.
+        Length of the transient: from then on the error is within the set's bound and
+        `sosmith.gen.reload.transient.RESIDUE` output LSB, and another swap may follow.
     use : Fraction
         Largest share of what its word in the hardware holds that a state may take, at most 1.
     """
@@ -150,7 +150,7 @@ def other_set(
     hardware : CoreDesign
         What the core was made from.
     ideal, polynomial
-        As for `sosmith.gen.quantize.with_constants`.
+        As for `sosmith.gen.word_lengths.quantize.with_constants`.
     calibrated : tuple of (int, int) or None
         Lowest and highest code of each input that the calibration covers; None for the core's own. The parallel
         architecture goes on to judge by its own range, so that the other must hold it.

@@ -19,13 +19,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
-from sosmith.gen.linear_model import LinearModel, linear_models
-from sosmith.gen.peak_gain import Drive, Extent, Horizon, Response, extent, impulse
-from sosmith.gen.proof import INPUT, Drives, Key, Lane, cascade_horizon
-from sosmith.gen.quantize import Quantized
-from sosmith.gen.realizations import Section
+from sosmith.gen.proof.cascade_proof import INPUT, Drives, Key, Lane, cascade_horizon
+from sosmith.gen.proof.linear_model import LinearModel, linear_models
+from sosmith.gen.proof.peak_gain import Drive, Extent, Horizon, Response, extent, impulse
+from sosmith.gen.realizations.registry import Section
+from sosmith.gen.word_lengths.quantize import Quantized
+from sosmith.model.dataflow.graph import Graph, Node, Op
 from sosmith.model.errors import ShortfallError
-from sosmith.model.graph import Graph, Node, Op
 
 RESIDUE = Fraction(1, 256)
 """What is left of the set before in any state and in the output once it counts as faded, in output LSBs."""

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from sosmith.gen.plots import NARROW, WIDE, ranking_figure
 from sosmith.gen.quantity import decibels, plain_number, quantity
-from sosmith.gen.report_page import both_widths, page, text
+from sosmith.gen.report.page import both_widths, page, text
+from sosmith.gen.report.plots import NARROW, WIDE, ranking_figure
 from sosmith.model.errors import SpecificationError
 
 Report = Mapping[str, Any]
@@ -142,7 +142,7 @@ def _percent(value: float, _unit: str) -> str:
 
 
 def compare(reports: Sequence[Report]) -> list[Row]:
-    """Line up reports as `load_report` returns them, or as `sosmith.gen.report.summarise` makes them.
+    """Line up reports as `load_report` returns them, or as `sosmith.gen.report.report.summarise` makes them.
 
     Raises
     ------

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from sosmith.gen.synthesis import Netlist
+from sosmith.gen.fpga.synthesis import Netlist
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]

@@ -11,10 +11,10 @@ from html import escape
 from importlib.resources import files
 from typing import Any
 
-from sosmith.gen import plots
-from sosmith.gen.evidence import Evidence, FilterFacts, Format
+from sosmith.gen.fpga.synthesis import Netlist
 from sosmith.gen.quantity import count, decibels, duration, plain_number, quantity, scale, unit_symbol
-from sosmith.gen.synthesis import Netlist
+from sosmith.gen.report import plots
+from sosmith.gen.report.evidence import Evidence, FilterFacts, Format
 
 Summary = Mapping[str, Any]
 
@@ -42,7 +42,7 @@ def page(title: str, body: str) -> str:
     body : str
         Markup, what comes from outside already escaped.
     """
-    style = files("sosmith.gen").joinpath("report.css").read_text(encoding="utf-8")
+    style = files("sosmith.gen.report").joinpath("report.css").read_text(encoding="utf-8")
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
@@ -497,7 +497,7 @@ def _run_section(evidence: Evidence) -> str:
 
 
 def render_page(evidence: Evidence, summary: Summary) -> str:
-    """Whole report page; `summary` is what `sosmith.gen.report.summarise` makes of `evidence`."""
+    """Whole report page; `summary` is what `sosmith.gen.report.report.summarise` makes of `evidence`."""
     body = _header(evidence, summary) + _tiles(evidence, summary)
     evidence = evidence.of_channel(evidence.worst_channel)
     body += _trace_section(evidence)

@@ -19,9 +19,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
 
-from sosmith.gen.evidence import Evidence, FilterFacts
-from sosmith.gen.quantity import quantity, scale
-from sosmith.gen.response import (
+from sosmith.gen.filter.response import (
     frequency_grid,
     group_delay,
     magnitude_db,
@@ -31,6 +29,8 @@ from sosmith.gen.response import (
     stopbands,
     zeros,
 )
+from sosmith.gen.quantity import quantity, scale
+from sosmith.gen.report.evidence import Evidence, FilterFacts
 
 Array = npt.NDArray[np.float64]
 

@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from sosmith import __version__
-from sosmith.gen.evidence import Alternative, Evidence, FilterFacts, Format
+from sosmith.gen.filter.response import MASK_TOLERANCE_DB, ResponseMeasures, measure_response
 from sosmith.gen.quantity import plain_number, quantity
-from sosmith.gen.report_page import render_page
-from sosmith.gen.response import MASK_TOLERANCE_DB, ResponseMeasures, measure_response
-from sosmith.model.accuracy import accuracy_percent, error_statistics, sqnr_db
+from sosmith.gen.report.evidence import Alternative, Evidence, FilterFacts, Format
+from sosmith.gen.report.page import render_page
+from sosmith.model.reference.accuracy import accuracy_percent, error_statistics, sqnr_db
 from sosmith.model.text_files import to_json, write_files
 
 __all__ = [

@@ -9,8 +9,8 @@ import math
 from collections.abc import Sequence
 from fractions import Fraction
 
-from sosmith.gen.specification_schema import FAMILIES, KINDS, MAX_ORDER, Document, FilterTable, InputTable
-from sosmith.gen.specification_values import UnfitError, identifier, key_text, listed, literal, one_of
+from sosmith.gen.specification.schema import FAMILIES, KINDS, MAX_ORDER, Document, FilterTable, InputTable
+from sosmith.gen.specification.values import UnfitError, identifier, key_text, listed, literal, one_of
 
 CALIBRATION_INPUTS = ("voltage", "temperature")
 """Inputs of the calibration polynomial, in the order of its indices."""
@@ -32,7 +32,7 @@ _LOSSES = {"chebyshev1": ("passband_loss",), "chebyshev2": ("stopband_loss",), "
 
 
 def check(document: Document) -> None:
-    """Check everything that `sosmith.gen.specification_schema.parse` cannot see.
+    """Check everything that `sosmith.gen.specification.schema.parse` cannot see.
 
     Raises
     ------

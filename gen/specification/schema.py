@@ -1,6 +1,6 @@
 """Shape of a specification: its tables, their keys, and the kind of value each key takes.
 
-What two keys mean together is checked in `sosmith.gen.specification_rules`. To add a key, add it to its
+What two keys mean together is checked in `sosmith.gen.specification.rules`. To add a key, add it to its
 table; messages about unknown and missing keys follow.
 """
 
@@ -13,7 +13,7 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field, PlainValidator, ValidationError
 from pydantic_core import ErrorDetails
 
-from sosmith.gen.specification_values import (
+from sosmith.gen.specification.values import (
     ABOVE_ZERO,
     IDENTIFIER,
     UnfitError,

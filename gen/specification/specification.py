@@ -13,10 +13,10 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from sosmith.gen.specification_rules import CALIBRATION_INPUTS, check
-from sosmith.gen.specification_schema import Document, FilterTable, InputTable, OutputTable, parse
-from sosmith.gen.specification_values import UnfitError
-from sosmith.gen.wear_limits import WearSpec
+from sosmith.gen.specification.rules import CALIBRATION_INPUTS, check
+from sosmith.gen.specification.schema import Document, FilterTable, InputTable, OutputTable, parse
+from sosmith.gen.specification.values import UnfitError
+from sosmith.gen.specification.wear_limits import WearSpec
 from sosmith.model.errors import SpecificationError
 from sosmith.model.port import Port
 

@@ -12,11 +12,11 @@ from decimal import Decimal
 from fractions import Fraction
 from typing import TypeVar
 
-from sosmith.gen.verilog_names import KEYWORDS, LONGEST_NAME, is_identifier
+from sosmith.gen.specification.verilog_names import KEYWORDS, MAX_NAME, is_identifier
 
 Item = TypeVar("Item")
 
-IDENTIFIER = f"a Verilog identifier of at most {LONGEST_NAME} letters, digits and underscores"
+IDENTIFIER = f"a Verilog identifier of at most {MAX_NAME} letters, digits and underscores"
 
 MAX_DIGITS = 50
 MAX_EXPONENT = 30

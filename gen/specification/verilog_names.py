@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-LONGEST_NAME = 64
+MAX_NAME = 64
 """Longest accepted name in characters, so that names derived from it stay within every tool's limits."""
 
 _WORDS = """
@@ -37,5 +37,5 @@ _IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
 
 def is_identifier(name: str) -> bool:
-    """Whether `name` is a simple identifier without ``$``, of at most `LONGEST_NAME` characters."""
-    return len(name) <= LONGEST_NAME and _IDENTIFIER.fullmatch(name) is not None
+    """Whether `name` is a simple identifier without ``$``, of at most `MAX_NAME` characters."""
+    return len(name) <= MAX_NAME and _IDENTIFIER.fullmatch(name) is not None

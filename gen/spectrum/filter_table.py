@@ -9,7 +9,7 @@ from decimal import Decimal
 from typing import Any
 
 from sosmith import __version__
-from sosmith.gen.filter_proposal import Proposal
+from sosmith.gen.spectrum.proposal import Proposal
 from sosmith.model.errors import SpecificationError
 
 _HEADER = re.compile(r"[ \t]*\[[ \t]*(?:filter|\"filter\"|'filter')[ \t]*\][ \t]*(?:#.*)?")

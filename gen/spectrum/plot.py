@@ -10,10 +10,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
-from sosmith.gen.filter_proposal import Proposal
+from sosmith.gen.filter.response import magnitude_db
 from sosmith.gen.picture import picture
-from sosmith.gen.response import magnitude_db
-from sosmith.gen.spectra import Array, Spectrum
+from sosmith.gen.spectrum.proposal import Proposal
+from sosmith.gen.spectrum.spectra import Array, Spectrum
 
 _COLOURS = ("#2563a8", "#b4432f", "#2f8f4e", "#8a5fb0", "#c08a1e", "#4a9aa8")
 _RED, _GREY = "#b4432f", "#8a8a8a"

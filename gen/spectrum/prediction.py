@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy import signal
 
-from sosmith.gen.design import Filter
-from sosmith.gen.spectra import Array, Spectrum
+from sosmith.gen.filter.design import Filter
+from sosmith.gen.spectrum.spectra import Array, Spectrum
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

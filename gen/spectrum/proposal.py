@@ -15,13 +15,13 @@ from fractions import Fraction
 
 import numpy as np
 
-from sosmith.gen.design import Filter, design, minimum_order, prewarp, unwarp
-from sosmith.gen.filter_prediction import Content, Prediction, band_rms, predict
-from sosmith.gen.response import group_delay
-from sosmith.gen.specification import FilterSpec
-from sosmith.gen.specification_rules import MARGIN
-from sosmith.gen.specification_schema import MAX_ORDER
-from sosmith.gen.spectra import Array, Spectrum
+from sosmith.gen.filter.design import Filter, design, minimum_order, prewarp, unwarp
+from sosmith.gen.filter.response import group_delay
+from sosmith.gen.specification.rules import MARGIN
+from sosmith.gen.specification.schema import MAX_ORDER
+from sosmith.gen.specification.specification import FilterSpec
+from sosmith.gen.spectrum.prediction import Content, Prediction, band_rms, predict
+from sosmith.gen.spectrum.spectra import Array, Spectrum
 from sosmith.model.errors import ShortfallError, SpecificationError
 
 TOLERANCE = 0.1
@@ -35,7 +35,7 @@ section 6.3.3)."""
 PASSBAND_LOSS = 0.1
 """Loss up to the pass edge, dB, where the wanted signal would bear more: the paper's choice in section 4.1."""
 
-LEAST_STOPBAND_LOSS = 3.02
+MIN_STOPBAND_LOSS = 3.02
 """Loss from the stop edge on, dB, where the disturbance would need less: the cutoff then lies below the stop edge."""
 
 PARTS = 4
@@ -315,11 +315,11 @@ def _stop_loss(contents: Sequence[Content], wish: Wish, edge: float) -> Choice:
         for one in contents
     )
     loss = 20 * math.log10(above / wish.share) if above > 0 else -math.inf
-    if loss < LEAST_STOPBAND_LOSS:
+    if loss < MIN_STOPBAND_LOSS:
         reason = (
             f"the least that puts the cutoff below the stop edge; {above:.3g} rms disturb above it{_of(name, contents)}"
         )
-        return Choice(key="stopband_loss", value=LEAST_STOPBAND_LOSS, unit="dB", reason=reason)
+        return Choice(key="stopband_loss", value=MIN_STOPBAND_LOSS, unit="dB", reason=reason)
     reason = f"20 log10({above:.3g} rms of the disturbance above the edge / {wish.share:.3g}){_of(name, contents)}"
     return Choice(key="stopband_loss", value=_up(loss), unit="dB", reason=reason)
 

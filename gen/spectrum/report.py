@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from sosmith.gen.filter_prediction import Prediction
-from sosmith.gen.filter_proposal import Proposal, Wish
-from sosmith.gen.filter_trial import Trial
-from sosmith.gen.spectra import Spectrum, SpectrumSettings
-from sosmith.model.signal_file import SignalFile
+from sosmith.gen.spectrum.prediction import Prediction
+from sosmith.gen.spectrum.proposal import Proposal, Wish
+from sosmith.gen.spectrum.spectra import Spectrum, SpectrumSettings
+from sosmith.gen.spectrum.trial import Trial
+from sosmith.model.traces.signal_file import SignalFile
 
 PEAKS = 3
 """Largest amplitudes that are called out."""

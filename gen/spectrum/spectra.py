@@ -18,7 +18,7 @@ DETRENDS = ("linear", "constant", "none")
 SEGMENTS = 8
 """Segments that a signal is cut into, before overlap, unless their length is given: 15 averages at half overlap."""
 
-LEAST_SEGMENT = 16
+MIN_SEGMENT = 16
 """Samples that a segment must have."""
 
 
@@ -118,12 +118,12 @@ def segment_length(count: int, sample_rate: float, settings: SpectrumSettings) -
         If they are too few, or more than the signal has.
     """
     if settings.segment is None:
-        return max(count // SEGMENTS, LEAST_SEGMENT)
+        return max(count // SEGMENTS, MIN_SEGMENT)
     length = round(settings.segment * sample_rate)
-    if not LEAST_SEGMENT <= length <= count:
+    if not MIN_SEGMENT <= length <= count:
         raise SpecificationError(
-            f"segment must be {LEAST_SEGMENT / sample_rate:.4g} to {count / sample_rate:.4g} s "
-            f"({LEAST_SEGMENT} to {count} samples), not {settings.segment:g} s"
+            f"segment must be {MIN_SEGMENT / sample_rate:.4g} to {count / sample_rate:.4g} s "
+            f"({MIN_SEGMENT} to {count} samples), not {settings.segment:g} s"
         )
     return length
 

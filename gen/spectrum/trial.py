@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy import signal
 
-from sosmith.gen.filter_proposal import Proposal
-from sosmith.gen.spectra import Array
+from sosmith.gen.spectrum.proposal import Proposal
+from sosmith.gen.spectrum.spectra import Array
 
 SETTLING = 10.0
 """Group delays left out at the start, in which the filter forgets what it began with."""

@@ -17,13 +17,13 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainSerializer, ValidationError
 from pydantic_core import ErrorDetails
 
+from sosmith.model.dataflow.graph import Op
 from sosmith.model.errors import SpecificationError
-from sosmith.model.graph import Op
 
 FORMAT = "sosmith certificate 1"
 _GRID_BITS = 64
-_MOST_BITS = 4096  # of any number; far beyond any design, and short of what would stall the arithmetic
-_MOST_DIGITS = 1300  # of an integer in the file, somewhat beyond the same
+_MAX_BITS = 4096  # of any number; far beyond any design, and short of what would stall the arithmetic
+_MAX_DIGITS = 1300  # of an integer in the file, somewhat beyond the same
 _RATIONAL = re.compile(r"(-?[0-9]{1,1200})(?:/([0-9]{1,1200}))?")
 
 
@@ -42,8 +42,8 @@ def _rational(value: object) -> object:
 
 
 Rational = Annotated[Fraction, BeforeValidator(_rational), PlainSerializer(str)]
-Integer = Annotated[int, Field(strict=True, ge=-(2**_MOST_BITS), le=2**_MOST_BITS)]
-Exponent = Annotated[int, Field(strict=True, ge=-_MOST_BITS, le=_MOST_BITS)]
+Integer = Annotated[int, Field(strict=True, ge=-(2**_MAX_BITS), le=2**_MAX_BITS)]
+Exponent = Annotated[int, Field(strict=True, ge=-_MAX_BITS, le=_MAX_BITS)]
 Index = Annotated[int, Field(strict=True, ge=0, lt=10_000)]
 Text = Annotated[str, Field(strict=True, max_length=1000)]
 
@@ -74,7 +74,7 @@ class PortEntry(_Part):
 
 
 class NodeEntry(_Part):
-    """A node of a dataflow graph, with the meaning that `sosmith.model.graph.Node` gives its fields."""
+    """A node of a dataflow graph, with the meaning that `sosmith.model.dataflow.graph.Node` gives its fields."""
 
     op: Op
     operands: tuple[Index, ...] = ()
@@ -231,7 +231,7 @@ def _power(value: int) -> str:
 
 
 def _integer(text: str) -> int:
-    if len(text) > _MOST_DIGITS:
+    if len(text) > _MAX_DIGITS:
         raise ValueError(f"an integer of {len(text)} digits")
     return int(text)
 

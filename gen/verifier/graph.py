@@ -1,7 +1,7 @@
 """Checks a certificate's dataflow graphs on their own, and reads transfer functions off them by determinants.
 
-Nothing here shares code with the way the graphs were built (`sosmith.model.graph.GraphBuilder`) or with the
-extraction that word lengths were chosen on (`sosmith.gen.linear_model`).
+Nothing here shares code with the way the graphs were built (`sosmith.model.dataflow.graph.GraphBuilder`) or with the
+extraction that word lengths were chosen on (`sosmith.gen.proof.linear_model`).
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from functools import cached_property
 
 from flint import fmpq, fmpq_mat, fmpq_poly
 
-from sosmith.gen.certificate_file import NodeEntry, StageEntry
+from sosmith.gen.verifier.certificate_file import NodeEntry, StageEntry
+from sosmith.model.dataflow.graph import Op
 from sosmith.model.errors import ShortfallError
-from sosmith.model.graph import Op
 
 Interval = tuple[int, int]
 """Smallest and largest code."""

@@ -13,9 +13,9 @@ from fractions import Fraction
 from itertools import product
 from operator import add
 
-from sosmith.gen.certificate_file import Certificate, NodeEntry, PortEntry, StageEntry
-from sosmith.gen.verified_graph import inputs_of, label, require
-from sosmith.model.graph import Op
+from sosmith.gen.verifier.certificate_file import Certificate, NodeEntry, PortEntry, StageEntry
+from sosmith.gen.verifier.graph import inputs_of, label, require
+from sosmith.model.dataflow.graph import Op
 
 _Polynomial = dict[tuple[int, ...], Fraction]
 """Coefficients by the powers of the variables."""

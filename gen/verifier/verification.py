@@ -1,11 +1,12 @@
 """Proves a certificate again, by another method than the one it was made with, from nothing but the certificate.
 
-1. Every graph is well formed, and every range in it follows from the ranges before (`sosmith.gen.verified_graph`).
-2. The polynomial and the output rounding are followed symbolically (`sosmith.gen.verified_polynomial`).
+1. Every graph is well formed, and every range in it follows from the ranges before (`sosmith.gen.verifier.graph`).
+2. The polynomial and the output rounding are followed symbolically (`sosmith.gen.verifier.polynomial`).
 3. The sections' transfer functions are found as determinants, and stability by the Schur-Cohn recursion. A section
    may have several inputs and outputs; the cascade has one of each.
-4. Responses are enclosed by approximate inverses (`sosmith.gen.l1_response`). Every range that a BOUND states must
-   hold what they allow, and every figure claimed must be what they give, to the last unit of the certificate's grid.
+4. Responses are enclosed by approximate inverses (`sosmith.gen.verifier.l1_response`). Every range that a BOUND
+   states must hold what they allow, and every figure claimed must be what they give, to the last unit of the
+   certificate's grid.
 
 The induction that carries the ranges: integers without limits obey the linear model exactly, with the quantizers'
 errors as further inputs; so its extents hold at every sample, and words of these ranges never overflow.
@@ -21,11 +22,11 @@ from math import lcm
 
 from flint import fmpq, fmpq_poly
 
-from sosmith.gen.certificate_file import Certificate, StageEntry, on_grid
-from sosmith.gen.l1_response import BITS, Inverse, Response, UndecidedError, inverse, is_stable, response
-from sosmith.gen.verified_graph import RejectedError, Transfer, check_graph, inputs_of, label, require
-from sosmith.gen.verified_polynomial import output_error, polynomial_error
-from sosmith.model.graph import Op
+from sosmith.gen.verifier.certificate_file import Certificate, StageEntry, on_grid
+from sosmith.gen.verifier.graph import RejectedError, Transfer, check_graph, inputs_of, label, require
+from sosmith.gen.verifier.l1_response import BITS, Inverse, Response, UndecidedError, inverse, is_stable, response
+from sosmith.gen.verifier.polynomial import output_error, polynomial_error
+from sosmith.model.dataflow.graph import Op
 
 Progress = Callable[[str, int, int], None]
 """Told the name of what is being done, how much of it is, and how much there is."""

@@ -8,17 +8,17 @@ from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
-from sosmith.gen.design import Filter
-from sosmith.gen.linear_model import linear_models
-from sosmith.gen.peak_gain import Extent
-from sosmith.gen.proof import CascadeProof, StageModel, TransferFunction, prove_cascade
-from sosmith.gen.realizations import REALIZATIONS, WIDE, Section, SectionFormat
-from sosmith.gen.word_lengths import Signal, Words
-from sosmith.model.datapath import Stage
-from sosmith.model.output import OutputStage
+from sosmith.gen.filter.design import Filter
+from sosmith.gen.proof.cascade_proof import CascadeProof, StageModel, TransferFunction, prove_cascade
+from sosmith.gen.proof.linear_model import linear_models
+from sosmith.gen.proof.peak_gain import Extent
+from sosmith.gen.realizations.registry import REALIZATIONS, WIDE, Section, SectionFormat
+from sosmith.gen.word_lengths.search import Signal, Words
+from sosmith.model.dataflow.datapath import Stage
 from sosmith.model.port import Port
+from sosmith.model.sections.output import OutputStage
 
-MOST_BITS = 40
+MAX_BITS = 40
 """Significant bits of a coefficient that are tried; as many fraction bits of a signal at most: no useful design lies
 beyond."""
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from sosmith.model.datapath import Datapath
-from sosmith.model.graph import Graph, Node, Op
+from sosmith.model.dataflow.datapath import Datapath
+from sosmith.model.dataflow.graph import Graph, Node, Op
 
 MULTIPLIER_BITS = 18
 """Bits of each operand of a hardware multiplier; Yosys adds what one bit more contributes instead of taking a block."""

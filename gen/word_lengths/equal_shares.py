@@ -6,11 +6,11 @@ import math
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 
-from sosmith.gen.cascade import MOST_BITS, ideal_sections, stages_of, values_of, wide
-from sosmith.gen.design import Filter
-from sosmith.gen.proof import coefficient_extent, rounding_gains
-from sosmith.gen.realizations import BEST_KEPT, WIDE, SectionFormat
-from sosmith.gen.word_lengths import FEWEST_BITS, Signal, Words
+from sosmith.gen.filter.design import Filter
+from sosmith.gen.proof.cascade_proof import coefficient_extent, rounding_gains
+from sosmith.gen.realizations.registry import BEST_KEPT, WIDE, SectionFormat
+from sosmith.gen.word_lengths.cascade import MAX_BITS, ideal_sections, stages_of, values_of, wide
+from sosmith.gen.word_lengths.search import MIN_BITS, Signal, Words
 from sosmith.model.errors import ShortfallError
 
 _Fracs = list[dict[str, int]]
@@ -19,8 +19,8 @@ _Fracs = list[dict[str, int]]
 def coefficient_bits(ideal: Filter, realization: str, signal: Signal, share: Fraction) -> int:
     """Fewest significant bits whose proven effect stays within `share`."""
     sections, ends = ideal_sections(ideal), values_of(signal)
-    bits = FEWEST_BITS
-    while bits <= MOST_BITS:
+    bits = MIN_BITS
+    while bits <= MAX_BITS:
         try:
             error = coefficient_extent(wide(ideal, realization, bits), sections, *ends).magnitude
         except ShortfallError:
@@ -31,7 +31,7 @@ def coefficient_bits(ideal: Filter, realization: str, signal: Signal, share: Fra
         # An error falls by half with each bit, now and then by more: leap most of the way.
         bits += max(1, math.floor(math.log2(error / share)) - 2)
     raise ShortfallError(
-        f"the filter's coefficients must keep their error below {float(share):.3g} output LSB with {MOST_BITS} "
+        f"the filter's coefficients must keep their error below {float(share):.3g} output LSB with {MAX_BITS} "
         f"significant bits each, and do not: {_remedy(ideal)}"
     )
 
@@ -56,10 +56,10 @@ def fraction_bits(ideal: Filter, realization: str, bits: int, share: Fraction) -
 
 def within_limits(fracs: _Fracs, ideal: Filter, realization: str, share: Fraction) -> _Fracs:
     """Return `fracs` unless there are more than may be."""
-    if max((frac for sources in fracs for frac in sources.values()), default=0) > MOST_BITS:
+    if max((frac for sources in fracs for frac in sources.values()), default=0) > MAX_BITS:
         better = [] if realization == BEST_KEPT else [f"set hardware.realization to {BEST_KEPT}"]
         raise ShortfallError(
-            f"the filter must keep its rounding error below {float(share):.3g} output LSB with {MOST_BITS} fraction "
+            f"the filter must keep its rounding error below {float(share):.3g} output LSB with {MAX_BITS} fraction "
             f"bits in each state, and does not: {_remedy(ideal, *better)}"
         )
     return fracs

@@ -1,6 +1,6 @@
 """Impulse responses of a cascade in double precision, from every quantizer to the output.
 
-What test signals are made from: the proof has its own, exact ones in `sosmith.gen.peak_gain`.
+What test signals are made from: the proof has its own, exact ones in `sosmith.gen.proof.peak_gain`.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy import signal
 
-from sosmith.gen.design import decay_length
-from sosmith.gen.linear_model import LinearModel, Source, linear_models
-from sosmith.gen.quantize import Quantized
+from sosmith.gen.filter.design import decay_length
+from sosmith.gen.proof.linear_model import LinearModel, Source, linear_models
+from sosmith.gen.word_lengths.quantize import Quantized
 
 Array = npt.NDArray[np.float64]
 

@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-from sosmith.gen.cascade import MOST_BITS, format_of
-from sosmith.gen.word_lengths import Signal
-from sosmith.model.datapath import Stage
+from sosmith.gen.word_lengths.cascade import MAX_BITS, format_of
+from sosmith.gen.word_lengths.search import Signal
+from sosmith.model.calibration.polynomial import Polynomial
+from sosmith.model.dataflow.datapath import Stage
 from sosmith.model.errors import ShortfallError
-from sosmith.model.horner import HornerPolynomial, Variable
-from sosmith.model.polynomial import Polynomial
 from sosmith.model.port import Port
+from sosmith.model.sections.horner import HornerPolynomial, Variable
 
 _COARSER = 4
 """Fraction bits that the calibration may have less than with an equal share of the budget."""
@@ -92,7 +92,7 @@ def entries(
     coefficients = normalised(polynomial or _IDENTITY, inputs, output)
     variables = tuple(Variable(name=p.name, bits=p.bits, signed=p.signed) for p in inputs)
     made: list[EntryStages] = []
-    for frac in range(MOST_BITS + 1):
+    for frac in range(MAX_BITS + 1):
         integers = tuple(tuple(round(c * 2**frac) for c in row) for row in coefficients)
         horner = HornerPolynomial(coefficients=integers, frac=frac, variables=variables)
         error = horner_error(coefficients, horner)
@@ -101,7 +101,7 @@ def entries(
         if error <= allowed:
             return tuple(made[:_COARSER])
     raise ShortfallError(
-        f"the calibration must keep its error below {float(allowed):.3g} output LSB with {MOST_BITS} fraction bits, "
+        f"the calibration must keep its error below {float(allowed):.3g} output LSB with {MAX_BITS} fraction bits, "
         f"not {float(error):.3g}: raise output.max_error or output.bits"
     )
 

@@ -25,20 +25,21 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from sosmith.gen.design import decay_length
-from sosmith.gen.linear_model import LinearModel
+from sosmith.gen.filter.design import decay_length
+from sosmith.gen.proof.linear_model import LinearModel
 
 Norm = Literal["l1", "l2", "linf"]
 """Of an impulse response: sum of magnitudes, root of the sum of squares, largest gain over all frequencies."""
 
 Spectrum = npt.NDArray[np.complex128]
 
-_LARGEST_WORK = 1 << 28
+_MAX_WORK = 1 << 28
 """Samples of all spectra together; beyond, an order is not looked for. About three seconds."""
 
 _WORTH_IT = 2 / 3
 """An order is changed only where it brings the error below this part of what it was. Word lengths come in whole bits:
-on the designs of tests/gen/test_sweep.py register bits fall by 2 % on average below this ratio, by nothing above."""
+on the designs of tests/gen/word_lengths/test_sweep.py register bits fall by 2 % on average below this ratio, by
+nothing above."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -160,7 +161,7 @@ def _length(sections: Sequence[NoisySection]) -> int:
 def _feasible(sections: Sequence[NoisySection], *, pairing: bool) -> bool:
     count = len(sections)
     states = math.comb(2 * count, count) * count if pairing else 2**count
-    return states * count * _length(sections) // 8 <= _LARGEST_WORK
+    return states * count * _length(sections) // 8 <= _MAX_WORK
 
 
 class _Costs:

@@ -2,8 +2,8 @@
 
 All amounts inside are in output LSBs. What `max_error` leaves beside the half LSB of the output rounding is
 divided equally between calibration, filter coefficients and filter rounding to begin with; then words are trimmed to
-the smallest estimated area, on whichever part that costs error (`sosmith.gen.word_lengths`). The parts of the bound
-are proven for what came out, and so are the ranges of all nodes.
+the smallest estimated area, on whichever part that costs error (`sosmith.gen.word_lengths.search`). The parts of
+the bound are proven for what came out, and so are the ranges of all nodes.
 """
 
 from __future__ import annotations
@@ -18,26 +18,26 @@ from typing import cast
 import numpy as np
 import numpy.typing as npt
 
-from sosmith.gen.cascade import MOST_BITS, cascade, format_of, ideal_sections, output_stage, parts_of, wide
-from sosmith.gen.cost import area_of, cost_of, cost_of_graphs
-from sosmith.gen.design import Filter
-from sosmith.gen.effective import effective_sections
-from sosmith.gen.entry import EntryStages, entries, needs_scaling
-from sosmith.gen.equal_shares import coefficient_bits, fraction_bits, rounded, within_limits
-from sosmith.gen.linear_model import linear_model, linear_models
-from sosmith.gen.ordering import best_order
-from sosmith.gen.proof import (
+from sosmith.gen.filter.design import Filter
+from sosmith.gen.proof.cascade_proof import (
     CascadeProof,
     ideal_gain,
 )
-from sosmith.gen.realizations import REALIZATIONS, Section
-from sosmith.gen.word_lengths import Choice, Entry, Search, Signal, Words
-from sosmith.model.datapath import Datapath
+from sosmith.gen.proof.linear_model import linear_model, linear_models
+from sosmith.gen.realizations.effective import effective_sections
+from sosmith.gen.realizations.registry import REALIZATIONS, Section
+from sosmith.gen.word_lengths.cascade import MAX_BITS, cascade, format_of, ideal_sections, output_stage, parts_of, wide
+from sosmith.gen.word_lengths.cost import area_of, cost_of, cost_of_graphs
+from sosmith.gen.word_lengths.equal_shares import coefficient_bits, fraction_bits, rounded, within_limits
+from sosmith.gen.word_lengths.input_stage import EntryStages, entries, needs_scaling
+from sosmith.gen.word_lengths.ordering import best_order
+from sosmith.gen.word_lengths.search import Choice, Entry, Search, Signal, Words
+from sosmith.model.calibration.polynomial import Polynomial
+from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.errors import ShortfallError
-from sosmith.model.horner import HornerStep
-from sosmith.model.output import OutputStage
-from sosmith.model.polynomial import Polynomial
 from sosmith.model.port import Port
+from sosmith.model.sections.horner import HornerStep
+from sosmith.model.sections.output import OutputStage
 
 Array = npt.NDArray[np.float64]
 
@@ -199,7 +199,7 @@ def plan(
             realization,
             [Entry(e.signal, float(e.error * gain), sum(area_of(stage.graph) for stage in e.stages)) for e in before],
         )
-        start = search.start(float(share), MOST_BITS)
+        start = search.start(float(share), MAX_BITS)
     planned = Plan(
         name=name,
         inputs=inputs,
@@ -272,7 +272,7 @@ def prove(planned: Plan) -> Quantized:
             if excess <= 0:
                 return made
             allowed -= max(2 * excess / planned.output.lsb, allowed / 64)
-            choice = search.trimmed(search.start(float(planned.share), MOST_BITS) or start, float(allowed))
+            choice = search.trimmed(search.start(float(planned.share), MAX_BITS) or start, float(allowed))
     return _equally_shared(planned, ideal)
 
 

@@ -23,16 +23,16 @@ import numpy as np
 import numpy.typing as npt
 from scipy import signal
 
-from sosmith.gen.coefficients import lowest_terms, round_significant
-from sosmith.gen.cost import MULTIPLIER_BITS, area_of
-from sosmith.gen.design import decay_length
-from sosmith.gen.linear_model import Source, linear_model
-from sosmith.gen.realizations import REALIZATIONS, Section, SectionFormat
+from sosmith.gen.filter.design import decay_length
+from sosmith.gen.proof.linear_model import Source, linear_model
+from sosmith.gen.realizations.coefficients import lowest_terms, round_significant
+from sosmith.gen.realizations.registry import REALIZATIONS, Section, SectionFormat
+from sosmith.gen.word_lengths.cost import MULTIPLIER_BITS, area_of
 from sosmith.model.errors import ShortfallError
 
 Array = npt.NDArray[np.float64]
 
-FEWEST_BITS = 4
+MIN_BITS = 4
 """Significant bits of a coefficient that are tried first."""
 
 _EXACT_BITS = 50
@@ -157,7 +157,7 @@ class Search:
         ]
         if max((frac for quantizers in fracs for frac in quantizers.values()), default=0) > most:
             return None
-        bits = FEWEST_BITS
+        bits = MIN_BITS
         while bits <= most:
             words = tuple(
                 Words({name: round_significant(value, bits) for name, value in e.ideal.items()}, kept)

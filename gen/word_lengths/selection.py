@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from sosmith.gen.cost import LUTS_OF_A_BLOCK, cost_of
-from sosmith.gen.quantize import Plan, Quantized, prove
-from sosmith.gen.realizations import BEST_KEPT, REALIZATIONS
-from sosmith.model.datapath import Datapath
+from sosmith.gen.realizations.registry import BEST_KEPT, REALIZATIONS
+from sosmith.gen.word_lengths.cost import LUTS_OF_A_BLOCK, cost_of
+from sosmith.gen.word_lengths.quantize import Plan, Quantized, prove
+from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.errors import ShortfallError
 
 Progress = Callable[[str], None]

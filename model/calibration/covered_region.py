@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sosmith.model.polynomial import Polynomial
+from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.port import Values
 
 GRID = 65

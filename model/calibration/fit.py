@@ -17,11 +17,11 @@ from pathlib import Path
 
 import numpy as np
 
-from sosmith.model.csv_table import CsvTable, check_rows, read_csv_table
+from sosmith.model.calibration.least_squares import Solution, Sums, Term
+from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.errors import SpecificationError
-from sosmith.model.least_squares import Solution, Sums, Term
-from sosmith.model.polynomial import Polynomial
 from sosmith.model.port import Values
+from sosmith.model.tables.csv_table import CsvTable, check_rows, read_csv_table
 
 COLUMNS = ("clearance_mm", "voltage_V", "temperature_C")
 """The columns of a measurement file, in the order of the contract."""
@@ -29,7 +29,7 @@ COLUMNS = ("clearance_mm", "voltage_V", "temperature_C")
 REQUIRED_R = 0.975
 """Adjusted r at which a polynomial is accepted (the paper's section 2.2)."""
 
-HIGHEST_ORDER = 6
+MAX_ORDER = 6
 """Highest total order tried: 28 terms, far beyond the paper's second order."""
 
 HUBER = 1.345
@@ -41,13 +41,13 @@ Huber's constant: 95 % of the efficiency of least squares where the errors are n
 NORMAL_CONSISTENCY = 1.4826
 """Standard deviation of a normal error over the median of its absolute value."""
 
-LEAST_SCATTER = 1e-6
+MIN_SCATTER = 1e-6
 """Standard deviation in mm taken at least: a nanometre, finer than anything measured."""
 
 WEIGHT_STEPS = 1024
 """Weights are whole multiples of one over this, so that rounds of weighting end."""
 
-MOST_ROUNDS = 25
+MAX_ROUNDS = 25
 """Rounds of weighting after which the weights are taken as they are; some ten are usual, but steps can alternate."""
 
 
@@ -221,7 +221,7 @@ def fit(
     ------
     SpecificationError
         If there are fewer measurements than the linear polynomial needs; if a quantity does not vary, or
-        voltage and temperature only together; if no polynomial up to `HIGHEST_ORDER` is good enough.
+        voltage and temperature only together; if no polynomial up to `MAX_ORDER` is good enough.
     """
     _check_variation(measurements)
     count = len(measurements)
@@ -249,7 +249,7 @@ def fit(
     best = max(rejected, key=lambda trial: trial.adjusted_r_squared)
     raise SpecificationError(
         f"{measurements.source}: adjusted r must reach {required_r} "
-        f"with a polynomial up to order {HIGHEST_ORDER}, not at most {best.adjusted_r:.4f} "
+        f"with a polynomial up to order {MAX_ORDER}, not at most {best.adjusted_r:.4f} "
         f"(orders {best.orders[0]}, {best.orders[1]})"
     )
 
@@ -291,13 +291,13 @@ def _huber(measurements: Measurements) -> _Minimize:
                 return None
             rounds.append((solution, weights))
             off = np.abs(residuals(measurements, solution.polynomial))
-            allowed = HUBER * max(NORMAL_CONSISTENCY * float(np.median(off)), LEAST_SCATTER)
+            allowed = HUBER * max(NORMAL_CONSISTENCY * float(np.median(off)), MIN_SCATTER)
             exact = allowed / np.maximum(off, allowed)
             weights = np.maximum(np.rint(exact * WEIGHT_STEPS), 1.0) / WEIGHT_STEPS
             again = [k for k, (_, earlier) in enumerate(rounds) if np.array_equal(weights, earlier)]
-            if again or len(rounds) == MOST_ROUNDS:
+            if again or len(rounds) == MAX_ROUNDS:
                 # Once weights come again, so do the rounds from there on; weights that stay are a turn of one round.
-                last = again[0] + (MOST_ROUNDS - 1 - again[0]) % (len(rounds) - again[0]) if again else -1
+                last = again[0] + (MAX_ROUNDS - 1 - again[0]) % (len(rounds) - again[0]) if again else -1
                 solution, weights = rounds[last]
                 return solution, tuple(weights.tolist())
             sums = sums.reweighted(weights)
@@ -307,7 +307,7 @@ def _huber(measurements: Measurements) -> _Minimize:
 
 def candidate_orders() -> tuple[tuple[int, int], ...]:
     """Orders (m, n) in the sequence in which `fit` tries them."""
-    every = [(m, n) for m in range(1, HIGHEST_ORDER + 1) for n in range(1, HIGHEST_ORDER + 1)]
+    every = [(m, n) for m in range(1, MAX_ORDER + 1) for n in range(1, MAX_ORDER + 1)]
     return tuple(sorted(every, key=lambda orders: (len(terms_of(orders)), max(orders), orders[1])))
 
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sosmith.model.calibration import Fit, Measurements, residuals, root_mean_square, terms_of
-from sosmith.model.covered_region import CoveredRegion
-from sosmith.model.least_squares import Sums
+from sosmith.model.calibration.covered_region import CoveredRegion
+from sosmith.model.calibration.fit import Fit, Measurements, residuals, root_mean_square, terms_of
+from sosmith.model.calibration.least_squares import Sums
 from sosmith.model.port import Values
 
 CELLS = 10

@@ -19,13 +19,13 @@ from operator import mul, sub
 
 import numpy as np
 
-from sosmith.model.polynomial import Polynomial
+from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.port import Values
 
 DIGITS = 150
-"""Digits of the decimal arithmetic. `LEAST_SINE` lets through a matrix that costs some 40 of them."""
+"""Digits of the decimal arithmetic. `MIN_SINE` lets through a matrix that costs some 40 of them."""
 
-LEAST_SINE = 1e-10
+MIN_SINE = 1e-10
 """Sine of the angle between a term and the span of those before it, below which it is not determined.
 
 Five digits above the rounding of the doubles, so that terms which depend on each other except for rounding count
@@ -249,7 +249,7 @@ def _factor(matrix: list[list[Decimal]]) -> tuple[list[list[Decimal]], list[Deci
             products.append(product)
             row.append(product / pivots[q])
         pivot = given[k] - sum(map(mul, row, products), Decimal(0))
-        if pivot <= given[k] * Decimal(LEAST_SINE) ** 2:
+        if pivot <= given[k] * Decimal(MIN_SINE) ** 2:
             return None
         lower.append(row)
         pivots.append(pivot)

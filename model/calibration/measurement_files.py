@@ -18,9 +18,9 @@ from typing import Any
 
 import openpyxl
 
-from sosmith.model.calibration import COLUMNS
-from sosmith.model.csv_table import NUMBER, check_separator
+from sosmith.model.calibration.fit import COLUMNS
 from sosmith.model.errors import SpecificationError
+from sosmith.model.tables.csv_table import NUMBER, check_separator
 
 DATE_COLUMN = "date"
 """Optional column with the day of each measurement, as 2024-03-01."""

@@ -16,10 +16,10 @@ from pathlib import Path
 
 import numpy as np
 
-from sosmith.model.calibration import Measurements
+from sosmith.model.calibration.fit import Measurements
+from sosmith.model.calibration.measurement_files import MeasurementFile, Range, Reading
+from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.errors import SpecificationError, ToolError
-from sosmith.model.measurement_files import MeasurementFile, Range, Reading
-from sosmith.model.polynomial import Polynomial
 
 APPLICATION_ID = 0x534F534D
 """Marks a SQLite file as a store, in its header."""

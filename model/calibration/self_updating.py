@@ -8,18 +8,24 @@ from pathlib import Path
 
 import numpy as np
 
-from sosmith.model.calibration import REQUIRED_R, Fit, Measurements, Progress, fit, root_mean_square, untold
-from sosmith.model.covered_region import CoveredRegion
-from sosmith.model.errors import ShortfallError, SpecificationError
-from sosmith.model.fit_quality import FitQuality, assess
-from sosmith.model.measurement_files import DEFAULT_RANGES, MeasurementFile, Range, Refusal, read_measurement_file
-from sosmith.model.measurement_store import (
+from sosmith.model.calibration.covered_region import CoveredRegion
+from sosmith.model.calibration.fit import REQUIRED_R, Fit, Measurements, Progress, fit, root_mean_square, untold
+from sosmith.model.calibration.fit_quality import FitQuality, assess
+from sosmith.model.calibration.measurement_files import (
+    DEFAULT_RANGES,
+    MeasurementFile,
+    Range,
+    Refusal,
+    read_measurement_file,
+)
+from sosmith.model.calibration.measurement_store import (
     MeasurementStore,
     StoredMeasurement,
     Version,
     as_measurements,
     data_sha256,
 )
+from sosmith.model.errors import ShortfallError, SpecificationError
 
 SWAPPED_FITS, SWAPPED_OFF = 2.0, 4.0
 """A file is taken for swapped if its rms residual, over the version's, is less than the first with clearance and

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from sosmith.model.graph import Graph, Node, Op
-from sosmith.model.status import Flag
+from sosmith.model.dataflow.graph import Graph, Node, Op
+from sosmith.model.dataflow.status import Flag
 
 if TYPE_CHECKING:
-    from sosmith.model.datapath import Datapath
+    from sosmith.model.dataflow.datapath import Datapath
 
 _NARROW = 64
 _WIDEST = 128

@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from sosmith.model.c_model import c_header, c_source, state_bytes
+from sosmith.model.dataflow.c_model import c_header, c_source, state_bytes
 from sosmith.model.errors import ToolError
 
 if TYPE_CHECKING:
-    from sosmith.model.datapath import Datapath
+    from sosmith.model.dataflow.datapath import Datapath
 
 
 class Block(Protocol):

@@ -13,8 +13,8 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from sosmith.model.compiled import compile_block
-from sosmith.model.graph import Graph
+from sosmith.model.dataflow.compiled import compile_block
+from sosmith.model.dataflow.graph import Graph
 from sosmith.model.port import Codes, Port
 
 
@@ -115,7 +115,7 @@ class Datapath:
         """Compute the status of each sample, from reset, bit for bit as the hardware does.
 
         Parameters, errors and shape of the result are those of `compute`, and the channels have to be as many as those
-        whose wear is judged; the bits are those of `sosmith.model.status.Flag`.
+        whose wear is judged; the bits are those of `sosmith.model.dataflow.status.Flag`.
         """
         checked = self._checked(codes)
         block = checked[:, np.newaxis, :] if checked.ndim == 2 else checked

@@ -17,10 +17,10 @@ from dataclasses import replace
 from fractions import Fraction
 from typing import NamedTuple
 
-from sosmith.model.datapath import Datapath
-from sosmith.model.graph import Node, Op
-from sosmith.model.program import HAZARD, Do, Instruction, Place, Program, digits_of
-from sosmith.model.word_reuse import Extent, Life, packed
+from sosmith.model.dataflow.datapath import Datapath
+from sosmith.model.dataflow.graph import Node, Op
+from sosmith.model.dataflow.program import HAZARD, Do, Instruction, Place, Program, digits_of
+from sosmith.model.dataflow.word_reuse import Extent, Life, packed
 
 
 class FoldingError(ValueError):

@@ -2,7 +2,7 @@
 
 A graph is a list of nodes in the order of computation. A node carries an integer `code` with
 `frac` fraction bits, so its value is ``code * 2**-frac``, and the integer range ``low..high`` that
-the code never leaves. The exact interpreter here, the C model (`sosmith.model.c_model`) and the
+the code never leaves. The exact interpreter here, the C model (`sosmith.model.dataflow.c_model`) and the
 hardware (`sosmith.hdl.ranked_logic`) all walk the same nodes.
 
 The usual quantizer is FLOOR, which drops lower bits and costs nothing; the bits it drops are FRACTION.

@@ -1,7 +1,8 @@
 """A program for one multiply-accumulate unit: its instructions, its words, and what it computes.
 
 Numbers are split into digits of ``digit_bits`` bits: the lower ones lie in [0, 2**digit_bits), the top one has a
-sign, so that every product of two digits fits one small signed multiplier. `sosmith.model.folding` makes programs.
+sign, so that every product of two digits fits one small signed multiplier. `sosmith.model.dataflow.folding` makes
+programs.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import signal
 
-from sosmith.model.polynomial import Polynomial
+from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.port import Codes, Port, Values
 
 

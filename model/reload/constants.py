@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from sosmith.model.datapath import Datapath, Stage
-from sosmith.model.graph import Graph, Node, Op
-from sosmith.model.horner import HornerStep
+from sosmith.model.dataflow.datapath import Datapath, Stage
+from sosmith.model.dataflow.graph import Graph, Node, Op
 from sosmith.model.port import Port
+from sosmith.model.sections.horner import HornerStep
 
 SPARE_BITS = 1
 """Bits that a constant has more than its value takes with its sign."""

@@ -14,7 +14,7 @@ MAGIC = int.from_bytes(b"SOSM", "little")
 INTERFACE = 1
 """Version of this description, as ``LAYOUT`` reads."""
 
-MOST_WORDS = (1 << 16) - 1
+MAX_WORDS = (1 << 16) - 1
 """Words of a bank at most: what ``LAYOUT`` can tell."""
 
 

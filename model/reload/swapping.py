@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from sosmith.model.datapath import Datapath
+from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.port import Codes
 
 

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from sosmith.model.errors import SpecificationError
-from sosmith.model.filter_signals import noise, step, step_samples, sweep
-from sosmith.model.instrument_signals import (
+from sosmith.model.scenarios.filter_signals import noise, step, step_samples, sweep
+from sosmith.model.scenarios.instrument_signals import (
     RAMP_CLEARANCE,
     TABLE_1_STEPS,
     TABLE_2_STEPS,
@@ -23,10 +23,10 @@ from sosmith.model.instrument_signals import (
     temperature_ramp,
     wear_ramp,
 )
-from sosmith.model.plateaus import stepped_samples
-from sosmith.model.scenario_run import LEAST_SAMPLES, Bench, Emulated, Run
-from sosmith.model.trace import Trace
-from sosmith.model.worst_case_inputs import all_responses, worst_cases, worst_cases_samples
+from sosmith.model.scenarios.plateaus import stepped_samples
+from sosmith.model.scenarios.run import MIN_SAMPLES, Bench, Emulated, Run
+from sosmith.model.scenarios.worst_case_inputs import all_responses, worst_cases, worst_cases_samples
+from sosmith.model.traces.trace import Trace
 
 LIMIT_SAMPLES = 10_000_000
 """Samples that a trace may have at all, a guard against a slip in the unit: some hundred megabytes."""
@@ -74,7 +74,7 @@ def emulate(name: str, bench: Bench, *, seed: int, seconds: float | None = None)
         Seed of all noise, 0 or more. Same seed, same trace.
     seconds : float, optional
         Duration; by default long enough for the filter to settle where it matters, and from
-        `LEAST_SAMPLES` to `MOST_SAMPLES` long.
+        `MIN_SAMPLES` to `MAX_SAMPLES` long.
 
     Raises
     ------
@@ -168,14 +168,14 @@ SCENARIOS: dict[str, Scenario] = {
             "sweep",
             "sine of 90 % of full scale from zero to 0.49 of the sample rate",
             ("filter",),
-            lambda _bench: 4 * LEAST_SAMPLES,
+            lambda _bench: 4 * MIN_SAMPLES,
             sweep,
         ),
         Scenario(
             "noise",
             "white noise, uniform over all codes",
             ("filter",),
-            lambda _bench: 4 * LEAST_SAMPLES,
+            lambda _bench: 4 * MIN_SAMPLES,
             noise,
         ),
     )

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sosmith.model.calibration import COLUMNS
-from sosmith.model.measurement_files import DATE_COLUMN
+from sosmith.model.calibration.fit import COLUMNS
+from sosmith.model.calibration.measurement_files import DATE_COLUMN
 from sosmith.model.random_streams import streams
-from sosmith.model.scenario_file import ScenarioFile
+from sosmith.model.scenarios.file import ScenarioFile
 
 DIGITS = 6
 """Decimals that are written."""

@@ -1,6 +1,6 @@
 """Scenario files: days of operation as TOML, and the traces that they make for a core.
 
-What a file can say is in `sosmith.model.scenario_schema`. Time is cut between excerpts: the trace is one excerpt after
+What a file can say is in `sosmith.model.scenarios.schema`. Time is cut between excerpts: the trace is one excerpt after
 another, its truth the clearance without the vehicle's motion.
 """
 
@@ -16,26 +16,26 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from sosmith.model.csv_table import check_rows, read_csv_table
-from sosmith.model.digitizer import CodeFault, Digitizer
 from sosmith.model.errors import SpecificationError
-from sosmith.model.inductive_sensor import (
+from sosmith.model.port import Port, Values
+from sosmith.model.random_streams import Streams, streams
+from sosmith.model.scenarios.catalogue import LIMIT_SAMPLES
+from sosmith.model.scenarios.plateaus import READING_PART, plateau_samples
+from sosmith.model.scenarios.run import Bench
+from sosmith.model.scenarios.schema import DigitizerTable, ExcerptTable, FaultTable, ScenarioDocument, WearTable
+from sosmith.model.sensors.digitizer import CodeFault, Digitizer
+from sosmith.model.sensors.inductive_sensor import (
     FORWARD_MODELS,
     Ageing,
     InductiveSensor,
     Mains,
     SystematicError,
 )
-from sosmith.model.plateaus import READING_PART, plateau_samples
-from sosmith.model.port import Port, Values
-from sosmith.model.random_streams import Streams, streams
-from sosmith.model.scenario_run import Bench
-from sosmith.model.scenario_schema import DigitizerTable, ExcerptTable, FaultTable, ScenarioDocument, WearTable
-from sosmith.model.scenarios import LIMIT_SAMPLES
-from sosmith.model.sensors import SensorFaults, Sensors
-from sosmith.model.thermometer import ThermocoupleChain
-from sosmith.model.toml_tables import read_tables
-from sosmith.model.trace import Trace
+from sosmith.model.sensors.instrument import SensorFaults, Sensors
+from sosmith.model.sensors.thermometer import ThermocoupleChain
+from sosmith.model.tables.csv_table import check_rows, read_csv_table
+from sosmith.model.tables.toml_tables import read_tables
+from sosmith.model.traces.trace import Trace
 
 VEHICLE = "vehicle"
 """What `motion_from` says for the motion that the vehicle model makes."""
@@ -43,7 +43,7 @@ VEHICLE = "vehicle"
 TRACKS = {"tangent": "tangent", "braking": "tangent", "curve": "paper"}
 """Track that the vehicle runs on during each operation: straight, or the paper's curve."""
 
-LEAST_STEADY = 200
+MIN_STEADY = 200
 """Samples that an excerpt without a duration has at least."""
 
 _SENSORS = ("inductive", "thermocouple")
@@ -124,7 +124,7 @@ def emulate_file(
     """Make the trace of a scenario file for one channel of a core.
 
     Readings are marked where the filter has settled: from the beginning of each excerpt and from the end of each fault
-    on, and of clearances in steps the last part of each (`sosmith.model.scenarios.READING_PART`).
+    on, and of clearances in steps the last part of each (`sosmith.model.scenarios.catalogue.READING_PART`).
 
     Parameters
     ----------
@@ -234,7 +234,7 @@ def _plan(scenario: ScenarioFile, bench: Bench, index: int, channel: int) -> _Pl
         levels = (scenario.clearance(excerpt.day, channel),)
     step = max(levels) + sum(amplitude for _, amplitude in excerpt.motion)
     settling = bench.settling(step)
-    least = plateau_samples(bench, levels) * len(levels) if len(levels) > 1 else 2 * settling + LEAST_STEADY
+    least = plateau_samples(bench, levels) * len(levels) if len(levels) > 1 else 2 * settling + MIN_STEADY
     samples = least if excerpt.seconds is None else math.floor(excerpt.seconds * rate + 0.5)
     if not 1 <= samples <= LIMIT_SAMPLES:
         raise scenario.refuse(

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from sosmith.model.plateaus import plateaus, stepped_samples
 from sosmith.model.port import Codes, Values
-from sosmith.model.scenario_run import Bench, Emulated, Run
+from sosmith.model.scenarios.plateaus import plateaus, stepped_samples
+from sosmith.model.scenarios.run import Bench, Emulated, Run
 
 SWEEP_END = 0.49
 """Last frequency of the sweep over the sample rate, just below Nyquist's 0.5."""

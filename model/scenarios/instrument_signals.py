@@ -7,11 +7,11 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
-from sosmith.model.plateaus import plateaus
 from sosmith.model.port import Codes, Values
 from sosmith.model.random_streams import one_stream
-from sosmith.model.scenario_run import LEAST_SAMPLES, MOST_SAMPLES, Bench, Emulated, Run
-from sosmith.model.sensors import Sensors
+from sosmith.model.scenarios.plateaus import plateaus
+from sosmith.model.scenarios.run import MAX_SAMPLES, MIN_SAMPLES, Bench, Emulated, Run
+from sosmith.model.sensors.instrument import Sensors
 
 TABLE_1_STEPS = tuple(float(d) for d in range(1, 11))
 """Clearances in mm of the run at 43 to 50 degC (the paper's table 1)."""
@@ -76,7 +76,7 @@ def settlings(count: int, step: float) -> Callable[[Bench], int]:
     """Make the default length of `count` settling times after a step in the output's unit."""
 
     def samples(bench: Bench) -> int:
-        return min(max(count * bench.settling(step), LEAST_SAMPLES), MOST_SAMPLES)
+        return min(max(count * bench.settling(step), MIN_SAMPLES), MAX_SAMPLES)
 
     return samples
 

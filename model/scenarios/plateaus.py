@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sosmith.model.port import Values
-from sosmith.model.scenario_run import LEAST_SAMPLES, MOST_SAMPLES, Bench, Run
+from sosmith.model.scenarios.run import MAX_SAMPLES, MIN_SAMPLES, Bench, Run
 
 READING_PART = 0.1
 """Last part of each plateau in which the micrometer is read; the paper reads once, more average the noise."""
@@ -52,7 +52,7 @@ def stepped_samples(levels: tuple[float, ...]) -> Callable[[Bench], int]:
     """Make the default length of plateaus on `levels`, in the output's unit."""
 
     def samples(bench: Bench) -> int:
-        least = math.ceil(LEAST_SAMPLES / len(levels))
-        return min(max(plateau_samples(bench, levels), least) * len(levels), MOST_SAMPLES)
+        least = math.ceil(MIN_SAMPLES / len(levels))
+        return min(max(plateau_samples(bench, levels), least) * len(levels), MAX_SAMPLES)
 
     return samples

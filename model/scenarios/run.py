@@ -9,14 +9,14 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.errors import SpecificationError
-from sosmith.model.polynomial import Polynomial
 from sosmith.model.port import Codes, Port, Values
 
-LEAST_SAMPLES = 4000
+MIN_SAMPLES = 4000
 """Samples that a trace has at least, unless its length is given."""
 
-MOST_SAMPLES = 60_000
+MAX_SAMPLES = 60_000
 """Samples that a trace has at most, unless its length is given: a co-simulation of tens of seconds."""
 
 

@@ -7,17 +7,17 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from sosmith.model.toml_tables import Table, UnfitKeyError, shown
+from sosmith.model.tables.toml_tables import Table, UnfitKeyError, shown
 
-LEAST = 0.01
-DEEPEST = 25.0
+MIN_CLEARANCE = 0.01
+MAX_CLEARANCE = 25.0
 """Least and largest clearance in mm; the paper's sensor ends at 10.5, and accuracy has no meaning at 0."""
 
 TEMPERATURES = (-40.0, 400.0)
 """Lowest and highest temperature in degC: a winter night, and twice what tread braking reaches (200 degC)."""
 
-LAST_DAY = 36_500.0
-LONGEST = 1e6
+MAX_DAY = 36_500.0
+MAX_SECONDS = 1e6
 """Longest excerpt in s."""
 
 MOVING = ("tangent", "curve", "braking")
@@ -48,10 +48,10 @@ def one_of(*names: str) -> str:
     return f"one of {', '.join(names)}"
 
 
-Clearance = Annotated[float, Field(ge=LEAST, le=DEEPEST)]
-Wear = Annotated[float, Field(ge=0.0, le=DEEPEST)]
+Clearance = Annotated[float, Field(ge=MIN_CLEARANCE, le=MAX_CLEARANCE)]
+Wear = Annotated[float, Field(ge=0.0, le=MAX_CLEARANCE)]
 Temperature = Annotated[float, Field(ge=TEMPERATURES[0], le=TEMPERATURES[1])]
-Day = Annotated[float, Field(ge=0.0, le=LAST_DAY)]
+Day = Annotated[float, Field(ge=0.0, le=MAX_DAY)]
 
 
 class MainsTable(Table):
@@ -134,7 +134,7 @@ class SensorsTable(Table):
 class WearTable(Table):
     """``[wear]``, or ``[[channel]]``: initial clearance and growth, by a rate or by breakpoints."""
 
-    initial_clearance: float = quantity("mm", LEAST, DEEPEST)
+    initial_clearance: float = quantity("mm", MIN_CLEARANCE, MAX_CLEARANCE)
     rate: float | None = quantity("mm per day", 0.0, 10.0, None)
     rate_per_1000_km: float | None = quantity("mm per 1000 km", 0.0, 10.0, None)
     km_per_day: float | None = quantity("km per day", 0.0, 10_000.0, None)
@@ -159,8 +159,8 @@ class WearTable(Table):
 class CalibrationTable(Table):
     """``[calibration]``: the measurements that are taken by hand in the depot."""
 
-    days: tuple[Day, ...] = numbers("days", 0.0, LAST_DAY)
-    clearances: tuple[Clearance, ...] = numbers("mm", LEAST, DEEPEST)
+    days: tuple[Day, ...] = numbers("days", 0.0, MAX_DAY)
+    clearances: tuple[Clearance, ...] = numbers("mm", MIN_CLEARANCE, MAX_CLEARANCE)
     temperatures: tuple[Temperature, ...] = numbers("degC", *TEMPERATURES)
     repeats: int = Field(1, ge=1, le=1000, description="a whole number from 1 to 1000")
     scatter: float = quantity("mm", 0.0, 5.0)
@@ -183,8 +183,8 @@ class FaultTable(Table):
 
     sensor: Literal["inductive", "thermocouple"] = Field(description=one_of("inductive", "thermocouple"))
     kind: Literal["missing", "stuck", "open"] = Field(description=one_of("missing", "stuck", "open"))
-    start: float = quantity("s", 0.0, LONGEST)
-    seconds: float = quantity("s", 1e-6, LONGEST)
+    start: float = quantity("s", 0.0, MAX_SECONDS)
+    seconds: float = quantity("s", 1e-6, MAX_SECONDS)
     share: float | None = quantity("", 0.0, 1.0, None)
     code: int | None = Field(None, ge=-(1 << 31), lt=1 << 32, description="a whole number, a code of the input")
 
@@ -202,16 +202,16 @@ class FaultTable(Table):
 class ExcerptTable(Table):
     """``[[excerpt]]``: some time out of a day."""
 
-    day: float = quantity("days", 0.0, LAST_DAY, 0.0)
+    day: float = quantity("days", 0.0, MAX_DAY, 0.0)
     operation: Operation = Field(description=one_of("bench", "depot", *MOVING))
-    seconds: float | None = quantity("s", 1e-3, LONGEST, None)
+    seconds: float | None = quantity("s", 1e-3, MAX_SECONDS, None)
     temperature: float = quantity("degC", *TEMPERATURES)
     temperature_to: float | None = quantity("degC", *TEMPERATURES, None)
-    time_constant: float | None = quantity("s", 1e-3, LONGEST, None)
-    clearances: tuple[Clearance, ...] | None = numbers("mm", LEAST, DEEPEST, None)
+    time_constant: float | None = quantity("s", 1e-3, MAX_SECONDS, None)
+    clearances: tuple[Clearance, ...] | None = numbers("mm", MIN_CLEARANCE, MAX_CLEARANCE, None)
     motion: tuple[
         Annotated[
-            tuple[Annotated[float, Field(gt=0.0, le=1000.0)], Annotated[float, Field(ge=0.0, le=DEEPEST)]],
+            tuple[Annotated[float, Field(gt=0.0, le=1000.0)], Annotated[float, Field(ge=0.0, le=MAX_CLEARANCE)]],
             Field(strict=False),
         ],
         ...,
@@ -219,7 +219,7 @@ class ExcerptTable(Table):
     motion_from: str | None = Field(
         None, min_length=1, description='"vehicle", or the name of a CSV file with the columns time_s and clearance_mm'
     )
-    vibration: float = quantity("mm", 0.0, DEEPEST, 0.0)
+    vibration: float = quantity("mm", 0.0, MAX_CLEARANCE, 0.0)
     fault: tuple[FaultTable, ...] = Field((), strict=False, description="tables [[excerpt.fault]]")
 
     @model_validator(mode="after")
@@ -255,8 +255,8 @@ class ScenarioDocument(Table):
     def _check(self) -> Self:
         if self.wear is not None and self.channel:
             raise UnfitKeyError("channel", "missing where [wear] is given", shown(self.channel))
-        if self.start.toordinal() + LAST_DAY > datetime.date.max.toordinal():
-            latest = datetime.date.fromordinal(datetime.date.max.toordinal() - int(LAST_DAY))
+        if self.start.toordinal() + MAX_DAY > datetime.date.max.toordinal():
+            latest = datetime.date.fromordinal(datetime.date.max.toordinal() - int(MAX_DAY))
             raise UnfitKeyError("start", f"a date until {latest}, so that the last day is one too", shown(self.start))
         wearing = [k for k, excerpt in enumerate(self.excerpt) if excerpt.clearances is None]
         if wearing and self.wear is None and not self.channel:

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from sosmith.model.port import Values
-from sosmith.model.track import curved_track, tangent_track
-from sosmith.model.vehicle_parameters import built_in
-from sosmith.model.vehicle_run import run
+from sosmith.model.vehicle.parameters import built_in
+from sosmith.model.vehicle.run import run
+from sosmith.model.vehicle.track import curved_track, tangent_track
 
 SPEED = 20.0
 """Of the vehicle in m/s, as in section 5.1 of the paper."""
@@ -20,7 +20,7 @@ IRREGULARITY = "low"
 WHEELSET = 0
 """Wheelset whose right flange the sensor faces: the leading one."""
 
-LEAST_RATE = 1.0
+MIN_RATE = 1.0
 """Lowest sample rate in Hz that the model takes."""
 
 
@@ -40,10 +40,10 @@ def vehicle_clearance(track: str, time: Values, seed: int) -> Values:
     Raises
     ------
     SpecificationError
-        As `sosmith.model.vehicle_run.run`.
+        As `sosmith.model.vehicle.run.run`.
     """
     parameters = built_in()
-    rate = (len(time) - 1) / time[-1] if len(time) > 1 else LEAST_RATE
+    rate = (len(time) - 1) / time[-1] if len(time) > 1 else MIN_RATE
     way = SPEED * (len(time) + 1) / rate
     table = parameters.track
     table = replace(table, run_out=max(table.run_out, way - table.tangent - 2 * table.spiral - table.curve))

@@ -8,9 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from sosmith.model.polynomial import Polynomial
+from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.port import Codes, Values
-from sosmith.model.scenario_run import LEAST_SAMPLES, MOST_SAMPLES, Bench, Emulated, Run
+from sosmith.model.scenarios.run import MAX_SAMPLES, MIN_SAMPLES, Bench, Emulated, Run
 
 STRONG_PART = 0.999
 """Share of an impulse response's magnitudes that a worst case of the error paths keeps: the rest is a long tail."""
@@ -45,7 +45,7 @@ def worst_cases(run: Run, responses: Sequence[Values]) -> Emulated:
 def worst_cases_samples(responses: Sequence[Values]) -> int:
     """Count the samples in which `worst_cases` shows whole patterns."""
     patterns = 2 * len(responses) * max(map(len, responses))
-    return min(patterns * math.ceil(LEAST_SAMPLES / patterns), MOST_SAMPLES)
+    return min(patterns * math.ceil(MIN_SAMPLES / patterns), MAX_SAMPLES)
 
 
 def _strong(response: Values) -> Values:

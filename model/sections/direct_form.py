@@ -35,7 +35,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 
-from sosmith.model.graph import Graph, GraphBuilder, Wire
+from sosmith.model.dataflow.graph import Graph, GraphBuilder, Wire
 
 
 @dataclass(frozen=True)

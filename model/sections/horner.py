@@ -15,7 +15,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from sosmith.model.graph import Graph, GraphBuilder, Node, Wire
+from sosmith.model.dataflow.graph import Graph, GraphBuilder, Node, Wire
 
 
 @dataclass(frozen=True, kw_only=True)

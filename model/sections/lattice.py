@@ -31,8 +31,8 @@ from fractions import Fraction
 from functools import cached_property
 from typing import NamedTuple
 
-from sosmith.model.graph import Graph, GraphBuilder, Wire
-from sosmith.model.state_space import Coefficient
+from sosmith.model.dataflow.graph import Graph, GraphBuilder, Wire
+from sosmith.model.sections.state_space import Coefficient
 
 LANES = ("upper", "lower")
 """Names of the two branches, and of the waves on them."""

@@ -1,6 +1,6 @@
 """Transposed direct form II sections in integers, in the shift operator or in the delta operator.
 
-The section of `sosmith.model.direct_form` is written in powers of ``z - g`` instead of z, and transposed.
+The section of `sosmith.model.sections.direct_form` is written in powers of ``z - g`` instead of z, and transposed.
 With (b0, B1, B2) and (1, A1, A2) for its numerator and denominator in these powers::
 
     y    = quantized(b0 x + s1)
@@ -26,8 +26,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from sosmith.model.direct_form import DirectForm1, Product
-from sosmith.model.graph import Graph, GraphBuilder, Wire
+from sosmith.model.dataflow.graph import Graph, GraphBuilder, Wire
+from sosmith.model.sections.direct_form import DirectForm1, Product
 
 Limits = tuple[int, int]
 """Smallest and largest code."""

@@ -9,10 +9,10 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from sosmith.model.coil import Coil
-from sosmith.model.polynomial import EQUATION_4, EQUATION_5A, Polynomial
+from sosmith.model.calibration.polynomial import EQUATION_4, EQUATION_5A, Polynomial
 from sosmith.model.port import Values
 from sosmith.model.random_streams import Streams
+from sosmith.model.sensors.coil import Coil
 
 VOLTAGE_NOISE = 0.01
 """Broadband noise of the inductive sensor's voltage, V rms.

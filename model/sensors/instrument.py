@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from sosmith.model.digitizer import CodeFault, Digitizer, with_faults
-from sosmith.model.inductive_sensor import VOLTAGE_NOISE, InductiveSensor, InductiveState, sensor_voltage
 from sosmith.model.port import Codes, Port, Values
 from sosmith.model.random_streams import Streams
-from sosmith.model.thermometer import TEMPERATURE_NOISE, IdealThermometer, Thermometer
+from sosmith.model.sensors.digitizer import CodeFault, Digitizer, with_faults
+from sosmith.model.sensors.inductive_sensor import VOLTAGE_NOISE, InductiveSensor, InductiveState, sensor_voltage
+from sosmith.model.sensors.thermometer import TEMPERATURE_NOISE, IdealThermometer, Thermometer
 
 __all__ = ["TEMPERATURE_NOISE", "VOLTAGE_NOISE", "SensorFaults", "Sensors", "sensor_voltage"]
 

@@ -9,10 +9,10 @@ from typing import Protocol
 
 import numpy as np
 
-from sosmith.model.digitizer import CodeFault, Digitizer, with_faults
 from sosmith.model.port import Codes, Port, Values
 from sosmith.model.random_streams import Streams
-from sosmith.model.thermocouple import EMF_RANGE, loop_emf, thermocouple_emf, thermocouple_temperature
+from sosmith.model.sensors.digitizer import CodeFault, Digitizer, with_faults
+from sosmith.model.sensors.thermocouple import EMF_RANGE, loop_emf, thermocouple_emf, thermocouple_temperature
 
 TEMPERATURE_NOISE = 0.1
 """Broadband noise of the thermocouple channel, degC rms.

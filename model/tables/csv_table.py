@@ -23,7 +23,7 @@ NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 LARGEST = 1e100
 """Largest magnitude of a number: sums of squares of such numbers are still doubles, and none has a physical meaning."""
 
-LONGEST_SHOWN = 60
+MAX_SHOWN = 60
 """Characters of a wrong cell that a message shows."""
 
 
@@ -204,4 +204,4 @@ def _number(where: str, column: str, cell: str, readers: Mapping[str, Reader]) -
 
 
 def _short(text: str) -> str:
-    return repr(text) if len(text) <= LONGEST_SHOWN else f"{text[: LONGEST_SHOWN - 4]!r} ..."
+    return repr(text) if len(text) <= MAX_SHOWN else f"{text[: MAX_SHOWN - 4]!r} ..."

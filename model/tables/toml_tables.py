@@ -20,7 +20,7 @@ from sosmith.model.errors import SpecificationError
 MAX_BYTES = 1 << 18
 """Largest file in bytes; a real one has some thousand."""
 
-LONGEST_SHOWN = 60
+MAX_SHOWN = 60
 """Characters of a wrong value that a message shows."""
 
 
@@ -177,4 +177,4 @@ def shown(value: object) -> str:
             text = repr(value)
         case _:
             text = str(value)
-    return text if len(text) <= LONGEST_SHOWN else f"{text[: LONGEST_SHOWN - 4]} ..."
+    return text if len(text) <= MAX_SHOWN else f"{text[: MAX_SHOWN - 4]} ..."

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from sosmith.model.csv_table import CsvTable, check_rows, csv_header, read_csv_table
+from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.errors import SpecificationError
-from sosmith.model.polynomial import Polynomial
 from sosmith.model.port import Values
-from sosmith.model.trace_file import CHANNEL, PHYSICAL_COLUMNS, TIME_TOLERANCE, rows_of_channel
+from sosmith.model.tables.csv_table import CsvTable, check_rows, csv_header, read_csv_table
+from sosmith.model.traces.trace_file import CHANNEL, PHYSICAL_COLUMNS, TIME_TOLERANCE, rows_of_channel
 
 TIME = "time_s"
 READING = "reading"
@@ -26,7 +26,7 @@ CALIBRATED = "calibrated clearance"
 TRUTHS = ("truth", "truth_mm", "true_clearance_mm")
 """Columns that are the truth wherever they stand; `clearance_mm` is beside voltage and temperature only."""
 
-LEAST_ROWS = 64
+MIN_ROWS = 64
 """Rows that a file must have: below, no spectrum has both a resolution and an average worth the name."""
 
 _UNITS = {
@@ -82,7 +82,7 @@ class SignalFile:
     sample_rate : float
         Rows per second, Hz, to nine digits.
     signals : tuple of Signal
-        At least one, each with at least `LEAST_ROWS` values.
+        At least one, each with at least `MIN_ROWS` values.
     """
 
     path: Path
@@ -131,8 +131,8 @@ def read_signal_file(
             raise SpecificationError(f"{path} must have the column {name}, not only {', '.join(header)}")
     parts = _parts(read_csv_table(path, header, required=[TIME]), channels)
     for of_channel, part in parts.items():
-        if len(part.lines) < LEAST_ROWS:
-            raise SpecificationError(f"{path} must hold at least {LEAST_ROWS} rows{of_channel}, not {len(part.lines)}")
+        if len(part.lines) < MIN_ROWS:
+            raise SpecificationError(f"{path} must hold at least {MIN_ROWS} rows{of_channel}, not {len(part.lines)}")
     rates = {of_channel: _sample_rate(part) for of_channel, part in parts.items()}
     (first, rate), *others = rates.items()
     for of_channel, other in others:

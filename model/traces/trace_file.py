@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from sosmith.model.csv_table import CsvTable, check_rows, read_csv_table
 from sosmith.model.errors import SpecificationError
 from sosmith.model.port import Codes, Port, Values
+from sosmith.model.tables.csv_table import CsvTable, check_rows, read_csv_table
 from sosmith.model.text_files import write_files
-from sosmith.model.trace import Trace
+from sosmith.model.traces.trace import Trace
 
 CHANNEL = "channel"
 """Column with the number of a row's channel, from 0; a file without it holds one channel."""

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sosmith.model.linear_motion import Array, LinearSystem, Suspension
-from sosmith.model.track import Track
-from sosmith.model.track_irregularity import Irregularity
-from sosmith.model.vehicle_parameters import Layout, Parameters
-from sosmith.model.wheel_rail_contact import GRAVITY, contact_matrices, creep_coefficients
+from sosmith.model.vehicle.linear_motion import Array, LinearSystem, Suspension
+from sosmith.model.vehicle.parameters import Layout, Parameters
+from sosmith.model.vehicle.track import Track
+from sosmith.model.vehicle.track_irregularity import Irregularity
+from sosmith.model.vehicle.wheel_rail_contact import GRAVITY, contact_matrices, creep_coefficients
 
 WHEELSETS = range(6)
 FRAMES = range(2)

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sosmith.model.linear_motion import Array
-from sosmith.model.track import Track
-from sosmith.model.vehicle_lateral import wheelset_load, wheelset_positions
-from sosmith.model.vehicle_motion import Motion
-from sosmith.model.vehicle_parameters import Parameters
+from sosmith.model.vehicle.lateral import wheelset_load, wheelset_positions
+from sosmith.model.vehicle.linear_motion import Array
+from sosmith.model.vehicle.motion import Motion
+from sosmith.model.vehicle.parameters import Parameters
+from sosmith.model.vehicle.track import Track
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

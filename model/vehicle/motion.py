@@ -7,9 +7,9 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from sosmith.model.linear_motion import Array
-from sosmith.model.vehicle_lateral import WHEELSETS, axle_positions, frame_of
-from sosmith.model.vehicle_parameters import Parameters
+from sosmith.model.vehicle.lateral import WHEELSETS, axle_positions, frame_of
+from sosmith.model.vehicle.linear_motion import Array
+from sosmith.model.vehicle.parameters import Parameters
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

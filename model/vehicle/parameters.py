@@ -188,7 +188,7 @@ T = TypeVar("T")
 
 def built_in_text() -> str:
     """Text of the built-in file, a locomotive of the class HXD1C as far as known."""
-    return (resources.files("sosmith.model") / "data" / "locomotive.toml").read_text(encoding="utf-8")
+    return (resources.files("sosmith.model.vehicle") / "locomotive.toml").read_text(encoding="utf-8")
 
 
 def built_in() -> Parameters:

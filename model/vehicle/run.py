@@ -7,11 +7,7 @@ import math
 import numpy as np
 
 from sosmith.model.errors import SpecificationError
-from sosmith.model.linear_motion import Array
-from sosmith.model.track import Track
-from sosmith.model.track_irregularity import LEVELS, Irregularity
-from sosmith.model.track_irregularity import irregularity as make_irregularity
-from sosmith.model.vehicle_lateral import (
+from sosmith.model.vehicle.lateral import (
     FRAMES,
     WHEELSETS,
     LateralDynamics,
@@ -19,12 +15,16 @@ from sosmith.model.vehicle_lateral import (
     wheelset_load,
     wheelset_positions,
 )
-from sosmith.model.vehicle_motion import Motion, clearance_change
-from sosmith.model.vehicle_parameters import Parameters
-from sosmith.model.vehicle_vertical import vertical_dynamics
-from sosmith.model.wheel_rail_contact import creep_coefficients
+from sosmith.model.vehicle.linear_motion import Array
+from sosmith.model.vehicle.motion import Motion, clearance_change
+from sosmith.model.vehicle.parameters import Parameters
+from sosmith.model.vehicle.track import Track
+from sosmith.model.vehicle.track_irregularity import LEVELS, Irregularity
+from sosmith.model.vehicle.track_irregularity import irregularity as make_irregularity
+from sosmith.model.vehicle.vertical import vertical_dynamics
+from sosmith.model.vehicle.wheel_rail_contact import creep_coefficients
 
-LEAST_RATE = 1000.0
+MIN_RATE = 1000.0
 """Samples per second inside, at least: the track is taken as linear between them (at 20 m/s, 20 mm)."""
 
 RUN_IN = 200.0
@@ -52,7 +52,7 @@ def run(
     """Run over a track at constant speed, until its first wheelset is at the end.
 
     Lateral and vertical equations are linear and solved exactly, with forces that are linear between samples of at
-    least `LEAST_RATE`. There is no flange contact and no limit to creep; `sosmith.model.vehicle_limits` tells where
+    least `MIN_RATE`. There is no flange contact and no limit to creep; `sosmith.model.vehicle.limits` tells where
     they would have acted.
 
     Parameters
@@ -82,7 +82,7 @@ def run(
         raise SpecificationError(f"the irregularities must be one of none, {', '.join(LEVELS)}, not {irregularity}")
     if seed < 0:
         raise SpecificationError(f"the seed must be 0 or more, not {seed}")
-    finer = math.ceil(LEAST_RATE / sample_rate)
+    finer = math.ceil(MIN_RATE / sample_rate)
     step = 1 / (finer * sample_rate)
     before = finer * math.ceil(RUN_IN / (speed * step * finer)) if irregularity else 0
     behind = math.floor(track.length / (speed * step) + 1e-9)

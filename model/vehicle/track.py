@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.interpolate import PPoly
 
-from sosmith.model.linear_motion import Array
-from sosmith.model.vehicle_parameters import TrackTable
+from sosmith.model.vehicle.linear_motion import Array
+from sosmith.model.vehicle.parameters import TrackTable
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

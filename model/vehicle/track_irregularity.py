@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from sosmith.model.linear_motion import Array
-from sosmith.model.vehicle_parameters import IrregularityTable
+from sosmith.model.vehicle.linear_motion import Array
+from sosmith.model.vehicle.parameters import IrregularityTable
 
 LEVELS = ("low", "high")
 """Levels of disturbance of ERRI B176."""

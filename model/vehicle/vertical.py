@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sosmith.model.linear_motion import Array, LinearSystem, Suspension
-from sosmith.model.track import Track
-from sosmith.model.track_irregularity import Irregularity
-from sosmith.model.vehicle_lateral import FRAMES, WHEELSETS, axle_positions, frame_of, frame_positions
-from sosmith.model.vehicle_lateral import wheelset_positions as positions_of
-from sosmith.model.vehicle_parameters import Parameters
+from sosmith.model.vehicle.lateral import FRAMES, WHEELSETS, axle_positions, frame_of, frame_positions
+from sosmith.model.vehicle.lateral import wheelset_positions as positions_of
+from sosmith.model.vehicle.linear_motion import Array, LinearSystem, Suspension
+from sosmith.model.vehicle.parameters import Parameters
+from sosmith.model.vehicle.track import Track
+from sosmith.model.vehicle.track_irregularity import Irregularity
 
 COORDINATES = (
     *(f"frame {k + 1} {motion}" for k in FRAMES for motion in ("vertical", "pitch")),

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sosmith.model.linear_motion import Array
-from sosmith.model.vehicle_parameters import Contact
+from sosmith.model.vehicle.linear_motion import Array
+from sosmith.model.vehicle.parameters import Contact
 
 GRAVITY = 9.81
 """In m/s^2."""

@@ -13,10 +13,10 @@ from scipy import stats
 from sosmith.model.errors import SpecificationError
 from sosmith.model.port import Values
 
-LEAST_BLOCKS = 8
+MIN_BLOCKS = 8
 """Blocks that a rate takes: with fewer, the interval of a median of slopes has hardly a meaning."""
 
-MOST_BLOCKS = 2000
+MAX_BLOCKS = 2000
 """Blocks that a rate may take: the slopes of all pairs are formed, two million here."""
 
 BLOCKS = 40
@@ -26,13 +26,13 @@ ROUNDING = 1e-9
 """So far below a limit, in mm, a reading has reached it: doubles of decimal numbers are off by less, and a step of an
 output code is more."""
 
-MOST_CORRELATION = 0.95
+MAX_CORRELATION = 0.95
 """Beyond this the deviations are no scatter about a line: an interval can hardly be wide enough."""
 
-LEAST_FALL = 1 / 20
+MIN_FALL = 1 / 20
 """Part of the limit that a fall of the clearance has at least: what is less may be the season."""
 
-_FALL_SCATTERS, _FALL_BLOCKS, _LEAST_FALL_BLOCKS = 8, 4, 3
+_FALL_SCATTERS, _FALL_BLOCKS, _MIN_FALL_BLOCKS = 8, 4, 3
 
 DAY = 1.0
 """Length of a block unless said otherwise, days: longer than anything a filter or a journey keeps for itself."""
@@ -231,7 +231,7 @@ def block_medians(
     clearance : ndarray, shape (n,)
         mm.
     block : float or None
-        Length in days; None takes `DAY`, or a fortieth of a record with fewer than `LEAST_BLOCKS` days.
+        Length in days; None takes `DAY`, or a fortieth of a record with fewer than `MIN_BLOCKS` days.
 
     Returns
     -------
@@ -244,12 +244,12 @@ def block_medians(
     """
     span = float(time[-1] - time[0])
     if block is None:
-        block = DAY if span >= LEAST_BLOCKS * DAY else span / BLOCKS
+        block = DAY if span >= MIN_BLOCKS * DAY else span / BLOCKS
     if not 0 < block < math.inf:
         raise SpecificationError(f"block must be a time above 0 days, not {block:g} days")
-    if span / block > MOST_BLOCKS:
+    if span / block > MAX_BLOCKS:
         raise SpecificationError(
-            f"block must be at least {span / MOST_BLOCKS:.3g} days for a record of {span:.4g} days, not {block:g} days"
+            f"block must be at least {span / MAX_BLOCKS:.3g} days for a record of {span:.4g} days, not {block:g} days"
         )
     number = np.floor((time[-1] - time) / block).astype(np.int64)[::-1]  # rising from the end of the record
     edges = np.flatnonzero(np.diff(number)) + 1
@@ -273,7 +273,7 @@ def rate_of(time: Values, clearance: Values, block: float, confidence: float) ->
     Parameters
     ----------
     time, clearance : ndarray, shape (blocks,)
-        Days and mm, at least `LEAST_BLOCKS`.
+        Days and mm, at least `MIN_BLOCKS`.
     block : float
         Length of a block, days.
     confidence : float
@@ -286,9 +286,9 @@ def rate_of(time: Values, clearance: Values, block: float, confidence: float) ->
     """
     if not 0 < confidence < 1:
         raise SpecificationError(f"confidence must be between 0 and 1, not {confidence:g}")
-    if len(time) < LEAST_BLOCKS:
+    if len(time) < MIN_BLOCKS:
         raise SpecificationError(
-            f"the record must have readings in at least {LEAST_BLOCKS} blocks of {block:.4g} days, not in {len(time)}"
+            f"the record must have readings in at least {MIN_BLOCKS} blocks of {block:.4g} days, not in {len(time)}"
         )
     slope, intercept, low, high = stats.theilslopes(clearance, time, alpha=confidence)
     deviation = clearance - intercept - slope * time
@@ -317,7 +317,7 @@ def _correlation(deviation: Values) -> float:
     if energy == 0:
         return 0.0
     found = float(np.sum(deviation[1:] * deviation[:-1])) / energy
-    return min((found + 2 / count) / (1 - 4 / count), MOST_CORRELATION)
+    return min((found + 2 / count) / (1 - 4 / count), MAX_CORRELATION)
 
 
 def last_fall(time: Values, clearance: Values, least: float) -> Fall | None:
@@ -335,13 +335,13 @@ def last_fall(time: Values, clearance: Values, least: float) -> Fall | None:
     Fall or None
         Its window ends between the two blocks, so far before the last of `time`.
     """
-    if len(time) < LEAST_BLOCKS:
+    if len(time) < MIN_BLOCKS:
         return None
     level = clearance - np.median(np.diff(clearance) / np.diff(time)) * time
     steps = np.diff(level)
     scatter = 1.4826 * float(np.median(np.abs(steps - np.median(steps))))
     sizes = np.zeros(len(steps))
-    for k in range(_LEAST_FALL_BLOCKS, len(clearance) - _LEAST_FALL_BLOCKS + 1):
+    for k in range(_MIN_FALL_BLOCKS, len(clearance) - _MIN_FALL_BLOCKS + 1):
         before, after = level[max(k - _FALL_BLOCKS, 0) : k], level[k : k + _FALL_BLOCKS]
         sizes[k - 1] = np.median(before) - np.median(after)
     found = np.flatnonzero(sizes > max(least, _FALL_SCATTERS * scatter))
@@ -407,7 +407,7 @@ def judge(
         )
     times, medians, counts, length = block_medians(time[recent], clearance[recent], block)
     rate = rate_of(times, medians, length, confidence)
-    fall = last_fall(times, medians, LEAST_FALL * limits.limit)
+    fall = last_fall(times, medians, MIN_FALL * limits.limit)
     now, last_block = float(medians[-1]), int(counts[-1])
     remaining = max(limits.critical_clearance - now, 0.0)
     gone = float(time[-1] - times[-1])

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
-from sosmith.model.csv_table import check_rows, csv_header, read_csv_table
 from sosmith.model.errors import SpecificationError
 from sosmith.model.port import Values
-from sosmith.model.signal_file import unit_of
-from sosmith.model.trace_file import CHANNEL, rows_of_channel
+from sosmith.model.tables.csv_table import check_rows, csv_header, read_csv_table
+from sosmith.model.traces.signal_file import unit_of
+from sosmith.model.traces.trace_file import CHANNEL, rows_of_channel
 
 SECONDS_A_DAY = 86400.0
 

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from sosmith.gen.design import Filter, decay_length, design, minimum_order, prewarp, unwarp
-from sosmith.gen.specification import FilterSpec
+from sosmith.gen.filter.design import Filter, decay_length, design, minimum_order, prewarp, unwarp
+from sosmith.gen.specification.specification import FilterSpec
 from sosmith.model.errors import ShortfallError, SpecificationError
 
 NONE = FilterSpec(

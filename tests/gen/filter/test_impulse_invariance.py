@@ -10,15 +10,15 @@ import pytest
 from click.testing import CliRunner
 from scipy import linalg, signal
 from tests.gen.designs import EXAMPLES, example_design
-from tests.gen.test_quantize import errors, plain, stimulus
+from tests.gen.word_lengths.test_quantize import errors, plain, stimulus
 
 from sosmith.cli import cli
 from sosmith.gen.core import design_core
-from sosmith.gen.design import Filter, design
-from sosmith.gen.impulse_invariance import AnalogFilter, analog_lowpass, impulse_invariant
-from sosmith.gen.manifest import manifest
-from sosmith.gen.realizations import CASCADES
-from sosmith.gen.specification import FilterSpec, load
+from sosmith.gen.filter.design import Filter, design
+from sosmith.gen.filter.impulse_invariance import AnalogFilter, analog_lowpass, impulse_invariant
+from sosmith.gen.output.manifest import manifest
+from sosmith.gen.realizations.registry import CASCADES
+from sosmith.gen.specification.specification import FilterSpec, load
 
 CASES = [
     ("butterworth", 1, 0.05),

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from sosmith.gen.boards import BOARDS, find_board
+from sosmith.gen.fpga.boards import BOARDS, find_board
 from sosmith.model.errors import SpecificationError
 
 

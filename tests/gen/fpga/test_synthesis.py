@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from sosmith.gen.boards import find_board
-from sosmith.gen.synthesis import share_folder, synthesize
+from sosmith.gen.fpga.boards import find_board
+from sosmith.gen.fpga.synthesis import share_folder, synthesize
 from sosmith.model.errors import ToolError
 
 CORE = "module core(input clk, a, b, output reg y); always_ff @(posedge clk) y <= a & b; endmodule\n"

@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests.gen.designs import ALL, EXAMPLES, example_design
-from tests.gen.test_quantize import stimulus
+from tests.gen.word_lengths.test_quantize import stimulus
 
-from sosmith.gen.generate import generate
-from sosmith.model.c_model import c_header, state_bytes
+from sosmith.gen.output.generate import generate
+from sosmith.model.dataflow.c_model import c_header, state_bytes
 from sosmith.model.errors import SpecificationError
 from sosmith.model.text_files import write_files
 

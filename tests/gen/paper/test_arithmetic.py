@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from sosmith.gen.paper_arithmetic import (
+from sosmith.gen.paper.arithmetic import (
     bilinear,
     butterworth_factors,
     butterworth_polynomial,
@@ -26,7 +26,7 @@ from sosmith.gen.paper_arithmetic import (
     rounded,
     scaled,
 )
-from sosmith.model.paper_figures import read_paper_figures
+from sosmith.gen.paper.figures import read_paper_figures
 
 PERIOD = Fraction(1, 100)
 CUTOFF = Fraction("1.626")

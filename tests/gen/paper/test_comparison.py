@@ -7,7 +7,7 @@ from fractions import Fraction
 
 import pytest
 
-from sosmith.gen.paper_comparison import (
+from sosmith.gen.paper.comparison import (
     DIFFERS,
     NEAR,
     NOT_COMPARABLE,

@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 from scipy import optimize, signal
 
-from sosmith.gen.design import design, minimum_order
-from sosmith.gen.paper_comparison import (
+from sosmith.gen.filter.design import design, minimum_order
+from sosmith.gen.filter.response import group_delay
+from sosmith.gen.paper.comparison import (
     DIFFERS,
     NEAR,
     NOT_COMPARABLE,
@@ -23,16 +24,15 @@ from sosmith.gen.paper_comparison import (
     Comparison,
     Part,
 )
-from sosmith.gen.paper_difference_equation import section_filters, step_response
-from sosmith.gen.paper_document import markdown, paper_parts
-from sosmith.gen.paper_regression import polynomial_of, scatter, voltage_for
-from sosmith.gen.paper_seventh_order import proper_cutoff
-from sosmith.gen.paper_vehicle import run_of_ours
-from sosmith.gen.response import group_delay
-from sosmith.gen.specification import example, load
-from sosmith.model.accuracy import accuracy_percent
-from sosmith.model.paper_figures import PaperFigures, read_paper_figures
-from sosmith.model.polynomial import EQUATION_5A
+from sosmith.gen.paper.difference_equation import section_filters, step_response
+from sosmith.gen.paper.document import markdown, paper_parts
+from sosmith.gen.paper.figures import PaperFigures, read_paper_figures
+from sosmith.gen.paper.regression import polynomial_of, scatter, voltage_for
+from sosmith.gen.paper.seventh_order import proper_cutoff
+from sosmith.gen.paper.vehicle import run_of_ours
+from sosmith.gen.specification.specification import example, load
+from sosmith.model.calibration.polynomial import EQUATION_5A
+from sosmith.model.reference.accuracy import accuracy_percent
 
 FIGURES = read_paper_figures()
 

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sosmith.gen.amplitude_spectrum import amplitude_spectrum, attenuation, ripple
-from sosmith.gen.paper_comparison import Comparison
-from sosmith.gen.vehicle_comparison import comparison
-from sosmith.gen.vehicle_report import vehicle_csv, vehicle_run
-from sosmith.model.paper_figures import read_paper_figures
-from sosmith.model.vehicle_motion import Motion
-from sosmith.model.vehicle_parameters import built_in
+from sosmith.gen.instrument.amplitude_spectrum import amplitude_spectrum, attenuation, ripple
+from sosmith.gen.instrument.vehicle_report import vehicle_csv, vehicle_run
+from sosmith.gen.paper.comparison import Comparison
+from sosmith.gen.paper.figures import read_paper_figures
+from sosmith.gen.paper.vehicle_comparison import comparison
+from sosmith.model.vehicle.motion import Motion
+from sosmith.model.vehicle.parameters import built_in
 
 
 @pytest.fixture(scope="module")

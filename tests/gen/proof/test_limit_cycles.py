@@ -12,7 +12,8 @@ from scipy import signal
 from tests.gen.designs import EXAMPLES, example_design
 
 from sosmith.cli import cli
-from sosmith.gen.limit_cycles import (
+from sosmith.gen.output.manifest import manifest
+from sosmith.gen.proof.limit_cycles import (
     cycle_from,
     is_positive_definite,
     limit_cycles,
@@ -22,9 +23,8 @@ from sosmith.gen.limit_cycles import (
     proves_decay,
     search_cycles,
 )
-from sosmith.gen.manifest import manifest
-from sosmith.gen.realizations import CASCADES, REALIZATIONS, Row, SectionFormat
-from sosmith.model.graph import Graph, GraphBuilder, value
+from sosmith.gen.realizations.registry import CASCADES, REALIZATIONS, Row, SectionFormat
+from sosmith.model.dataflow.graph import Graph, GraphBuilder, value
 
 SECTION: Row = tuple(signal.butter(2, 0.1)[0]) + tuple(signal.butter(2, 0.1)[1])
 """Low-pass at a twentieth of the sample rate, unity gain at zero frequency."""

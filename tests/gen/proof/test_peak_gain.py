@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import signal
 
-from sosmith.gen.l1_response import inverse, is_stable, response
-from sosmith.gen.peak_gain import Coefficients, Drive, Extent, extent, horizon, impulse, peak_gain, pole_radii
+from sosmith.gen.proof.peak_gain import Coefficients, Drive, Extent, extent, horizon, impulse, peak_gain, pole_radii
+from sosmith.gen.verifier.l1_response import inverse, is_stable, response
 from sosmith.model.errors import ShortfallError
 
 Section = tuple[Coefficients, Coefficients]

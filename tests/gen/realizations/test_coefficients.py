@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sosmith.gen.coefficients import Rounding, lowest_terms, round_significant
+from sosmith.gen.realizations.coefficients import Rounding, lowest_terms, round_significant
 
 BITS = st.integers(1, 50)
 VALUES = st.floats(2.0**-60, 2.0**20) | st.floats(-(2.0**20), -(2.0**-60))

@@ -13,27 +13,27 @@ import pytest
 from scipy import signal
 from tests.gen.designs import EXAMPLES
 from tests.gen.proven_stages import run
-from tests.gen.test_certificate import all_edits, proven, wrongly_accepted
-from tests.gen.test_quantize import OUT, SIGNED, butterworth, errors, plain, stimulus
-from tests.gen.test_sweep import REFUSED
+from tests.gen.verifier.test_certificate import all_edits, proven, wrongly_accepted
+from tests.gen.word_lengths.test_quantize import OUT, SIGNED, butterworth, errors, plain, stimulus
+from tests.gen.word_lengths.test_sweep import REFUSED
 
-from sosmith.gen.certificate import certificate
-from sosmith.gen.certificate_file import Certificate, certificate_text
 from sosmith.gen.core import design_core
-from sosmith.gen.design import Filter
-from sosmith.gen.error_paths import error_paths
-from sosmith.gen.lattice_design import LatticePair, LatticeSigns, Row, lattice_parts
-from sosmith.gen.limit_cycles import limit_cycles, recursions, search_cycles
-from sosmith.gen.linear_model import LinearModel, linear_models
-from sosmith.gen.manifest import manifest
-from sosmith.gen.realizations import REALIZATIONS, SectionFormat
-from sosmith.gen.specification import load
-from sosmith.gen.verification import RejectedError, verify
-from sosmith.model.datapath import Stage
+from sosmith.gen.filter.design import Filter
+from sosmith.gen.output.certificate import certificate
+from sosmith.gen.output.manifest import manifest
+from sosmith.gen.proof.limit_cycles import limit_cycles, recursions, search_cycles
+from sosmith.gen.proof.linear_model import LinearModel, linear_models
+from sosmith.gen.realizations.lattice import LatticePair, LatticeSigns, Row, lattice_parts
+from sosmith.gen.realizations.registry import REALIZATIONS, SectionFormat
+from sosmith.gen.specification.specification import load
+from sosmith.gen.verifier.certificate_file import Certificate, certificate_text
+from sosmith.gen.verifier.verification import RejectedError, verify
+from sosmith.gen.word_lengths.error_paths import error_paths
+from sosmith.model.dataflow.datapath import Stage
+from sosmith.model.dataflow.graph import Graph, Op
 from sosmith.model.errors import ShortfallError
-from sosmith.model.graph import Graph, Op
-from sosmith.model.lattice import Adaptor, Allpass, Format, LatticeStage
-from sosmith.model.state_space import Coefficient
+from sosmith.model.sections.lattice import Adaptor, Allpass, Format, LatticeStage
+from sosmith.model.sections.state_space import Coefficient
 
 KINDS = ("lowpass", "highpass", "bandpass", "bandstop")
 ODD = [(kind, order, cutoff) for kind in KINDS for order in (1, 3, 5) for cutoff in (0.002, 0.05, 0.25, 0.35)]

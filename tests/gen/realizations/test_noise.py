@@ -14,12 +14,12 @@ import pytest
 from scipy import signal
 from tests.gen.proven_stages import Format, Ranges, proven_cascade, run
 
-from sosmith.gen.design import decay_length
-from sosmith.gen.linear_model import LinearModel, Source, linear_model
-from sosmith.gen.realizations import REALIZATIONS, SectionFormat
-from sosmith.model.datapath import Stage
+from sosmith.gen.filter.design import decay_length
+from sosmith.gen.proof.linear_model import LinearModel, Source, linear_model
+from sosmith.gen.realizations.registry import REALIZATIONS, SectionFormat
+from sosmith.model.dataflow.datapath import Stage
 from sosmith.model.port import Port
-from sosmith.model.transposed_form import TransposedForm
+from sosmith.model.sections.transposed_form import TransposedForm
 
 Q = 2.24698  # the highest of a 7th-order Butterworth filter
 CUTOFFS = (0.0015, 0.004, 0.01, 0.025, 0.05)

@@ -23,23 +23,23 @@ from benchmarks.published import butterworth as whole_butterworth
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy import signal
-from tests.gen.test_quantize import butterworth, errors, plain, stimulus
+from tests.gen.word_lengths.test_quantize import butterworth, errors, plain, stimulus
 from tests.hdl.stage_bench import run
 
-from sosmith.gen.linear_model import linear_model
-from sosmith.gen.noise import (
+from sosmith.gen.proof.linear_model import linear_model
+from sosmith.gen.realizations.noise import (
     StateSystem,
     companion,
     minimum_gain,
     second_order_modes,
 )
-from sosmith.gen.realizations import REALIZATIONS, SectionFormat
-from sosmith.gen.state_space_design import StateDesign, minimum_noise, normal
-from sosmith.model.datapath import Datapath, Stage
+from sosmith.gen.realizations.registry import REALIZATIONS, SectionFormat
+from sosmith.gen.realizations.state_space import StateDesign, minimum_noise, normal
+from sosmith.model.dataflow.datapath import Datapath, Stage
+from sosmith.model.dataflow.graph import Graph, GraphBuilder
 from sosmith.model.errors import ShortfallError
-from sosmith.model.graph import Graph, GraphBuilder
 from sosmith.model.port import Port
-from sosmith.model.state_space import Coefficient, StateSpace
+from sosmith.model.sections.state_space import Coefficient, StateSpace
 
 CUTOFFS = (0.0026, 0.01, 0.03, 0.1, 0.25)
 Row = tuple[float, ...]

@@ -10,19 +10,19 @@ import numpy as np
 import pytest
 from scipy import signal
 from tests.gen.proven_stages import Format, Ranges, datapath_of, proven_cascade
-from tests.gen.test_quantize import butterworth, errors, plain, stimulus
+from tests.gen.word_lengths.test_quantize import butterworth, errors, plain, stimulus
 from tests.hdl.stage_bench import run as run_hardware
 
-from sosmith.gen.coefficients import Rounding
-from sosmith.gen.direct_form_design import direct_form
-from sosmith.gen.linear_model import linear_model
-from sosmith.gen.realizations import REALIZATIONS, WIDE, SectionFormat
-from sosmith.gen.transposed_design import transposed_form
-from sosmith.model.datapath import Stage
-from sosmith.model.direct_form import DirectForm1
+from sosmith.gen.proof.linear_model import linear_model
+from sosmith.gen.realizations.coefficients import Rounding
+from sosmith.gen.realizations.direct_form import direct_form
+from sosmith.gen.realizations.registry import REALIZATIONS, WIDE, SectionFormat
+from sosmith.gen.realizations.transposed import transposed_form
+from sosmith.model.dataflow.datapath import Stage
 from sosmith.model.errors import ShortfallError
 from sosmith.model.port import Port
-from sosmith.model.transposed_form import TransposedForm
+from sosmith.model.sections.direct_form import DirectForm1
+from sosmith.model.sections.transposed_form import TransposedForm
 
 INPUT = Port.from_range("x", 16, -1, 1, signed=True)
 Row = tuple[float, ...]

@@ -6,11 +6,11 @@ from fractions import Fraction
 import numpy as np
 
 from sosmith.gen.core import CoreDesign
-from sosmith.gen.design import Filter, design
-from sosmith.gen.quantize import Quantized
-from sosmith.gen.transient import transient
-from sosmith.model.constants import with_ranges
-from sosmith.model.datapath import Datapath
+from sosmith.gen.filter.design import Filter, design
+from sosmith.gen.reload.transient import transient
+from sosmith.gen.word_lengths.quantize import Quantized
+from sosmith.model.dataflow.datapath import Datapath
+from sosmith.model.reload.constants import with_ranges
 
 
 def moved(hardware: CoreDesign, ratio: str) -> Filter:

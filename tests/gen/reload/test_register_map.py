@@ -8,8 +8,8 @@ import pytest
 from systemrdl import RDLCompiler
 from systemrdl.node import AddrmapNode
 
-from sosmith.gen.register_map import c_registers, markdown, systemrdl
-from sosmith.model.reload_registers import CRC, LAYOUT, MAGIC, REGISTERS, STATUS, Field, Outcome, Register
+from sosmith.gen.reload.register_map import c_registers, markdown, systemrdl
+from sosmith.model.reload.registers import CRC, LAYOUT, MAGIC, REGISTERS, STATUS, Field, Outcome, Register
 
 CORE = {"words": 513, "design": 0x89ABCDEF}
 

@@ -9,24 +9,24 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests.gen.designs import EXAMPLES, example_design
-from tests.gen.swaps import during, moved, worst_input
+from tests.gen.reload.swaps import during, moved, worst_input
 
-from sosmith.gen import reload
 from sosmith.gen.core import CoreDesign, design_core
-from sosmith.gen.design import design
-from sosmith.gen.other_constants import with_constants
-from sosmith.gen.quantize import Quantized
-from sosmith.gen.realizations import REALIZATIONS
-from sosmith.gen.reload import ADVICE, OtherSet, check_swap, other_set, own_set, parallel_bank, room_of, set_for
-from sosmith.gen.reload_file import bank_size, register_writes, reload_json
-from sosmith.gen.specification import load
+from sosmith.gen.filter.design import design
+from sosmith.gen.realizations.registry import REALIZATIONS
+from sosmith.gen.reload import reload
+from sosmith.gen.reload.other_constants import with_constants
+from sosmith.gen.reload.register_writes import bank_size, register_writes, reload_json
+from sosmith.gen.reload.reload import ADVICE, OtherSet, check_swap, other_set, own_set, parallel_bank, room_of, set_for
+from sosmith.gen.specification.specification import load
+from sosmith.gen.word_lengths.quantize import Quantized
 from sosmith.hdl.folded import encoded
-from sosmith.model.constants import constants, unpacked
+from sosmith.model.calibration.polynomial import Polynomial
+from sosmith.model.dataflow.program import Do, Program
 from sosmith.model.errors import ShortfallError, SpecificationError
-from sosmith.model.polynomial import Polynomial
-from sosmith.model.program import Do, Program
-from sosmith.model.reload_registers import CRC, DATA, VERSION
-from sosmith.model.swapping import compute_swapping
+from sosmith.model.reload.constants import constants, unpacked
+from sosmith.model.reload.registers import CRC, DATA, VERSION
+from sosmith.model.reload.swapping import compute_swapping
 
 EXACT = [name for name in REALIZATIONS if name != "state_space"]  # that one rounds its coefficients together
 

@@ -5,16 +5,16 @@ from functools import cache
 import numpy as np
 import pytest
 from tests.gen.designs import example_design
-from tests.gen.swaps import during, moved, worst_input
+from tests.gen.reload.swaps import during, moved, worst_input
 
-from sosmith.gen import transient as module
-from sosmith.gen.other_constants import with_constants
-from sosmith.gen.quantize import Quantized
-from sosmith.gen.transient import RESIDUE, transient
-from sosmith.model.datapath import Datapath
+from sosmith.gen.reload import transient as module
+from sosmith.gen.reload.other_constants import with_constants
+from sosmith.gen.reload.transient import RESIDUE, transient
+from sosmith.gen.word_lengths.quantize import Quantized
+from sosmith.model.dataflow.datapath import Datapath
+from sosmith.model.dataflow.graph import RangeError
 from sosmith.model.errors import ShortfallError
-from sosmith.model.graph import RangeError
-from sosmith.model.swapping import compute_swapping
+from sosmith.model.reload.swapping import compute_swapping
 
 REALIZATIONS = ("df1", "df1_ef2", "df2t", "delta", "normal", "lattice_wdf")
 RATIOS = ("0.5", "1.2")

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from sosmith.gen.comparison import (
+from sosmith.gen.report.comparison import (
     Row,
     column_names,
     compare,

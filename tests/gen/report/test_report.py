@@ -17,11 +17,13 @@ import numpy.typing as npt
 import pytest
 from scipy import signal
 
-from sosmith.gen import plots, quantity, response
-from sosmith.gen.boards import find_board
-from sosmith.gen.report import Alternative, Evidence, FilterFacts, Format, summarise, write_report
-from sosmith.gen.report_page import render_page
-from sosmith.gen.synthesis import Netlist
+from sosmith.gen import quantity
+from sosmith.gen.filter import response
+from sosmith.gen.fpga.boards import find_board
+from sosmith.gen.fpga.synthesis import Netlist
+from sosmith.gen.report import plots
+from sosmith.gen.report.page import render_page
+from sosmith.gen.report.report import Alternative, Evidence, FilterFacts, Format, summarise, write_report
 
 Array = npt.NDArray[np.float64]
 

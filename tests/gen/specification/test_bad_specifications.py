@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from sosmith.gen.specification import load
+from sosmith.gen.specification.specification import load
 from sosmith.model.errors import SpecificationError
 
 BASE = """\

@@ -14,13 +14,13 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from sosmith.gen import specification
-from sosmith.gen.specification import CalibrationSpec, FilterSpec, HardwareSpec, Specification, load
-from sosmith.gen.verilog_names import KEYWORDS
+from sosmith.gen.specification import specification
+from sosmith.gen.specification.specification import CalibrationSpec, FilterSpec, HardwareSpec, Specification, load
+from sosmith.gen.specification.verilog_names import KEYWORDS
 from sosmith.model.errors import SpecificationError
 from sosmith.model.port import Port
 
-EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.toml"))
+EXAMPLES = sorted((Path(__file__).parents[3] / "examples").glob("*.toml"))
 
 # The example of the contract with the user, word for word in content.
 CONTRACT = {

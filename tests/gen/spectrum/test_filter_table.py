@@ -8,11 +8,11 @@ import tomllib
 import numpy as np
 import pytest
 
-from sosmith.gen.filter_prediction import Content
-from sosmith.gen.filter_proposal import Proposal, Wish, propose
-from sosmith.gen.filter_table import filter_table, replace_filter
-from sosmith.gen.specification import example
-from sosmith.gen.spectra import SpectrumSettings, spectrum
+from sosmith.gen.specification.specification import example
+from sosmith.gen.spectrum.filter_table import filter_table, replace_filter
+from sosmith.gen.spectrum.prediction import Content
+from sosmith.gen.spectrum.proposal import Proposal, Wish, propose
+from sosmith.gen.spectrum.spectra import SpectrumSettings, spectrum
 from sosmith.model.errors import SpecificationError
 
 TABLE = '[filter]\nfamily = "butterworth"\norder = 2\n'

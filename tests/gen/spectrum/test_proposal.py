@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sosmith.gen.design import minimum_order
-from sosmith.gen.filter_prediction import Content, told_apart
-from sosmith.gen.filter_proposal import Proposal, Wish, propose
-from sosmith.gen.filter_trial import try_filter
-from sosmith.gen.response import magnitude_db
-from sosmith.gen.spectra import Array, SpectrumSettings, spectrum
-from sosmith.gen.spectrum_report import ripple
+from sosmith.gen.filter.design import minimum_order
+from sosmith.gen.filter.response import magnitude_db
+from sosmith.gen.spectrum.prediction import Content, told_apart
+from sosmith.gen.spectrum.proposal import Proposal, Wish, propose
+from sosmith.gen.spectrum.report import ripple
+from sosmith.gen.spectrum.spectra import Array, SpectrumSettings, spectrum
+from sosmith.gen.spectrum.trial import try_filter
 from sosmith.model.errors import ShortfallError, SpecificationError
 
 SETTINGS = SpectrumSettings()

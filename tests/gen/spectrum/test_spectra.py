@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sosmith.gen.spectra import WINDOWS, SpectrumSettings, degrees_of_freedom, slow_rms, spectrum
-from sosmith.gen.spectrum_report import peaks
+from sosmith.gen.spectrum.report import peaks
+from sosmith.gen.spectrum.spectra import WINDOWS, SpectrumSettings, degrees_of_freedom, slow_rms, spectrum
 from sosmith.model.errors import SpecificationError
 
 RATE = 50.0

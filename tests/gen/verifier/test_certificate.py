@@ -17,20 +17,20 @@ import pytest
 from flint import fmpq, fmpq_poly
 from pydantic import ValidationError
 from tests.gen.designs import ALL, example_design
-from tests.gen.test_quantize import OUT, SIGNED, butterworth, plain
+from tests.gen.word_lengths.test_quantize import OUT, SIGNED, butterworth, plain
 
 from sosmith.cli import main
-from sosmith.gen.certificate import certificate
-from sosmith.gen.certificate_file import Certificate, certificate_text, on_grid, read_certificate
-from sosmith.gen.design import design
-from sosmith.gen.l1_response import UndecidedError, inverse, is_stable, response
-from sosmith.gen.quantize import Quantized, quantize
-from sosmith.gen.realizations import CASCADES, REALIZATIONS
-from sosmith.gen.specification import FilterSpec
-from sosmith.gen.verification import RejectedError, verify
+from sosmith.gen.filter.design import design
+from sosmith.gen.output.certificate import certificate
+from sosmith.gen.realizations.registry import CASCADES, REALIZATIONS
+from sosmith.gen.specification.specification import FilterSpec
+from sosmith.gen.verifier.certificate_file import Certificate, certificate_text, on_grid, read_certificate
+from sosmith.gen.verifier.l1_response import UndecidedError, inverse, is_stable, response
+from sosmith.gen.verifier.verification import RejectedError, verify
+from sosmith.gen.word_lengths.quantize import Quantized, quantize
+from sosmith.model.calibration.polynomial import Polynomial
+from sosmith.model.dataflow.graph import Graph, Node, Op
 from sosmith.model.errors import SpecificationError
-from sosmith.model.graph import Graph, Node, Op
-from sosmith.model.polynomial import Polynomial
 from sosmith.model.port import Port
 
 BENCH, LOCOMOTIVE = "flange_wear_bench.toml", "flange_wear_locomotive.toml"
@@ -150,7 +150,7 @@ def test_a_polynomial_of_higher_order() -> None:
 def test_verification_has_nothing_in_common_with_the_proof() -> None:
     """Neither the extraction nor the peak gains nor the search for word lengths are even loaded."""
     program = (
-        "import sys, sosmith.gen.verification;"
+        "import sys, sosmith.gen.verifier.verification;"
         "print(*sorted(name.removeprefix('sosmith.') for name in sys.modules if name.startswith('sosmith.')))"
     )
     loaded = subprocess.run([sys.executable, "-c", program], check=True, capture_output=True, text=True).stdout.split()

@@ -2,8 +2,8 @@
 
 import pytest
 
-from sosmith.gen.cost import LUTS_OF_A_BLOCK, Cost, Multiplication, Operand, area_of, cost_of_graphs
-from sosmith.model.graph import Graph, GraphBuilder
+from sosmith.gen.word_lengths.cost import LUTS_OF_A_BLOCK, Cost, Multiplication, Operand, area_of, cost_of_graphs
+from sosmith.model.dataflow.graph import Graph, GraphBuilder
 
 BLOCKS = [
     # signed data, positive constant: the constant takes a sign bit

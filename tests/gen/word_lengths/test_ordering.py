@@ -10,13 +10,13 @@ from itertools import permutations
 import numpy as np
 import pytest
 from scipy import signal
-from tests.gen.test_quantize import butterworth as butterworth_filter
-from tests.gen.test_quantize import plain
+from tests.gen.word_lengths.test_quantize import butterworth as butterworth_filter
+from tests.gen.word_lengths.test_quantize import plain
 
-from sosmith.gen.design import decay_length
-from sosmith.gen.linear_model import linear_model
-from sosmith.gen.ordering import NoisySection, Norm, arrange, best_order
-from sosmith.gen.realizations import REALIZATIONS, Row, SectionFormat
+from sosmith.gen.filter.design import decay_length
+from sosmith.gen.proof.linear_model import linear_model
+from sosmith.gen.realizations.registry import REALIZATIONS, Row, SectionFormat
+from sosmith.gen.word_lengths.ordering import NoisySection, Norm, arrange, best_order
 
 NORMS: tuple[Norm, ...] = ("l1", "l2", "linf")
 

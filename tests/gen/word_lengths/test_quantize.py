@@ -9,13 +9,13 @@ import pytest
 from scipy import signal
 from tests.gen.designs import ALL, example_design
 
-from sosmith.gen.design import Filter, design
-from sosmith.gen.quantize import Quantized, quantize, with_realization
-from sosmith.gen.realizations import CASCADES, REALIZATIONS
-from sosmith.gen.specification import FilterSpec
-from sosmith.model.golden import calibrated, filtered
-from sosmith.model.polynomial import Polynomial
+from sosmith.gen.filter.design import Filter, design
+from sosmith.gen.realizations.registry import CASCADES, REALIZATIONS
+from sosmith.gen.specification.specification import FilterSpec
+from sosmith.gen.word_lengths.quantize import Quantized, quantize, with_realization
+from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.port import Port
+from sosmith.model.reference.golden import calibrated, filtered
 
 SIGNED = Port.from_range("x", 16, Fraction(-1), Fraction(1), signed=True)
 OUT = Port.from_range("y", 16, Fraction(-1), Fraction(1), signed=True)

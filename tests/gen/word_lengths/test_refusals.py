@@ -5,13 +5,13 @@ from dataclasses import replace
 from fractions import Fraction
 
 import pytest
-from tests.gen.test_quantize import OUT, SIGNED, butterworth, plain
+from tests.gen.word_lengths.test_quantize import OUT, SIGNED, butterworth, plain
 
-from sosmith.gen.design import Filter
-from sosmith.gen.quantize import quantize
-from sosmith.gen.realizations import CASCADES, REALIZATIONS, Row, SectionFormat
+from sosmith.gen.filter.design import Filter
+from sosmith.gen.realizations.registry import CASCADES, REALIZATIONS, Row, SectionFormat
+from sosmith.gen.word_lengths.quantize import quantize
+from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.errors import ShortfallError
-from sosmith.model.polynomial import Polynomial
 from sosmith.model.port import Port
 
 EIGHT_BITS = Port.from_range("y", 8, Fraction(-1), Fraction(1), signed=True)

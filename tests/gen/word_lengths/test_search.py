@@ -9,17 +9,17 @@ from functools import cache
 
 import pytest
 from tests.gen.designs import ALL, example_design
-from tests.gen.test_quantize import OUT, SIGNED, butterworth
+from tests.gen.word_lengths.test_quantize import OUT, SIGNED, butterworth
 
-from sosmith.gen import quantize as quantize_module
-from sosmith.gen.coefficients import lowest_terms, round_significant
-from sosmith.gen.cost import cost_of, cost_of_graphs
-from sosmith.gen.design import Filter
-from sosmith.gen.linear_model import Source, linear_model
-from sosmith.gen.quantize import Plan, Quantized, plan, prove
-from sosmith.gen.realizations import CASCADES, REALIZATIONS, Section, SectionFormat
-from sosmith.gen.word_lengths import Choice, Search
-from sosmith.model.direct_form import DirectForm1, Product
+from sosmith.gen.filter.design import Filter
+from sosmith.gen.proof.linear_model import Source, linear_model
+from sosmith.gen.realizations.coefficients import lowest_terms, round_significant
+from sosmith.gen.realizations.registry import CASCADES, REALIZATIONS, Section, SectionFormat
+from sosmith.gen.word_lengths import quantize as quantize_module
+from sosmith.gen.word_lengths.cost import cost_of, cost_of_graphs
+from sosmith.gen.word_lengths.quantize import Plan, Quantized, plan, prove
+from sosmith.gen.word_lengths.search import Choice, Search
+from sosmith.model.sections.direct_form import DirectForm1, Product
 
 FAST = "audio_lowpass.toml", "flange_wear_bench.toml"
 EXAMPLES = [pytest.param(name, marks=[] if name in FAST else [pytest.mark.slow]) for name in ALL]

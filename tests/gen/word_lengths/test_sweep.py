@@ -14,15 +14,15 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from sosmith.gen.design import decay_length, design, impulse_response
-from sosmith.gen.error_paths import error_responses
-from sosmith.gen.quantize import Quantized, quantize
-from sosmith.gen.realizations import CASCADES, REALIZATIONS
-from sosmith.gen.specification import FilterSpec
+from sosmith.gen.filter.design import decay_length, design, impulse_response
+from sosmith.gen.realizations.registry import CASCADES, REALIZATIONS
+from sosmith.gen.specification.specification import FilterSpec
+from sosmith.gen.word_lengths.error_paths import error_responses
+from sosmith.gen.word_lengths.quantize import Quantized, quantize
 from sosmith.model.errors import ShortfallError
-from sosmith.model.golden import calibrated, filtered
 from sosmith.model.port import Port
-from sosmith.model.worst_case_inputs import sign_matched
+from sosmith.model.reference.golden import calibrated, filtered
+from sosmith.model.scenarios.worst_case_inputs import sign_matched
 
 RANDOM_SAMPLES = 1_000_000
 

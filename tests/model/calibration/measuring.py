@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from sosmith.model.calibration import COLUMNS, Measurements
-from sosmith.model.polynomial import EQUATION_5A, Polynomial
+from sosmith.model.calibration.fit import COLUMNS, Measurements
+from sosmith.model.calibration.polynomial import EQUATION_5A, Polynomial
 
 
 def readings(

@@ -7,14 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.model.measuring import as_arrays, readings
+from tests.model.calibration.measuring import as_arrays, readings
 
-from sosmith.model.calibration import Measurements, fit, residuals, terms_of
-from sosmith.model.covered_region import CoveredRegion
+from sosmith.model.calibration.covered_region import CoveredRegion
+from sosmith.model.calibration.fit import Measurements, fit, residuals, terms_of
+from sosmith.model.calibration.fit_quality import assess
+from sosmith.model.calibration.least_squares import Solution, Sums
+from sosmith.model.calibration.polynomial import EQUATION_5A, Polynomial
 from sosmith.model.errors import SpecificationError
-from sosmith.model.fit_quality import assess
-from sosmith.model.least_squares import Solution, Sums
-from sosmith.model.polynomial import EQUATION_5A, Polynomial
 
 
 def hat_matrix(data: Measurements, orders: tuple[int, int], weights: np.ndarray) -> np.ndarray:

@@ -7,10 +7,10 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from flint import fmpq, fmpq_mat
-from tests.model.measuring import readings
+from tests.model.calibration.measuring import readings
 
-from sosmith.model.calibration import terms_of
-from sosmith.model.least_squares import Sums
+from sosmith.model.calibration.fit import terms_of
+from sosmith.model.calibration.least_squares import Sums
 
 
 def exact_minimum(

@@ -12,8 +12,8 @@ from typing import Any
 import openpyxl
 import pytest
 
+from sosmith.model.calibration.measurement_files import MeasurementFile, parse_date, read_measurement_file
 from sosmith.model.errors import SpecificationError
-from sosmith.model.measurement_files import MeasurementFile, parse_date, read_measurement_file
 
 HEADER = ("clearance_mm", "voltage_V", "temperature_C")
 DAY = "2024-03-01"

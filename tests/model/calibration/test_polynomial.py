@@ -8,7 +8,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from sosmith.model.polynomial import EQUATION_5A, Polynomial
+from sosmith.model.calibration.polynomial import EQUATION_5A, Polynomial
 
 
 def test_equation_5a_at_a_point_worked_by_hand() -> None:

@@ -14,15 +14,15 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from tests.model.measuring import readings, write_csv
+from tests.model.calibration.measuring import readings, write_csv
 
+from sosmith.model.calibration.measurement_store import MeasurementStore, open_store
+from sosmith.model.calibration.polynomial import EQUATION_5A, Polynomial
+from sosmith.model.calibration.self_updating import add, calibration_of, find_version, refit
 from sosmith.model.errors import ShortfallError, SpecificationError, ToolError
-from sosmith.model.measurement_store import MeasurementStore, open_store
-from sosmith.model.polynomial import EQUATION_5A, Polynomial
-from sosmith.model.self_updating import add, calibration_of, find_version, refit
 
 DAY = "2024-03-01"
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 
 @pytest.fixture
@@ -167,8 +167,8 @@ def test_a_process_that_takes_the_processor_for_an_older_one_finds_the_same_bits
     add(store, "left", batch(tmp_path, "a.csv", 500), DAY, required_r=0.9999 - 0.001)
     script = (
         "import sys; from pathlib import Path\n"
-        "from sosmith.model.measurement_store import open_store\n"
-        "from sosmith.model.self_updating import calibration_of\n"
+        "from sosmith.model.calibration.measurement_store import open_store\n"
+        "from sosmith.model.calibration.self_updating import calibration_of\n"
         "with open_store(Path(sys.argv[1])) as store: calibration_of(store, 'left')\n"
     )
     environment = {
@@ -229,8 +229,8 @@ def test_10000_measurements_refit_in_under_a_second(store: MeasurementStore, tmp
 ADDING = """
 import sys
 from pathlib import Path
-from sosmith.model.measurement_store import open_store
-from sosmith.model.self_updating import add
+from sosmith.model.calibration.measurement_store import open_store
+from sosmith.model.calibration.self_updating import add
 store, folder, first, last = Path(sys.argv[1]), Path(sys.argv[2]), int(sys.argv[3]), int(sys.argv[4])
 print("ready", flush=True)
 for k in range(first, last):
@@ -296,7 +296,7 @@ def test_a_damaged_store_is_noticed(store: MeasurementStore, tmp_path: Path) -> 
 def test_a_writer_that_waits_in_vain_says_so(
     store: MeasurementStore, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("sosmith.model.measurement_store.PATIENCE", 0.05)
+    monkeypatch.setattr("sosmith.model.calibration.measurement_store.PATIENCE", 0.05)
     message = f"{store.path}: the store must be free within a minute, not locked by another program"
     refused = pytest.raises(ToolError, match=f"^{re.escape(message)}$")
     with store.transaction(), refused, open_store(store.path) as other:
@@ -414,7 +414,7 @@ def test_without_a_transaction_a_kill_would_tear_an_addition(tmp_path: Path) -> 
     with open_store(path, create=True) as opened:
         add(opened, "left", tmp_path / "0.csv", DAY, required_r=0.9)
     broken = (
-        "import contextlib\nfrom sosmith.model.measurement_store import MeasurementStore\n"
+        "import contextlib\nfrom sosmith.model.calibration.measurement_store import MeasurementStore\n"
         "MeasurementStore.transaction = lambda self: contextlib.nullcontext()\n"
     )
     adding(path, tmp_path, 1, 2, AT_STATEMENT + broken, "24").communicate(timeout=60)

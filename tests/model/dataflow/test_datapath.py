@@ -10,11 +10,11 @@ import pytest
 from scipy import signal
 from tests.model.datapaths import INPUT, OUTPUT, butterworth, cascade
 
-from sosmith.model.c_model import c_header, c_source
-from sosmith.model.datapath import Datapath
-from sosmith.model.graph import GraphBuilder
-from sosmith.model.horner import HornerPolynomial, HornerStep, Variable
+from sosmith.model.dataflow.c_model import c_header, c_source
+from sosmith.model.dataflow.datapath import Datapath
+from sosmith.model.dataflow.graph import GraphBuilder
 from sosmith.model.port import Port
+from sosmith.model.sections.horner import HornerPolynomial, HornerStep, Variable
 
 
 @pytest.mark.parametrize("order", [1, 2, 5, 7])

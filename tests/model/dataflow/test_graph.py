@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sosmith.model.graph import GraphBuilder, Op, RangeError, value
+from sosmith.model.dataflow.graph import GraphBuilder, Op, RangeError, value
 
 codes = st.integers(-(1 << 20), 1 << 20)
 

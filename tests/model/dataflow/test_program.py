@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from tests.formal.small import limiter
 from tests.gen.designs import ALL, example_design
 
-from sosmith.model.datapath import Datapath
-from sosmith.model.folding import FoldingError, program
-from sosmith.model.program import HAZARD, Do, Instruction, Program, digits_of
+from sosmith.model.dataflow.datapath import Datapath
+from sosmith.model.dataflow.folding import FoldingError, program
+from sosmith.model.dataflow.program import HAZARD, Do, Instruction, Program, digits_of
 
 FOLDABLE = ("df1", "df1_ef1", "df1_ef2", "df2t", "delta", "state_space")
 READS = {Do.MULTIPLY, Do.OPERAND, Do.PRODUCT, Do.GIVE}

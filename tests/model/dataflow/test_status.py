@@ -8,9 +8,9 @@ import pytest
 from tests.gen.designs import example_design
 
 from sosmith.gen.core import design_core
-from sosmith.gen.wear_limits import WearSpec
-from sosmith.model.datapath import Datapath
-from sosmith.model.status import Flag
+from sosmith.gen.specification.wear_limits import WearSpec
+from sosmith.model.dataflow.datapath import Datapath
+from sosmith.model.dataflow.status import Flag
 
 RAIL, OUTSIDE, SATURATED, WARNING, CRITICAL = (1 << flag for flag in Flag)
 

@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 
-from sosmith.model.accuracy import accuracy_percent, error_statistics, sqnr_db
+from sosmith.model.reference.accuracy import accuracy_percent, error_statistics, sqnr_db
 
 TRUTH = np.arange(1.0, 11.0)
 TABLE_1_ERROR = np.array(

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from sosmith.model.golden import calibrated, filtered
-from sosmith.model.polynomial import Polynomial
+from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.port import Port
+from sosmith.model.reference.golden import calibrated, filtered
 
 VOLTAGE = Port.from_range("voltage", 16, Fraction(0), Fraction(10), unit="V")
 TEMPERATURE = Port.from_range("temperature", 12, Fraction(-32), Fraction(96), unit="degC")

@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.gen.designs import example_design
 
-from sosmith.model.constants import Constant, constants, packed, unpacked, values_of, with_room
-from sosmith.model.graph import Op
+from sosmith.model.dataflow.graph import Op
+from sosmith.model.reload.constants import Constant, constants, packed, unpacked, values_of, with_room
 
 NARROW, WIDE = Constant(0, 1, "a", 20), Constant(0, 2, "b", 40)
 

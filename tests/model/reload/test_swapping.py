@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from tests.gen.designs import example_design
 
-from sosmith.gen.design import design
-from sosmith.gen.other_constants import with_constants
-from sosmith.model.datapath import Datapath
-from sosmith.model.graph import RangeError
-from sosmith.model.swapping import compute_swapping
+from sosmith.gen.filter.design import design
+from sosmith.gen.reload.other_constants import with_constants
+from sosmith.model.dataflow.datapath import Datapath
+from sosmith.model.dataflow.graph import RangeError
+from sosmith.model.reload.swapping import compute_swapping
 
 
 def pair(realization: str) -> tuple[Datapath, Datapath]:

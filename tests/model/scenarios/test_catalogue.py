@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from sosmith.model.accuracy import accuracy_percent
+from sosmith.model.calibration.polynomial import EQUATION_5A, Polynomial
 from sosmith.model.errors import SpecificationError
-from sosmith.model.inductive_sensor import VOLTAGE_NOISE
-from sosmith.model.instrument_signals import TABLE_1_STEPS, TABLE_2_STEPS
-from sosmith.model.polynomial import EQUATION_5A, Polynomial
 from sosmith.model.port import Port, Values
-from sosmith.model.scenario_run import LEAST_SAMPLES, MOST_SAMPLES, Bench
-from sosmith.model.scenarios import SCENARIOS, emulate
-from sosmith.model.trace import Trace
+from sosmith.model.reference.accuracy import accuracy_percent
+from sosmith.model.scenarios.catalogue import SCENARIOS, emulate
+from sosmith.model.scenarios.instrument_signals import TABLE_1_STEPS, TABLE_2_STEPS
+from sosmith.model.scenarios.run import MAX_SAMPLES, MIN_SAMPLES, Bench
+from sosmith.model.sensors.inductive_sensor import VOLTAGE_NOISE
+from sosmith.model.traces.trace import Trace
 
 VOLTAGE = Port.from_range("voltage", 16, Fraction(0), Fraction(10), unit="V")
 TEMPERATURE = Port.from_range("temperature", 16, Fraction(0), Fraction(128), unit="degC")
@@ -75,7 +75,7 @@ def test_same_seed_same_trace_of_reasonable_length(name: str, bench: str) -> Non
     trace = emulate(name, BENCHES[bench], seed=7)
     again = emulate(name, BENCHES[bench], seed=7)
     np.testing.assert_array_equal(trace.codes, again.codes)
-    assert LEAST_SAMPLES <= len(trace) <= MOST_SAMPLES
+    assert MIN_SAMPLES <= len(trace) <= MAX_SAMPLES
     assert len(trace) == round(SCENARIOS[name].default_seconds(BENCHES[bench]) * BENCHES[bench].sample_rate)
     assert (trace.name, trace.seed) == (name, 7)
     random = name not in {"worst_case", "worst_case_errors", "step", "sweep"}

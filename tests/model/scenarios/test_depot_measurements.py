@@ -6,17 +6,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.model.scenario_texts import CALIBRATION, PLAIN
+from tests.model.scenarios.scenario_texts import CALIBRATION, PLAIN
 
-from sosmith.model.calibration import fit, read_measurements
-from sosmith.model.depot_measurements import DepotMeasurement, measurements_csv, measurements_of
+from sosmith.model.calibration.fit import fit, read_measurements
+from sosmith.model.calibration.measurement_files import read_measurement_file
 from sosmith.model.errors import SpecificationError
-from sosmith.model.inductive_sensor import sensor_voltage
-from sosmith.model.measurement_files import read_measurement_file
 from sosmith.model.random_streams import streams
-from sosmith.model.scenario_file import load_scenario
+from sosmith.model.scenarios.depot_measurements import DepotMeasurement, measurements_csv, measurements_of
+from sosmith.model.scenarios.file import load_scenario
+from sosmith.model.sensors.inductive_sensor import sensor_voltage
 
-EXAMPLES = Path(__file__).parents[2] / "examples" / "scenarios"
+EXAMPLES = Path(__file__).parents[3] / "examples" / "scenarios"
 ADJUSTED_R = {"bench_43_50": 0.9853, "bench_92_96": 0.9852}
 """Adjusted r of the paper's equations 4 and 5a."""
 

@@ -9,18 +9,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.model.scenario_texts import FAULT, PLAIN
+from tests.model.scenarios.scenario_texts import FAULT, PLAIN
 
+from sosmith.model.calibration.polynomial import EQUATION_5A
 from sosmith.model.errors import SpecificationError
-from sosmith.model.inductive_sensor import sensor_voltage
-from sosmith.model.instrument_signals import TABLE_1_STEPS, TABLE_2_STEPS
-from sosmith.model.polynomial import EQUATION_5A
 from sosmith.model.port import Port, Values
-from sosmith.model.scenario_file import ScenarioFile, emulate_file, load_scenario, range_notes
-from sosmith.model.scenario_run import Bench
-from sosmith.model.trace import Trace
+from sosmith.model.scenarios.file import ScenarioFile, emulate_file, load_scenario, range_notes
+from sosmith.model.scenarios.instrument_signals import TABLE_1_STEPS, TABLE_2_STEPS
+from sosmith.model.scenarios.run import Bench
+from sosmith.model.sensors.inductive_sensor import sensor_voltage
+from sosmith.model.traces.trace import Trace
 
-EXAMPLES = sorted((Path(__file__).parents[2] / "examples" / "scenarios").glob("*.toml"))
+EXAMPLES = sorted((Path(__file__).parents[3] / "examples" / "scenarios").glob("*.toml"))
 VOLTAGE = Port.from_range("voltage", 16, Fraction(0), Fraction(10), unit="V")
 TEMPERATURE = Port.from_range("temperature", 16, Fraction(0), Fraction(128), unit="degC")
 BENCH = Bench(

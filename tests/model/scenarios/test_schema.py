@@ -6,10 +6,10 @@ import re
 from pathlib import Path
 
 import pytest
-from tests.model.scenario_texts import CALIBRATION, FAULT, PLAIN
+from tests.model.scenarios.scenario_texts import CALIBRATION, FAULT, PLAIN
 
 from sosmith.model.errors import SpecificationError
-from sosmith.model.scenario_file import load_scenario
+from sosmith.model.scenarios.file import load_scenario
 
 EXCERPT_KEYS = (
     "day, operation, seconds, temperature, temperature_to, time_constant, clearances, motion, motion_from, vibration, "

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sosmith.model.track import curved_track, tangent_track
-from sosmith.model.vehicle_clearance import IRREGULARITY, SPEED, WHEELSET, vehicle_clearance
-from sosmith.model.vehicle_parameters import built_in
-from sosmith.model.vehicle_run import run
+from sosmith.model.scenarios.vehicle_clearance import IRREGULARITY, SPEED, WHEELSET, vehicle_clearance
+from sosmith.model.vehicle.parameters import built_in
+from sosmith.model.vehicle.run import run
+from sosmith.model.vehicle.track import curved_track, tangent_track
 
 
 @pytest.mark.parametrize(("name", "make"), [("paper", curved_track), ("tangent", tangent_track)])

@@ -9,7 +9,7 @@ import pytest
 from scipy import signal
 from tests.model.datapaths import butterworth, sections_of
 
-from sosmith.model.direct_form import DirectForm1, Product
+from sosmith.model.sections.direct_form import DirectForm1, Product
 
 F7 = butterworth(7, 0.002588)
 

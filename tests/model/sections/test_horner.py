@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sosmith.model.horner import HornerPolynomial, Variable
+from sosmith.model.sections.horner import HornerPolynomial, Variable
 
 V, T = Variable(name="voltage", bits=10), Variable(name="temperature", bits=8, signed=True)
 rows = st.lists(st.lists(st.integers(-5000, 5000), min_size=1, max_size=4).map(tuple), min_size=1, max_size=5).map(

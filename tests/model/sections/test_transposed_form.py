@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from tests.model.datapaths import butterworth, sections_of
 
-from sosmith.model.direct_form import Product
-from sosmith.model.transposed_form import TransposedForm
+from sosmith.model.sections.direct_form import Product
+from sosmith.model.sections.transposed_form import TransposedForm
 
 F7 = butterworth(7, 0.002588)
 WIDE = (-(1 << 90), 1 << 90)

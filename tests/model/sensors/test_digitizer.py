@@ -7,9 +7,9 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from sosmith.model.digitizer import CodeFault, Digitizer, with_faults
 from sosmith.model.port import Codes, Port
 from sosmith.model.random_streams import streams
+from sosmith.model.sensors.digitizer import CodeFault, Digitizer, with_faults
 
 VOLTAGE = Port.from_range("voltage", 16, Fraction(0), Fraction(10), unit="V")
 SIGNED = Port.from_range("emf", 8, Fraction(-1), Fraction(1), signed=True, unit="mV")

@@ -8,8 +8,12 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from sosmith.model.coil import FIT_CLEARANCES, FIT_TEMPERATURES, REFERENCE_TEMPERATURE, Coil
-from sosmith.model.inductive_sensor import (
+from sosmith.gen.paper.figures import read_paper_figures
+from sosmith.model.calibration.polynomial import EQUATION_4, EQUATION_5A, Polynomial
+from sosmith.model.port import Values
+from sosmith.model.random_streams import streams
+from sosmith.model.sensors.coil import FIT_CLEARANCES, FIT_TEMPERATURES, REFERENCE_TEMPERATURE, Coil
+from sosmith.model.sensors.inductive_sensor import (
     FORWARD_MODELS,
     VOLTAGE_NOISE,
     Ageing,
@@ -20,10 +24,6 @@ from sosmith.model.inductive_sensor import (
     SystematicError,
     sensor_voltage,
 )
-from sosmith.model.paper_figures import read_paper_figures
-from sosmith.model.polynomial import EQUATION_4, EQUATION_5A, Polynomial
-from sosmith.model.port import Values
-from sosmith.model.random_streams import streams
 
 PAPER = read_paper_figures()
 TABLE_1, TABLE_4 = (np.array(PAPER.numbers(table, "error"), dtype=np.float64) for table in ("table_1", "table_4"))

@@ -8,12 +8,12 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from sosmith.model.digitizer import CodeFault, Digitizer
-from sosmith.model.inductive_sensor import InductiveSensor, sensor_voltage
 from sosmith.model.port import Codes, Port
 from sosmith.model.random_streams import one_stream, streams
-from sosmith.model.sensors import SensorFaults, Sensors
-from sosmith.model.thermometer import IdealThermometer, ThermocoupleChain
+from sosmith.model.sensors.digitizer import CodeFault, Digitizer
+from sosmith.model.sensors.inductive_sensor import InductiveSensor, sensor_voltage
+from sosmith.model.sensors.instrument import SensorFaults, Sensors
+from sosmith.model.sensors.thermometer import IdealThermometer, ThermocoupleChain
 
 VOLTAGE = Port.from_range("voltage", 16, Fraction(0), Fraction(10), unit="V")
 TEMPERATURE = Port.from_range("temperature", 16, Fraction(0), Fraction(256), unit="degC")

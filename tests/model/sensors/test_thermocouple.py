@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sosmith.model.errors import SpecificationError
-from sosmith.model.thermocouple import (
+from sosmith.model.sensors.thermocouple import (
     EMF_RANGE,
     INVERSE_ERROR,
     TEMPERATURE_RANGE,

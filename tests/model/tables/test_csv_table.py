@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from sosmith.model.csv_table import read_csv_table
 from sosmith.model.errors import SpecificationError
+from sosmith.model.tables.csv_table import read_csv_table
 
 
 def test_reads_numbers_in_any_column_order(tmp_path: Path) -> None:

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sosmith.model.calibration.polynomial import EQUATION_5A
 from sosmith.model.errors import SpecificationError
-from sosmith.model.polynomial import EQUATION_5A
-from sosmith.model.signal_file import CALIBRATED, SignalFile, read_signal_file
+from sosmith.model.traces.signal_file import CALIBRATED, SignalFile, read_signal_file
 
 
 def write(path: Path, header: str, row: Callable[[int], str], rows: int = 100) -> Path:

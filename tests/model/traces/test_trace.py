@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from sosmith.model.port import Port
-from sosmith.model.trace import Trace
+from sosmith.model.traces.trace import Trace
 
 VOLTAGE = Port.from_range("voltage", 16, Fraction(0), Fraction(10), unit="V")
 TEMPERATURE = Port.from_range("temperature", 16, Fraction(0), Fraction(128), unit="degC")

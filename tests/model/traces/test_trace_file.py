@@ -12,8 +12,8 @@ import pytest
 
 from sosmith.model.errors import SpecificationError
 from sosmith.model.port import Port
-from sosmith.model.trace import Trace
-from sosmith.model.trace_file import read_traces, traces_csv, write_traces
+from sosmith.model.traces.trace import Trace
+from sosmith.model.traces.trace_file import read_traces, traces_csv, write_traces
 
 VOLTAGE = Port.from_range("voltage", 16, Fraction(0), Fraction(10), unit="V")
 TEMPERATURE = Port.from_range("temperature", 16, Fraction(0), Fraction(128), unit="degC")

@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sosmith.model.linear_motion import LinearSystem
-from sosmith.model.vehicle_lateral import (
+from sosmith.model.vehicle.lateral import (
     COORDINATES,
     ROLLS,
     axle_positions,
@@ -18,10 +17,11 @@ from sosmith.model.vehicle_lateral import (
     wheelset_load,
     wheelset_positions,
 )
-from sosmith.model.vehicle_parameters import built_in
-from sosmith.model.vehicle_vertical import COORDINATES as VERTICAL
-from sosmith.model.vehicle_vertical import vertical_dynamics
-from sosmith.model.wheel_rail_contact import GRAVITY, klingel_frequency
+from sosmith.model.vehicle.linear_motion import LinearSystem
+from sosmith.model.vehicle.parameters import built_in
+from sosmith.model.vehicle.vertical import COORDINATES as VERTICAL
+from sosmith.model.vehicle.vertical import vertical_dynamics
+from sosmith.model.vehicle.wheel_rail_contact import GRAVITY, klingel_frequency
 
 GIVEN = built_in()
 NAMES = COORDINATES + ROLLS

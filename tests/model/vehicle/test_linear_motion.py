@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import integrate
 
-from sosmith.model.linear_motion import LinearSystem, Mode, Suspension
+from sosmith.model.vehicle.linear_motion import LinearSystem, Mode, Suspension
 
 M, C, K = 3.0, 2.0, 50.0
 SINGLE = LinearSystem(names=("x",), mass=np.array([[M]]), damping=np.array([[C]]), stiffness=np.array([[K]]))

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from sosmith.model.errors import SpecificationError
-from sosmith.model.vehicle_parameters import LABELS, built_in, built_in_text, load, parse
-from sosmith.model.wheel_rail_contact import GRAVITY
+from sosmith.model.vehicle.parameters import LABELS, built_in, built_in_text, load, parse
+from sosmith.model.vehicle.wheel_rail_contact import GRAVITY
 
 RIGHT = built_in_text()
 LOAD = 'source = "[assumed] dry rail; only tells where linear creep ends"'

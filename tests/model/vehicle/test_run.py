@@ -9,19 +9,19 @@ import numpy as np
 import pytest
 
 from sosmith.model.errors import SpecificationError
-from sosmith.model.track import Track, curved_track, tangent_track
-from sosmith.model.vehicle_lateral import (
+from sosmith.model.vehicle.lateral import (
     COORDINATES,
     frame_positions,
     lateral_dynamics,
     wheelset_load,
     wheelset_positions,
 )
-from sosmith.model.vehicle_limits import limits
-from sosmith.model.vehicle_motion import Motion, clearance_change
-from sosmith.model.vehicle_parameters import Parameters, built_in
-from sosmith.model.vehicle_run import run
-from sosmith.model.wheel_rail_contact import GRAVITY, creep_coefficients
+from sosmith.model.vehicle.limits import limits
+from sosmith.model.vehicle.motion import Motion, clearance_change
+from sosmith.model.vehicle.parameters import Parameters, built_in
+from sosmith.model.vehicle.run import run
+from sosmith.model.vehicle.track import Track, curved_track, tangent_track
+from sosmith.model.vehicle.wheel_rail_contact import GRAVITY, creep_coefficients
 
 GIVEN = built_in()
 PAPER = curved_track(GIVEN.track)

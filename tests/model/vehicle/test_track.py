@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from scipy import integrate, signal
 
-from sosmith.model.track import curved_track, tangent_track
-from sosmith.model.track_irregularity import irregularity, spectra, synthesize
-from sosmith.model.vehicle_parameters import built_in
+from sosmith.model.vehicle.parameters import built_in
+from sosmith.model.vehicle.track import curved_track, tangent_track
+from sosmith.model.vehicle.track_irregularity import irregularity, spectra, synthesize
 
 TABLE = built_in().track
 WAVES = built_in().irregularities

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from sosmith.model.linear_motion import LinearSystem, Suspension
-from sosmith.model.vehicle_parameters import built_in
-from sosmith.model.wheel_rail_contact import Creep, contact_matrices, creep_coefficients, klingel_frequency
+from sosmith.model.vehicle.linear_motion import LinearSystem, Suspension
+from sosmith.model.vehicle.parameters import built_in
+from sosmith.model.vehicle.wheel_rail_contact import Creep, contact_matrices, creep_coefficients, klingel_frequency
 
 WHEELSET = {"conicity": 0.1, "rolling_radius": 0.45, "half_spacing": 0.75}
 

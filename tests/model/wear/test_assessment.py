@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sosmith.gen.wear_limits import WearSpec
+from sosmith.gen.specification.wear_limits import WearSpec
 from sosmith.model.errors import SpecificationError
 from sosmith.model.port import Port, Values
-from sosmith.model.wear import WearLimits, WearState, block_medians, judge, last_fall, rate_of
+from sosmith.model.wear.assessment import WearLimits, WearState, block_medians, judge, last_fall, rate_of
 
 LIMITS = WearLimits(initial=1.5, limit=9, warning=7)
 
