@@ -81,9 +81,13 @@ def _specifications() -> dict[str, str]:
             "df1",
         ),
         "minimum_noise": ('family = "butterworth"; kind = "lowpass"; order = 4; cutoff = 8.0', "state_space"),
-        "normal_form": ('family = "chebyshev1"; kind = "lowpass"; order = 3; cutoff = 20.0; passband_loss = 0.3', "normal"),
+        "normal_form": (
+            'family = "chebyshev1"; kind = "lowpass"; order = 3; cutoff = 20.0; passband_loss = 0.3',
+            "normal",
+        ),
         "wave_lattice": (
-            'family = "elliptic"; kind = "lowpass"; order = 5; cutoff = 100.0; passband_loss = 0.5; stopband_loss = 50.0',
+            'family = "elliptic"; kind = "lowpass"; order = 5; cutoff = 100.0; passband_loss = 0.5;'
+            "stopband_loss = 50.0",
             "lattice_wdf",
         ),
         "sampled_impulse": (

@@ -1,8 +1,8 @@
 """Results that do not depend on the machine: ball arithmetic at rising precision until every number is decided.
 
-A ball encloses the exact value of an expression. Where all of a ball rounds to one double, that is the correctly rounded
-value, whatever the precision, the library's version and the machine. Where it does not, `evaluate` starts again with
-twice the bits.
+A ball encloses the exact value of an expression. Where all of a ball rounds to one double, that is the correctly
+rounded value, whatever the precision, the library's version and the machine. Where it does not, `evaluate` starts again
+with twice the bits.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ T = TypeVar("T")
 _FIRST_PRECISION = 192
 """Bits: enough for nearly all filters of low order."""
 
-_LAST_PRECISION = 6144
+_MAX_PRECISION = 6144
 """Bits: far beyond what any filter needs that a specification allows. What is open here is an equality."""
 
 
@@ -41,7 +41,7 @@ def evaluate(function: Callable[[], T]) -> T:
             with ctx.workprec(bits):
                 return function()
         except UndecidedError:
-            if bits >= _LAST_PRECISION:
+            if bits >= _MAX_PRECISION:
                 raise
             bits *= 2
 
@@ -67,7 +67,7 @@ def nearest_double(value: arb) -> float:
     low, high = float(_fraction(value.lower())), float(_fraction(value.upper()))
     if low == high:
         return low + 0.0  # zero has no sign here
-    if ctx.prec >= _LAST_PRECISION:
+    if ctx.prec >= _MAX_PRECISION:
         return float(_fraction(value.mid()))
     raise UndecidedError
 
@@ -84,7 +84,7 @@ def sign(value: arb) -> int:
         return 1
     if value < 0:
         return -1
-    if value.is_zero() or (value.is_finite() and ctx.prec >= _LAST_PRECISION):
+    if value.is_zero() or (value.is_finite() and ctx.prec >= _MAX_PRECISION):
         return 0
     raise UndecidedError
 

@@ -220,9 +220,7 @@ def _zero_groups(numerator: acb_poly, *, delayed: bool) -> list[_Group]:
     """
     constant = 1 if delayed else 0
     rest = acb_poly([numerator[k] for k in range(constant, numerator.degree() + 1)])
-    zeros = sorted(
-        (1 / root for root in _roots(rest)), key=lambda zero: (nearest_double(abs(zero) ** 2), nearest_double(zero.imag))
-    )
+    zeros = sorted((1 / root for root in _roots(rest)), key=_size_and_side)
     real = [zero for zero in zeros if zero.imag.is_zero()]
     groups = [_Group(acb_poly([1, -2 * zero.real, abs(zero) ** 2]), (zero,)) for zero in zeros if zero.imag > 0]
     while len(real) > 1:
@@ -232,6 +230,10 @@ def _zero_groups(numerator: acb_poly, *, delayed: bool) -> list[_Group]:
     if delayed or real:
         groups.append(_Group(left_over * acb_poly([0, 1]) if delayed else left_over, tuple(real)))
     return groups
+
+
+def _size_and_side(zero: acb) -> tuple[float, float]:
+    return nearest_double(abs(zero) ** 2), nearest_double(zero.imag)
 
 
 def _roots(polynomial: acb_poly) -> list[acb]:

@@ -10,9 +10,9 @@ References
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import cast
 
 from flint import acb, arb, fmpq, fmpz_poly
 
@@ -64,18 +64,20 @@ def prototype(family: str, order: int, passband_loss: Fraction | None, stopband_
     passband_loss, stopband_loss : Fraction or None
         dB, where the family has ripples there.
     """
-    if family == "butterworth":
-        return _butterworth(order)
-    if family == "bessel":
-        return _bessel(order)
-    made: Callable[..., Prototype] = {"chebyshev1": _chebyshev1, "chebyshev2": _chebyshev2, "elliptic": _elliptic}[family]
-    losses = {"chebyshev1": (passband_loss,), "chebyshev2": (stopband_loss,), "elliptic": (passband_loss, stopband_loss)}
-    ripples = []
-    for loss in losses[family]:
-        if loss is None:
-            raise ValueError(f"{family} must have its losses given, not None")
-        ripples.append(ripple(loss))
-    return made(order, *ripples)
+    passband, stopband = (None if loss is None else ripple(loss) for loss in (passband_loss, stopband_loss))
+    match family, passband, stopband:
+        case "butterworth", _, _:
+            return _butterworth(order)
+        case "bessel", _, _:
+            return _bessel(order)
+        case "chebyshev1", arb(), _:
+            return _chebyshev1(order, passband)
+        case "chebyshev2", _, arb():
+            return _chebyshev2(order, stopband)
+        case "elliptic", arb(), arb():
+            return _elliptic(order, passband, stopband)
+        case _:
+            raise ValueError(f"family must be one that these losses suit, not {family}")
 
 
 def ripple(loss: Fraction) -> arb:
@@ -140,11 +142,11 @@ def _elliptic(order: int, passband: arb, stopband: arb) -> Prototype:
     square = 1 / (1 + passband**2)  # sin(phi)**2
     integral = acb.elliptic_rf(acb(1 - square), acb(1 - square + k1**2 * square), acb(1)).real * square.sqrt()
     v = integral * 2 * complement.agm(1) / (arb.pi() * order)
-    _, second, third, _ = acb(0).modular_theta(tau)
+    _, second, third, _ = acb.modular_theta(acb(0), tau)
 
     def sine(z: acb) -> acb:
         """``sqrt(k) sn(2 z K)``, and k = (second / third)**2."""
-        first, _, _, fourth = z.modular_theta(tau)
+        first, _, _, fourth = acb.modular_theta(z, tau)
         return first / fourth
 
     root = second / third  # of k
@@ -166,11 +168,16 @@ def _bessel(order: int) -> Prototype:
     even = fmpz_poly([(-1) ** (k // 2) * c for k, c in enumerate(coefficients) if k % 2 == 0])
     odd = fmpz_poly([(-1) ** (k // 2) * c for k, c in enumerate(coefficients) if k % 2])
     power = even * even + fmpz_poly([0, 1]) * odd * odd - 2 * coefficients[0] ** 2
-    (edge,) = (root.real.sqrt() for root, _ in power.complex_roots() if root.imag.is_zero() and root.real > 0)
-    poles = [root / edge for root, _ in fmpz_poly(coefficients).complex_roots()]
+    (edge,) = (root.real.sqrt() for root in _roots(power) if root.imag.is_zero() and root.real > 0)
+    poles = [root / edge for root in _roots(fmpz_poly(coefficients))]
     return Prototype(
         zeros=(),
         real_poles=tuple(pole.real for pole in poles if pole.imag.is_zero()),
         pole_pairs=tuple(pole for pole in poles if pole.imag > 0),
         dc_gain=arb(1),
     )
+
+
+def _roots(polynomial: fmpz_poly) -> list[acb]:
+    # The library's own types leave out the multiplicities; both polynomials have simple roots.
+    return [root for root, _ in cast("list[tuple[acb, int]]", polynomial.complex_roots())]

@@ -111,7 +111,9 @@ def _sorted(roots: list[_Root]) -> list[_Root]:
 def _with_equal_zeros(filter_: DigitalFilter, zero: int) -> list[Section]:
     one, zero_ball = arb(1), arb(0)
     made = [Section((one, arb(-zero), zero_ball), (one, -pole, zero_ball)) for pole in filter_.real_poles]
-    pairs = sorted((_Root(pole, real=False) for pole in filter_.pole_pairs), key=lambda pole: (-_margin(pole), pole.key))
+    pairs = sorted(
+        (_Root(pole, real=False) for pole in filter_.pole_pairs), key=lambda pole: (-_margin(pole), pole.key)
+    )
     return made + [Section((one, arb(-2 * zero), one), _pair(pole)) for pole in pairs]
 
 

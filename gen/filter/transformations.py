@@ -70,7 +70,12 @@ def bilinear(prototype: Prototype, kind: str, edges: Sequence[arb]) -> DigitalFi
     UndecidedError
         If the precision does not tell whether two poles are real.
     """
-    real, pairs, zeros, infinite = prototype.real_poles, prototype.pole_pairs, prototype.zeros, prototype.zeros_at_infinity
+    real, pairs, zeros, infinite = (
+        prototype.real_poles,
+        prototype.pole_pairs,
+        prototype.zeros,
+        prototype.zeros_at_infinity,
+    )
     if kind in {"highpass", "bandstop"}:  # s -> 1 / s
         real = tuple(1 / pole for pole in real)
         pairs = tuple((1 / pole).conjugate() for pole in pairs)
@@ -104,9 +109,7 @@ def bilinear(prototype: Prototype, kind: str, edges: Sequence[arb]) -> DigitalFi
     )
 
 
-def _band(
-    real: Sequence[arb], pairs: Sequence[acb], centre: arb
-) -> tuple[tuple[arb, ...], tuple[acb, ...]]:
+def _band(real: Sequence[arb], pairs: Sequence[acb], centre: arb) -> tuple[tuple[arb, ...], tuple[acb, ...]]:
     """Roots s of ``s**2 - 2 q s + centre`` for every q, real or one of each conjugate pair."""
     real_roots: list[arb] = []
     pair_roots: list[acb] = []
