@@ -18,13 +18,13 @@ import numpy.typing as npt
 from flint import acb, arb, fmpq
 from scipy import signal
 
-from sosmith.gen.filter.correct_rounding import evaluate, nearest_double, sign
 from sosmith.gen.filter.impulse_invariance import Aliasing, aliasing, impulse_invariant
 from sosmith.gen.filter.minimum_order import least_order
 from sosmith.gen.filter.prototypes import Prototype, prototype
 from sosmith.gen.filter.sections import Row, rounded, sections
 from sosmith.gen.filter.transformations import bilinear, unwarped, warped
 from sosmith.gen.specification.specification import FilterSpec
+from sosmith.model.arithmetic.correct_rounding import evaluate, nearest_double, sign
 from sosmith.model.errors import ShortfallError, SpecificationError
 
 Array = npt.NDArray[np.float64]

@@ -22,9 +22,9 @@ from fractions import Fraction
 
 from flint import acb, acb_poly, arb, ctx
 
-from sosmith.gen.filter.correct_rounding import UndecidedError, ball, nearest_double
 from sosmith.gen.filter.prototypes import Prototype
 from sosmith.gen.filter.sections import Row, Section, rounded
+from sosmith.model.arithmetic.correct_rounding import UndecidedError, ball, nearest_double
 
 _GRID = 512
 """Points of each of the two grids on which responses are compared, one even and one logarithmic."""

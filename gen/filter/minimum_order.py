@@ -11,8 +11,8 @@ from fractions import Fraction
 
 from flint import arb
 
-from sosmith.gen.filter.correct_rounding import ceiling
 from sosmith.gen.filter.prototypes import excess
+from sosmith.model.arithmetic.correct_rounding import ceiling
 
 
 def least_order(

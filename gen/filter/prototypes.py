@@ -16,7 +16,7 @@ from typing import cast
 
 from flint import acb, arb, fmpq, fmpz_poly
 
-from sosmith.gen.filter.correct_rounding import ball
+from sosmith.model.arithmetic.correct_rounding import ball
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 from flint import acb, arb
 
-from sosmith.gen.filter.correct_rounding import ball, nearest_double
 from sosmith.gen.filter.transformations import DigitalFilter
+from sosmith.model.arithmetic.correct_rounding import ball, nearest_double
 
 Row = tuple[float, ...]
 """(b0, b1, b2, 1, a1, a2)."""

@@ -11,8 +11,8 @@ from fractions import Fraction
 
 from flint import acb, arb, fmpq
 
-from sosmith.gen.filter.correct_rounding import sign
 from sosmith.gen.filter.prototypes import Prototype
+from sosmith.model.arithmetic.correct_rounding import sign
 
 
 @dataclass(frozen=True, kw_only=True)
