@@ -27,11 +27,10 @@ def installed(tmp_path: Path, *versions: str) -> subprocess.CompletedProcess[str
         (tmp_path / "bin" / name).symlink_to("/bin/true")
     for place, version in enumerate(versions):
         path = tmp_path / "bin" / (f"python{version}" if place else "python3")
+        as_told = f"import sys; sys.version_info = ({version.replace('.', ', ')}, 0)"
         path.write_text(
-            "#!/bin/sh\ncase $1 in\n"
-            f"--version) echo Python {version}.0 ;;\n"
-            f"-c) exec {sys.executable} -c \"import sys; sys.version_info = ({version.replace('.', ', ')}, 0); $2\" ;;\n"
-            "-m) exit 1 ;;\nesac\n"
+            f"#!/bin/sh\ncase $1 in\n--version) echo Python {version}.0 ;;\n"
+            f'-c) exec {sys.executable} -c "{as_told}; $2" ;;\n-m) exit 1 ;;\nesac\n'
         )
         path.chmod(0o755)
     for name in ("run", "pyproject.toml", "constraints.txt"):
@@ -78,5 +77,7 @@ def test_the_versions_are_the_same_everywhere() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     assert project["requires-python"] == ">=3.11,<3.15"
     prefix = "Programming Language :: Python :: 3."
-    assert tuple(f"3.{one.removeprefix(prefix)}" for one in project["classifiers"] if one.startswith(prefix)) == SUPPORTED
-    assert re.findall(r"Python (3\.\d+ to 3\.\d+)", (ROOT / "README.md").read_text(encoding="utf-8")) == ["3.11 to 3.14"]
+    classified = [one.removeprefix(prefix) for one in project["classifiers"] if one.startswith(prefix)]
+    assert tuple(f"3.{minor}" for minor in classified) == SUPPORTED
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert re.findall(r"Python (3\.\d+ to 3\.\d+)", readme) == ["3.11 to 3.14"]
