@@ -32,8 +32,8 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
 from sosmith.gen.core import CoreDesign, design_core
-from sosmith.gen.specification import load
-from sosmith.gen.verilog import to_rtlil, to_verilog
+from sosmith.gen.output.verilog import to_rtlil, to_verilog
+from sosmith.gen.specification.specification import load
 
 ROOT = Path(__file__).resolve().parent.parent
 RECORD = ROOT / "benchmarks" / "cost.json"

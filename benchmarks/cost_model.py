@@ -1,4 +1,4 @@
-"""Synthesizes cores for ECP5 and fits the area model of `sosmith.gen.cost` to the result.
+"""Synthesizes cores for ECP5 and fits the area model of `sosmith.gen.word_lengths.cost` to the result.
 
 `python -m benchmarks.cost_model` needs no more than the program itself. It prints, for each core, the LUT4 (a
 CCU2C counts as two), flip-flops and MULT18X18D that Yosys needs beside what the model says, then the fitted constants.
@@ -13,10 +13,10 @@ import numpy as np
 from benchmarks.synthesis import TARGETS, Area, synthesize
 
 from sosmith.gen.core import design_core
-from sosmith.gen.cost import Cost, cost_of
-from sosmith.gen.generate import generate
-from sosmith.gen.realizations import REALIZATIONS
-from sosmith.gen.specification import load
+from sosmith.gen.output.generate import generate
+from sosmith.gen.realizations.registry import REALIZATIONS
+from sosmith.gen.specification.specification import load
+from sosmith.gen.word_lengths.cost import Cost, cost_of
 
 ROOT = Path(__file__).resolve().parent.parent
 CORES = [

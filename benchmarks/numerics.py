@@ -18,17 +18,17 @@ from matplotlib.figure import Figure
 from scipy import signal
 
 from sosmith.gen.core import CoreDesign, design_core
-from sosmith.gen.cost import LUTS_OF_A_BLOCK, cost_of
-from sosmith.gen.design import decay_length
-from sosmith.gen.linear_model import linear_model
-from sosmith.gen.noise import minimum_gain, second_order_modes
-from sosmith.gen.realizations import REALIZATIONS, SectionFormat
-from sosmith.gen.specification import load
-from sosmith.gen.state_space_design import minimum_noise
+from sosmith.gen.filter.design import decay_length
+from sosmith.gen.proof.linear_model import linear_model
+from sosmith.gen.realizations.noise import minimum_gain, second_order_modes
+from sosmith.gen.realizations.registry import REALIZATIONS, SectionFormat
+from sosmith.gen.realizations.state_space import minimum_noise
+from sosmith.gen.specification.specification import load
+from sosmith.gen.word_lengths.cost import LUTS_OF_A_BLOCK, cost_of
+from sosmith.model.dataflow.graph import Op
 from sosmith.model.errors import ShortfallError
-from sosmith.model.golden import calibrated, filtered
-from sosmith.model.graph import Op
 from sosmith.model.port import Codes
+from sosmith.model.reference.golden import calibrated, filtered
 from sosmith.sim.simulation import traces_for
 
 ROOT = Path(__file__).resolve().parent.parent

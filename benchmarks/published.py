@@ -11,7 +11,14 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from sosmith.gen.noise import StateSystem, block_optimal, cascade, companion, minimum_gain, second_order_modes
+from sosmith.gen.realizations.noise import (
+    StateSystem,
+    block_optimal,
+    cascade,
+    companion,
+    minimum_gain,
+    second_order_modes,
+)
 
 Array = npt.NDArray[np.float64]
 Row = tuple[float, ...]

@@ -18,22 +18,22 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
 from sosmith.gen.core import CoreDesign, design_core
-from sosmith.gen.specification import load
-from sosmith.model.accuracy import accuracy_percent
-from sosmith.model.calibration import Fit, Measurements, fit
-from sosmith.model.depot_measurements import measurements_of
-from sosmith.model.golden import calibrated, filtered
-from sosmith.model.inductive_sensor import FORWARD_MODELS, SystematicError, sensor_voltage
-from sosmith.model.instrument_signals import TABLE_1_STEPS, TABLE_2_STEPS
-from sosmith.model.paper_figures import read_paper_figures
-from sosmith.model.polynomial import EQUATION_5A, Polynomial
+from sosmith.gen.paper.figures import read_paper_figures
+from sosmith.gen.specification.specification import load
+from sosmith.model.calibration.fit import Fit, Measurements, fit
+from sosmith.model.calibration.polynomial import EQUATION_5A, Polynomial
 from sosmith.model.port import Values
 from sosmith.model.random_streams import streams
-from sosmith.model.scenario_file import ScenarioFile, emulate_file, load_scenario
-from sosmith.model.scenario_schema import ScenarioDocument
-from sosmith.model.thermocouple import thermocouple_emf, thermocouple_temperature
-from sosmith.model.toml_tables import Table, shown
-from sosmith.model.trace import Trace
+from sosmith.model.reference.accuracy import accuracy_percent
+from sosmith.model.reference.golden import calibrated, filtered
+from sosmith.model.scenarios.depot_measurements import measurements_of
+from sosmith.model.scenarios.file import ScenarioFile, emulate_file, load_scenario
+from sosmith.model.scenarios.instrument_signals import TABLE_1_STEPS, TABLE_2_STEPS
+from sosmith.model.scenarios.schema import ScenarioDocument
+from sosmith.model.sensors.inductive_sensor import FORWARD_MODELS, SystematicError, sensor_voltage
+from sosmith.model.sensors.thermocouple import thermocouple_emf, thermocouple_temperature
+from sosmith.model.tables.toml_tables import Table, shown
+from sosmith.model.traces.trace import Trace
 from sosmith.sim.simulation import bench_of
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from sosmith.gen.boards import Board, find_board
+from sosmith.gen.fpga.boards import Board, find_board
 
 GOAL = 200
 """Clock in MHz that nextpnr is asked for: above what any design reaches, so that it never stops short of its best."""

@@ -10,14 +10,14 @@ from functools import cached_property
 
 from amaranth.lib.wiring import Component
 
-from sosmith.gen.boards import Board
+from sosmith.gen.fpga.boards import Board
 from sosmith.hdl import core, folded
-from sosmith.model.constants import with_room
-from sosmith.model.datapath import Datapath
+from sosmith.model.dataflow.datapath import Datapath
+from sosmith.model.dataflow.folding import FoldingError, program
+from sosmith.model.dataflow.graph import Node, Op
+from sosmith.model.dataflow.program import Program
 from sosmith.model.errors import ShortfallError
-from sosmith.model.folding import FoldingError, program
-from sosmith.model.graph import Node, Op
-from sosmith.model.program import Program
+from sosmith.model.reload.constants import with_room
 
 DIGIT_BITS = 15
 """Of a digit: products of 16 bits, signed, fit one block of an iCE40 UltraPlus as well as one of an ECP5."""

@@ -7,16 +7,16 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 from sosmith.gen.architecture import Architecture, Budget, candidates, fitting, reason_for
-from sosmith.gen.boards import Board
-from sosmith.gen.design import Filter, design
-from sosmith.gen.quantize import Plan, Quantized, plan, prove, with_realization
-from sosmith.gen.realizations import ERROR_FEEDBACK, REALIZATIONS
-from sosmith.gen.selection import Accept, Selection
-from sosmith.gen.specification import Specification
-from sosmith.model.calibration import Fit, fit, read_measurements
-from sosmith.model.datapath import Datapath
+from sosmith.gen.filter.design import Filter, design
+from sosmith.gen.fpga.boards import Board
+from sosmith.gen.realizations.registry import ERROR_FEEDBACK, REALIZATIONS
+from sosmith.gen.specification.specification import Specification
+from sosmith.gen.word_lengths.quantize import Plan, Quantized, plan, prove, with_realization
+from sosmith.gen.word_lengths.selection import Accept, Selection
+from sosmith.model.calibration.fit import Fit, fit, read_measurements
+from sosmith.model.calibration.polynomial import Polynomial
+from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.errors import ShortfallError, SpecificationError
-from sosmith.model.polynomial import Polynomial
 from sosmith.model.port import Port
 
 CORES = ("instrument", "filter", "calibration")

@@ -9,8 +9,8 @@ from amaranth.hdl import Cat, Module, Signal, Value
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
+from sosmith.model.dataflow.status import STATUS_BITS
 from sosmith.model.port import Port
-from sosmith.model.status import STATUS_BITS
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ from amaranth.hdl import Cat, Module, Mux, Signal, Value, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In
 
-from sosmith.model.constants import Constant, packed, values_of
-from sosmith.model.datapath import Datapath
+from sosmith.model.dataflow.datapath import Datapath
+from sosmith.model.reload.constants import Constant, packed, values_of
 
 _WORD = 32
 

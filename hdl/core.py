@@ -22,9 +22,9 @@ from sosmith.hdl.ranked_logic import banks_in_use
 from sosmith.hdl.reload import ReloadPort
 from sosmith.hdl.stage import PipelineStage, rank_count
 from sosmith.hdl.status import at_rail, flag_count, outside_calibration, worn
-from sosmith.model.constants import constants
-from sosmith.model.datapath import Datapath, Stage
-from sosmith.model.reload_registers import ADDRESS_BITS
+from sosmith.model.dataflow.datapath import Datapath, Stage
+from sosmith.model.reload.constants import constants
+from sosmith.model.reload.registers import ADDRESS_BITS
 
 
 def latency_cycles(datapath: Datapath, channels: int = 1) -> int:
@@ -67,7 +67,7 @@ class Core(wiring.Component):
     m_axis_tdata, m_axis_tvalid, m_axis_tready
         Output samples: one field, extended likewise.
     m_axis_tuser : Out(8)
-        Status of the output sample, bits as of `sosmith.model.status.Flag`.
+        Status of the output sample, bits as of `sosmith.model.dataflow.status.Flag`.
     s_axis_tdest, m_axis_tdest
         Number of the sample's channel, in whole bytes; only with several channels.
     s_axil_*

@@ -1,9 +1,9 @@
 """The folded and serial architectures: one multiply-accumulate unit that runs a datapath's program.
 
 Several ranks work on as many instructions at once: fetch, read, multiply, accumulate; the program keeps an
-instruction that reads a word far enough from the one that stores it (`sosmith.model.program.HAZARD`). In the folded
-architecture both memories have a register behind them, for speed. In the serial one they have none, for size, the
-multiplication is done by shifts and additions in the accumulator, and the ranks wait for it.
+instruction that reads a word far enough from the one that stores it (`sosmith.model.dataflow.program.HAZARD`).
+In the folded architecture both memories have a register behind them, for speed. In the serial one they have none,
+for size, the multiplication is done by shifts and additions in the accumulator, and the ranks wait for it.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from sosmith.hdl.axi_stream import channel_bits, core_members, extended, fields
 from sosmith.hdl.ranked_logic import limits
 from sosmith.hdl.reload import ReloadPort
 from sosmith.hdl.status import at_rail, worn
-from sosmith.model.datapath import Datapath
-from sosmith.model.graph import Op
-from sosmith.model.program import Do, Instruction, Place, Program
-from sosmith.model.reload_registers import ADDRESS_BITS
+from sosmith.model.dataflow.datapath import Datapath
+from sosmith.model.dataflow.graph import Op
+from sosmith.model.dataflow.program import Do, Instruction, Place, Program
+from sosmith.model.reload.registers import ADDRESS_BITS
 
 _FOLDED_RANKS, _SERIAL_RANKS = 5, 3
 

@@ -20,8 +20,8 @@ from sosmith.hdl.axi_stream import channel_bits
 from sosmith.hdl.constant_banks import NO_CONSTANTS, Pair
 from sosmith.hdl.ranked_logic import RankedLogic, banks_in_use, limits, shape_of
 from sosmith.hdl.stage import PLAIN
-from sosmith.model.datapath import Stage
-from sosmith.model.graph import Graph, Node, Op
+from sosmith.model.dataflow.datapath import Stage
+from sosmith.model.dataflow.graph import Graph, Node, Op
 
 _ADDITION, _MULTIPLICATION, _PARTIAL_PRODUCT = 5, 12, 2
 """Time that an operation takes, some half nanoseconds of an ECP5; a product of several blocks has its parts added."""

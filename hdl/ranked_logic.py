@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from amaranth.hdl import Cat, Const, Module, Mux, Shape, Signal, Value
 
 from sosmith.hdl.constant_banks import Pair, chosen
-from sosmith.model.graph import Graph, Node, Op
+from sosmith.model.dataflow.graph import Graph, Node, Op
 
 
 def shape_of(node: Node) -> Shape:

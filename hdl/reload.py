@@ -9,7 +9,7 @@ from amaranth.lib.wiring import In, Out
 
 from sosmith.hdl.axi_lite import BITS, SerialSlave, slave_members
 from sosmith.hdl.serial_crc import SerialCrc
-from sosmith.model.reload_registers import (
+from sosmith.model.reload.registers import (
     ADDRESS_BITS,
     CRC,
     DATA,
@@ -18,7 +18,7 @@ from sosmith.model.reload_registers import (
     INTERFACE,
     LAYOUT,
     MAGIC,
-    MOST_WORDS,
+    MAX_WORDS,
     REGISTERS,
     STATUS,
     VERSION,
@@ -30,7 +30,7 @@ from sosmith.model.reload_registers import (
 class ReloadPort(wiring.Component):
     """Fills the bank of a core that is not active, and makes it active if it has arrived as it should.
 
-    The registers are those of `sosmith.model.reload_registers`. A load is a write of ``VERSION``, one of ``DATA`` for
+    The registers are those of `sosmith.model.reload.registers`. A load is a write of ``VERSION``, one of ``DATA`` for
     each word of the bank, and one of ``CRC``. Any refused write ends it. Only a load whose words are complete and whose
     CRC is right asks for a swap: `pending` is high from then on until a clock in which `may_swap` is high.
 
@@ -51,7 +51,7 @@ class ReloadPort(wiring.Component):
     Members
     -------
     s_axil_awaddr, .., s_axil_rready
-        AXI4-Lite slave of `sosmith.model.reload_registers.ADDRESS_BITS` address lines.
+        AXI4-Lite slave of `sosmith.model.reload.registers.ADDRESS_BITS` address lines.
     write_enable : Out(1)
         High for one clock for each word.
     write_address : Out(range(depth))
@@ -69,8 +69,8 @@ class ReloadPort(wiring.Component):
     """
 
     def __init__(self, depth: int, *, bits: int = BITS, design: int = 0) -> None:
-        if not 1 <= depth <= MOST_WORDS:
-            raise ValueError(f"depth must be 1 to {MOST_WORDS}, not {depth!r}")
+        if not 1 <= depth <= MAX_WORDS:
+            raise ValueError(f"depth must be 1 to {MAX_WORDS}, not {depth!r}")
         if not 1 <= bits <= BITS:
             raise ValueError(f"bits must be 1 to {BITS}, not {bits!r}")
         self.depth = depth

@@ -15,8 +15,8 @@ from amaranth.lib.wiring import In, Out
 
 from sosmith.hdl.constant_banks import NO_CONSTANTS, Pair
 from sosmith.hdl.ranked_logic import RankedLogic, banks_in_use, limits, shape_of
-from sosmith.model.datapath import Stage
-from sosmith.model.graph import Graph, Node, Op
+from sosmith.model.dataflow.datapath import Stage
+from sosmith.model.dataflow.graph import Graph, Node, Op
 
 PLAIN = {Op.INPUT, Op.CONSTANT, Op.DELAY, Op.SHIFT, Op.FLOOR, Op.FRACTION, Op.BOUND}
 """What takes no time in hardware."""

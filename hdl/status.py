@@ -1,4 +1,4 @@
-"""The flags beside a result, as of `sosmith.model.status.Flag`."""
+"""The flags beside a result, as of `sosmith.model.dataflow.status.Flag`."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from amaranth.hdl import Cat, Const, Module, Value
 from amaranth.lib.memory import Memory
 
 from sosmith.hdl.axi_stream import fields
-from sosmith.model.datapath import Datapath
+from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.port import Port
 
 

@@ -13,25 +13,25 @@ from typing import TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from sosmith.gen.boards import Board
 from sosmith.gen.core import CoreDesign
-from sosmith.gen.error_paths import error_responses
-from sosmith.gen.evidence import Alternative, Evidence, FilterFacts, Format
-from sosmith.gen.generate import generate
-from sosmith.gen.manifest import manifest, section_entries
-from sosmith.gen.quantize import Quantized, with_realization
-from sosmith.gen.realizations import ERROR_FEEDBACK
-from sosmith.gen.synthesis import Netlist, synthesize
+from sosmith.gen.fpga.boards import Board
+from sosmith.gen.fpga.synthesis import Netlist, synthesize
+from sosmith.gen.output.generate import generate
+from sosmith.gen.output.manifest import manifest, section_entries
+from sosmith.gen.realizations.registry import ERROR_FEEDBACK
+from sosmith.gen.report.evidence import Alternative, Evidence, FilterFacts, Format
+from sosmith.gen.word_lengths.error_paths import error_responses
+from sosmith.gen.word_lengths.quantize import Quantized, with_realization
 from sosmith.model.errors import SpecificationError
-from sosmith.model.golden import calibrated, filtered
 from sosmith.model.port import Codes, Values
-from sosmith.model.scenario_file import emulate_file, load_scenario, range_notes
-from sosmith.model.scenario_run import Bench
-from sosmith.model.scenarios import SCENARIOS, emulate
+from sosmith.model.reference.golden import calibrated, filtered
+from sosmith.model.scenarios.catalogue import SCENARIOS, emulate
+from sosmith.model.scenarios.file import emulate_file, load_scenario, range_notes
+from sosmith.model.scenarios.run import Bench
+from sosmith.model.scenarios.vehicle_clearance import vehicle_clearance
 from sosmith.model.text_files import write_files
-from sosmith.model.trace import Trace
-from sosmith.model.trace_file import read_traces
-from sosmith.model.vehicle_clearance import vehicle_clearance
+from sosmith.model.traces.trace import Trace
+from sosmith.model.traces.trace_file import read_traces
 from sosmith.sim.cosimulate import CosimulationResult, cosimulate
 from sosmith.sim.gate_level import with_cell_models
 from sosmith.sim.simulators import check_name

@@ -12,13 +12,13 @@ import pytest
 
 from sosmith.commands.calibrate import calibrate
 from sosmith.gen.core import design_core
-from sosmith.gen.specification import example, load
-from sosmith.model.calibration import fit, read_measurements
+from sosmith.gen.specification.specification import example, load
+from sosmith.model.calibration.fit import fit, read_measurements
+from sosmith.model.calibration.measurement_store import open_store
+from sosmith.model.calibration.self_updating import Addition, add, refused_first_file
 from sosmith.model.errors import ShortfallError, SpecificationError
-from sosmith.model.measurement_store import open_store
-from sosmith.model.self_updating import Addition, add, refused_first_file
 from tests.invocation import Invocation
-from tests.model.measuring import readings, write_csv
+from tests.model.calibration.measuring import readings, write_csv
 
 INVOCATION = Invocation("calibrate", columns=100)
 run, good, refused = INVOCATION.run, INVOCATION.good, INVOCATION.refused

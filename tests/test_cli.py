@@ -17,9 +17,9 @@ import pytest
 
 from sosmith import __version__
 from sosmith.cli import main
-from sosmith.gen.specification import example
+from sosmith.gen.specification.specification import example
 from sosmith.sim import simulators
-from tests.gen.test_bad_specifications import BAD, BASE
+from tests.gen.specification.test_bad_specifications import BAD, BASE
 
 FILTER = """\
 name = "plain"

@@ -16,10 +16,10 @@ import pytest
 from click.testing import CliRunner
 
 from sosmith.cli import cli
-from sosmith.gen.register_map import markdown
-from sosmith.gen.vehicle_report import parameters_markdown
-from sosmith.model.measurement_store import SCHEMA
-from sosmith.model.vehicle_parameters import built_in
+from sosmith.gen.instrument.vehicle_report import parameters_markdown
+from sosmith.gen.reload.register_map import markdown
+from sosmith.model.calibration.measurement_store import SCHEMA
+from sosmith.model.vehicle.parameters import built_in
 
 ROOT = Path(__file__).parents[1]
 README = ROOT / "README.md"

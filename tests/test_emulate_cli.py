@@ -12,12 +12,12 @@ from click.testing import CliRunner, Result
 
 from sosmith.cli import cli
 from sosmith.gen.core import design_core
-from sosmith.gen.specification import load
+from sosmith.gen.specification.specification import load
 from sosmith.model.errors import SpecificationError
-from sosmith.model.scenario_file import load_scenario, range_notes
-from sosmith.model.vehicle_clearance import vehicle_clearance
+from sosmith.model.scenarios.file import load_scenario, range_notes
+from sosmith.model.scenarios.vehicle_clearance import vehicle_clearance
 from sosmith.sim.simulation import traces_for
-from tests.model.scenario_texts import CALIBRATION, PLAIN
+from tests.model.scenarios.scenario_texts import CALIBRATION, PLAIN
 from tests.test_cli import FILTER, INSTRUMENT
 
 SHORT = PLAIN.replace("seconds = 60", "seconds = 20")

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from benchmarks import numerics
 
-from sosmith.gen.realizations import REALIZATIONS, Realization
-from sosmith.model.datapath import Stage
+from sosmith.gen.realizations.registry import REALIZATIONS, Realization
+from sosmith.model.dataflow.datapath import Stage
 from sosmith.model.errors import ShortfallError
 
 

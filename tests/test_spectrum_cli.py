@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sosmith.gen.design import design
-from sosmith.gen.specification import example, load
+from sosmith.gen.filter.design import design
+from sosmith.gen.specification.specification import example, load
 from sosmith.model.errors import ShortfallError
-from sosmith.model.sensors import sensor_voltage
+from sosmith.model.sensors.instrument import sensor_voltage
 from tests.invocation import Invocation
 
 INVOCATION = Invocation("spectrum", columns=120)

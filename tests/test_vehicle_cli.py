@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sosmith.model.vehicle_parameters import built_in, built_in_text
+from sosmith.model.vehicle.parameters import built_in, built_in_text
 from tests.invocation import Invocation
 
 INVOCATION = Invocation("vehicle", columns=110)

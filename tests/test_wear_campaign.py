@@ -15,8 +15,8 @@ from examples.wear_campaign.document import document
 from examples.wear_campaign.spread import spread
 from scipy import signal
 
-from sosmith.gen.specification import load
-from sosmith.model.scenario_file import load_scenario
+from sosmith.gen.specification.specification import load
+from sosmith.model.scenarios.file import load_scenario
 
 ROOT = Path(__file__).parents[1]
 HERE = ROOT / "examples" / "wear_campaign"

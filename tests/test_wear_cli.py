@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from sosmith.gen.specification import example
+from sosmith.gen.specification.specification import example
 from sosmith.model.errors import SpecificationError
-from sosmith.model.wear_file import moment_text, parse_moment, read_wear_record
+from sosmith.model.wear.record_file import moment_text, parse_moment, read_wear_record
 from tests.invocation import Invocation
 
 INVOCATION = Invocation("wear", columns=100)

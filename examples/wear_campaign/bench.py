@@ -12,17 +12,17 @@ import numpy.typing as npt
 from examples.wear_campaign import depot, hardware
 
 from sosmith.gen.core import CoreDesign
-from sosmith.gen.filter_proposal import Content, Proposal, Wish, propose
-from sosmith.gen.filter_table import filter_table
-from sosmith.gen.spectra import SpectrumSettings, spectrum
-from sosmith.model.accuracy import accuracy_percent
-from sosmith.model.depot_measurements import measurements_of
-from sosmith.model.golden import calibrated, filtered
-from sosmith.model.inductive_sensor import SystematicError
-from sosmith.model.polynomial import EQUATION_5A, Polynomial
-from sosmith.model.scenario_file import ScenarioFile, emulate_file
-from sosmith.model.scenarios import Bench
-from sosmith.model.trace import Trace
+from sosmith.gen.spectrum.filter_table import filter_table
+from sosmith.gen.spectrum.proposal import Content, Proposal, Wish, propose
+from sosmith.gen.spectrum.spectra import SpectrumSettings, spectrum
+from sosmith.model.calibration.polynomial import EQUATION_5A, Polynomial
+from sosmith.model.reference.accuracy import accuracy_percent
+from sosmith.model.reference.golden import calibrated, filtered
+from sosmith.model.scenarios.catalogue import Bench
+from sosmith.model.scenarios.depot_measurements import measurements_of
+from sosmith.model.scenarios.file import ScenarioFile, emulate_file
+from sosmith.model.sensors.inductive_sensor import SystematicError
+from sosmith.model.traces.trace import Trace
 from sosmith.sim.simulation import Progress, bench_of
 
 Values = npt.NDArray[np.float64]

@@ -8,11 +8,11 @@ from typing import Any
 from examples.wear_campaign import bench, depot, hardware, ride, week
 from examples.wear_campaign.spread import spread
 
-from sosmith.gen.calibration_report import specification_table
 from sosmith.gen.core import CoreDesign, design_core
-from sosmith.gen.specification import load
-from sosmith.model.polynomial import EQUATION_5A, Polynomial
-from sosmith.model.scenario_file import ScenarioFile, emulate_file, load_scenario
+from sosmith.gen.instrument.calibration_report import specification_table
+from sosmith.gen.specification.specification import load
+from sosmith.model.calibration.polynomial import EQUATION_5A, Polynomial
+from sosmith.model.scenarios.file import ScenarioFile, emulate_file, load_scenario
 from sosmith.sim.simulation import Progress, bench_of
 
 HERE = Path(__file__).parent

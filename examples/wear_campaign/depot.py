@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from sosmith.model.calibration import COLUMNS, Fit, Measurements, fit
-from sosmith.model.depot_measurements import DepotMeasurement, measurements_csv, measurements_of
-from sosmith.model.measurement_store import open_store
-from sosmith.model.scenario_file import ScenarioFile
-from sosmith.model.self_updating import Calibration, add
+from sosmith.model.calibration.fit import COLUMNS, Fit, Measurements, fit
+from sosmith.model.calibration.measurement_store import open_store
+from sosmith.model.calibration.self_updating import Calibration, add
+from sosmith.model.scenarios.depot_measurements import DepotMeasurement, measurements_csv, measurements_of
+from sosmith.model.scenarios.file import ScenarioFile
 from sosmith.model.text_files import write_files
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from examples.wear_campaign.pictures import stated
 
-from sosmith.model.paper_figures import read_paper_figures
+from sosmith.gen.paper.figures import read_paper_figures
 
 WIDTH = 120
 """Characters of a line."""

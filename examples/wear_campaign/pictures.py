@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from sosmith.gen.paper.figures import PaperFigures, read_paper_figures
 from sosmith.gen.picture import picture
-from sosmith.gen.plots import envelope
-from sosmith.model.paper_figures import PaperFigures, read_paper_figures
+from sosmith.gen.report.plots import envelope
 
 BLUE, RED, GREEN, GREY, INK = "#2563a8", "#b4432f", "#2f7d4f", "#9a9a9a", "#222222"
 

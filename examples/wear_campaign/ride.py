@@ -12,22 +12,22 @@ from examples.wear_campaign import hardware
 from scipy import signal
 
 from sosmith.gen.core import CoreDesign
-from sosmith.gen.design import prewarp, unwarp
-from sosmith.gen.filter_proposal import Content, Proposal, Wish, propose
-from sosmith.gen.filter_table import filter_table
-from sosmith.gen.response import group_delay, magnitude_db
-from sosmith.gen.spectra import SpectrumSettings, spectrum
-from sosmith.model.accuracy import accuracy_percent
-from sosmith.model.golden import calibrated, filtered
-from sosmith.model.polynomial import EQUATION_5A
-from sosmith.model.scenario_file import ScenarioFile, emulate_file
-from sosmith.model.scenarios import Bench
-from sosmith.model.trace import Trace
-from sosmith.model.track import curved_track, tangent_track
-from sosmith.model.vehicle_clearance import IRREGULARITY, SPEED, WHEELSET, vehicle_clearance
-from sosmith.model.vehicle_limits import limits
-from sosmith.model.vehicle_parameters import built_in
-from sosmith.model.vehicle_run import run
+from sosmith.gen.filter.design import prewarp, unwarp
+from sosmith.gen.filter.response import group_delay, magnitude_db
+from sosmith.gen.spectrum.filter_table import filter_table
+from sosmith.gen.spectrum.proposal import Content, Proposal, Wish, propose
+from sosmith.gen.spectrum.spectra import SpectrumSettings, spectrum
+from sosmith.model.calibration.polynomial import EQUATION_5A
+from sosmith.model.reference.accuracy import accuracy_percent
+from sosmith.model.reference.golden import calibrated, filtered
+from sosmith.model.scenarios.catalogue import Bench
+from sosmith.model.scenarios.file import ScenarioFile, emulate_file
+from sosmith.model.scenarios.vehicle_clearance import IRREGULARITY, SPEED, WHEELSET, vehicle_clearance
+from sosmith.model.traces.trace import Trace
+from sosmith.model.vehicle.limits import limits
+from sosmith.model.vehicle.parameters import built_in
+from sosmith.model.vehicle.run import run
+from sosmith.model.vehicle.track import curved_track, tangent_track
 from sosmith.sim.simulation import Progress, bench_of
 
 Values = npt.NDArray[np.float64]

@@ -10,18 +10,18 @@ import numpy as np
 import numpy.typing as npt
 from examples.wear_campaign import depot, hardware
 
-from sosmith.gen.calibration_report import specification_table
-from sosmith.gen.reload import check_swap, own_set, set_for
-from sosmith.gen.specification import load
-from sosmith.model.accuracy import accuracy_percent
-from sosmith.model.datapath import Datapath
+from sosmith.gen.instrument.calibration_report import specification_table
+from sosmith.gen.reload.reload import check_swap, own_set, set_for
+from sosmith.gen.specification.specification import load
+from sosmith.model.calibration.polynomial import EQUATION_5A
+from sosmith.model.calibration.self_updating import Calibration
+from sosmith.model.dataflow.datapath import Datapath
+from sosmith.model.dataflow.status import Flag
 from sosmith.model.errors import ShortfallError
-from sosmith.model.polynomial import EQUATION_5A
-from sosmith.model.scenario_file import ScenarioFile, emulate_file
-from sosmith.model.self_updating import Calibration
-from sosmith.model.status import Flag
-from sosmith.model.trace import Trace
-from sosmith.model.wear import WearLimits, WearReport, judge
+from sosmith.model.reference.accuracy import accuracy_percent
+from sosmith.model.scenarios.file import ScenarioFile, emulate_file
+from sosmith.model.traces.trace import Trace
+from sosmith.model.wear.assessment import WearLimits, WearReport, judge
 from sosmith.sim.simulation import Progress, bench_of
 
 Values = npt.NDArray[np.float64]

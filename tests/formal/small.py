@@ -6,11 +6,11 @@ from fractions import Fraction
 from amaranth.hdl import Const, Module, Mux, Signal, Value
 
 from sosmith.hdl.ranked_logic import shape_of
-from sosmith.model.datapath import Datapath
-from sosmith.model.graph import Graph, GraphBuilder, Node, Op
-from sosmith.model.horner import HornerStep
-from sosmith.model.output import OutputStage
+from sosmith.model.dataflow.datapath import Datapath
+from sosmith.model.dataflow.graph import Graph, GraphBuilder, Node, Op
 from sosmith.model.port import Port
+from sosmith.model.sections.horner import HornerStep
+from sosmith.model.sections.output import OutputStage
 
 _X = (0, -2, 1)
 """Fraction bits and range of the input, two bits wide."""

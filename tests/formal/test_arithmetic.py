@@ -8,8 +8,8 @@ from amaranth.hdl import Assert, Assume, Const, Module, Signal, Value
 from tests.formal.prover import INDUCTION, Proof, broken, prove
 
 from sosmith.hdl import ranked_logic, stage
-from sosmith.model.graph import GraphBuilder
-from sosmith.model.horner import HornerStep
+from sosmith.model.dataflow.graph import GraphBuilder
+from sosmith.model.sections.horner import HornerStep
 
 
 class Quantizers(Proof):

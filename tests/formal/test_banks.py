@@ -13,7 +13,7 @@ from tests.formal.prover import Proof, broken, prove
 from tests.formal.small import limiter
 
 from sosmith.hdl import folded, reload
-from sosmith.model.folding import program
+from sosmith.model.dataflow.folding import program
 
 
 class WritesFreeBanks(Proof):

@@ -10,12 +10,12 @@ from tests.formal.prover import Proof, prove
 from tests.formal.small import port, resonator
 from tests.gen.proven_stages import Format, Ranges, proven_cascade
 
-from sosmith.gen.realizations import WIDE
+from sosmith.gen.realizations.registry import WIDE
 from sosmith.hdl.ranked_logic import unique_names
 from sosmith.hdl.stage import PipelineStage, _ranks
-from sosmith.model.datapath import Stage
-from sosmith.model.direct_form import DirectForm1, Product
-from sosmith.model.graph import Op
+from sosmith.model.dataflow.datapath import Stage
+from sosmith.model.dataflow.graph import Op
+from sosmith.model.sections.direct_form import DirectForm1, Product
 
 
 class StatedRanges(Proof):

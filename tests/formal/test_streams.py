@@ -12,8 +12,8 @@ from tests.formal.prover import Proof, broken, combinational_outputs, prove
 from tests.formal.small import leaky, limiter, reference, resonator
 
 from sosmith.hdl import axi_stream, core, folded
-from sosmith.model.datapath import Datapath
-from sosmith.model.folding import program
+from sosmith.model.dataflow.datapath import Datapath
+from sosmith.model.dataflow.folding import program
 
 DIGIT_BITS = 3
 

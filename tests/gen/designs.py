@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from sosmith.gen.core import CoreDesign, design_core
-from sosmith.gen.specification import load
+from sosmith.gen.specification.specification import load
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 ALL = sorted(path.name for path in EXAMPLES.glob("*.toml"))

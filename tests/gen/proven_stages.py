@@ -6,13 +6,13 @@ from fractions import Fraction
 
 import numpy as np
 
-from sosmith.gen.linear_model import linear_model
-from sosmith.gen.proof import prove_cascade
-from sosmith.gen.realizations import WIDE
-from sosmith.model.datapath import Datapath, Stage
-from sosmith.model.graph import GraphBuilder
-from sosmith.model.horner import HornerStep
+from sosmith.gen.proof.cascade_proof import prove_cascade
+from sosmith.gen.proof.linear_model import linear_model
+from sosmith.gen.realizations.registry import WIDE
+from sosmith.model.dataflow.datapath import Datapath, Stage
+from sosmith.model.dataflow.graph import GraphBuilder
 from sosmith.model.port import Port
+from sosmith.model.sections.horner import HornerStep
 
 Format = tuple[int, int, int]
 Ranges = Mapping[str, tuple[int, int]]

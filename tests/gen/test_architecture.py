@@ -9,10 +9,10 @@ import pytest
 from tests.gen.designs import EXAMPLES, example_design
 
 from sosmith.gen.architecture import Budget, fitting
-from sosmith.gen.boards import find_board
 from sosmith.gen.core import CoreDesign, design_core
-from sosmith.gen.manifest import manifest
-from sosmith.gen.specification import load
+from sosmith.gen.fpga.boards import find_board
+from sosmith.gen.output.manifest import manifest
+from sosmith.gen.specification.specification import load
 from sosmith.model.errors import ShortfallError
 
 

@@ -10,10 +10,10 @@ from tests.gen.designs import EXAMPLES
 
 from sosmith.gen import core
 from sosmith.gen.core import design_core
-from sosmith.gen.cost import cost_of
-from sosmith.gen.quantize import Plan, plan
-from sosmith.gen.realizations import REALIZATIONS
-from sosmith.gen.specification import Specification, load
+from sosmith.gen.realizations.registry import REALIZATIONS
+from sosmith.gen.specification.specification import Specification, load
+from sosmith.gen.word_lengths.cost import cost_of
+from sosmith.gen.word_lengths.quantize import Plan, plan
 from sosmith.model.errors import ShortfallError
 
 

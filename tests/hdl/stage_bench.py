@@ -6,7 +6,7 @@ from typing import Any
 from amaranth.sim import Simulator
 
 from sosmith.hdl.stage import PipelineStage
-from sosmith.model.datapath import Stage
+from sosmith.model.dataflow.datapath import Stage
 
 
 def run(stage: Stage, samples: list[list[int]], seed: int) -> list[list[int]]:

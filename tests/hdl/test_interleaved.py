@@ -7,7 +7,7 @@ from tests.gen.designs import example_design
 
 from sosmith.hdl.core import latency_cycles
 from sosmith.hdl.interleaved import schedule
-from sosmith.model.graph import Graph, Op
+from sosmith.model.dataflow.graph import Graph, Op
 
 REALIZATIONS = ("df1_ef2", "df2t", "delta", "state_space", "normal", "lattice_wdf")
 

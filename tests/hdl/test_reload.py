@@ -15,7 +15,7 @@ from tests.hdl.axi_lite_bench import OKAY, SLVERR, Bus, run
 
 from sosmith.hdl import reload
 from sosmith.hdl.reload import ReloadPort
-from sosmith.model.reload_registers import (
+from sosmith.model.reload.registers import (
     ADDRESS_BITS,
     CRC,
     DATA,

@@ -2,10 +2,10 @@
 
 import pytest
 from tests.gen.designs import ALL, example_design
-from tests.gen.test_quantize import stimulus
+from tests.gen.word_lengths.test_quantize import stimulus
 from tests.hdl.stage_bench import run
 
-from sosmith.gen.realizations import REALIZATIONS
+from sosmith.gen.realizations.registry import REALIZATIONS
 
 
 @pytest.mark.parametrize("realization", list(REALIZATIONS))

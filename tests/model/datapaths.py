@@ -7,10 +7,10 @@ from fractions import Fraction
 import numpy as np
 from scipy import signal
 
-from sosmith.model.datapath import Datapath, Stage
-from sosmith.model.direct_form import DirectForm1, Product
-from sosmith.model.output import OutputStage
+from sosmith.model.dataflow.datapath import Datapath, Stage
 from sosmith.model.port import Port
+from sosmith.model.sections.direct_form import DirectForm1, Product
+from sosmith.model.sections.output import OutputStage
 
 INPUT = Port.from_range("x", 16, Fraction(-1), Fraction(1), signed=True)
 OUTPUT = Port.from_range("y", 16, Fraction(-1), Fraction(1), signed=True)

@@ -10,7 +10,7 @@ from cocotb.clock import Clock
 from cocotb.triggers import RisingEdge
 from cocotbext.axi import AxiLiteBus, AxiLiteMaster, AxiResp
 
-from sosmith.model.reload_registers import CRC, DATA, DESIGN, ID, LAYOUT, MAGIC, STATUS, VERSION, Outcome
+from sosmith.model.reload.registers import CRC, DATA, DESIGN, ID, LAYOUT, MAGIC, STATUS, VERSION, Outcome
 
 LOADS = 20
 

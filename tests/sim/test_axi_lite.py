@@ -7,7 +7,7 @@ import pytest
 from cocotb_tools.check_results import get_results
 from cocotb_tools.runner import Icarus
 
-from sosmith.gen.verilog import to_rtlil, to_verilog
+from sosmith.gen.output.verilog import to_rtlil, to_verilog
 from sosmith.hdl.reload import ReloadPort
 from sosmith.sim.lint import icarus_check, lint
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from tests.sim.test_peers import expected, made_of, run, stimulus, words
 
-from sosmith.gen.verilog import to_rtlil, to_verilog
+from sosmith.gen.output.verilog import to_rtlil, to_verilog
 
 _MEMORY = re.compile(
     r"\(\* no_rw_check = 32'd1 \*\)\s+(?:\(\* ram_style = \"block\" \*\)\s+)?reg (?:signed )?(?:\[(\d+):0\] )?(\S+) +\["

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from sosmith.gen.boards import find_board
-from sosmith.gen.synthesis import Netlist, synthesize
+from sosmith.gen.fpga.boards import find_board
+from sosmith.gen.fpga.synthesis import Netlist, synthesize
 from sosmith.sim import gate_level
 from sosmith.sim.gate_level import with_cell_models
 

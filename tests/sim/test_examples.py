@@ -14,13 +14,13 @@ import pytest
 from tests.gen.designs import ALL, EXAMPLES, parallel_design
 
 from sosmith.gen.core import CoreDesign
-from sosmith.gen.evidence import Evidence
-from sosmith.gen.generate import generate
-from sosmith.gen.realizations import REALIZATIONS
-from sosmith.gen.report import summarise
+from sosmith.gen.output.generate import generate
+from sosmith.gen.realizations.registry import REALIZATIONS
+from sosmith.gen.report.evidence import Evidence
+from sosmith.gen.report.report import summarise
 from sosmith.model.errors import ShortfallError
-from sosmith.model.scenarios import SCENARIOS
-from sosmith.model.trace import Trace
+from sosmith.model.scenarios.catalogue import SCENARIOS
+from sosmith.model.traces.trace import Trace
 from sosmith.sim import simulation
 from sosmith.sim.simulation import bench_of, simulate, traces_for
 

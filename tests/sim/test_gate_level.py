@@ -9,13 +9,13 @@ from pathlib import Path
 import pytest
 from tests.gen.designs import EXAMPLES
 
-from sosmith.gen.boards import Board, find_board
 from sosmith.gen.core import CoreDesign, design_core
-from sosmith.gen.evidence import Evidence
-from sosmith.gen.report import summarise
-from sosmith.gen.report_page import render_page
-from sosmith.gen.specification import load
-from sosmith.gen.synthesis import Netlist, synthesize
+from sosmith.gen.fpga.boards import Board, find_board
+from sosmith.gen.fpga.synthesis import Netlist, synthesize
+from sosmith.gen.report.evidence import Evidence
+from sosmith.gen.report.page import render_page
+from sosmith.gen.report.report import summarise
+from sosmith.gen.specification.specification import load
 from sosmith.model.errors import ShortfallError, ToolError
 from sosmith.sim import simulation
 from sosmith.sim.gate_level import with_cell_models

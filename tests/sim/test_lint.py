@@ -13,7 +13,7 @@ from tests.gen.designs import ALL, example_design
 
 from sosmith.gen.architecture import Architecture
 from sosmith.gen.core import CORES, design_core
-from sosmith.gen.generate import generate
+from sosmith.gen.output.generate import generate
 from sosmith.model.errors import ShortfallError
 from sosmith.sim.lint import WAIVERS, icarus_check, lint
 

@@ -16,9 +16,9 @@ from cocotb_tools.runner import Icarus
 from tests.gen.designs import EXAMPLES
 
 from sosmith.gen.core import CoreDesign, design_core
-from sosmith.gen.realizations import REALIZATIONS
-from sosmith.gen.specification import load
-from sosmith.gen.verilog import to_rtlil, to_verilog
+from sosmith.gen.output.verilog import to_rtlil, to_verilog
+from sosmith.gen.realizations.registry import REALIZATIONS
+from sosmith.gen.specification.specification import load
 from sosmith.hdl.axi_stream import fields
 from sosmith.hdl.folded import FoldedCore
 

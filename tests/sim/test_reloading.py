@@ -17,17 +17,17 @@ from cocotb_tools.runner import Icarus
 from tests.gen.designs import EXAMPLES
 
 from sosmith.gen.core import CoreDesign, design_core
-from sosmith.gen.design import design
-from sosmith.gen.other_constants import with_constants
-from sosmith.gen.reload import OtherSet, other_set, room_of
-from sosmith.gen.reload_file import register_writes
-from sosmith.gen.specification import load
-from sosmith.gen.verilog import to_rtlil, to_verilog
+from sosmith.gen.filter.design import design
+from sosmith.gen.output.verilog import to_rtlil, to_verilog
+from sosmith.gen.reload.other_constants import with_constants
+from sosmith.gen.reload.register_writes import register_writes
+from sosmith.gen.reload.reload import OtherSet, other_set, room_of
+from sosmith.gen.specification.specification import load
 from sosmith.hdl.axi_stream import fields
 from sosmith.hdl.folded import FoldedCore
 from sosmith.hdl.reload import ReloadPort
-from sosmith.model.polynomial import Polynomial
-from sosmith.model.swapping import compute_swapping
+from sosmith.model.calibration.polynomial import Polynomial
+from sosmith.model.reload.swapping import compute_swapping
 
 RATIOS = ("0.8", "0.9", "1.1", "1.2")
 """Cutoffs of the sets over that of the core."""

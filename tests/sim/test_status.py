@@ -11,13 +11,13 @@ import pytest
 from tests.gen.designs import EXAMPLES
 
 from sosmith.gen.core import CoreDesign, design_core
-from sosmith.gen.generate import generate
-from sosmith.gen.manifest import manifest
-from sosmith.gen.specification import load
-from sosmith.gen.wear_limits import WearSpec
+from sosmith.gen.output.generate import generate
+from sosmith.gen.output.manifest import manifest
+from sosmith.gen.specification.specification import load
+from sosmith.gen.specification.wear_limits import WearSpec
+from sosmith.model.dataflow.status import Flag
 from sosmith.model.errors import ShortfallError
 from sosmith.model.port import Port
-from sosmith.model.status import Flag
 from sosmith.sim.lint import icarus_check, lint
 from sosmith.sim.simulation import simulate, traces_for
 

@@ -10,8 +10,8 @@ from typing import Any
 import click
 from rich.markup import escape
 
-from sosmith.gen.calibration_plot import calibration_plot
-from sosmith.gen.calibration_report import (
+from sosmith.gen.instrument.calibration_plot import calibration_plot
+from sosmith.gen.instrument.calibration_report import (
     CALLED_OUT,
     addition_json,
     calibration_json,
@@ -20,12 +20,19 @@ from sosmith.gen.calibration_report import (
     version_json,
 )
 from sosmith.gen.picture import FORMATS
-from sosmith.model.calibration import REQUIRED_R, terms_of
+from sosmith.model.calibration.fit import REQUIRED_R, terms_of
+from sosmith.model.calibration.fit_quality import CELLS
+from sosmith.model.calibration.measurement_files import DEFAULT_RANGES, Range, Refusal, parse_date
+from sosmith.model.calibration.measurement_store import Version, open_store
+from sosmith.model.calibration.self_updating import (
+    Calibration,
+    add,
+    calibration_of,
+    find_version,
+    refit,
+    refused_first_file,
+)
 from sosmith.model.errors import ShortfallError, SpecificationError
-from sosmith.model.fit_quality import CELLS
-from sosmith.model.measurement_files import DEFAULT_RANGES, Range, Refusal, parse_date
-from sosmith.model.measurement_store import Version, open_store
-from sosmith.model.self_updating import Calibration, add, calibration_of, find_version, refit, refused_first_file
 from sosmith.model.text_files import write_contents, write_files
 from sosmith.terminal import (
     JSON_OPTION,

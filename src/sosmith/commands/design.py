@@ -17,9 +17,9 @@ from sosmith.commands.options import (
     default_folder,
 )
 from sosmith.gen.core import design_core
-from sosmith.gen.generate import generate as generate_files
-from sosmith.gen.manifest import manifest
-from sosmith.gen.specification import example, load
+from sosmith.gen.output.generate import generate as generate_files
+from sosmith.gen.output.manifest import manifest
+from sosmith.gen.specification.specification import example, load
 from sosmith.model.errors import SpecificationError
 from sosmith.model.text_files import write_files
 from sosmith.terminal import JSON_OPTION, note, output_option, print_json, show_progress

@@ -10,12 +10,12 @@ from rich.markup import escape
 
 from sosmith.gen.architecture import Architecture
 from sosmith.gen.core import CoreDesign
-from sosmith.gen.cost import cost_of
-from sosmith.gen.limit_cycles import limit_cycles, recursions
-from sosmith.gen.manifest import section_entries
-from sosmith.gen.wear_limits import WearSpec
+from sosmith.gen.output.manifest import section_entries
+from sosmith.gen.proof.limit_cycles import limit_cycles, recursions
+from sosmith.gen.specification.wear_limits import WearSpec
+from sosmith.gen.word_lengths.cost import cost_of
+from sosmith.model.dataflow.program import Program
 from sosmith.model.port import Port
-from sosmith.model.program import Program
 from sosmith.terminal import TableConsole, new_table
 
 

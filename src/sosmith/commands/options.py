@@ -6,9 +6,9 @@ from pathlib import Path
 
 import click
 
-from sosmith.gen.boards import BOARDS, Board, find_board
 from sosmith.gen.core import CORES, CoreDesign
-from sosmith.gen.realizations import ERROR_FEEDBACK, REALIZATIONS
+from sosmith.gen.fpga.boards import BOARDS, Board, find_board
+from sosmith.gen.realizations.registry import ERROR_FEEDBACK, REALIZATIONS
 
 SPEC = click.argument("spec", type=click.Path(path_type=Path))
 CORE = click.option(

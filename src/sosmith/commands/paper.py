@@ -6,9 +6,9 @@ from pathlib import Path
 
 import click
 
-from sosmith.gen.paper_comparison import LABELS
-from sosmith.gen.paper_document import paper_files, paper_json, summary_rows
-from sosmith.model.paper_figures import read_paper_figures
+from sosmith.gen.paper.comparison import LABELS
+from sosmith.gen.paper.document import paper_files, paper_json, summary_rows
+from sosmith.gen.paper.figures import read_paper_figures
 from sosmith.model.text_files import write_files
 from sosmith.terminal import JSON_OPTION, TableConsole, new_table, note, output_option, print_json, show_progress
 

@@ -18,9 +18,9 @@ from sosmith.commands.options import (
     default_folder,
 )
 from sosmith.gen.core import CoreDesign, design_core
-from sosmith.gen.reload import Swap, check_swap, own_set, set_for
-from sosmith.gen.reload_file import reload_json
-from sosmith.gen.specification import Specification, load
+from sosmith.gen.reload.register_writes import reload_json
+from sosmith.gen.reload.reload import Swap, check_swap, own_set, set_for
+from sosmith.gen.specification.specification import Specification, load
 from sosmith.model.text_files import to_json, write_files
 from sosmith.terminal import JSON_OPTION, TableConsole, new_table, note, output_option, print_json, show_progress
 

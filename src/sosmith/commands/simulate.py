@@ -22,16 +22,16 @@ from sosmith.commands.options import (
     board_named,
     default_folder,
 )
-from sosmith.gen.boards import BOARDS
 from sosmith.gen.core import CoreDesign, design_core
-from sosmith.gen.report import write_report
-from sosmith.gen.specification import example, load
-from sosmith.model.depot_measurements import measurements_csv, measurements_of
+from sosmith.gen.fpga.boards import BOARDS
+from sosmith.gen.report.report import write_report
+from sosmith.gen.specification.specification import example, load
 from sosmith.model.errors import SpecificationError
-from sosmith.model.scenario_file import load_scenario
-from sosmith.model.scenarios import SCENARIOS
+from sosmith.model.scenarios.catalogue import SCENARIOS
+from sosmith.model.scenarios.depot_measurements import measurements_csv, measurements_of
+from sosmith.model.scenarios.file import load_scenario
 from sosmith.model.text_files import write_files
-from sosmith.model.trace_file import traces_csv, write_traces
+from sosmith.model.traces.trace_file import traces_csv, write_traces
 from sosmith.sim.simulation import bench_of, default_scenario, is_scenario_file, notes_on, simulate, traces_for
 from sosmith.sim.simulators import check_name
 from sosmith.terminal import (

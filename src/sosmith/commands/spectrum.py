@@ -11,22 +11,22 @@ import click
 from rich.markup import escape
 
 from sosmith.gen.core import polynomial_of
-from sosmith.gen.filter_prediction import Content, told_apart
-from sosmith.gen.filter_proposal import COVERAGE, PASSBAND_LOSS, TOLERANCE, Proposal, Wish, propose
-from sosmith.gen.filter_table import filter_table, replace_filter
-from sosmith.gen.filter_trial import Trial, try_filter
 from sosmith.gen.picture import FORMATS
-from sosmith.gen.specification import load
-from sosmith.gen.spectra import DETRENDS, WINDOWS, Spectrum, SpectrumSettings, slow_rms, spectrum
-from sosmith.gen.spectrum_plot import Curve, spectrum_plot
-from sosmith.gen.spectrum_report import peaks, proposal_json, provenance, ripple, signal_json
-from sosmith.model.csv_table import csv_header
+from sosmith.gen.specification.specification import load
+from sosmith.gen.spectrum.filter_table import filter_table, replace_filter
+from sosmith.gen.spectrum.plot import Curve, spectrum_plot
+from sosmith.gen.spectrum.prediction import Content, told_apart
+from sosmith.gen.spectrum.proposal import COVERAGE, PASSBAND_LOSS, TOLERANCE, Proposal, Wish, propose
+from sosmith.gen.spectrum.report import peaks, proposal_json, provenance, ripple, signal_json
+from sosmith.gen.spectrum.spectra import DETRENDS, WINDOWS, Spectrum, SpectrumSettings, slow_rms, spectrum
+from sosmith.gen.spectrum.trial import Trial, try_filter
+from sosmith.model.calibration.polynomial import EQUATION_5A, Polynomial
 from sosmith.model.errors import ShortfallError, SpecificationError
-from sosmith.model.polynomial import EQUATION_5A, Polynomial
 from sosmith.model.port import Values
-from sosmith.model.signal_file import Signal, SignalFile, read_signal_file
+from sosmith.model.tables.csv_table import csv_header
 from sosmith.model.text_files import write_contents
-from sosmith.model.trace_file import TIME_TOLERANCE
+from sosmith.model.traces.signal_file import Signal, SignalFile, read_signal_file
+from sosmith.model.traces.trace_file import TIME_TOLERANCE
 from sosmith.terminal import (
     JSON_OPTION,
     TableConsole,

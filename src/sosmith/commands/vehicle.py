@@ -7,14 +7,14 @@ from pathlib import Path
 import click
 from rich.table import Table
 
+from sosmith.gen.instrument.vehicle_plot import vehicle_plot
+from sosmith.gen.instrument.vehicle_report import TRACKS, VehicleRun, largest, vehicle_csv, vehicle_json, vehicle_run
 from sosmith.gen.picture import FORMATS
-from sosmith.gen.vehicle_plot import vehicle_plot
-from sosmith.gen.vehicle_report import TRACKS, VehicleRun, largest, vehicle_csv, vehicle_json, vehicle_run
 from sosmith.model.errors import SpecificationError
-from sosmith.model.linear_motion import Mode
 from sosmith.model.text_files import write_contents, write_files
-from sosmith.model.track_irregularity import LEVELS
-from sosmith.model.vehicle_parameters import built_in, built_in_text, load
+from sosmith.model.vehicle.linear_motion import Mode
+from sosmith.model.vehicle.parameters import built_in, built_in_text, load
+from sosmith.model.vehicle.track_irregularity import LEVELS
 from sosmith.terminal import (
     JSON_OPTION,
     TableConsole,

@@ -9,9 +9,9 @@ import click
 from rich.markup import escape
 
 from sosmith.commands.design_tables import print_budget
-from sosmith.gen.certificate_file import Certificate, read_certificate
-from sosmith.gen.verification import RejectedError, Verdict
-from sosmith.gen.verification import verify as verify_certificate
+from sosmith.gen.verifier.certificate_file import Certificate, read_certificate
+from sosmith.gen.verifier.verification import RejectedError, Verdict
+from sosmith.gen.verifier.verification import verify as verify_certificate
 from sosmith.terminal import JSON_OPTION, TableConsole, print_json, show_progress
 
 

@@ -9,13 +9,13 @@ from typing import Any
 import click
 from rich.markup import escape
 
+from sosmith.gen.instrument.wear_plot import wear_plot
 from sosmith.gen.picture import FORMATS
-from sosmith.gen.specification import load
-from sosmith.gen.wear_plot import wear_plot
+from sosmith.gen.specification.specification import load
 from sosmith.model.errors import SpecificationError
 from sosmith.model.text_files import write_contents
-from sosmith.model.wear import WearLimits, WearReport, judge
-from sosmith.model.wear_file import CLEARANCES, TIMES, WearRecord, moment_text, read_wear_record
+from sosmith.model.wear.assessment import WearLimits, WearReport, judge
+from sosmith.model.wear.record_file import CLEARANCES, TIMES, WearRecord, moment_text, read_wear_record
 from sosmith.terminal import JSON_OPTION, TableConsole, new_table, note, print_json, show_progress
 
 _HELP = f"""Tell from TRACE.csv how far a wheel flange is worn, how fast it wears, and how long it will last.

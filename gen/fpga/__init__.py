@@ -1,0 +1,1 @@
+"""FPGAs, boards, and the synthesis for them."""

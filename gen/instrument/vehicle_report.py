@@ -1,0 +1,174 @@
+"""What is told of a run of the vehicle: its figures as JSON, its motion as CSV."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from sosmith.gen.paper.comparison import Comparison
+from sosmith.gen.paper.figures import read_paper_figures
+from sosmith.gen.paper.vehicle_comparison import PAPER_SPEED, comparison
+from sosmith.model.vehicle.lateral import lateral_dynamics
+from sosmith.model.vehicle.limits import Limits, limits
+from sosmith.model.vehicle.linear_motion import Mode
+from sosmith.model.vehicle.motion import Motion
+from sosmith.model.vehicle.parameters import Parameters
+from sosmith.model.vehicle.run import run
+from sosmith.model.vehicle.track import curved_track, tangent_track
+from sosmith.model.vehicle.vertical import vertical_dynamics
+
+TRACKS = {"paper": curved_track, "tangent": tangent_track}
+"""Tracks by name."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class VehicleRun:
+    """A run and all that is told of it.
+
+    Attributes
+    ----------
+    parameters : Parameters
+    track : str
+        One of `TRACKS`.
+    speed, sample_rate : float
+        In m/s and Hz.
+    irregularities : str
+        "none", "low" or "high".
+    seed : int
+    motion : Motion
+    limits : Limits
+    lateral_modes, vertical_modes : tuple of Mode
+    comparison : mapping of table number to tuple of Comparison
+        With the paper's tables; empty unless track, speed and sample rate allow it.
+    """
+
+    parameters: Parameters
+    track: str
+    speed: float
+    sample_rate: float
+    irregularities: str
+    seed: int
+    motion: Motion
+    limits: Limits
+    lateral_modes: tuple[Mode, ...]
+    vertical_modes: tuple[Mode, ...]
+    comparison: Mapping[int, tuple[Comparison, ...]]
+
+
+def vehicle_run(
+    parameters: Parameters, *, track: str, speed: float, sample_rate: float, irregularities: str, seed: int
+) -> VehicleRun:
+    """Carry out a run; refuses as `sosmith.model.vehicle.run.run` does."""
+    made = TRACKS[track](parameters.track)
+    level = None if irregularities == "none" else irregularities
+    motion = run(parameters, made, speed=speed, sample_rate=sample_rate, irregularity=level, seed=seed)
+    comparable = track == "paper" and speed == PAPER_SPEED and sample_rate >= 100
+    return VehicleRun(
+        parameters=parameters,
+        track=track,
+        speed=speed,
+        sample_rate=sample_rate,
+        irregularities=irregularities,
+        seed=seed,
+        motion=motion,
+        limits=limits(parameters, made, motion),
+        lateral_modes=lateral_dynamics(parameters, speed).system.modes(),
+        vertical_modes=vertical_dynamics(parameters).system.modes(),
+        comparison=comparison(motion, read_paper_figures()) if comparable else {},
+    )
+
+
+def largest(motion: Motion) -> dict[str, float]:
+    """Largest magnitude of every motion, by the names of the columns."""
+    return {
+        name: float(np.abs(values).max()) for name, values in motion.columns() if name not in ("time_s", "distance_m")
+    }
+
+
+def vehicle_json(made: VehicleRun) -> dict[str, Any]:
+    """All figures of a run; units are in the names."""
+    found = made.limits
+    return {
+        "track": made.track,
+        "speed_m_s": made.speed,
+        "sample_rate_Hz": made.sample_rate,
+        "irregularities": made.irregularities,
+        "seed": made.seed,
+        "samples": len(made.motion.time),
+        "modes": {"lateral": _modes(made.lateral_modes), "vertical": _modes(made.vertical_modes)},
+        "largest": largest(made.motion),
+        "limits": [
+            {
+                "wheelset": k + 1,
+                "beyond_flange_mm": 1e3 * float(found.beyond_flange[k]),
+                "beyond_flange_share": float(found.beyond_flange_share[k]),
+                "friction_used": float(found.friction_used[k]),
+                "friction_exceeded_share": float(found.friction_exceeded_share[k]),
+            }
+            for k in range(6)
+        ],
+        "within_limits": found.kept,
+        "comparison": [
+            {
+                "table": str(number),
+                "what": one.quantity,
+                "unit": one.unit,
+                "paper": None if one.printed is None else float(one.printed),
+                "ours": None if one.ours is None else float(one.ours),
+                "label": one.label,
+                "why": one.explanation,
+            }
+            for number, rows in made.comparison.items()
+            for one in rows
+        ],
+        "parameters": _parameters(made.parameters),
+    }
+
+
+def _modes(modes: tuple[Mode, ...]) -> list[dict[str, Any]]:
+    return [
+        {
+            "frequency_Hz": mode.frequency,
+            "damping_ratio": mode.damping,
+            "growth_per_s": mode.growth,
+            "coordinate": mode.coordinate,
+        }
+        for mode in modes
+    ]
+
+
+def _parameters(parameters: Parameters) -> dict[str, Any]:
+    """Values with unit and source by their paths."""
+    found: dict[str, Any] = {}
+    for table in fields(parameters):
+        if table.name != "sources":
+            part = getattr(parameters, table.name)
+            for one in fields(part):
+                path = f"{table.name}.{one.name}"
+                value, unit = getattr(part, one.name), one.metadata["unit"]
+                found[path] = {"value": value, "unit": unit, "source": parameters.sources[path]}
+    return found
+
+
+def vehicle_csv(motion: Motion) -> str:
+    """Motion as CSV with one header line and six digits after the point, nanometres and nanoradians."""
+    columns = dict(motion.columns())
+    stream = io.StringIO()
+    stream.write(",".join(columns) + "\n")
+    # adding 0.0 makes a negative zero positive, so that it is written the same everywhere
+    np.savetxt(stream, np.round(np.stack(list(columns.values()), axis=1), 6) + 0.0, fmt="%.6f", delimiter=",")
+    return stream.getvalue()
+
+
+def parameters_markdown(parameters: Parameters) -> str:
+    """Table of all parameters with unit and source, in Markdown."""
+    rows = [
+        f"| `{path}` | {entry['value']:g} {entry['unit'] if entry['unit'] != '1' else ''}".rstrip()
+        + f" | {entry['source']} |\n"
+        for path, entry in _parameters(parameters).items()
+    ]
+    return "| parameter | value | source |\n|---|---|---|\n" + "".join(rows)

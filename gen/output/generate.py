@@ -1,0 +1,61 @@
+"""Writes a core's files: SystemVerilog, RTLIL, manifest, certificate, the bit-true C model, and its registers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from sosmith.gen.core import CoreDesign
+from sosmith.gen.output.certificate import certificate
+from sosmith.gen.output.manifest import manifest
+from sosmith.gen.output.verilog import to_rtlil, to_verilog
+from sosmith.gen.reload.register_map import c_registers, systemrdl
+from sosmith.gen.reload.register_writes import bank_size
+from sosmith.gen.verifier.certificate_file import certificate_text
+from sosmith.model.dataflow.c_model import c_header, c_source
+from sosmith.model.text_files import to_json, write_files
+
+
+def generate(design: CoreDesign, directory: Path, progress: Callable[[str], None] = lambda step: None) -> list[Path]:
+    """Write SystemVerilog, RTLIL, manifest, certificate and C model into `directory`; return the files' paths.
+
+    Of a core that can be reloaded, the registers too: as a C header and in SystemRDL. Two runs on the same
+    specification write the same bytes.
+
+    Raises
+    ------
+    ToolError
+        If Yosys fails.
+    SpecificationError
+        If the folder cannot be written.
+    """
+    name, datapath = design.spec.name, design.datapath
+    progress("RTLIL")
+    rtlil_text = to_rtlil(design.architecture.component(), datapath.name)
+    progress("SystemVerilog")
+    verilog_text = to_verilog(rtlil_text)
+    progress("certificate")
+    proven = certificate(design.quantized, design.spec.max_error)
+    return write_files(
+        directory,
+        {
+            f"{name}.sv": verilog_text,
+            f"{name}.il": rtlil_text,
+            f"{name}.json": to_json(manifest(design)),
+            f"{name}.certificate.json": certificate_text(proven),
+            f"{name}.c": c_source(datapath),
+            f"{name}.h": c_header(datapath),
+        }
+        | _register_files(design),
+    )
+
+
+def _register_files(design: CoreDesign) -> dict[str, str]:
+    fingerprint = design.architecture.fingerprint
+    if fingerprint is None:
+        return {}
+    name, (words, _) = design.spec.name, bank_size(design.architecture)
+    return {
+        f"{name}_registers.h": c_registers(name, words=words, design=fingerprint),
+        f"{name}.rdl": systemrdl(name, words=words, design=fingerprint),
+    }

@@ -1,0 +1,205 @@
+"""The proof of a cascade: ranges of all its nodes, and the error of its roundings and its coefficients.
+
+Every stage's exact linear models hand the responses of all sources on to the next: the input, and the error
+of every quantizer so far. At each node whose range a stage states, and at the end, the responses say what is
+possible. If no node overflows at any sample before, none does at this one: so by induction the linear model
+holds throughout.
+
+Stages may have several inputs and outputs. What one source sends along several wires is added where they meet: it
+drives there as one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+from sosmith.gen.proof.linear_model import LinearModel, Polynomial
+from sosmith.gen.proof.peak_gain import Drive, Extent, Horizon, Response, extent, horizon, impulse
+
+StageModel = Sequence[LinearModel]
+"""Models of all outputs of a stage, in their order."""
+
+TransferFunction = tuple[tuple[Fraction, ...], tuple[Fraction, ...]]
+"""Numerator and denominator in ``w = z**-1``."""
+
+
+@dataclass(frozen=True)
+class CascadeProof:
+    """What is proven about a cascade of linear stages, in the units of its input and output.
+
+    Attributes
+    ----------
+    nodes : tuple of dict of int to Extent
+        For each stage, the values that its BOUND nodes (by index) can take.
+    output : Extent
+        The values that the output can take.
+    rounding : Extent
+        Output minus what the same coefficients would give without quantizers.
+    coefficients : Extent
+        What the stages' transfer functions give, minus what the ideal sections give.
+    gain : Fraction
+        Worst-case peak gain of the ideal sections.
+    """
+
+    nodes: tuple[dict[int, Extent], ...]
+    output: Extent
+    rounding: Extent
+    coefficients: Extent
+    gain: Fraction
+
+
+def prove_cascade(
+    stages: Sequence[StageModel], ideal: Sequence[TransferFunction], low: Fraction, high: Fraction
+) -> CascadeProof:
+    """Prove a cascade of at least one stage, with one input and one output, for inputs in [low, high] from reset on.
+
+    Raises
+    ------
+    ShortfallError
+        If a stage is unstable or its response does not end in time.
+    """
+    at = cascade_horizon(stages, ideal)
+    wires: list[Drives] = [{INPUT: Drive(impulse(at), low, high)}]
+    nodes = []
+    for number, stage in enumerate(stages):
+        lanes = [Lane(number, model, wires, at) for model in stage]
+        nodes.append({node: extent(list(lane.at(node).values())) for lane in lanes for node in lane.model.bounds})
+        wires = [lane.at(lane.model.output) for lane in lanes]
+    (drives,) = wires
+    exact = through(ideal, at)
+    return CascadeProof(
+        nodes=tuple(nodes),
+        output=extent(list(drives.values())),
+        rounding=extent([drive for key, drive in drives.items() if key != INPUT]),
+        coefficients=extent([Drive(drives[INPUT].response.minus(exact), low, high)]),
+        gain=_gain(exact),
+    )
+
+
+def coefficient_extent(
+    stages: Sequence[StageModel], ideal: Sequence[TransferFunction], low: Fraction, high: Fraction
+) -> Extent:
+    """Limits of what the stages' transfer functions give, minus what the ideal sections give."""
+    at = cascade_horizon(stages, ideal)
+    return extent([Drive(made_response(stages, at).minus(through(ideal, at)), low, high)])
+
+
+def made_response(stages: Sequence[StageModel], at: Horizon) -> Response:
+    """Impulse response of the stages without their quantizers."""
+    wires = [impulse(at)]
+    for stage in stages:
+        wires = [_joined([(wires[k], t) for k, t in zip(m.entries, m.transfers, strict=True)], m) for m in stage]
+    (response,) = wires
+    return response
+
+
+def error_drives(stages: Sequence[StageModel], at: Horizon) -> list[Drive]:
+    """Drives at the output by all that the stages add to the input: errors of the quantizers, and constants."""
+    wires: list[Drives] = [{}]
+    for number, stage in enumerate(stages):
+        lanes = [Lane(number, model, wires, at) for model in stage]
+        wires = [lane.at(lane.model.output) for lane in lanes]
+    (drives,) = wires
+    return list(drives.values())
+
+
+def rounding_gains(stages: Sequence[StageModel]) -> list[dict[str, Fraction]]:
+    """Error at the output of each stage's quantizers, by name, half from the lowest to the highest possible."""
+    at = cascade_horizon(stages, [])
+    wires = [impulse(at)]  # from each output of a stage to the end
+    gains = []
+    for stage in reversed(stages):
+        after = [wire.all_pole(model.denominator) for wire, model in zip(wires, stage, strict=True)]
+        found = {
+            source.name: extent([Drive(response.taps(source.numerators[model.output]), source.low, source.high)])
+            for response, model in zip(after, stage, strict=True)
+            for source in model.quantizers
+        }
+        gains.append({name: (e.high - e.low) / 2 for name, e in found.items()})
+        wires = [
+            _sum(
+                response.taps(model.transfers[model.entries.index(k)])
+                for response, model in zip(after, stage, strict=True)
+                if k in model.entries
+            )
+            for k in range(_input_count(stage))
+        ]
+    return gains[::-1]
+
+
+def ideal_gain(ideal: Sequence[TransferFunction]) -> Fraction:
+    """Worst-case peak gain of the ideal sections."""
+    return _gain(through(ideal, cascade_horizon([], ideal)))
+
+
+def through(sections: Sequence[TransferFunction], at: Horizon) -> Response:
+    """Impulse response of sections in a row."""
+    response = impulse(at)
+    for numerator, denominator in sections:
+        response = response.all_pole(denominator).taps(numerator)
+    return response
+
+
+def cascade_horizon(stages: Sequence[StageModel], ideal: Sequence[TransferFunction]) -> Horizon:
+    """Choose a horizon for the responses of stages and ideal sections."""
+    paths: list[list[list[Polynomial]]] = [[[]]]  # for each wire the ways to it, for each way its denominators
+    for stage in stages:
+        paths = [[[*path, m.denominator] for k in m.entries for path in paths[k]] for m in stage]
+    return horizon([*(path for wire in paths for path in wire), [denominator for _, denominator in ideal]])
+
+
+Key = tuple[int, int, str, int]
+"""A source: number of the stage, output node, name, and position among the sources of that output's model."""
+
+Drives = Mapping[Key, Drive]
+
+INPUT: Key = (-1, 0, "input", 0)
+
+
+class Lane:
+    """One output of a stage, with all that arrives at it."""
+
+    def __init__(self, number: int, model: LinearModel, wires: Sequence[Drives], at: Horizon) -> None:
+        self.model = model
+        self._number = number
+        self._arrived = [
+            {key: Drive(d.response.all_pole(model.denominator), d.low, d.high) for key, d in wires[k].items()}
+            for k in model.entries
+        ]
+        self._own = impulse(at).all_pole(model.denominator)
+
+    def at(self, node: int) -> Drives:
+        """Drives at a node: what has come from before, then the stage's own sources."""
+        model = self.model
+        drives: dict[Key, Drive] = {}
+        for source, arrived in zip(model.sources, self._arrived, strict=False):
+            for key, drive in arrived.items():
+                response = drive.response.taps(source.numerators[node])
+                if key in drives:
+                    response = drives[key].response.plus(response)
+                drives[key] = Drive(response, drive.low, drive.high)
+        for index, source in enumerate(model.own):
+            key = self._number, model.output, source.name, index
+            drives[key] = Drive(self._own.taps(source.numerators[node]), source.low, source.high)
+        return drives
+
+
+def _joined(arrived: Sequence[tuple[Response, Polynomial]], model: LinearModel) -> Response:
+    return _sum(response.all_pole(model.denominator).taps(transfer) for response, transfer in arrived)
+
+
+def _sum(responses: Iterable[Response]) -> Response:
+    total, *rest = responses
+    for response in rest:
+        total = total.plus(response)
+    return total
+
+
+def _input_count(stage: StageModel) -> int:
+    return 1 + max(k for model in stage for k in model.entries)
+
+
+def _gain(response: Response) -> Fraction:
+    return extent([Drive(response, Fraction(-1), Fraction(1))]).high

@@ -1,0 +1,292 @@
+"""What a section does of its own accord: limit cycles of the rounding, and dead bands.
+
+Without input, the quantizers of a recursion can keep it from coming to rest, and a small constant input can stay
+without effect. Three things are told of a section's dataflow graph.
+
+- The largest output that its quantizers can sustain, from the same exact gains as the proof: all their errors at
+  their worst, for ever. It holds for every cycle; with one rounding quantizer it is half an LSB times L1 of the way
+  from there to the output.
+- The dead band: the same for constant errors, by the gains at zero frequency. A constant output can be this far
+  from what the input asks for. Error feedback has a zero there.
+- Whether there are no cycles at all: with a diagonal D > 0 for which D - A^T D A is positive definite, x^T D x falls
+  with every sample, and no quantizer that only shortens each state (magnitude truncation) can raise it. Where the
+  states overflow, the same D excludes overflow oscillations (Mills, Mullis and Roberts 1978). D and its proof are in
+  rationals.
+
+A section with several outputs is told of output by output. Small sections can also be searched exhaustively.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import lru_cache
+from itertools import product
+from math import prod
+
+from sosmith.gen.proof.linear_model import LinearModel, cone, linear_model, state_matrix
+from sosmith.gen.proof.peak_gain import Drive, extent, horizon, impulse
+from sosmith.model.dataflow.datapath import Stage
+from sosmith.model.dataflow.graph import Graph, Op, value
+
+Matrix = Sequence[Sequence[Fraction]]
+
+_MAX_STARTS = 1 << 20
+_MIN_SHARE = 400  # of the weight of one state in a triangular matrix, as a power of two
+
+
+def recursions(section: Stage) -> dict[str, Graph]:
+    """Recursions of a section by name, each with one input and one output.
+
+    They are the section itself, or where it has several inputs or outputs, what leads to each output that depends on a
+    state.
+    """
+    graph = section.graph
+    if len(graph.inputs) == len(graph.outputs) == 1:
+        return {section.name: graph}
+    parts = {f"{section.name} {graph.nodes[output].name}": cone(graph, output)[0] for output in graph.outputs}
+    return {name: part for name, part in parts.items() if part.delays}
+
+
+@dataclass(frozen=True, kw_only=True)
+class LimitCycles:
+    """What the quantizers of a section can sustain, in the units of its output.
+
+    Attributes
+    ----------
+    largest : Fraction
+        Proven bound of the output's magnitude in every limit cycle without input, and of its distance from the
+        exact response with any input once the start is over.
+    dead_band : Fraction
+        Largest error that a constant output can have.
+    lyapunov : tuple of Fraction or None
+        Diagonal D of the certificate, one entry per state in the loop; None if there is none.
+    none : bool
+        Whether it is proven that the section comes to rest without input: there is a certificate, and no other
+        quantizer in the loop than truncation of magnitudes, of the states or on the only way to one.
+    """
+
+    largest: Fraction
+    dead_band: Fraction
+    lyapunov: tuple[Fraction, ...] | None
+    none: bool
+
+
+@lru_cache(maxsize=256)
+def limit_cycles(graph: Graph) -> LimitCycles:
+    """Tell what the quantizers of a section can sustain.
+
+    Raises
+    ------
+    ValueError
+        If the graph is not linear, or has not one input and one output.
+    ShortfallError
+        If the section is unstable.
+    """
+    model = linear_model(graph)
+    certificate = lyapunov_diagonal(loop_matrix(graph))
+    return LimitCycles(
+        largest=_largest(model),
+        dead_band=_dead_band(model),
+        lyapunov=certificate,
+        none=certificate is not None and _only_truncates_states(graph),
+    )
+
+
+def _largest(model: LinearModel) -> Fraction:
+    own = impulse(horizon([[model.denominator]])).all_pole(model.denominator)
+    drives = [Drive(own.taps(s.numerators[model.output]), s.low, s.high) for s in model.sources[1:]]
+    return extent(drives).magnitude
+
+
+def _dead_band(model: LinearModel) -> Fraction:
+    low = high = Fraction(0)
+    for source in model.sources[1:]:
+        gain = sum(source.numerators[model.output], Fraction(0)) / sum(model.denominator, Fraction(0))
+        ends = gain * source.low, gain * source.high
+        low, high = low + min(ends), high + max(ends)
+    return max(-low, high)
+
+
+def loop_states(graph: Graph) -> tuple[int, ...]:
+    """Which of the graph's delays lie in a loop, as positions among them; the others empty themselves."""
+    matrix = state_matrix(graph)
+    size = len(matrix)
+    reach = [[bool(matrix[i][j]) for j in range(size)] for i in range(size)]
+    for k, i, j in product(range(size), repeat=3):
+        reach[i][j] = reach[i][j] or (reach[i][k] and reach[k][j])
+    return tuple(k for k in range(size) if reach[k][k])
+
+
+def loop_matrix(graph: Graph) -> list[list[Fraction]]:
+    """Rows and columns of `state_matrix` for the states in a loop."""
+    matrix, states = state_matrix(graph), loop_states(graph)
+    return [[matrix[i][j] for j in states] for i in states]
+
+
+def is_positive_definite(matrix: Matrix) -> bool:
+    """Whether a symmetric matrix of rationals is positive definite: all pivots of its L D L^T are positive."""
+    rows = [list(row) for row in matrix]
+    for k, row in enumerate(rows):
+        if row[k] <= 0:
+            return False
+        for other in rows[k + 1 :]:
+            factor = other[k] / row[k]
+            for j in range(k, len(rows)):
+                other[j] -= factor * row[j]
+    return True
+
+
+def proves_decay(diagonal: Sequence[Fraction], matrix: Matrix) -> bool:
+    """Whether ``x^T D x`` falls with every step ``x' = A x``: D and D - A^T D A are positive definite."""
+    size = len(matrix)
+    difference = [
+        [
+            (diagonal[i] if i == j else Fraction(0))
+            - sum((matrix[k][i] * diagonal[k] * matrix[k][j] for k in range(size)), Fraction(0))
+            for j in range(size)
+        ]
+        for i in range(size)
+    ]
+    return all(entry > 0 for entry in diagonal) and is_positive_definite(difference)
+
+
+def lyapunov_diagonal(matrix: Matrix) -> tuple[Fraction, ...] | None:
+    """Find a diagonal D that `proves_decay`; None if there is none, or for more than two states.
+
+    With two states D = diag(|a21|, |a12|) makes the cross terms of ``sqrt(D) A / sqrt(D)`` equal in size, which no
+    other ratio betters: it is the only one to try, unless a cross term is zero. Then D may make the other as small
+    as it takes.
+    """
+    if len(matrix) > 2:
+        return None
+    if len(matrix) < 2:
+        candidates = [(Fraction(1),) * len(matrix)]
+    else:
+        a12, a21 = abs(matrix[0][1]), abs(matrix[1][0])
+        if a12 and a21:
+            candidates = [(Fraction(1), a12 / a21)]
+        else:
+            shares = [Fraction(1, 1 << k) for k in range(_MIN_SHARE if a12 or a21 else 1)]
+            candidates = [(share, Fraction(1)) if a12 else (Fraction(1), share) for share in shares]
+    return next((diagonal for diagonal in candidates if proves_decay(diagonal, matrix)), None)
+
+
+def _only_truncates_states(graph: Graph) -> bool:
+    delays = graph.delays
+    return all(_never_grows(graph, graph.nodes[delays[k]].operands[0]) for k in loop_states(graph))
+
+
+def _never_grows(graph: Graph, index: int) -> bool:
+    """Whether a node's quantizers can only make it smaller in magnitude than the states make it without them.
+
+    It is a sum of multiples of states, or a multiple of just one value that is truncated in turn, and is truncated
+    itself or not quantized.
+    """
+    index = _unbounded(graph, index)
+    if graph.nodes[index].op is Op.TRUNCATE:
+        index = graph.nodes[index].operands[0]
+    pending, states, truncated = [index], 0, set[int]()
+    while pending:
+        current = pending.pop()
+        node = graph.nodes[current]
+        if node.op in {Op.FLOOR, Op.FRACTION} or (node.op is Op.CONSTANT and node.parameter):
+            return False
+        if node.op is Op.TRUNCATE:
+            truncated.add(current)
+        elif node.op is Op.DELAY:
+            states += 1
+        else:
+            pending += node.operands
+    return not truncated or (not states and len(truncated) == 1 and _never_grows(graph, truncated.pop()))
+
+
+def _unbounded(graph: Graph, index: int) -> int:
+    while graph.nodes[index].op is Op.BOUND:
+        index = graph.nodes[index].operands[0]
+    return index
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cycles:
+    """What a search has found.
+
+    Attributes
+    ----------
+    starts : int
+        States that it began from.
+    amplitude : Fraction
+        Largest magnitude of the output in any cycle that they end in, in the units of the output.
+    longest : int
+        Samples of the longest such cycle; 1 for a constant output.
+    """
+
+    starts: int
+    amplitude: Fraction
+    longest: int
+
+
+def search_cycles(graph: Graph, reach: int, *, fraction_bits: int | None = None) -> Cycles:
+    """Run a section without input from every state of its loop within `reach`.
+
+    Exact, on the integer graph. Its ranges should be wide, as they are until a proof narrows them.
+
+    Parameters
+    ----------
+    graph : Graph
+        The section.
+    reach : int
+        Largest magnitude of a state at the start, in LSBs of the output.
+    fraction_bits : int or None
+        How much finer than LSBs of the output the starts are spaced; None for every code. Without error feedback
+        the bits below are never read, and 0 loses nothing.
+
+    Raises
+    ------
+    ValueError
+        If these are more than a million states.
+    RangeError
+        If a code leaves the range that its node states.
+    """
+    loop = loop_states(graph)
+    output = graph.nodes[graph.outputs[0]]
+    starts = []
+    for k in loop:
+        finer = graph.nodes[graph.delays[k]].frac - output.frac
+        step = 1 if fraction_bits is None else 1 << max(finer - fraction_bits, 0)
+        most = (reach << max(finer, 0)) // step
+        starts.append([step * n for n in range(-most, most + 1)])
+    count = prod(map(len, starts))
+    if count > _MAX_STARTS:
+        raise ValueError(f"starts must be at most {_MAX_STARTS}, not {count}")
+    known: set[tuple[int, ...]] = set()
+    amplitude, longest = Fraction(0), 1
+    for codes in product(*starts):
+        state = graph.reset()
+        for k, code in zip(loop, codes, strict=True):
+            state[k] = code
+        cycle = _cycle_from(graph, state, known)
+        longest = max(longest, len(cycle))
+        amplitude = max([amplitude, *cycle])
+    return Cycles(starts=count, amplitude=amplitude, longest=longest)
+
+
+def cycle_from(graph: Graph, state: Sequence[int]) -> list[Fraction]:
+    """Magnitudes of the output over one period of the cycle that a section ends in without input."""
+    return _cycle_from(graph, list(state), set())
+
+
+def _cycle_from(graph: Graph, state: list[int], known: set[tuple[int, ...]]) -> list[Fraction]:
+    """Add the states passed to `known`; an empty list if one of them was known before."""
+    output = graph.nodes[graph.outputs[0]]
+    path: dict[tuple[int, ...], int] = {}
+    magnitudes: list[Fraction] = []
+    key = tuple(state)
+    while key not in path and key not in known:
+        path[key] = len(magnitudes)
+        (code,) = graph.step([0], state)
+        magnitudes.append(abs(value(output, code)))
+        key = tuple(state)
+    known.update(path)
+    return magnitudes[path[key] :] if key in path else []

@@ -1,0 +1,305 @@
+"""Exact transfer functions of a linear stage, read off its dataflow graph.
+
+A quantizer is an error source: ``floor(a) = a - e`` with e in [0, 2**-frac), ``truncate(a) = a - e`` with e in
+(-2**-frac, 2**-frac). A FLOOR or FRACTION of a delayed node sees the delayed error of that node, so that all the
+places where one error enters count as one source, which is what error feedback lives on. Everything is a polynomial
+in ``w = z**-1`` with rational coefficients.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import lru_cache
+
+from sosmith.model.dataflow.graph import Graph, Node, Op
+
+Polynomial = tuple[Fraction, ...]
+"""Coefficients of w**0, w**1, ..; the last one is not zero unless it is the only one."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """Something that drives a stage.
+
+    Attributes
+    ----------
+    name : str
+        ``"input"``, ``"constant"``, or the name of the quantized node.
+    low, high : Fraction
+        Range of its value at every sample from reset on; for the input, the range its node states.
+    kept : int or None
+        Fraction bits that the quantizer keeps; None for what is no quantizer.
+    numerators : mapping of int to Polynomial
+        From this source to the output node and to every BOUND node, over the stage's denominator.
+    """
+
+    name: str
+    low: Fraction
+    high: Fraction
+    kept: int | None
+    numerators: Mapping[int, Polynomial]
+
+
+@dataclass(frozen=True)
+class LinearModel:
+    """What leads to one output of a stage: one denominator, and a numerator for every source and node.
+
+    Attributes
+    ----------
+    denominator : Polynomial
+        Constant term 1; of the states that this output depends on.
+    output : int
+        Index of the output node.
+    entries : tuple of int
+        Which of the stage's inputs it depends on, as positions among them.
+    bounds : tuple of int
+        Indices of the BOUND nodes that it depends on, whose ranges are to be proven.
+    sources : tuple of Source
+        The inputs first, as in `entries`.
+    """
+
+    denominator: Polynomial
+    output: int
+    entries: tuple[int, ...]
+    bounds: tuple[int, ...]
+    sources: tuple[Source, ...]
+
+    @property
+    def transfers(self) -> tuple[Polynomial, ...]:
+        """Numerators from the inputs to the output."""
+        return tuple(source.numerators[self.output] for source in self.sources[: len(self.entries)])
+
+    @property
+    def transfer(self) -> Polynomial:
+        """Numerator from the one input to the output."""
+        (numerator,) = self.transfers
+        return numerator
+
+    @property
+    def own(self) -> tuple[Source, ...]:
+        """All sources but the inputs."""
+        return self.sources[len(self.entries) :]
+
+    @property
+    def quantizers(self) -> tuple[Source, ...]:
+        """The sources that are errors of a quantizer."""
+        return tuple(source for source in self.own if source.kept is not None)
+
+
+def linear_model(graph: Graph) -> LinearModel:
+    """Extract the model of a graph with one input and one output.
+
+    Raises
+    ------
+    ValueError
+        If the graph multiplies two variables or clamps, or has not one input and one output.
+    """
+    if len(graph.inputs) != 1 or len(graph.outputs) != 1:
+        raise ValueError(f"graph must have one input and one output, not {len(graph.inputs)}, {len(graph.outputs)}")
+    (model,) = linear_models(graph)
+    return model
+
+
+@lru_cache(maxsize=256)
+def linear_models(graph: Graph) -> tuple[LinearModel, ...]:
+    """Extract the models of all outputs of `graph`, each of what leads to that output alone.
+
+    Raises
+    ------
+    ValueError
+        If the graph multiplies two variables or clamps, or states a range of what no output depends on.
+    """
+    for node in graph.nodes:
+        if node.op in {Op.MULTIPLY, Op.CLAMP}:
+            raise ValueError(f"graph must be linear, not {node.op.value}")
+    bounds = [index for index, node in enumerate(graph.nodes) if node.op is Op.BOUND]
+    # Beside a single output, a state that does not reach it has its range proven too.
+    beside = bounds if len(graph.outputs) == 1 else []
+    models = tuple(_model(*cone(graph, output, beside)) for output in graph.outputs)
+    seen = {index for model in models for index in model.bounds}
+    for index in bounds:
+        if index not in seen:
+            node = graph.nodes[index]
+            raise ValueError(f"outputs must depend on every range that is stated, not leave out {node.name or index}")
+    return models
+
+
+def cone(graph: Graph, output: int, beside: Sequence[int] = ()) -> tuple[Graph, tuple[int, ...], tuple[int, ...]]:
+    """Cut out what leads to one node of `graph`, and to those `beside` it.
+
+    Returns
+    -------
+    graph : Graph
+        With all its inputs among those of the whole, and the one output.
+    indices : tuple of int
+        For each of its nodes the index in the whole.
+    entries : tuple of int
+        For each of its inputs the position among those of the whole.
+    """
+    reached, pending = {output, *beside}, [output, *beside]
+    while pending:
+        new = set(graph.nodes[pending.pop()].operands) - reached
+        reached |= new
+        pending += new
+    indices = tuple(sorted(reached))
+    place = {index: k for k, index in enumerate(indices)}
+    nodes = (graph.nodes[index] for index in indices)
+    entries = tuple(k for k, index in enumerate(graph.inputs) if index in reached)
+    part = Graph(
+        tuple(replace(node, operands=tuple(place[i] for i in node.operands)) for node in nodes),
+        tuple(place[graph.inputs[k]] for k in entries),
+        (place[output],),
+    )
+    return part, indices, entries
+
+
+def _model(graph: Graph, indices: Sequence[int], entries: tuple[int, ...]) -> LinearModel:
+    """Model of `graph`, which has one output; `indices` and `entries` tell its nodes and inputs in the whole."""
+    (output,) = graph.outputs
+    bounds = tuple(i for i, node in enumerate(graph.nodes) if node.op is Op.BOUND)
+    denominator = _denominator(state_matrix(graph))
+    watched = tuple(dict.fromkeys((output, *bounds)))
+    sources = []
+    for key in _source_keys(graph):
+        # A numerator's degree is at most the number of states and the longest delay of an error together.
+        responses = _impulse_responses(graph, key, watched, 2 * len(graph.delays) + 1)
+        numerators = {indices[i]: _trim(_product(responses[i], denominator, len(responses[i]))) for i in watched}
+        low, high = _range(graph, key)
+        kept = key[2] if key[0] in {"error", "truncation"} else None
+        sources.append(Source(_name(graph, key), low, high, kept, numerators))
+    return LinearModel(denominator, indices[output], entries, tuple(indices[i] for i in bounds), tuple(sources))
+
+
+_Key = tuple[str, int, int]
+"""Kind (``"input"``, ``"constant"``, ``"error"``, ``"truncation"``), node, and for the last two the fraction bits
+kept."""
+
+
+def _source_keys(graph: Graph) -> list[_Key]:
+    keys: dict[_Key, None] = {("input", index, 0): None for index in graph.inputs}
+    for index, node in enumerate(graph.nodes):
+        if node.op is Op.CONSTANT and node.parameter:
+            keys[("constant", index, 0)] = None
+        elif node.op in {Op.FLOOR, Op.FRACTION, Op.TRUNCATE}:
+            root, _ = _undelayed(graph, node.operands[0])
+            keys[(_kind(node), root, _kept(node))] = None
+    return list(keys)
+
+
+def _kind(node: Node) -> str:
+    return "truncation" if node.op is Op.TRUNCATE else "error"
+
+
+def _kept(node: Node) -> int:
+    return node.parameter if node.op is Op.FRACTION else node.frac
+
+
+def _undelayed(graph: Graph, index: int) -> tuple[int, int]:
+    """Node that `index` is a delayed copy of, and the delay in samples."""
+    delay = 0
+    while graph.nodes[index].op is Op.DELAY:
+        index, delay = graph.nodes[index].operands[0], delay + 1
+    return index, delay
+
+
+def _range(graph: Graph, key: _Key) -> tuple[Fraction, Fraction]:
+    kind, index, kept = key
+    node = graph.nodes[index]
+    unit = Fraction(2) ** -node.frac
+    if kind in {"error", "truncation"}:
+        most = ((1 << (node.frac - kept)) - 1) * unit
+        return Fraction(0) if kind == "error" else -most, most
+    return node.low * unit, node.high * unit
+
+
+def _name(graph: Graph, key: _Key) -> str:
+    kind, index, _ = key
+    return kind if kind in {"input", "constant"} else graph.nodes[index].name or f"node{index}"
+
+
+def _impulse_responses(graph: Graph, key: _Key, watched: Sequence[int], length: int) -> dict[int, list[Fraction]]:
+    state = [Fraction(0)] * len(graph.delays)
+    result: dict[int, list[Fraction]] = {i: [] for i in watched}
+    for time in range(length):
+        values = _step(graph, state, key, time)
+        for i in watched:
+            result[i].append(values[i])
+        state = [values[graph.nodes[i].operands[0]] for i in graph.delays]
+    return result
+
+
+def _step(graph: Graph, state: Sequence[Fraction], key: _Key | None, time: int) -> list[Fraction]:
+    """Values of all nodes with the source `key` at 1 at time 0 and 0 at every other, all else at 0."""
+    kind, source, kept = key or ("", -1, 0)
+    memory = iter(state)
+    values: list[Fraction] = []
+    for index, node in enumerate(graph.nodes):
+        operands = [values[i] for i in node.operands if node.op is not Op.DELAY]
+        value = Fraction(0)
+        if node.op is Op.DELAY:
+            value = next(memory)
+        elif node.op in {Op.INPUT, Op.CONSTANT}:
+            value = Fraction(int(index == source and kind in {"input", "constant"} and time == 0))
+        elif node.op is Op.ADD:
+            value = operands[0] + operands[1]
+        elif node.op is Op.SUBTRACT:
+            value = operands[0] - operands[1]
+        elif node.op is Op.SHIFT:
+            value = operands[0] * Fraction(2) ** node.parameter
+        elif node.op is Op.SCALE:
+            value = operands[0] * node.parameter * Fraction(2) ** -node.parameter_frac
+        elif node.op is Op.BOUND:
+            value = operands[0]
+        else:
+            root, delay = _undelayed(graph, node.operands[0])
+            error = Fraction(int((_kind(node), root, _kept(node), delay) == (kind, source, kept, time)))
+            value = error if node.op is Op.FRACTION else operands[0] - error
+        values.append(value)
+    return values
+
+
+def state_matrix(graph: Graph) -> list[list[Fraction]]:
+    """Matrix by which a sample carries the delays of `graph`, in their order, into the next, without quantizers."""
+    size = len(graph.delays)
+    columns = []
+    for j in range(size):
+        values = _step(graph, [Fraction(int(i == j)) for i in range(size)], None, 0)
+        columns.append([values[graph.nodes[i].operands[0]] for i in graph.delays])
+    return [[columns[j][i] for j in range(size)] for i in range(size)]
+
+
+def _denominator(matrix: list[list[Fraction]]) -> Polynomial:
+    """``det(I - w A)`` by the Faddeev-LeVerrier recursion, exact in rationals."""
+    size = len(matrix)
+    coefficients = [Fraction(1)]
+    power = [[Fraction(int(i == j)) for j in range(size)] for i in range(size)]
+    for k in range(1, size + 1):
+        power = _matrix_product(matrix, power)
+        coefficients.append(-sum((power[i][i] for i in range(size)), Fraction(0)) / k)
+        for i in range(size):
+            power[i][i] += coefficients[-1]
+    return _trim(coefficients)
+
+
+def _matrix_product(a: list[list[Fraction]], b: list[list[Fraction]]) -> list[list[Fraction]]:
+    size = len(a)
+    return [
+        [sum((a[i][k] * b[k][j] for k in range(size) if a[i][k] and b[k][j]), Fraction(0)) for j in range(size)]
+        for i in range(size)
+    ]
+
+
+def _product(a: Sequence[Fraction], b: Sequence[Fraction], length: int) -> list[Fraction]:
+    result = [Fraction(0)] * length
+    for i, x in enumerate(a):
+        if x:
+            for j, y in enumerate(b[: length - i]):
+                result[i + j] += x * y
+    return result
+
+
+def _trim(values: Sequence[Fraction]) -> Polynomial:
+    end = max((k for k, value in enumerate(values) if value), default=0)
+    return tuple(values[: end + 1])

@@ -1,0 +1,99 @@
+"""Makes transposed direct form II sections: chooses the operator and its scaling."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from sosmith.gen.realizations.coefficients import Rounding
+from sosmith.gen.realizations.direct_form import pole_side, products
+from sosmith.model.errors import ShortfallError
+from sosmith.model.sections.transposed_form import Limits, TransposedForm
+
+Row = Sequence[float]
+
+
+def transposed_form(
+    row: Row,
+    *,
+    name: str,
+    delta: bool,
+    rounding: Rounding,
+    x: tuple[int, int, int],
+    fracs: Mapping[str, int],
+    ranges: Mapping[str, Limits],
+    wide: Limits,
+) -> TransposedForm:
+    """Make a section.
+
+    Parameters
+    ----------
+    row : sequence of float
+        b0, b1, b2, 1, a1, a2.
+    name : str
+        Its name.
+    delta : bool
+        In the delta operator about the side of the unit circle where its poles lie, not in the shift operator.
+    rounding : Rounding
+        Rounds the coefficients.
+    x : tuple of int
+        Fraction bits, smallest and largest code of the input.
+    fracs : mapping of str to int
+        Fraction bits that the quantizers of v, t1 and t2 keep. Empty, they keep as many as the input has; else those
+        that are missing keep all, because with none nothing was left there to drop.
+    ranges : mapping of str to tuple of int
+        Ranges of the codes of v, t1 and t2.
+    wide : tuple of int
+        Range where one is missing.
+
+    Raises
+    ------
+    ShortfallError
+        If the section passes nothing, or its rounded coefficients are unstable.
+    """
+    # In transposed form each coefficient meets x by itself, so that a unity gain on the other side saves nothing.
+    side = pole_side(row)
+    made, integer_part = products(row, rounding, name, side)
+    operator = side if delta else 0
+    exponent = _delta_exponent(row, operator)
+    state_fracs = (fracs.get("t1"), fracs.get("t2")) if fracs else (x[0], x[0])
+    # Without x(n) in it, y(n) is s1, which is quantized already.
+    output = "v" if any(product.x[0] for product in made) else "t1"
+    try:
+        return TransposedForm(
+            name=name,
+            products=made,
+            integer_part=integer_part,
+            operator=operator,
+            delta_exponent=exponent,
+            x_frac=x[0],
+            x_low=x[1],
+            x_high=x[2],
+            y_frac=fracs.get(output, _exact_frac(x[0], fracs, exponent)),
+            state_fracs=state_fracs,
+            v_range=ranges.get("v", wide),
+            t1_range=ranges.get("t1", wide),
+            t2_range=ranges.get("t2", wide),
+        )
+    except ValueError as error:
+        raise ShortfallError(f"{name} must be stable with coefficients of {rounding.bits} bits: {error}") from None
+
+
+def _exact_frac(x_frac: int, fracs: Mapping[str, int], delta_exponent: int) -> int:
+    """Fraction bits of y where it adds only integer multiples of x and of what the states keep."""
+    if not fracs:
+        return x_frac
+    return max(x_frac, fracs.get("t1", 0), fracs.get("t2", 0) - delta_exponent)
+
+
+def _delta_exponent(row: Row, operator: int) -> int:
+    """Exponent of the power of two nearest to the ratio of the states' rms values.
+
+    With A1 and A2 in powers of ``z - g``, ``Delta s2`` is about the derivative of y plus A1 y; for noise in a
+    narrow band about the poles these are independent, of the powers A2 and A1**2 times that of y.
+    """
+    if operator == 0:
+        return 0
+    a1, a2 = row[4:]
+    first, second = 2 * operator + a1, 1 + operator * a1 + a2
+    return round(math.log2(math.sqrt(first**2 + second)))

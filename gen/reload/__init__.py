@@ -1,0 +1,1 @@
+"""Other coefficients for hardware that exists: made, proven, and written as register writes."""

@@ -1,0 +1,67 @@
+"""What is written to a core's registers to load a set, as a list and as a JSON file."""
+
+from __future__ import annotations
+
+import zlib
+from typing import Any
+
+from sosmith.gen.architecture import Architecture
+from sosmith.gen.core import CoreDesign
+from sosmith.gen.reload.reload import OtherSet, Swap, parallel_bank
+from sosmith.gen.reload.transient import RESIDUE
+from sosmith.hdl import folded
+from sosmith.hdl.axi_lite import BITS
+from sosmith.model.reload.constants import constants
+from sosmith.model.reload.registers import CRC, DATA, VERSION, Register
+
+
+def bank_size(architecture: Architecture) -> tuple[int, int]:
+    """Return the number of words in a bank of a core, and the bits of each that are used."""
+    made = architecture.program
+    if made is not None:
+        return len(made.instructions), folded.instruction_bits(made)
+    return sum(constant.words for constant in constants(architecture.datapath)), BITS
+
+
+def register_writes(hardware: CoreDesign, made: OtherSet, version: int) -> list[tuple[Register, int]]:
+    """List what is to be written to which register, in this order, so that a core takes a set over.
+
+    Parameters
+    ----------
+    hardware : CoreDesign
+        What the core was made from.
+    made : OtherSet
+        The set, as `check_swap` returns it.
+    version : int
+        What ``VERSION`` is to read once the set is active, 32 bits.
+    """
+    if not 0 <= version < 1 << 32:
+        raise ValueError(f"version must be in 0..4294967295, not {version}")
+    if made.program is None:
+        words = parallel_bank(hardware, made)
+    else:
+        words = [folded.encoded(instruction, made.program) for instruction in made.program.instructions]
+    crc = zlib.crc32(b"".join(word.to_bytes(4, "little") for word in (version, *words)))
+    return [(VERSION, version), *((DATA, word) for word in words), (CRC, crc)]
+
+
+def reload_json(hardware: CoreDesign, swap: Swap, version: int) -> dict[str, Any]:
+    """Return what a host needs to load a set, and what is proven of it, as a tree of JSON values.
+
+    ``writes`` are pairs of a byte address and a word, in order; errors are in the output's unit.
+    """
+    output = hardware.datapath.output
+    words, _ = bank_size(hardware.architecture)
+    return {
+        "name": hardware.spec.name,
+        "design": hardware.architecture.fingerprint,
+        "version": version,
+        "words": words,
+        "error_bound": float(swap.made.quantized.bound * output.lsb),
+        "error_parts": {part: float(value * output.lsb) for part, value in swap.made.quantized.budget.items()},
+        "error_unit": output.unit,
+        "transient_samples": swap.samples,
+        "error_after_transient": float((swap.made.quantized.bound + (RESIDUE if swap.samples else 0)) * output.lsb),
+        "state_use": float(swap.use),
+        "writes": [[register.address, word] for register, word in register_writes(hardware, swap.made, version)],
+    }

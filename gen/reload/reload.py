@@ -1,0 +1,344 @@
+"""Other coefficients for hardware that exists: made in its formats, proven anew, and refused where they do not fit.
+
+Ranges and bound of a set are proven for a core that runs from reset with it. What a swap hands on is a state that
+another set made, so a swap is proven too: that nothing wraps from the first sample on, whatever the input was and will
+be, and after how many samples the bound holds again (`sosmith.gen.reload.transient`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+from sosmith.gen.architecture import Budget, structure
+from sosmith.gen.core import CoreDesign, calibrated_codes, filter_of, polynomial_of
+from sosmith.gen.filter.design import Filter
+from sosmith.gen.quantity import quantity
+from sosmith.gen.reload.other_constants import with_constants
+from sosmith.gen.reload.transient import transient
+from sosmith.gen.specification.specification import Specification
+from sosmith.gen.word_lengths.quantize import Quantized
+from sosmith.hdl import folded
+from sosmith.model.calibration.polynomial import Polynomial
+from sosmith.model.dataflow.datapath import Datapath
+from sosmith.model.dataflow.folding import program
+from sosmith.model.dataflow.graph import Node, Op
+from sosmith.model.dataflow.program import Program
+from sosmith.model.errors import ShortfallError, SpecificationError
+from sosmith.model.reload.constants import constants, packed, values_of, with_ranges, with_room
+
+ADVICE = (
+    "go there in smaller steps, each after the one before has faded, or stop the samples and reset the core before "
+    "the first one with the new set"
+)
+"""What helps where a swap is refused."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class OtherSet:
+    """Constants for hardware that exists.
+
+    Attributes
+    ----------
+    quantized : Quantized
+        The design with them, its bound proven.
+    program : Program or None
+        What the hardware's unit runs with them, in as many instructions as before; None in the parallel architecture.
+    """
+
+    quantized: Quantized
+    program: Program | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Swap:
+    """A swap from one set to another that nothing can wrap in.
+
+    Attributes
+    ----------
+    made : OtherSet
+        The new set. Where there is a program, it is made for all values that the swap can cause.
+    samples : int
+        Length of the transient: from then on the error is within the set's bound and
+        `sosmith.gen.reload.transient.RESIDUE` output LSB, and another swap may follow.
+    use : Fraction
+        Largest share of what its word in the hardware holds that a state may take, at most 1.
+    """
+
+    made: OtherSet
+    samples: int
+    use: Fraction
+
+
+def own_set(hardware: CoreDesign) -> OtherSet:
+    """Return the set that a core was generated with, in the formats of all others.
+
+    Raises
+    ------
+    ShortfallError
+        If its constants cannot be written in these without a change.
+    """
+    quantized = with_constants(hardware.quantized, None, None, room=room_of(hardware))
+    if _values(quantized.datapath) != _values(hardware.datapath):
+        raise ShortfallError(
+            f"the realization must keep its coefficients to be loaded anew, and {quantized.realization} does not"
+        )
+    return OtherSet(quantized=quantized, program=hardware.architecture.program)
+
+
+def _values(datapath: Datapath) -> list[Fraction]:
+    """Values of all that multiplies or is added, in the order of the nodes."""
+    return [
+        node.parameter * Fraction(2) ** -(node.parameter_frac if node.op is Op.SCALE else node.frac)
+        for stage in datapath.stages
+        for node in stage.graph.nodes
+        if node.op in {Op.SCALE, Op.CONSTANT}
+    ]
+
+
+def set_for(hardware: CoreDesign, wanted: Specification) -> OtherSet:
+    """Make the set that another specification asks for: its filter, its calibration, its `max_error`.
+
+    Raises
+    ------
+    SpecificationError
+        If it differs in what is not loadable, or the hardware is not.
+    ShortfallError
+        As `other_set`.
+    """
+    spec = hardware.spec
+    if not spec.hardware.reload:
+        raise SpecificationError(f"{spec.path}: hardware.reload must be true for a set to be loaded, not false")
+    for name, have, other in (
+        ("sample_rate", spec.sample_rate, wanted.sample_rate),
+        ("inputs", spec.inputs, wanted.inputs),
+        ("output", spec.output, wanted.output),
+        ("wear", spec.wear, wanted.wear),
+    ):
+        if have != other:
+            raise SpecificationError(f"{wanted.path}: {name} must be as in {spec.path} for a set to be loaded there")
+    if (spec.calibration is None) != (wanted.calibration is None):
+        presence = "no" if spec.calibration is None else "a"
+        raise SpecificationError(f"{wanted.path}: there must be {presence} [calibration], as in {spec.path}")
+    quantized = hardware.quantized
+    ideal, polynomial, covered = None, None, None
+    if quantized.filter is not None and wanted.filter != spec.filter:
+        ideal = filter_of(wanted)
+    if quantized.polynomial is not None and wanted.calibration != spec.calibration:
+        polynomial, fitted = polynomial_of(wanted)
+        inputs = hardware.datapath.inputs
+        ends = tuple((port.lowest, port.highest) for port in inputs)
+        covered = ends if fitted is None else calibrated_codes(inputs, fitted)
+    return other_set(hardware, ideal=ideal, polynomial=polynomial, calibrated=covered, max_error=wanted.max_error)
+
+
+def other_set(
+    hardware: CoreDesign,
+    *,
+    ideal: Filter | None = None,
+    polynomial: Polynomial | None = None,
+    calibrated: tuple[tuple[int, int], ...] | None = None,
+    max_error: Fraction | None = None,
+) -> OtherSet:
+    """Make constants of another filter or polynomial for a core that exists, and prove their error.
+
+    The formats of all signals are the hardware's. Where a program is loaded, coefficients may have more fraction bits
+    than those that they replace: as few as the error allowed needs.
+
+    Parameters
+    ----------
+    hardware : CoreDesign
+        What the core was made from.
+    ideal, polynomial
+        As for `sosmith.gen.word_lengths.quantize.with_constants`.
+    calibrated : tuple of (int, int) or None
+        Lowest and highest code of each input that the calibration covers; None for the core's own. The parallel
+        architecture goes on to judge by its own range, so that the other must hold it.
+    max_error : Fraction or None
+        Error allowed, in the output's unit; None for what the core was made for.
+
+    Raises
+    ------
+    ShortfallError
+        If the constants have another structure, do not fit the hardware, or break the bound. Nothing of the kind
+        must be loaded.
+    """
+    allowed = hardware.spec.max_error if max_error is None else max_error
+    room = room_of(hardware)
+    refusal: ShortfallError | None = None
+    for finer in range((0 if ideal is None else room) + 1):
+        try:
+            quantized = with_constants(hardware.quantized, ideal, polynomial, finer=finer, room=room)
+            _check_bound(quantized, allowed)
+            if calibrated is not None:
+                _check_calibrated(hardware, calibrated)
+                quantized = replace(quantized, datapath=replace(quantized.datapath, calibrated=calibrated))
+            return OtherSet(quantized=quantized, program=_fitted(hardware, quantized.datapath, "set"))
+        except ShortfallError as error:
+            refusal = refusal or error  # the first one is about the hardware's own formats
+    assert refusal is not None
+    raise refusal
+
+
+def room_of(hardware: CoreDesign) -> int:
+    """Fraction bits that coefficients may have more than the hardware's, with all states where they are.
+
+    A program keeps a state with as many fraction bits as bring its cut between two digits, often more than the
+    datapath has. None in the parallel architecture, where every bit has its own wire.
+    """
+    made = hardware.architecture.program
+    if made is None or not hardware.quantized.sections:
+        return 0
+    places = {place.name: place.frac for place in made.places if place.is_state}
+    lifted = with_constants(hardware.quantized, None, None, room=1)
+    return min(
+        (
+            places[f"{old.name}.{old.graph.nodes[i].name}"] - old.graph.nodes[i].frac
+            for old, new in zip(hardware.quantized.sections, lifted.sections, strict=True)
+            for i in old.graph.delays
+            if new.graph.nodes[i].frac != old.graph.nodes[i].frac
+        ),
+        default=0,
+    )
+
+
+def parallel_bank(hardware: CoreDesign, made: OtherSet) -> list[int]:
+    """Words of a bank of the parallel architecture."""
+    loadable = constants(hardware.datapath)
+    return packed(values_of(made.quantized.datapath, loadable), loadable)
+
+
+def check_swap(hardware: CoreDesign, active: OtherSet | None, other: OtherSet) -> Swap:
+    """Prove that nothing wraps when `other` takes over from `active`, between any two samples, for all inputs in range.
+
+    Parameters
+    ----------
+    hardware : CoreDesign
+        What the core was made from.
+    active : OtherSet or None
+        What it runs: from reset on, or since a swap whose transient has ended. None if the core is reset between the
+        swap and the next sample: then there is nothing to prove beyond the set.
+    other : OtherSet
+        The new set.
+
+    Raises
+    ------
+    ShortfallError
+        If something inside could leave what the hardware's words hold.
+    """
+    if active is None or not other.quantized.sections:
+        return Swap(made=other, samples=0, use=_use(hardware, other.quantized.datapath, other.program))
+    old, new = active.quantized, other.quantized
+    found = transient(old, new)
+    first = new.datapath.stages.index(new.sections[0])
+    ranges: list[dict[str, tuple[int, int]]] = [{} for _ in new.datapath.stages]
+    ranges[first : first + len(found.ranges)] = found.ranges
+    try:
+        during = with_ranges(new.datapath, ranges)
+        made = _fitted(hardware, during, "swap")
+    except ValueError as error:
+        raise ShortfallError(f"the swap must fit the hardware: {error}; {ADVICE}") from None
+    except ShortfallError as error:
+        raise ShortfallError(f"{error}; {ADVICE}") from None
+    return Swap(made=replace(other, program=made), samples=found.samples, use=_use(hardware, during, made))
+
+
+def _use(hardware: CoreDesign, during: Datapath, made: Program | None) -> Fraction:
+    """Largest share of what its word holds that a state may take, of those that remember more than the input."""
+    shares = []
+    places = {} if made is None else {place.name: place for place in made.places}
+    for stage, roomy in zip(during.stages, with_room(hardware.datapath).stages, strict=True):
+        for index in stage.graph.delays:
+            node = stage.graph.nodes[index]
+            if stage.graph.nodes[node.operands[0]].op in {Op.INPUT, Op.FRACTION, Op.DELAY}:
+                continue
+            (low, high), shift = _word(roomy.graph.nodes[index]), 0
+            if made is not None:
+                place = places[f"{stage.name}.{node.name}"]
+                high = (1 << made.digit_bits * place.digits) - 1
+                low, shift = -high - 1, place.frac - node.frac
+            shares += [Fraction(node.low << shift, low or -1), Fraction(node.high << shift, high)]
+    return max(shares, default=Fraction(0))
+
+
+def _check_bound(quantized: Quantized, allowed: Fraction) -> None:
+    output = quantized.datapath.output
+    bound = quantized.bound * output.lsb
+    if bound > allowed:
+        raise ShortfallError(
+            f"the set must keep its error within {quantity(float(allowed), output.unit)}, and is proven to "
+            f"{quantity(float(bound), output.unit)} only: nothing is to be loaded"
+        )
+
+
+def _check_calibrated(hardware: CoreDesign, calibrated: tuple[tuple[int, int], ...]) -> None:
+    if hardware.architecture.program is not None:
+        return
+    own = hardware.datapath.calibrated
+    if any(low > own_low or own_high > high for (low, high), (own_low, own_high) in zip(calibrated, own, strict=True)):
+        raise ShortfallError(
+            f"the measurements must cover all codes that the hardware's did, {_ends(own)}, not {_ends(calibrated)}: "
+            "the parallel architecture goes on to flag samples by those"
+        )
+
+
+def _ends(ranges: tuple[tuple[int, int], ...]) -> str:
+    return " and ".join(f"{low}..{high}" for low, high in ranges)
+
+
+def _fitted(hardware: CoreDesign, datapath: Datapath, what: str) -> Program | None:
+    """Check that the hardware can run it; return its program, if there is one. `what` is what does not fit if not."""
+    before = hardware.architecture.program
+    limited = [_is_limited(made) for made in (hardware.datapath, datapath)]
+    if limited[1] and not limited[0]:
+        raise ShortfallError(f"the {what} must keep the output within its range, as the hardware does not limit it")
+    if before is None:
+        _check_parallel(hardware.datapath, datapath, what)
+        return None
+    try:
+        made = program(datapath, before.digit_bits, like=before).padded(len(before.instructions))
+    except ValueError as error:  # FoldingError is one
+        raise ShortfallError(f"the {what} must fit the hardware: {error}") from None
+    spec, architecture = hardware.spec, hardware.architecture
+    budget = Budget(clock=spec.hardware.clock, sample_rate=spec.sample_rate, channels=architecture.channels)
+    needed = folded.latency_cycles(made, serial=architecture.name == "serial") + 1
+    if needed > budget.cycles:
+        raise ShortfallError(f"the {what} must take at most {budget.cycles:,} clocks a sample, not {needed:,}")
+    return made
+
+
+def _is_limited(datapath: Datapath) -> bool:
+    graph = datapath.stages[-1].graph
+    return graph.nodes[graph.outputs[0]].op is Op.CLAMP
+
+
+def _check_parallel(hardware: Datapath, other: Datapath, what: str) -> None:
+    """Check that `other` is `hardware` with other constants, and that these and all ranges fit.
+
+    Raises
+    ------
+    ShortfallError
+        If not; tells the first thing that does not fit.
+    """
+    loadable = constants(hardware)
+    for old, new in zip(with_room(hardware).stages, other.stages, strict=True):
+        if [*map(structure, old.graph.nodes)] != [*map(structure, new.graph.nodes)]:
+            raise ShortfallError(f"the {what} must fit the hardware: {old.name} must have the same operations")
+    try:
+        packed(values_of(other, loadable), loadable)
+    except ValueError as error:
+        raise ShortfallError(f"the {what} must fit the hardware: {error}") from None
+    for old, new in zip(with_room(hardware).stages, other.stages, strict=True):
+        for room, node in zip(old.graph.nodes, new.graph.nodes, strict=True):
+            low, high = _word(room)
+            if not low <= node.low <= node.high <= high:
+                raise ShortfallError(
+                    f"the {what} must fit the hardware: {old.name}.{node.name or node.op.value} must stay in "
+                    f"{low}..{high}, not {node.low}..{node.high}"
+                )
+
+
+def _word(node: Node) -> tuple[int, int]:
+    """Codes that the hardware's word for a node holds."""
+    span = 1 << node.width
+    return (-span // 2, span // 2 - 1) if node.signed else (0, span - 1)

@@ -1,0 +1,296 @@
+"""What a swap of constants leaves behind: values inside while the filter's memory fades, and how long that takes.
+
+The states that a new set finds were made by the set before. Let that one run on beside it, over the same input. Where
+the new set's equations are applied to the old run's states and input, they give other next states and outputs than
+the old set did: by amounts that are themselves driven by the input, through the old set alone, and so bounded by exact
+responses. Everything inside the new run is what these equations give plus the answer of the new set, from the swap
+on, to the sum of such differences. With A, B of the old set and A', B' of the new one::
+
+    x'(n+1) - x(n+1) = A' (x'(n) - x(n)) + (A' - A) x(n) + (B' - B) u(n),    x'(0) - x(0) = 0
+
+So the bound is small where the sets are close to each other, however slow the filter is. Each quantizer may err
+differently in the two runs: that drives the difference too.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+from sosmith.gen.proof.cascade_proof import INPUT, Drives, Key, Lane, cascade_horizon
+from sosmith.gen.proof.linear_model import LinearModel, linear_models
+from sosmith.gen.proof.peak_gain import Drive, Extent, Horizon, Response, extent, impulse
+from sosmith.gen.realizations.registry import Section
+from sosmith.gen.word_lengths.quantize import Quantized
+from sosmith.model.dataflow.graph import Graph, Node, Op
+from sosmith.model.errors import ShortfallError
+
+RESIDUE = Fraction(1, 256)
+"""What is left of the set before in any state and in the output once it counts as faded, in output LSBs."""
+
+_GRID = 1 << 40
+"""Limits of a source are rounded outward to multiples of its reciprocal."""
+
+Codes = tuple[int, int]
+"""Smallest and largest code."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Transient:
+    """What is proven about a swap.
+
+    Attributes
+    ----------
+    ranges : tuple of dict of str to (int, int)
+        For each section the codes of its inputs and of its BOUND nodes, by name, at any time before or after the swap.
+    samples : int
+        After so many samples `RESIDUE` bounds what is left in every state and in the output.
+    """
+
+    ranges: tuple[dict[str, Codes], ...]
+    samples: int
+
+
+def transient(active: Quantized, other: Quantized) -> Transient:
+    """Bound what can happen when `other` takes over from `active`, at any sample and for all inputs in range.
+
+    The last swap before may have left `RESIDUE` in every state.
+
+    Parameters
+    ----------
+    active, other : Quantized
+        Filters in the same number of sections, with the same states.
+
+    Raises
+    ------
+    ShortfallError
+        If their states differ.
+    """
+    pairs = [_Pair(a, b) for a, b in zip(active.sections, other.sections, strict=True)]
+    low, high = _input_values(active, other)
+    at = cascade_horizon([linear_models(section.graph) for section in active.sections], [])
+    wires: list[Drives] = [{INPUT: Drive(impulse(at), low, high)}]
+    fading = _Fading(cascade_horizon([linear_models(section.graph) for section in other.sections], []))
+    ranges = []
+    for number, pair in enumerate(pairs):
+        lanes = [Lane(number, model, wires, at) for model in linear_models(pair.together)]
+        outputs = [lane.at(lane.model.output) for lane in lanes]
+        starts = {lane.model.output: extent(list(d.values())) for lane, d in zip(lanes, outputs, strict=True)}
+        found = {node: extent(list(lane.at(pair.place[node]).values())) for node, lane in pair.bounds(lanes).items()}
+        moved = fading.section(number, pair, starts)
+        count = len(pair.active.graph.outputs)
+        wires = [_merged(drives, {INPUT}, (number, k, "rounding", 0), at) for k, drives in enumerate(outputs[:count])]
+        ranges.append(pair.ranges({node: _sum(found[node], moved[node]) for node in found}))
+    return Transient(ranges=tuple(ranges), samples=fading.samples)
+
+
+def _input_values(active: Quantized, other: Quantized) -> tuple[Fraction, Fraction]:
+    """Values that may arrive at the first section."""
+    nodes = [made.sections[0].graph.nodes[made.sections[0].graph.inputs[0]] for made in (active, other)]
+    units = [Fraction(2) ** -node.frac for node in nodes]
+    return (
+        min(node.low * unit for node, unit in zip(nodes, units, strict=True)),
+        max(node.high * unit for node, unit in zip(nodes, units, strict=True)),
+    )
+
+
+class _Pair:
+    """A section of both sets.
+
+    Attributes
+    ----------
+    together : Graph
+        The active set's section, and the other's equations on its states and input. Outputs: those of the active
+        set, then the differences in next state and output, without those that are nothing at all.
+    place : list of int
+        For each node of the other set's graph the one in `together`.
+    differences : dict of int to int
+        For the states and, counted on from there, the outputs of the other set: the node in `together` that tells the
+        difference.
+    after : Graph
+        The other set's section with a further input for each state and each output, which adds to it. All its
+        states are watched as BOUND nodes. Constants are 0, as they are in the equations already.
+    """
+
+    def __init__(self, active: Section, other: Section) -> None:
+        self.active, self.other = active, other
+        a, b = active.graph, other.graph
+        before = {a.nodes[i].name: i for i in a.delays}
+        forms = [
+            [(graph.nodes[i].name, graph.nodes[i].frac) for i in (*graph.inputs, *graph.delays)] for graph in (a, b)
+        ]
+        if forms[0] != forms[1]:
+            raise ShortfallError(f"the states of {other.name} must be {forms[0]}, not {forms[1]}")
+        nodes = list(a.nodes)
+        inputs = iter(a.inputs)
+        self.place: list[int] = []
+        for node in b.nodes:
+            if node.op is Op.INPUT:
+                self.place.append(next(inputs))
+            elif node.op is Op.DELAY:
+                self.place.append(before[node.name])
+            else:
+                self.place.append(len(nodes))
+                nodes.append(replace(node, operands=tuple(self.place[i] for i in node.operands)))
+        self.differences: dict[int, int] = {}
+        ends = [(b.nodes[i].operands[0], a.nodes[before[b.nodes[i].name]].operands[0]) for i in b.delays]
+        ends += list(zip(b.outputs, a.outputs, strict=True))
+        for k, (new, old) in enumerate(ends):
+            if self.place[new] != old:
+                self.differences[k] = len(nodes)
+                nodes.append(Node(Op.SUBTRACT, (self.place[new], old), b.nodes[new].frac, 0, 0))
+        self.together = Graph(tuple(nodes), a.inputs, (*a.outputs, *self.differences.values()))
+        self.after, self.watched = _with_additions(b)
+
+    def bounds(self, lanes: Sequence[Lane]) -> dict[int, Lane]:
+        """Tell for every BOUND node of the other set an output that depends on it."""
+        return {
+            node: next(lane for lane in lanes if self.place[node] in lane.model.bounds)
+            for node, it in enumerate(self.other.graph.nodes)
+            if it.op is Op.BOUND
+        }
+
+    def ranges(self, extents: Mapping[int, Extent]) -> dict[str, Codes]:
+        """Codes of inputs and BOUND nodes: those of each set by itself, and what `extents` tell."""
+        result: dict[str, Codes] = {}
+        for graph, left in ((self.active.graph, RESIDUE), (self.other.graph, Fraction(0))):
+            for node in graph.nodes:
+                if node.op in {Op.INPUT, Op.BOUND}:
+                    more = math.ceil(left * Fraction(2) ** node.frac) if node.op is Op.BOUND else 0
+                    low, high = result.get(node.name, (node.low, node.high))
+                    result[node.name] = min(low, node.low - more), max(high, node.high + more)
+        for index, found in extents.items():
+            node = self.other.graph.nodes[index]
+            unit = Fraction(2) ** node.frac
+            low, high = result[node.name]
+            result[node.name] = min(low, math.floor(found.low * unit)), max(high, math.ceil(found.high * unit))
+        return result
+
+    def mismatch(self, state: int) -> Fraction:
+        """Return how far a state, by its number, can be from what the other set alone would have made of it.
+
+        What a quantizer has dropped counts as none: any such error might have been.
+        """
+        b = self.other.graph
+        node = b.nodes[b.delays[state]]
+        if b.nodes[node.operands[0]].op is Op.FRACTION:
+            return Fraction(0)
+        (same,) = (n for n in self.active.graph.nodes if n.op is Op.DELAY and n.name == node.name)
+        return (max(node.high, same.high) - min(node.low, same.low)) * Fraction(2) ** -node.frac + RESIDUE
+
+
+def _with_additions(graph: Graph) -> tuple[Graph, tuple[int, ...]]:
+    """Give every state and every output an input that adds to it; return the nodes of the states' next values too."""
+    nodes = [replace(node, parameter=0, low=0, high=0) if node.op is Op.CONSTANT else node for node in graph.nodes]
+    added, sums = [], []
+    for k, source in enumerate([*(graph.nodes[i].operands[0] for i in graph.delays), *graph.outputs]):
+        frac = graph.nodes[source].frac
+        added.append(len(nodes))
+        nodes.append(Node(Op.INPUT, (), frac, 0, 0, name=f"difference{k}"))
+        nodes.append(Node(Op.ADD, (source, added[-1]), frac, 0, 0))
+        sums.append(len(nodes) - 1)
+    states = len(graph.delays)
+    watched = []
+    for delay, total in zip(graph.delays, sums, strict=False):
+        watched.append(len(nodes))
+        nodes.append(Node(Op.BOUND, (total,), nodes[total].frac, 0, 0))
+        nodes[delay] = replace(nodes[delay], operands=(watched[-1],))
+    return Graph(tuple(nodes), (*graph.inputs, *added), tuple(sums[states:])), tuple(watched)
+
+
+class _Fading:
+    """Follows the difference between the two runs through the other set's sections, one after the other."""
+
+    def __init__(self, at: Horizon) -> None:
+        self.samples = 0
+        self._at = at
+        self._wires: list[Drives] = [{}]
+        self._mismatches: dict[Key, Fraction] = {}
+
+    def section(self, number: int, pair: _Pair, starts: Mapping[int, Extent]) -> dict[int, Extent]:
+        """Return how far BOUND nodes of a section can be from what its equations give on the old run.
+
+        Parameters
+        ----------
+        number : int
+            Of the section.
+        pair : _Pair
+            The section in both sets.
+        starts : mapping of int to Extent
+            Values of the differences, by their nodes in `pair.together`.
+        """
+        states = len(pair.other.graph.delays)
+        additions: list[Drives] = []
+        for k in range(states + len(pair.other.graph.outputs)):
+            key = number, k, "difference", 0
+            found = starts[pair.differences[k]] if k in pair.differences else Extent(Fraction(0), Fraction(0))
+            mismatch = pair.mismatch(k) if k < states else Fraction(0)
+            left = RESIDUE if mismatch else Fraction(0)
+            if mismatch:
+                self._mismatches[key] = mismatch
+            additions.append({key: _drive(self._at, found, left)})
+        models = [_symmetric(model) for model in linear_models(pair.after)]
+        lanes = [Lane(number, model, [*self._wires, *additions], self._at) for model in models]
+        moved: dict[int, Extent] = {}
+        for lane in lanes:
+            for node in lane.model.bounds:
+                drives = lane.at(node)
+                if node in pair.watched:
+                    self._watch(drives, states)
+                else:
+                    moved[node] = extent(list(drives.values()))
+        outputs = [lane.at(lane.model.output) for lane in lanes]
+        for drives in outputs:
+            self._watch(drives, states)
+        kept = {key for drives in outputs for key in drives if key[2] == "difference"}
+        self._wires = [_merged(drives, kept, (number, k, "rounding", 0), self._at) for k, drives in enumerate(outputs)]
+        return moved
+
+    def _watch(self, drives: Drives, delays: int) -> None:
+        """Lengthen `samples` until the states that the swap found no longer matter here, nor in so many delays."""
+        weighted = [(d.response, self._mismatches[key]) for key, d in drives.items() if key in self._mismatches]
+        self.samples = max(self.samples, _last_above(weighted, self._at) + delays + 1)
+
+
+def _last_above(weighted: Sequence[tuple[Response, Fraction]], at: Horizon) -> int:
+    """Last sample at which the weighted sum of absolute responses may exceed `RESIDUE`."""
+    scale = 1 << 8
+    limit = math.floor(RESIDUE * scale * (1 << at.bits))
+    totals = [0] * at.length
+    tail = Fraction(0)
+    for response, weight in weighted:
+        factor, error = math.ceil(weight * scale), math.ceil(response.rounding)
+        totals = [total + factor * (abs(v) + error) for total, v in zip(totals, response.samples, strict=True)]
+        tail += weight * response.tail
+    last = max((k for k, total in enumerate(totals) if total > limit), default=0)
+    if tail > RESIDUE or last == at.length - 1:
+        raise ShortfallError(f"a swap must fade within {at.length} samples, and is not proven to")
+    return last
+
+
+def _symmetric(model: LinearModel) -> LinearModel:
+    """Return the model with quantizers whose errors are differences of two errors."""
+    count = len(model.entries)
+    sources = [*model.sources[:count]]
+    for source in model.own:
+        most = max(abs(source.low), abs(source.high))
+        sources.append(replace(source, low=-most, high=most))
+    return replace(model, sources=tuple(sources))
+
+
+def _merged(drives: Drives, kept: set[Key], rest: Key, at: Horizon) -> Drives:
+    """Take all sources but those of `kept` together as one, which is as large and knows nothing of before."""
+    found = extent([drive for key, drive in drives.items() if key not in kept])
+    return {key: drive for key, drive in drives.items() if key in kept} | {rest: _drive(at, found)}
+
+
+def _sum(a: Extent, b: Extent) -> Extent:
+    return Extent(a.low + b.low, a.high + b.high)
+
+
+def _drive(at: Horizon, limits: Extent, more: Fraction = Fraction(0)) -> Drive:
+    """Make a source of anything within limits, rounded outward, and so much `more`."""
+    low, high = limits.low - more, limits.high + more
+    return Drive(impulse(at), Fraction(math.floor(low * _GRID), _GRID), Fraction(math.ceil(high * _GRID), _GRID))

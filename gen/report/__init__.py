@@ -1,0 +1,1 @@
+"""The report of a co-simulation, its page and plots, and reports side by side."""

@@ -1,0 +1,259 @@
+"""What one co-simulation run hands to the report: the samples, and the facts about the design behind them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from sosmith.gen.fpga.synthesis import Netlist
+
+Array = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
+
+KINDS = ("lowpass", "highpass", "bandpass", "bandstop")
+
+
+@dataclass(frozen=True, kw_only=True)
+class FilterFacts:
+    """A filter as it was asked for and as its integer coefficients realize it.
+
+    Attributes
+    ----------
+    sample_rate : float
+        Sampling frequency of one channel in Hz.
+    ideal_sos, quantized_sos : ndarray, shape (n_sections, 6)
+        Rows ``[b0, b1, b2, a0, a1, a2]`` with scipy's signs, ``a0 != 0``; the second holds the integer
+        coefficients of the hardware as numbers. The order of the rows may differ between the two.
+    kind : str
+        ``"lowpass"``, ``"highpass"``, ``"bandpass"`` or ``"bandstop"``.
+    passband_edge, stopband_edge : tuple of float or None
+        Edges of the specification's mask in Hz: one for low-pass and high-pass, else two, rising.
+    passband_loss, stopband_loss : float or None
+        Largest loss in the passband and smallest in the stopband, in dB, both positive.
+    cutoff : tuple of float or None
+        Cut-off frequencies in Hz, as many as edges.
+    """
+
+    sample_rate: float
+    ideal_sos: Array
+    quantized_sos: Array
+    kind: str = "lowpass"
+    passband_edge: tuple[float, ...] | None = None
+    stopband_edge: tuple[float, ...] | None = None
+    passband_loss: float | None = None
+    stopband_loss: float | None = None
+    cutoff: tuple[float, ...] | None = None
+
+    def __post_init__(self) -> None:
+        if self.kind not in KINDS:
+            raise ValueError(f"kind must be one of {', '.join(KINDS)}, not {self.kind!r}")
+        count = 1 if self.kind in ("lowpass", "highpass") else 2
+        for name in ("passband_edge", "stopband_edge", "cutoff"):
+            edges = getattr(self, name)
+            if edges is not None and len(edges) != count:
+                raise ValueError(f"{name} of a {self.kind} must hold {count} frequencies, not {edges!r}")
+        for name in ("ideal_sos", "quantized_sos"):
+            shape = np.shape(getattr(self, name))
+            if len(shape) != 2 or shape[0] < 1 or shape[1] != 6:
+                raise ValueError(f"{name} must have the shape (n_sections, 6), not {shape!r}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Alternative:
+    """Another realization at the same word lengths, run on the same input codes.
+
+    Attributes
+    ----------
+    name : str
+        Its name in the specification, such as ``df1``.
+    max_abs, rms : float
+        Largest and root-mean-square error against the golden chain, in the output's unit.
+    """
+
+    name: str
+    max_abs: float
+    rms: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Format:
+    """Number format of one node of the datapath.
+
+    Attributes
+    ----------
+    node : str
+        Name of the node.
+    notation : str
+        The format in words, such as ``s4.20``.
+    low, high : float
+        Smallest and largest value the format holds, in `unit`.
+    unit : str
+        Unit of the node, ``""`` for a plain number.
+    """
+
+    node: str
+    notation: str
+    low: float
+    high: float
+    unit: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Evidence:
+    """Everything a report shows.
+
+    The sample arrays have the shape (n,) or (n, channels), one entry per output sample, in the output's `unit`; `time`
+    is always of the shape (n,).
+
+    Attributes
+    ----------
+    name, core, description : str
+        The design: its identifier, which core of it ran, one sentence for people (may be empty).
+    scenario : str
+        Name of the trace or scenario that drove the input.
+    unit : str
+        Unit of the output, ``""`` for a plain number.
+    lsb : float
+        One step of the output code, positive.
+    low, high : float
+        Range of the output.
+    bound : float
+        Limit of ``|hardware - golden|`` over all inputs in range, positive.
+    bound_parts : Mapping
+        Contributions to `bound` by name; their sum need not equal it.
+    proven : bool
+        Whether `bound` is proven; if false, it is an estimate in double precision and the page says so.
+    max_error : float
+        The largest error the specification allows.
+    time : ndarray
+        Sampling instants in s, rising.
+    truth : ndarray or None
+        What an ideal sensor would have shown, where the trace knows it.
+    reading : ndarray of bool or None
+        The instants at which the measurement counts, all if None.
+    unfiltered : ndarray or None
+        The calibration alone, without a filter.
+    golden : ndarray
+        Double-precision chain on the same input codes, clamped to the output's range.
+    hardware : ndarray
+        The simulated hardware.
+    mismatches : int
+        Samples at which hardware and integer model differ; `first_mismatch` is the first of them.
+    samples, channels, cycles, latency_cycles : int
+        Compared samples over all channels, channels, clock cycles of the run, cycles from input to output.
+    simulator : str
+        Name of the simulator.
+    gates : Netlist or None
+        The netlist that ran, None if the SystemVerilog itself did.
+    seed : int
+        Seed of all random handshakes and noise.
+    tools : Mapping of str to str
+        Version by tool.
+    wall_seconds, cycles_per_second : float
+        Duration and speed of the simulation.
+    realization, architecture, why : str
+        Structure of the sections, of the hardware, and the reason for the choice (may be empty).
+    formats : sequence of Format
+        Number formats along the datapath.
+    sections : sequence of Mapping
+        As in the manifest: ``name``, ``realization``, ``coefficients`` with ``name``, ``integer``, ``frac``
+        (fractional bits) and ``value`` each.
+    limit_cycles : sequence of Mapping
+        As in the manifest, one for each section: ``section``, ``largest`` and ``dead_band`` in `unit`, ``none``
+        (whether it is proven to come to rest), ``lyapunov`` (weights as texts of rationals, or None).
+    shown_channel : int or None
+        Channel that the sample arrays are of, where they are of one of several.
+    filter : FilterFacts or None
+        None for a core without a filter.
+    alternatives : sequence of Alternative
+        Other realizations at the same word lengths, possibly none.
+    """
+
+    name: str
+    core: str
+    scenario: str
+    unit: str
+    lsb: float
+    low: float
+    high: float
+    bound: float
+    max_error: float
+    time: Array
+    golden: Array
+    hardware: Array
+    mismatches: int
+    samples: int
+    cycles: int
+    latency_cycles: int
+    simulator: str
+    seed: int
+    tools: Mapping[str, str]
+    wall_seconds: float
+    cycles_per_second: float
+    realization: str
+    architecture: str
+    description: str = ""
+    why: str = ""
+    channels: int = 1
+    first_mismatch: int | None = None
+    proven: bool = False
+    bound_parts: Mapping[str, float] = field(default_factory=dict)
+    truth: Array | None = None
+    reading: Mask | None = None
+    unfiltered: Array | None = None
+    formats: Sequence[Format] = ()
+    sections: Sequence[Mapping[str, Any]] = ()
+    limit_cycles: Sequence[Mapping[str, Any]] = ()
+    shown_channel: int | None = None
+    filter: FilterFacts | None = None
+    gates: Netlist | None = None
+    alternatives: Sequence[Alternative] = ()
+
+    def __post_init__(self) -> None:
+        for name in ("lsb", "bound", "max_error"):
+            value = getattr(self, name)
+            if not 0 < value < math.inf:
+                raise ValueError(f"{name} must be positive and finite, not {value!r}")
+        if self.samples < 1:
+            raise ValueError(f"samples must be at least 1, not {self.samples!r}")
+        shape = np.shape(self.hardware)
+        if len(shape) not in {1, 2} or min(shape) < 1:
+            raise ValueError(f"hardware must have the shape (n,) or (n, channels) with n >= 1, not {shape!r}")
+        if np.shape(self.time) != shape[:1]:
+            raise ValueError(f"time must have the shape {shape[:1]!r}, not {np.shape(self.time)!r}")
+        for name in ("golden", "truth", "reading", "unfiltered"):
+            values = getattr(self, name)
+            if values is not None and np.shape(values) != shape:
+                raise ValueError(f"{name} must have the shape {shape!r}, not {np.shape(values)!r}")
+        for name in ("golden", "hardware"):
+            if not np.all(np.isfinite(getattr(self, name))):
+                raise ValueError(f"{name} must be finite, not NaN or infinite")
+
+    @property
+    def error(self) -> Array:
+        """Hardware minus golden, in `unit`."""
+        return self.hardware - self.golden
+
+    @property
+    def worst_channel(self) -> int:
+        """Number of the channel that has the largest error."""
+        return int(np.argmax(np.abs(self.error).max(axis=0))) if self.error.ndim == 2 else 0
+
+    def of_channel(self, channel: int) -> Evidence:
+        """Return the same with arrays of the shape (n,), those of one channel."""
+        if self.error.ndim == 1:
+            return self
+        names = ("golden", "hardware", "truth", "reading", "unfiltered")
+        arrays = {name: getattr(self, name) for name in names}
+        columns: dict[str, Any] = {name: None if array is None else array[:, channel] for name, array in arrays.items()}
+        return replace(self, shown_channel=channel if self.channels > 1 else None, **columns)
+
+    @property
+    def rivals(self) -> list[Alternative]:
+        """The alternatives that are not this design itself."""
+        return [other for other in self.alternatives if other.name != self.realization]

@@ -1,0 +1,481 @@
+"""Figures of the report, as SVG elements to stand inside an HTML page.
+
+Each figure is drawn in placeholder colours, which are then replaced by the page's CSS variables: light, dark
+and print follow the page. Texts stay texts, in the page's own font. The same evidence gives the same bytes.
+"""
+
+from __future__ import annotations
+
+import io
+import itertools
+import re
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import matplotlib as mpl
+import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
+
+from sosmith.gen.filter.response import (
+    frequency_grid,
+    group_delay,
+    magnitude_db,
+    passband_level_db,
+    passbands,
+    poles,
+    stopbands,
+    zeros,
+)
+from sosmith.gen.quantity import quantity, scale
+from sosmith.gen.report.evidence import Evidence, FilterFacts
+
+Array = npt.NDArray[np.float64]
+
+WIDE, NARROW = 940, 460
+"""Widths of the drawing in CSS pixels: across the page, and half the page or a telephone."""
+
+ROLES = ("ink", "muted", "grid", "truth", "unfiltered", "golden", "hardware", "limit", "asked")
+COLOUR = {role: f"#00000{index:x}" for index, role in enumerate(ROLES, start=1)}
+PANEL_HEIGHT = 350
+
+IDEAL_LINE: dict[str, Any] = {"lw": 3.6}
+REAL_LINE: dict[str, Any] = {"lw": 2.0, "ls": (0, (3.0, 1.6))}
+"""Two curves that nearly always coincide: dashes on a broad line show both."""
+
+STYLE: dict[Any, Any] = {
+    "svg.fonttype": "none",
+    "font.family": "DejaVu Sans",
+    "font.size": 12.0,
+    "axes.edgecolor": COLOUR["muted"],
+    "axes.labelcolor": COLOUR["ink"],
+    "axes.linewidth": 0.8,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "grid.color": COLOUR["grid"],
+    "grid.linewidth": 0.8,
+    "xtick.color": COLOUR["muted"],
+    "ytick.color": COLOUR["muted"],
+    "xtick.labelcolor": COLOUR["ink"],
+    "ytick.labelcolor": COLOUR["ink"],
+    "text.color": COLOUR["ink"],
+    "lines.linewidth": 1.4,
+    "lines.solid_joinstyle": "round",
+    "path.simplify": False,
+    "text.parse_math": False,  # a dollar sign in a name is a dollar sign
+    "savefig.transparent": True,
+}
+
+
+def _draw(name: str, title: str, width: int, height: int, paint: Callable[[Figure], None]) -> str:
+    """Paint a figure of `width` by `height` CSS pixels and return it as one ``<svg>`` element.
+
+    Parameters
+    ----------
+    name : str
+        Name of the figure, unique in the page: it keeps the identifiers of its parts apart from others'.
+    title : str
+        What the figure shows, read out by screen readers; may not hold markup.
+    """
+    with mpl.rc_context(STYLE | {"svg.hashsalt": f"{name}-{width}"}):
+        figure = Figure(figsize=(width / 72, height / 72), dpi=72, layout="constrained")
+        paint(figure)
+        stream = io.StringIO()
+        figure.savefig(stream, format="svg", metadata={"Date": None})
+    return _embed(stream.getvalue(), title, width, height)
+
+
+def _embed(svg: str, title: str, width: int, height: int) -> str:
+    """Strip a standalone SVG to the element that an HTML page wants, and hand its colours to the page."""
+    body = svg[svg.index("<svg") :]
+    body = body[body.index(">") + 1 :].removesuffix("\n")
+    body = re.sub(r"<metadata>.*?</metadata>\s*", "", body, flags=re.DOTALL)
+    body = re.sub(r'<g id="[^"]*">', "<g>", body)
+    body = re.sub(r"<!--.*?-->\s*", "", body)
+    body = body.replace("xlink:href", "href")
+    # before its release 3.11 matplotlib wrote size and family as one property
+    body = re.sub(r"font: ([\d.]+px) [^;\"]*", r"font: \1 var(--sans)", body)
+    body = re.sub(r"font-family: [^;\"]*", "font-family: var(--sans)", body)
+    body = re.sub(r'(?<= )(d|x|y|width|height)="[^"]*"', _shorten, body)
+    body = re.sub(r"\n\s*", "\n", body)
+    for role, colour in COLOUR.items():
+        body = body.replace(colour, f"var(--{role})")
+    return f'<svg viewBox="0 0 {width} {height}" role="img" aria-label="{title}">{body}'
+
+
+def _shorten(attribute: re.Match[str]) -> str:
+    """Round the numbers of an attribute to a hundredth of a pixel."""
+    rounded = re.sub(r"\d+\.\d{3,}", lambda number: f"{float(number[0]):.2f}", attribute[0])
+    return re.sub(r"\s+", " ", rounded)
+
+
+def envelope(time: Array, values: Array, columns: int) -> tuple[Array, Array]:
+    """Thin out a long trace so that no peak is lost.
+
+    Parameters
+    ----------
+    time, values : ndarray, shape (n,)
+        The trace.
+    columns : int
+        Number of stretches to divide it into.
+
+    Returns
+    -------
+    time, values : ndarray, shape (m,) with m <= 2 * columns
+        The smallest and the largest value of each stretch at their own times; a short trace as it is.
+    """
+    if len(values) <= 2 * columns:
+        return time, values
+    edges = np.linspace(0, len(values), columns + 1).astype(int)
+    chosen = set()
+    for start, stop in itertools.pairwise(edges):
+        chosen.add(start + int(np.argmin(values[start:stop])))
+        chosen.add(start + int(np.argmax(values[start:stop])))
+    index = np.array(sorted(chosen))
+    return time[index], values[index]
+
+
+def _range_of(values: Array, margin: float) -> tuple[float, float]:
+    """Limits of an axis around `values`, with `margin` of their span to spare, never empty."""
+    low, high = float(np.min(values)), float(np.max(values))
+    space = margin * (high - low) if high > low else 0.5 * abs(high) or 1.0
+    return low - space, high + space
+
+
+def _time_axis(axes: Axes, time: Array) -> tuple[float, str]:
+    """Label the time axis and return the factor from seconds to its unit."""
+    factor, unit = scale(float(np.max(np.abs(time))), "s")
+    axes.set_xlabel(f"time in {unit}")
+    axes.set_xlim(*_range_of(time * factor, margin=0.0))
+    return factor, unit
+
+
+def trace_figure(evidence: Evidence, width: int) -> str:
+    """Output against time: true value, unfiltered, exact calculation, hardware."""
+
+    def paint(figure: Figure) -> None:
+        axes = figure.subplots()
+        factor, _ = _time_axis(axes, evidence.time)
+        traces = (evidence.unfiltered, evidence.truth, evidence.golden, evidence.hardware)
+        shown = [values for values in traces if values is not None]
+        scaling, unit = scale(max(float(np.max(np.abs(v))) for v in shown), evidence.unit)
+        # dashes along a curve that fills an area would make a pattern that is not in the data
+        real = {"lw": 0.7} if _fills_area(evidence.hardware, width) else REAL_LINE
+        layers = (
+            (evidence.unfiltered, "unfiltered", {"lw": 0.8}),
+            (evidence.truth, "truth", {"lw": 5.0}),
+            (evidence.golden, "golden", IDEAL_LINE),
+            (evidence.hardware, "hardware", real),
+        )
+        for order, (values, role, line) in enumerate(layers, start=2):
+            if values is not None:
+                thin_time, thin_values = envelope(evidence.time, values, width)
+                axes.plot(thin_time * factor, thin_values * scaling, color=COLOUR[role], zorder=order, **line)
+        axes.set_ylim(*_range_of(np.concatenate(shown) * scaling, margin=0.06))
+        axes.set_ylabel(f"output in {unit}" if unit else "output")
+
+    return _draw("trace", "Output against time", width, 310, paint)
+
+
+def _fills_area(values: Array, width: int) -> bool:
+    """Whether a trace swings so often that its curve covers an area `width` pixels wide."""
+    _, thin = envelope(np.arange(len(values), dtype=np.float64), values, width)
+    travel = float(np.sum(np.abs(np.diff(thin))))
+    return travel > width / 10 * float(np.ptp(values))
+
+
+def close_up(evidence: Evidence, samples: int = 60) -> slice:
+    """At most `samples` samples around the first of those with the largest error."""
+    count = len(evidence.hardware)
+    start = int(np.argmax(np.abs(evidence.error))) - samples // 2
+    start = min(max(start, 0), max(count - samples, 0))
+    return slice(start, min(start + samples, count))
+
+
+def close_up_figure(evidence: Evidence, width: int) -> str:
+    """Exact calculation and hardware, sample by sample, around the largest error."""
+
+    def paint(figure: Figure) -> None:
+        axes = figure.subplots()
+        near = close_up(evidence)
+        time, golden, hardware = evidence.time[near], evidence.golden[near], evidence.hardware[near]
+        factor, _ = _time_axis(axes, time)
+        both = np.concatenate([golden, hardware])
+        scaling, unit = scale(float(np.max(np.abs(both))), evidence.unit)
+        axes.plot(time * factor, golden * scaling, color=COLOUR["golden"], **IDEAL_LINE)
+        axes.plot(time * factor, hardware * scaling, color=COLOUR["hardware"], ls="", marker="o", ms=4.5)
+        axes.set_ylim(*_range_of(both * scaling, margin=0.1))
+        axes.ticklabel_format(axis="y", useOffset=False)
+        axes.set_ylabel(f"output in {unit}" if unit else "output")
+        worst = int(np.argmax(np.abs(hardware - golden)))
+        axes.axvline(time[worst] * factor, color=COLOUR["muted"], lw=1.0, ls=":")
+
+    return _draw("close-up", "Output around the largest error", width, 250, paint)
+
+
+class Limit(NamedTuple):
+    """Limit of the error, in the output's unit, and how it is drawn."""
+
+    value: float
+    role: str
+    dashes: str
+    words: str
+
+
+def error_limits(evidence: Evidence) -> tuple[list[Limit], list[Limit]]:
+    """Split the limits of the error into those to draw and those too far outside.
+
+    A limit beyond six times the largest error would squeeze the curve to a line.
+    """
+    limits = [Limit(evidence.bound, "limit", "--", "limit")]
+    if not np.isclose(evidence.max_error, evidence.bound, rtol=1e-3):
+        limits.append(Limit(evidence.max_error, "asked", ":", "allowed by the specification"))
+    reach = 6 * _error_peak(evidence)
+    return [limit for limit in limits if limit.value <= reach], [limit for limit in limits if limit.value > reach]
+
+
+def _error_peak(evidence: Evidence) -> float:
+    """Largest error, at least half a step of the output, so that no axis is empty."""
+    return max(float(np.max(np.abs(evidence.error))), evidence.lsb / 2)
+
+
+def error_figure(evidence: Evidence, width: int) -> str:
+    """Hardware minus exact calculation against time, with its limits."""
+
+    def paint(figure: Figure) -> None:
+        axes = figure.subplots()
+        factor, _ = _time_axis(axes, evidence.time)
+        inside, _outside = error_limits(evidence)
+        top = 1.25 * max([_error_peak(evidence), *(limit.value for limit in inside)])
+        scaling, unit = scale(top, evidence.unit)
+        thin_time, thin_error = envelope(evidence.time, evidence.error, width)
+        axes.plot(thin_time * factor, thin_error * scaling, color=COLOUR["hardware"], lw=0.9)
+        axes.set_ylim(-top * scaling, top * scaling)
+        for limit in inside:
+            for value in (-limit.value, limit.value):
+                axes.axhline(value * scaling, color=COLOUR[limit.role], ls=limit.dashes, lw=1.6)
+        if evidence.first_mismatch is not None:
+            axes.axvline(evidence.time[evidence.first_mismatch] * factor, color=COLOUR["limit"], lw=1.6)
+        axes.set_ylabel(f"error in {unit}" if unit else "error")
+
+    return _draw("error", "Error of the hardware against time", width, 270, paint)
+
+
+def histogram_figure(evidence: Evidence) -> str:
+    """Share of samples over the error in steps of the output code."""
+
+    def paint(figure: Figure) -> None:
+        axes = figure.subplots()
+        steps = evidence.error / evidence.lsb
+        reach = 1.2 * _error_peak(evidence) / evidence.lsb
+        counts, edges = np.histogram(steps, bins=np.linspace(-reach, reach, 52))
+        axes.stairs(100 * counts / len(steps), edges, fill=True, color=COLOUR["hardware"])
+        for limit in (-0.5, 0.5):
+            axes.axvline(limit, color=COLOUR["limit"], lw=1.2, ls=":")
+        axes.set_xlim(-reach, reach)
+        axes.set_ylim(bottom=0)
+        axes.set_xlabel("error in steps of the output (LSB)")
+        axes.set_ylabel("share of samples in %")
+
+    return _draw("histogram", "How often each error occurs", NARROW, PANEL_HEIGHT, paint)
+
+
+def ranking_figure(
+    rows: Sequence[tuple[str, float, str]], marks: Sequence[tuple[float, str]], unit: str, width: int
+) -> str:
+    """Largest errors beside each other on a logarithmic axis.
+
+    Parameters
+    ----------
+    rows : sequence of (str, float, str)
+        Name, value in `unit`, colour role.
+    marks : sequence of (float, str)
+        Values to mark with an upright line, and their colour roles.
+    unit : str
+        Unit of all values.
+    width : int
+        `WIDE` or `NARROW`.
+    """
+    known = [value for _name, value, _role in rows if value > 0] + [value for value, _role in marks]
+    low, high = min(known, default=1.0) / 3, max(known, default=1.0) * 3
+
+    def paint(figure: Figure) -> None:
+        axes = figure.subplots()
+        axes.set_xscale("log")
+        axes.set_xlim(low, high)
+        axes.set_ylim(len(rows) - 0.4, -0.6)
+        for value, role in marks:
+            axes.axvline(value, color=COLOUR[role], lw=1.6, ls=":")
+        for place, (_name, value, role) in enumerate(rows):
+            if value > 0:
+                axes.plot([low, value], [place, place], color=COLOUR[role], lw=2.5, solid_capstyle="butt")
+                axes.plot([value], [place], color=COLOUR[role], marker="o", ms=9)
+        axes.set_yticks(range(len(rows)), [_clip(name, width // 20) for name, _value, _role in rows])
+        axes.grid(visible=False, axis="y")
+        axes.tick_params(axis="y", length=0)
+        axes.xaxis.set_major_locator(LogLocator(numticks=5))
+        axes.xaxis.set_minor_locator(NullLocator())
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda v, _: quantity(v, unit, 1)))
+        axes.set_xlabel("largest error")
+
+    return _draw("ranking", "Largest errors beside each other", width, 80 + 40 * len(rows), paint)
+
+
+def _clip(name: str, longest: int) -> str:
+    return name if len(name) <= longest else name[: longest - 1] + "…"
+
+
+def alternatives_figure(evidence: Evidence) -> str:
+    """Largest errors of this design and its alternatives, with one LSB and the allowed error marked."""
+    own = float(np.max(np.abs(evidence.error)))
+    rows = [(evidence.realization, own, "hardware")]
+    rows += [(other.name, other.max_abs, "golden") for other in evidence.rivals]
+    marks = [(evidence.lsb, "muted"), (evidence.max_error, "asked")]
+    return ranking_figure(rows, marks, evidence.unit, NARROW)
+
+
+def _frequency_axis(axes: Axes, frequency: Array) -> None:
+    axes.set_xscale("log")
+    axes.set_xlim(float(frequency[0]), float(frequency[-1]))
+    axes.xaxis.set_major_locator(LogLocator(numticks=6))
+    axes.xaxis.set_minor_locator(NullLocator())
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda v, _: quantity(v, "Hz", 1)))
+
+
+def _paint_mask(axes: Axes, facts: FilterFacts, level: float, start: float) -> None:
+    """Shade what the specification forbids, inside the axis limits set before."""
+    bottom, top = axes.get_ylim()
+    forbidden = []
+    if facts.passband_edge and facts.passband_loss is not None:
+        forbidden += [(band, level - facts.passband_loss, bottom) for band in passbands(facts)]
+    if facts.stopband_edge and facts.stopband_loss is not None:
+        forbidden += [(band, level - facts.stopband_loss, top) for band in stopbands(facts)]
+    for (low, high), border, end in forbidden:
+        ends = [max(low, start), high]
+        axes.fill_between(ends, border, end, facecolor=COLOUR["limit"], alpha=0.16, lw=0)
+        axes.plot(ends, [border, border], color=COLOUR["limit"], lw=1.2)
+
+
+def magnitude_figure(facts: FilterFacts) -> str:
+    """Magnitude of the ideal and the quantized filter with the mask, and their difference below."""
+
+    def paint(figure: Figure) -> None:
+        upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
+        frequency = frequency_grid(facts)
+        ideal = magnitude_db(facts.ideal_sos, frequency, facts.sample_rate)
+        quantized = magnitude_db(facts.quantized_sos, frequency, facts.sample_rate)
+        level = passband_level_db(facts)
+        floor = level - max(100.0, (facts.stopband_loss or 0) + 30)
+        upper.set_ylim(floor, level + 8)
+        _paint_mask(upper, facts, level, float(frequency[0]))
+        upper.plot(frequency, ideal, color=COLOUR["golden"], **IDEAL_LINE)
+        upper.plot(frequency, quantized, color=COLOUR["hardware"], **REAL_LINE)
+        upper.set_ylabel("gain in dB")
+        shown = ideal >= floor
+        difference = np.where(shown, quantized - ideal, np.nan)
+        factor, unit = scale(float(np.nanmax(np.abs(difference))), "dB")
+        lower.plot(frequency, difference * factor, color=COLOUR["hardware"])
+        lower.set_ylabel(f"difference\nin {unit}")
+        lower.yaxis.set_major_locator(MaxNLocator(3))
+        lower.set_xlabel("frequency")
+        _frequency_axis(lower, frequency)
+
+    return _draw("magnitude", "Gain against frequency", NARROW, PANEL_HEIGHT, paint)
+
+
+def delay_figure(facts: FilterFacts) -> str:
+    """Group delay of the ideal and the quantized filter."""
+
+    def paint(figure: Figure) -> None:
+        axes = figure.subplots()
+        frequency = frequency_grid(facts)
+        ideal = group_delay(facts.ideal_sos, frequency, facts.sample_rate)
+        quantized = group_delay(facts.quantized_sos, frequency, facts.sample_rate)
+        # Zeros just off the unit circle, where nothing passes anyway, have delays beyond all bounds: not to be framed.
+        most = 2 * float(np.nanmax(np.abs(ideal)))
+        both = np.concatenate([ideal, np.clip(quantized, -most, most)])
+        factor, unit = scale(float(np.nanmax(np.abs(both))), "s")
+        axes.plot(frequency, ideal * factor, color=COLOUR["golden"], **IDEAL_LINE)
+        axes.plot(frequency, quantized * factor, color=COLOUR["hardware"], **REAL_LINE)
+        top = float(np.nanmax(both)) * factor
+        axes.set_ylim(min(0.0, 1.08 * float(np.nanmin(both)) * factor), 1.08 * top if top > 0 else None)
+        axes.set_ylabel(f"group delay in {unit}")
+        axes.set_xlabel("frequency")
+        _frequency_axis(axes, frequency)
+
+    return _draw("delay", "Group delay against frequency", NARROW, PANEL_HEIGHT, paint)
+
+
+def _zoom_box(facts: FilterFacts) -> tuple[float, float, float]:
+    """Centre (real, imaginary) and half width of a square around the poles of the upper half plane."""
+    both = np.concatenate([poles(facts.ideal_sos), poles(facts.quantized_sos)])
+    upper = both[both.imag >= -1e-12]
+    if not len(upper):
+        return 0.0, 0.0, 1.0
+    real = (float(upper.real.min()), float(upper.real.max()))
+    imag = (float(upper.imag.min()), float(upper.imag.max()))
+    half = max(real[1] - real[0], imag[1] - imag[0]) / 2
+    return sum(real) / 2, sum(imag) / 2, max(1.4 * half, 1e-3)
+
+
+def _paint_plane(axes: Axes, facts: FilterFacts, centre: tuple[float, float], half: float) -> None:
+    """Poles, zeros and the unit circle in the square of half width `half` around `centre`."""
+    angle = np.linspace(0, 2 * np.pi, 721)
+    if half < 0.5:
+        middle = float(np.arctan2(centre[1], centre[0]))
+        angle = np.linspace(middle - 4 * half, middle + 4 * half, 361)
+    axes.plot(np.cos(angle), np.sin(angle), color=COLOUR["muted"], lw=1)
+    for sos, role, size, edge in (
+        (facts.ideal_sos, "golden", 11, 3.0),
+        (facts.quantized_sos, "hardware", 7, 1.5),
+    ):
+        for points, marker in ((poles(sos), "x"), (zeros(sos), "o")):
+            distance = np.maximum(np.abs(points.real - centre[0]), np.abs(points.imag - centre[1]))
+            near = points[distance <= half]
+            axes.plot(near.real, near.imag, ls="", marker=marker, ms=size, mew=edge, color=COLOUR[role], mfc="none")
+    axes.set_xlim(centre[0] - half, centre[0] + half)
+    axes.set_ylim(centre[1] - half, centre[1] + half)
+    axes.set_aspect("equal")
+    axes.xaxis.set_major_locator(MaxNLocator(3))
+    axes.yaxis.set_major_locator(MaxNLocator(4))
+    axes.ticklabel_format(useOffset=False)
+    axes.set_xlabel("real part")
+
+
+def _paint_multiplicity(axes: Axes, facts: FilterFacts) -> None:
+    """Write how many zeros share one place, where more than one does."""
+    places, counts = np.unique(np.round(zeros(facts.quantized_sos), 3), return_counts=True)
+    for place, number in zip(places, counts, strict=True):
+        if number > 1:
+            inward = 1 if place.real < 0 else -1
+            axes.annotate(
+                f"{number} zeros",
+                (place.real, place.imag),
+                xytext=(11 * inward, 0),
+                textcoords="offset points",
+                ha="left" if inward > 0 else "right",
+                va="center",
+            )
+
+
+def pole_zero_figure(facts: FilterFacts) -> str:
+    """Poles and zeros in the z plane: the whole unit circle, and a close-up of the poles."""
+
+    def paint(figure: Figure) -> None:
+        real, imag, half = _zoom_box(facts)
+        panels = figure.subplots(1, 2 if half < 0.6 else 1, squeeze=False)[0]
+        _paint_plane(panels[0], facts, (0.0, 0.0), 1.25)
+        _paint_multiplicity(panels[0], facts)
+        panels[0].set_xticks([-1, 0, 1])
+        panels[0].set_yticks([-1, 0, 1])
+        panels[0].set_ylabel("imaginary part")
+        panels[0].set_title("unit circle", fontsize=12)
+        if len(panels) > 1:
+            _paint_plane(panels[1], facts, (real, imag), half)
+            panels[1].set_title("close-up of the poles", fontsize=12)
+
+    return _draw("poles", "Poles and zeros in the z plane", NARROW, 250, paint)

@@ -1,0 +1,208 @@
+"""The report of one co-simulation: `report.json` for scripts, `report.html` for people."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from sosmith import __version__
+from sosmith.gen.filter.response import MASK_TOLERANCE_DB, ResponseMeasures, measure_response
+from sosmith.gen.quantity import plain_number, quantity
+from sosmith.gen.report.evidence import Alternative, Evidence, FilterFacts, Format
+from sosmith.gen.report.page import render_page
+from sosmith.model.reference.accuracy import accuracy_percent, error_statistics, sqnr_db
+from sosmith.model.text_files import to_json, write_files
+
+__all__ = [
+    "Alternative",
+    "Evidence",
+    "FilterFacts",
+    "Format",
+    "mask_shortfalls",
+    "summarise",
+    "write_report",
+]
+
+
+def mask_shortfalls(facts: FilterFacts, measures: ResponseMeasures) -> list[str]:
+    """Say in one sentence each where the quantized response misses the specification's mask.
+
+    A miss of at most `MASK_TOLERANCE_DB` counts as met, for the reason given there. A filter whose largest
+    pole radius is 1 or more has no frequency response to speak of, and misses whatever the mask.
+    """
+    found = []
+    if measures.largest_pole_radius >= 1:
+        radius = plain_number(measures.largest_pole_radius, 6)
+        found.append(f"The filter with its integer coefficients is unstable: a pole lies at radius {radius}.")
+    if facts.passband_edge and facts.passband_loss is not None:
+        if measures.passband_loss_db > facts.passband_loss + MASK_TOLERANCE_DB:
+            found.append(
+                f"The passband loss is {measures.passband_loss_db:.4f} dB, "
+                f"more than the {facts.passband_loss:g} dB allowed."
+            )
+        if measures.passband_gain_db > MASK_TOLERANCE_DB:
+            found.append(f"The passband rises {measures.passband_gain_db:.4f} dB above the level of the ideal filter.")
+    attenuation = measures.stopband_attenuation_db
+    asked = facts.stopband_loss if facts.stopband_edge else None
+    if asked is not None and attenuation is not None and attenuation < asked - MASK_TOLERANCE_DB:
+        found.append(f"The stopband attenuation is {attenuation:.3f} dB, less than the {asked:g} dB asked for.")
+    return found
+
+
+def _shortfalls(evidence: Evidence, max_abs: float, measures: ResponseMeasures | None) -> list[str]:
+    """Reasons why the run did not pass, one sentence each; none if it did."""
+    found = []
+    if evidence.mismatches:
+        where = "" if evidence.first_mismatch is None else f", first at sample {evidence.first_mismatch:,}"
+        found.append(
+            f"The hardware differs from the integer model at {evidence.mismatches:,} "
+            f"of {evidence.samples:,} samples{where}."
+        )
+    error = quantity(max_abs, evidence.unit)
+    if max_abs > evidence.bound:
+        found.append(f"The largest error is {error}, over the limit of {quantity(evidence.bound, evidence.unit)}.")
+    if max_abs > evidence.max_error:
+        asked = quantity(evidence.max_error, evidence.unit)
+        found.append(f"The largest error is {error}, more than the {asked} that the specification allows.")
+    if evidence.filter is not None and measures is not None:
+        found += mask_shortfalls(evidence.filter, measures)
+    return found
+
+
+def _notes(evidence: Evidence) -> list[str]:
+    """Say what a reader must know to judge the verdict, one sentence each."""
+    notes = []
+    if evidence.gates is not None and evidence.gates.excess:
+        board = evidence.gates.board
+        notes.append(f"The netlist takes more than the {board.title} has: {', '.join(evidence.gates.excess)}.")
+    if not evidence.proven:
+        notes.append("The error limit is estimated in double precision, not yet proven.")
+    if evidence.bound > evidence.max_error:
+        notes.append(
+            f"The error limit {quantity(evidence.bound, evidence.unit)} is wider than the "
+            f"{quantity(evidence.max_error, evidence.unit)} that the specification allows: other inputs "
+            "could exceed the allowance."
+        )
+    return notes
+
+
+def _accuracy(evidence: Evidence) -> dict[str, float | None]:
+    """Accuracy of each trace by the paper's equation 7, None where there is no truth to measure against."""
+    traces = {
+        "unfiltered": evidence.unfiltered,
+        "golden": evidence.golden,
+        "hardware": evidence.hardware,
+    }
+    truth, reading = evidence.truth, evidence.reading
+    if truth is None:
+        return dict.fromkeys(traces)
+    counted = truth if reading is None else truth[reading]
+    if not len(counted) or not counted.all():
+        return dict.fromkeys(traces)
+    return {
+        name: None if values is None else accuracy_percent(values, truth, reading) for name, values in traces.items()
+    }
+
+
+def summarise(evidence: Evidence) -> dict[str, Any]:
+    """Content of `report.json`.
+
+    Returns
+    -------
+    dict
+        The keys of the contract, and: ``core``, ``scenario``, ``realization``, ``architecture``, ``gates`` (name of
+        the board whose netlist ran, None if the SystemVerilog itself did), ``lsb``, ``range``, ``max_error``,
+        ``error.{max_lsb,mean,proven,parts}``, ``first_mismatch``, ``latency_cycles``, ``cycles_per_sample`` (of
+        this run, waiting included), ``alternatives``, ``limit_cycles``, ``tools``, ``sosmith_version``,
+        ``shortfalls`` (why it did not pass) and ``notes``. Lengths are in samples or cycles, errors in
+        ``error.unit``. What is unknown or not finite is None.
+        ``passed`` is true if hardware and integer model agree bit for bit, the largest error is within
+        ``error.bound`` and ``max_error``, and the quantized filter is stable and meets the specification's
+        mask (see `mask_shortfalls`).
+    """
+    statistics = error_statistics(evidence.error)
+    measures = None if evidence.filter is None else measure_response(evidence.filter)
+    shortfalls = _shortfalls(evidence, statistics.max_abs, measures)
+    summary = {
+        "name": evidence.name,
+        "core": evidence.core,
+        "scenario": evidence.scenario,
+        "passed": not shortfalls,
+        "shortfalls": shortfalls,
+        "notes": _notes(evidence),
+        "samples": evidence.samples,
+        "channels": evidence.channels,
+        "cycles": evidence.cycles,
+        "cycles_per_sample": evidence.cycles / evidence.samples,
+        "latency_cycles": evidence.latency_cycles,
+        "simulator": evidence.simulator,
+        "gates": None if evidence.gates is None else evidence.gates.board.name,
+        "seed": evidence.seed,
+        "bit_exact": evidence.mismatches == 0,
+        "mismatches": evidence.mismatches,
+        "first_mismatch": evidence.first_mismatch,
+        "error": {
+            "max_abs": statistics.max_abs,
+            "max_lsb": statistics.max_abs / evidence.lsb,
+            "rms": statistics.rms,
+            "mean": statistics.mean,
+            "bound": evidence.bound,
+            "proven": evidence.proven,
+            "parts": dict(evidence.bound_parts),
+            "unit": evidence.unit,
+        },
+        "max_error": evidence.max_error,
+        "lsb": evidence.lsb,
+        "range": [evidence.low, evidence.high],
+        "sqnr_db": sqnr_db(evidence.golden, evidence.error),
+        "frequency_response": _response_summary(measures),
+        "accuracy_percent": _accuracy(evidence),
+        "alternatives": [
+            {"name": other.name, "max_abs": other.max_abs, "rms": other.rms} for other in evidence.alternatives
+        ],
+        "limit_cycles": [dict(found) for found in evidence.limit_cycles],
+        "realization": evidence.realization,
+        "architecture": evidence.architecture,
+        "cycles_per_second": evidence.cycles_per_second,
+        "wall_seconds": evidence.wall_seconds,
+        "sosmith_version": __version__,
+        "tools": dict(evidence.tools),
+    }
+    cleaned: dict[str, Any] = _without_infinities(summary)
+    return cleaned
+
+
+def _response_summary(measures: ResponseMeasures | None) -> dict[str, float | None]:
+    """Measures of the response by name, None for a core without a filter."""
+    names = (
+        "max_deviation_db_passband",
+        "stopband_attenuation_db",
+        "passband_loss_db",
+        "largest_pole_radius",
+    )
+    return {name: getattr(measures, name, None) for name in names}
+
+
+def _without_infinities(value: Any) -> Any:
+    """Copy of nested dicts and lists with None in place of what JSON cannot say."""
+    if isinstance(value, Mapping):
+        return {key: _without_infinities(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_without_infinities(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def write_report(evidence: Evidence, directory: Path) -> dict[str, Any]:
+    """Write `report.json` and `report.html` into `directory`, made if missing, and return the summary.
+
+    Raises
+    ------
+    SpecificationError
+        If the folder cannot be made or written; both files are then as they were.
+    """
+    summary = summarise(evidence)
+    page = render_page(evidence, summary)
+    write_files(directory, {"report.json": to_json(summary), "report.html": page})
+    return summary

@@ -1,0 +1,1 @@
+"""The specification file: its shape, its values, its rules."""

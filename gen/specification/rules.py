@@ -1,0 +1,302 @@
+"""What the keys of a specification mean together: everything that cannot be told from one key alone.
+
+Each function checks one subject and raises `UnfitError` with the path of the key at fault.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from fractions import Fraction
+
+from sosmith.gen.specification.schema import FAMILIES, KINDS, MAX_ORDER, Document, FilterTable, InputTable
+from sosmith.gen.specification.values import UnfitError, identifier, key_text, listed, literal, one_of
+
+CALIBRATION_INPUTS = ("voltage", "temperature")
+"""Inputs of the calibration polynomial, in the order of its indices."""
+
+MARGIN = Fraction(1, 10**6)
+"""Least distance of a band edge from 0 and from half the sample rate, as a part of the sample rate.
+
+At this ratio a section's 1 + a1 + a2, about ``(2 * pi * MARGIN)**2``, is already below 2**-34, so that
+coefficients would need that many bits before the first that matters.
+"""
+
+_BY_ORDER = ("order", "cutoff")
+_BY_EDGES = ("passband_edge", "stopband_edge", "passband_loss", "stopband_loss")
+_BY_SECTIONS = ("sos",)
+_FORMS = "given by order and cutoff, by passband_edge, stopband_edge, passband_loss and stopband_loss, or by sos"
+
+_LOSSES = {"chebyshev1": ("passband_loss",), "chebyshev2": ("stopband_loss",), "elliptic": _BY_EDGES[2:]}
+"""Losses that a family needs beside order and cutoff: where it has ripples, it has to be told how large."""
+
+
+def check(document: Document) -> None:
+    """Check everything that `sosmith.gen.specification.schema.parse` cannot see.
+
+    Raises
+    ------
+    UnfitError
+        For the first finding.
+    """
+    _check_inputs(document)
+    _check_calibration(document)
+    _check_filter(document.filter, document.sample_rate)
+    _check_output(document)
+    _check_wear(document)
+    if document.hardware.clock < document.sample_rate:
+        raise UnfitError(
+            f"at least the sample_rate ({literal(document.sample_rate)} Hz)",
+            literal(document.hardware.clock),
+            where="hardware.clock",
+        )
+
+
+def _check_inputs(document: Document) -> None:
+    names = list(document.input)
+    found = ", ".join(literal(name) for name in names) or "none"
+    if document.calibration is not None and set(names) != set(CALIBRATION_INPUTS):
+        raise UnfitError("the two tables voltage and temperature beside [calibration]", found, where="input")
+    if document.calibration is None and len(names) != 1:
+        raise UnfitError("one table where there is no [calibration]", found, where="input")
+    for name, table in document.input.items():
+        try:
+            identifier(name)
+        except UnfitError as unfit:
+            where = f"input.{key_text(name)}"
+            raise UnfitError(f"named by {unfit.expected}", unfit.found, where=where) from None
+        _check_range(table, f"input.{name}")
+
+
+def _check_range(table: InputTable, where: str) -> None:
+    low, high = table.range
+    if table.signed and low != -high:
+        raise UnfitError("symmetric, [-high, high], where signed = true", literal(table.range), where=f"{where}.range")
+
+
+def _check_calibration(document: Document) -> None:
+    calibration = document.calibration
+    if calibration is None:
+        return
+    if (calibration.coefficients is None) == (calibration.data is None):
+        found = "none of them" if calibration.data is None else "both"
+        raise UnfitError("given by one of coefficients and data", found, where="calibration")
+    if calibration.coefficients is not None and not any(map(any, calibration.coefficients)):
+        raise UnfitError("a polynomial that is not zero", "zeros only", where="calibration.coefficients")
+
+
+def _check_filter(table: FilterTable, sample_rate: Fraction) -> None:
+    given = [key for key in (*_BY_ORDER, *_BY_EDGES, *_BY_SECTIONS) if getattr(table, key) is not None]
+    match [any(key in given for key in form) for form in (_BY_ORDER, _BY_EDGES[:2], _BY_SECTIONS)]:
+        case [True, False, False]:
+            _check_by_order(table, given, sample_rate)
+        case [False, True, False]:
+            _check_by_edges(table, given, sample_rate)
+        case [False, False, True]:
+            _check_sections(table, given)
+        case _:
+            raise UnfitError(_FORMS, f"by {listed(given) if given else 'none of them'}", where="filter")
+
+
+def _check_by_order(table: FilterTable, given: Sequence[str], sample_rate: Fraction) -> None:
+    family, kind = _family_and_kind(table)
+    if table.method == "impulse_invariant":
+        _check_impulse_invariant(table, family, kind)
+    losses = _LOSSES.get(family, ())
+    beside = f"beside order and cutoff for {family}"
+    _check_given(given, _BY_ORDER)
+    for key in _BY_EDGES[2:]:
+        if key in losses and key not in given:
+            raise UnfitError(f"given in dB {beside}", "missing", where=f"filter.{key}")
+        if key in given and key not in losses:
+            raise UnfitError(f"left out {beside}", literal(getattr(table, key)), where=f"filter.{key}")
+    _check_losses(table)
+    _check_band(table, "cutoff", kind, sample_rate)
+    limit = MAX_ORDER // 2 if _is_band(kind) else MAX_ORDER
+    if table.order is not None and table.order > limit:
+        raise UnfitError(
+            f"at most {limit} for {kind}, which doubles the order", literal(table.order), where="filter.order"
+        )
+
+
+def _check_by_edges(table: FilterTable, given: Sequence[str], sample_rate: Fraction) -> None:
+    family, kind = _family_and_kind(table)
+    if table.method == "impulse_invariant":
+        raise UnfitError(
+            "given by order and cutoff with impulse_invariant, whose aliases no formula for the minimum order knows",
+            "by edges",
+            where="filter",
+        )
+    if family == "bessel":
+        raise UnfitError(
+            "given by order and cutoff for bessel, which has no formula for the minimum order",
+            "by edges",
+            where="filter",
+        )
+    _check_given(given, _BY_EDGES)
+    _check_losses(table)
+    passband = _check_band(table, "passband_edge", kind, sample_rate)
+    stopband = _check_band(table, "stopband_edge", kind, sample_rate)
+    relation, holds = _relation(kind, passband, stopband)
+    if not holds:
+        raise UnfitError(
+            f"{relation} stopband_edge ({_frequencies(stopband)} Hz) for {kind}",
+            _frequencies(passband),
+            where="filter.passband_edge",
+        )
+
+
+def _check_impulse_invariant(table: FilterTable, family: str, kind: str) -> None:
+    if kind == "bandpass":
+        raise UnfitError("lowpass with impulse_invariant", literal(kind), where="filter.kind", later=True)
+    if kind != "lowpass":
+        raise UnfitError(
+            "lowpass with impulse_invariant, as all that an analog filter passes above half the sample rate would "
+            "fold back",
+            literal(kind),
+            where="filter.kind",
+        )
+    if family in ("chebyshev2", "elliptic") and table.order is not None and table.order % 2 == 0:
+        raise UnfitError(
+            f"odd for {family} with impulse_invariant, as an even one passes a part of all high frequencies",
+            literal(table.order),
+            where="filter.order",
+        )
+
+
+def _check_sections(table: FilterTable, given: Sequence[str]) -> None:
+    for key in given:
+        if key != "sos":
+            raise UnfitError("left out beside sos", literal(getattr(table, key)), where=f"filter.{key}")
+    for k, (b0, b1, b2, a0, a1, a2) in enumerate(table.sos or ()):
+        where = f"filter.sos[{k}]"
+        if a0 != 1:
+            raise UnfitError("a section with a0 = 1", literal(a0), where=where)
+        if not (b0 or b1 or b2):
+            raise UnfitError("a section with a b that is not zero", "b0 = b1 = b2 = 0", where=where)
+        # The triangle of Jury's criterion: both poles strictly inside the unit circle, exact in rationals.
+        if not (abs(a2) < 1 and abs(a1) < 1 + a2):
+            raise UnfitError(
+                "a stable section, |a2| < 1 and |a1| < 1 + a2",
+                f"a1 = {literal(a1)}, a2 = {literal(a2)}",
+                where=where,
+            )
+
+
+def _family_and_kind(table: FilterTable) -> tuple[str, str]:
+    if table.family is None:
+        raise UnfitError(one_of(FAMILIES), "missing", where="filter.family")
+    if table.kind is None:
+        raise UnfitError(one_of(KINDS), "missing", where="filter.kind")
+    return table.family, table.kind
+
+
+def _check_given(given: Sequence[str], needed: Sequence[str]) -> None:
+    for key in needed:
+        if key not in given:
+            others = [other for other in needed if other in given]
+            raise UnfitError(f"given beside {listed(others)}", "missing", where=f"filter.{key}")
+
+
+def _check_losses(table: FilterTable) -> None:
+    passband, stopband = table.passband_loss, table.stopband_loss
+    if passband is not None and stopband is not None and passband >= stopband:
+        raise UnfitError(
+            f"below stopband_loss ({literal(stopband)} dB)", literal(passband), where="filter.passband_loss"
+        )
+
+
+def _is_band(kind: str) -> bool:
+    return kind in ("bandpass", "bandstop")
+
+
+def _check_band(table: FilterTable, key: str, kind: str, sample_rate: Fraction) -> tuple[Fraction, ...]:
+    """Check the frequencies of `key` on their own and return them."""
+    frequencies: tuple[Fraction, ...] = getattr(table, key)
+    where = f"filter.{key}"
+    found = _frequencies(frequencies)
+    if _is_band(kind) and len(frequencies) != 2:
+        raise UnfitError(f"two frequencies [low, high] for {kind}", found, where=where)
+    if not _is_band(kind) and len(frequencies) != 1:
+        raise UnfitError(f"one frequency for {kind}", found, where=where)
+    if not all(0 < frequency < sample_rate / 2 for frequency in frequencies):
+        raise UnfitError(f"above 0 and below half the sample_rate ({literal(sample_rate / 2)} Hz)", found, where=where)
+    margin = MARGIN * sample_rate
+    if not all(margin <= frequency <= sample_rate / 2 - margin for frequency in frequencies):
+        raise UnfitError(
+            f"at least a millionth of the sample_rate ({literal(margin)} Hz) away from 0 and from half the"
+            " sample_rate, as no word length holds a filter beyond",
+            found,
+            where=where,
+        )
+    if list(frequencies) != sorted(set(frequencies)):
+        raise UnfitError("rising, [low, high]", found, where=where)
+    return frequencies
+
+
+def _frequencies(frequencies: Sequence[Fraction]) -> str:
+    return literal(frequencies if len(frequencies) > 1 else frequencies[0])
+
+
+def _relation(kind: str, passband: Sequence[Fraction], stopband: Sequence[Fraction]) -> tuple[str, bool]:
+    """Return how the edges of the passband have to lie against those of the stopband, and whether they do."""
+    match kind:
+        case "lowpass":
+            return "below", passband[0] < stopband[0]
+        case "highpass":
+            return "above", passband[0] > stopband[0]
+        case "bandpass":
+            return "inside", stopband[0] < passband[0] and passband[1] < stopband[1]
+        case _:
+            return "around", passband[0] < stopband[0] and stopband[1] < passband[1]
+
+
+def _check_output(document: Document) -> None:
+    output = document.output
+    _check_range(output, "output")
+    low, high = output.range
+    half = (high - low) / 2 ** (output.bits + 1)
+    if output.max_error is not None and output.max_error <= half:
+        raise UnfitError(
+            f"more than half an LSB of the output ({literal(half)}), which its rounding alone takes",
+            literal(output.max_error),
+            where="output.max_error",
+        )
+
+
+def _check_wear(document: Document) -> None:
+    wear, output = document.wear, document.output
+    if wear is None:
+        return
+    if len(wear.initial) not in {1, document.channels}:
+        expected = "one number" if document.channels == 1 else f"one number, or a list of {document.channels}"
+        raise UnfitError(expected, literal(wear.initial), where="wear.initial")
+    if wear.warning >= wear.limit:
+        raise UnfitError(f"below limit ({literal(wear.limit)})", literal(wear.warning), where="wear.warning")
+    low, high = output.range
+    last = high - (high - low) / 2**output.bits  # of the highest code
+    for initial in wear.initial:
+        if not low <= initial <= last:
+            raise UnfitError(
+                f"in the range of the output, {literal(output.range)}", literal(initial), where="wear.initial"
+            )
+        end = initial + wear.limit if wear.sensor_range is None else min(initial + wear.limit, wear.sensor_range)
+        if wear.sensor_range is not None and initial + wear.warning >= wear.sensor_range:
+            raise UnfitError(
+                f"above the clearance of the warning ({literal(initial + wear.warning)})",
+                literal(wear.sensor_range),
+                where="wear.sensor_range",
+            )
+        if end > last:
+            raise UnfitError(
+                f"at most {literal(last - initial)}, so that the output can show it",
+                literal(wear.limit),
+                where="wear.limit",
+            )
+        step = (high - low) / 2**output.bits
+        if math.ceil((initial + wear.warning - low) / step) >= math.ceil((end - low) / step):
+            raise UnfitError(
+                f"at least an LSB of the output ({literal(step)}) below limit",
+                literal(wear.warning),
+                where="wear.warning",
+            )

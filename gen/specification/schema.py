@@ -1,0 +1,231 @@
+"""Shape of a specification: its tables, their keys, and the kind of value each key takes.
+
+What two keys mean together is checked in `sosmith.gen.specification.rules`. To add a key, add it to its
+table; messages about unknown and missing keys follow.
+"""
+
+from __future__ import annotations
+
+import difflib
+from fractions import Fraction
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, PlainValidator, ValidationError
+from pydantic_core import ErrorDetails
+
+from sosmith.gen.specification.values import (
+    ABOVE_ZERO,
+    IDENTIFIER,
+    UnfitError,
+    above_zero,
+    between,
+    choice,
+    edges,
+    file_name,
+    flag,
+    identifier,
+    key_text,
+    list_of,
+    literal,
+    number,
+    one_or_more,
+    positive,
+    rising_pair,
+    text,
+    whole,
+)
+
+FAMILIES = ("butterworth", "chebyshev1", "chebyshev2", "elliptic", "bessel")
+KINDS = ("lowpass", "highpass", "bandpass", "bandstop")
+METHODS = ("bilinear", "impulse_invariant")
+REALIZATIONS = ("auto", "df1", "df1_ef1", "df1_ef2", "df2t", "delta", "state_space", "normal", "lattice_wdf")
+ARCHITECTURES = ("auto", "parallel", "folded", "serial")
+
+MAX_ORDER = 20
+"""Highest order of the digital filter, ten second-order sections."""
+
+MAX_CHANNELS = 65536
+"""So many channels have numbers of two bytes."""
+
+LOSS_LIMITS = (Fraction(1, 10**6), Fraction(200))
+"""In dB: double precision designs ripples down to the first, and a 32-bit code spans less than the second."""
+
+Rows = tuple[tuple[Fraction, ...], ...]
+Loss = Annotated[Fraction | None, PlainValidator(between(*LOSS_LIMITS, "dB"))]
+Edges = Annotated[tuple[Fraction, ...] | None, PlainValidator(edges)]
+
+
+def read_max_error(value: object) -> Fraction | None:
+    """Read the largest error; "faithful" gives None."""
+    if value == "faithful":
+        return None
+    expected = 'a positive number in the unit of the output, or "faithful"'
+    exact = number(value, expected)
+    if exact <= 0:
+        raise UnfitError(expected, literal(value))
+    return exact
+
+
+class Table(BaseModel):
+    """A table of the specification: only its own keys, immutable."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class InputTable(Table):
+    """``[input.NAME]``: the integer format of a sensor."""
+
+    bits: Annotated[int, PlainValidator(whole(2, 32))] = Field(description="a whole number from 2 to 32")
+    range: Annotated[tuple[Fraction, Fraction], PlainValidator(rising_pair)] = Field(
+        description="a list of 2 numbers, [low, high]"
+    )
+    signed: Annotated[bool, PlainValidator(flag)] = False
+
+
+class OutputTable(InputTable):
+    """``[output]``: the integer format of the result and how exact it has to be."""
+
+    unit: Annotated[str, PlainValidator(text(16))] = ""
+    max_error: Annotated[Fraction | None, PlainValidator(read_max_error)] = None
+
+
+class CalibrationTable(Table):
+    """``[calibration]``: the polynomial, or the measurements that it is fitted to."""
+
+    coefficients: Annotated[
+        Rows | None, PlainValidator(list_of(list_of(number, 1, 8), 1, 8, "rows of 1 to 8 numbers"))
+    ] = None
+    data: Annotated[str | None, PlainValidator(file_name)] = None
+
+
+class FilterTable(Table):
+    """``[filter]``: by order and cutoff, by edges and losses, or by its sections."""
+
+    family: Annotated[str | None, PlainValidator(choice(FAMILIES))] = None
+    kind: Annotated[str | None, PlainValidator(choice(KINDS))] = None
+    method: Annotated[str | None, PlainValidator(choice(METHODS))] = None
+    order: Annotated[int | None, PlainValidator(whole(1, MAX_ORDER))] = None
+    cutoff: Edges = None
+    passband_edge: Edges = None
+    stopband_edge: Edges = None
+    passband_loss: Loss = None
+    stopband_loss: Loss = None
+    sos: Annotated[
+        Rows | None,
+        PlainValidator(list_of(list_of(number, 6, 6), 1, MAX_ORDER // 2, "rows [b0, b1, b2, 1.0, a1, a2]")),
+    ] = None
+
+
+class WearTable(Table):
+    """``[wear]``: what the output means for a wheel, for the flags of wear."""
+
+    initial: Annotated[tuple[Fraction, ...], PlainValidator(one_or_more)] = Field(
+        description="a number in the unit of the output, or a list of one for each channel"
+    )
+    warning: Annotated[Fraction, PlainValidator(above_zero)] = Field(description=ABOVE_ZERO)
+    limit: Annotated[Fraction, PlainValidator(above_zero)] = Field(description=ABOVE_ZERO)
+    sensor_range: Annotated[Fraction | None, PlainValidator(number)] = None
+
+
+class HardwareTable(Table):
+    """``[hardware]``: how the datapath is built."""
+
+    realization: Annotated[str, PlainValidator(choice(REALIZATIONS))] = "auto"
+    architecture: Annotated[str, PlainValidator(choice(ARCHITECTURES))] = "auto"
+    clock: Annotated[Fraction, PlainValidator(positive("Hz"))] = Fraction(12_000_000)
+    reload: Annotated[bool, PlainValidator(flag)] = False
+
+
+class Document(Table):
+    """The whole specification."""
+
+    name: Annotated[str, PlainValidator(identifier)] = Field(description=IDENTIFIER)
+    sample_rate: Annotated[Fraction, PlainValidator(positive("Hz"))] = Field(description="a positive number of Hz")
+    channels: Annotated[int, PlainValidator(whole(1, MAX_CHANNELS))] = 1
+    input: dict[str, InputTable] = Field(description="a table [input.NAME] per input")
+    calibration: CalibrationTable | None = Field(default=None, description="a table [calibration]")
+    filter: FilterTable = Field(description="a table [filter]")
+    output: OutputTable = Field(description="a table [output]")
+    wear: WearTable | None = Field(default=None, description="a table [wear]")
+    hardware: HardwareTable = Field(default=HardwareTable(), description="a table [hardware]")
+
+
+_TABLES: dict[str, type[Table]] = {
+    "calibration": CalibrationTable,
+    "filter": FilterTable,
+    "output": OutputTable,
+    "wear": WearTable,
+    "hardware": HardwareTable,
+}
+
+
+def parse(tree: dict[str, Any]) -> Document:
+    """Check the shape of a specification.
+
+    Parameters
+    ----------
+    tree : dict
+        As `tomllib` gives it, with every float as `decimal.Decimal`.
+
+    Raises
+    ------
+    UnfitError
+        For the first finding in the order of the file; the message tells how many more there are.
+    """
+    try:
+        return Document.model_validate(tree)
+    except ValidationError as error:
+        findings = sorted(error.errors(), key=lambda finding: _position(tree, finding["loc"]))
+    unfit = _unfit(findings[0])
+    if len(findings) > 1:
+        unfit = UnfitError(
+            unfit.expected,
+            f"{unfit.found} (and {len(findings) - 1} more)",
+            where=unfit.where,
+            later=unfit.later,
+        )
+    raise unfit
+
+
+def _position(tree: Any, path: tuple[int | str, ...]) -> list[int]:
+    """Return the place of a key in the order of the file, for a missing one the end of its table."""
+    position = []
+    for key in path:
+        position.append(list(tree).index(key) if key in tree else len(tree))
+        tree = tree.get(key)
+    return position
+
+
+def _unfit(finding: ErrorDetails) -> UnfitError:
+    path = tuple(map(str, finding["loc"]))
+    where = ".".join(map(key_text, path))
+    if finding["type"] == "value_error":
+        unfit = finding["ctx"]["error"]
+        assert isinstance(unfit, UnfitError)
+        return unfit.inside(where)
+    keys = _table_at(path[:-1]).model_fields
+    if finding["type"] == "extra_forbidden":
+        return UnfitError(
+            f"one of the keys {', '.join(keys)}", f"an unknown one{_hint(path[-1], list(keys))}", where=where
+        )
+    found = "missing" if finding["type"] == "missing" else literal(finding["input"])
+    # A table [input.NAME] is no field of a model, hence has no description of its own.
+    expected = keys[path[-1]].description if path[-1] in keys else "a table"
+    return UnfitError(str(expected), found, where=where)
+
+
+def _table_at(path: tuple[str, ...]) -> type[Table]:
+    match path:
+        case ():
+            return Document
+        case ("input",):
+            return Table
+        case ("input", _):
+            return InputTable
+        case _:
+            return _TABLES[path[0]]
+
+
+def _hint(key: str, known: list[str]) -> str:
+    closest = difflib.get_close_matches(key, known, n=1)
+    return f" (did you mean {closest[0]}?)" if closest else ""

@@ -1,0 +1,288 @@
+"""The specification: a TOML file in physical units, read exactly and checked before anything is built.
+
+Every number stays exact (`Fraction`) as written. What this version does not carry out yet is refused by name.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from dataclasses import dataclass
+from decimal import Decimal
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from sosmith.gen.specification.rules import CALIBRATION_INPUTS, check
+from sosmith.gen.specification.schema import Document, FilterTable, InputTable, OutputTable, parse
+from sosmith.gen.specification.values import UnfitError
+from sosmith.gen.specification.wear_limits import WearSpec
+from sosmith.model.errors import SpecificationError
+from sosmith.model.port import Port
+
+MAX_BYTES = 1 << 16
+"""Largest specification in bytes; a real one has one or two thousand."""
+
+SECTIONS = "sections"
+"""Family, kind and method of a filter given by its sections, where the specification does not name them."""
+
+_UNITS = {"voltage": "V", "temperature": "degC"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class CalibrationSpec:
+    """Calibration polynomial d = sum of a[i][j] * voltage**i * temperature**j; one attribute is None.
+
+    Attributes
+    ----------
+    coefficients : tuple of tuples of Fraction or None
+        1 to 8 rows of 1 to 8 numbers a[i][j], not all zero; i is the power of the voltage (V), j that of
+        the temperature (degC). Rows may differ in length.
+    data : Path or None
+        CSV file of measurements to fit the polynomial to, found from the folder of the specification.
+    """
+
+    coefficients: tuple[tuple[Fraction, ...], ...] | None
+    data: Path | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class FilterSpec:
+    """What filter is wanted: by `order` and `cutoff`, by edges and losses, or by `sos`; the rest is None.
+
+    Attributes
+    ----------
+    family, kind, method : str
+        For example "butterworth", "lowpass", "bilinear". Beside `sos` they are only a label, "sections" where
+        missing.
+    order : int or None
+        Order of the prototype, 1 to 20; for bandpass and bandstop 1 to 10, the filter having twice that.
+    cutoff, passband_edge, stopband_edge : tuple of Fraction or None
+        In Hz, one for lowpass and highpass, two rising ones for bandpass and bandstop, all of them at least a
+        millionth of the sample rate away from 0 and from half the sample rate.
+    passband_loss, stopband_loss : Fraction or None
+        In dB, 1e-6 to 200, the first below the second. Beside `order` and `cutoff` just those that the family
+        needs.
+    sos : tuple of tuples of Fraction or None
+        1 to 10 stable rows (b0, b1, b2, a0, a1, a2) with a0 = 1 and the sign convention of scipy.
+    """
+
+    family: str
+    kind: str
+    method: str
+    order: int | None
+    cutoff: tuple[Fraction, ...] | None
+    passband_edge: tuple[Fraction, ...] | None
+    stopband_edge: tuple[Fraction, ...] | None
+    passband_loss: Fraction | None
+    stopband_loss: Fraction | None
+    sos: tuple[tuple[Fraction, ...], ...] | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class HardwareSpec:
+    """How the datapath is built.
+
+    Attributes
+    ----------
+    realization : str
+        "auto", "df1", "df1_ef1" or "df1_ef2".
+    architecture : str
+        "auto", "parallel", "folded" or "serial".
+    clock : Fraction
+        In Hz, at least the sample rate.
+    reload : bool
+        Whether coefficients are loadable at run time; False so far.
+    """
+
+    realization: str
+    architecture: str
+    clock: Fraction
+    reload: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class Specification:
+    """A checked specification.
+
+    Attributes
+    ----------
+    path : Path
+        File that it was read from.
+    source : dict
+        The file as read, in the types of JSON, for the manifest.
+    name : str
+        Name of the top module and of the files: a Verilog identifier.
+    sample_rate : Fraction
+        In Hz, of each channel.
+    channels : int
+        Number of channels.
+    inputs : tuple of Port
+        Voltage (V) and temperature (degC), in this order also where the file has another; without
+        `calibration` the one input of the filter, in the unit of the output.
+    calibration : CalibrationSpec or None
+        None for a plain filter.
+    filter : FilterSpec
+        The filter.
+    output : Port
+        The result, "clearance" with `calibration` and "y" without.
+    max_error : Fraction
+        Largest allowed |hardware - exact|, in the unit of the output, more than half an LSB of the output.
+    wear : WearSpec or None
+        What the output means for a wheel.
+    hardware : HardwareSpec
+        The hardware.
+    """
+
+    path: Path
+    source: dict[str, Any]
+    name: str
+    sample_rate: Fraction
+    channels: int
+    inputs: tuple[Port, ...]
+    calibration: CalibrationSpec | None
+    filter: FilterSpec
+    output: Port
+    max_error: Fraction
+    wear: WearSpec | None
+    hardware: HardwareSpec
+
+
+def load(path: Path) -> Specification:
+    """Read and check the specification in the file `path`.
+
+    Raises
+    ------
+    SpecificationError
+        For the first thing that is wrong, in one sentence: the file, the path of the key or the line, what
+        would be right and what was found.
+    """
+    tree = _read_toml(path)
+    try:
+        document = parse(tree)
+        check(document)
+    except UnfitError as unfit:
+        raise SpecificationError(f"{path}: {unfit}") from None
+    return _specification(path, tree, document)
+
+
+def example() -> str:
+    """Return the commented example specification, TOML."""
+    return Path(__file__).with_name("example.toml").read_text(encoding="utf-8")
+
+
+def _read_toml(path: Path) -> dict[str, Any]:
+    """Read the file as a dict with every float as `Decimal`."""
+    try:
+        with path.open("rb") as file:
+            content = file.read(MAX_BYTES + 1)
+    except OSError as error:
+        found = (error.strerror or str(error)).lower()
+        raise SpecificationError(f"{path}: the specification must be a readable file, not: {found}") from None
+    except ValueError:
+        raise SpecificationError(f"{str(path)!r} must be the path of a file, not an impossible one") from None
+    if len(content) > MAX_BYTES:
+        raise SpecificationError(f"{path}: the specification must be at most {MAX_BYTES} bytes, not longer")
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        raise SpecificationError(
+            f"{path}: line {line} must be UTF-8 text, not the byte 0x{content[error.start]:02x}"
+        ) from None
+    try:
+        tree = tomllib.loads(text, parse_float=Decimal)
+    except tomllib.TOMLDecodeError as error:
+        raise SpecificationError(f"{path}: {_syntax_error(str(error), text)}") from None
+    except (ValueError, ArithmeticError, RecursionError):
+        # Python's own limits: 4300 digits of an int, 18 of an exponent, some hundred lists in one another.
+        raise SpecificationError(
+            f"{path}: the specification must be TOML within reason, not lists some hundred deep"
+            " or a number too long to read"
+        ) from None
+    if not tree:
+        raise SpecificationError(f"{path}: the specification must hold the keys of a specification, not nothing")
+    return tree
+
+
+def _syntax_error(message: str, text: str) -> str:
+    """Put tomllib's message "Problem (at line 3, column 7)" into our words."""
+    problem, _, place = message.removesuffix(")").rpartition(" (at ")
+    if not re.fullmatch(r"line \d+, column \d+", place):
+        place = f"line {max(len(text.splitlines()), 1)}"  # "end of document"
+    return f"{place} must be valid TOML, not a syntax error: {problem[:1].lower()}{problem[1:]}"
+
+
+def _specification(path: Path, tree: dict[str, Any], document: Document) -> Specification:
+    output = document.output
+    calibrated = document.calibration is not None
+    output_port = _port("clearance" if calibrated else "y", output, output.unit)
+    hardware, wear = document.hardware, document.wear
+    return Specification(
+        path=path,
+        source={key: _to_json(value) for key, value in tree.items()},
+        name=document.name,
+        sample_rate=document.sample_rate,
+        channels=document.channels,
+        inputs=tuple(
+            _port(name, document.input[name], _UNITS[name] if calibrated else output.unit)
+            for name in (CALIBRATION_INPUTS if calibrated else document.input)
+        ),
+        calibration=_calibration(path, document),
+        filter=_filter(document.filter),
+        output=output_port,
+        max_error=output_port.lsb if output.max_error is None else output.max_error,
+        wear=None
+        if wear is None
+        else WearSpec(initial=wear.initial, warning=wear.warning, limit=wear.limit, sensor_range=wear.sensor_range),
+        hardware=HardwareSpec(
+            realization=hardware.realization,
+            architecture=hardware.architecture,
+            clock=hardware.clock,
+            reload=hardware.reload,
+        ),
+    )
+
+
+def _to_json(value: Any) -> Any:
+    """Return `value` in the types of JSON."""
+    match value:
+        case dict():
+            return {key: _to_json(item) for key, item in value.items()}
+        case list():
+            return [_to_json(item) for item in value]
+        case Decimal():
+            return float(value)
+        case _:
+            return value
+
+
+def _port(name: str, table: InputTable | OutputTable, unit: str) -> Port:
+    low, high = table.range
+    return Port.from_range(name, table.bits, low, high, signed=table.signed, unit=unit)
+
+
+def _calibration(path: Path, document: Document) -> CalibrationSpec | None:
+    calibration = document.calibration
+    if calibration is None:
+        return None
+    return CalibrationSpec(
+        coefficients=calibration.coefficients,
+        data=None if calibration.data is None else path.parent / calibration.data,
+    )
+
+
+def _filter(table: FilterTable) -> FilterSpec:
+    by_sections = table.sos is not None
+    return FilterSpec(
+        family=table.family or SECTIONS,
+        kind=table.kind or SECTIONS,
+        method=table.method or (SECTIONS if by_sections else "bilinear"),
+        order=table.order,
+        cutoff=table.cutoff,
+        passband_edge=table.passband_edge,
+        stopband_edge=table.stopband_edge,
+        passband_loss=table.passband_loss,
+        stopband_loss=table.stopband_loss,
+        sos=table.sos,
+    )

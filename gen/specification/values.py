@@ -1,0 +1,261 @@
+"""Readers of single values in a specification, exact, and the one error they raise.
+
+A reader takes a value as `tomllib` gives it (every TOML float as `decimal.Decimal`) and returns it checked,
+numbers as `Fraction`. What does not fit raises `UnfitError`, from which the sentence for the user is made.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from decimal import Decimal
+from fractions import Fraction
+from typing import TypeVar
+
+from sosmith.gen.specification.verilog_names import KEYWORDS, MAX_NAME, is_identifier
+
+Item = TypeVar("Item")
+
+IDENTIFIER = f"a Verilog identifier of at most {MAX_NAME} letters, digits and underscores"
+
+MAX_DIGITS = 50
+MAX_EXPONENT = 30
+"""Numbers are zero or from 1e-30 to below 1e30 in size: `Fraction` would write ``1e999999999`` in full."""
+
+
+class UnfitError(ValueError):
+    """A value that a specification cannot have.
+
+    Parameters
+    ----------
+    expected : str
+        What would be right, to be read after "must be".
+    found : str
+        What stands there.
+    where : str
+        Path of the key, such as ``filter.sos[2]``.
+    later : bool
+        Whether the value is a known one that this version does not carry out yet.
+    """
+
+    def __init__(self, expected: str, found: str, *, where: str = "", later: bool = False) -> None:
+        self.expected = expected
+        self.found = found
+        self.where = where
+        self.later = later
+        prefix = "not yet available: " if later else ""
+        super().__init__(f"{prefix}{where} must be {expected}, not {found}")
+
+    def inside(self, where: str) -> UnfitError:
+        """Return the same finding with `where` put before its place."""
+        return UnfitError(self.expected, self.found, where=where + self.where, later=self.later)
+
+
+def literal(value: object) -> str:
+    """Return `value` on one line of bounded length, as a message shows it."""
+    match value:
+        case bool():
+            shown = "true" if value else "false"
+        case int() if value.bit_length() > 128:  # str() itself refuses thousands of digits
+            shown = f"a whole number of {value.bit_length()} bits"
+        case Decimal() if not value.is_finite() or not -300 < value.adjusted() < 300:
+            shown = str(value).lower()
+        case Decimal():
+            shown = repr(float(value))
+        case Fraction():
+            shown = repr(float(value)).removesuffix(".0")
+        case int() | str():
+            shown = repr(value)
+        case list() | tuple() if len(value) > 6 or any(isinstance(item, list | tuple) for item in value):
+            shown = f"a list of {len(value)} values"
+        case list() | tuple():
+            return f"[{', '.join(map(literal, value))}]"
+        case dict():
+            shown = "a table"
+        case _:
+            shown = f"a {type(value).__name__}"
+    return shown if len(shown) <= 60 else f"{shown[:56]} ..."
+
+
+def number(value: object, expected: str = "a number") -> Fraction:
+    """Read a finite number exactly: 0.0036 becomes ``Fraction(36, 10000)``.
+
+    What is no number at all is told to be no `expected`.
+
+    Raises
+    ------
+    UnfitError
+        If `value` is no number, is not finite, has more than `MAX_DIGITS` digits or is out of all proportion.
+    """
+    if isinstance(value, bool) or not isinstance(value, int | Decimal):
+        raise UnfitError(expected, literal(value))
+    exact = Decimal(value)
+    if not exact.is_finite():
+        raise UnfitError("a finite number", literal(value))
+    if not exact:
+        return Fraction(0)
+    if len(exact.as_tuple().digits) > MAX_DIGITS or not -MAX_EXPONENT <= exact.adjusted() < MAX_EXPONENT:
+        raise UnfitError(
+            f"a number of at most {MAX_DIGITS} digits, zero or"
+            f" from 1e-{MAX_EXPONENT} to below 1e{MAX_EXPONENT} in size",
+            literal(value),
+        )
+    return Fraction(exact)
+
+
+def positive(unit: str) -> Callable[[object], Fraction]:
+    """Return the reader of a positive number of `unit`."""
+    expected = f"a positive number of {unit}"
+
+    def read(value: object) -> Fraction:
+        exact = number(value, expected)
+        if exact <= 0:
+            raise UnfitError(expected, literal(value))
+        return exact
+
+    return read
+
+
+def between(low: Fraction, high: Fraction, unit: str) -> Callable[[object], Fraction]:
+    """Return the reader of a number of `unit` from `low` to `high`."""
+    expected = f"a number of {unit} from {literal(low)} to {literal(high)}"
+
+    def read(value: object) -> Fraction:
+        exact = number(value, expected)
+        if not low <= exact <= high:
+            raise UnfitError(expected, literal(value))
+        return exact
+
+    return read
+
+
+def whole(low: int, high: int) -> Callable[[object], int]:
+    """Return the reader of a whole number from `low` to `high`, written without a point."""
+
+    def read(value: object) -> int:
+        if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+            raise UnfitError(f"a whole number from {low} to {high}", literal(value))
+        return value
+
+    return read
+
+
+def flag(value: object) -> bool:
+    """Read true or false."""
+    if not isinstance(value, bool):
+        raise UnfitError("true or false", literal(value))
+    return value
+
+
+def text(longest: int) -> Callable[[object], str]:
+    """Return the reader of a printable text of at most `longest` characters."""
+
+    def read(value: object) -> str:
+        if not isinstance(value, str) or not value.isprintable() or len(value) > longest:
+            raise UnfitError(f"a printable text of at most {longest} characters", literal(value))
+        return value
+
+    return read
+
+
+def file_name(value: object) -> str:
+    """Read the name of a file, not empty."""
+    if not isinstance(value, str) or not value.isprintable() or not value:
+        raise UnfitError("the name of a file", literal(value))
+    return value
+
+
+def choice(names: Sequence[str]) -> Callable[[object], str]:
+    """Return the reader of one of `names`."""
+
+    def read(value: object) -> str:
+        if not isinstance(value, str) or value not in names:
+            raise UnfitError(one_of(names), literal(value))
+        return value
+
+    return read
+
+
+def one_of(names: Sequence[str]) -> str:
+    """Return `names` as a phrase, such as "one of bilinear, impulse_invariant"."""
+    return f"one of {', '.join(names)}" if len(names) > 1 else names[0]
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return one or more `names` as a list in a sentence, such as "order, cutoff and sos"."""
+    return " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))
+
+
+def key_text(key: str) -> str:
+    """Return `key` as TOML writes it: bare where that is allowed, else quoted."""
+    return key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else literal(key)
+
+
+def identifier(value: object) -> str:
+    """Read a Verilog identifier that is no keyword."""
+    if not isinstance(value, str) or not is_identifier(value):
+        raise UnfitError(IDENTIFIER, literal(value))
+    if value in KEYWORDS:
+        raise UnfitError(f"{IDENTIFIER}, none of the keywords of SystemVerilog", literal(value))
+    return value
+
+
+def list_of(
+    read: Callable[[object], Item], shortest: int, longest: int, items: str = "numbers"
+) -> Callable[[object], tuple[Item, ...]]:
+    """Return the reader of a list of `shortest` to `longest` values, each taken by `read`."""
+    count = str(shortest) if shortest == longest else f"{shortest} to {longest}"
+
+    def read_list(value: object) -> tuple[Item, ...]:
+        if not isinstance(value, list) or not shortest <= len(value) <= longest:
+            raise UnfitError(f"a list of {count} {items}", literal(value))
+        return tuple(_read_item(read, value, k) for k in range(len(value)))
+
+    return read_list
+
+
+def _read_item(read: Callable[[object], Item], values: Sequence[object], k: int) -> Item:
+    try:
+        return read(values[k])
+    except UnfitError as unfit:
+        raise unfit.inside(f"[{k}]") from None
+
+
+ABOVE_ZERO = "a positive number in the unit of the output"
+"""What `above_zero` reads."""
+
+
+def above_zero(value: object) -> Fraction:
+    """Read a positive number in the unit of the output."""
+    exact = number(value, ABOVE_ZERO)
+    if exact <= 0:
+        raise UnfitError(ABOVE_ZERO, literal(value))
+    return exact
+
+
+ONE_OR_MORE = "a number in the unit of the output, or a list of one for each channel"
+"""What `one_or_more` reads, after "must be"."""
+
+
+def one_or_more(value: object) -> tuple[Fraction, ...]:
+    """Read one number for all channels, or a list of one for each."""
+    if isinstance(value, list):
+        if not value:
+            raise UnfitError(ONE_OR_MORE, literal(value))
+        return list_of(number, 1, len(value))(value)
+    return (number(value, ONE_OR_MORE),)
+
+
+def rising_pair(value: object) -> tuple[Fraction, Fraction]:
+    """Read two rising numbers ``[low, high]``."""
+    low, high = list_of(number, 2, 2)(value)
+    if low >= high:
+        raise UnfitError("rising, [low, high]", literal(value))
+    return low, high
+
+
+def edges(value: object) -> tuple[Fraction, ...]:
+    """Read one frequency, or a list of two."""
+    if isinstance(value, list):
+        return list_of(number, 2, 2)(value)
+    return (number(value, "a number of Hz, or a list of 2 numbers for a band"),)

@@ -1,0 +1,1 @@
+"""Spectra of recorded signals, and the filter proposed from them."""

@@ -1,0 +1,196 @@
+"""Windowed spectra by Welch's method: density, amplitude, and how far chance may have them off."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy import signal, stats
+
+from sosmith.model.errors import SpecificationError
+
+Array = npt.NDArray[np.float64]
+
+WINDOWS = ("hann", "hamming", "blackman", "blackmanharris", "flattop", "boxcar")
+DETRENDS = ("linear", "constant", "none")
+
+SEGMENTS = 8
+"""Segments that a signal is cut into, before overlap, unless their length is given: 15 averages at half overlap."""
+
+MIN_SEGMENT = 16
+"""Samples that a segment must have."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpectrumSettings:
+    """How spectra are estimated.
+
+    Attributes
+    ----------
+    window : str
+        One of `WINDOWS`. Hann's, at an overlap of one half, loses little of the data, and its side lobes fall fast.
+    segment : float or None
+        Length of a segment, s; None takes an eighth of the signal.
+    overlap : float
+        Share of a segment that the next one overlaps, 0 to 0.95.
+    detrend : str
+        One of `DETRENDS`: what is taken away from each segment first. A straight line passes a low-pass filter with
+        unity gain at zero frequency unchanged but for the delay, so it is no part of what a mask has to heed.
+    confidence : float
+        Probability of the confidence interval, between 0 and 1.
+
+    Raises
+    ------
+    SpecificationError
+        If a value is none of these.
+    """
+
+    window: str = "hann"
+    segment: float | None = None
+    overlap: float = 0.5
+    detrend: str = "linear"
+    confidence: float = 0.95
+
+    def __post_init__(self) -> None:
+        if self.window not in WINDOWS:
+            raise SpecificationError(f"window must be one of {', '.join(WINDOWS)}, not {self.window!r}")
+        if self.detrend not in DETRENDS:
+            raise SpecificationError(f"detrend must be one of {', '.join(DETRENDS)}, not {self.detrend!r}")
+        if self.segment is not None and not 0 < self.segment < np.inf:
+            raise SpecificationError(f"segment must be a positive number of seconds, not {self.segment:g}")
+        if not 0 <= self.overlap <= 0.95:
+            raise SpecificationError(f"overlap must be 0 to 0.95 of a segment, not {self.overlap:g}")
+        if not 0 < self.confidence < 1:
+            raise SpecificationError(f"confidence must be between 0 and 1, not {self.confidence:g}")
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Spectrum:
+    """Spectrum of a signal in a unit U; all arrays have shape (n,).
+
+    Attributes
+    ----------
+    frequency : ndarray
+        Hz, even steps from 0 to half the sample rate.
+    density : ndarray
+        One-sided power spectral density, U**2/Hz; 0 at zero frequency if a mean or a line was taken away. The sum
+        over a band times `step` is the mean square there.
+    sides : ndarray of int
+        2 where a wave has a half at the negative frequency as well, 1 at zero and at half the sample rate.
+    amplitude : ndarray
+        Amplitude of a sine wave of that frequency, U; at half the sample rate that of samples of alternating sign, and
+        at zero frequency the mean.
+    averages : int
+        Count of segments.
+    degrees_of_freedom : float
+        Of the chi-square distribution that the density of noise follows, 2 for each independent segment.
+    lower, upper : float
+        The true density lies within these multiples of the estimate, at the confidence of the settings, for noise.
+    """
+
+    frequency: Array
+    density: Array
+    sides: npt.NDArray[np.int64]
+    amplitude: Array
+    averages: int
+    degrees_of_freedom: float
+    lower: float
+    upper: float
+
+    @property
+    def step(self) -> float:
+        """Distance of two frequencies, Hz: the inverse of a segment's length."""
+        return float(self.frequency[1])
+
+    @property
+    def rms(self) -> float:
+        """Root mean square over all frequencies but zero, U."""
+        return float(np.sqrt(np.sum(self.density[1:]) * self.step))
+
+
+def segment_length(count: int, sample_rate: float, settings: SpectrumSettings) -> int:
+    """Count the samples of a segment of a signal of `count` samples.
+
+    Raises
+    ------
+    SpecificationError
+        If they are too few, or more than the signal has.
+    """
+    if settings.segment is None:
+        return max(count // SEGMENTS, MIN_SEGMENT)
+    length = round(settings.segment * sample_rate)
+    if not MIN_SEGMENT <= length <= count:
+        raise SpecificationError(
+            f"segment must be {MIN_SEGMENT / sample_rate:.4g} to {count / sample_rate:.4g} s "
+            f"({MIN_SEGMENT} to {count} samples), not {settings.segment:g} s"
+        )
+    return length
+
+
+def spectrum(values: Array, sample_rate: float, settings: SpectrumSettings) -> Spectrum:
+    """Estimate the spectrum of `values`, shape (n,), sampled at `sample_rate` in Hz.
+
+    Welch's method (P. D. Welch, IEEE Trans. Audio Electroacoust. AU-15, 1967): the mean of the windowed periodograms
+    of overlapping segments.
+
+    Raises
+    ------
+    SpecificationError
+        If the segment does not fit the signal.
+    """
+    length = segment_length(len(values), sample_rate, settings)
+    overlap = min(int(settings.overlap * length), length - 1)
+    detrend = False if settings.detrend == "none" else settings.detrend
+    common = {"fs": sample_rate, "window": settings.window, "nperseg": length, "noverlap": overlap, "detrend": detrend}
+    frequency, density = signal.welch(values, scaling="density", **common)
+    _, power = signal.welch(values, scaling="spectrum", **common)
+    sides = np.full(len(frequency), 2)
+    sides[[0, -1] if length % 2 == 0 else [0]] = 1
+    averages = 1 + (len(values) - length) // (length - overlap)
+    window = signal.get_window(settings.window, length)
+    freedom = degrees_of_freedom(window, length - overlap, averages)
+    tail = (1 - settings.confidence) / 2
+    return Spectrum(
+        frequency=frequency,
+        density=density,
+        sides=sides,
+        amplitude=np.sqrt(sides * power),
+        averages=averages,
+        degrees_of_freedom=freedom,
+        lower=float(freedom / stats.chi2.ppf(1 - tail, freedom)),
+        upper=float(freedom / stats.chi2.ppf(tail, freedom)),
+    )
+
+
+def slow_rms(values: Array, length: int) -> float:
+    """Root mean square of the straight lines through segments of `length` samples of `values`, about the mean of all.
+
+    It is what `values`, shape (n,), hold slower than spectra of such segments resolve: detrending takes it from them.
+    """
+    count = len(values) // length
+    cut = (values - np.mean(values))[: count * length].reshape(count, length)
+    return float(np.sqrt(np.mean((cut - signal.detrend(cut, axis=1)) ** 2)))
+
+
+def degrees_of_freedom(window: Array, step: int, averages: int) -> float:
+    """Equivalent degrees of freedom of a mean of `averages` periodograms, `step` samples apart.
+
+    ``2 K / (1 + 2 sum_m (1 - m / K) rho_m**2)`` with ``rho_m`` the correlation of the window with itself, shifted by m
+    steps (Welch 1967; D. B. Percival and A. T. Walden, Spectral Analysis for Physical Applications, 1993, eq. 292b).
+
+    Examples
+    --------
+    Segments that do not overlap are independent, with two degrees of freedom each.
+
+    >>> degrees_of_freedom(np.ones(8), 8, 5)
+    10.0
+    """
+    length, energy = len(window), float(np.sum(window**2))
+    variance = 1.0
+    for m in range(1, averages):
+        if m * step >= length:
+            break
+        rho = float(np.sum(window[m * step :] * window[: length - m * step])) / energy
+        variance += 2 * (1 - m / averages) * rho**2
+    return 2 * averages / variance

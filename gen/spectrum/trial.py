@@ -1,0 +1,65 @@
+"""A proposed filter tried on a trace with its truth: the error before and after, counted sample by sample."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy import signal
+
+from sosmith.gen.spectrum.proposal import Proposal
+from sosmith.gen.spectrum.spectra import Array
+
+SETTLING = 10.0
+"""Group delays left out at the start, in which the filter forgets what it began with."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Trial:
+    """Errors against the truth, in the signal's unit, each with its mean taken away: no filter removes an offset.
+
+    Attributes
+    ----------
+    samples : int
+        Count of samples compared.
+    at_readings : bool
+        Whether those are the trace's readings, compared at the same time; else the truth is delayed as the filter is.
+    before, after : float
+        Rms error without and with the filter.
+    offset_before, offset_after : float
+        Mean error without and with the filter: where readings are compared at the same time, the lag behind a steady
+        change is in the second.
+    """
+
+    samples: int
+    at_readings: bool
+    before: float
+    after: float
+    offset_before: float
+    offset_after: float
+
+
+def try_filter(values: Array, truth: Array, reading: npt.NDArray[np.bool_] | None, proposal: Proposal) -> Trial | None:
+    """Filter `values`, shape (n,), and compare with `truth`; None if the trace is too short to settle.
+
+    The filter, in double precision, starts as if the first value had been there for ever.
+    """
+    made = proposal.filter
+    filtered, _ = signal.sosfilt(made.sos, values, zi=signal.sosfilt_zi(made.sos) * values[0])
+    settled = int(np.ceil(SETTLING * proposal.delay * made.sample_rate))
+    lag = 0 if reading is not None else round(proposal.delay * made.sample_rate)
+    index = np.arange(max(settled, lag), len(values))
+    if reading is not None:
+        index = index[reading[index]]
+    if len(index) < 2:
+        return None
+    before, after = (values - truth)[index - lag], filtered[index] - truth[index - lag]
+    return Trial(
+        samples=len(index),
+        at_readings=reading is not None,
+        before=float(np.std(before)),
+        after=float(np.std(after)),
+        offset_before=float(np.mean(before)),
+        offset_after=float(np.mean(after)),
+    )

@@ -1,0 +1,247 @@
+"""The format of a certificate: what stands in the file, and nothing about how it is proven.
+
+A certificate is a JSON text. Integers are JSON integers, rationals are strings ``"p/q"``; there are no
+floating-point numbers in it. A figure that is the sum of an infinite series stands as the next multiple of
+``2**-64`` above it (`on_grid`), so that whoever computes it closely enough finds the same number.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from fractions import Fraction
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainSerializer, ValidationError
+from pydantic_core import ErrorDetails
+
+from sosmith.model.dataflow.graph import Op
+from sosmith.model.errors import SpecificationError
+
+FORMAT = "sosmith certificate 1"
+_GRID_BITS = 64
+_MAX_BITS = 4096  # of any number; far beyond any design, and short of what would stall the arithmetic
+_MAX_DIGITS = 1300  # of an integer in the file, somewhat beyond the same
+_RATIONAL = re.compile(r"(-?[0-9]{1,1200})(?:/([0-9]{1,1200}))?")
+
+
+def on_grid(value: Fraction) -> Fraction:
+    """Smallest multiple of ``2**-64`` that is greater than `value`."""
+    return Fraction(math.floor(value * 2**_GRID_BITS) + 1, 2**_GRID_BITS)
+
+
+def _rational(value: object) -> object:
+    if isinstance(value, Fraction):
+        return value
+    match = _RATIONAL.fullmatch(value) if isinstance(value, str) else None
+    if match is None or int(match[2] or 1) == 0:
+        raise ValueError('must be a rational number as a text "p/q"')
+    return Fraction(int(match[1]), int(match[2] or 1))
+
+
+Rational = Annotated[Fraction, BeforeValidator(_rational), PlainSerializer(str)]
+Integer = Annotated[int, Field(strict=True, ge=-(2**_MAX_BITS), le=2**_MAX_BITS)]
+Exponent = Annotated[int, Field(strict=True, ge=-_MAX_BITS, le=_MAX_BITS)]
+Index = Annotated[int, Field(strict=True, ge=0, lt=10_000)]
+Text = Annotated[str, Field(strict=True, max_length=1000)]
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", arbitrary_types_allowed=True)
+
+
+class PortEntry(_Part):
+    """An input or output: physical value = zero + lsb * code."""
+
+    name: Text
+    bits: Annotated[int, Field(strict=True, ge=2, le=32)]
+    signed: Annotated[bool, Field(strict=True)]
+    lsb: Rational
+    zero: Rational
+    unit: Text
+
+    @property
+    def lowest(self) -> int:
+        """Smallest code."""
+        return -(1 << (self.bits - 1)) if self.signed else 0
+
+    @property
+    def highest(self) -> int:
+        """Largest code."""
+        return (1 << (self.bits - int(self.signed))) - 1
+
+
+class NodeEntry(_Part):
+    """A node of a dataflow graph, with the meaning that `sosmith.model.dataflow.graph.Node` gives its fields."""
+
+    op: Op
+    operands: tuple[Index, ...] = ()
+    frac: Exponent
+    low: Integer
+    high: Integer
+    parameter: Integer = 0
+    parameter_frac: Exponent = 0
+    name: Text = ""
+
+
+class StageEntry(_Part):
+    """A stage of the datapath."""
+
+    name: Text
+    role: Literal["polynomial", "section", "output"]
+    nodes: Annotated[tuple[NodeEntry, ...], Field(min_length=1, max_length=10_000)]
+    outputs: Annotated[tuple[Index, ...], Field(min_length=1)]
+
+
+class SectionEntry(_Part):
+    """An ideal section: coefficients of powers of ``z**-1``, the constant one first."""
+
+    numerator: Annotated[tuple[Rational, ...], Field(min_length=1, max_length=3)]
+    denominator: Annotated[tuple[Rational, ...], Field(min_length=1, max_length=3)]
+
+
+class IdealEntry(_Part):
+    """What the hardware stands for.
+
+    `polynomial` holds the calibration's coefficients in physical units, row i those of the first input to the
+    power i; None where the value of the one input is taken as it is.
+    """
+
+    polynomial: tuple[Annotated[tuple[Rational, ...], Field(min_length=1)], ...] | None
+    sections: Annotated[tuple[SectionEntry, ...], Field(max_length=64)]
+
+
+class GainEntry(_Part):
+    """Worst-case peak gains of a section of the hardware: of the section, and of its recursion 1/A alone."""
+
+    section: Text
+    peak_gain: Rational
+    recursion_gain: Rational
+
+
+class ClaimsEntry(_Part):
+    """What is claimed, in output LSBs; the gains are plain numbers, `peak_gain` that of the ideal filter."""
+
+    budget: dict[Text, Rational]
+    bound: Rational
+    peak_gain: Rational | None
+    sections: tuple[GainEntry, ...]
+
+
+class Certificate(_Part):
+    """A whole certificate; `max_error` is in the unit of the output."""
+
+    format: Literal["sosmith certificate 1"]
+    name: Text
+    inputs: Annotated[tuple[PortEntry, ...], Field(min_length=1, max_length=2)]
+    output: PortEntry
+    max_error: Rational
+    ideal: IdealEntry
+    stages: Annotated[tuple[StageEntry, ...], Field(min_length=1, max_length=256)]
+    claims: ClaimsEntry
+
+
+def certificate_text(certificate: Certificate) -> str:
+    """JSON text with one node a line, the same on every run."""
+    tree = certificate.model_dump(mode="json", exclude_defaults=True)
+    return _layout(tree, "") + "\n"
+
+
+def _layout(tree: Any, indent: str) -> str:
+    """Break lines down to the innermost lists and objects, which take one each."""
+    inner = indent + " "
+    if isinstance(tree, dict) and any(isinstance(value, dict | list) and value for value in tree.values()):
+        if "op" not in tree:
+            rows = [f"{inner}{json.dumps(key)}: {_layout(value, inner)}" for key, value in tree.items()]
+            return "{\n" + ",\n".join(rows) + f"\n{indent}}}"
+    elif isinstance(tree, list) and any(isinstance(value, dict | list) for value in tree):
+        return "[\n" + ",\n".join(inner + _layout(value, inner) for value in tree) + f"\n{indent}]"
+    return json.dumps(tree, ensure_ascii=False)
+
+
+def read_certificate(path: Path) -> Certificate:
+    """Read a certificate and check its form.
+
+    Raises
+    ------
+    SpecificationError
+        If the file cannot be read or is no certificate.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8"
+        raise SpecificationError(f"{path}: the certificate must be a file that can be read, not: {reason}") from None
+    try:
+        tree = json.loads(
+            text,
+            object_pairs_hook=_without_duplicates,
+            parse_int=_integer,
+            parse_float=_refused,
+            parse_constant=_refused,
+        )
+        return Certificate.model_validate(tree)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        place = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in first["loc"]).lstrip(".")
+        raise SpecificationError(
+            f"{path}: the file must be a certificate, not one where {place or 'the whole'} is wrong: {_said(first)}"
+        ) from None
+    except json.JSONDecodeError as error:
+        where = f"line {error.lineno}, column {error.colno}"
+        raise SpecificationError(f"{path}: the file must be a certificate in JSON, not: what is at {where}") from None
+    except RecursionError:
+        raise SpecificationError(f"{path}: the file must be a certificate in JSON, not: one nested so deep") from None
+    except ValueError as error:
+        raise SpecificationError(f"{path}: the file must be a certificate in JSON, not: {error}") from None
+
+
+_SENTENCES = {
+    "missing": "the key is missing",
+    "extra_forbidden": "there is no such key",
+    "model_type": "it must be an object",
+    "dict_type": "it must be an object",
+    "tuple_type": "it must be a list",
+    "int_type": "it must be an integer",
+    "bool_type": "it must be true or false",
+    "string_type": "it must be a text",
+    "string_too_long": "it must have at most {max_length} characters",
+    "too_short": "it must have no fewer entries than {min_length}",
+    "too_long": "it must have no more entries than {max_length}",
+    "literal_error": "it must be {expected}",
+    "enum": "it must be {expected}",
+    "greater_than_equal": "it must be at least {ge}",
+    "less_than_equal": "it must be at most {le}",
+    "less_than": "it must be less than {lt}",
+    "value_error": "it {error}",
+}
+"""What to say of the errors that validation finds, by their type; in braces what it knows about them."""
+
+
+def _said(error: ErrorDetails) -> str:
+    known = {key: _power(value) if isinstance(value, int) else value for key, value in error.get("ctx", {}).items()}
+    return _SENTENCES[error["type"]].format(**known)
+
+
+def _power(value: int) -> str:
+    """Write a limit, which is a power of two where it is large."""
+    return str(value) if abs(value) < 10**6 else f"{'-' if value < 0 else ''}2**{value.bit_length() - 1}"
+
+
+def _integer(text: str) -> int:
+    if len(text) > _MAX_DIGITS:
+        raise ValueError(f"an integer of {len(text)} digits")
+    return int(text)
+
+
+def _without_duplicates(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    result = dict(pairs)
+    if len(result) < len(pairs):
+        raise ValueError("an object with the same key twice")
+    return result
+
+
+def _refused(text: str) -> float:
+    raise ValueError(f"{text}, which is neither an integer nor a text")

@@ -1,0 +1,346 @@
+"""Proves a certificate again, by another method than the one it was made with, from nothing but the certificate.
+
+1. Every graph is well formed, and every range in it follows from the ranges before (`sosmith.gen.verifier.graph`).
+2. The polynomial and the output rounding are followed symbolically (`sosmith.gen.verifier.polynomial`).
+3. The sections' transfer functions are found as determinants, and stability by the Schur-Cohn recursion. A section
+   may have several inputs and outputs; the cascade has one of each.
+4. Responses are enclosed by approximate inverses (`sosmith.gen.verifier.l1_response`). Every range that a BOUND
+   states must hold what they allow, and every figure claimed must be what they give, to the last unit of the
+   certificate's grid.
+
+The induction that carries the ranges: integers without limits obey the linear model exactly, with the quantizers'
+errors as further inputs; so its extents hold at every sample, and words of these ranges never overflow.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import accumulate, zip_longest
+from math import lcm
+
+from flint import fmpq, fmpq_poly
+
+from sosmith.gen.verifier.certificate_file import Certificate, StageEntry, on_grid
+from sosmith.gen.verifier.graph import RejectedError, Transfer, check_graph, inputs_of, label, require
+from sosmith.gen.verifier.l1_response import BITS, Inverse, Response, UndecidedError, inverse, is_stable, response
+from sosmith.gen.verifier.polynomial import output_error, polynomial_error
+from sosmith.model.dataflow.graph import Op
+
+Progress = Callable[[str, int, int], None]
+"""Told the name of what is being done, how much of it is, and how much there is."""
+
+_ROLES = ("polynomial", "section", "output")
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What a certificate proves.
+
+    Attributes
+    ----------
+    budget : dict of str to Fraction
+        Parts of the error bound, in output LSBs.
+    nodes, ranges : int
+        Number of nodes whose range was checked, and of those whose range needed a peak gain.
+    """
+
+    budget: dict[str, Fraction]
+    nodes: int
+    ranges: int
+
+    @property
+    def bound(self) -> Fraction:
+        """Bound on ``|hardware - exact|`` in output LSBs, the exact value limited to the output's range."""
+        return sum(self.budget.values(), Fraction(0))
+
+
+def verify(certificate: Certificate, progress: Progress = lambda step, done, total: None) -> Verdict:
+    """Prove a certificate.
+
+    Parameters
+    ----------
+    certificate : Certificate
+        As read from its file.
+    progress : callable
+        Told of every step.
+
+    Returns
+    -------
+    Verdict
+        What is proven: just what the certificate claims.
+
+    Raises
+    ------
+    RejectedError
+        If something claimed does not hold, is not exactly what follows, or could not be decided.
+    """
+    try:
+        return _verified(certificate, progress)
+    except UndecidedError as error:
+        raise RejectedError(f"the certificate could not be decided: {error}") from None
+
+
+def _verified(certificate: Certificate, progress: Progress) -> Verdict:
+    progress("graphs", 0, 0)
+    stages = certificate.stages
+    for stage in stages:
+        check_graph(stage)
+    _check_seams(certificate)
+    fore, sections, last = ([stage for stage in stages if stage.role == role] for role in _ROLES)
+    progress("calibration", 0, 0)
+    budget: dict[str, Fraction] = {}
+    if fore:
+        budget["input scaling" if certificate.ideal.polynomial is None else "calibration"] = polynomial_error(
+            certificate, fore
+        )
+    else:
+        _check_plain_input(certificate)
+    require(
+        bool(sections) == bool(certificate.ideal.sections),
+        f"the hardware's sections must stand for ideal ones, not {len(sections)} for {len(certificate.ideal.sections)}",
+    )
+    ranges = 0
+    if sections:
+        cascade = _Cascade(certificate, sections, progress)
+        for part in budget:
+            budget[part] *= cascade.peak_gain
+        budget["filter coefficients"], budget["filter rounding"] = cascade.coefficients, cascade.rounding
+        ranges = cascade.ranges
+        _compare("peak_gain of the filter", certificate.claims.peak_gain, cascade.peak_gain)
+    else:
+        _compare("peak_gain of the filter", certificate.claims.peak_gain, None)
+        require(not certificate.claims.sections, "the gains of sections must not be given where there are none")
+    budget["output rounding"] = output_error(certificate, last[0])
+    _compare_budget(certificate, budget)
+    return Verdict(budget, sum(len(stage.nodes) for stage in stages), ranges)
+
+
+def _compare(what: str, claimed: Fraction | None, proven: Fraction | None) -> None:
+    require(claimed == proven, f"the {what} must be {_short(proven)}, not {_short(claimed)}")
+
+
+def _short(value: Fraction | None) -> str:
+    return "absent" if value is None else f"{value} = {float(value):.6g}"
+
+
+def _compare_budget(certificate: Certificate, proven: dict[str, Fraction]) -> None:
+    claims = certificate.claims
+    require(
+        claims.budget.keys() == proven.keys(),
+        f"the parts of the budget must be {', '.join(proven)}, not {', '.join(claims.budget)}",
+    )
+    for part, value in proven.items():
+        _compare(f"part {part} of the budget", claims.budget[part], value)
+    _compare("bound", claims.bound, sum(proven.values(), Fraction(0)))
+    error = claims.bound * certificate.output.lsb
+    unit = f" {certificate.output.unit}".rstrip()
+    require(
+        error <= certificate.max_error,
+        f"the error must be at most {float(certificate.max_error):.6g}{unit}, not {float(error):.6g}{unit}",
+    )
+
+
+# Where stages meet.
+
+
+def _check_seams(certificate: Certificate) -> None:
+    stages = certificate.stages
+    roles = [stage.role for stage in stages]
+    require(
+        roles == sorted(roles, key=_ROLES.index) and roles.count("output") == 1,
+        f"the stages must be polynomial, section and one output, in this order, not {', '.join(roles)}",
+    )
+    for port in (*certificate.inputs, certificate.output):
+        require(port.lsb > 0, f"lsb of {port.name} must be positive, not {port.lsb}")
+    wires: list[tuple[int | None, int, int]] = [(None, port.lowest, port.highest) for port in certificate.inputs]
+    for stage in stages:
+        entries = [stage.nodes[index] for index in inputs_of(stage)]
+        require(len(entries) == len(wires), f"{stage.name} must have {len(wires)} inputs, not {len(entries)}")
+        for entry, (frac, low, high) in zip(entries, wires, strict=True):
+            fits = frac in {None, entry.frac} and (entry.low, entry.high) == (low, high)
+            require(
+                fits,
+                f"input {entry.name} of {stage.name} must take the range {low}..{high} and the format of what feeds "
+                f"it, not {entry.low}..{entry.high}",
+            )
+        wires = [(stage.nodes[i].frac, stage.nodes[i].low, stage.nodes[i].high) for i in stage.outputs]
+    output, node = certificate.output, stages[-1].nodes[stages[-1].outputs[0]]
+    require(len(wires) == 1, f"the last stage must have one output, not {len(wires)}")
+    require(
+        node.frac == 0 and output.lowest <= node.low and node.high <= output.highest,
+        f"the output must be whole codes in {output.lowest}..{output.highest}, not in {node.low}..{node.high} "
+        f"with {node.frac} fraction bits",
+    )
+
+
+def _check_plain_input(certificate: Certificate) -> None:
+    """Without a polynomial, the input's code is taken as a multiple of the output's LSB."""
+    port, output = certificate.inputs[0], certificate.output
+    entry = certificate.stages[0].nodes[inputs_of(certificate.stages[0])[0]]
+    require(
+        certificate.ideal.polynomial is None and len(certificate.inputs) == 1,
+        "the calibration must have stages that compute it",
+    )
+    require(
+        port.zero == 0 and port.lsb / output.lsb == Fraction(2) ** -entry.frac,
+        f"lsb and zero of {port.name} must be {Fraction(2) ** -entry.frac * output.lsb} and 0, "
+        f"not {port.lsb} and {port.zero}",
+    )
+
+
+# The sections.
+
+
+@dataclass(frozen=True)
+class _Drive:
+    """A source on its way: where it entered, the numerator that it has gathered on each wire, and its range."""
+
+    first: int
+    numerators: Sequence[fmpq_poly]
+    low: Fraction
+    high: Fraction
+
+
+_Driven = tuple[Response, Fraction, Fraction]
+"""A response and the range of what drives it."""
+
+
+class _Cascade:
+    """The proof of a cascade of sections; its attributes are what is claimed, on the grid."""
+
+    def __init__(self, certificate: Certificate, sections: Sequence[StageEntry], progress: Progress) -> None:
+        self._models = [Transfer(section) for section in sections]
+        self._inverses: dict[tuple[int, int], Inverse] = {}
+        shape = (len(inputs_of(sections[0])), len(sections[-1].outputs))
+        require(shape == (1, 1), f"the sections must have one input and one output in all, not {shape}")
+        for section, model in zip(sections, self._models, strict=True):
+            require(is_stable(model.denominator), f"{section.name} must have its poles inside the unit circle")
+        self._compare_gains(certificate)
+        entry = self._models[0].sources[self._models[0].inputs[0]]
+        exact = self._ideal(certificate)
+        self.peak_gain = on_grid(exact.gain)
+        self.ranges = 0
+        drives = [_Drive(0, [fmpq_poly([1])], *entry)]
+        for index, model in enumerate(self._models):
+            progress("sections", index, len(self._models))
+            arrived = drives
+            for node, entry_of in enumerate(model.stage.nodes):
+                if entry_of.op is Op.BOUND:
+                    self._check_bound(index, node, arrived)
+                    self.ranges += 1
+            drives = self._at(index, model.stage.outputs, arrived)
+        progress("sections", len(self._models), len(self._models))
+        made, *errors = (self._driven(drive, len(self._models) - 1) for drive in drives)
+        self.rounding = on_grid(_magnitude(errors))
+        difference = _difference(made[0], exact)
+        self.coefficients = on_grid(_magnitude([(difference, *entry)]))
+
+    def _compare_gains(self, certificate: Certificate) -> None:
+        claims = certificate.claims.sections
+        names = [model.stage.name for model in self._models]
+        require(
+            [claim.section for claim in claims] == names,
+            f"gains must be given of {', '.join(names)}, not {', '.join(claim.section for claim in claims)}",
+        )
+        for index, (claim, model) in enumerate(zip(claims, self._models, strict=True)):
+            over = self._inverse(index, index)
+            gains = [
+                sum((response(model.numerator(entry, output), over).gain for entry in model.inputs), Fraction(0))
+                for output in model.stage.outputs
+            ]
+            _compare(f"peak_gain of {claim.section}", claim.peak_gain, on_grid(max(gains)))
+            recursion = response(fmpq_poly([1]), over)
+            _compare(f"recursion_gain of {claim.section}", claim.recursion_gain, on_grid(recursion.gain))
+
+    def _ideal(self, certificate: Certificate) -> Response:
+        numerator = denominator = fmpq_poly([1])
+        for index, section in enumerate(certificate.ideal.sections):
+            b, a = (
+                fmpq_poly([fmpq(c.numerator, c.denominator) for c in p])
+                for p in (section.numerator, section.denominator)
+            )
+            require(section.denominator[0] == 1, f"the denominator of ideal section {index} must begin with 1")
+            require(is_stable(a), f"ideal section {index} must have its poles inside the unit circle")
+            numerator, denominator = numerator * b, denominator * a
+        return response(numerator, inverse(denominator))
+
+    def _inverse(self, first: int, last: int) -> Inverse:
+        """Inverse of the denominators of the sections from `first` to `last`."""
+        if (first, last) not in self._inverses:
+            denominator = fmpq_poly([1])
+            for model in self._models[first : last + 1]:
+                denominator *= model.denominator
+            self._inverses[first, last] = inverse(denominator)
+        return self._inverses[first, last]
+
+    def _at(self, index: int, nodes: Sequence[int], arrived: Sequence[_Drive]) -> list[_Drive]:
+        """All that drives some nodes: what arrives at their section, then the section's own sources."""
+        model = self._models[index]
+        ways = [[model.numerator(entry, node) for entry in model.inputs] for node in nodes]
+        return [
+            *(_Drive(d.first, [_combined(d.numerators, way) for way in ways], d.low, d.high) for d in arrived),
+            *(
+                _Drive(index, [model.numerator(source, node) for node in nodes], *ends)
+                for source, ends in model.sources.items()
+                if source not in model.inputs
+            ),
+        ]
+
+    def _driven(self, drive: _Drive, last: int) -> _Driven:
+        (numerator,) = drive.numerators
+        return response(numerator, self._inverse(drive.first, last)), drive.low, drive.high
+
+    def _check_bound(self, index: int, node: int, arrived: Sequence[_Drive]) -> None:
+        stage = self._models[index].stage
+        bound = stage.nodes[node]
+        of = stage.nodes[bound.operands[0]]
+        low, high = (
+            end * 2**bound.frac for end in _extremes([self._driven(d, index) for d in self._at(index, [node], arrived)])
+        )
+        require(
+            bound.low <= max(low, of.low) and min(high, of.high) <= bound.high,
+            f"{label(stage, node)} must hold {float(low):.17g}..{float(high):.17g}, not {bound.low}..{bound.high}",
+        )
+
+
+def _combined(numerators: Sequence[fmpq_poly], way: Sequence[fmpq_poly]) -> fmpq_poly:
+    total = fmpq_poly([0])
+    for numerator, through in zip(numerators, way, strict=True):
+        total += numerator * through
+    return total
+
+
+def _difference(a: Response, b: Response) -> Response:
+    samples = [x - y for x, y in zip_longest(a.samples, b.samples, fillvalue=0)]
+    return Response(samples, a.error + b.error)
+
+
+def _magnitude(driven: Sequence[_Driven]) -> Fraction:
+    low, high = _extremes(driven)
+    return max(-low, high)
+
+
+def _extremes(driven: Sequence[_Driven]) -> tuple[Fraction, Fraction]:
+    """Limits, over all times n, of the sum over all drives of ``sum over k <= n of h_k u(n - k)``."""
+    scale = lcm(*(end.denominator for _, *ends in driven for end in ends))
+    tops: list[int] = []
+    bottoms: list[int] = []
+    slack = Fraction(0)
+    for reached, *ends in driven:
+        low, high = (int(end * scale) for end in ends)
+        if low or high:
+            up, down = (low, high), (high, low)
+            tops = _added(tops, [value * up[value > 0] for value in reached.samples])
+            bottoms = _added(bottoms, [value * down[value > 0] for value in reached.samples])
+            slack += max(map(abs, ends)) * reached.error
+    unit = Fraction(1, scale << BITS)
+    return min(accumulate(bottoms), default=0) * unit - slack, max(accumulate(tops), default=0) * unit + slack
+
+
+def _added(a: list[int], b: list[int]) -> list[int]:
+    return [x + y for x, y in zip_longest(a, b, fillvalue=0)]
+
+
+__all__ = ["Progress", "RejectedError", "Verdict", "verify"]

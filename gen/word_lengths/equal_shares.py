@@ -1,0 +1,93 @@
+"""Words that give every part of the error budget the same share, by exact figures."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
+
+from sosmith.gen.filter.design import Filter
+from sosmith.gen.proof.cascade_proof import coefficient_extent, rounding_gains
+from sosmith.gen.realizations.registry import BEST_KEPT, WIDE, SectionFormat
+from sosmith.gen.word_lengths.cascade import MAX_BITS, ideal_sections, stages_of, values_of, wide
+from sosmith.gen.word_lengths.search import MIN_BITS, Signal, Words
+from sosmith.model.errors import ShortfallError
+
+_Fracs = list[dict[str, int]]
+
+
+def coefficient_bits(ideal: Filter, realization: str, signal: Signal, share: Fraction) -> int:
+    """Fewest significant bits whose proven effect stays within `share`."""
+    sections, ends = ideal_sections(ideal), values_of(signal)
+    bits = MIN_BITS
+    while bits <= MAX_BITS:
+        try:
+            error = coefficient_extent(wide(ideal, realization, bits), sections, *ends).magnitude
+        except ShortfallError:
+            bits += 1  # unstable with so few bits
+            continue
+        if error <= share:
+            return bits
+        # An error falls by half with each bit, now and then by more: leap most of the way.
+        bits += max(1, math.floor(math.log2(error / share)) - 2)
+    raise ShortfallError(
+        f"the filter's coefficients must keep their error below {float(share):.3g} output LSB with {MAX_BITS} "
+        f"significant bits each, and do not: {_remedy(ideal)}"
+    )
+
+
+def fraction_bits(ideal: Filter, realization: str, bits: int, share: Fraction) -> list[dict[str, int]]:
+    """Fraction bits of every quantizer so that all their errors together stay within `share`."""
+    unit = rounding_gains(wide(ideal, realization, bits))
+    count = sum(map(len, unit))
+    fracs = [
+        {name: max(0, math.ceil(math.log2(error * count / share))) if error else 0 for name, error in sources.items()}
+        for sources in unit
+    ]
+    within_limits(fracs, ideal, realization, share)
+    # An equal split wastes up to a bit each; give back what the sum allows, the first section first.
+    for sources, errors in zip(fracs, unit, strict=True):
+        for name in sources:
+            total = _total(fracs, unit) + errors[name] * Fraction(2) ** -sources[name]
+            if sources[name] > 0 and total <= share:
+                sources[name] -= 1
+    return fracs
+
+
+def within_limits(fracs: _Fracs, ideal: Filter, realization: str, share: Fraction) -> _Fracs:
+    """Return `fracs` unless there are more than may be."""
+    if max((frac for sources in fracs for frac in sources.values()), default=0) > MAX_BITS:
+        better = [] if realization == BEST_KEPT else [f"set hardware.realization to {BEST_KEPT}"]
+        raise ShortfallError(
+            f"the filter must keep its rounding error below {float(share):.3g} output LSB with {MAX_BITS} fraction "
+            f"bits in each state, and does not: {_remedy(ideal, *better)}"
+        )
+    return fracs
+
+
+def _total(fracs: Sequence[Mapping[str, int]], unit: Sequence[Mapping[str, Fraction]]) -> Fraction:
+    return sum(
+        (
+            errors[name] * Fraction(2) ** -sources[name]
+            for sources, errors in zip(fracs, unit, strict=True)
+            for name in sources
+        ),
+        Fraction(0),
+    )
+
+
+def rounded(ideal: Filter, realization: str, bits: int, fracs: Sequence[Mapping[str, int]]) -> list[Words]:
+    """Words of stages whose coefficients all have the same significant bits."""
+    formats = [SectionFormat(coefficient_bits=bits)] * len(fracs)
+    stages = stages_of(ideal, realization, formats, Signal(0, -WIDE, WIDE))
+    return [Words(stage.coefficients, kept) for stage, kept in zip(stages, fracs, strict=True)]
+
+
+def _remedy(ideal: Filter, *first: str) -> str:
+    """Name what would help where a share of the budget cannot be kept to."""
+    ways = [*first, "raise output.max_error", "raise output.bits"]
+    if ideal.decimation > 1:
+        assert ideal.cutoff is not None
+        ratio = ideal.sample_rate / ideal.cutoff[-1]
+        ways.append(f"decimate by {ideal.decimation} first, as the cutoff is 1/{ratio:.0f} of the sample rate")
+    return f"{', '.join(ways[:-1])} or {ways[-1]}"

@@ -1,0 +1,116 @@
+"""What stands before a filter's sections: the calibration polynomial, or the scaling of the input."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+from sosmith.gen.word_lengths.cascade import MAX_BITS, format_of
+from sosmith.gen.word_lengths.search import Signal
+from sosmith.model.calibration.polynomial import Polynomial
+from sosmith.model.dataflow.datapath import Stage
+from sosmith.model.errors import ShortfallError
+from sosmith.model.port import Port
+from sosmith.model.sections.horner import HornerPolynomial, Variable
+
+_COARSER = 4
+"""Fraction bits that the calibration may have less than with an equal share of the budget."""
+
+
+_IDENTITY = Polynomial(((Fraction(0),), (Fraction(1),)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class EntryStages:
+    """What may stand before the sections: its stages, the signal that they give, and its error in output LSBs."""
+
+    stages: tuple[Stage, ...]
+    signal: Signal
+    error: Fraction
+
+
+def needs_scaling(port: Port, output: Port) -> bool:
+    """Whether the code of a filter's input is anything but a power of two times an output LSB."""
+    return port.zero != 0 or _exponent_of_two(port.lsb / output.lsb) is None
+
+
+def _exponent_of_two(value: Fraction) -> int | None:
+    """Exponent k where `value` is 2**k, else None."""
+    exponent = value.numerator.bit_length() - value.denominator.bit_length()
+    return exponent if value == Fraction(2) ** exponent else None
+
+
+def normalised(polynomial: Polynomial, inputs: Sequence[Port], output: Port) -> tuple[tuple[Fraction, ...], ...]:
+    """Return exact coefficients in the codes' fractions ``code * 2**-bits``, in output LSBs."""
+    columns = max(map(len, polynomial.coefficients))
+    first = _substitution(inputs[0], len(polynomial.coefficients))
+    second = _substitution(inputs[1], columns) if len(inputs) > 1 else [[Fraction(1)]]
+    result = [[Fraction(0)] * columns for _ in polynomial.coefficients]
+    for i, row in enumerate(polynomial.coefficients):
+        for j, a in enumerate(row):
+            for p, left in enumerate(first[i]):
+                for q, right in enumerate(second[j]):
+                    result[p][q] += a * left * right / output.lsb
+    return tuple(_trimmed(row) for row in result)
+
+
+def _trimmed(row: Sequence[Fraction]) -> tuple[Fraction, ...]:
+    end = max((k for k, value in enumerate(row) if value), default=0)
+    return tuple(row[: end + 1])
+
+
+def _substitution(port: Port, count: int) -> list[list[Fraction]]:
+    """Powers of ``zero + lsb * 2**bits * u`` as coefficients of u."""
+    powers = [[Fraction(1)]]
+    span = port.lsb * 2**port.bits
+    for _ in range(count - 1):
+        last = powers[-1]
+        powers.append(
+            [a * port.zero + b * span for a, b in zip([*last, Fraction(0)], [Fraction(0), *last], strict=True)]
+        )
+    return powers
+
+
+def entries(
+    polynomial: Polynomial | None, inputs: Sequence[Port], output: Port, allowed: Fraction
+) -> tuple[EntryStages, ...]:
+    """Choose stages with the fewest fraction bits whose error stays below `allowed` output LSBs, and with fewer.
+
+    Without a polynomial, they scale the input to output LSBs; there are none where that is a power of two.
+
+    Raises
+    ------
+    ShortfallError
+        If no formats within the limits keep to the error allowed.
+    """
+    if polynomial is None and not needs_scaling(inputs[0], output):
+        exponent = _exponent_of_two(inputs[0].lsb / output.lsb)
+        assert exponent is not None
+        signal = Signal(-exponent, inputs[0].lowest, inputs[0].highest)
+        return (EntryStages(stages=(), signal=signal, error=Fraction(0)),)
+    coefficients = normalised(polynomial or _IDENTITY, inputs, output)
+    variables = tuple(Variable(name=p.name, bits=p.bits, signed=p.signed) for p in inputs)
+    made: list[EntryStages] = []
+    for frac in range(MAX_BITS + 1):
+        integers = tuple(tuple(round(c * 2**frac) for c in row) for row in coefficients)
+        horner = HornerPolynomial(coefficients=integers, frac=frac, variables=variables)
+        error = horner_error(coefficients, horner)
+        stages = horner.stages
+        made.insert(0, EntryStages(stages=stages, signal=format_of(stages[-1]), error=error))
+        if error <= allowed:
+            return tuple(made[:_COARSER])
+    raise ShortfallError(
+        f"the calibration must keep its error below {float(allowed):.3g} output LSB with {MAX_BITS} fraction bits, "
+        f"not {float(error):.3g}: raise output.max_error or output.bits"
+    )
+
+
+def horner_error(exact: tuple[tuple[Fraction, ...], ...], horner: HornerPolynomial) -> Fraction:
+    """Bound on the polynomial's error over all input codes, exact; |u| and |t| are at most one."""
+    half = Fraction(1, 2 ** (horner.frac + 1))
+    rows = []
+    for wanted, made in zip(exact, horner.coefficients, strict=True):
+        errors = [abs(w - m * Fraction(1, 2**horner.frac)) for w, m in zip(wanted, made, strict=True)]
+        rows.append(sum(errors) + half * (len(errors) - 1))
+    return Fraction(sum(rows) + half * (len(rows) - 1))

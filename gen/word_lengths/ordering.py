@@ -1,0 +1,233 @@
+"""Which poles go with which zeros, and in which order: the arrangement of a cascade that rounds best.
+
+Every section is scaled so that the largest value at its output fits its word, hence its quantizer's error counts
+by the gain from the input up to there, times the gain of the error from there to the output. The first depends
+only on *which* sections lie before, not on their order, and the second only on which lie behind. So with S the set
+of sections placed and s the next one::
+
+    cost(S, s) = (|| prod of H_i over S and s ||_p  *  || noise_s / A_s * prod of H_j over the others ||_q) ** m
+    V(S and s) = min over s of V(S) + cost(S, s)
+
+is exact (dynamic programming over subsets, Dehner 2003). With q = 2 and m = 2 the sum is the power of the noise at
+the output against that of one quantizer; with q = 1 and m = 1 it is the error that cannot be exceeded.
+
+Norms are in double precision: they choose here, what is chosen gets proven afterwards.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from sosmith.gen.filter.design import decay_length
+from sosmith.gen.proof.linear_model import LinearModel
+
+Norm = Literal["l1", "l2", "linf"]
+"""Of an impulse response: sum of magnitudes, root of the sum of squares, largest gain over all frequencies."""
+
+Spectrum = npt.NDArray[np.complex128]
+
+_MAX_WORK = 1 << 28
+"""Samples of all spectra together; beyond, an order is not looked for. About three seconds."""
+
+_WORTH_IT = 2 / 3
+"""An order is changed only where it brings the error below this part of what it was. Word lengths come in whole bits:
+on the designs of tests/gen/word_lengths/test_sweep.py register bits fall by 2 % on average below this ratio, by
+nothing above."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class NoisySection:
+    """A section and the ways of its rounding errors, as polynomials in ``w = z**-1``, constant term first.
+
+    Attributes
+    ----------
+    numerator, denominator : tuple of float
+        Of the transfer function; the denominator begins with 1 and has a degree of at most 2.
+    noise : tuple of tuple of float
+        For each error its numerator to the section's output, over the same denominator.
+    """
+
+    numerator: tuple[float, ...]
+    denominator: tuple[float, ...]
+    noise: tuple[tuple[float, ...], ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Arrangement:
+    """Sections in the order of the cascade.
+
+    Attributes
+    ----------
+    order : tuple of tuple of int
+        For each place the index of the denominator and that of the numerator.
+    cost : float
+        Sum over all errors, as the module describes.
+    """
+
+    order: tuple[tuple[int, int], ...]
+    cost: float
+
+    @property
+    def decibels(self) -> float:
+        """`cost` as a power, in dB."""
+        return 10 * math.log10(self.cost)
+
+
+def arrange(
+    sections: Sequence[NoisySection],
+    *,
+    scale: Norm,
+    noise: Norm = "l2",
+    pairing: bool = False,
+    worst: bool = False,
+) -> Arrangement:
+    """Find the best arrangement of `sections`.
+
+    Parameters
+    ----------
+    sections : sequence of NoisySection
+        At most some ten, or five with `pairing`.
+    scale : Norm
+        What keeps a value in its word: "l1" for all inputs, "linf" for sinusoids, "l2" for white noise.
+    noise : Norm
+        How errors count: "l2" as power, else as amplitude.
+    pairing : bool
+        Whether numerators may go with other denominators of the same or a higher degree.
+    worst : bool
+        Find the worst one instead, to see what there is to gain.
+
+    Raises
+    ------
+    ValueError
+        If there are too many sections for responses as long as theirs.
+    """
+    table = _Costs(sections, scale, noise, pairing=pairing)
+    sign = -1 if worst else 1
+    reached: dict[_Placed, tuple[float, tuple[tuple[int, int], ...]]] = {(0, 0): (0.0, ())}
+    for _ in sections:
+        longer: dict[_Placed, tuple[float, tuple[tuple[int, int], ...]]] = {}
+        for placed, (cost, order) in reached.items():
+            for pole, zero in table.choices(placed):
+                after = placed[0] | 1 << pole, placed[1] | 1 << zero
+                candidate = (cost + sign * table.cost(after, pole), (*order, (pole, zero)))
+                longer[after] = min(longer.get(after, candidate), candidate)
+        reached = longer
+    ((cost, order),) = reached.values()
+    return Arrangement(order=order, cost=sign * cost)
+
+
+def best_order(models: Sequence[LinearModel]) -> tuple[int, ...]:
+    """Order of a cascade with the smallest error that its roundings can add up to, by the stages' models.
+
+    Both norms are "l1", as in the proof: the words must hold every input, and the bound holds for every error. The
+    order stays as it is where another brings less than a third, or where the table would be too large.
+    """
+    present = tuple(range(len(models)))
+    sections = [_section(model) for model in models]
+    if len(models) < 2 or not _feasible(sections, pairing=False):
+        return present
+    best = arrange(sections, scale="l1", noise="l1")
+    table = _Costs(sections, "l1", "l1", pairing=False)
+    now = sum(table.cost((placed, placed), k) for k in present for placed in [(1 << k + 1) - 1])
+    return tuple(pole for pole, _ in best.order) if best.cost < _WORTH_IT * now else present
+
+
+def _section(model: LinearModel) -> NoisySection:
+    errors = [source for source in model.sources if source.name not in {"input", "constant"}]
+    return NoisySection(
+        numerator=tuple(map(float, model.transfer)),
+        denominator=tuple(map(float, model.denominator)),
+        noise=tuple(tuple(map(float, source.numerators[model.output])) for source in errors),
+    )
+
+
+_Placed = tuple[int, int]
+"""Bit sets of the denominators and of the numerators already placed."""
+
+
+def _length(sections: Sequence[NoisySection]) -> int:
+    """Length of the spectra: eight times that of the responses, so that resonances show their peaks to 0.1 %."""
+    rows = [[1.0, 0.0, 0.0, *s.denominator, *[0.0] * (3 - len(s.denominator))] for s in sections]
+    return 1 << (8 * decay_length(np.array(rows)) - 1).bit_length()
+
+
+def _feasible(sections: Sequence[NoisySection], *, pairing: bool) -> bool:
+    count = len(sections)
+    states = math.comb(2 * count, count) * count if pairing else 2**count
+    return states * count * _length(sections) // 8 <= _MAX_WORK
+
+
+class _Costs:
+    """Norms over the sets of sections, each computed once."""
+
+    def __init__(self, sections: Sequence[NoisySection], scale: Norm, noise: Norm, *, pairing: bool) -> None:
+        if not _feasible(sections, pairing=pairing):
+            raise ValueError(f"sections must be few enough for responses of theirs, not {len(sections)}")
+        self._sections = sections
+        self._pairing = pairing
+        self._scale, self._noise = scale, noise
+        self._full = (1 << len(sections)) - 1
+        length = _length(sections)
+        if "linf" not in {scale, noise}:
+            length //= 8
+        self._length = length
+        self._all_pole = [1 / self._spectrum(s.denominator) for s in sections]
+        self._numerators = [self._spectrum(s.numerator) for s in sections]
+        self._gain_to = cache(self._gain_to_uncached)
+        self._gains_from = cache(self._gains_from_uncached)
+
+    def _spectrum(self, polynomial: tuple[float, ...]) -> Spectrum:
+        return np.asarray(np.fft.rfft(polynomial, self._length), dtype=np.complex128)
+
+    def choices(self, placed: _Placed) -> Iterator[tuple[int, int]]:
+        """Pairs of denominator and numerator that may come next."""
+        for pole in _members(self._full & ~placed[0]):
+            for zero in _members(self._full & ~placed[1]) if self._pairing else (pole,):
+                fits = len(self._sections[zero].numerator) <= len(self._sections[pole].denominator)
+                if fits or zero == pole:
+                    yield pole, zero
+
+    def cost(self, after: _Placed, last: int) -> float:
+        """Cost of the section whose denominator is `last`, by what has been placed together with it."""
+        gain, power = self._gain_to(after), 2 if self._noise == "l2" else 1
+        return float(sum((gain * error) ** power for error in self._gains_from(after)[last]))
+
+    def _product(self, placed: _Placed) -> Spectrum:
+        spectrum = np.ones(self._length // 2 + 1, dtype=np.complex128)
+        for pole in _members(placed[0]):
+            spectrum = spectrum * self._all_pole[pole]
+        for zero in _members(placed[1]):
+            spectrum = spectrum * self._numerators[zero]
+        return spectrum
+
+    def _gain_to_uncached(self, after: _Placed) -> float:
+        return self._norm(self._product(after), self._scale)
+
+    def _gains_from_uncached(self, after: _Placed) -> dict[int, list[float]]:
+        behind = self._product((self._full & ~after[0], self._full & ~after[1]))
+        return {
+            pole: [
+                self._norm(behind * self._all_pole[pole] * self._spectrum(error), self._noise)
+                for error in self._sections[pole].noise
+            ]
+            for pole in _members(after[0])
+        }
+
+    def _norm(self, spectrum: Spectrum, norm: Norm) -> float:
+        if norm == "linf":
+            return float(np.abs(spectrum).max())
+        if norm == "l1":
+            return float(np.abs(np.fft.irfft(spectrum, self._length)).sum())
+        power = np.abs(spectrum) ** 2
+        return math.sqrt(float(2 * power.sum() - power[0] - power[-1]) / self._length)
+
+
+def _members(mask: int) -> Iterator[int]:
+    return (k for k in range(mask.bit_length()) if mask >> k & 1)

@@ -1,0 +1,446 @@
+"""Trims the words of a cascade until nothing more can be saved: fraction bits of every quantizer, every coefficient.
+
+From a start that keeps to the error allowed, the step that saves the most estimated area for the error it costs is
+taken, again and again, until no step fits any more. A step drops bits of one quantizer, of the calibration or of one
+coefficient, which may become either neighbour of its ideal value; or it begins to drop bits of a product's operand so
+that it fits one hardware multiplier.
+
+All errors here are linear estimates in double precision: of a quantizer its gain to the output, of a coefficient the
+response of its derivative, so that errors of several coefficients may cancel. They only choose; what is chosen
+gets proven afterwards.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from itertools import zip_longest
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from scipy import signal
+
+from sosmith.gen.filter.design import decay_length
+from sosmith.gen.proof.linear_model import Source, linear_model
+from sosmith.gen.realizations.coefficients import lowest_terms, round_significant
+from sosmith.gen.realizations.registry import REALIZATIONS, Section, SectionFormat
+from sosmith.gen.word_lengths.cost import MULTIPLIER_BITS, area_of
+from sosmith.model.errors import ShortfallError
+
+Array = npt.NDArray[np.float64]
+
+MIN_BITS = 4
+"""Significant bits of a coefficient that are tried first."""
+
+_EXACT_BITS = 50
+"""Significant bits of a coefficient that count as exact."""
+
+_STEPS = (1, 2, 3)
+"""Bits that one step may drop: several, because a shorter fraction may pay only once it is the shortest."""
+
+
+class Signal(NamedTuple):
+    """Fraction bits, smallest and largest code of a signal."""
+
+    frac: int
+    low: int
+    high: int
+
+
+@dataclass(frozen=True)
+class Words:
+    """Words of one section.
+
+    Attributes
+    ----------
+    coefficients : mapping of str to tuple of int
+        Integer and fraction bits of each coefficient, by name.
+    fracs : mapping of str to int
+        Fraction bits that each quantizer keeps, by the name of the node that it quantizes.
+    """
+
+    coefficients: Mapping[str, tuple[int, int]]
+    fracs: Mapping[str, int]
+
+    @property
+    def coefficient_bits(self) -> int:
+        """Significant bits of the longest coefficient."""
+        return max((abs(integer).bit_length() for integer, _ in self.coefficients.values()), default=0)
+
+    def with_frac(self, name: str, frac: int) -> Words:
+        """Return the same with other fraction bits of one quantizer."""
+        return replace(self, fracs={**self.fracs, name: frac})
+
+    def with_coefficient(self, name: str, value: tuple[int, int]) -> Words:
+        """Return the same with another value of one coefficient."""
+        return replace(self, coefficients={**self.coefficients, name: value})
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One choice for everything before the sections.
+
+    Attributes
+    ----------
+    signal : Signal
+        What enters the sections.
+    error : float
+        Error at the filter's output in output LSBs.
+    area : float
+        Estimated area.
+    """
+
+    signal: Signal
+    error: float
+    area: float
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Index of the entry, and the words of every section."""
+
+    entry: int
+    words: tuple[Words, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _Base:
+    """Words that others differ from in a few coefficients, and the deviation and error that theirs make."""
+
+    words: tuple[Words, ...]
+    deviation: Array
+    error: float
+
+
+class Search:
+    """Looks for the words of a cascade.
+
+    Parameters
+    ----------
+    rows : sequence of sequence of float
+        b0, b1, b2, 1, a1, a2 of each section.
+    realization : str
+        A key of `REALIZATIONS`.
+    entries : sequence of Entry
+        What may stand before the sections, each a little coarser than the one before.
+
+    Raises
+    ------
+    ShortfallError
+        If a section cannot be built, or its response does not end in time.
+    """
+
+    def __init__(self, rows: Sequence[Sequence[float]], realization: str, entries: Sequence[Entry]) -> None:
+        self._build = REALIZATIONS[realization].build
+        self._rows = rows
+        self._entries = entries
+        entry = entries[0].signal
+        self._ends = entry.low * 2.0**-entry.frac, entry.high * 2.0**-entry.frac
+        self._estimates = _estimates(rows, realization, self._ends)
+        self._base: _Base | None = None
+        self._known: dict[tuple[object, ...], tuple[float, Signal, dict[str, int]]] = {}
+
+    def start(self, share: float, most: int) -> Choice | None:
+        """Find words whose coefficients and whose quantizers each keep their error within `share` output LSBs.
+
+        Every coefficient has the same significant bits; the quantizers share what is allowed equally. None if a
+        coefficient or a quantizer would need more than `most` bits.
+        """
+        names = [[name for name in e.gains if name not in e.optional] for e in self._estimates]
+        count = sum(map(len, names))
+        fracs = [
+            {name: max(0, _bits_below(e.gains[name] * count, share)) for name in required}
+            for e, required in zip(self._estimates, names, strict=True)
+        ]
+        if max((frac for quantizers in fracs for frac in quantizers.values()), default=0) > most:
+            return None
+        bits = MIN_BITS
+        while bits <= most:
+            words = tuple(
+                Words({name: round_significant(value, bits) for name, value in e.ideal.items()}, kept)
+                for e, kept in zip(self._estimates, fracs, strict=True)
+            )
+            choice = Choice(0, words)
+            error = self.coefficient_error(choice)
+            if error <= share and self._is_stable(choice):
+                return choice
+            # An error falls by half with each bit, now and then by more: leap most of the way.
+            bits += max(1, _bits_below(error, share) - 3)
+        return None
+
+    def trimmed(self, start: Choice, allowed: float) -> Choice:
+        """Trim the words until nothing more can be saved.
+
+        Parameters
+        ----------
+        start : Choice
+            Words to begin with.
+        allowed : float
+            Error of entry, coefficients and rounding together, in output LSBs.
+        """
+        choice, error, area = start, self.error(start), self.area(start)
+        while error <= allowed:
+            deviation = self._deviation(choice, None)
+            self._base = _Base(choice.words, deviation, max(map(abs, _limits(deviation, self._ends))))
+            best: tuple[float, Choice, float, float] | None = None
+            for candidate in self._steps(choice):
+                saved = area - self.area(candidate)
+                if saved <= 0:
+                    continue
+                after = self.error(candidate)
+                if after > allowed:
+                    continue
+                merit = saved / max(after - error, 1e-6 * allowed)
+                if best is None or merit > best[0]:
+                    best = merit, candidate, after, area - saved
+            if best is None:
+                break
+            _, choice, error, area = best
+        return choice
+
+    def _steps(self, choice: Choice) -> Iterator[Choice]:
+        for index in range(choice.entry + 1, min(choice.entry + 1 + len(_STEPS), len(self._entries))):
+            yield replace(choice, entry=index)
+        signal_in = self._entries[choice.entry].signal
+        for k, words in enumerate(choice.words):
+            _, signal_out, fits = self._section(k, signal_in, words)
+            for changed in self._changes(k, words, fits):
+                yield replace(choice, words=(*choice.words[:k], changed, *choice.words[k + 1 :]))
+            signal_in = signal_out
+
+    def _changes(self, k: int, words: Words, fits: Mapping[str, int]) -> Iterator[Words]:
+        """Yield words of section k with fewer bits in one place; an operand that is too long may fit with `fits`."""
+        for name, frac in words.fracs.items():
+            for step in _STEPS:
+                if frac >= step:
+                    yield words.with_frac(name, frac - step)
+        for name, frac in fits.items():
+            yield words.with_frac(name, frac)
+        for name, (integer, frac) in words.coefficients.items():
+            for step in _STEPS:
+                exact = self._estimates[k].ideal[name] * 2.0 ** (frac - step)
+                if abs(integer).bit_length() > step + 1:
+                    for neighbour in {math.floor(exact), math.ceil(exact)} - {0}:
+                        yield words.with_coefficient(name, lowest_terms(neighbour, frac - step))
+
+    def error(self, choice: Choice) -> float:
+        """Estimated error of entry, coefficients and rounding together, in output LSBs."""
+        rounding = sum(
+            estimate.gains.get(name, 0.0) * 2.0**-frac
+            for estimate, words in zip(self._estimates, choice.words, strict=True)
+            for name, frac in words.fracs.items()
+        )
+        return self._entries[choice.entry].error + rounding + self.coefficient_error(choice)
+
+    def coefficient_error(self, choice: Choice) -> float:
+        """Estimated error of the coefficients in output LSBs."""
+        base = self._base
+        if base is not None and all(
+            a.coefficients is b.coefficients for a, b in zip(choice.words, base.words, strict=True)
+        ):
+            return base.error
+        return max(map(abs, _limits(self._deviation(choice, base), self._ends)))
+
+    def _deviation(self, choice: Choice, base: _Base | None) -> Array:
+        """Deviation of the impulse response by the coefficients, from that of `base` on."""
+        response = np.zeros(1) if base is None else base.deviation
+        for k, (estimate, words) in enumerate(zip(self._estimates, choice.words, strict=True)):
+            before = None if base is None else base.words[k].coefficients
+            for name, (integer, frac) in words.coefficients.items():
+                start = estimate.ideal[name]
+                if before is not None:
+                    if before[name] == (integer, frac):
+                        continue
+                    start = before[name][0] * 2.0 ** -before[name][1]
+                response = response + (integer * 2.0**-frac - start) * estimate.slopes[name]
+        return response
+
+    def _is_stable(self, choice: Choice) -> bool:
+        return self.area(choice) < math.inf
+
+    def area(self, choice: Choice) -> float:
+        """Estimated area of the entry and the sections, infinite where rounded coefficients are unstable."""
+        return self._entries[choice.entry].area + sum(area for area, _ in self._built_sections(choice))
+
+    def output(self, choice: Choice) -> Signal:
+        """Return what leaves the last section, its range estimated."""
+        *_, (_, passed) = self._built_sections(choice)
+        return passed
+
+    def _built_sections(self, choice: Choice) -> Iterator[tuple[float, Signal]]:
+        passed = self._entries[choice.entry].signal
+        for k, words in enumerate(choice.words):
+            area, passed, _ = self._section(k, passed, words)
+            yield area, passed
+
+    def _section(self, k: int, entry: Signal, words: Words) -> tuple[float, Signal, dict[str, int]]:
+        """Area and output of section k, and the fraction bits with which each long operand would fit a multiplier."""
+        key = (k, entry, tuple(words.coefficients.items()), tuple(words.fracs.items()))
+        if key not in self._known:
+            try:
+                self._known[key] = self._built(k, entry, words)
+            except ShortfallError:
+                self._known[key] = math.inf, entry, {}
+        return self._known[key]
+
+    def _built(self, k: int, entry: Signal, words: Words) -> tuple[float, Signal, dict[str, int]]:
+        formats = SectionFormat(
+            coefficient_bits=_EXACT_BITS, coefficients=words.coefficients, fracs=words.fracs, x_frac=entry.frac
+        )
+        name = f"section{k}"
+        ranges = {}
+        for node in self._build(self._rows[k], formats, name).graph.nodes:
+            if node.name in self._estimates[k].limits:
+                low, high = self._estimates[k].limits_of(node.name, words.fracs)
+                ranges[node.name] = math.floor(low * 2.0**node.frac), math.ceil(high * 2.0**node.frac)
+        section = self._build(self._rows[k], replace(formats, ranges=ranges, x_low=entry.low, x_high=entry.high), name)
+        graph = section.graph
+        output = graph.nodes[graph.outputs[0]]
+        operands = {node.name: node for node in graph.nodes if node.name in section.optional_quantizers}
+        fits = {
+            name: node.frac - (node.width - MULTIPLIER_BITS)
+            for name, node in operands.items()
+            if node.width > MULTIPLIER_BITS
+        }
+        return area_of(graph), Signal(output.frac, output.low, output.high), fits
+
+
+@dataclass(frozen=True, eq=False)
+class _Estimate:
+    """What double precision says about a section.
+
+    Attributes
+    ----------
+    ideal : dict of str to float
+        Coefficients by name.
+    slopes : dict of str to array
+        Change of the filter's impulse response for a unit of each coefficient.
+    gains : dict of str to float
+        Largest error at the filter's output of each quantizer to whole numbers, centred.
+    limits : dict of str to tuple of float
+        Smallest and largest value of every node whose range is stated, without quantizers.
+    spreads : dict of str to dict of str to float
+        Largest error at every such node of each of the section's quantizers to whole numbers, centred.
+    optional : tuple of str
+        Those of `gains` that need not be.
+    """
+
+    ideal: dict[str, float]
+    slopes: dict[str, Array]
+    gains: dict[str, float]
+    limits: dict[str, tuple[float, float]]
+    spreads: dict[str, dict[str, float]]
+    optional: tuple[str, ...]
+
+    def limits_of(self, node: str, fracs: Mapping[str, int]) -> tuple[float, float]:
+        """Limits of a node with quantizers: what cannot be negative without them may need a sign bit with them."""
+        low, high = self.limits[node]
+        spread = sum(self.spreads[node].get(name, 0.0) * 2.0**-frac for name, frac in fracs.items())
+        return low - spread, high + spread
+
+
+def _estimates(rows: Sequence[Sequence[float]], realization: str, ends: tuple[float, float]) -> list[_Estimate]:
+    sos = np.array(rows, dtype=np.float64)
+    impulse = np.zeros(decay_length(sos))
+    impulse[0] = 1.0
+    through = [np.asarray(signal.sosfilt(sos[:k], impulse)) if k else impulse for k in range(len(rows))]
+    behind = [
+        np.asarray(signal.sosfilt(sos[k + 1 :], impulse)) if k + 1 < len(rows) else impulse for k in range(len(rows))
+    ]
+    others = [
+        np.asarray(signal.sosfilt(np.delete(sos, k, axis=0), impulse)) if len(rows) > 1 else impulse
+        for k in range(len(rows))
+    ]
+    result = []
+    for k, row in enumerate(rows):
+        section = _exact(row, realization)
+        model = linear_model(section.graph)
+        poles = _floats(model.denominator)
+        names = {i: section.graph.nodes[i].name for i in model.bounds}
+        quantizers = [source for source in model.sources if source.kept is not None]
+        result.append(
+            _Estimate(
+                ideal={name: integer * 2.0**-frac for name, (integer, frac) in section.coefficients.items()},
+                slopes={name: _slope(row, realization, section, name, others[k]) for name in section.coefficients},
+                gains={s.name: _gain(s, model.output, poles, behind[k]) for s in quantizers},
+                limits={
+                    name: _limits(_filtered(model.sources[0].numerators[i], poles, through[k]), ends)
+                    for i, name in names.items()
+                },
+                spreads={name: {s.name: _gain(s, i, poles, impulse) for s in quantizers} for i, name in names.items()},
+                optional=section.optional_quantizers,
+            )
+        )
+    return result
+
+
+def _gain(quantizer: Source, node: int, poles: Sequence[float], behind: Array) -> float:
+    """Largest error through a node of a quantizer to whole numbers: half a unit centred, or one either way."""
+    unit = 1.0 if quantizer.low < 0 else 0.5
+    return unit * float(np.abs(_filtered(quantizer.numerators[node], poles, behind)).sum())
+
+
+def _exact(
+    row: Sequence[float], realization: str, coefficients: Mapping[str, tuple[int, int]] | None = None
+) -> Section:
+    """Build a section with exact coefficients, but for those given, and all quantizers dropping bits."""
+    build = REALIZATIONS[realization].build
+    formats = SectionFormat(coefficient_bits=_EXACT_BITS, coefficients=coefficients or {})
+    section = build(row, formats, "section")
+    required = [source.name for source in linear_model(section.graph).sources if source.kept is not None]
+    # An operand has bits to drop only where its terms have some.
+    fracs = dict.fromkeys(required, 1) | dict.fromkeys(section.optional_quantizers, 0)
+    return build(row, replace(formats, fracs=fracs), "section")
+
+
+def _slope(row: Sequence[float], realization: str, section: Section, name: str, others: Array) -> Array:
+    """Response to the derivative of a section's transfer function by a coefficient, and through all other sections."""
+    integer, frac = section.coefficients[name]
+    shift = max(0, 30 - abs(integer).bit_length())
+    step = max(1, abs(integer) << shift >> 24)
+    moved = (integer << shift) + step, frac + shift
+    try:
+        changed = linear_model(_exact(row, realization, {name: moved}).graph)
+    except ShortfallError:
+        changed = linear_model(_exact(row, realization, {name: (moved[0] - 2 * step, moved[1])}).graph)
+        step = -step
+    model = linear_model(section.graph)
+    delta = step * Fraction(2) ** -moved[1]
+    terms = [
+        Fraction(a - b) / delta
+        for a, b in zip_longest(
+            _product(changed.transfer, model.denominator), _product(model.transfer, changed.denominator), fillvalue=0
+        )
+    ]
+    return _filtered((1,), _floats(changed.denominator), _filtered(terms, _floats(model.denominator), others))
+
+
+def _bits_below(error: float, share: float) -> int:
+    """Fraction bits that bring `error` below `share`."""
+    return math.ceil(math.log2(error / share)) if error else 0
+
+
+def _product(a: Sequence[Fraction], b: Sequence[Fraction]) -> list[Fraction]:
+    result = [Fraction(0)] * (len(a) + len(b) - 1)
+    for i, x in enumerate(a):
+        for j, y in enumerate(b):
+            result[i + j] += x * y
+    return result
+
+
+def _floats(values: Sequence[Fraction | int]) -> list[float]:
+    return [float(value) for value in values]
+
+
+def _filtered(numerator: Sequence[Fraction | int], denominator: Sequence[float], values: Array) -> Array:
+    return np.asarray(signal.lfilter(_floats(numerator), denominator, values), dtype=np.float64)
+
+
+def _limits(response: Array, ends: tuple[float, float]) -> tuple[float, float]:
+    """Smallest and largest value that inputs within `ends` from reset on can drive a response to."""
+    low, high = response * ends[0], response * ends[1]
+    bottom, top = np.minimum(low, high).cumsum().min(), np.maximum(low, high).cumsum().max()
+    return min(float(bottom), 0.0), max(float(top), 0.0)

@@ -1,0 +1,1 @@
+"""From measurements to the calibration polynomial, and how good it is."""

@@ -1,0 +1,330 @@
+"""Regression of the clearance on voltage and temperature, from reference measurements.
+
+The paper's method (section 2.2): least squares for the coefficients (equations 2 and 3), starting with
+the linear polynomial, orders raised until the adjusted coefficient of correlation reaches 0.975; the
+smallest polynomial that reaches it is kept.
+
+Equation 3 is the normal equations. `Sums` adds them up exactly and solves them without loss, so the same
+measurements give the same bits everywhere and in any order. On request, outliers are weighted down.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from sosmith.model.calibration.least_squares import Solution, Sums, Term
+from sosmith.model.calibration.polynomial import Polynomial
+from sosmith.model.errors import SpecificationError
+from sosmith.model.port import Values
+from sosmith.model.tables.csv_table import CsvTable, check_rows, read_csv_table
+
+COLUMNS = ("clearance_mm", "voltage_V", "temperature_C")
+"""The columns of a measurement file, in the order of the contract."""
+
+REQUIRED_R = 0.975
+"""Adjusted r at which a polynomial is accepted (the paper's section 2.2)."""
+
+MAX_ORDER = 6
+"""Highest total order tried: 28 terms, far beyond the paper's second order."""
+
+HUBER = 1.345
+"""Residual, in standard deviations, from which a robust fit weights a measurement down.
+
+Huber's constant: 95 % of the efficiency of least squares where the errors are normal.
+"""
+
+NORMAL_CONSISTENCY = 1.4826
+"""Standard deviation of a normal error over the median of its absolute value."""
+
+MIN_SCATTER = 1e-6
+"""Standard deviation in mm taken at least: a nanometre, finer than anything measured."""
+
+WEIGHT_STEPS = 1024
+"""Weights are whole multiples of one over this, so that rounds of weighting end."""
+
+MAX_ROUNDS = 25
+"""Rounds of weighting after which the weights are taken as they are; some ten are usual, but steps can alternate."""
+
+
+Progress = Callable[[int, int], None]
+"""Is told how much is done, and of how much."""
+
+
+def untold(done: int, total: int) -> None:
+    """Take progress and tell nobody."""
+
+
+@dataclass(frozen=True, eq=False)
+class Measurements:
+    """Reference measurements, one element of every array per measurement.
+
+    Attributes
+    ----------
+    clearance : ndarray, shape (n,)
+        Micrometer reading in mm, not negative.
+    voltage : ndarray, shape (n,)
+        Sensor voltage in V.
+    temperature : ndarray, shape (n,)
+        Temperature at the sensor in degC.
+    source : str
+        Where they come from, for messages.
+    """
+
+    clearance: Values
+    voltage: Values
+    temperature: Values
+    source: str = "measurements"
+
+    def __post_init__(self) -> None:
+        for name in ("clearance", "voltage", "temperature"):
+            values: Values = getattr(self, name)
+            if values.ndim != 1 or len(values) != len(self.clearance):
+                raise ValueError(f"{name} must be of shape ({len(self.clearance)},), not {values.shape}")
+            if not np.all(np.isfinite(values)):
+                raise ValueError(f"{name} must be finite, not {values[~np.isfinite(values)][0]}")
+
+    def __len__(self) -> int:
+        """Count of measurements."""
+        return len(self.clearance)
+
+    @property
+    def covered(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Least and largest voltage and temperature."""
+        voltage, temperature = (
+            (float(values.min()), float(values.max())) for values in (self.voltage, self.temperature)
+        )
+        return voltage, temperature
+
+
+@dataclass(frozen=True)
+class Trial:
+    """Orders that were tried, and how well they fit.
+
+    Attributes
+    ----------
+    orders : tuple of int
+        Highest powers (m, n) of voltage and temperature.
+    terms : int
+        Count of coefficients.
+    adjusted_r_squared : float
+        Adjusted coefficient of determination; at most 1, negative for a useless model.
+    """
+
+    orders: tuple[int, int]
+    terms: int
+    adjusted_r_squared: float
+
+    @property
+    def adjusted_r(self) -> float:
+        """Root of the adjusted R squared; 0 where that is negative."""
+        return math.sqrt(max(self.adjusted_r_squared, 0.0))
+
+
+@dataclass(frozen=True)
+class Fit:
+    """The accepted regression.
+
+    Attributes
+    ----------
+    polynomial : Polynomial
+        Clearance in mm; every coefficient is a double, so printing it loses nothing.
+    accepted : Trial
+        Orders and quality of `polynomial`.
+    rms : float
+        Root mean square residual in mm, over all measurements with equal weight.
+    rejected : tuple of Trial
+        The smaller polynomials that fell short, in the order they were tried.
+    covered : tuple of (float, float)
+        Least and largest voltage in V and temperature in degC of the measurements.
+    weights : tuple of float
+        Weight of each measurement, in (0, 1]; empty where all have the same, as without `robust`.
+    """
+
+    polynomial: Polynomial
+    accepted: Trial
+    rms: float
+    rejected: tuple[Trial, ...]
+    covered: tuple[tuple[float, float], tuple[float, float]]
+    weights: tuple[float, ...] = ()
+
+    @property
+    def orders(self) -> tuple[int, int]:
+        """Highest powers (m, n) of voltage and temperature."""
+        return self.accepted.orders
+
+    @property
+    def adjusted_r_squared(self) -> float:
+        """Adjusted coefficient of determination."""
+        return self.accepted.adjusted_r_squared
+
+    @property
+    def adjusted_r(self) -> float:
+        """Adjusted coefficient of correlation, at least `REQUIRED_R`."""
+        return self.accepted.adjusted_r
+
+
+def read_measurements(path: Path) -> Measurements:
+    """Read the CSV file with the columns clearance_mm, voltage_V and temperature_C, in any order.
+
+    Raises
+    ------
+    SpecificationError
+        As `read_csv_table`; if a clearance is negative; if a row repeats another one.
+    """
+    table = read_csv_table(path, COLUMNS, required=COLUMNS)
+    clearance, voltage, temperature = (table.column(name) for name in COLUMNS)
+    check_rows(table, clearance < 0, lambda k: f"clearance_mm must be 0 or more, not {clearance[k]}")
+    _refuse_repeated_row(table)
+    return Measurements(clearance, voltage, temperature, str(path))
+
+
+def _refuse_repeated_row(table: CsvTable) -> None:
+    first_line: dict[tuple[float, ...], int] = {}
+    for index, row in enumerate(table.values.tolist()):
+        line = first_line.setdefault(tuple(row), table.lines[index])
+        if line != table.lines[index]:
+            raise table.refuse(index, f"row must be a measurement of its own, not a duplicate of line {line}")
+
+
+def fit(
+    measurements: Measurements,
+    required_r: float = REQUIRED_R,
+    *,
+    robust: bool = False,
+    progress: Progress = untold,
+) -> Fit:
+    """Find the smallest polynomial whose adjusted r reaches `required_r`.
+
+    1. Orders (m, n) are tried by rising count of terms from (1, 1) on; among equals the lower total
+       order first, then the lower order in temperature. The terms of (m, n) are ``V**i T**j`` with
+       i <= m, j <= n, i + j <= max(m, n): equation 5b is (1, 1), equations 4 and 5a are (2, 1).
+    2. Least squares give the coefficients and the residual sum of squares RSS.
+    3. With N measurements, p terms and the total sum of squares TSS,
+       ``adjusted R**2 = 1 - (RSS / (N - p)) / (TSS / (N - 1))`` and r is its root.
+
+    Orders that the measurements cannot determine are passed over: too few rows, or too few different
+    values of a variable.
+
+    With `robust`, step 2 weights each measurement by ``min(1, HUBER * s / |residual|)``, where s is the scatter by
+    the median of the absolute residuals, until the weights stay (Huber's M-estimate by iterated weighting).
+    RSS and TSS are weighted likewise. A measurement that is far off both in clearance and in voltage or temperature
+    can still pull the fit towards itself: its leverage tells.
+
+    `progress` is called with how many of how many orders have been tried.
+
+    Raises
+    ------
+    SpecificationError
+        If there are fewer measurements than the linear polynomial needs; if a quantity does not vary, or
+        voltage and temperature only together; if no polynomial up to `MAX_ORDER` is good enough.
+    """
+    _check_variation(measurements)
+    count = len(measurements)
+    rejected: list[Trial] = []
+    minimize = _huber(measurements) if robust else _least_squares(measurements)
+    every = candidate_orders()
+    for tried, orders in enumerate(every):
+        progress(tried, len(every))
+        terms = terms_of(orders)
+        found = minimize(terms) if len(terms) < count else None
+        if found is None:
+            if not rejected:
+                raise SpecificationError(
+                    f"{measurements.source}: voltage_V and temperature_C must vary independently, "
+                    "not along one straight line"
+                )
+            continue
+        solution, weights = found
+        unexplained = (solution.residual_squares / (count - len(terms))) / (solution.total_squares / (count - 1))
+        trial = Trial(orders, len(terms), 1.0 - float(unexplained))
+        if trial.adjusted_r >= required_r:
+            rms = root_mean_square(residuals(measurements, solution.polynomial))
+            return Fit(solution.polynomial, trial, rms, tuple(rejected), measurements.covered, weights)
+        rejected.append(trial)
+    best = max(rejected, key=lambda trial: trial.adjusted_r_squared)
+    raise SpecificationError(
+        f"{measurements.source}: adjusted r must reach {required_r} "
+        f"with a polynomial up to order {MAX_ORDER}, not at most {best.adjusted_r:.4f} "
+        f"(orders {best.orders[0]}, {best.orders[1]})"
+    )
+
+
+def residuals(measurements: Measurements, polynomial: Polynomial) -> Values:
+    """Measured clearance minus that of `polynomial`, in mm, shape (n,)."""
+    return measurements.clearance - polynomial(measurements.voltage, measurements.temperature)
+
+
+def root_mean_square(values: Values) -> float:
+    """Root of the mean square; the sum is rounded once, so that it is the same on every machine."""
+    return math.sqrt(math.fsum(values**2) / len(values))
+
+
+_Minimize = Callable[[tuple[Term, ...]], tuple[Solution, tuple[float, ...]] | None]
+"""From terms to coefficients and weights, or None if the measurements do not determine them."""
+
+
+def _least_squares(measurements: Measurements) -> _Minimize:
+    sums = Sums(measurements.clearance, measurements.voltage, measurements.temperature)
+
+    def minimize(terms: tuple[Term, ...]) -> tuple[Solution, tuple[float, ...]] | None:
+        solution = sums.solve(terms)
+        return None if solution is None else (solution, ())
+
+    return minimize
+
+
+def _huber(measurements: Measurements) -> _Minimize:
+    equal = np.ones(len(measurements))
+    unweighted = Sums(measurements.clearance, measurements.voltage, measurements.temperature, equal)
+
+    def minimize(terms: tuple[Term, ...]) -> tuple[Solution, tuple[float, ...]] | None:
+        sums, weights = unweighted, equal
+        rounds: list[tuple[Solution, Values]] = []
+        while True:
+            solution = sums.solve(terms)
+            if solution is None:
+                return None
+            rounds.append((solution, weights))
+            off = np.abs(residuals(measurements, solution.polynomial))
+            allowed = HUBER * max(NORMAL_CONSISTENCY * float(np.median(off)), MIN_SCATTER)
+            exact = allowed / np.maximum(off, allowed)
+            weights = np.maximum(np.rint(exact * WEIGHT_STEPS), 1.0) / WEIGHT_STEPS
+            again = [k for k, (_, earlier) in enumerate(rounds) if np.array_equal(weights, earlier)]
+            if again or len(rounds) == MAX_ROUNDS:
+                # Once weights come again, so do the rounds from there on; weights that stay are a turn of one round.
+                last = again[0] + (MAX_ROUNDS - 1 - again[0]) % (len(rounds) - again[0]) if again else -1
+                solution, weights = rounds[last]
+                return solution, tuple(weights.tolist())
+            sums = sums.reweighted(weights)
+
+    return minimize
+
+
+def candidate_orders() -> tuple[tuple[int, int], ...]:
+    """Orders (m, n) in the sequence in which `fit` tries them."""
+    every = [(m, n) for m in range(1, MAX_ORDER + 1) for n in range(1, MAX_ORDER + 1)]
+    return tuple(sorted(every, key=lambda orders: (len(terms_of(orders)), max(orders), orders[1])))
+
+
+def terms_of(orders: tuple[int, int]) -> tuple[Term, ...]:
+    """Powers (i, j) of voltage and temperature that a polynomial of `orders` has."""
+    m, n = orders
+    return tuple((i, j) for i in range(m + 1) for j in range(n + 1) if i + j <= max(m, n))
+
+
+def _check_variation(measurements: Measurements) -> None:
+    fewest = len(terms_of((1, 1))) + 1
+    if len(measurements) < fewest:
+        raise SpecificationError(
+            f"{measurements.source} must hold at least {fewest} measurements for a linear regression, "
+            f"not {len(measurements)}"
+        )
+    columns = (measurements.clearance, measurements.voltage, measurements.temperature)
+    for name, values in zip(COLUMNS, columns, strict=True):
+        if values.min() == values.max():
+            raise SpecificationError(f"{measurements.source}: {name} must vary, not be {values[0]} in every row")

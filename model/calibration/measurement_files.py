@@ -1,0 +1,283 @@
+"""Reads files of measurements, CSV or XLSX: good rows, and what is wrong with each of the others.
+
+`read_measurements` is for a file that has to be right as a whole: it stops at the first flaw.
+"""
+
+from __future__ import annotations
+
+import csv
+import datetime
+import hashlib
+import io
+import sys
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import openpyxl
+
+from sosmith.model.calibration.fit import COLUMNS
+from sosmith.model.errors import SpecificationError
+from sosmith.model.tables.csv_table import NUMBER, check_separator
+
+DATE_COLUMN = "date"
+"""Optional column with the day of each measurement, as 2024-03-01."""
+
+Range = tuple[float, float]
+"""Least and largest value that can be right."""
+
+DEFAULT_RANGES: tuple[Range, Range, Range] = ((0.0, 16.0), (0.0, 10.0), (0.0, 128.0))
+"""Ranges of `COLUMNS` in mm, V and degC: those of the example specification."""
+
+_SLIPS: dict[str, tuple[tuple[str, Callable[[float], float]], ...]] = {
+    "clearance_mm": (("micrometres", lambda x: x / 1000), ("metres", lambda x: x * 1000)),
+    "voltage_V": (("millivolts", lambda x: x / 1000), ("microvolts", lambda x: x / 1e6)),
+    "temperature_C": (("kelvins", lambda x: x - 273.15), ("degrees Fahrenheit", lambda x: (x - 32) / 1.8)),
+}
+"""Units that a number out of range may be in."""
+
+
+@dataclass(frozen=True)
+class Reading:
+    """One good row.
+
+    Attributes
+    ----------
+    line : int
+        Its line in the file, or row in the sheet, counted from 1.
+    date : str
+        Day of the measurement as in 2024-03-01.
+    values : tuple of float
+        Clearance in mm, voltage in V, temperature in degC.
+    """
+
+    line: int
+    date: str
+    values: tuple[float, float, float]
+
+    def sha256(self, sensor: str) -> str:
+        """Hash over sensor, date and the exact values, in hexadecimal."""
+        text = "\n".join([sensor, self.date, *(value.hex() for value in self.values)])
+        return hashlib.sha256(text.encode()).hexdigest()
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """A row that cannot be right: its line, and a sentence that says why."""
+
+    line: int
+    reason: str
+
+
+@dataclass(frozen=True)
+class MeasurementFile:
+    """What a file holds.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    sha256 : str
+        Hash over its bytes, in hexadecimal.
+    readings : tuple of Reading
+        The good rows, in the order of the file.
+    refusals : tuple of Refusal
+        The others, likewise.
+    """
+
+    path: Path
+    sha256: str
+    readings: tuple[Reading, ...]
+    refusals: tuple[Refusal, ...]
+
+
+def read_measurement_file(
+    path: Path, date: str, ranges: tuple[Range, Range, Range] = DEFAULT_RANGES
+) -> MeasurementFile:
+    """Read the columns clearance_mm, voltage_V, temperature_C and, if there, date, from a CSV or XLSX file.
+
+    Of a workbook the first sheet is read, and of formulas the value that was stored with them.
+
+    Parameters
+    ----------
+    path : Path
+        File whose name ends in ``.csv`` (UTF-8) or ``.xlsx``.
+    date : str
+        Day of measurements that have no date of their own.
+    ranges : tuple of Range
+        Least and largest clearance in mm, voltage in V and temperature in degC that can be right.
+
+    Raises
+    ------
+    SpecificationError
+        If the file cannot be read, is of another kind, or has no header with the three columns. What is wrong with
+        single rows is in `MeasurementFile.refusals` instead.
+    """
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise SpecificationError(f"{path} must be a readable CSV or XLSX file ({reason})") from None
+    readers = {".csv": _csv_rows, ".xlsx": _xlsx_rows}
+    if path.suffix.lower() not in readers:
+        raise SpecificationError(f"{path}: the file's name must end in .csv or .xlsx, not {path.suffix or 'neither'}")
+    rows = ((line, cells) for line, cells in readers[path.suffix.lower()](path, content) if not _blank(cells))
+    line, header = next(rows, (1, ()))
+    names = tuple(cell.strip() if isinstance(cell, str) else cell for cell in _trimmed(header, 0))
+    _check_header(f"{path}, line {line}", names)
+    reader = _Rows(names, date, ranges)
+    for line, cells in rows:
+        reader.take(line, cells)
+    if not reader.readings and not reader.refusals:
+        raise SpecificationError(f"{path} must hold rows of numbers below its header, not the header only")
+    sha256 = hashlib.sha256(content).hexdigest()
+    return MeasurementFile(path, sha256, tuple(reader.readings), tuple(reader.refusals))
+
+
+def parse_date(text: str) -> str:
+    """Check a day written as 2024-03-01, and return it.
+
+    Raises
+    ------
+    SpecificationError
+        If it is none.
+    """
+    try:
+        if datetime.date.fromisoformat(text).isoformat() == text:
+            return text
+    except ValueError:
+        pass
+    raise SpecificationError(f"date must be a day as in 2024-03-01, not {text!r}")
+
+
+def _blank(cells: Sequence[Any]) -> bool:
+    return all(cell is None or (isinstance(cell, str) and not cell.strip()) for cell in cells)
+
+
+def _trimmed(cells: Sequence[Any], least: int) -> Sequence[Any]:
+    """Leave out empty cells at the end of a row, as workbooks have them, down to `least` cells."""
+    end = len(cells)
+    while end > least and _blank(cells[end - 1 : end]):
+        end -= 1
+    return cells[:end]
+
+
+def _csv_rows(path: Path, content: bytes) -> Iterator[tuple[int, Sequence[Any]]]:
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        raise SpecificationError(
+            f"{path}, line {line}: text must be UTF-8, not contain the byte 0x{content[error.start]:02x}"
+        ) from None
+    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
+    try:
+        for cells in reader:
+            yield reader.line_num, [float(cell) if NUMBER.fullmatch(cell.strip()) else cell for cell in cells]
+    except csv.Error as error:
+        raise SpecificationError(
+            f"{path}, line {reader.line_num}: row must be valid CSV, not broken ({error})"
+        ) from None
+
+
+def _xlsx_rows(path: Path, content: bytes) -> Iterator[tuple[int, Sequence[Any]]]:
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # it warns of styles and extensions that do not matter here
+            book = openpyxl.load_workbook(io.BytesIO(content), read_only=True, data_only=True)
+            yield from enumerate(book.worksheets[0].iter_rows(values_only=True), start=1)
+    except Exception as error:  # of the archive, of XML, or whatever damage leads openpyxl into
+        raise SpecificationError(f"{path} must be an XLSX workbook, not damaged ({error})") from None
+
+
+def _check_header(where: str, names: Sequence[Any]) -> None:
+    known = (*COLUMNS, DATE_COLUMN)
+    if not names:
+        raise SpecificationError(f"{where}: header must be {','.join(COLUMNS)}, not empty")
+    if isinstance(names[0], str):
+        check_separator(where, names)
+    for name in names:
+        if name not in known:
+            raise SpecificationError(
+                f"{where}: column must be one of {', '.join(known)}, with the unit in its name, not {name or ''!r}"
+            )
+        if names.count(name) > 1:
+            raise SpecificationError(f"{where}: column {name} must be there once, not {names.count(name)} times")
+    for name in COLUMNS:
+        if name not in names:
+            raise SpecificationError(f"{where}: column {name} must be there, not missing among {', '.join(names)}")
+
+
+@dataclass
+class _Rows:
+    """Sorts rows into good ones and others."""
+
+    names: Sequence[Any]
+    date: str
+    ranges: tuple[Range, Range, Range]
+    readings: list[Reading] = field(default_factory=list)
+    refusals: list[Refusal] = field(default_factory=list)
+    first_lines: dict[tuple[float, ...], int] = field(default_factory=dict)
+
+    def take(self, line: int, cells: Sequence[Any]) -> None:
+        """Read one row."""
+        try:
+            reading = self._reading(line, cells)
+        except SpecificationError as error:
+            self.refusals.append(Refusal(line, str(error)))
+            return
+        first = self.first_lines.setdefault(reading.values, line)
+        if first == line:
+            self.readings.append(reading)
+        else:
+            self.refusals.append(
+                Refusal(line, f"row must be a measurement of its own, not a duplicate of line {first}")
+            )
+
+    def _reading(self, line: int, cells: Sequence[Any]) -> Reading:
+        filled = _trimmed(cells, len(self.names))
+        if len(filled) != len(self.names):
+            raise SpecificationError(f"row must have {len(self.names)} cells, not {len(filled)}")
+        row = dict(zip(self.names, filled, strict=True))
+        numbers = [_number(name, row[name]) for name in COLUMNS]
+        wrong = list(_out_of_range(numbers, self.ranges))
+        if wrong:
+            raise SpecificationError("; ".join(wrong))
+        clearance, voltage, temperature = numbers
+        date = _date(row[DATE_COLUMN]) if DATE_COLUMN in row else self.date
+        return Reading(line, date, (clearance, voltage, temperature))
+
+
+def _number(name: str, cell: Any) -> float:
+    if cell is None or (isinstance(cell, str) and not cell.strip()):
+        raise SpecificationError(f"{name} must be a finite number, not empty")
+    if isinstance(cell, bool | str) or not isinstance(cell, int | float) or not abs(cell) <= sys.float_info.max:
+        raise SpecificationError(f"{name} must be a finite number, not {_shown(cell)}")
+    return float(cell) + 0.0  # so that -0 and 0 are the same measurement
+
+
+def _shown(cell: Any) -> str:
+    return f"the text {cell.strip()!r}" if isinstance(cell, str) else str(cell)
+
+
+def _date(cell: Any) -> str:
+    if isinstance(cell, datetime.datetime):
+        return cell.date().isoformat()
+    return parse_date("" if cell is None else str(cell).strip())
+
+
+def _out_of_range(numbers: Sequence[float], ranges: Iterable[Range]) -> Iterator[str]:
+    """Sentences about the numbers out of their range, with a guess at the cause."""
+    ranges = tuple(ranges)
+    for k, (name, number, (low, high)) in enumerate(zip(COLUMNS, numbers, ranges, strict=True)):
+        if low <= number <= high:
+            continue
+        unit = name.rpartition("_")[2]
+        guess = next((f" (in {slip}?)" for slip, right in _SLIPS[name] if low <= right(number) <= high), "")
+        for other, (other_low, other_high) in enumerate(ranges):
+            swapped = other != k and ranges[k][0] <= numbers[other] <= ranges[k][1]
+            if swapped and other_low <= number <= other_high:
+                guess = f" (columns {name} and {COLUMNS[other]} swapped?)"
+        yield f"{name} must be {low:g} to {high:g} {unit}, not {number:g}{guess}"

@@ -1,0 +1,339 @@
+"""The store of measurements and of the calibrations fitted to them: one SQLite file that only ever grows.
+
+Everything that belongs together is written in one transaction, and on disk before it counts: whoever is interrupted
+leaves the store as it was, and writers wait for each other. `docs/calibration.md` describes the tables.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import sqlite3
+from collections.abc import Iterator, Sequence
+from contextlib import closing, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from sosmith.model.calibration.fit import Measurements
+from sosmith.model.calibration.measurement_files import MeasurementFile, Range, Reading
+from sosmith.model.calibration.polynomial import Polynomial
+from sosmith.model.errors import SpecificationError, ToolError
+
+APPLICATION_ID = 0x534F534D
+"""Marks a SQLite file as a store, in its header."""
+
+SCHEMA_VERSION = 1
+
+PATIENCE = 60.0
+"""Seconds that a writer waits for another one."""
+
+SCHEMA = (
+    """CREATE TABLE sensor (
+        id INTEGER PRIMARY KEY,
+        name TEXT NOT NULL UNIQUE,
+        clearance_low_mm REAL NOT NULL, clearance_high_mm REAL NOT NULL,
+        voltage_low_V REAL NOT NULL, voltage_high_V REAL NOT NULL,
+        temperature_low_C REAL NOT NULL, temperature_high_C REAL NOT NULL
+    ) STRICT""",
+    """CREATE TABLE source (
+        id INTEGER PRIMARY KEY AUTOINCREMENT,
+        sensor INTEGER NOT NULL REFERENCES sensor,
+        name TEXT NOT NULL,
+        sha256 TEXT NOT NULL,
+        UNIQUE (sensor, sha256)
+    ) STRICT""",
+    """CREATE TABLE measurement (
+        id INTEGER PRIMARY KEY AUTOINCREMENT,
+        sensor INTEGER NOT NULL REFERENCES sensor,
+        source INTEGER NOT NULL REFERENCES source,
+        line INTEGER NOT NULL,
+        date TEXT NOT NULL,
+        clearance_mm REAL NOT NULL, voltage_V REAL NOT NULL, temperature_C REAL NOT NULL,
+        sha256 TEXT NOT NULL,
+        UNIQUE (sensor, clearance_mm, voltage_V, temperature_C)
+    ) STRICT""",
+    """CREATE TABLE version (
+        sensor INTEGER NOT NULL REFERENCES sensor,
+        number INTEGER NOT NULL,
+        date TEXT NOT NULL,
+        measurements INTEGER NOT NULL,
+        last_measurement INTEGER NOT NULL REFERENCES measurement,
+        data_sha256 TEXT NOT NULL,
+        required_r REAL NOT NULL,
+        robust INTEGER NOT NULL,
+        coefficients TEXT NOT NULL,
+        adjusted_r_squared REAL NOT NULL,
+        rms_mm REAL NOT NULL,
+        cross_validated_mm REAL,
+        drift_mm REAL,
+        PRIMARY KEY (sensor, number)
+    ) STRICT""",
+    *(
+        f"""CREATE TRIGGER {table}_{event.lower()} BEFORE {event} ON {table}
+        BEGIN SELECT RAISE(ABORT, 'what is in the store stays as it is'); END"""
+        for table in ("source", "measurement", "version")
+        for event in ("UPDATE", "DELETE")
+    ),
+)
+
+_COMPLAINTS = {
+    "database is locked": "must be free within a minute, not locked by another program",
+    "file is not a database": "must be a store of measurements, not another kind of file",
+}
+
+
+@dataclass(frozen=True)
+class StoredMeasurement:
+    """Where a measurement in the store comes from: its number, file, and what that file said."""
+
+    number: int
+    source: str
+    reading: Reading
+
+
+@dataclass(frozen=True)
+class Version:
+    """A calibration as it was fitted.
+
+    Attributes
+    ----------
+    number : int
+        Counts from 1 for each sensor.
+    date : str
+        Day of the fit as in 2024-03-01.
+    measurements, last_measurement : int
+        Count of measurements it was fitted to: those of the sensor up to this number.
+    data_sha256 : str
+        Hash over the hashes of these measurements.
+    required_r : float
+        Adjusted r that was asked for.
+    robust : bool
+        Whether outliers were weighted down.
+    polynomial : Polynomial
+        Clearance in mm from volts and degC; coefficients are doubles.
+    adjusted_r_squared, rms, cross_validated : float
+        As in `Fit` and `FitQuality`; `rms` and `cross_validated` in mm, the latter None where it is not defined.
+    drift : float or None
+        Largest difference in mm to the version before, over the region that the measurements cover.
+    """
+
+    number: int
+    date: str
+    measurements: int
+    last_measurement: int
+    data_sha256: str
+    required_r: float
+    robust: bool
+    polynomial: Polynomial
+    adjusted_r_squared: float
+    rms: float
+    cross_validated: float | None
+    drift: float | None
+
+
+class MeasurementStore:
+    """An open store; see `open_store`."""
+
+    def __init__(self, path: Path, connection: sqlite3.Connection) -> None:
+        self.path = path
+        self._sql = connection
+
+    @contextmanager
+    def transaction(self) -> Iterator[None]:
+        """Write all or nothing; others wait meanwhile."""
+        self._sql.execute("BEGIN IMMEDIATE")
+        try:
+            yield
+        except BaseException:
+            if self._sql.in_transaction:  # SQLite ends it by itself when the disk is full
+                self._sql.execute("ROLLBACK")
+            raise
+        self._sql.execute("COMMIT")
+
+    def sensors(self) -> list[str]:
+        """Names of all sensors."""
+        return [name for (name,) in self._sql.execute("SELECT name FROM sensor ORDER BY name")]
+
+    def ranges(self, sensor: str) -> tuple[Range, Range, Range] | None:
+        """Ranges of clearance in mm, voltage in V and temperature in degC; None for a sensor that is not there."""
+        row = self._sql.execute(
+            "SELECT clearance_low_mm, clearance_high_mm, voltage_low_V, voltage_high_V, temperature_low_C, "
+            "temperature_high_C FROM sensor WHERE name = ?",
+            (sensor,),
+        ).fetchone()
+        return None if row is None else ((row[0], row[1]), (row[2], row[3]), (row[4], row[5]))
+
+    def set_ranges(self, sensor: str, ranges: tuple[Range, Range, Range]) -> None:
+        """Enter a sensor, or give it other ranges."""
+        self._sql.execute(
+            "INSERT INTO sensor VALUES (NULL, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (name) DO UPDATE SET "
+            "(clearance_low_mm, clearance_high_mm, voltage_low_V, voltage_high_V, temperature_low_C, "
+            "temperature_high_C) = (excluded.clearance_low_mm, excluded.clearance_high_mm, excluded.voltage_low_V, "
+            "excluded.voltage_high_V, excluded.temperature_low_C, excluded.temperature_high_C)",
+            (sensor, *(limit for pair in ranges for limit in pair)),
+        )
+
+    def source_of(self, sensor: str, sha256: str) -> str | None:
+        """Name under which a file with this hash was added, or None."""
+        row = self._sql.execute(
+            "SELECT name FROM source WHERE sensor = (SELECT id FROM sensor WHERE name = ?) AND sha256 = ?",
+            (sensor, sha256),
+        ).fetchone()
+        return None if row is None else str(row[0])
+
+    def insert(self, sensor: str, file: MeasurementFile) -> None:
+        """Enter the good rows of a file, none of which may be there already."""
+        (sensor_id,) = self._sql.execute("SELECT id FROM sensor WHERE name = ?", (sensor,)).fetchone()
+        source = self._sql.execute(
+            "INSERT INTO source VALUES (NULL, ?, ?, ?)", (sensor_id, str(file.path), file.sha256)
+        ).lastrowid
+        self._sql.executemany(
+            "INSERT INTO measurement VALUES (NULL, ?, ?, ?, ?, ?, ?, ?, ?)",
+            [
+                (sensor_id, source, reading.line, reading.date, *reading.values, reading.sha256(sensor))
+                for reading in file.readings
+            ],
+        )
+
+    def measurements(self, sensor: str, last: int | None = None) -> list[StoredMeasurement]:
+        """Measurements of a sensor in the order they came, up to the number `last`.
+
+        Raises
+        ------
+        SpecificationError
+            If one is not what it was when it was added.
+        """
+        found = []
+        for number, source, line, date, *values, sha256 in self._sql.execute(
+            "SELECT measurement.id, source.name, line, date, clearance_mm, voltage_V, temperature_C, "
+            "measurement.sha256 FROM measurement JOIN sensor ON sensor.id = measurement.sensor "
+            "JOIN source ON source.id = measurement.source "
+            "WHERE sensor.name = ? AND measurement.id <= coalesce(?, measurement.id) ORDER BY measurement.id",
+            (sensor, last),
+        ):
+            reading = Reading(line, date, (values[0], values[1], values[2]))
+            if reading.sha256(sensor) != sha256:
+                raise SpecificationError(
+                    f"{self.path}: measurement {number} must be as it was added, not changed (its hash differs)"
+                )
+            found.append(StoredMeasurement(number, source, reading))
+        return found
+
+    def versions(self, sensor: str) -> list[Version]:
+        """Versions of a sensor's calibration, the first one first."""
+        rows = self._sql.execute(
+            "SELECT number, date, measurements, last_measurement, data_sha256, required_r, robust, coefficients, "
+            "adjusted_r_squared, rms_mm, cross_validated_mm, drift_mm FROM version "
+            "WHERE sensor = (SELECT id FROM sensor WHERE name = ?) ORDER BY number",
+            (sensor,),
+        )
+        return [
+            Version(
+                number, date, count, last, data, required_r, bool(robust), _polynomial(text), r, rms, left_out, drift
+            )
+            for number, date, count, last, data, required_r, robust, text, r, rms, left_out, drift in rows
+        ]
+
+    def insert_version(self, sensor: str, version: Version) -> None:
+        """Enter a version; its number must be the next one."""
+        coefficients = [[float(a).hex() for a in row] for row in version.polynomial.coefficients]
+        self._sql.execute(
+            "INSERT INTO version SELECT id, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ? FROM sensor WHERE name = ?",
+            (
+                version.number,
+                version.date,
+                version.measurements,
+                version.last_measurement,
+                version.data_sha256,
+                version.required_r,
+                int(version.robust),
+                json.dumps(coefficients),
+                version.adjusted_r_squared,
+                version.rms,
+                version.cross_validated,
+                version.drift,
+                sensor,
+            ),
+        )
+
+    def check(self) -> None:
+        """Have SQLite check the whole file.
+
+        Raises
+        ------
+        SpecificationError
+            If it finds anything wrong.
+        """
+        complaints = [text for (text,) in self._sql.execute("PRAGMA integrity_check")]
+        if complaints != ["ok"]:
+            raise SpecificationError(f"{self.path} must be an undamaged store, not: {complaints[0]}")
+
+
+@contextmanager
+def open_store(path: Path, *, create: bool = False) -> Iterator[MeasurementStore]:
+    """Open a store, or with `create` make it where it is not there yet.
+
+    Raises
+    ------
+    SpecificationError
+        If there is none, or the file is something else, damaged, or of a later version of sosmith.
+    ToolError
+        If the file cannot be read or written, now or while it is open, or another program keeps it locked.
+    """
+    if not create and not path.is_file():
+        raise SpecificationError(f"{path} must be a store of measurements; sosmith calibrate add makes one")
+    try:
+        with closing(sqlite3.connect(path, timeout=PATIENCE, isolation_level=None)) as connection:
+            # EXTRA: once a transaction has ended, not even a power failure undoes it.
+            connection.execute("PRAGMA synchronous = EXTRA")
+            connection.execute("PRAGMA foreign_keys = ON")
+            store = MeasurementStore(path, connection)
+            _prepare(store, connection)
+            yield store
+    except sqlite3.OperationalError as error:
+        complaint = _COMPLAINTS.get(str(error), f"must be readable and writable, not: {error}")
+        raise ToolError(f"{path}: the store {complaint}") from None
+    except sqlite3.DatabaseError as error:
+        complaint = _COMPLAINTS.get(str(error), f"must be undamaged, not: {error}")
+        raise SpecificationError(f"{path}: the file {complaint}") from None
+
+
+def _prepare(store: MeasurementStore, connection: sqlite3.Connection) -> None:
+    """Make the tables of an empty file; refuse one that is no store."""
+    if _pragmas(connection) == (0, 0):
+        with store.transaction():  # another process may just have done it
+            (tables,) = connection.execute("SELECT count(*) FROM sqlite_schema").fetchone()
+            if tables == 0:
+                for statement in SCHEMA:
+                    connection.execute(statement)
+                connection.execute(f"PRAGMA application_id = {APPLICATION_ID}")
+                connection.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
+    application, version = _pragmas(connection)
+    if application != APPLICATION_ID:
+        raise SpecificationError(f"{store.path} must be a store of measurements, not another SQLite database")
+    if version != SCHEMA_VERSION:
+        raise SpecificationError(f"{store.path}: the store's schema must be version {SCHEMA_VERSION}, not {version}")
+
+
+def _pragmas(connection: sqlite3.Connection) -> tuple[int, int]:
+    (application,) = connection.execute("PRAGMA application_id").fetchone()
+    (version,) = connection.execute("PRAGMA user_version").fetchone()
+    return application, version
+
+
+def _polynomial(coefficients: str) -> Polynomial:
+    return Polynomial.from_numbers([[float.fromhex(a) for a in row] for row in json.loads(coefficients)])
+
+
+def as_measurements(stored: Sequence[StoredMeasurement], source: str) -> Measurements:
+    """Arrays for `fit`; `source` names them in messages."""
+    values = np.array([one.reading.values for one in stored], dtype=np.float64).reshape(-1, 3)
+    clearance, voltage, temperature = values.T
+    return Measurements(clearance.copy(), voltage.copy(), temperature.copy(), source)
+
+
+def data_sha256(stored: Sequence[StoredMeasurement], sensor: str) -> str:
+    """Hash over the hashes of measurements, in their order."""
+    return hashlib.sha256("\n".join(one.reading.sha256(sensor) for one in stored).encode()).hexdigest()

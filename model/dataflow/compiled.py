@@ -1,0 +1,99 @@
+"""Compiles a datapath's C model and calls it on arrays."""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import shutil
+import subprocess
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from sosmith.model.dataflow.c_model import c_header, c_source, state_bytes
+from sosmith.model.errors import ToolError
+
+if TYPE_CHECKING:
+    from sosmith.model.dataflow.datapath import Datapath
+
+
+class Block(Protocol):
+    """A compiled datapath."""
+
+    def __call__(
+        self, codes: npt.NDArray[np.int64], *, with_status: bool = False
+    ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.uint8]]:
+        """Compute output codes and, if asked for, status: both (samples, channels), else the status is empty."""
+        ...
+
+
+_FLAGS = ("-O2", "-std=gnu99", "-shared", "-fPIC")
+
+
+@functools.lru_cache(maxsize=64)
+def compile_block(datapath: Datapath) -> Block:
+    """Compile `datapath`; the function returned takes codes of the shape (samples, channels, inputs).
+
+    Raises
+    ------
+    ToolError
+        If no C compiler is found or it fails.
+    """
+    library = _load(datapath.name, c_header(datapath), c_source(datapath))
+    function = getattr(library, f"{datapath.name}_block")
+    function.restype = None
+    function.argtypes = [
+        ctypes.c_void_p,
+        ctypes.c_size_t,
+        ctypes.c_size_t,
+        ctypes.c_void_p,
+        ctypes.c_void_p,
+        ctypes.c_void_p,
+    ]
+    state_size = state_bytes(datapath)
+
+    def block(
+        codes: npt.NDArray[np.int64], *, with_status: bool = False
+    ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.uint8]]:
+        samples, channels, _ = codes.shape
+        source = np.ascontiguousarray(codes, dtype=np.int64)
+        result = np.empty((samples, channels), dtype=np.int64)
+        # 16 bytes of alignment for states of 128 bits; numpy allocates large arrays so.
+        states = np.zeros((channels, state_size // 8), dtype=np.int64)
+        status = np.empty((samples, channels) if with_status else (0, 0), dtype=np.uint8)
+        function(
+            states.ctypes.data,
+            samples,
+            channels,
+            source.ctypes.data,
+            result.ctypes.data,
+            status.ctypes.data if with_status else None,
+        )
+        return result, status
+
+    return block
+
+
+def _load(name: str, header: str, source: str) -> ctypes.CDLL:
+    compiler = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
+    if compiler is None:
+        raise ToolError("a C compiler is needed for the bit-true model, and none was found: apt-get install gcc")
+    with tempfile.TemporaryDirectory(prefix="sosmith-") as folder:
+        directory = Path(folder)
+        (directory / f"{name}.h").write_text(header, encoding="utf-8")
+        (directory / f"{name}.c").write_text(source, encoding="utf-8")
+        library = directory / f"{name}.so"
+        result = subprocess.run(
+            [compiler, *_FLAGS, "-o", str(library), f"{name}.c"],
+            cwd=directory,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        if result.returncode:
+            raise ToolError(f"{compiler} failed on the bit-true model: {result.stderr.strip()[-500:]}")
+        # The loader keeps the library mapped after its file is gone.
+        return ctypes.CDLL(str(library))

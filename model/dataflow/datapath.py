@@ -1,0 +1,171 @@
+"""The frozen datapath: a chain of stages between ports, and its bit-true computation.
+
+This object is the one source of truth. The software (`Datapath.compute`), the C model, the hardware
+(`sosmith.hdl.core`) and the manifest are made from the dataflow graphs of its stages and from
+nothing else.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from sosmith.model.dataflow.compiled import compile_block
+from sosmith.model.dataflow.graph import Graph
+from sosmith.model.port import Codes, Port
+
+
+class Stage(Protocol):
+    """A part of a datapath with a name and a dataflow graph."""
+
+    @property
+    def name(self) -> str:
+        """Name of the stage."""
+        ...
+
+    @property
+    def graph(self) -> Graph:
+        """What the stage computes."""
+        ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class Datapath:
+    """Stages in a chain, from the input ports' codes to the output port's code.
+
+    Inside, values are in output LSBs: 1.0 is one step of the output code.
+
+    Attributes
+    ----------
+    name : str
+        Name of the core.
+    inputs : tuple of Port
+        Input quantities, in the order of the first stage's inputs.
+    output : Port
+        Output quantity.
+    stages : tuple of Stage
+        At least one; the outputs of each are the inputs of the next.
+    calibrated : tuple of (int, int)
+        Lowest and highest code of each input that the calibration's measurements covered; by default, all codes.
+    wear : tuple of (int, int)
+        Lowest output codes whose wear is a warning and is critical: one pair for all channels, or one for each; none if
+        wear is not judged.
+    """
+
+    name: str
+    inputs: tuple[Port, ...]
+    output: Port
+    stages: tuple[Stage, ...]
+    calibrated: tuple[tuple[int, int], ...] = ()
+    wear: tuple[tuple[int, int], ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.calibrated:
+            object.__setattr__(self, "calibrated", tuple((port.lowest, port.highest) for port in self.inputs))
+        first, last = self.stages[0].graph, self.stages[-1].graph
+        ports = [(port.lowest, port.highest) for port in self.inputs]
+        expected = [(first.nodes[i].low, first.nodes[i].high) for i in first.inputs]
+        if ports != expected:
+            raise ValueError(f"input ports must have the ranges {expected}, not {ports}")
+        for before, after in zip(self.stages, self.stages[1:], strict=False):
+            _check_seam(before, after)
+        if len(last.outputs) != 1:
+            raise ValueError(f"the last stage must have one output, not {len(last.outputs)}")
+        node = last.nodes[last.outputs[0]]
+        if node.frac != 0 or node.low < self.output.lowest or node.high > self.output.highest:
+            raise ValueError(f"the last stage's output must fit the output port, not {node!r}")
+        for warning, critical in self.wear:
+            if not self.output.lowest < warning < critical <= self.output.highest:
+                raise ValueError(
+                    f"wear must be codes that rise within {self.output.lowest + 1}..{self.output.highest}, "
+                    f"not {warning}, {critical}"
+                )
+
+    def compute(self, codes: Codes) -> Codes:
+        """Compute the output codes for input codes, from reset, bit for bit as the hardware does.
+
+        Compiled from the stages' graphs; the first call of a datapath compiles for some tenths of a second.
+
+        Parameters
+        ----------
+        codes : integer array, shape (samples, inputs) or (samples, channels, inputs)
+            Input codes, each in its port's range.
+
+        Returns
+        -------
+        int64 array, shape (samples,) or (samples, channels)
+            Output codes.
+
+        Raises
+        ------
+        ValueError
+            If the shape is wrong or a code is outside its port's range.
+        ToolError
+            If no C compiler is at hand.
+        """
+        checked = self._checked(codes)
+        block = checked[:, np.newaxis, :] if checked.ndim == 2 else checked
+        result, _ = compile_block(self)(block)
+        return result[:, 0] if checked.ndim == 2 else result
+
+    def compute_status(self, codes: Codes) -> npt.NDArray[np.uint8]:
+        """Compute the status of each sample, from reset, bit for bit as the hardware does.
+
+        Parameters, errors and shape of the result are those of `compute`, and the channels have to be as many as those
+        whose wear is judged; the bits are those of `sosmith.model.dataflow.status.Flag`.
+        """
+        checked = self._checked(codes)
+        block = checked[:, np.newaxis, :] if checked.ndim == 2 else checked
+        if len(self.wear) not in {0, 1, block.shape[1]}:
+            raise ValueError(
+                f"codes must be of {len(self.wear)} channels, for each of which wear is judged, not {block.shape[1]}"
+            )
+        _, status = compile_block(self)(block, with_status=True)
+        return status[:, 0] if checked.ndim == 2 else status
+
+    def compute_exact(self, codes: Codes) -> list[int]:
+        """Compute one channel in exact integers, checking every node's range; slow.
+
+        Raises
+        ------
+        RangeError
+            If a value inside leaves the range that its node states.
+        """
+        states = [stage.graph.reset() for stage in self.stages]
+        results = []
+        for sample in self._checked(codes).tolist():
+            wires = sample
+            for stage, state in zip(self.stages, states, strict=True):
+                wires = stage.graph.step(wires, state)
+            results.append(wires[0])
+        return results
+
+    def _checked(self, codes: Codes) -> Codes:
+        array = np.asarray(codes)
+        if array.ndim not in {2, 3} or array.shape[-1] != len(self.inputs):
+            raise ValueError(
+                f"codes must have the shape (samples, {len(self.inputs)}) or "
+                f"(samples, channels, {len(self.inputs)}), not {array.shape}"
+            )
+        if not np.issubdtype(array.dtype, np.integer):
+            raise ValueError(f"codes must be integers, not {array.dtype}")
+        for index, port in enumerate(self.inputs):
+            column = array[..., index]
+            if column.size and (column.min() < port.lowest or column.max() > port.highest):
+                raise ValueError(
+                    f"codes of {port.name} must be in {port.lowest}..{port.highest}, not {column.min()}..{column.max()}"
+                )
+        return array.astype(np.int64, copy=False)
+
+
+def _check_seam(before: Stage, after: Stage) -> None:
+    sources = [before.graph.nodes[i] for i in before.graph.outputs]
+    sinks = [after.graph.nodes[i] for i in after.graph.inputs]
+    if len(sources) != len(sinks):
+        raise ValueError(f"{after.name} must have {len(sources)} inputs, not {len(sinks)}")
+    for source, sink in zip(sources, sinks, strict=True):
+        if source.frac != sink.frac or source.low < sink.low or source.high > sink.high:
+            raise ValueError(f"input {sink.name} of {after.name} must hold {source!r}, not {sink!r}")

@@ -1,0 +1,521 @@
+"""Folds a datapath into a program for one multiply-accumulate unit, the schedule of folded and serial hardware.
+
+A sum of products is computed column by column, the lowest first; when a column is complete its low digit is stored and
+the rest carried on by a shift. Dropping a column instead of storing it is the floor that the datapath asks for, so
+nothing is approximate here.
+
+Each value that has to exist is stored with just those fraction bits that bring a quantizer's cut between two
+digits: ``floor(v)`` is then the upper digits of v and what it drops the lower ones, at no cost.
+
+The program is made from the graphs of the datapath's stages and nothing else, and computes the same codes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from fractions import Fraction
+from typing import NamedTuple
+
+from sosmith.model.dataflow.datapath import Datapath
+from sosmith.model.dataflow.graph import Node, Op
+from sosmith.model.dataflow.program import HAZARD, Do, Instruction, Place, Program, digits_of
+from sosmith.model.dataflow.word_reuse import Extent, Life, packed
+
+
+class FoldingError(ValueError):
+    """The datapath has an operation that one multiply-accumulate unit cannot do."""
+
+
+def program(datapath: Datapath, digit_bits: int, *, like: Program | None = None) -> Program:
+    """Fold a datapath.
+
+    Parameters
+    ----------
+    datapath : Datapath
+        What is to be computed.
+    digit_bits : int
+        Bits of a digit, one less than the multiplier has.
+    like : Program or None
+        A program that this one is to take over from at any sample, in the same hardware and with its states: places
+        of the same name get at least as many digits.
+
+    Raises
+    ------
+    FoldingError
+        If the datapath has an operation that cannot be folded, or the program cannot take over from `like`.
+    """
+    kept = {} if like is None else {place.name: place.digits for place in like.places}
+    least = 0 if like is None else like.words
+    made = _Folding(_flattened(datapath), digit_bits, kept, datapath.calibrated).program(least)
+    if like is None:
+        return made
+    _check_can_take_over(made, like)
+    return replace(made, accumulator_bits=like.accumulator_bits)
+
+
+def _check_can_take_over(made: Program, like: Program) -> None:
+    """Check that states lie where they lay, that ports have as many digits, and that everything else has room."""
+    for what, new, old in (
+        ("digit_bits", made.digit_bits, like.digit_bits),
+        ("its states", _states(made), _states(like)),
+        ("digits and fraction bits of its inputs", _forms(made.inputs), _forms(like.inputs)),
+        ("digits and fraction bits of its output", _forms([made.output]), _forms([like.output])),
+    ):
+        if new != old:
+            raise FoldingError(f"to take over, {what} must be {old}, not {new}")
+    for what, new, old in (
+        ("words of memory", made.words, like.words),
+        ("bits of the accumulator", made.accumulator_bits, like.accumulator_bits),
+    ):
+        if new > old:
+            raise FoldingError(f"to take over, {what} must be at most {old}, not {new}")
+
+
+def _states(made: Program) -> list[tuple[str, int, int, int]]:
+    return [(place.name, place.address, place.digits, place.frac) for place in made.places if place.is_state]
+
+
+def _forms(places: Sequence[Place]) -> list[tuple[int, int]]:
+    return [(place.digits, place.frac) for place in places]
+
+
+class _Flat(NamedTuple):
+    """All stages' nodes in one list; `inputs` and `output` index it."""
+
+    nodes: list[Node]
+    inputs: list[int]
+    output: int
+
+
+def _flattened(datapath: Datapath) -> _Flat:
+    nodes: list[Node] = []
+    inputs: list[int] = []
+    passed: list[int] = []
+    for stage in datapath.stages:
+        graph = stage.graph
+        supply = iter(passed)
+        at: list[int] = []
+        start = len(nodes)
+        for node in graph.nodes:
+            if node.op is Op.INPUT and passed:
+                at.append(next(supply))
+                continue
+            at.append(len(nodes))
+            name = f"{stage.name}.{node.name}" if node.name else ""
+            nodes.append(Node(**{**vars(node), "name": name}))
+            if node.op is Op.INPUT:
+                inputs.append(len(nodes) - 1)
+        for index in range(start, len(nodes)):
+            node = nodes[index]
+            nodes[index] = Node(**{**vars(node), "operands": tuple(at[i] for i in node.operands)})
+        passed = [at[i] for i in graph.outputs]
+    (output,) = passed
+    return _Flat(nodes, inputs, output)
+
+
+class _Term(NamedTuple):
+    """Digits of a stored value: those from `first` on, `length` of them; `other` is a second factor or -1."""
+
+    place: int
+    first: int
+    length: int
+    other: int = -1
+
+
+_Sum = dict[_Term, Fraction]
+"""Multiples of stored digits, each read as a number with the fraction bits of its lowest digit."""
+
+
+class _Folding:
+    """Works out what to store, where, and in which order to compute it."""
+
+    def __init__(
+        self, flat: _Flat, digit_bits: int, kept: Mapping[str, int], calibrated: Sequence[tuple[int, int]]
+    ) -> None:
+        self._nodes, self._inputs, self._output = flat
+        self._calibrated = calibrated
+        self._bits = digit_bits
+        self._kept = kept
+        last = self._nodes[self._output]
+        if last.op is Op.CLAMP:  # done on the way out
+            self._nodes.remove(last)
+            self._output = last.operands[0]
+        self._stored = self._find_stored()
+        self._fracs = self._find_fracs()
+        while apart := self._cut_elsewhere():
+            self._stored |= apart
+            self._fracs = self._find_fracs()
+        self._sums: dict[int, tuple[_Sum, Fraction]] = {}
+        self._places: dict[int, Place] = {}
+        self._instructions: list[Instruction] = []
+        self._schedule: list[tuple[str, int, int]] = []
+        self._one = 0
+
+    def program(self, least_words: int) -> Program:
+        """Make the program, for a memory of at least so many words.
+
+        At first every value has words of its own, and the word of ones comes behind the states.
+        """
+        address = states = 0
+        for index in sorted(self._stored, key=lambda i: self._nodes[i].op is not Op.DELAY):
+            node = self._nodes[index]
+            if node.op is not Op.DELAY and address == states:
+                address += 1  # the word of ones
+            count = self._digits(
+                node.low << (self._fracs[index] - node.frac), node.high << (self._fracs[index] - node.frac)
+            )
+            state, name = node.op is Op.DELAY, node.name or f"value{index}"
+            count = max(count, self._kept.get(name, 0))
+            self._places[index] = Place(name, address, count, self._fracs[index], state)
+            address += count
+            states += count * state
+        self._one = states
+        self._emit_all()
+        accumulator_bits = self._accumulator_bits()
+        words = self._share_words(states, least_words)
+        return Program(
+            digit_bits=self._bits,
+            instructions=tuple(self._instructions),
+            places=tuple(self._places.values()),
+            inputs=tuple(self._places[i] for i in self._inputs),
+            output=self._places[self._output],
+            states=states,
+            words=words,
+            schedule=tuple(self._schedule),
+            accumulator_bits=accumulator_bits,
+        )
+
+    def _emit_all(self) -> None:
+        places = [self._places[index] for index in self._inputs]
+        for k, digit in enumerate(place.address + k for place in places for k in range(place.digits)):
+            self._emit(Do.TAKE, digit, k)
+        self._scheduled("input")
+        for index, ends in zip(self._inputs, self._calibrated, strict=True):
+            self._judge(index, *ends)
+        self._scheduled("range")
+        for index in self._in_order():
+            self._evaluate(self._places[index], *self._sum(index))
+            self._scheduled(self._places[index].name)
+        output = self._places[self._output]
+        for k in range(output.digits):
+            self._emit(Do.GIVE, output.address + k, k)
+        self._scheduled("output")
+
+    def _scheduled(self, name: str) -> None:
+        """Note that all instructions since the last note are about `name`."""
+        start = sum(self._schedule[-1][1:]) if self._schedule else 0
+        count = len(self._instructions) - start
+        if count:
+            self._schedule.append((name, start, count))
+
+    def _share_words(self, states: int, least: int) -> int:
+        """Give words to several values where their lives allow it; return how many there are then, a power of two."""
+        uses: dict[int, list[int]] = {}
+        for number, (do, address, _) in enumerate(self._instructions):
+            if do not in {Do.NOTHING, Do.DROP, Do.JUDGE}:
+                uses.setdefault(address, []).append(number)
+        values = []
+        for place in self._places.values():
+            if not place.is_state:
+                found = sorted(number for k in range(place.digits) for number in uses.get(place.address + k, ()))
+                values.append((Extent(place.address, place.digits), Life(found[0], found[-1])))
+        given, end = packed(values, states)
+        words = max(1 << end.bit_length(), least)
+        moved = {self._one: words - 1} | {
+            extent.address + k: address + k for extent, address in given.items() for k in range(extent.words)
+        }
+        self._instructions = [i._replace(address=moved.get(i.address, i.address)) for i in self._instructions]
+        self._places = {
+            index: replace(place, address=moved.get(place.address, place.address))
+            for index, place in self._places.items()
+        }
+        return words
+
+    # What is stored.
+
+    def _find_stored(self) -> set[int]:
+        """Nodes that need a place: ports, states, and whatever is cut, delayed or multiplied as a whole."""
+        stored = {*self._inputs, self._output}
+        for index, node in enumerate(self._nodes):
+            first = node.operands[0] if node.operands else -1
+            if node.op is Op.DELAY:
+                is_cut = self._nodes[first].op in {Op.FLOOR, Op.FRACTION}
+                stored |= {index} if is_cut else {index, first}
+            elif node.op is Op.FRACTION:
+                stored.add(first)
+            elif node.op is Op.MULTIPLY:
+                stored |= {i for i in node.operands if self._nodes[i].op is not Op.CONSTANT}
+            elif node.op is Op.SCALE and self._nodes[first].op in {Op.ADD, Op.SUBTRACT, Op.SHIFT, Op.BOUND}:
+                stored.add(first)
+            elif node.op in {Op.CLAMP, Op.TRUNCATE}:
+                raise FoldingError(f"the datapath must not {node.op.value} inside to be folded")
+        for index, node in enumerate(self._nodes):
+            if node.op is Op.FLOOR and node.operands[0] not in stored:
+                stored.add(index)
+        return {i for i in stored if self._nodes[i].op is not Op.CONSTANT}
+
+    def _cut_elsewhere(self) -> set[int]:
+        """FLOOR nodes whose cut does not lie between two digits of the stored value: they need a place of their own."""
+        return {
+            index
+            for index, node in enumerate(self._nodes)
+            if node.op is Op.FLOOR
+            and index not in self._stored
+            and (self._fracs[node.operands[0]] - node.frac) % self._bits
+        }
+
+    def _find_fracs(self) -> dict[int, int]:
+        """Fraction bits of each stored code: at least the node's, with its first cut between two digits."""
+        group = {index: index for index in self._stored}
+        for index in self._stored:
+            node = self._nodes[index]
+            if node.op is Op.DELAY:
+                group[index] = self._first_source(index)
+        cuts: dict[int, int] = {}
+        for node in self._nodes:
+            if node.op in {Op.FLOOR, Op.FRACTION}:
+                operand = node.operands[0]
+                if operand in self._stored:
+                    cuts.setdefault(group[operand], node.parameter if node.op is Op.FRACTION else node.frac)
+            elif node.op is Op.MULTIPLY and all(self._nodes[i].op is not Op.CONSTANT for i in node.operands):
+                cuts.setdefault(group[node.operands[1]], 0)
+        fracs = {}
+        for index in self._stored:
+            frac = max(self._nodes[i].frac for i in self._stored if group[i] == group[index])
+            cut = cuts.get(group[index], frac)
+            fracs[index] = cut + self._bits * -(-(frac - cut) // self._bits)
+        return fracs
+
+    def _first_source(self, index: int) -> int:
+        """Follow a chain of delays to what it begins with."""
+        while self._nodes[index].op is Op.DELAY:
+            index = self._nodes[index].operands[0]
+        return index
+
+    def _digits(self, low: int, high: int) -> int:
+        count = 1
+        while not (-(1 << (self._bits * count)) <= low and high < 1 << (self._bits * count)):
+            count += 1
+        return count
+
+    # What values are made of.
+
+    def _value(self, index: int) -> tuple[_Sum, Fraction]:
+        """Return a node as a sum of stored digits and a constant."""
+        if index in self._places:
+            return {_Term(index, 0, self._places[index].digits): Fraction(1)}, Fraction(0)
+        if index not in self._sums:
+            self._sums[index] = self._definition(index)
+        return self._sums[index]
+
+    def _definition(self, index: int) -> tuple[_Sum, Fraction]:
+        node = self._nodes[index]
+        if node.op is Op.CONSTANT:
+            return {}, node.parameter * Fraction(2) ** -node.frac
+        if node.op in {Op.ADD, Op.SUBTRACT}:
+            sign = 1 if node.op is Op.ADD else -1
+            (a, constant_a), (b, constant_b) = map(self._value, node.operands)
+            total = dict(a)
+            for term, weight in b.items():
+                total[term] = total.get(term, Fraction(0)) + sign * weight
+            return {term: weight for term, weight in total.items() if weight}, constant_a + sign * constant_b
+        if node.op in {Op.SHIFT, Op.SCALE}:
+            scales = node.op is Op.SCALE
+            factor = node.parameter * Fraction(2) ** -node.parameter_frac if scales else Fraction(2) ** node.parameter
+            total, constant = self._value(node.operands[0])
+            return {term: weight * factor for term, weight in total.items()}, constant * factor
+        if node.op is Op.BOUND:
+            return self._value(node.operands[0])
+        if node.op is Op.MULTIPLY:
+            return self._product(*node.operands)
+        if node.op in {Op.FLOOR, Op.FRACTION}:
+            return self._cut(node)
+        raise FoldingError(f"the datapath must not {node.op.value} inside to be folded")
+
+    def _product(self, a: int, b: int) -> tuple[_Sum, Fraction]:
+        for one, other in ((a, b), (b, a)):
+            if self._nodes[one].op is Op.CONSTANT:
+                _, factor = self._value(one)
+                total, constant = self._value(other)
+                return {term: weight * factor for term, weight in total.items()}, constant * factor
+        first, second = self._places[a], b
+        return {_Term(a, 0, first.digits, second): Fraction(1)}, Fraction(0)
+
+    def _cut(self, node: Node) -> tuple[_Sum, Fraction]:
+        """Return the upper or the lower digits of a stored value."""
+        root = node.operands[0]
+        if root not in self._places:
+            raise FoldingError(f"{node.name!r} must cut a stored value to be folded")
+        place = self._places[root]
+        kept = node.parameter if node.op is Op.FRACTION else node.frac
+        lower, rest = divmod(place.frac - kept, self._bits)
+        if rest:
+            raise FoldingError(f"{node.name!r} must cut its value where another quantizer does to be folded")
+        if node.op is Op.FRACTION:
+            return ({_Term(root, 0, lower): Fraction(1)} if lower else {}), Fraction(0)
+        if lower >= place.digits:
+            raise FoldingError(f"{node.name!r} must leave a digit to be folded")
+        return {_Term(root, lower, place.digits - lower): Fraction(1)}, Fraction(0)
+
+    # How they are computed.
+
+    def _judge(self, index: int, low: int, high: int) -> None:
+        """Subtract the ends of an input's calibrated range that are not those of its codes, and judge by the sign."""
+        node, place = self._nodes[index], self._places[index]
+        ends = [(low, 1)] * (low > node.low) + [(high, -1)] * (high < node.high)
+        for end, sign in ends:
+            for k, digit in enumerate(digits_of(end << (place.frac - node.frac), place.digits, self._bits)):
+                self._emit(Do.MULTIPLY, place.address + k, sign)
+                self._emit(Do.MULTIPLY, self._one, -sign * digit)
+                self._emit(*((Do.JUDGE,) if k == place.digits - 1 else (Do.DROP,)))
+
+    def _sum(self, index: int) -> tuple[_Sum, Fraction]:
+        """Return what a stored value is, in terms of others."""
+        node = self._nodes[index]
+        return self._value(node.operands[0]) if node.op in {Op.FLOOR, Op.DELAY} else self._definition(index)
+
+    def _in_order(self) -> Iterator[int]:
+        """Yield values in the order of the datapath, and states as soon as nothing needs what they held before.
+
+        The sooner, the shorter the lives of the values that states come from.
+        """
+        read = {
+            i: {place for term in self._sum(i)[0] for place in (term.place, term.other)}
+            for i in self._stored
+            if self._nodes[i].op is not Op.INPUT
+        }
+        values = [i for i in sorted(read) if self._nodes[i].op is not Op.DELAY]
+        delays = [i for i in sorted(read) if self._nodes[i].op is Op.DELAY]
+        while values or delays:
+            waiting = set(values)
+            free = [
+                d
+                for d in delays
+                if not read[d] & waiting and not any(d in read[i] for i in (*values, *delays) if i != d)
+            ]
+            if free:
+                delays.remove(free[0])
+                yield free[0]
+            else:
+                yield values.pop(0)
+
+    def _evaluate(self, place: Place, total: _Sum, constant: Fraction) -> None:
+        """Emit the columns of a sum, the lowest first, and store those from the place's own on."""
+        terms: list[tuple[_Term, int, Fraction]] = []
+        for term, weight in total.items():
+            stored = self._places[term.place]
+            frac = stored.frac - self._bits * term.first
+            if term.other >= 0:
+                frac += self._places[term.other].frac
+            terms.append((term, frac, weight))
+        exact = max([frac + _fraction_bits(weight) for _, frac, weight in terms] + [_fraction_bits(constant)])
+        below = max(0, -(-(exact - place.frac) // self._bits))
+        unit = Fraction(2) ** (place.frac + self._bits * below)
+        columns: list[list[Instruction]] = [[] for _ in range(below + place.digits)]
+        for term, frac, weight in terms:
+            factor = weight * unit / Fraction(2) ** frac
+            for instructions, column in self._products(term, int(factor)):
+                self._place(instructions, column, columns)
+        for column, digit in enumerate(self._constant_digits(int(constant * unit))):
+            self._place([Instruction(Do.MULTIPLY, self._one, digit)], column, columns)
+        for column, instructions in enumerate(columns):
+            for instruction in instructions:
+                self._emit(*instruction)
+            if column < below:
+                self._emit(Do.DROP)
+            elif column < len(columns) - 1:
+                self._emit(Do.STORE, place.address + column - below)
+            else:
+                self._emit(Do.FINISH, place.address + column - below)
+
+    def _place(self, instructions: list[Instruction], column: int, columns: list[list[Instruction]]) -> None:
+        """Put instructions into their column.
+
+        FINISH keeps ``digit_bits + 1`` bits, so that of a product one column above the top only the lowest bit
+        counts, and nothing of those farther up; the value is known to fit.
+        """
+        if column < len(columns):
+            columns[column] += instructions
+        elif column == len(columns):
+            (instruction,) = instructions
+            if instruction.do is not Do.MULTIPLY:
+                raise FoldingError("a product of two values must end below its sum's top digit to be folded")
+            if instruction.constant % 2:
+                columns[-1].append(instruction._replace(constant=-1 << self._bits))
+
+    def _products(self, term: _Term, factor: int) -> Iterator[tuple[list[Instruction], int]]:
+        start = self._places[term.place].address + term.first
+        if term.other < 0:
+            for j, digit in enumerate(self._constant_digits(factor)):
+                if not digit:
+                    continue
+                for i in range(term.length):
+                    yield [Instruction(Do.MULTIPLY, start + i, digit)], i + j
+            return
+        shift = factor.bit_length() - 1
+        if factor != 1 << shift or shift % self._bits:
+            raise FoldingError("a product of two values must fall on a digit to be folded")
+        other = self._places[term.other]
+        for i in range(term.length):
+            for j in range(other.digits):
+                pair = [Instruction(Do.OPERAND, start + i), Instruction(Do.PRODUCT, other.address + j)]
+                yield pair, i + j + shift // self._bits
+
+    def _constant_digits(self, value: int) -> list[int]:
+        """Digits of a constant, balanced about zero, unless one digit does."""
+        base, half = 1 << self._bits, 1 << (self._bits - 1)
+        digits = []
+        while value:
+            if -base <= value < base:
+                digits.append(value)
+                break
+            digit = (value + half) % base - half
+            digits.append(digit)
+            value = (value - digit) >> self._bits
+        return digits
+
+    def _emit(self, do: Do, address: int = 0, constant: int = 0) -> None:
+        """Append an instruction, and before it what keeps it far enough from the one that stores what it reads."""
+        if do in {Do.MULTIPLY, Do.OPERAND, Do.PRODUCT, Do.GIVE}:
+            for distance, earlier in enumerate(reversed(self._instructions[-HAZARD + 1 :]), start=1):
+                if earlier.do in {Do.TAKE, Do.STORE, Do.FINISH} and earlier.address == address:
+                    self._instructions += [Instruction(Do.NOTHING)] * (HAZARD - distance)
+                    break
+        self._instructions.append(Instruction(do, address, constant))
+
+    def _accumulator_bits(self) -> int:
+        """Width by interval arithmetic over the program, every digit taking any value; no less than a word has."""
+        base = 1 << self._bits
+        tops = {p.address + p.digits - 1: self._top_range(i, p) for i, p in self._places.items()}
+        tops[self._one] = (1, 1)
+        low = high = least = most = 0
+        operand = (0, 0)
+        for do, address, constant in self._instructions:
+            word = tops.get(address, (0, base - 1))
+            if do is Do.OPERAND:
+                operand = word
+            elif do in {Do.MULTIPLY, Do.PRODUCT}:
+                factors = (constant, constant) if do is Do.MULTIPLY else operand
+                ends = [a * b for a in word for b in factors]
+                low, high = low + min(ends), high + max(ends)
+            elif do in {Do.STORE, Do.DROP}:
+                low, high = low >> self._bits, high >> self._bits
+            elif do in {Do.FINISH, Do.JUDGE}:
+                low = high = 0
+            least, most = min(least, low), max(most, high)
+        return max((-least - 1).bit_length(), most.bit_length(), self._bits) + 1
+
+    def _top_range(self, index: int, place: Place) -> tuple[int, int]:
+        node = self._nodes[index]
+        shift = place.frac - node.frac - self._bits * (place.digits - 1)
+        low, high = (_shifted(end, shift) for end in (node.low, node.high))
+        return low, high
+
+
+def _shifted(code: int, shift: int) -> int:
+    return code << shift if shift >= 0 else code >> -shift
+
+
+def _fraction_bits(value: Fraction) -> int:
+    return value.denominator.bit_length() - 1

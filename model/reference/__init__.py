@@ -1,0 +1,1 @@
+"""The double-precision golden chain, and the measures that hold the hardware against it."""

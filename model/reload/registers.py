@@ -1,0 +1,137 @@
+"""The registers of a reloadable core: one description for hardware, host, C header and documents.
+
+All are 32 bits wide; a register's address is four times its place in `REGISTERS`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+MAGIC = int.from_bytes(b"SOSM", "little")
+"""What ``ID`` reads: the letters SOSM, the first one in the lowest byte."""
+
+INTERFACE = 1
+"""Version of this description, as ``LAYOUT`` reads."""
+
+MAX_WORDS = (1 << 16) - 1
+"""Words of a bank at most: what ``LAYOUT`` can tell."""
+
+
+class Outcome(IntEnum):
+    """How the last load ended."""
+
+    NONE = 0  # no load has ended since reset
+    ACCEPTED = 1  # its CRC was right; active as soon as nothing is pending
+    WRONG_CRC = 2  # the CRC of what arrived is not the one that was written
+    BROKEN_OFF = 3  # a write was refused before the load was complete
+
+
+@dataclass(frozen=True)
+class Field:
+    """Bits of a register: the lowest one, how many, what they mean, and their values where these have names."""
+
+    name: str
+    low: int
+    bits: int
+    text: str
+    values: type[IntEnum] | None = None
+
+    @property
+    def mask(self) -> int:
+        """The bits, where they lie in the register."""
+        return ((1 << self.bits) - 1) << self.low
+
+    def of(self, word: int) -> int:
+        """Take the field out of a register's `word`."""
+        return (word & self.mask) >> self.low
+
+
+@dataclass(frozen=True)
+class Register:
+    """A register: whether it can be read and written, what that does, and its fields; without any it is one number."""
+
+    name: str
+    reads: bool
+    writes: bool
+    text: str
+    fields: tuple[Field, ...] = ()
+
+    def __post_init__(self) -> None:
+        end = 0
+        for field in self.fields:
+            if not end <= field.low < field.low + field.bits <= 32:
+                raise ValueError(f"field {field.name} of {self.name} must lie in bits {end} to 31, in ascending order")
+            end = field.low + field.bits
+
+    def field(self, name: str) -> Field:
+        """Find a field by its name."""
+        return next(field for field in self.fields if field.name == name)
+
+    @property
+    def index(self) -> int:
+        """Place in `REGISTERS`."""
+        return REGISTERS.index(self)
+
+    @property
+    def address(self) -> int:
+        """Address in bytes."""
+        return 4 * self.index
+
+
+ID = Register("ID", True, False, 'Always 0x4D534F53, in memory the letters "SOSM".')
+LAYOUT = Register(
+    "LAYOUT",
+    True,
+    False,
+    "How to talk to this core.",
+    (
+        Field("INTERFACE", 0, 16, "Version of this register map."),
+        Field("WORDS", 16, 16, "Words of a bank: a load takes exactly so many."),
+    ),
+)
+DESIGN = Register(
+    "DESIGN",
+    True,
+    False,
+    "Fingerprint of the core's structure and formats: a set made for another fingerprint does not fit.",
+)
+STATUS = Register(
+    "STATUS",
+    True,
+    False,
+    "What is going on.",
+    (
+        Field("LOADING", 0, 1, "A load has begun and is not complete."),
+        Field("PENDING", 1, 1, "A load was accepted and becomes active at the next gap between samples."),
+        Field("BANK", 2, 1, "Bank that is active."),
+        Field("OUTCOME", 4, 2, "How the last load ended.", Outcome),
+    ),
+)
+VERSION = Register(
+    "VERSION",
+    True,
+    True,
+    "Reads the version of the active set, 0 before the first one. A write begins a load: it gives the new set's "
+    "version, any number of the host's choice, and makes it the first word of the CRC. Refused while a swap is pending "
+    "or a sample still uses the other bank.",
+)
+DATA = Register(
+    "DATA",
+    False,
+    True,
+    "A write gives the next word of the bank. Refused outside a load and beyond the bank's end.",
+)
+CRC = Register(
+    "CRC",
+    True,
+    True,
+    "Reads the CRC-32 (IEEE 802.3, as zlib.crc32) of the version and the words so far, each as four bytes, the lowest "
+    "first. A write tells what it should be, and ends the load: if it is right, the set becomes active between two "
+    "samples, else the write is refused. Refused too while words are missing.",
+)
+REGISTERS = (ID, LAYOUT, DESIGN, STATUS, VERSION, DATA, CRC)
+"""All registers, by ascending address."""
+
+ADDRESS_BITS = (4 * len(REGISTERS) - 1).bit_length()
+"""Address lines of the slave."""

@@ -1,0 +1,1 @@
+"""Scenarios: input traces made from a description, with their truth."""

@@ -1,0 +1,52 @@
+"""The vehicle's motion as a scenario file takes it: change of the clearance at one sensor, at the paper's speed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from sosmith.model.port import Values
+from sosmith.model.vehicle.parameters import built_in
+from sosmith.model.vehicle.run import run
+from sosmith.model.vehicle.track import curved_track, tangent_track
+
+SPEED = 20.0
+"""Of the vehicle in m/s, as in section 5.1 of the paper."""
+
+IRREGULARITY = "low"
+"""Level of the random irregularities."""
+
+WHEELSET = 0
+"""Wheelset whose right flange the sensor faces: the leading one."""
+
+MIN_RATE = 1.0
+"""Lowest sample rate in Hz that the model takes."""
+
+
+def vehicle_clearance(track: str, time: Values, seed: int) -> Values:
+    """Change of the clearance in mm on the track "paper", its curve, or "tangent", shape as `time`.
+
+    Where the time goes on behind the end of the track, so does the track, straight.
+
+    Parameters
+    ----------
+    track : {"paper", "tangent"}
+    time : ndarray, shape (n,)
+        In s, equally spaced from 0.
+    seed : int
+        Of the random irregularities, 0 or more.
+
+    Raises
+    ------
+    SpecificationError
+        As `sosmith.model.vehicle.run.run`.
+    """
+    parameters = built_in()
+    rate = (len(time) - 1) / time[-1] if len(time) > 1 else MIN_RATE
+    way = SPEED * (len(time) + 1) / rate
+    table = parameters.track
+    table = replace(table, run_out=max(table.run_out, way - table.tangent - 2 * table.spiral - table.curve))
+    made = (curved_track if track == "paper" else tangent_track)(table)
+    motion = run(parameters, made, speed=SPEED, sample_rate=rate, irregularity=IRREGULARITY, seed=seed)
+    return np.asarray(motion.clearance_mm[: len(time), WHEELSET])

@@ -1,0 +1,240 @@
+"""Direct form I sections in integers, with error feedback at the one quantizer.
+
+Sign convention, here and everywhere in this package, scipy's: a section is
+``H(z) = (b0 + b1 z^-1 + b2 z^-2) / (1 + a1 z^-1 + a2 z^-2)``.
+
+The recursion is split into a multiplier-free integer part and products whose constants are small::
+
+    v(n) = - m1 y(n-1) - m2 y(n-2) + sum_i c_i 2^-s_i (taps_i . x + taps_i . y)
+             - k1 e(n-1) - k2 e(n-2) + h (1 + k1 + k2)
+    y(n) = floor(v(n)),  e(n) = v(n) - y(n)
+
+with h half an LSB of y. The constant makes the quantizer round on average: it centres the error, and
+it vanishes where the error feedback has a zero at z = 1, so that there dropping bits costs nothing.
+Where (m1, m2) = (k1, k2), the state y + e is v itself, one register and one addition.
+
+For a low-pass section with unity gain at zero frequency, two products do::
+
+    v(n) = 2 v(n-1) - v(n-2) - A1 (y(n-1) - y(n-2)) + A2 ((x(n) + 2 x(n-1) + x(n-2)) / 4 - y(n-2))
+    A1 = 2 + a1,  A2 = 1 + a1 + a2
+
+The tap sum of a product may be quantized too, with first-order error feedback: it then fits the operand of a
+hardware multiplier, and because c_i is small and the error differenced, next to nothing of it reaches the output.
+
+A1 and A2 keep their relative precision in few bits however low the cutoff, and the gain at zero
+frequency is exactly one whatever they are rounded to.
+
+The quantization error reaches the section's output through ``-(1 + k1 z^-1 + k2 z^-2) / A(z)``:
+(k1, k2) = (0, 0) is the plain direct form, (-1, 0) and (-2, 1) are error feedback of first and
+second order for poles near z = 1 (Laakso and Hartimo 1992; residue feedback after Williamson).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+
+from sosmith.model.dataflow.graph import Graph, GraphBuilder, Wire
+
+
+@dataclass(frozen=True)
+class Product:
+    """One multiplication: ``coefficient * 2**-frac * 2**-shift * (sum x[k] x(n-k) + sum y[k-1] y(n-k))``.
+
+    Attributes
+    ----------
+    name : str
+        Name of the coefficient.
+    coefficient : int
+        Integer constant, not zero.
+    frac : int
+        Fraction bits of the coefficient.
+    x : tuple of int
+        Taps on x(n), x(n-1), x(n-2); each 0 or plus or minus a power of two.
+    y : tuple of int
+        Taps on y(n-1), y(n-2), likewise.
+    shift : int
+        Right shift of the tap sum, exact.
+    kept : int or None
+        Fraction bits kept of the tap sum, what is dropped being added at the next sample; None keeps all.
+    range : tuple of int or None
+        Smallest and largest code of the tap sum before bits are dropped, known from peak gains.
+    """
+
+    name: str
+    coefficient: int
+    frac: int
+    x: tuple[int, int, int]
+    y: tuple[int, int]
+    shift: int = 0
+    kept: int | None = None
+    range: tuple[int, int] | None = None
+
+    def __post_init__(self) -> None:
+        if self.coefficient == 0:
+            raise ValueError(f"coefficient {self.name} must not be zero")
+        if not (any(self.x) or any(self.y)):
+            raise ValueError(f"taps of {self.name} must not all be zero")
+
+    @property
+    def value(self) -> Fraction:
+        """Exact value of the coefficient, without the shift."""
+        return self.coefficient * Fraction(2) ** -self.frac
+
+    @property
+    def operand(self) -> str:
+        """Name of the tap sum."""
+        return f"taps_{self.name}"
+
+    @property
+    def is_sum(self) -> bool:
+        """Whether there is more than one tap."""
+        return sum(map(bool, (*self.x, *self.y))) > 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class DirectForm1:
+    """A first- or second-order section in direct form I with error feedback; a stage of a datapath.
+
+    Attributes
+    ----------
+    name : str
+        Name of the section.
+    products : tuple of Product
+        The multiplications.
+    integer_part : tuple of int
+        (m1, m2), the multiplier-free part of (a1, a2).
+    feedback : tuple of int
+        (k1, k2), the error feedback.
+    x_frac, x_low, x_high : int
+        Fraction bits and range of the input's code.
+    y_frac : int
+        Fraction bits of the output.
+    v_low, v_high : int
+        Range of the code of v, known from peak gains; v has `total_frac` fraction bits.
+    """
+
+    name: str
+    products: tuple[Product, ...]
+    integer_part: tuple[int, int]
+    feedback: tuple[int, int]
+    x_frac: int
+    x_low: int
+    x_high: int
+    y_frac: int
+    v_low: int
+    v_high: int
+
+    def __post_init__(self) -> None:
+        if not self.products:
+            raise ValueError("products must not be empty")
+        if not self.is_stable:
+            a1, a2 = self.denominator
+            raise ValueError(f"poles must lie inside the unit circle, not at a1 = {float(a1)}, a2 = {float(a2)}")
+
+    @cached_property
+    def numerator(self) -> tuple[Fraction, Fraction, Fraction]:
+        """Exact (b0, b1, b2) of the integer coefficients."""
+        b = [Fraction(0)] * 3
+        for product in self.products:
+            for k in range(3):
+                b[k] += product.value * product.x[k] / 2**product.shift
+        return b[0], b[1], b[2]
+
+    @cached_property
+    def denominator(self) -> tuple[Fraction, Fraction]:
+        """Exact (a1, a2) of the integer coefficients."""
+        a = [Fraction(self.integer_part[0]), Fraction(self.integer_part[1])]
+        for product in self.products:
+            for k in range(2):
+                a[k] -= product.value * product.y[k] / 2**product.shift
+        return a[0], a[1]
+
+    @property
+    def is_stable(self) -> bool:
+        """Whether both poles lie inside the unit circle, decided in rationals."""
+        a1, a2 = self.denominator
+        return abs(a2) < 1 and abs(a1) < 1 + a2
+
+    @cached_property
+    def graph(self) -> Graph:
+        """The section as a dataflow graph with the input ``x`` and the output ``y``."""
+        g = GraphBuilder()
+        x = g.input("x", self.x_frac, self.x_low, self.x_high)
+        taps_x = _delay_line(g, x, "x", reach=max(_reach(p.x) for p in self.products))
+        frac = self.total_frac
+        v1 = g.delay("v1", frac, self.v_low, self.v_high)
+        past = [v1, g.previous(v1, "v2")] if self._order > 1 else [v1]
+        taps_y = [g.floor(v, self.y_frac, f"y{i}") for i, v in enumerate(past, start=1)]
+        # Products that need y(n-1) are known last and are added last.
+        products: list[tuple[bool, tuple[int, Wire]]] = []
+        for product in self.products:
+            taps = [*zip(product.x, taps_x, strict=False), *zip(product.y, taps_y, strict=False)]
+            operand = _operand(g, product, g.shift(g.combine(taps), -product.shift))
+            made = g.scale(operand, product.coefficient, product.frac, f"product_{product.name}")
+            products.append((product.y[0] != 0, (1, made)))
+        terms = [term for is_newest, term in products if not is_newest]
+        centre = 1 + sum(self.feedback)
+        if frac > self.y_frac and centre:
+            terms.append((1, g.constant(centre, self.y_frac + 1, "centre")))
+        for v, y, m, k in zip(past, taps_y, self.integer_part, self.feedback, strict=False):
+            if m == k:
+                terms.append((-m, v))
+            else:
+                terms += [(-m, y), (-k, g.fraction(v, self.y_frac))]
+        terms += [term for is_newest, term in products if is_newest]
+        v = g.bound(g.floor(g.combine(terms), frac), self.v_low, self.v_high, "v")
+        g.connect(v1, v)
+        return g.build([g.floor(v, self.y_frac, "y")])
+
+    @property
+    def coefficients(self) -> dict[str, tuple[int, int]]:
+        """Integer and fraction bits of every coefficient, by name."""
+        return {p.name: (p.coefficient, p.frac) for p in self.products}
+
+    @property
+    def optional_quantizers(self) -> tuple[str, ...]:
+        """Names of the nodes of which bits may be dropped without need."""
+        return tuple(p.operand for p in self.products if p.is_sum)
+
+    @property
+    def _order(self) -> int:
+        second = self.integer_part[1] or self.feedback[1] or any(p.y[1] for p in self.products)
+        return 2 if second else 1
+
+    @property
+    def total_frac(self) -> int:
+        """Fraction bits that hold the exact total of all products."""
+        fracs = [self.y_frac]
+        for p in self.products:
+            inputs = ([self.x_frac] if any(p.x) else []) + ([self.y_frac] if any(p.y) else [])
+            exact = max(inputs) + p.shift
+            fracs.append((exact if p.kept is None else min(exact, p.kept)) + p.frac)
+        return max(fracs)
+
+
+def _operand(g: GraphBuilder, product: Product, taps: Wire) -> Wire:
+    """State the range of a tap sum and drop those of its bits that are not kept."""
+    frac = g[taps].frac
+    kept = frac if product.kept is None else min(frac, product.kept)
+    if kept < frac:
+        error = g.delay(f"error_{product.name}", frac, 0, (1 << (frac - kept)) - 1)
+        taps = g.add(taps, error)
+    if product.range is not None:
+        taps = g.bound(taps, *product.range)
+    taps = g.named(taps, product.operand)
+    if kept < frac:
+        g.connect(error, g.fraction(taps, kept))
+    return g.floor(taps, kept)
+
+
+def _reach(taps: tuple[int, int, int]) -> int:
+    return max((k for k in range(3) if taps[k]), default=0)
+
+
+def _delay_line(g: GraphBuilder, source: Wire, name: str, *, reach: int) -> list[Wire]:
+    line = [source]
+    for k in range(1, reach + 1):
+        line.append(g.previous(line[-1], f"{name}{k}"))
+    return line

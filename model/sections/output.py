@@ -1,0 +1,44 @@
+"""The last stage: from output LSBs with guard bits to the output code, limited to its range."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from sosmith.model.dataflow.graph import Graph, GraphBuilder
+
+
+@dataclass(frozen=True, kw_only=True)
+class OutputStage:
+    """Subtract the code of the range's lower end, round to whole output LSBs, saturate.
+
+    Attributes
+    ----------
+    offset, offset_frac : int
+        What is added before rounding, in units of ``2**-offset_frac`` output LSBs.
+    x_frac, x_low, x_high : int
+        Fraction bits and range of the input's code, in output LSBs.
+    low, high : int
+        Range of the output code; the only saturation in a datapath.
+    """
+
+    offset: int
+    offset_frac: int
+    x_frac: int
+    x_low: int
+    x_high: int
+    low: int
+    high: int
+    name: str = "output_stage"
+
+    @cached_property
+    def graph(self) -> Graph:
+        """The stage as a dataflow graph with the input ``x`` and the output ``code``."""
+        g = GraphBuilder()
+        x = g.input("x", self.x_frac, self.x_low, self.x_high)
+        if self.offset:
+            x = g.add(x, g.constant(self.offset, self.offset_frac, "offset"))
+        rounded = g.round(x, 0, "rounded")
+        if self.low <= g[rounded].low and g[rounded].high <= self.high:
+            return g.build([rounded])
+        return g.build([g.clamp(rounded, self.low, self.high, "code")])

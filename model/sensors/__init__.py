@@ -1,0 +1,1 @@
+"""Emulated sensors: coil, thermocouple, what digitizes them, and their faults."""

@@ -1,0 +1,95 @@
+"""The instrument's sensors as one object: inductive sensor, thermometer, and what digitizes them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from sosmith.model.port import Codes, Port, Values
+from sosmith.model.random_streams import Streams
+from sosmith.model.sensors.digitizer import CodeFault, Digitizer, with_faults
+from sosmith.model.sensors.inductive_sensor import VOLTAGE_NOISE, InductiveSensor, InductiveState, sensor_voltage
+from sosmith.model.sensors.thermometer import TEMPERATURE_NOISE, IdealThermometer, Thermometer
+
+__all__ = ["TEMPERATURE_NOISE", "VOLTAGE_NOISE", "SensorFaults", "Sensors", "sensor_voltage"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SensorFaults:
+    """Faults during a measurement.
+
+    Attributes
+    ----------
+    voltage, temperature : tuple of CodeFault
+        Faults of the codes of each channel.
+    open_thermocouple : tuple of slice
+        Samples during which the thermocouple is disconnected.
+    """
+
+    voltage: tuple[CodeFault, ...] = ()
+    temperature: tuple[CodeFault, ...] = ()
+    open_thermocouple: tuple[slice, ...] = ()
+
+    def marks(self, samples: int) -> np.typing.NDArray[np.bool_]:
+        """Mark the samples, shape (samples,), at which any fault is on."""
+        index = np.arange(samples)
+        spans = [(fault.start, fault.stop) for fault in (*self.voltage, *self.temperature)]
+        spans += [(span.start, span.stop) for span in self.open_thermocouple]
+        marks = np.zeros(samples, dtype=np.bool_)
+        for start, stop in spans:
+            marks |= (index >= start) & (index < stop)
+        return marks
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sensors:
+    """What turns clearance and temperature into the codes of a core.
+
+    Attributes
+    ----------
+    inductive : InductiveSensor
+    thermometer : Thermometer
+    voltage_digitizer : Digitizer
+        Errors of the converter whose codes the voltage port takes.
+    """
+
+    inductive: InductiveSensor = field(default_factory=InductiveSensor)
+    thermometer: Thermometer = field(default_factory=IdealThermometer)
+    voltage_digitizer: Digitizer = field(default_factory=Digitizer)
+
+    def codes(
+        self,
+        clearance: Values,
+        temperature: Values,
+        time: Values,
+        ports: Sequence[Port],
+        chance: Streams,
+        *,
+        state: InductiveState | None = None,
+        faults: SensorFaults | None = None,
+    ) -> Codes:
+        """Codes of the ports, shape (n, n_ports).
+
+        Parameters
+        ----------
+        clearance, temperature, time : ndarray, shape (n,)
+            Clearance in mm with all motion, temperature in degC, time in s.
+        ports : sequence of Port
+            Voltage in V and, if there are two, temperature in degC.
+        chance : Streams
+            Source of noise; without faults the inductive sensor draws first.
+        state : InductiveState, optional
+            What the days have made of the inductive sensor; by default it is new.
+        faults : SensorFaults, optional
+        """
+        faults = faults or SensorFaults()
+        voltage = self.inductive.voltage(clearance, temperature, time, state or InductiveState(), chance)
+        codes = self.voltage_digitizer.codes(ports[0], voltage)
+        columns = [with_faults(codes, ports[0], faults.voltage, chance)]
+        if len(ports) > 1:
+            columns.append(
+                self.thermometer.codes(temperature, ports[1], chance, faults.temperature, faults.open_thermocouple)
+            )
+        return np.stack(columns, axis=1)

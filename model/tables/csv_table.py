@@ -1,0 +1,207 @@
+"""Strict reading of CSV files that hold numbers; every refusal names the file and the line."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import re
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from sosmith.model.errors import SpecificationError
+from sosmith.model.port import Values
+
+# float() would also take "nan", "1_000" and digits of other scripts.
+NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+
+LARGEST = 1e100
+"""Largest magnitude of a number: sums of squares of such numbers are still doubles, and none has a physical meaning."""
+
+MAX_SHOWN = 60
+"""Characters of a wrong cell that a message shows."""
+
+
+@dataclass(frozen=True, eq=False)
+class CsvTable:
+    """Named columns of finite numbers.
+
+    Attributes
+    ----------
+    path : Path
+        File the table was read from.
+    header : tuple of str
+        Names of the columns, all different.
+    values : ndarray, shape (n_rows, n_columns)
+        Cells; at least one row.
+    lines : tuple of int
+        Line of the file, counted from 1, on which each row ends.
+    """
+
+    path: Path
+    header: tuple[str, ...]
+    values: Values
+    lines: tuple[int, ...]
+
+    def __contains__(self, column: str) -> bool:
+        """Whether the table has a column of that name."""
+        return column in self.header
+
+    def column(self, name: str) -> Values:
+        """Cells of the column `name`, shape (n_rows,)."""
+        return np.asarray(self.values[:, self.header.index(name)])
+
+    def take(self, rows: npt.NDArray[np.intp]) -> CsvTable:
+        """Return the table of the rows of these indices, in their order."""
+        return CsvTable(self.path, self.header, self.values[rows], tuple(self.lines[row] for row in rows))
+
+    def refuse(self, row: int, what: str) -> SpecificationError:
+        """Error about the row of index `row`; `what` is a sentence from its subject on."""
+        return SpecificationError(f"{self.path}, line {self.lines[row]}: {what}")
+
+
+Reader = Callable[[str], float]
+"""Makes a number of a cell; raises ValueError with what the cell must be."""
+
+
+def read_csv_table(
+    path: Path, known: Sequence[str], required: Sequence[str] = (), readers: Mapping[str, Reader] | None = None
+) -> CsvTable:
+    """Read a CSV file of numbers with one header line.
+
+    Blank lines are skipped, spaces around a cell and a byte order mark do not matter.
+
+    Parameters
+    ----------
+    path : Path
+        File to read, UTF-8.
+    known : sequence of str
+        Names that a column may have.
+    required : sequence of str
+        Names that must be there.
+    readers : mapping of str to Reader, optional
+        How to read the cells of a column that holds something else than plain numbers.
+
+    Raises
+    ------
+    SpecificationError
+        If the file cannot be read or is no UTF-8 text; if it is empty or has a header only; if a
+        column is unknown, missing or there twice; if a row has too few or too many cells; if a cell
+        is no finite number, or one beyond `LARGEST`. One sentence with the file and, where there is one, the line.
+    """
+    reader = csv.reader(io.StringIO(_read_text(path), newline=""), strict=True)
+    rows: list[list[float]] = []
+    lines: list[int] = []
+    header: tuple[str, ...] = ()
+    try:
+        for cells in reader:
+            where = f"{path}, line {reader.line_num}"
+            if not any(cell.strip() for cell in cells) and len(cells) <= 1:
+                continue
+            if not header:
+                header = tuple(cell.strip() for cell in cells)
+                _check_header(where, header, known, required)
+                continue
+            if len(cells) != len(header):
+                raise SpecificationError(f"{where}: row must have {len(header)} cells, not {len(cells)}")
+            rows.append([_number(where, name, cell, readers or {}) for name, cell in zip(header, cells, strict=True)])
+            lines.append(reader.line_num)
+    except csv.Error as error:
+        raise SpecificationError(
+            f"{path}, line {reader.line_num}: row must be valid CSV, not broken ({error})"
+        ) from None
+    if not header:
+        raise SpecificationError(f"{path} must hold a header line and rows of numbers, not nothing")
+    if not rows:
+        raise SpecificationError(f"{path} must hold rows of numbers below its header, not the header only")
+    return CsvTable(path, header, np.array(rows, dtype=np.float64), tuple(lines))
+
+
+def csv_header(path: Path) -> list[str]:
+    """Names in the first line that is not blank; none if it cannot be read, as `read_csv_table` then says."""
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            for cells in csv.reader(file, strict=True):
+                if any(cell.strip() for cell in cells):
+                    check_separator(str(path), cells)
+                    return [cell.strip() for cell in cells]
+    except (OSError, UnicodeDecodeError, csv.Error, SpecificationError):
+        pass
+    return []
+
+
+def check_separator(where: str, header: Sequence[str]) -> None:
+    """Refuse a header that holds a single cell because other characters than commas separate the names.
+
+    Raises
+    ------
+    SpecificationError
+        If it does; `where` begins the sentence.
+    """
+    for separator, name in ((";", "semicolons"), ("\t", "tabs")):
+        if len(header) == 1 and separator in header[0]:
+            raise SpecificationError(
+                f"{where}: cells must be separated by commas, with points in decimal numbers, not by {name}"
+            )
+
+
+def check_rows(table: CsvTable, bad: npt.NDArray[np.bool_], what: Callable[[int], str]) -> None:
+    """Refuse the first row that `bad` marks, with the sentence that `what` makes of its index.
+
+    Raises
+    ------
+    SpecificationError
+        If `bad` marks a row.
+    """
+    if bad.any():
+        row = int(np.argmax(bad))
+        raise table.refuse(row, what(row))
+
+
+def _read_text(path: Path) -> str:
+    try:
+        return path.read_bytes().decode("utf-8-sig")
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise SpecificationError(f"{path} must be a readable CSV file ({reason})") from None
+    except UnicodeDecodeError as error:
+        line = error.object.count(b"\n", 0, error.start) + 1
+        byte = error.object[error.start]
+        raise SpecificationError(
+            f"{path}, line {line}: text must be UTF-8, not contain the byte 0x{byte:02x}"
+        ) from None
+
+
+def _check_header(where: str, header: Sequence[str], known: Sequence[str], required: Sequence[str]) -> None:
+    check_separator(where, header)
+    for name, count in Counter(header).items():
+        if name not in known:
+            raise SpecificationError(f"{where}: column must be one of {', '.join(known)}, not {name!r}")
+        if count > 1:
+            raise SpecificationError(f"{where}: column {name} must be there once, not {count} times")
+    for name in required:
+        if name not in header:
+            raise SpecificationError(f"{where}: column {name} must be there, not missing among {', '.join(header)}")
+
+
+def _number(where: str, column: str, cell: str, readers: Mapping[str, Reader]) -> float:
+    text = cell.strip()
+    if column in readers:
+        try:
+            return readers[column](text)
+        except ValueError as error:
+            raise SpecificationError(f"{where}: {column} must be {error}, not {text!r}") from None
+    if not NUMBER.fullmatch(text) or math.isinf(float(text)):
+        raise SpecificationError(f"{where}: {column} must be a finite number, not {_short(text)}")
+    if abs(float(text)) > LARGEST:
+        raise SpecificationError(f"{where}: {column} must be from -{LARGEST:g} to {LARGEST:g}, not {_short(text)}")
+    return float(text)
+
+
+def _short(text: str) -> str:
+    return repr(text) if len(text) <= MAX_SHOWN else f"{text[: MAX_SHOWN - 4]!r} ..."

@@ -1,0 +1,180 @@
+"""TOML files of checked tables: every refusal names file and key, what would be right and what was found.
+
+A file's shape is a pydantic model made of `Table`. Each field has a description that can be read after "must be";
+a rule about several keys raises `UnfitKeyError`.
+"""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from pathlib import Path
+from typing import Any, TypeVar, get_args
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic.fields import FieldInfo
+from pydantic_core import ErrorDetails
+
+from sosmith.model.errors import SpecificationError
+
+MAX_BYTES = 1 << 18
+"""Largest file in bytes; a real one has some thousand."""
+
+MAX_SHOWN = 60
+"""Characters of a wrong value that a message shows."""
+
+
+class UnfitKeyError(ValueError):
+    """Keys that do not go together.
+
+    Parameters
+    ----------
+    where : str
+        Path of the key, seen from the table that has the rule.
+    expected : str
+        What would be right, to be read after "must be".
+    found : str
+        What stands there.
+    """
+
+    def __init__(self, where: str, expected: str, found: str) -> None:
+        self.where = where
+        self.expected = expected
+        self.found = found
+        super().__init__(f"{where} must be {expected}, not {found}")
+
+
+class Table(BaseModel):
+    """A table: only its own keys, of just the types it says, immutable."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False, hide_input_in_errors=True)
+
+
+Document = TypeVar("Document", bound=Table)
+
+
+def read_tables(path: Path, shape: type[Document]) -> Document:
+    """Read the file `path` as a table of that `shape`.
+
+    Raises
+    ------
+    SpecificationError
+        If the file cannot be read or is no TOML, and for the first thing in it that does not fit.
+    """
+    try:
+        return shape.model_validate(_read_toml(path))
+    except ValidationError as error:
+        findings = _own(error.errors(include_url=False))
+        more = f" (and {len(findings) - 1} more)" if len(findings) > 1 else ""
+        raise SpecificationError(f"{path}: {_sentence(shape, findings[0])}{more}") from None
+
+
+def _read_toml(path: Path) -> dict[str, Any]:
+    try:
+        with path.open("rb") as file:
+            content = file.read(MAX_BYTES + 1)
+    except OSError as error:
+        found = (error.strerror or str(error)).lower()
+        raise SpecificationError(f"{path} must be a readable file, not: {found}") from None
+    if len(content) > MAX_BYTES:
+        raise SpecificationError(f"{path} must be at most {MAX_BYTES} bytes, not longer")
+    try:
+        return tomllib.loads(content.decode("utf-8-sig"))
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        raise SpecificationError(f"{path}: line {line} must be UTF-8 text") from None
+    except tomllib.TOMLDecodeError as error:
+        problem = str(error)
+        raise SpecificationError(
+            f"{path}: the file must be valid TOML, not a syntax error: {problem[:1].lower()}{problem[1:]}"
+        ) from None
+    except (ValueError, RecursionError):
+        raise SpecificationError(f"{path}: the file must be TOML within reason, not nested or long numbers") from None
+
+
+def _own(findings: list[ErrorDetails]) -> list[ErrorDetails]:
+    """Put unknown keys first, often the slip behind missing ones, and keys before those of tables inside.
+
+    Leave out that a list is too short where it is so only because items of it do not fit.
+    """
+    own = [
+        finding
+        for finding in findings
+        if finding["type"] != "too_short"
+        or not any(other["loc"][: len(finding["loc"])] == finding["loc"] for other in findings if other is not finding)
+    ]
+    return sorted(own, key=lambda finding: (finding["type"] != "extra_forbidden", len(finding["loc"])))
+
+
+def _sentence(shape: type[Table], finding: ErrorDetails) -> str:
+    path = finding["loc"]
+    cause = finding.get("ctx", {}).get("error")
+    if isinstance(cause, UnfitKeyError):
+        return f"{_joined(_path_text(path), cause.where)} must be {cause.expected}, not {cause.found}"
+    where = _path_text(path)
+    owner, field = _field_at(shape, path)
+    if finding["type"] == "extra_forbidden":
+        closest = difflib.get_close_matches(str(path[-1]), owner.model_fields, n=1)
+        hint = f" (did you mean {closest[0]}?)" if closest else ""
+        return f"{where} must be one of the keys {', '.join(owner.model_fields)}, not an unknown one{hint}"
+    assert field is not None
+    assert field.description, f"{where} must have a description"
+    found = "missing" if finding["type"] == "missing" else shown(finding["input"])
+    inside = _path_text(path[_last_name(path) + 1 :])
+    if inside:  # the description is that of the whole list
+        whole = _path_text(path[: _last_name(path) + 1])
+        return f"{whole} must be {field.description}, not one with {found} at {inside}"
+    return f"{where} must be {field.description}, not {found}"
+
+
+def _last_name(path: tuple[int | str, ...]) -> int:
+    return max(k for k, key in enumerate(path) if isinstance(key, str))
+
+
+def _joined(first: str, second: str) -> str:
+    return ".".join(filter(None, (first, second)))
+
+
+def _path_text(path: tuple[int | str, ...]) -> str:
+    text = ""
+    for key in path:
+        text = f"{text}[{key}]" if isinstance(key, int) else _joined(text, key)
+    return text
+
+
+def _field_at(shape: type[Table], path: tuple[int | str, ...]) -> tuple[type[Table], FieldInfo | None]:
+    """Find the last named field on a path, and the table it is in."""
+    field = None
+    for key in path:
+        if isinstance(key, int):
+            continue
+        if field is not None:
+            (shape,) = _tables_in(field.annotation)
+        field = shape.model_fields.get(key)
+    return shape, field
+
+
+def _tables_in(annotation: Any) -> list[type[Table]]:
+    if isinstance(annotation, type) and issubclass(annotation, Table):
+        return [annotation]
+    return [table for part in get_args(annotation) for table in _tables_in(part)]
+
+
+def shown(value: object) -> str:
+    """Return a value from a TOML file on one line of bounded length."""
+    match value:
+        case None:
+            text = "missing"
+        case bool():
+            text = "true" if value else "false"
+        case dict() | Table():
+            text = "a table"
+        case list() | tuple() if len(value) > 6 or any(isinstance(item, list | tuple | dict | Table) for item in value):
+            text = f"a list of {len(value)} values"
+        case list() | tuple():
+            text = f"[{', '.join(map(shown, value))}]"
+        case str() | int() | float():
+            text = repr(value)
+        case _:
+            text = str(value)
+    return text if len(text) <= MAX_SHOWN else f"{text[: MAX_SHOWN - 4]} ..."

@@ -1,0 +1,1 @@
+"""Traces of codes and signals of sensors, as arrays and as files."""

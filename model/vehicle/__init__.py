@@ -1,0 +1,1 @@
+"""The locomotive on its track: parameters, dynamics, motion, and the clearance that follows."""

@@ -1,0 +1,240 @@
+"""Lateral dynamics of a six-axle locomotive: 21 coordinates, linear, and what the track does to them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sosmith.model.vehicle.linear_motion import Array, LinearSystem, Suspension
+from sosmith.model.vehicle.parameters import Layout, Parameters
+from sosmith.model.vehicle.track import Track
+from sosmith.model.vehicle.track_irregularity import Irregularity
+from sosmith.model.vehicle.wheel_rail_contact import GRAVITY, contact_matrices, creep_coefficients
+
+WHEELSETS = range(6)
+FRAMES = range(2)
+
+COORDINATES = (
+    *(f"wheelset {k + 1} {motion}" for k in WHEELSETS for motion in ("lateral", "yaw")),
+    *(f"frame {k + 1} {motion}" for k in FRAMES for motion in ("lateral", "yaw", "roll")),
+    *(f"body {motion}" for motion in ("lateral", "yaw", "roll")),
+)
+"""The 21 coordinates, in m and rad: lateral to the left, yaw to the left, roll with the left side up."""
+
+ROLLS = tuple(f"wheelset {k + 1} roll" for k in WHEELSETS)
+"""Prescribed by the track: a wheelset rolls with it."""
+
+
+def frame_of(wheelset: int) -> int:
+    """Index of the frame that a wheelset belongs to."""
+    return wheelset // 3
+
+
+def axle_positions(layout: Layout) -> Array:
+    """Distance in m of each wheelset ahead of its frame's centre, shape (6,); the centre halves the wheelbase."""
+    half = (layout.outer_axle_spacing + layout.inner_axle_spacing) / 2
+    middle = half - layout.outer_axle_spacing
+    return np.array([half, middle, -half, half, -middle, -half])
+
+
+def frame_positions(layout: Layout) -> Array:
+    """Distance in m of each frame's centre ahead of the body's, shape (2,)."""
+    return np.array([layout.bogie_distance / 2, -layout.bogie_distance / 2])
+
+
+def wheelset_positions(layout: Layout) -> Array:
+    """Distance in m of each wheelset ahead of the body's centre, shape (6,)."""
+    return axle_positions(layout) + np.repeat(frame_positions(layout), 3)
+
+
+def wheelset_load(parameters: Parameters) -> float:
+    """Load in N of one wheelset on its rails; all six carry the same."""
+    return parameters.total_mass * GRAVITY / 6
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LateralDynamics:
+    """The lateral equations at one speed, and the forces of a track on them.
+
+    Positions are counted across the straight line that goes on from the track's beginning, so that inertia needs no
+    extra terms in curves; `relative` takes the track off again.
+
+    Attributes
+    ----------
+    parameters : Parameters
+        Of the vehicle.
+    speed : float
+        In m/s.
+    system : LinearSystem
+        Suspension and contacts, with the coordinates `COORDINATES`.
+    suspension : Suspension
+        Springs and dampers alone, with the coordinates `COORDINATES` and `ROLLS`.
+    """
+
+    parameters: Parameters
+    speed: float
+    system: LinearSystem
+    suspension: Suspension
+
+    def _places(self) -> Array:
+        """Distance ahead of the body's centre and height above the rails for each coordinate, shape (21, 2)."""
+        given = self.parameters
+        ahead = [*np.repeat(wheelset_positions(given.layout), 2), *np.repeat(frame_positions(given.layout), 3), 0, 0, 0]
+        height = np.repeat(
+            [given.wheelset.rolling_radius, given.frame.centre_height, given.body.centre_height], [12, 6, 3]
+        )
+        return np.stack([ahead, height], axis=1)
+
+    def track_pose(self, track: Track, centre: Array) -> Array:
+        """Where the coordinates would be if the vehicle were one with the track, shape (n, 21).
+
+        Parameters
+        ----------
+        track : Track
+        centre : ndarray, shape (n,)
+            Distance of the body's centre in m.
+        """
+        pose, _ = self._poses(track, centre)
+        return pose
+
+    def _poses(self, track: Track, centre: Array) -> tuple[Array, Array]:
+        """Pose of the track at each coordinate, and its change with time."""
+        gauge = 2 * self.parameters.wheelset.contact_half_spacing
+        pose = np.zeros((len(centre), len(COORDINATES)))
+        rate = np.zeros_like(pose)
+        for k, (name, (ahead, height)) in enumerate(zip(COORDINATES, self._places(), strict=True)):
+            s = centre + ahead
+            if name.endswith("lateral"):
+                pose[:, k] = track.offset_at(s) - height * track.cant_at(s) / gauge
+                rate[:, k] = track.heading_at(s) - height * track.cant_slope_at(s) / gauge
+            elif name.endswith("yaw"):
+                pose[:, k], rate[:, k] = track.heading_at(s), track.curvature_at(s)
+            else:
+                pose[:, k], rate[:, k] = track.cant_at(s) / gauge, track.cant_slope_at(s) / gauge
+        return pose, self.speed * rate
+
+    def forces(self, track: Track, irregularity: Irregularity | None, centre: Array) -> Array:
+        """Return the forces of a track, shape (n, 21), with the body's centre at `centre` in m, shape (n,)."""
+        given, count = self.parameters, len(COORDINATES)
+        gauge = 2 * given.wheelset.contact_half_spacing
+        pose, rate = self._poses(track, centre)
+        # contacts and preload act on what is relative to the track; creep along the rail on the absolute yaw rate
+        contact_damping = self.system.damping - self.suspension.damping[:count, :count]
+        contact_stiffness = self.system.stiffness - self.suspension.stiffness[:count, :count]
+        lateral = [k for k, name in enumerate(COORDINATES) if name.endswith("lateral")]
+        force = pose @ contact_stiffness.T + rate[:, lateral] @ contact_damping[:, lateral].T
+        positions = wheelset_positions(given.layout)
+        for k in WHEELSETS:
+            s = centre + positions[k]
+            shift = track.irregularity_at(s)
+            if irregularity is not None:
+                shift = shift + irregularity.alignment.at(s)
+            force += np.outer(shift, contact_stiffness[:, 2 * k])
+            roll, roll_rate = track.cant_at(s) / gauge, self.speed * track.cant_slope_at(s) / gauge
+            force -= np.outer(roll, self.suspension.stiffness[:count, count + k])
+            force -= np.outer(roll_rate, self.suspension.damping[:count, count + k])
+        for k in lateral:
+            s = centre + self._places()[k, 0]
+            force[:, k] += self.system.mass[k, k] * GRAVITY * track.cant_at(s) / gauge
+        return force
+
+
+def lateral_dynamics(parameters: Parameters, speed: float) -> LateralDynamics:
+    """Assemble the lateral equations at `speed` m/s."""
+    suspension = lateral_suspension(parameters)
+    count = len(COORDINATES)
+    damping = suspension.damping[:count, :count].copy()
+    stiffness = suspension.stiffness[:count, :count] + _preload(parameters)
+    load, wheelset = wheelset_load(parameters), parameters.wheelset
+    contact_damping, contact_stiffness = contact_matrices(
+        creep_coefficients(parameters.contact, load / 2),
+        speed=speed,
+        conicity=wheelset.conicity,
+        rolling_radius=wheelset.rolling_radius,
+        half_spacing=wheelset.contact_half_spacing,
+        load=load,
+    )
+    for k in WHEELSETS:
+        place = slice(2 * k, 2 * k + 2)
+        damping[place, place] += contact_damping
+        stiffness[place, place] += contact_stiffness
+    frame, body = parameters.frame, parameters.body
+    masses = [wheelset.mass, wheelset.yaw_inertia] * 6
+    masses += [frame.mass, frame.yaw_inertia, frame.roll_inertia] * 2
+    masses += [body.mass, body.yaw_inertia, body.roll_inertia]
+    system = LinearSystem(names=COORDINATES, mass=np.diag(masses), damping=damping, stiffness=stiffness)
+    return LateralDynamics(parameters=parameters, speed=speed, system=system, suspension=suspension)
+
+
+def primary_elongation(parameters: Parameters, wheelset: int) -> dict[str, float]:
+    """Lateral elongation of the primary suspension: wheelset less frame, at the axle's height."""
+    below = parameters.frame.centre_height - parameters.wheelset.rolling_radius
+    w, f = f"wheelset {wheelset + 1}", f"frame {frame_of(wheelset) + 1}"
+    ahead = float(axle_positions(parameters.layout)[wheelset])
+    return {f"{w} lateral": 1.0, f"{f} lateral": -1.0, f"{f} yaw": -ahead, f"{f} roll": -below}
+
+
+def lateral_suspension(parameters: Parameters) -> Suspension:
+    """Primary and secondary suspension between `COORDINATES` and `ROLLS`."""
+    made = Suspension(COORDINATES + ROLLS)
+    primary, secondary = parameters.primary, parameters.secondary
+    for k in WHEELSETS:
+        w, f = f"wheelset {k + 1}", f"frame {frame_of(k) + 1}"
+        side = primary.half_spacing
+        across = primary.middle_lateral_stiffness if k % 3 == 1 else primary.lateral_stiffness
+        made.add(primary_elongation(parameters, k), across, primary.lateral_damping, count=2)
+        made.add(
+            {f"{w} yaw": side, f"{f} yaw": -side},
+            primary.longitudinal_stiffness,
+            primary.longitudinal_damping,
+            count=2,
+        )
+        made.add({f"{w} roll": side, f"{f} roll": -side}, primary.vertical_stiffness, primary.vertical_damping, count=2)
+    above = secondary.height - parameters.frame.centre_height
+    below = parameters.body.centre_height - secondary.height
+    for k, ahead in enumerate(frame_positions(parameters.layout)):
+        f, side, outer = f"frame {k + 1}", secondary.half_spacing, secondary.yaw_damper_half_spacing
+        across_body = {
+            f"{f} lateral": 1.0,
+            f"{f} roll": -above,
+            "body lateral": -1.0,
+            "body yaw": -float(ahead),
+            "body roll": -below,
+        }
+        made.add(across_body, secondary.lateral_stiffness, secondary.lateral_damping, count=2)
+        made.add(
+            {f"{f} yaw": side, "body yaw": -side},
+            secondary.longitudinal_stiffness,
+            secondary.longitudinal_damping,
+            count=2,
+        )
+        made.add(
+            {f"{f} roll": side, "body roll": -side},
+            secondary.vertical_stiffness,
+            secondary.vertical_damping,
+            count=2,
+        )
+        made.add({f"{f} yaw": outer, "body yaw": -outer}, 0.0, secondary.yaw_damping, count=2)
+    return made
+
+
+def _preload(parameters: Parameters) -> Array:
+    """Stiffness of the static load on the springs: what stands on springs below its centre tends to topple.
+
+    A mass that rolls by p lifts the attachments a height h below its centre by h p^2 / 2, so the load P on them does
+    the work P h p^2 / 2.
+    """
+    stiffness = np.zeros((len(COORDINATES), len(COORDINATES)))
+    body, frame, secondary = parameters.body, parameters.frame, parameters.secondary
+    on_frame = body.mass * GRAVITY / 2
+    on_axles = on_frame + frame.mass * GRAVITY
+    index = {name: k for k, name in enumerate(COORDINATES)}
+    k = index["body roll"]
+    stiffness[k, k] = -2 * on_frame * (body.centre_height - secondary.height)
+    for number in FRAMES:
+        k = index[f"frame {number + 1} roll"]
+        above = secondary.height - frame.centre_height
+        below = frame.centre_height - parameters.wheelset.rolling_radius
+        stiffness[k, k] = -on_frame * above - on_axles * below
+    return stiffness

@@ -1,0 +1,133 @@
+"""Motion of the vehicle over time, and the clearance that a sensor on the bogie frame sees of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from sosmith.model.vehicle.lateral import WHEELSETS, axle_positions, frame_of
+from sosmith.model.vehicle.linear_motion import Array
+from sosmith.model.vehicle.parameters import Parameters
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Motion:
+    """Motion at n times, in SI units. Lateral and yaw are positive to the left, roll with the left side up.
+
+    Lateral, yaw and roll count from the designed track at the place of each part: from its middle, its direction, its
+    cant. Vertical counts from the height of the rails before the curve, so it holds the cant.
+
+    Attributes
+    ----------
+    time : ndarray, shape (n,)
+        In s, from 0, when the first wheelset is at the beginning of the track.
+    distance : ndarray, shape (n,)
+        Of the first wheelset, in m.
+    wheelset_lateral, wheelset_yaw, wheelset_vertical : ndarray, shape (n, 6)
+        In m, rad and m.
+    frame_lateral, frame_yaw, frame_roll, frame_vertical, frame_pitch : ndarray, shape (n, 2)
+        In m and rad.
+    body_lateral, body_yaw, body_roll, body_vertical, body_pitch : ndarray, shape (n,)
+        In m and rad.
+    wheelset_yaw_to_frame : ndarray, shape (n, 6)
+        Yaw of the wheelsets relative to their frames in rad; in a curve not the difference of the two above.
+    left_wheel_rise, right_wheel_rise : ndarray, shape (n, 6)
+        How much a wheel's centre rises above the rails by conicity, in m.
+    clearance_mm : ndarray, shape (n, 6)
+        Change of the clearance in mm at a sensor that faces the flange of the right wheel; what it reads is its
+        clearance at rest plus this. At the left wheel it is the same with the other sign.
+    lateral_to_rails : ndarray, shape (n, 6)
+        Lateral position of the wheelsets relative to the rails with their irregularities, in m.
+    creep_force : ndarray, shape (n, 6)
+        Resultant of longitudinal and lateral creep force in N, the same at both wheels of a wheelset.
+    """
+
+    time: Array
+    distance: Array
+    wheelset_lateral: Array
+    wheelset_yaw: Array
+    wheelset_vertical: Array
+    frame_lateral: Array
+    frame_yaw: Array
+    frame_roll: Array
+    frame_vertical: Array
+    frame_pitch: Array
+    body_lateral: Array
+    body_yaw: Array
+    body_roll: Array
+    body_vertical: Array
+    body_pitch: Array
+    wheelset_yaw_to_frame: Array
+    left_wheel_rise: Array
+    right_wheel_rise: Array
+    clearance_mm: Array
+    lateral_to_rails: Array
+    creep_force: Array
+
+    def __post_init__(self) -> None:
+        for one in fields(self):
+            getattr(self, one.name).setflags(write=False)
+
+    @property
+    def clearance_left_mm(self) -> Array:
+        """Change of the clearance in mm at sensors that face the flanges of the left wheels, shape (n, 6)."""
+        return -self.clearance_mm
+
+    def columns(self) -> Iterator[tuple[str, Array]]:
+        """Every motion with its name and unit, such as ``wheelset1_lateral_mm``, for a table."""
+        yield "time_s", self.time
+        yield "distance_m", self.distance
+        for part, count in (("wheelset", 6), ("frame", 2), ("body", 1)):
+            for number in range(count):
+                for motion in ("lateral", "vertical", "yaw", "roll", "pitch"):
+                    values = getattr(self, f"{part}_{motion}", None)
+                    if values is not None:
+                        unit = "mm" if motion in ("lateral", "vertical") else "mrad"
+                        label = f"{part}{number + 1}" if count > 1 else part
+                        yield f"{label}_{motion}_{unit}", 1e3 * (values[:, number] if count > 1 else values)
+        for number in range(6):
+            yield f"wheelset{number + 1}_yaw_to_frame_mrad", 1e3 * self.wheelset_yaw_to_frame[:, number]
+        for number in range(6):
+            yield f"clearance{number + 1}_mm", self.clearance_mm[:, number]
+
+
+def clearance_change(
+    parameters: Parameters,
+    *,
+    wheelset_lateral: Array,
+    wheelset_yaw: Array,
+    frame_lateral: Array,
+    frame_yaw: Array,
+    frame_roll: Array,
+) -> Array:
+    """Change of the clearance in mm at the right wheels' sensors, shape (n, 6).
+
+    Positions count from one straight line, not from the curved track. The sensor is one with the frame; at the axle's
+    height and `sensor.arm` ahead of the axle it looks from the field side at the flank of the flange, across the
+    track. At the right wheel the clearance there grows by
+
+        y_w + arm psi_w - (y_f + (a + arm) psi_f + h roll_f) - slope l (psi_w - psi_f),
+
+    with a the axle's place ahead of the frame's centre, h that centre's height above the axle, l the half distance of
+    the wheels: yaw moves the wheel along the track by l (psi_w - psi_f) too, and a flank that leans by `flank_slope`
+    passes sideways by it. Relative vertical motion changes nothing to first order, as the paper (5.1) says.
+
+    Parameters
+    ----------
+    wheelset_lateral, wheelset_yaw : ndarray, shape (n, 6)
+        In m and rad.
+    frame_lateral, frame_yaw, frame_roll : ndarray, shape (n, 2)
+        In m and rad.
+    """
+    sensor, half = parameters.sensor, parameters.wheelset.contact_half_spacing
+    above = parameters.frame.centre_height - parameters.wheelset.rolling_radius
+    axles = axle_positions(parameters.layout)
+    change = np.zeros_like(wheelset_lateral)
+    for k in WHEELSETS:
+        f = frame_of(k)
+        yaw = wheelset_yaw[:, k] - frame_yaw[:, f]
+        across = wheelset_lateral[:, k] - frame_lateral[:, f] - axles[k] * frame_yaw[:, f] - above * frame_roll[:, f]
+        change[:, k] = across + (sensor.arm - sensor.flank_slope * half) * yaw
+    return 1e3 * change

@@ -1,0 +1,191 @@
+"""A run of the locomotive over a track: from parameters, speed and seed to its motion."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from sosmith.model.errors import SpecificationError
+from sosmith.model.vehicle.lateral import (
+    FRAMES,
+    WHEELSETS,
+    LateralDynamics,
+    lateral_dynamics,
+    wheelset_load,
+    wheelset_positions,
+)
+from sosmith.model.vehicle.linear_motion import Array
+from sosmith.model.vehicle.motion import Motion, clearance_change
+from sosmith.model.vehicle.parameters import Parameters
+from sosmith.model.vehicle.track import Track
+from sosmith.model.vehicle.track_irregularity import LEVELS, Irregularity
+from sosmith.model.vehicle.track_irregularity import irregularity as make_irregularity
+from sosmith.model.vehicle.vertical import vertical_dynamics
+from sosmith.model.vehicle.wheel_rail_contact import creep_coefficients
+
+MIN_RATE = 1000.0
+"""Samples per second inside, at least: the track is taken as linear between them (at 20 m/s, 20 mm)."""
+
+RUN_IN = 200.0
+"""Way in m before the beginning of a track with random irregularities, on which the start from rest dies away."""
+
+SPEEDS = (1.0, 100.0)
+"""Lowest and highest speed in m/s: linear creep has no meaning at rest."""
+
+RATES = (1.0, 20_000.0)
+"""Lowest and highest sample rate in Hz."""
+
+LIMIT_SAMPLES = 5_000_000
+"""Samples inside that a run may have, a guard against a slip in the unit."""
+
+
+def run(
+    parameters: Parameters,
+    track: Track,
+    *,
+    speed: float,
+    sample_rate: float,
+    irregularity: str | None = None,
+    seed: int = 1,
+) -> Motion:
+    """Run over a track at constant speed, until its first wheelset is at the end.
+
+    Lateral and vertical equations are linear and solved exactly, with forces that are linear between samples of at
+    least `MIN_RATE`. There is no flange contact and no limit to creep; `sosmith.model.vehicle.limits` tells where
+    they would have acted.
+
+    Parameters
+    ----------
+    parameters : Parameters
+        Of the vehicle and the irregularities.
+    track : Track
+        Course, cant and single irregularity.
+    speed : float
+        In m/s, within `SPEEDS`.
+    sample_rate : float
+        Of the motion in Hz, within `RATES`.
+    irregularity : {None, "low", "high"}, optional
+        Random irregularities on top.
+    seed : int, optional
+        Of the random irregularities, 0 or more.
+
+    Raises
+    ------
+    SpecificationError
+        If speed, sample rate, irregularity or seed are not as above, the run is too long, or the vehicle is unstable
+        at that speed.
+    """
+    _check("speed", speed, SPEEDS, "m/s")
+    _check("sample rate", sample_rate, RATES, "Hz")
+    if irregularity not in (None, *LEVELS):
+        raise SpecificationError(f"the irregularities must be one of none, {', '.join(LEVELS)}, not {irregularity}")
+    if seed < 0:
+        raise SpecificationError(f"the seed must be 0 or more, not {seed}")
+    finer = math.ceil(MIN_RATE / sample_rate)
+    step = 1 / (finer * sample_rate)
+    before = finer * math.ceil(RUN_IN / (speed * step * finer)) if irregularity else 0
+    behind = math.floor(track.length / (speed * step) + 1e-9)
+    if before + behind > LIMIT_SAMPLES:
+        raise SpecificationError(
+            f"the run must have at most {LIMIT_SAMPLES:,} samples inside, not {before + behind:,}: "
+            "a shorter track, more speed or a lower sample rate"
+        )
+    lateral = lateral_dynamics(parameters, speed)
+    growing = max(mode.growth for mode in lateral.system.modes())
+    if growing >= 0:
+        raise SpecificationError(
+            f"the speed must be one at which the vehicle is stable, not {speed:g} m/s, "
+            f"where a motion grows by {growing:.3g} per second"
+        )
+    clock = step * np.arange(-before, behind + 1, dtype=np.float64)
+    front = speed * clock
+    random = None
+    if irregularity is not None:
+        random = make_irregularity(parameters.irregularities, irregularity, _reach(parameters, track), seed)
+    return _motion(lateral, track, random, front, step, keep=slice(before, None, finer))
+
+
+def _check(name: str, value: float, allowed: tuple[float, float], unit: str) -> None:
+    low, high = allowed
+    if not low <= value <= high:
+        raise SpecificationError(f"the {name} must be from {low:g} to {high:g} {unit}, not {value:g}")
+
+
+def _reach(parameters: Parameters, track: Track) -> float:
+    """Distance in m between the first and the last place that a wheel touches."""
+    positions = wheelset_positions(parameters.layout)
+    return RUN_IN + 1.0 + float(positions[0] - positions[-1]) + track.length
+
+
+def _motion(
+    lateral: LateralDynamics, track: Track, random: Irregularity | None, front: Array, step: float, keep: slice
+) -> Motion:
+    parameters, speed = lateral.parameters, lateral.speed
+    positions = wheelset_positions(parameters.layout)
+    centre = front - positions[0]
+    moved, rate = lateral.system.respond(lateral.forces(track, random, centre), step)
+    vertical = vertical_dynamics(parameters)
+    rails, rails_rate = vertical.rails(track, random, centre, speed)
+    lifted, _ = vertical.system.respond(vertical.forces(rails, rails_rate), step)
+
+    moved, rate, lifted, rails, centre = (array[keep] for array in (moved, rate, lifted, rails, centre))
+    relative = moved - lateral.track_pose(track, centre)
+    w, f, b = slice(0, 12), slice(12, 18), slice(18, 21)
+    yaw_to_frame = moved[:, w][:, 1::2] - np.repeat(moved[:, f][:, 1::3], 3, axis=1)
+    to_rails = relative[:, w][:, 0::2].copy()
+    for k in WHEELSETS:
+        s = centre + positions[k]
+        to_rails[:, k] -= track.irregularity_at(s)
+        if random is not None:
+            to_rails[:, k] -= random.alignment.at(s)
+    rise = parameters.wheelset.conicity * to_rails
+    return Motion(
+        time=(front[keep] - front[keep][0]) / speed,
+        distance=front[keep],
+        wheelset_lateral=relative[:, w][:, 0::2],
+        wheelset_yaw=relative[:, w][:, 1::2],
+        wheelset_vertical=rails,
+        frame_lateral=relative[:, f][:, 0::3],
+        frame_yaw=relative[:, f][:, 1::3],
+        frame_roll=relative[:, f][:, 2::3],
+        frame_vertical=lifted[:, [2 * k for k in FRAMES]],
+        frame_pitch=lifted[:, [2 * k + 1 for k in FRAMES]],
+        body_lateral=relative[:, b][:, 0],
+        body_yaw=relative[:, b][:, 1],
+        body_roll=relative[:, b][:, 2],
+        body_vertical=lifted[:, 4],
+        body_pitch=lifted[:, 5],
+        wheelset_yaw_to_frame=yaw_to_frame,
+        left_wheel_rise=rise,
+        right_wheel_rise=-rise,
+        clearance_mm=clearance_change(
+            parameters,
+            wheelset_lateral=moved[:, w][:, 0::2],
+            wheelset_yaw=moved[:, w][:, 1::2],
+            frame_lateral=moved[:, f][:, 0::3],
+            frame_yaw=moved[:, f][:, 1::3],
+            frame_roll=moved[:, f][:, 2::3],
+        ),
+        lateral_to_rails=to_rails,
+        creep_force=_creep_force(lateral, track, centre, relative, rate, to_rails),
+    )
+
+
+def _creep_force(
+    lateral: LateralDynamics, track: Track, centre: Array, relative: Array, rate: Array, to_rails: Array
+) -> Array:
+    """Resultant creep force of a wheel in N, shape (n, 6)."""
+    parameters, speed = lateral.parameters, lateral.speed
+    wheelset = parameters.wheelset
+    creep = creep_coefficients(parameters.contact, wheelset_load(parameters) / 2)
+    result = np.zeros_like(to_rails)
+    gauge = 2 * wheelset.contact_half_spacing
+    for k, ahead in enumerate(wheelset_positions(parameters.layout)):
+        s = centre + ahead
+        pose_rate = speed * (track.heading_at(s) - wheelset.rolling_radius * track.cant_slope_at(s) / gauge)
+        across = (rate[:, 2 * k] - pose_rate) / speed - relative[:, 2 * k + 1]
+        spin = rate[:, 2 * k + 1] / speed
+        along = wheelset.contact_half_spacing * spin + wheelset.conicity * to_rails[:, k] / wheelset.rolling_radius
+        result[:, k] = np.hypot(creep.f11 * along, creep.f22 * across + creep.f23 * spin)
+    return result

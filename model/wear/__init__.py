@@ -1,0 +1,1 @@
+"""Wear of the flange from records of clearance."""

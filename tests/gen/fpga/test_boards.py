@@ -1,0 +1,35 @@
+"""The table of boards."""
+
+import re
+
+import pytest
+
+from sosmith.gen.fpga.boards import BOARDS, find_board
+from sosmith.model.errors import SpecificationError
+
+
+def test_boards_are_found_by_name() -> None:
+    assert all(find_board(name).name == name for name in BOARDS)
+    families = {board.device.family for board in BOARDS.values()}
+    assert families == {"ice40", "ecp5"}
+
+
+def test_an_unknown_board_is_refused_with_those_that_exist() -> None:
+    message = (
+        "the board must be one of icebreaker, upduino, ice40_hx8k_b_evn, icestick, ulx3s_25f, ulx3s_45f, ulx3s_85f, "
+        "colorlight_i5, orangecrab_25f, ecp5_evn, not arty"
+    )
+    with pytest.raises(SpecificationError, match=f"^{re.escape(message)}$"):
+        find_board("arty")
+
+
+def test_what_a_device_lacks_is_told() -> None:
+    up5k, ecp5 = find_board("icebreaker").device, find_board("colorlight_i5").device
+    assert up5k.excess({"SB_LUT4": 5280, "SB_MAC16": 8, "SB_RAM40_4K": 30, "SB_CARRY": 9999}) == []
+    assert up5k.excess({"SB_LUT4": 5281, "SB_MAC16": 13, "SB_RAM40_4K": 31}) == [
+        "5,281 LUT4 of 5,280",
+        "13 SB_MAC16 of 8",
+        "31 SB_RAM40_4K of 30",
+    ]
+    assert ecp5.excess({"LUT4": 24000, "CCU2C": 100, "TRELLIS_DPR16X4": 22, "MULT18X18D": 28}) == []
+    assert ecp5.excess({"LUT4": 24000, "CCU2C": 100, "TRELLIS_DPR16X4": 23}) == ["24,292 LUT4 of 24,288"]

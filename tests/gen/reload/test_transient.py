@@ -1,0 +1,88 @@
+"""Swaps: nothing leaves the ranges proven for them, whatever the input, and what they leave behind fades in time."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from tests.gen.designs import example_design
+from tests.gen.reload.swaps import during, moved, worst_input
+
+from sosmith.gen.reload import transient as module
+from sosmith.gen.reload.other_constants import with_constants
+from sosmith.gen.reload.transient import RESIDUE, transient
+from sosmith.gen.word_lengths.quantize import Quantized
+from sosmith.model.dataflow.datapath import Datapath
+from sosmith.model.dataflow.graph import RangeError
+from sosmith.model.errors import ShortfallError
+from sosmith.model.reload.swapping import compute_swapping
+
+REALIZATIONS = ("df1", "df1_ef2", "df2t", "delta", "normal", "lattice_wdf")
+RATIOS = ("0.5", "1.2")
+
+
+@cache
+def sets(realization: str, ratio: str) -> tuple[Quantized, Quantized]:
+    """Make a design and the same with another cutoff, in formats in which states carry over."""
+    made = example_design("audio_lowpass.toml", realization=realization)
+    own = with_constants(made.quantized, None, None, room=2)
+    return own, with_constants(made.quantized, moved(made, ratio), None, finer=2, room=2)
+
+
+def swapped(active: Quantized, other: Quantized, during: Datapath) -> None:
+    """Run the worst input through a swap, either way round, with all ranges checked."""
+    swap, samples = 300, 420
+    codes = worst_input(active, other, swap, samples)
+    for way in (codes, -1 - codes):
+        compute_swapping(active.datapath, [(swap, during)], way)
+
+
+@pytest.mark.parametrize("ratio", RATIOS)
+@pytest.mark.parametrize("realization", REALIZATIONS)
+def test_nothing_leaves_the_ranges_that_are_proven_for_a_swap(realization: str, ratio: str) -> None:
+    active, other = sets(realization, ratio)
+    swapped(active, other, during(active, other))
+
+
+def test_without_its_own_proof_a_swap_does_leave_ranges() -> None:
+    active, other = sets("df1_ef2", "0.5")
+    with pytest.raises(RangeError):
+        swapped(active, other, other.datapath)
+
+
+def test_the_answer_to_the_differences_is_needed(monkeypatch: pytest.MonkeyPatch) -> None:
+    active, other = sets("df1_ef2", "0.5")
+    monkeypatch.setattr(module, "_sum", lambda equations, answer: equations)
+    broken = during(active, other)
+    with pytest.raises(RangeError):
+        swapped(active, other, broken)
+
+
+def test_a_swap_to_the_same_set_needs_hardly_more_than_the_set() -> None:
+    active, _ = sets("df1_ef2", "2")
+    for section, ranges in zip(active.sections, transient(active, active).ranges, strict=True):
+        for node in section.graph.nodes:
+            if node.name in ranges:
+                low, high = ranges[node.name]
+                assert high - low <= 1.01 * (node.high - node.low) + 2 * 2.0**node.frac
+
+
+def test_a_transient_ends_when_it_is_said_to() -> None:
+    """After it, the swapped run is within two rounding bounds of one that had the new set from the beginning."""
+    active, other = sets("df1_ef2", "0.8")
+    length = transient(active, other).samples
+    swap, samples = 300, 300 + length + 200
+    codes = worst_input(active, other, swap, samples)
+    after = np.array(compute_swapping(active.datapath, [(swap, during(active, other))], codes))
+    always = other.datapath.compute(codes)
+    assert other.proof is not None
+    most = 2 * (other.proof.rounding.magnitude + RESIDUE) + 1
+    difference = np.abs(after - always)[swap:]
+    assert difference[length:].max() <= most
+    assert difference[: length // 8].max() > 100 * most
+
+
+def test_other_states_are_refused() -> None:
+    active, _ = sets("df1_ef2", "2")
+    other, _ = sets("df1", "2")
+    with pytest.raises(ShortfallError, match=r"^the states of section\d must be \[.*\], not \[.*\]$"):
+        transient(active, other)

@@ -1,0 +1,745 @@
+"""The report: its measures against independent computations, its verdicts, and the page's promises."""
+
+from __future__ import annotations
+
+import doctest
+import json
+import math
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from scipy import signal
+
+from sosmith.gen import quantity
+from sosmith.gen.filter import response
+from sosmith.gen.fpga.boards import find_board
+from sosmith.gen.fpga.synthesis import Netlist
+from sosmith.gen.report import plots
+from sosmith.gen.report.page import render_page
+from sosmith.gen.report.report import Alternative, Evidence, FilterFacts, Format, summarise, write_report
+
+Array = npt.NDArray[np.float64]
+
+LSB = 16 / 2**16
+F7 = signal.butter(7, 0.2587803, fs=100, output="sos")
+
+
+def rounded(sos: Array, frac: int) -> Array:
+    """Sections with a1, a2 rounded to `frac` fractional bits, and their DC gains kept."""
+    result = sos.copy()
+    result[:, 4:] = np.round(sos[:, 4:] * 2.0**frac) / 2.0**frac
+    change = (result[:, 3:].sum(axis=1)) / (sos[:, 3:].sum(axis=1))
+    result[:, :3] *= change[:, None]
+    return result
+
+
+def facts(**changes: Any) -> FilterFacts:
+    known: dict[str, Any] = {
+        "sample_rate": 100.0,
+        "ideal_sos": F7,
+        "quantized_sos": rounded(F7, 30),
+        "cutoff": (0.2587803,),
+    }
+    return FilterFacts(**(known | changes))
+
+
+def masked(order: int, **changes: Any) -> FilterFacts:
+    """Low-pass with the mask of the paper's Table 9 (10 Hz, 0.02 dB, 45 Hz, 60 dB)."""
+    sos = signal.butter(order, 14.17, fs=100, output="sos")
+    known: dict[str, Any] = {
+        "ideal_sos": sos,
+        "quantized_sos": sos,
+        "passband_edge": (10.0,),
+        "stopband_edge": (45.0,),
+        "passband_loss": 0.02,
+        "stopband_loss": 60.0,
+    }
+    return facts(**(known | changes))
+
+
+def evidence(**changes: Any) -> Evidence:
+    """One run of a flange-wear instrument that passes."""
+    generator = np.random.default_rng(11)
+    time = np.arange(3000) / 100
+    truth = 2 + 0.2 * time
+    unfiltered = truth + 0.3 * np.sin(2 * np.pi * 1.2 * time) + 0.1 * generator.standard_normal(len(time))
+    golden = signal.sosfilt(F7, unfiltered)
+    known: dict[str, Any] = {
+        "name": "flange_wear",
+        "core": "instrument",
+        "description": "Wear of a wheel flange.",
+        "scenario": "wear_ramp",
+        "unit": "mm",
+        "lsb": LSB,
+        "low": 0.0,
+        "high": 16.0,
+        "bound": 0.0002,
+        "bound_parts": {"output": LSB / 2, "coefficients": 0.00002},
+        "max_error": 0.00025,
+        "time": time,
+        "truth": truth,
+        "reading": time > 10,
+        "unfiltered": unfiltered,
+        "golden": golden,
+        "hardware": np.round(golden / LSB) * LSB,
+        "mismatches": 0,
+        "samples": len(time),
+        "cycles": 9007,
+        "latency_cycles": 23,
+        "simulator": "verilator",
+        "seed": 7,
+        "tools": {"Verilator": "5.048", "cocotb": "2.1.0"},
+        "wall_seconds": 1.5,
+        "cycles_per_second": 6005.0,
+        "realization": "df1_ef2",
+        "architecture": "parallel",
+        "formats": (Format(node="section 0", notation="s18.14", low=-22.5, high=22.5, unit="mm"),),
+        "sections": (
+            {
+                "name": "section 0",
+                "realization": "df1_ef2",
+                "coefficients": [{"name": "a1", "integer": -66026473, "frac": 26, "value": -0.98387}],
+            },
+        ),
+        "limit_cycles": (
+            {"section": "section 0", "largest": 0.00003, "dead_band": 0.0, "none": False, "lyapunov": None},
+            {"section": "section 1", "largest": 0.00003, "dead_band": 0.000061, "none": True, "lyapunov": ["1", "1/3"]},
+        ),
+        "filter": facts(),
+        "alternatives": (Alternative(name="df1", max_abs=0.4, rms=0.1),),
+    }
+    return Evidence(**(known | changes))
+
+
+def plain(**changes: Any) -> Evidence:
+    """Core without a filter, a truth, or anything else that may be missing."""
+    bare: dict[str, Any] = {
+        "description": "",
+        "truth": None,
+        "reading": None,
+        "unfiltered": None,
+        "filter": None,
+        "formats": (),
+        "sections": (),
+        "limit_cycles": (),
+        "alternatives": (),
+        "bound_parts": {},
+        "unit": "",
+    }
+    return evidence(**(bare | changes))
+
+
+def bandpass() -> Evidence:
+    sos = signal.butter(4, (8, 12), btype="bandpass", fs=100, output="sos")
+    return evidence(
+        filter=facts(
+            kind="bandpass",
+            ideal_sos=sos,
+            quantized_sos=sos,
+            cutoff=(8.0, 12.0),
+            passband_edge=(9.0, 11.0),
+            passband_loss=1.0,
+        )
+    )
+
+
+CASES: dict[str, Callable[[], Evidence]] = {
+    "instrument": evidence,
+    "failing": lambda: evidence(mismatches=3, first_mismatch=1500, bound=0.00001),
+    "plain": plain,
+    "bandpass": bandpass,
+}
+
+
+@pytest.fixture(scope="module", params=CASES, name="built")
+def build(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Path, dict[str, Any]]:
+    """Name, folder and summary of each case, written once for all tests."""
+    directory = tmp_path_factory.mktemp(request.param) / "made" / "on the way"
+    return request.param, directory, write_report(CASES[request.param](), directory)
+
+
+class Page(HTMLParser):
+    """Collects tags and attributes, and checks that elements are closed in order."""
+
+    VOID = ("meta", "path", "circle", "use", "rect", "br", "stop")
+
+    def __init__(self, content: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.tags: list[str] = []
+        self.attributes: list[tuple[str, str]] = []
+        self.words: list[str] = []
+        self.feed(content)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+        self.attributes += [(name, value or "") for name, value in attrs]
+        if tag not in self.VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+        self.attributes += [(name, value or "") for name, value in attrs]
+
+    def handle_endtag(self, tag: str) -> None:
+        if tag not in self.VOID:
+            assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        self.words.append(data)
+
+
+# the summary
+
+
+def test_summary_has_the_keys_of_the_contract(built: tuple[str, Path, dict[str, Any]]) -> None:
+    """CONTRACT.md, section "The report"."""
+    _, directory, _ = built
+    report = json.loads((directory / "report.json").read_text(encoding="utf-8"))
+    assert report.keys() >= {
+        "name", "samples", "channels", "cycles", "simulator", "seed", "bit_exact", "mismatches", "error",
+        "sqnr_db", "frequency_response", "accuracy_percent", "cycles_per_second", "wall_seconds", "passed",
+    }  # fmt: skip
+    assert report.keys() >= {
+        "core", "scenario", "realization", "architecture", "lsb", "range", "max_error", "first_mismatch",
+        "latency_cycles", "cycles_per_sample", "alternatives", "limit_cycles", "tools", "sosmith_version", "shortfalls",
+        "notes",
+    }  # fmt: skip
+    assert report["error"].keys() >= {"max_abs", "rms", "bound", "unit", "max_lsb", "mean", "proven", "parts"}
+    assert report["frequency_response"].keys() >= {"max_deviation_db_passband", "stopband_attenuation_db"}
+    assert report["accuracy_percent"].keys() == {"unfiltered", "golden", "hardware"}
+
+
+def test_gates_are_told_with_what_does_not_fit(tmp_path: Path) -> None:
+    cells = {"SB_LUT4": 952, "SB_MAC16": 13}
+    run = evidence(gates=Netlist(find_board("icebreaker"), tmp_path / "netlist.v", cells, "0.70"))
+    summary = summarise(run)
+    assert (summary["gates"], summary["passed"]) == ("icebreaker", True)
+    assert summary["notes"][0] == "The netlist takes more than the iCEBreaker has: 13 SB_MAC16 of 8."
+    words = " ".join(Page(page_of(run)).words)
+    assert "the netlist for the iCEBreaker, iCE40 UP5K: 952 SB_LUT4, 13 SB_MAC16" in words
+    assert "gate by gate" in words
+    assert summarise(evidence())["gates"] is None
+
+
+def test_file_holds_the_summary(built: tuple[str, Path, dict[str, Any]]) -> None:
+    _, directory, summary = built
+    assert json.loads((directory / "report.json").read_text(encoding="utf-8")) == summary
+
+
+def test_error_is_hardware_minus_golden() -> None:
+    run = evidence()
+    error = summarise(run)["error"]
+    assert error["max_abs"] == pytest.approx(np.abs(run.hardware - run.golden).max(), rel=1e-15)
+    assert error["rms"] == pytest.approx(np.sqrt(np.mean((run.hardware - run.golden) ** 2)), rel=1e-12)
+    assert error["max_lsb"] == pytest.approx(error["max_abs"] / LSB)
+    assert error["unit"] == "mm"
+
+
+def test_accuracy_counts_only_the_readings() -> None:
+    """Equation 7 by hand: hardware 1 % off at the one reading, wild elsewhere."""
+    ones = np.ones(4)
+    run = evidence(
+        time=np.arange(4.0), golden=ones, hardware=np.array([9.0, 9.0, 1.01, 9.0]), truth=ones,
+        unfiltered=1.2 * ones, reading=np.array([False, False, True, False]),
+    )  # fmt: skip
+    assert summarise(run)["accuracy_percent"] == pytest.approx({"unfiltered": 80.0, "golden": 100.0, "hardware": 99.0})
+
+
+@pytest.mark.parametrize(
+    "changes", [{"truth": None}, {"truth": np.zeros(3000)}, {"reading": np.zeros(3000, dtype=bool)}]
+)
+def test_accuracy_is_null_where_it_has_no_meaning(changes: dict[str, Any]) -> None:
+    measured = summarise(evidence(**changes))["accuracy_percent"]
+    assert measured == {"unfiltered": None, "golden": None, "hardware": None}
+
+
+def test_json_has_no_infinities(tmp_path: Path) -> None:
+    """Hardware equal to golden has no finite ratio of signal to error."""
+    run = evidence(cycles_per_second=math.inf)
+    write_report(replace(run, hardware=run.golden), tmp_path)
+    report = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
+    assert report["sqnr_db"] is None
+    assert report["cycles_per_second"] is None
+    assert "no error at all" in (tmp_path / "report.html").read_text(encoding="utf-8")
+
+
+def test_summary_of_a_core_without_filter() -> None:
+    assert set(summarise(plain())["frequency_response"].values()) == {None}
+
+
+# the verdict
+
+
+def shortfalls(run: Evidence) -> list[str]:
+    """Shortfalls, after a look at whether `passed` agrees with them."""
+    summary = summarise(run)
+    assert summary["passed"] == (summary["shortfalls"] == [])
+    found: list[str] = summary["shortfalls"]
+    return found
+
+
+def test_a_good_run_passes() -> None:
+    assert shortfalls(evidence()) == []
+
+
+def test_a_mismatch_falls_short() -> None:
+    run = evidence(mismatches=3, first_mismatch=1500)
+    assert shortfalls(run) == [
+        "The hardware differs from the integer model at 3 of 3,000 samples, first at sample 1,500."
+    ]
+    assert not summarise(run)["bit_exact"]
+
+
+def test_an_error_over_the_limit_falls_short() -> None:
+    assert shortfalls(evidence(bound=0.0001)) == ["The largest error is 122 nm, over the limit of 100 nm."]
+
+
+def test_an_error_over_the_allowance_falls_short() -> None:
+    assert shortfalls(evidence(max_error=0.00011)) == [
+        "The largest error is 122 nm, more than the 110 nm that the specification allows."
+    ]
+
+
+def test_a_mask_that_is_met_passes() -> None:
+    assert shortfalls(evidence(filter=masked(7))) == []
+
+
+def test_a_passband_loss_falls_short() -> None:
+    """Order 5 at the same cut-off: 10 log10(1 + (tan(.1 pi) / tan(.1417 pi))^10) = 0.131 dB at 10 Hz."""
+    ratio = math.tan(math.pi * 0.1) / math.tan(math.pi * 0.1417)
+    loss = 10 * math.log10(1 + ratio**10)
+    assert shortfalls(evidence(filter=masked(5))) == [
+        f"The passband loss is {loss:.4f} dB, more than the 0.02 dB allowed."
+    ]
+
+
+def test_a_stopband_attenuation_falls_short() -> None:
+    run = evidence(filter=masked(2, passband_edge=(1.0,)))
+    attenuation = 10 * math.log10(1 + (math.tan(math.pi * 0.45) / math.tan(math.pi * 0.1417)) ** 4)
+    assert shortfalls(run) == [f"The stopband attenuation is {attenuation:.3f} dB, less than the 60 dB asked for."]
+
+
+def test_a_rising_passband_falls_short() -> None:
+    louder = masked(7).ideal_sos.copy()
+    louder[0, :3] *= 10 ** (0.05 / 20)
+    assert shortfalls(evidence(filter=masked(7, quantized_sos=louder))) == [
+        "The passband rises 0.0500 dB above the level of the ideal filter."
+    ]
+
+
+def test_a_mask_met_with_equality_passes() -> None:
+    """A Chebyshev filter touches its mask; rounding its coefficients to 20 bits tips it by a hair."""
+    sos = signal.cheby1(5, 0.5, 10, fs=100, output="sos")
+    run = evidence(
+        filter=facts(ideal_sos=sos, quantized_sos=rounded(sos, 20), passband_edge=(10.0,), passband_loss=0.5)
+    )
+    assert 0.5 < summarise(run)["frequency_response"]["passband_loss_db"] < 0.501
+    assert shortfalls(run) == []
+
+
+def test_an_unstable_filter_falls_short() -> None:
+    """The bare verdict: no mask is needed to see that this filter cannot be."""
+    unstable = F7.copy()
+    unstable[1, 5] = 1.0001
+    assert shortfalls(evidence(filter=facts(quantized_sos=unstable))) == [
+        "The filter with its integer coefficients is unstable: a pole lies at radius 1.00005."
+    ]
+
+
+def test_notes_say_what_is_not_proven() -> None:
+    estimated = "The error limit is estimated in double precision, not yet proven."
+    assert summarise(evidence())["notes"] == [estimated]
+    assert summarise(evidence(proven=True))["notes"] == []
+    assert summarise(evidence(proven=True, max_error=0.00015))["notes"] == [
+        "The error limit 200 nm is wider than the 150 nm that the specification allows: "
+        "other inputs could exceed the allowance."
+    ]
+
+
+# the frequency response
+
+
+def test_group_delay_at_dc_of_the_paper() -> None:
+    """Sum of 2 sin of the pole angles over the pre-warped cut-off: 4.494 / 1.626 rad/s = 2.76 s.
+
+    The bilinear transformation keeps the delay at DC, and 1.626 rad/s is the cut-off of `F7` pre-warped.
+    """
+    angles = np.pi * (2 * np.arange(1, 8) - 1) / 14
+    cutoff = 200 * math.tan(math.pi * 0.2587803 / 100)
+    expected = float(np.sum(np.sin(angles))) / cutoff
+    assert expected == pytest.approx(2.764, abs=5e-4)
+    delay = response.group_delay(F7, np.array([0.0, 1e-6]), 100.0)
+    assert delay == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    "sos",
+    [
+        signal.butter(5, 10, fs=100, output="sos"),
+        signal.cheby1(4, 1, (8, 20), btype="bandpass", fs=100, output="sos"),
+        signal.bessel(6, 12, btype="highpass", fs=100, output="sos"),
+        np.array([[0.9, 0.4, 0.1, 1.0, -0.5, 0.2], [2.0, 0.5, 0.0, 1.0, 0.3, 0.0]]),
+    ],
+    ids=["butterworth", "chebyshev bandpass", "bessel highpass", "no zeros on the circle"],
+)
+def test_response_agrees_with_scipy(sos: Array) -> None:
+    """Reliable in scipy too: poles well inside, frequencies off the zeros at 0 and at Nyquist."""
+    frequency = np.linspace(3, 45, 50)
+    delay = sum(signal.group_delay((section[:3], section[3:]), w=frequency, fs=100)[1] for section in sos)
+    assert response.group_delay(sos, frequency, 100.0) == pytest.approx(np.asarray(delay) / 100, abs=1e-9)
+    _, gain = signal.sosfreqz(sos, worN=frequency, fs=100)
+    expected = 20 * np.log10(np.abs(gain))
+    assert response.magnitude_db(sos, frequency, 100.0) == pytest.approx(expected, abs=1e-8)
+
+
+def test_group_delay_where_the_response_vanishes() -> None:
+    """A zero on the unit circle without linear phase: the delay does not exist there."""
+    section = np.array([[1.0, -0.5, -0.5, 1.0, 0.0, 0.0]])
+    delay = response.group_delay(section, np.array([0.0, 25.0]), 100.0)
+    assert np.isnan(delay[0])
+    assert np.isfinite(delay[1])
+
+
+def test_group_delay_at_a_zero_of_linear_phase() -> None:
+    """All zeros of `F7` lie at Nyquist; half a sample each goes on there as if nothing had happened."""
+    delay = response.group_delay(F7, np.array([49.9, 50.0]), 100.0)
+    assert delay[1] == pytest.approx(delay[0], rel=1e-4)
+
+
+def test_magnitude_has_a_floor() -> None:
+    assert response.magnitude_db(F7, np.array([50.0]), 100.0) == pytest.approx(response.FLOOR_DB)
+
+
+def test_poles_and_zeros_leave_out_the_origin() -> None:
+    first_order = np.array([[0.5, 0.5, 0.0, 1.0, -0.9, 0.0]])
+    assert response.poles(first_order).tolist() == pytest.approx([0.9])
+    assert response.zeros(first_order).tolist() == pytest.approx([-1.0])
+
+
+def test_stopband_attenuation_an_octave_beyond_the_cutoff() -> None:
+    """Butterworth: 10 log10(1 + (tan(pi 2 fc/fs) / tan(pi fc/fs))^14), the smallest in the stopband."""
+    ratio = math.tan(2 * math.pi * 0.2587803 / 100) / math.tan(math.pi * 0.2587803 / 100)
+    measures = response.measure_response(facts(quantized_sos=F7))
+    assert measures.stopband_attenuation_db == pytest.approx(10 * math.log10(1 + ratio**14), abs=1e-6)
+    assert measures.passband_loss_db == pytest.approx(10 * math.log10(2), abs=1e-6)
+    assert measures.max_deviation_db_passband == 0.0
+
+
+def test_deviation_in_the_passband() -> None:
+    louder = F7.copy()
+    louder[0, :3] *= 10 ** (0.25 / 20)
+    measures = response.measure_response(facts(quantized_sos=louder))
+    assert measures.max_deviation_db_passband == pytest.approx(0.25, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("kind", "cutoff", "passing", "stopping"),
+    [
+        ("lowpass", (10.0,), [(0.0, 10.0)], [(20.0, 50.0)]),
+        ("lowpass", (30.0,), [(0.0, 30.0)], [(40.0, 50.0)]),
+        ("highpass", (10.0,), [(10.0, 50.0)], [(0.0, 5.0)]),
+        ("bandpass", (8.0, 12.0), [(8.0, 12.0)], [(0.0, 4.0), (24.0, 50.0)]),
+        ("bandstop", (8.0, 12.0), [(0.0, 8.0), (12.0, 50.0)], [(9.0, 11.0)]),
+    ],
+)
+def test_bands(
+    kind: str, cutoff: tuple[float, ...], passing: list[response.Band], stopping: list[response.Band]
+) -> None:
+    filter_facts = facts(kind=kind, cutoff=cutoff)
+    assert response.passbands(filter_facts) == passing
+    assert response.stopbands(filter_facts) == stopping
+
+
+def test_given_sections_have_a_passband_but_no_stopband() -> None:
+    measures = response.measure_response(facts(cutoff=None, quantized_sos=F7))
+    assert measures.stopband_attenuation_db is None
+    assert 2.9 < measures.passband_loss_db <= 10 * math.log10(2)
+
+
+def test_frequencies_reach_well_below_the_cutoff() -> None:
+    for filter_facts in (facts(), facts(cutoff=None)):
+        grid = response.frequency_grid(filter_facts)
+        assert grid[0] < 0.01
+        assert grid[-1] == 50.0
+
+
+# the page
+
+
+def test_same_evidence_gives_the_same_bytes(built: tuple[str, Path, dict[str, Any]], tmp_path: Path) -> None:
+    case, directory, _ = built
+    write_report(CASES[case](), tmp_path)
+    for name in ("report.json", "report.html"):
+        assert (tmp_path / name).read_bytes() == (directory / name).read_bytes()
+
+
+def test_page_needs_nothing_from_elsewhere(built: tuple[str, Path, dict[str, Any]]) -> None:
+    content = (built[1] / "report.html").read_text(encoding="utf-8")
+    page = Page(content)
+    assert page.open == []
+    assert not {"script", "link", "img", "iframe", "image"} & set(page.tags)
+    references = [value for name, value in page.attributes if name in ("src", "href", "xlink:href")]
+    assert all(value.startswith("#") for value in references)
+    assert not re.search(r"https?:|url\((?!#)|@import", content)
+    assert len(content.encode()) < 1_500_000
+
+
+def test_references_inside_the_page_lead_somewhere(built: tuple[str, Path, dict[str, Any]]) -> None:
+    content = (built[1] / "report.html").read_text(encoding="utf-8")
+    page = Page(content)
+    targets = re.findall(r"url\(#([^)]*)\)", content)
+    targets += [value[1:] for name, value in page.attributes if name == "href"]
+    identifiers = [value for name, value in page.attributes if name == "id"]
+    assert targets
+    assert set(targets) <= set(identifiers)
+    assert len(identifiers) == len(set(identifiers))
+
+
+def test_every_colour_of_a_figure_follows_the_page(built: tuple[str, Path, dict[str, Any]]) -> None:
+    """No colour of its own, which would vanish on a dark page; nothing left of the placeholders."""
+    content = (built[1] / "report.html").read_text(encoding="utf-8")
+    figures = "".join(re.findall(r"<svg.*?</svg>", content, flags=re.DOTALL))
+    assert not re.search(r"#[0-9a-f]{6}\b(?!\))", re.sub(r'(href|id)="[^"]*"', "", figures))
+    style = content[: content.index("</style>")]
+    for role in plots.ROLES:
+        assert style.count(f"--{role}:") == 2
+
+
+def test_page_says_the_verdict_first(built: tuple[str, Path, dict[str, Any]]) -> None:
+    case, directory, _ = built
+    content = (directory / "report.html").read_text(encoding="utf-8")
+    kind, verdict = ("fail", "Falls short") if case == "failing" else ("pass", "Passed")
+    start = content[: content.index("<dl")]
+    assert f"<strong>{verdict}</strong>" in start
+    assert f'<div class="verdict {kind}">' in start
+
+
+def test_page_shows_numbers_with_units() -> None:
+    content = " ".join(Page(page_of(evidence())).words)
+    for words in ("122\u00a0nm", "0.500 LSB", "200\u00a0nm", "−66,026,473", "s18.14", "5.048", "3.01 dB"):
+        assert words in content
+
+
+def page_of(run: Evidence) -> str:
+    """Page of `run`."""
+    return render_page(run, summarise(run))
+
+
+def test_texts_from_outside_are_escaped() -> None:
+    """Every text that the page takes, each with markup and its own mark, appears in words and not as markup."""
+    nasty = "<script>alert('{}')</script>&amp;\"$x$"
+    marks = iter(range(100))
+
+    def text() -> str:
+        return nasty.format(next(marks))
+
+    run = evidence(
+        name=text(), core=text(), description=text(), scenario=text(), unit=text(), simulator=text(),
+        realization=text(), architecture=text(), why=text(), tools={text(): text()}, bound_parts={text(): 0.1},
+        formats=(Format(node=text(), notation=text(), low=0.0, high=1.0, unit=text()),),
+        sections=(
+            {
+                "name": text(),
+                "realization": text(),
+                "coefficients": [{"name": text(), "integer": 1, "frac": 0, "value": 1.0}],
+            },
+        ),
+        alternatives=(Alternative(name=text(), max_abs=0.4, rms=0.1),),
+    )  # fmt: skip
+    page = Page(page_of(run))
+    assert "script" not in page.tags
+    assert page.open == []
+    words = "".join(page.words).replace("\u00a0", " ")
+    for number in range(next(marks) - 1):
+        assert nasty.format(number)[:26] in words
+
+
+def test_a_dollar_sign_in_a_figure_is_no_formula() -> None:
+    assert "output in $x^2$" in Page(page_of(evidence(unit="$x^2$"))).words
+
+
+def test_page_shows_what_rounding_keeps_up() -> None:
+    words = " ".join(Page(page_of(evidence())).words).replace("\u00a0", " ")
+    start = words.index("What rounding can keep up by itself")
+    rows = " ".join(words[start:].split())
+    assert "section 0 30.0 nm 0.123 LSB none none exist" in rows
+    assert "section 1 none, proven 61.0 nm 0.250 LSB 1, 0.3333" in rows
+    assert "What rounding can keep up by itself" not in page_of(plain())
+
+
+def test_a_delay_beyond_all_bounds_is_not_framed() -> None:
+    """A zero that rounding has moved off z = -1 delays the nothing that is left at Nyquist by any time at all."""
+    ideal = signal.butter(1, 1000, fs=48000, output="sos")
+    moved = ideal * [1, 1 + 1e-6, 1, 1, 1, 1]
+    drawn = plots.delay_figure(facts(ideal_sos=ideal, quantized_sos=moved, sample_rate=48000.0, cutoff=(1000.0,)))
+    assert "group delay in µs" in Page(drawn).words
+
+
+def test_this_design_is_not_its_own_alternative() -> None:
+    known = evidence().alternatives
+    itself = Alternative(name="df1_ef2", max_abs=0.1, rms=0.1)
+    assert page_of(evidence(alternatives=(*known, itself))) == page_of(evidence())
+
+
+@pytest.mark.parametrize(("length", "unfolded"), [(24, True), (25, False)])
+def test_many_formats_are_folded_up(length: int, unfolded: bool) -> None:
+    formats = [Format(node=f"stage.n{i}", notation="Q1.15", low=-1.0, high=1.0) for i in range(length)]
+    page = Page(page_of(evidence(formats=formats)))
+    assert page.words.count("stage") == 2  # title of the column, and of the first row only
+    assert page.words.count("Q1.15") == length
+    assert (("open", "") in page.attributes) == unfolded
+
+
+@pytest.mark.parametrize("length", [1, 2, 7])
+def test_a_handful_of_samples_makes_a_page(length: int) -> None:
+    run = plain(time=np.arange(float(length)), golden=np.zeros(length), hardware=np.zeros(length))
+    assert Page(page_of(run)).open == []
+
+
+def test_a_limit_far_outside_is_named_instead_of_drawn() -> None:
+    run = evidence(bound=0.5, max_error=1.0)
+    assert plots.error_limits(run)[0] == []
+    assert "Too far out to draw: limit ±500\u00a0µm and allowed by the specification ±1.00\u00a0mm." in page_of(run)
+
+
+def test_thinning_keeps_peaks() -> None:
+    values = np.random.default_rng(3).standard_normal(100_003)
+    values[77_777] = 100.0
+    values[50_001] = -100.0
+    time, thin = plots.envelope(np.arange(100_003.0), values, 500)
+    assert len(thin) <= 1000
+    assert thin.max() == 100.0
+    assert thin.min() == -100.0
+    assert time[np.argmax(thin)] == 77_777
+    assert np.all(np.diff(time) > 0)
+
+
+def test_thinning_leaves_short_traces_alone() -> None:
+    values = np.arange(1000.0)
+    assert plots.envelope(values, values, 500)[1] is values
+
+
+def test_close_up_holds_the_largest_error() -> None:
+    for worst in (0, 5, 1500, 2999):
+        hardware = evidence().golden.copy()
+        hardware[worst] += 1
+        near = plots.close_up(evidence(hardware=hardware))
+        assert near.stop - near.start == 60
+        assert near.start <= worst < near.stop
+
+
+# files
+
+
+def test_a_page_that_fails_leaves_the_old_report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Neither file is written before both are made."""
+    write_report(evidence(), tmp_path)
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+
+    def fail(*_: object) -> str:
+        raise RuntimeError("no picture")
+
+    monkeypatch.setattr(plots, "trace_figure", fail)
+    with pytest.raises(RuntimeError, match=r"^no picture$"):
+        write_report(evidence(seed=8), tmp_path)
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+# refusals
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"lsb": 0.0}, "lsb must be positive and finite, not 0.0"),
+        ({"bound": math.nan}, "bound must be positive and finite, not nan"),
+        ({"max_error": math.inf}, "max_error must be positive and finite, not inf"),
+        ({"samples": 0}, "samples must be at least 1, not 0"),
+        (
+            {"hardware": np.zeros((2, 2, 2))},
+            "hardware must have the shape (n,) or (n, channels) with n >= 1, not (2, 2, 2)",
+        ),
+        ({"hardware": np.zeros((2, 2))}, "time must have the shape (2,), not (3000,)"),
+        ({"hardware": np.zeros((3000, 2))}, "golden must have the shape (3000, 2), not (3000,)"),
+        ({"truth": np.zeros(2)}, "truth must have the shape (3000,), not (2,)"),
+        ({"golden": np.full(3000, np.nan)}, "golden must be finite, not NaN or infinite"),
+    ],
+)
+def test_evidence_refuses(changes: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=f"^{re.escape(message)}$"):
+        evidence(**changes)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"kind": "allpass"}, "kind must be one of lowpass, highpass, bandpass, bandstop, not 'allpass'"),
+        ({"cutoff": (1.0, 2.0)}, "cutoff of a lowpass must hold 1 frequencies, not (1.0, 2.0)"),
+        ({"ideal_sos": np.zeros((2, 5))}, "ideal_sos must have the shape (n_sections, 6), not (2, 5)"),
+    ],
+)
+def test_filter_facts_refuse(changes: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=f"^{re.escape(message)}$"):
+        facts(**changes)
+
+
+# numbers for people
+
+
+@pytest.mark.parametrize("module", [quantity, response])
+def test_examples_in_docstrings(module: Any) -> None:
+    results = doctest.testmod(module)
+    assert results.attempted > 0
+    assert results.failed == 0
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "words"),
+    [
+        (0.9999, "mm", "1.00 mm"),
+        (0.00099996, "mm", "1.00 µm"),
+        (1e-3, "m", "1.00 mm"),
+        (16.0, "mm", "16.0 mm"),
+        (-2500.0, "mm", "−2.50 m"),
+        (1500.0, "kHz", "1.50 MHz"),
+        (2.0, "cm", "2.00 cm"),
+        (0.5, "", "0.500"),
+        (123456.0, "", "123,456"),
+        (1.5e7, "", "15.0 × 10⁶"),
+        (0.004, "degC", "4.00 × 10⁻³ °C"),
+        (math.nan, "mm", "—"),
+        (None, "mm", "—"),
+    ],
+)
+def test_quantities(value: float | None, unit: str, words: str) -> None:
+    assert quantity.quantity(value, unit) == words
+
+
+def test_several_channels_are_measured_together_and_the_worst_is_shown() -> None:
+    one = evidence()
+    arrays = {
+        name: np.stack([getattr(one, name)] * 3, axis=1)
+        for name in ("golden", "truth", "reading", "unfiltered")
+        if getattr(one, name) is not None
+    }
+    hardware = np.stack([one.hardware] * 3, axis=1)
+    hardware[100, 1] += 2 * one.lsb
+    several = replace(one, hardware=hardware, channels=3, samples=hardware.size, **arrays)
+    assert several.worst_channel == 1
+    shown = several.of_channel(1)
+    assert shown.shown_channel == 1
+    assert shown.hardware.tolist() == hardware[:, 1].tolist()
+    summary = summarise(several)
+    assert summary["error"]["max_abs"] == np.abs(several.error).max() > summarise(one)["error"]["max_abs"]
+    assert summary["error"]["rms"] == pytest.approx(np.sqrt(np.mean(several.error**2)))
+    page = render_page(several, summary)
+    assert "All pictures show channel 1, the one of 3 with the largest error" in page
+    assert "All pictures show" not in render_page(one, summarise(one))

@@ -1,0 +1,180 @@
+"""A datapath's program computes what its graphs compute, in the words and the accumulator that it states."""
+
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from tests.formal.small import limiter
+from tests.gen.designs import ALL, example_design
+
+from sosmith.model.dataflow.datapath import Datapath
+from sosmith.model.dataflow.folding import FoldingError, program
+from sosmith.model.dataflow.program import HAZARD, Do, Instruction, Program, digits_of
+
+FOLDABLE = ("df1", "df1_ef1", "df1_ef2", "df2t", "delta", "state_space")
+READS = {Do.MULTIPLY, Do.OPERAND, Do.PRODUCT, Do.GIVE}
+WRITES = {Do.TAKE, Do.STORE, Do.FINISH}
+
+
+def stimulus(datapath: Datapath, samples: int) -> np.ndarray:
+    """Noise, then both rails."""
+    rng = np.random.default_rng(7)
+    columns = [rng.integers(port.lowest, port.highest + 1, samples) for port in datapath.inputs]
+    codes = np.stack(columns, axis=1)
+    codes[samples // 2 : samples * 3 // 4] = [port.lowest for port in datapath.inputs]
+    codes[samples * 3 // 4 :] = [port.highest for port in datapath.inputs]
+    return codes
+
+
+def run(made: Program, datapath: Datapath, codes: np.ndarray) -> list[int]:
+    graph = datapath.stages[0].graph
+    fracs = [graph.nodes[i].frac for i in graph.inputs]
+    words = made.reset()
+    given_out = [made.step(sample, words, fracs).code for sample in codes.tolist()]
+    return [min(max(code, datapath.output.lowest), datapath.output.highest) for code in given_out]
+
+
+@pytest.mark.parametrize("digit_bits", [8, 15, 17])
+@pytest.mark.parametrize("realization", FOLDABLE)
+@pytest.mark.parametrize("example", ALL)
+def test_a_program_computes_the_same_codes(example: str, realization: str, digit_bits: int) -> None:
+    datapath = example_design(example, realization=realization).datapath
+    codes = stimulus(datapath, 60)
+    assert run(program(datapath, digit_bits), datapath, codes) == datapath.compute_exact(codes)
+
+
+def test_a_wrong_constant_is_noticed() -> None:
+    datapath = example_design("audio_lowpass.toml", realization="df1_ef2").datapath
+    made = program(datapath, 15)
+    place = next(k for k, (do, _, constant) in enumerate(made.instructions) if do is Do.MULTIPLY and constant > 1000)
+    do, address, constant = made.instructions[place]
+    wrong = [*made.instructions]
+    wrong[place] = Instruction(do, address, constant // 2)
+    codes = stimulus(datapath, 60)
+    assert run(replace(made, instructions=tuple(wrong)), datapath, codes) != datapath.compute_exact(codes)
+
+
+@pytest.mark.parametrize("realization", FOLDABLE)
+def test_what_is_read_was_stored_long_enough_before(realization: str) -> None:
+    made = program(example_design("flange_wear_locomotive.toml", realization=realization).datapath, 15)
+    stored = {}
+    for k, (do, address, _) in enumerate(made.instructions):
+        if do in READS and address in stored:
+            assert k - stored[address] >= HAZARD
+        if do in WRITES:
+            stored[address] = k
+    assert made.instructions[-1].do is Do.GIVE
+
+
+@pytest.mark.parametrize("digit_bits", [10, 15])
+def test_constants_and_words_fit_the_multiplier(digit_bits: int) -> None:
+    made = program(example_design("flange_wear_locomotive.toml", realization="df1_ef2").datapath, digit_bits)
+    limit = 1 << digit_bits
+    assert all(-limit <= constant < limit for _, _, constant in made.instructions)
+    assert {address for do, address, _ in made.instructions if do in WRITES}.isdisjoint({made.one})
+    states = sorted((place for place in made.places if place.is_state), key=lambda place: place.address)
+    ends = [place.address + place.digits for place in states]
+    assert [place.address for place in states] == [0, *ends[:-1]]
+    assert made.states == ends[-1]
+    others = [place for place in made.places if not place.is_state]
+    assert all(made.states <= place.address <= made.one - place.digits for place in others)
+    assert made.words == made.one + 1 == 1 << made.one.bit_length()
+
+
+def test_words_are_used_again() -> None:
+    made = program(example_design("flange_wear_locomotive.toml", realization="df1_ef2").datapath, 15)
+    others = [place for place in made.places if not place.is_state]
+    assert made.words - made.states < sum(place.digits for place in others)
+
+
+def test_the_schedule_covers_the_program() -> None:
+    made = program(example_design("flange_wear_locomotive.toml", realization="df1_ef2").datapath, 15)
+    ends = [start + count for _, start, count in made.schedule]
+    assert [start for _, start, _ in made.schedule] == [0, *ends[:-1]]
+    assert ends[-1] == len(made.instructions)
+
+
+def test_an_accumulator_that_is_too_narrow_is_noticed() -> None:
+    datapath = example_design("audio_lowpass.toml", realization="df1_ef2").datapath
+    made = program(datapath, 15)
+    with pytest.raises(OverflowError, match=r"^the accumulator must stay within 24 bits, not -?\d+$"):
+        run(replace(made, accumulator_bits=24), datapath, stimulus(datapath, 60))
+
+
+def test_truncation_cannot_be_folded() -> None:
+    datapath = example_design("audio_lowpass.toml", realization="normal").datapath
+    with pytest.raises(FoldingError, match=r"^the datapath must not truncate inside to be folded$"):
+        program(datapath, 15)
+
+
+def test_serial_clocks_are_those_of_the_constants_bits() -> None:
+    """One clock a bit, the sign's included; what is left of a negative constant ends as -1."""
+    base = program(example_design("audio_lowpass.toml", realization="df1_ef2").datapath, 15)
+
+    def clocks(do: Do, constant: int = 0) -> int:
+        return replace(base, instructions=(Instruction(do, 1, constant),)).serial_cycles
+
+    found = {constant: clocks(Do.MULTIPLY, constant) for constant in (1, 2, 3, 4, 32767, -1, -2, -3, -4, -32768)}
+    assert found == {1: 1, 2: 2, 3: 2, 4: 3, 32767: 15, -1: 1, -2: 2, -3: 3, -4: 3, -32768: 16}
+    assert [clocks(do) for do in (Do.STORE, Do.GIVE, Do.NOTHING, Do.PRODUCT)] == [1, 1, 1, 16]
+
+
+@given(st.integers(-(1 << 44), (1 << 44) - 1))
+def test_digits_make_the_code(code: int) -> None:
+    digits = digits_of(code, 3, 15)
+    assert sum(digit * Fraction(2) ** (15 * k) for k, digit in enumerate(digits)) == code
+    assert all(0 <= digit < 1 << 15 for digit in digits[:-1])
+    assert -(1 << 15) <= digits[-1] < 1 << 15
+
+
+def test_a_padded_program_does_nothing_first() -> None:
+    datapath = example_design("audio_lowpass.toml", realization="df1_ef2").datapath
+    made = program(datapath, 15)
+    count = len(made.instructions)
+    padded = made.padded(count + 7)
+    assert padded.instructions == (*[Instruction(Do.NOTHING)] * 7, *made.instructions)
+    codes = stimulus(datapath, 20)
+    assert run(padded, datapath, codes) == datapath.compute_exact(codes)
+    with pytest.raises(ValueError, match=rf"^a program must have at most {count - 1} instructions, not {count}$"):
+        made.padded(count - 1)
+
+
+def test_a_program_takes_over_only_where_everything_fits() -> None:
+    datapath = example_design("audio_lowpass.toml", realization="df1_ef2").datapath
+    made = program(datapath, 15)
+    assert program(datapath, 15, like=made) == made
+    roomy = replace(made, words=made.words + 3, accumulator_bits=made.accumulator_bits + 2)
+    taken = program(datapath, 15, like=roomy)
+    assert (taken.words, taken.accumulator_bits) == (roomy.words, roomy.accumulator_bits)
+    for changed, message in (
+        ({"accumulator_bits": 20}, rf"bits of the accumulator must be at most 20, not {made.accumulator_bits}"),
+        ({"words": 5}, rf"words of memory must be at most 5, not {made.words}"),
+        ({"digit_bits": 14}, "digit_bits must be 14, not 15"),
+        ({"places": ()}, r"its states must be \[\], not \[.*\]"),
+        ({"inputs": ()}, r"digits and fraction bits of its inputs must be \[\], not \[.*\]"),
+    ):
+        with pytest.raises(FoldingError, match=rf"^to take over, {message}$"):
+            program(datapath, 15, like=replace(made, **changed))
+
+
+def test_a_state_keeps_its_digits() -> None:
+    """A program that would need fewer digits for a state takes as many as before: the upper ones hold its sign."""
+    datapath = example_design("audio_lowpass.toml", realization="df1_ef2").datapath
+    made = program(datapath, 15)
+    wider = tuple(replace(p, digits=p.digits + (p.name == "section1.v1")) for p in made.places)
+    with pytest.raises(FoldingError, match=r"^to take over, its states must be .*$"):
+        program(datapath, 15, like=replace(made, places=wider))  # the places behind it would have to move
+    last = [p for p in made.places if p.is_state][-1].name
+    wider = tuple(replace(p, digits=p.digits + (p.name == last)) for p in made.places)
+    taken = program(datapath, 15, like=replace(made, places=wider, words=made.words + 1))
+    assert next(p.digits for p in taken.places if p.name == last) == next(p.digits for p in wider if p.name == last)
+    codes = stimulus(datapath, 20)
+    assert run(taken, datapath, codes) == datapath.compute_exact(codes)
+
+
+def test_the_accumulator_holds_a_word_however_small_the_sums() -> None:
+    made = program(limiter(), 15)
+    assert made.accumulator_bits == 16

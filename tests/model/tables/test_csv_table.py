@@ -1,0 +1,67 @@
+"""Strict CSV reading: every way a file can be wrong is refused with file, line and cure."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from sosmith.model.errors import SpecificationError
+from sosmith.model.tables.csv_table import read_csv_table
+
+
+def test_reads_numbers_in_any_column_order(tmp_path: Path) -> None:
+    path = tmp_path / "t.csv"
+    path.write_bytes("\ufeffb, a\r\n1, -2.5e-1\r\n\r\n.5,3.\r\n".encode())
+    table = read_csv_table(path, ["a", "b", "c"], required=["a"])
+    assert table.column("a").tolist() == [-0.25, 3.0]
+    assert table.column("b").tolist() == [1.0, 0.5]
+    assert table.lines == (2, 4)
+    assert "b" in table
+    assert "c" not in table
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"", " must hold a header line and rows of numbers, not nothing"),
+        (b"\n\n", " must hold a header line and rows of numbers, not nothing"),
+        (b"a,b\n", " must hold rows of numbers below its header, not the header only"),
+        (b"a,x\n1,2\n", ", line 1: column must be one of a, b, c, not 'x'"),
+        (
+            b"a;b\n1,5;2\n",
+            ", line 1: cells must be separated by commas, with points in decimal numbers, not by semicolons",
+        ),
+        (b"a\tb\n1\t2\n", ", line 1: cells must be separated by commas, with points in decimal numbers, not by tabs"),
+        (b"a,\n1,2\n", ", line 1: column must be one of a, b, c, not ''"),
+        (b"a,b,a\n1,2,3\n", ", line 1: column a must be there once, not 2 times"),
+        (b"b\n1\n", ", line 1: column a must be there, not missing among b"),
+        (b"a,b\n1,2\n1,2,3\n", ", line 3: row must have 2 cells, not 3"),
+        (b"a,b\n1,2\n1\n", ", line 3: row must have 2 cells, not 1"),
+        (b"a,b\n1,two\n", ", line 2: b must be a finite number, not 'two'"),
+        (b"a,b\n1,\n", ", line 2: b must be a finite number, not ''"),
+        (b"a,b\n1,nan\n", ", line 2: b must be a finite number, not 'nan'"),
+        (b"a,b\n1,2\n-inf,2\n", ", line 3: a must be a finite number, not '-inf'"),
+        (b"a,b\n1,1e999\n", ", line 2: b must be a finite number, not '1e999'"),
+        (b"a,b\n1,1e101\n", ", line 2: b must be from -1e+100 to 1e+100, not '1e101'"),
+        (b"a,b\n1," + b"9" * 400 + b"\n", f", line 2: b must be a finite number, not '{'9' * 56}' ..."),
+        (b"a,b\n1_0,2\n", ", line 2: a must be a finite number, not '1_0'"),
+        ("a,b\n1,٣\n".encode(), ", line 2: b must be a finite number, not '٣'"),
+        (b"a,b\n1;5,2\n", ", line 2: a must be a finite number, not '1;5'"),
+        (b"a,b\n1,2\n3,\xb5\n", ", line 3: text must be UTF-8, not contain the byte 0xb5"),
+        (b'a,b\n1,"2\n', ", line 2: row must be valid CSV, not broken (unexpected end of data)"),
+    ],
+)
+def test_refusals(tmp_path: Path, content: bytes, message: str) -> None:
+    path = tmp_path / "t.csv"
+    path.write_bytes(content)
+    with pytest.raises(SpecificationError, match=f"^{re.escape(str(path) + message)}$"):
+        read_csv_table(path, ["a", "b", "c"], required=["a"])
+
+
+def test_missing_file_and_folder(tmp_path: Path) -> None:
+    for path, reason in ((tmp_path / "none.csv", "no such file or directory"), (tmp_path, "is a directory")):
+        message = f"{path} must be a readable CSV file ({reason})"
+        with pytest.raises(SpecificationError, match=f"^{re.escape(message)}$"):
+            read_csv_table(path, ["a"])
