@@ -13,10 +13,10 @@ from click.testing import CliRunner, Result
 from sosmith.cli import cli
 from sosmith.gen.core import design_core
 from sosmith.gen.specification.specification import load
+from sosmith.gen.stimuli import traces_for
 from sosmith.model.errors import SpecificationError
 from sosmith.model.scenarios.file import load_scenario, range_notes
 from sosmith.model.scenarios.vehicle_clearance import vehicle_clearance
-from sosmith.sim.simulation import traces_for
 from tests.model.scenarios.scenario_texts import CALIBRATION, PLAIN
 from tests.test_cli import FILTER, INSTRUMENT
 
