@@ -118,7 +118,7 @@ def _limit_cycles(name: str, graph: Graph, output: Port) -> dict[str, Any]:
 
 
 def _schedule(program: Program | None) -> dict[str, Any] | None:
-    """Program of the folded and serial architectures; each instruction as what it does, address and constant."""
+    """Program of the folded and serial architectures; each instruction as opcode, address and constant."""
     if program is None:
         return None
     return {
@@ -128,9 +128,9 @@ def _schedule(program: Program | None) -> dict[str, Any] | None:
         "words": program.words,
         "places": [
             {"name": p.name, "address": p.address, "digits": p.digits, "frac": p.frac, "state": p.is_state}
-            for p in sorted(program.places, key=lambda place: place.address)
+            for p in sorted(program.locations, key=lambda location: location.address)
         ],
-        "instructions": [[do.value, address, constant] for do, address, constant in program.instructions],
+        "instructions": [[opcode.mnemonic, address, constant] for opcode, address, constant in program.instructions],
     }
 
 

@@ -36,7 +36,7 @@ def test_one_unit_for_all(architecture: str) -> None:
         f"{architecture}: asked for in the specification; takes {clocks + 1:,} of 2,083 clocks a sample"
     )
     schedule = json.loads(json.dumps(tree["schedule"]))
-    assert [[i.do.value, i.address, i.constant] for i in program.instructions] == schedule["instructions"]
+    assert [[i.opcode.mnemonic, i.address, i.constant] for i in program.instructions] == schedule["instructions"]
     assert sum(count for _, _, count in program.schedule) == len(program.instructions)
     assert [name for name, _, _ in program.schedule][:: len(program.schedule) - 1] == ["input", "output"]
 

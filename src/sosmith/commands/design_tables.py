@@ -103,9 +103,9 @@ def _print_schedule(console: Console, program: Program | None) -> None:
         f"Schedule: {len(program.instructions)} instructions for each sample of each channel",
         ["from", "clocks", "value", "words"],
     )
-    places = {place.name: f"{place.address}..{place.address + place.digits - 1}" for place in program.places}
+    words = {at.name: f"{at.address}..{at.address + at.digits - 1}" for at in program.locations}
     for name, start, count in program.schedule:
-        table.add_row(str(start), str(count), escape(name), places.get(name, ""))
+        table.add_row(str(start), str(count), escape(name), words.get(name, ""))
     console.print(table)
 
 
