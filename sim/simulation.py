@@ -14,12 +14,13 @@ import numpy as np
 import numpy.typing as npt
 
 from sosmith.gen.core import CoreDesign
+from sosmith.gen.filter.response import FilterFacts
 from sosmith.gen.fpga.boards import Board
 from sosmith.gen.fpga.synthesis import Netlist, synthesize
 from sosmith.gen.output.core_facts import CoreFacts, core_facts
 from sosmith.gen.output.generate import generate
 from sosmith.gen.realizations.registry import ERROR_FEEDBACK
-from sosmith.gen.report.evidence import Alternative, Evidence, FilterFacts
+from sosmith.gen.report.evidence import Alternative, Evidence
 from sosmith.gen.word_lengths.quantize import Quantized, with_realization
 from sosmith.model.errors import SpecificationError
 from sosmith.model.port import Codes, Values

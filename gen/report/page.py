@@ -10,11 +10,12 @@ from html import escape
 from importlib.resources import files
 from typing import Any
 
+from sosmith.gen.filter.response import FilterFacts
 from sosmith.gen.fpga.synthesis import Netlist
 from sosmith.gen.output.core_facts import NodeFormat
 from sosmith.gen.quantity import count, decibels, duration, plain_number, quantity, scale, unit_symbol
 from sosmith.gen.report import plots
-from sosmith.gen.report.evidence import Evidence, FilterFacts
+from sosmith.gen.report.evidence import Evidence
 
 Summary = Mapping[str, Any]
 

@@ -20,12 +20,14 @@ from scipy import signal
 
 from sosmith.gen import quantity
 from sosmith.gen.filter import response
+from sosmith.gen.filter.response import FilterFacts
 from sosmith.gen.fpga.boards import find_board
 from sosmith.gen.fpga.synthesis import Netlist
 from sosmith.gen.output.core_facts import CoefficientFacts, LimitCycleFacts, NodeFormat, SectionFacts
 from sosmith.gen.report import plots
+from sosmith.gen.report.evidence import Alternative, Evidence
 from sosmith.gen.report.page import render_page
-from sosmith.gen.report.report import Alternative, Evidence, FilterFacts, summarise, write_report
+from sosmith.gen.report.report import summarise, write_report
 
 Array = npt.NDArray[np.float64]
 
