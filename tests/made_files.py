@@ -141,7 +141,7 @@ def _design(name: str, folder: Path) -> None:
 
 
 def _report(name: str, folder: Path) -> None:
-    """Make the report of a short co-simulation, and its page, but for the speed in them, which is none of the design."""
+    """Make the report of a short co-simulation, and its page, without the speed in them."""
     with tempfile.TemporaryDirectory() as scratch:
         _print("simulate", _specification(name, folder), "--seconds", "0.005", "-o", scratch)
         report = json.loads((Path(scratch) / "report.json").read_text(encoding="utf-8"))
