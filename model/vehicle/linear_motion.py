@@ -1,4 +1,4 @@
-"""Linear mechanical systems: assembled from springs and dampers, their modes, their exact response."""
+"""Linear mechanical systems: assembly from springs and dampers, modes, exact response."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class Mode:
-    """A mode of free motion, exp(growth t) cos(2 pi frequency t).
+    """A mode of free vibration, exp(growth t) cos(2 pi frequency t).
 
     Attributes
     ----------
     frequency : float
-        In Hz; 0 for a motion that dies away or grows without swinging.
+        Frequency in Hz; 0 for a mode that decays or grows without oscillating.
     growth : float
-        Real part of the eigenvalue in 1/s; below 0 if the motion dies away.
+        Real part of the eigenvalue in 1/s; negative if the mode decays.
     coordinate : str
-        The kind of coordinate with the most of the kinetic energy: its name without numbers, since in a symmetric
-        system rounding alone would decide between twins.
+        The kind of coordinate with the largest share of kinetic energy: a coordinate's name without numbers, since in
+        a symmetric system only rounding would distinguish equal coordinates.
     """
 
     frequency: float
@@ -35,21 +35,21 @@ class Mode:
 
     @property
     def damping(self) -> float:
-        """Damping ratio: minus the real part over the magnitude of the eigenvalue, 1 without swinging."""
+        """Damping ratio: minus the real part over the magnitude of the eigenvalue; 1 without oscillation."""
         size = float(np.hypot(self.growth, 2 * np.pi * self.frequency))
         return -self.growth / size if size else 0.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LinearSystem:
-    """The equations mass q'' + damping q' + stiffness q = force.
+    """The equations of motion mass q'' + damping q' + stiffness q = force.
 
     Attributes
     ----------
     names : tuple of str
         Names of the n coordinates.
     mass, damping, stiffness : ndarray, shape (n, n)
-        Matrices in SI units; the mass is symmetric and positive definite.
+        Matrices in SI units; the mass matrix is symmetric and positive definite.
     """
 
     names: tuple[str, ...]
@@ -58,19 +58,19 @@ class LinearSystem:
     stiffness: Array
 
     def state_matrix(self) -> Array:
-        """Matrix A of x' = A x + (0, mass^-1 force) for the state x = (q, q'), shape (2 n, 2 n)."""
+        """Return the matrix A of x' = A x + (0, mass^-1 force) for the state x = (q, q'), shape (2 n, 2 n)."""
         n = len(self.names)
         inverse = np.linalg.inv(self.mass)
         return np.block([[np.zeros((n, n)), np.eye(n)], [-inverse @ self.stiffness, -inverse @ self.damping]])
 
     def modes(self) -> tuple[Mode, ...]:
-        """All modes by rising frequency and growth; of each conjugate pair one, so n to 2 n of them."""
+        """Return all modes by rising frequency, then growth; one per conjugate pair, so n to 2 n modes."""
         values, vectors = np.linalg.eig(self.state_matrix())
         kinds = [" ".join(word for word in name.split(" ") if not word.isdigit()) for name in self.names]
         found = []
         for value, vector in zip(values, vectors.T, strict=True):
             if value.imag >= 0:
-                # displacements stand first; their rates of change are only a factor off
+                # displacements come first; velocities differ only by a factor
                 energy = dict.fromkeys(kinds, 0.0)
                 for kind, mass, moved in zip(kinds, np.diag(self.mass), vector[: len(kinds)], strict=True):
                     energy[kind] += float(mass * abs(moved) ** 2)
@@ -79,25 +79,25 @@ class LinearSystem:
         return tuple(sorted(found, key=lambda mode: (mode.frequency, mode.growth)))
 
     def energy(self, displacement: Array, velocity: Array) -> Array:
-        """Kinetic and elastic energy in J over time, shape (m,), of motions of shape (m, n).
+        """Return kinetic plus elastic energy in J, shape (m,), of motions of shape (m, n).
 
-        An energy only if the stiffness is symmetric.
+        It is an energy only if the stiffness matrix is symmetric.
         """
         kinetic = np.einsum("ti,ij,tj->t", velocity, self.mass, velocity)
         elastic = np.einsum("ti,ij,tj->t", displacement, self.stiffness, displacement)
         return np.asarray((kinetic + elastic) / 2)
 
     def respond(self, force: Array, step: float, start: tuple[Array, Array] | None = None) -> tuple[Array, Array]:
-        """Motion under a force that is linear between its samples: exact but for rounding.
+        """Return the motion under a force that is linear between its samples, exact except for rounding.
 
         Parameters
         ----------
         force : ndarray, shape (m, n)
             Force on each coordinate at times 0, step, 2 step, ...
         step : float
-            In s.
+            Time step in s.
         start : pair of ndarray, shape (n,), optional
-            Displacements and velocities at time 0; otherwise rest.
+            Displacements and velocities at time 0; zero by default.
 
         Returns
         -------
@@ -105,7 +105,7 @@ class LinearSystem:
         """
         n = len(self.names)
         inputs = np.vstack([np.zeros((n, n)), np.linalg.inv(self.mass)])
-        # x' = A x + B u with u' = constant over a step: Van Loan's block exponential holds all three factors
+        # x' = A x + B u with u' = constant over a step: Van Loan's block exponential gives all three factors
         block = np.zeros((4 * n, 4 * n))
         block[: 2 * n, : 2 * n] = self.state_matrix() * step
         block[: 2 * n, 2 * n : 3 * n] = inputs * step
@@ -119,9 +119,9 @@ class LinearSystem:
 
 
 def _accumulate(move: Array, push: Array, first: Array) -> Array:
-    """States of x[k + 1] = move x[k] + push[k] from x[0] = first, shape (m + 1, d) for pushes of shape (m, d).
+    """Return the states of x[k + 1] = move x[k] + push[k] from x[0] = first, shape (m + 1, d) for push of shape (m, d).
 
-    All of about sqrt(m) blocks step along side by side from zero; then each gets what the end of the one before adds.
+    About sqrt(m) blocks advance in parallel from zero; then each gets the contribution of the previous block's end.
     """
     count, width = push.shape
     size = max(1, math.isqrt(count))
@@ -146,10 +146,10 @@ def _thirds(n: int) -> tuple[slice, slice, slice]:
 
 
 class Suspension:
-    """Matrices of springs and dampers between named coordinates, built element by element.
+    """Stiffness and damping matrices of springs and dampers between named coordinates, built element by element.
 
     An element with the elongation u = sum of factor * coordinate adds k u^2 / 2 to the elastic energy and c u'^2 / 2
-    to the dissipation, so the matrices are symmetric and take no energy out of nothing, whatever the elements.
+    to the dissipation. The matrices are therefore symmetric and passive for any set of elements.
     """
 
     def __init__(self, names: Sequence[str]) -> None:
@@ -159,7 +159,7 @@ class Suspension:
         self.damping: Array = np.zeros_like(self.stiffness)
 
     def add(self, elongation: Mapping[str, float], stiffness: float, damping: float = 0.0, count: int = 1) -> None:
-        """Add `count` equal springs in N/m and dampers in N s/m with this elongation."""
+        """Add `count` equal springs in N/m and dampers in N s/m with this `elongation`."""
         for (one, a), (other, b) in itertools.product(elongation.items(), repeat=2):
             place = self._index[one], self._index[other]
             self.stiffness[place] += count * stiffness * a * b
