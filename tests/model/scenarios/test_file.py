@@ -297,8 +297,8 @@ def test_a_note_on_what_the_temperature_input_cannot_show(tmp_path: Path) -> Non
     hot = scenario(tmp_path, PLAIN.replace("temperature = 20.0", "temperature = 20.0\ntemperature_to = 200.0"))
     assert range_notes(hot, BENCH.ports) == (
         f"{tmp_path}/day.toml: excerpt[0] reaches 200 degC, but the range of the core's temperature input ends at "
-        "128 degC: its code saturates there, and the clearance is calibrated for the wrong temperature; widen the range "
-        "in [input.temperature]",
+        "128 degC: its code saturates there, and the clearance is calibrated for the wrong temperature; widen the "
+        "range in [input.temperature]",
     )
     cold = scenario(tmp_path, PLAIN.replace("temperature = 20.0", "temperature = -10.0"))
     assert (
