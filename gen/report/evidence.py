@@ -10,57 +10,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from sosmith.gen.filter.response import FilterFacts
 from sosmith.gen.fpga.synthesis import Netlist
+from sosmith.gen.output.core_facts import LimitCycleFacts, NodeFormat, SectionFacts
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
-
-KINDS = ("lowpass", "highpass", "bandpass", "bandstop")
-
-
-@dataclass(frozen=True, kw_only=True)
-class FilterFacts:
-    """A filter as it was asked for and as its integer coefficients realize it.
-
-    Attributes
-    ----------
-    sample_rate : float
-        Sampling frequency of one channel in Hz.
-    ideal_sos, quantized_sos : ndarray, shape (n_sections, 6)
-        Rows ``[b0, b1, b2, a0, a1, a2]`` with scipy's signs, ``a0 != 0``; the second holds the integer
-        coefficients of the hardware as numbers. The order of the rows may differ between the two.
-    kind : str
-        ``"lowpass"``, ``"highpass"``, ``"bandpass"`` or ``"bandstop"``.
-    passband_edge, stopband_edge : tuple of float or None
-        Edges of the specification's mask in Hz: one for low-pass and high-pass, else two, rising.
-    passband_loss, stopband_loss : float or None
-        Largest loss in the passband and smallest in the stopband, in dB, both positive.
-    cutoff : tuple of float or None
-        Cut-off frequencies in Hz, as many as edges.
-    """
-
-    sample_rate: float
-    ideal_sos: Array
-    quantized_sos: Array
-    kind: str = "lowpass"
-    passband_edge: tuple[float, ...] | None = None
-    stopband_edge: tuple[float, ...] | None = None
-    passband_loss: float | None = None
-    stopband_loss: float | None = None
-    cutoff: tuple[float, ...] | None = None
-
-    def __post_init__(self) -> None:
-        if self.kind not in KINDS:
-            raise ValueError(f"kind must be one of {', '.join(KINDS)}, not {self.kind!r}")
-        count = 1 if self.kind in ("lowpass", "highpass") else 2
-        for name in ("passband_edge", "stopband_edge", "cutoff"):
-            edges = getattr(self, name)
-            if edges is not None and len(edges) != count:
-                raise ValueError(f"{name} of a {self.kind} must hold {count} frequencies, not {edges!r}")
-        for name in ("ideal_sos", "quantized_sos"):
-            shape = np.shape(getattr(self, name))
-            if len(shape) != 2 or shape[0] < 1 or shape[1] != 6:
-                raise ValueError(f"{name} must have the shape (n_sections, 6), not {shape!r}")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,29 +33,6 @@ class Alternative:
     name: str
     max_abs: float
     rms: float
-
-
-@dataclass(frozen=True, kw_only=True)
-class Format:
-    """Number format of one node of the datapath.
-
-    Attributes
-    ----------
-    node : str
-        Name of the node.
-    notation : str
-        The format in words, such as ``s4.20``.
-    low, high : float
-        Smallest and largest value the format holds, in `unit`.
-    unit : str
-        Unit of the node, ``""`` for a plain number.
-    """
-
-    node: str
-    notation: str
-    low: float
-    high: float
-    unit: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -158,14 +90,12 @@ class Evidence:
         Duration and speed of the simulation.
     realization, architecture, why : str
         Structure of the sections, of the hardware, and the reason for the choice (may be empty).
-    formats : sequence of Format
+    formats : sequence of NodeFormat
         Number formats along the datapath.
-    sections : sequence of Mapping
-        As in the manifest: ``name``, ``realization``, ``coefficients`` with ``name``, ``integer``, ``frac``
-        (fractional bits) and ``value`` each.
-    limit_cycles : sequence of Mapping
-        As in the manifest, one for each section: ``section``, ``largest`` and ``dead_band`` in `unit`, ``none``
-        (whether it is proven to come to rest), ``lyapunov`` (weights as texts of rationals, or None).
+    sections : sequence of SectionFacts
+        The filter's sections.
+    limit_cycles : sequence of LimitCycleFacts
+        One for each section, in `unit`.
     shown_channel : int or None
         Channel that the sample arrays are of, where they are of one of several.
     filter : FilterFacts or None
@@ -206,9 +136,9 @@ class Evidence:
     truth: Array | None = None
     reading: Mask | None = None
     unfiltered: Array | None = None
-    formats: Sequence[Format] = ()
-    sections: Sequence[Mapping[str, Any]] = ()
-    limit_cycles: Sequence[Mapping[str, Any]] = ()
+    formats: Sequence[NodeFormat] = ()
+    sections: Sequence[SectionFacts] = ()
+    limit_cycles: Sequence[LimitCycleFacts] = ()
     shown_channel: int | None = None
     filter: FilterFacts | None = None
     gates: Netlist | None = None

@@ -6,7 +6,6 @@ table; messages about unknown and missing keys follow.
 
 from __future__ import annotations
 
-import difflib
 from fractions import Fraction
 from typing import Annotated, Any
 
@@ -34,6 +33,7 @@ from sosmith.gen.specification.values import (
     text,
     whole,
 )
+from sosmith.model.suggestion import did_you_mean
 
 FAMILIES = ("butterworth", "chebyshev1", "chebyshev2", "elliptic", "bessel")
 KINDS = ("lowpass", "highpass", "bandpass", "bandstop")
@@ -206,7 +206,7 @@ def _unfit(finding: ErrorDetails) -> UnfitError:
     keys = _table_at(path[:-1]).model_fields
     if finding["type"] == "extra_forbidden":
         return UnfitError(
-            f"one of the keys {', '.join(keys)}", f"an unknown one{_hint(path[-1], list(keys))}", where=where
+            f"one of the keys {', '.join(keys)}", f"an unknown one{did_you_mean(path[-1], keys)}", where=where
         )
     found = "missing" if finding["type"] == "missing" else literal(finding["input"])
     # A table [input.NAME] is no field of a model, hence has no description of its own.
@@ -224,8 +224,3 @@ def _table_at(path: tuple[str, ...]) -> type[Table]:
             return InputTable
         case _:
             return _TABLES[path[0]]
-
-
-def _hint(key: str, known: list[str]) -> str:
-    closest = difflib.get_close_matches(key, known, n=1)
-    return f" (did you mean {closest[0]}?)" if closest else ""

@@ -6,7 +6,6 @@ a rule about several keys raises `UnfitKeyError`.
 
 from __future__ import annotations
 
-import difflib
 import tomllib
 from pathlib import Path
 from typing import Any, TypeVar, get_args
@@ -16,6 +15,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from sosmith.model.errors import SpecificationError
+from sosmith.model.suggestion import did_you_mean
 
 MAX_BYTES = 1 << 18
 """Largest file size in bytes; real files have a few thousand."""
@@ -114,8 +114,7 @@ def _sentence(shape: type[Table], finding: ErrorDetails) -> str:
     where = _path_text(path)
     owner, field = _field_at(shape, path)
     if finding["type"] == "extra_forbidden":
-        closest = difflib.get_close_matches(str(path[-1]), owner.model_fields, n=1)
-        hint = f" (did you mean {closest[0]}?)" if closest else ""
+        hint = did_you_mean(str(path[-1]), owner.model_fields)
         return f"{where} must be one of the keys {', '.join(owner.model_fields)}, not an unknown one{hint}"
     assert field is not None
     assert field.description, f"{where} must have a description"

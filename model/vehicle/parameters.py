@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import tomllib
 from dataclasses import dataclass, field, fields
 from importlib import resources
@@ -10,6 +9,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from sosmith.model.errors import SpecificationError
+from sosmith.model.suggestion import did_you_mean
 
 MAX_BYTES = 1 << 16
 """Largest file size in bytes; the built-in file has about ten thousand."""
@@ -251,8 +251,7 @@ def _check_keys(name: str, path: str, tree: dict[str, Any], known: list[str]) ->
     where = f"{name}: {path}" if path else name
     for key in tree:
         if key not in known:
-            near = difflib.get_close_matches(key, known, n=1)
-            hint = f" (did you mean {near[0]}?)" if near else ""
+            hint = did_you_mean(key, known)
             raise SpecificationError(f"{where} must only have the keys {', '.join(known)}, not {key!r}{hint}")
     for key in known:
         if key not in tree:

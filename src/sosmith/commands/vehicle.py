@@ -2,13 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import click
 from rich.table import Table
 
 from sosmith.gen.instrument.vehicle_plot import vehicle_plot
-from sosmith.gen.instrument.vehicle_report import TRACKS, VehicleRun, largest, vehicle_csv, vehicle_json, vehicle_run
+from sosmith.gen.instrument.vehicle_report import (
+    TRACKS,
+    VehicleRun,
+    largest,
+    parameters_json,
+    vehicle_csv,
+    vehicle_json,
+    vehicle_run,
+)
+from sosmith.gen.paper.comparison import Comparison
+from sosmith.gen.paper.figures import read_paper_figures
+from sosmith.gen.paper.vehicle_comparison import comparison_json, run_comparison
 from sosmith.gen.picture import FORMATS
 from sosmith.model.errors import SpecificationError
 from sosmith.model.text_files import write_contents, write_files
@@ -97,10 +109,12 @@ def vehicle(
             note(f"wrote {path}")
     if not made.limits.kept:
         note(_warning(made))
+    tables = run_comparison(made, read_paper_figures())
     if as_json:
-        print_json(vehicle_json(made))
+        beside = {"comparison": comparison_json(tables), "parameters": parameters_json(made.parameters)}
+        print_json(vehicle_json(made) | beside)
     else:
-        _print_tables(made)
+        _print_tables(made, tables)
 
 
 def _plot_format(path: Path) -> str:
@@ -124,14 +138,14 @@ def _warning(made: VehicleRun) -> str:
     return f"this run leaves what a linear model can tell: {' and '.join(parts)}"
 
 
-def _print_tables(made: VehicleRun) -> None:
+def _print_tables(made: VehicleRun, tables: Mapping[int, tuple[Comparison, ...]]) -> None:
     console = TableConsole()
     for name, modes in (("Lateral", made.lateral_modes), ("Vertical", made.vertical_modes)):
         console.print(_modes_table(f"{name} modes at {made.speed:g} m/s", modes))
     console.print(_wheelsets_table(made))
     console.print(_bodies_table(made))
-    if made.comparison:
-        console.print(_comparison_table(made))
+    if tables:
+        console.print(_comparison_table(tables))
 
 
 def _modes_table(title: str, modes: tuple[Mode, ...]) -> Table:
@@ -176,11 +190,11 @@ def _bodies_table(made: VehicleRun) -> Table:
     return table
 
 
-def _comparison_table(made: VehicleRun) -> Table:
+def _comparison_table(tables: Mapping[int, tuple[Comparison, ...]]) -> Table:
     """Figures of the paper and ours, and below them the reasons."""
-    reasons = list(dict.fromkeys(one.explanation for rows in made.comparison.values() for one in rows))
+    reasons = list(dict.fromkeys(one.explanation for rows in tables.values() for one in rows))
     table = new_table("Beside the paper's tables 5 to 8", ["table", "", "unit", "paper", "ours", "label", "why"])
-    for number, rows in made.comparison.items():
+    for number, rows in tables.items():
         for one in rows:
             why = str(reasons.index(one.explanation) + 1)
             table.add_row(str(number), one.quantity, one.unit, one.shown_printed, one.shown, one.label, why)
