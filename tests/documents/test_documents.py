@@ -69,8 +69,8 @@ def worked_example(folder: Path) -> str:
     specification = next(line for line in lines if line.startswith("cat > "))
     run(specification, folder)
     printed = run(next(line for line in lines if line.startswith("./run design ")), folder)
-    beginning = printed.partition("\nSections\n")[0]
-    return "".join(f"{line.rstrip()}\n" for line in beginning.strip().splitlines())
+    lines = [line.rstrip() for line in printed.strip().splitlines()]
+    return "\n".join(lines[: lines.index("Sections") - 1]) + "\n"
 
 
 def with_output(text: str, folder: Path) -> str:
