@@ -13,12 +13,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.gen.specification.test_bad_specifications import BAD, BASE
 
 from sosmith import __version__
 from sosmith.cli import main
 from sosmith.gen.specification.specification import example
 from sosmith.sim import simulators
-from tests.gen.specification.test_bad_specifications import BAD, BASE
 
 FILTER = """\
 name = "plain"
