@@ -9,7 +9,8 @@ from functools import partial
 from sosmith.gen.architecture import Architecture, Budget, candidates, fitting, reason_for
 from sosmith.gen.filter.design import Filter, design
 from sosmith.gen.fpga.boards import Board
-from sosmith.gen.realizations.registry import ERROR_FEEDBACK, REALIZATIONS
+from sosmith.gen.realizations.registry import REALIZATIONS
+from sosmith.gen.specification.choices import ERROR_FEEDBACK
 from sosmith.gen.specification.specification import Specification
 from sosmith.gen.word_lengths.quantize import Plan, Quantized, plan, prove, with_realization
 from sosmith.gen.word_lengths.selection import Accept, Selection
@@ -18,9 +19,6 @@ from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.errors import ShortfallError, SpecificationError
 from sosmith.model.port import Port
-
-CORES = ("instrument", "filter", "calibration")
-"""What can be generated of a specification: all of it, or one part."""
 
 AUTO = "auto"
 """Realization that stands for the cheapest proven one."""
@@ -37,7 +35,7 @@ class CoreDesign:
     spec : Specification
         What was asked for.
     core : str
-        One of `CORES`.
+        One of `sosmith.gen.specification.choices.CORES`.
     quantized : Quantized
         The datapath, with the ideal filter and polynomial it stands for.
     architecture : Architecture
@@ -77,7 +75,7 @@ def design_core(
     spec : Specification
         What is asked for.
     core : str or None
-        One of `CORES`; None takes all that the specification has.
+        One of `sosmith.gen.specification.choices.CORES`; None takes all that the specification has.
     realization : str or None
         Overrides the specification's.
     widths_of : str or None

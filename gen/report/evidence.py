@@ -11,11 +11,10 @@ import numpy as np
 import numpy.typing as npt
 
 from sosmith.gen.fpga.synthesis import Netlist
+from sosmith.gen.specification.choices import KINDS
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
-
-KINDS = ("lowpass", "highpass", "bandpass", "bandstop")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,7 +9,8 @@ import math
 from collections.abc import Sequence
 from fractions import Fraction
 
-from sosmith.gen.specification.schema import FAMILIES, KINDS, MAX_ORDER, Document, FilterTable, InputTable
+from sosmith.gen.specification.choices import FAMILIES, KINDS
+from sosmith.gen.specification.schema import MAX_ORDER, Document, FilterTable, InputTable
 from sosmith.gen.specification.values import UnfitError, identifier, key_text, listed, literal, one_of
 
 CALIBRATION_INPUTS = ("voltage", "temperature")

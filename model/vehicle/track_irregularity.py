@@ -11,9 +11,6 @@ from scipy.interpolate import CubicSpline
 from sosmith.model.vehicle.linear_motion import Array
 from sosmith.model.vehicle.parameters import IrregularityTable
 
-LEVELS = ("low", "high")
-"""Levels of disturbance of ERRI B176."""
-
 POINTS = 16
 """Points per shortest wave of a profile; its cubic spline is then right to some 1e-4 of the wave's amplitude."""
 

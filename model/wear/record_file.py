@@ -14,14 +14,9 @@ from sosmith.model.port import Values
 from sosmith.model.tables.csv_table import check_rows, csv_header, read_csv_table
 from sosmith.model.traces.signal_file import unit_of
 from sosmith.model.traces.trace_file import CHANNEL, rows_of_channel
+from sosmith.model.wear.record_columns import CLEARANCES, TIMES
 
 SECONDS_A_DAY = 86400.0
-
-TIMES = {"date": 1.0, "days": 1.0, "time_days": 1.0, "time_d": 1.0, "hours": 1 / 24, "time_h": 1 / 24}
-"""Columns that may hold the time, and the days of one unit of them; time_s too, of which 86400 are a day."""
-
-CLEARANCES = ("hardware_mm", "measured_mm", "clearance_mm")
-"""Columns that may hold the clearance in mm, the first that is there."""
 
 _EPOCH = datetime.datetime(1970, 1, 1, tzinfo=datetime.UTC)
 

@@ -5,12 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import click
-from rich.markup import escape
 
-from sosmith.gen.report.comparison import column_names, comparison_json, comparison_page, load_report
-from sosmith.gen.report.comparison import compare as compare_reports
 from sosmith.model.text_files import write_files
-from sosmith.terminal import JSON_OPTION, TableConsole, new_table, note, output_option, print_json
+from sosmith.terminal import JSON_OPTION, note, output_option, print_json
 
 
 @click.command("compare")

@@ -3,25 +3,35 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from sosmith.gen.core import CORES, CoreDesign
 from sosmith.gen.fpga.boards import BOARDS, Board, find_board
-from sosmith.gen.realizations.registry import ERROR_FEEDBACK, REALIZATIONS
+from sosmith.gen.specification.choices import CORES, ERROR_FEEDBACK, REALIZATIONS
+from sosmith.model.suggestion import did_you_mean
+
+if TYPE_CHECKING:
+    from sosmith.gen.core import CoreDesign
+
+
+class OneOf(click.Choice[str]):
+    """One of some names; an unknown one is refused with the name that was probably meant."""
+
+    def get_invalid_choice_message(self, value: Any, ctx: click.Context | None) -> str:
+        return f"{super().get_invalid_choice_message(value, ctx)[:-1]}{did_you_mean(str(value), self.choices)}."
+
 
 SPEC = click.argument("spec", type=click.Path(path_type=Path))
-CORE = click.option(
-    "--core", type=click.Choice(CORES), help="The part to make.  [default: all that the specification has]"
-)
+CORE = click.option("--core", type=OneOf(CORES), help="The part to make.  [default: all that the specification has]")
 REALIZATION = click.option(
     "--realization",
-    type=click.Choice(["auto", *REALIZATIONS]),
+    type=OneOf(REALIZATIONS),
     help="Use this one, whatever the specification says.",
 )
 WIDTHS_OF = click.option(
     "--widths-of",
-    type=click.Choice(ERROR_FEEDBACK),
+    type=OneOf(ERROR_FEEDBACK),
     help="Keep the word lengths chosen for this realization, to compare structures at equal width.",
 )
 BOARD = click.option(

@@ -8,6 +8,7 @@ from fractions import Fraction
 from rich.console import Console
 from rich.markup import escape
 
+from sosmith.commands.tables.console import TableConsole, new_table
 from sosmith.gen.architecture import Architecture
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.output.manifest import section_entries
@@ -16,7 +17,6 @@ from sosmith.gen.specification.wear_limits import WearSpec
 from sosmith.gen.word_lengths.cost import cost_of
 from sosmith.model.dataflow.program import Program
 from sosmith.model.port import Port
-from sosmith.terminal import TableConsole, new_table
 
 
 def print_design(made: CoreDesign, *, brief: bool = False) -> None:
