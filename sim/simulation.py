@@ -25,13 +25,8 @@ from sosmith.gen.word_lengths.quantize import Quantized, with_realization
 from sosmith.model.errors import SpecificationError
 from sosmith.model.port import Codes, Values
 from sosmith.model.reference.golden import calibrated, filtered
-from sosmith.model.scenarios.catalogue import SCENARIOS, emulate
-from sosmith.model.scenarios.file import emulate_file, load_scenario, range_notes
-from sosmith.model.scenarios.run import Bench
-from sosmith.model.scenarios.vehicle_clearance import vehicle_clearance
 from sosmith.model.text_files import write_files
 from sosmith.model.traces.trace import Trace
-from sosmith.model.traces.trace_file import read_traces
 from sosmith.sim.cosimulate import CosimulationResult, cosimulate
 from sosmith.sim.gate_level import with_cell_models
 from sosmith.sim.simulators import check_name
@@ -40,69 +35,6 @@ _Kind = TypeVar("_Kind", bound=np.generic)
 
 Progress = Callable[[str, int, int], None]
 """Told the step, what is done of it and the total; a total of 0 means that only the step's name is known."""
-
-
-def bench_of(design: CoreDesign) -> Bench:
-    """Make what the scenarios need to know of a core."""
-    quantized = design.quantized
-    return Bench(
-        ports=design.datapath.inputs,
-        output=design.datapath.output,
-        sample_rate=design.spec.sample_rate,
-        polynomial=quantized.polynomial,
-        impulse_response=np.ones(1) if quantized.filter is None else quantized.filter.impulse_response,
-        error_responses=tuple(error_responses(quantized)),
-    )
-
-
-def default_scenario(design: CoreDesign) -> str:
-    """Scenario that shows most of a core, for when none is named."""
-    return "sweep" if design.quantized.polynomial is None else "wear_ramp"
-
-
-def traces_for(design: CoreDesign, source: str, *, seed: int, seconds: float | None = None) -> tuple[Trace, ...]:
-    """Make a trace for every channel from a CSV file, a scenario file (TOML) or a scenario's name.
-
-    Each channel begins a sample later than the one before, and has noise of its own, so that none looks like another.
-    A CSV file with the column channel has each channel's rows as they are; one without goes to all channels.
-
-    Raises
-    ------
-    SpecificationError
-        If the file is unfit or the scenario does not exist for this core.
-    """
-    channels = range(design.spec.channels)
-    if is_scenario_file(source):
-        if seconds is not None:
-            raise SpecificationError(f"--seconds must come with a scenario's name, not with the file {source}")
-        scenario, bench = load_scenario(Path(source)), bench_of(design)
-        traces = [emulate_file(scenario, bench, seed=seed + k, channel=k, vehicle=vehicle_clearance) for k in channels]
-        return tuple(trace.delayed(k) for k, trace in enumerate(traces))
-    if source not in SCENARIOS and (source.lower().endswith(".csv") or Path(source).exists()):
-        if seconds is not None:
-            raise SpecificationError(f"--seconds must come with a scenario, not with the file {source}")
-        given = read_traces(Path(source), design.datapath.inputs, design.spec.sample_rate, len(channels))
-        return given if len(given) == len(channels) else tuple(given[0].delayed(k) for k in channels)
-    bench = bench_of(design)  # an unknown scenario is refused there, with a list of those that fit
-    return tuple(emulate(source, bench, seed=seed + k, seconds=seconds).delayed(k) for k in channels)
-
-
-def is_scenario_file(source: str) -> bool:
-    """Tell whether `source` is the path of a scenario file, and no built-in scenario or trace."""
-    return source not in SCENARIOS and source.lower().endswith(".toml")
-
-
-def notes_on(design: CoreDesign, source: str) -> tuple[str, ...]:
-    """Sentences about what the core's inputs cannot show of a scenario file; none for other sources.
-
-    Raises
-    ------
-    SpecificationError
-        If the file is unfit.
-    """
-    if not is_scenario_file(source):
-        return ()
-    return range_notes(load_scenario(Path(source)), design.datapath.inputs)
 
 
 def simulate(

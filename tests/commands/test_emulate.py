@@ -15,10 +15,10 @@ from tests.test_cli import FILTER, INSTRUMENT
 from sosmith.cli import cli
 from sosmith.gen.core import design_core
 from sosmith.gen.specification.specification import load
+from sosmith.gen.stimuli import traces_for
 from sosmith.model.errors import SpecificationError
 from sosmith.model.scenarios.file import load_scenario, range_notes
 from sosmith.model.scenarios.vehicle_clearance import vehicle_clearance
-from sosmith.sim.simulation import traces_for
 
 SHORT = PLAIN.replace("seconds = 60", "seconds = 20")
 
