@@ -20,7 +20,6 @@ from sosmith.gen.output.generate import generate
 from sosmith.gen.output.manifest import manifest, section_entries
 from sosmith.gen.report.evidence import Alternative, Evidence, FilterFacts, Format
 from sosmith.gen.specification.choices import ERROR_FEEDBACK
-from sosmith.gen.word_lengths.error_paths import error_responses
 from sosmith.gen.word_lengths.quantize import Quantized, with_realization
 from sosmith.model.errors import SpecificationError
 from sosmith.model.port import Codes, Values

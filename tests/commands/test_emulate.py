@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
+from tests.commands.test_cli import FILTER, INSTRUMENT
 from tests.model.scenarios.scenario_texts import CALIBRATION, PLAIN
-from tests.test_cli import FILTER, INSTRUMENT
 
 from sosmith.cli import cli
 from sosmith.gen.core import design_core
