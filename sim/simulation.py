@@ -14,11 +14,12 @@ import numpy as np
 import numpy.typing as npt
 
 from sosmith.gen.core import CoreDesign
+from sosmith.gen.filter.response import FilterFacts
 from sosmith.gen.fpga.boards import Board
 from sosmith.gen.fpga.synthesis import Netlist, synthesize
 from sosmith.gen.output.generate import generate
 from sosmith.gen.output.manifest import manifest, section_entries
-from sosmith.gen.report.evidence import Alternative, Evidence, FilterFacts, Format
+from sosmith.gen.report.evidence import Alternative, Evidence, Format
 from sosmith.gen.specification.choices import ERROR_FEEDBACK
 from sosmith.gen.word_lengths.quantize import Quantized, with_realization
 from sosmith.model.errors import SpecificationError

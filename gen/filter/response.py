@@ -12,11 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from sosmith.gen.report.evidence import FilterFacts
-
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 Band = tuple[float, float]
+
+KINDS = ("lowpass", "highpass", "bandpass", "bandstop")
 
 FLOOR_DB = -400.0
 """Magnitudes below this, such as at a zero on the unit circle, are given as this."""
@@ -26,6 +26,51 @@ MASK_TOLERANCE_DB = 1e-3
 so rounding the coefficients puts it a hair to either side of it."""
 
 HALF_POWER_DB = 10 * np.log10(2)
+
+
+@dataclass(frozen=True, kw_only=True)
+class FilterFacts:
+    """A filter as it was asked for and as its integer coefficients realize it.
+
+    Attributes
+    ----------
+    sample_rate : float
+        Sampling frequency of one channel in Hz.
+    ideal_sos, quantized_sos : ndarray, shape (n_sections, 6)
+        Rows ``[b0, b1, b2, a0, a1, a2]`` with scipy's signs, ``a0 != 0``; the second holds the integer
+        coefficients of the hardware as numbers. The order of the rows may differ between the two.
+    kind : str
+        ``"lowpass"``, ``"highpass"``, ``"bandpass"`` or ``"bandstop"``.
+    passband_edge, stopband_edge : tuple of float or None
+        Edges of the specification's mask in Hz: one for low-pass and high-pass, else two, rising.
+    passband_loss, stopband_loss : float or None
+        Largest loss in the passband and smallest in the stopband, in dB, both positive.
+    cutoff : tuple of float or None
+        Cut-off frequencies in Hz, as many as edges.
+    """
+
+    sample_rate: float
+    ideal_sos: Array
+    quantized_sos: Array
+    kind: str = "lowpass"
+    passband_edge: tuple[float, ...] | None = None
+    stopband_edge: tuple[float, ...] | None = None
+    passband_loss: float | None = None
+    stopband_loss: float | None = None
+    cutoff: tuple[float, ...] | None = None
+
+    def __post_init__(self) -> None:
+        if self.kind not in KINDS:
+            raise ValueError(f"kind must be one of {', '.join(KINDS)}, not {self.kind!r}")
+        count = 1 if self.kind in ("lowpass", "highpass") else 2
+        for name in ("passband_edge", "stopband_edge", "cutoff"):
+            edges = getattr(self, name)
+            if edges is not None and len(edges) != count:
+                raise ValueError(f"{name} of a {self.kind} must hold {count} frequencies, not {edges!r}")
+        for name in ("ideal_sos", "quantized_sos"):
+            shape = np.shape(getattr(self, name))
+            if len(shape) != 2 or shape[0] < 1 or shape[1] != 6:
+                raise ValueError(f"{name} must have the shape (n_sections, 6), not {shape!r}")
 
 
 @dataclass(frozen=True, kw_only=True)

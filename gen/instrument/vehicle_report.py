@@ -1,17 +1,13 @@
-"""What is told of a run of the vehicle: its figures as JSON, its motion as CSV."""
+"""The results of a vehicle run: figures as JSON, motion as CSV."""
 
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
 
-from sosmith.gen.paper.comparison import Comparison
-from sosmith.gen.paper.figures import read_paper_figures
-from sosmith.gen.paper.vehicle_comparison import PAPER_SPEED, comparison
 from sosmith.model.vehicle.choices import TRACK_NAMES
 from sosmith.model.vehicle.lateral import lateral_dynamics
 from sosmith.model.vehicle.limits import Limits, limits
@@ -28,7 +24,7 @@ TRACKS = dict(zip(TRACK_NAMES, (curved_track, tangent_track), strict=True))
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class VehicleRun:
-    """A run and all that is told of it.
+    """A run over a track: its settings, its motion and its limits.
 
     Attributes
     ----------
@@ -43,8 +39,6 @@ class VehicleRun:
     motion : Motion
     limits : Limits
     lateral_modes, vertical_modes : tuple of Mode
-    comparison : mapping of table number to tuple of Comparison
-        With the paper's tables; empty unless track, speed and sample rate allow it.
     """
 
     parameters: Parameters
@@ -57,17 +51,15 @@ class VehicleRun:
     limits: Limits
     lateral_modes: tuple[Mode, ...]
     vertical_modes: tuple[Mode, ...]
-    comparison: Mapping[int, tuple[Comparison, ...]]
 
 
 def vehicle_run(
     parameters: Parameters, *, track: str, speed: float, sample_rate: float, irregularities: str, seed: int
 ) -> VehicleRun:
-    """Carry out a run; refuses as `sosmith.model.vehicle.run.run` does."""
+    """Run the vehicle over one of `TRACKS`; raises what `sosmith.model.vehicle.run.run` raises."""
     made = TRACKS[track](parameters.track)
     level = None if irregularities == "none" else irregularities
     motion = run(parameters, made, speed=speed, sample_rate=sample_rate, irregularity=level, seed=seed)
-    comparable = track == "paper" and speed == PAPER_SPEED and sample_rate >= 100
     return VehicleRun(
         parameters=parameters,
         track=track,
@@ -79,7 +71,6 @@ def vehicle_run(
         limits=limits(parameters, made, motion),
         lateral_modes=lateral_dynamics(parameters, speed).system.modes(),
         vertical_modes=vertical_dynamics(parameters).system.modes(),
-        comparison=comparison(motion, read_paper_figures()) if comparable else {},
     )
 
 
@@ -91,7 +82,7 @@ def largest(motion: Motion) -> dict[str, float]:
 
 
 def vehicle_json(made: VehicleRun) -> dict[str, Any]:
-    """All figures of a run; units are in the names."""
+    """Return settings, modes, largest motions and limits of a run; units are in the keys."""
     found = made.limits
     return {
         "track": made.track,
@@ -113,20 +104,6 @@ def vehicle_json(made: VehicleRun) -> dict[str, Any]:
             for k in range(6)
         ],
         "within_limits": found.kept,
-        "comparison": [
-            {
-                "table": str(number),
-                "what": one.quantity,
-                "unit": one.unit,
-                "paper": None if one.printed is None else float(one.printed),
-                "ours": None if one.ours is None else float(one.ours),
-                "label": one.label,
-                "why": one.explanation,
-            }
-            for number, rows in made.comparison.items()
-            for one in rows
-        ],
-        "parameters": _parameters(made.parameters),
     }
 
 
@@ -142,8 +119,8 @@ def _modes(modes: tuple[Mode, ...]) -> list[dict[str, Any]]:
     ]
 
 
-def _parameters(parameters: Parameters) -> dict[str, Any]:
-    """Values with unit and source by their paths."""
+def parameters_json(parameters: Parameters) -> dict[str, Any]:
+    """Value, unit and source of each parameter by its path, such as ``body.mass``."""
     found: dict[str, Any] = {}
     for table in fields(parameters):
         if table.name != "sources":
@@ -156,20 +133,10 @@ def _parameters(parameters: Parameters) -> dict[str, Any]:
 
 
 def vehicle_csv(motion: Motion) -> str:
-    """Motion as CSV with one header line and six digits after the point, nanometres and nanoradians."""
+    """Motion as CSV: one header line, then six decimals of mm and mrad (nanometres and nanoradians)."""
     columns = dict(motion.columns())
     stream = io.StringIO()
     stream.write(",".join(columns) + "\n")
     # adding 0.0 makes a negative zero positive, so that it is written the same everywhere
     np.savetxt(stream, np.round(np.stack(list(columns.values()), axis=1), 6) + 0.0, fmt="%.6f", delimiter=",")
     return stream.getvalue()
-
-
-def parameters_markdown(parameters: Parameters) -> str:
-    """Table of all parameters with unit and source, in Markdown."""
-    rows = [
-        f"| `{path}` | {entry['value']:g} {entry['unit'] if entry['unit'] != '1' else ''}".rstrip()
-        + f" | {entry['source']} |\n"
-        for path, entry in _parameters(parameters).items()
-    ]
-    return "| parameter | value | source |\n|---|---|---|\n" + "".join(rows)

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
 
 from sosmith.gen.instrument.amplitude_spectrum import attenuation, ripple
+from sosmith.gen.instrument.vehicle_report import VehicleRun
 from sosmith.gen.paper.comparison import Comparison, compare
 from sosmith.gen.paper.figures import PaperFigures
 from sosmith.model.vehicle.motion import Motion
 
 PAPER_SPEED = 20.0
 """Speed in m/s of section 5.1."""
+
+MIN_SAMPLE_RATE = 100.0
+"""In Hz: the paper's tables need motion up to `STOP_FREQUENCY`."""
 
 STOP_FREQUENCY = 50.0
 """In Hz; section 5.3 reads the ripple delta there and prints -20 log10(delta)."""
@@ -30,11 +35,37 @@ _YAW = "hangs on the links' stiffness, radius and flange force, which the paper 
 _SCALE = "the scale of the paper's transform is not told: its yaw ripple of 0.1 exceeds its largest yaw, 0.0126 rad"
 
 
-def comparison(motion: Motion, figures: PaperFigures) -> dict[int, tuple[Comparison, ...]]:
-    """Set a run over the paper's track at `PAPER_SPEED` beside the paper's tables; at least 100 samples per second.
+def run_comparison(made: VehicleRun, figures: PaperFigures) -> dict[int, tuple[Comparison, ...]]:
+    """Compare a run with the paper's tables 5 to 8.
 
-    Returns the comparisons by the numbers of the tables, row by row. Which of them are of the same quantity was
-    decided before any result.
+    Empty unless the run is over the paper's track at `PAPER_SPEED` with at least `MIN_SAMPLE_RATE`.
+    """
+    comparable = made.track == "paper" and made.speed == PAPER_SPEED and made.sample_rate >= MIN_SAMPLE_RATE
+    return comparison(made.motion, figures) if comparable else {}
+
+
+def comparison_json(tables: Mapping[int, tuple[Comparison, ...]]) -> list[dict[str, Any]]:
+    """Return the comparisons in the order of the tables, numbers as floats."""
+    return [
+        {
+            "table": str(number),
+            "what": one.quantity,
+            "unit": one.unit,
+            "paper": None if one.printed is None else float(one.printed),
+            "ours": None if one.ours is None else float(one.ours),
+            "label": one.label,
+            "why": one.explanation,
+        }
+        for number, rows in tables.items()
+        for one in rows
+    ]
+
+
+def comparison(motion: Motion, figures: PaperFigures) -> dict[int, tuple[Comparison, ...]]:
+    """Compare a motion with the paper's tables 5 to 8; the conditions are those of `run_comparison`.
+
+    Returns the comparisons by table number, row by row. Which of them compare the same quantity was decided before
+    any result was known.
     """
     tables = {5: _vertical, 6: _lateral, 7: _yaw, 8: _attenuations}
     return {number: tuple(table(motion, figures)) for number, table in tables.items()}

@@ -10,56 +10,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from sosmith.gen.filter.response import FilterFacts
 from sosmith.gen.fpga.synthesis import Netlist
-from sosmith.gen.specification.choices import KINDS
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
-
-
-@dataclass(frozen=True, kw_only=True)
-class FilterFacts:
-    """A filter as it was asked for and as its integer coefficients realize it.
-
-    Attributes
-    ----------
-    sample_rate : float
-        Sampling frequency of one channel in Hz.
-    ideal_sos, quantized_sos : ndarray, shape (n_sections, 6)
-        Rows ``[b0, b1, b2, a0, a1, a2]`` with scipy's signs, ``a0 != 0``; the second holds the integer
-        coefficients of the hardware as numbers. The order of the rows may differ between the two.
-    kind : str
-        ``"lowpass"``, ``"highpass"``, ``"bandpass"`` or ``"bandstop"``.
-    passband_edge, stopband_edge : tuple of float or None
-        Edges of the specification's mask in Hz: one for low-pass and high-pass, else two, rising.
-    passband_loss, stopband_loss : float or None
-        Largest loss in the passband and smallest in the stopband, in dB, both positive.
-    cutoff : tuple of float or None
-        Cut-off frequencies in Hz, as many as edges.
-    """
-
-    sample_rate: float
-    ideal_sos: Array
-    quantized_sos: Array
-    kind: str = "lowpass"
-    passband_edge: tuple[float, ...] | None = None
-    stopband_edge: tuple[float, ...] | None = None
-    passband_loss: float | None = None
-    stopband_loss: float | None = None
-    cutoff: tuple[float, ...] | None = None
-
-    def __post_init__(self) -> None:
-        if self.kind not in KINDS:
-            raise ValueError(f"kind must be one of {', '.join(KINDS)}, not {self.kind!r}")
-        count = 1 if self.kind in ("lowpass", "highpass") else 2
-        for name in ("passband_edge", "stopband_edge", "cutoff"):
-            edges = getattr(self, name)
-            if edges is not None and len(edges) != count:
-                raise ValueError(f"{name} of a {self.kind} must hold {count} frequencies, not {edges!r}")
-        for name in ("ideal_sos", "quantized_sos"):
-            shape = np.shape(getattr(self, name))
-            if len(shape) != 2 or shape[0] < 1 or shape[1] != 6:
-                raise ValueError(f"{name} must have the shape (n_sections, 6), not {shape!r}")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,10 +11,11 @@ from html import escape
 from importlib.resources import files
 from typing import Any
 
+from sosmith.gen.filter.response import FilterFacts
 from sosmith.gen.fpga.synthesis import Netlist
 from sosmith.gen.quantity import count, decibels, duration, plain_number, quantity, scale, unit_symbol
 from sosmith.gen.report import plots
-from sosmith.gen.report.evidence import Evidence, FilterFacts, Format
+from sosmith.gen.report.evidence import Evidence, Format
 
 Summary = Mapping[str, Any]
 

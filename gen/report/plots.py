@@ -20,6 +20,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
 
 from sosmith.gen.filter.response import (
+    FilterFacts,
     frequency_grid,
     group_delay,
     magnitude_db,
@@ -30,7 +31,7 @@ from sosmith.gen.filter.response import (
     zeros,
 )
 from sosmith.gen.quantity import quantity, scale
-from sosmith.gen.report.evidence import Evidence, FilterFacts
+from sosmith.gen.report.evidence import Evidence
 
 Array = npt.NDArray[np.float64]
 

@@ -8,22 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from sosmith import __version__
-from sosmith.gen.filter.response import MASK_TOLERANCE_DB, ResponseMeasures, measure_response
+from sosmith.gen.filter.response import MASK_TOLERANCE_DB, FilterFacts, ResponseMeasures, measure_response
 from sosmith.gen.quantity import plain_number, quantity
-from sosmith.gen.report.evidence import Alternative, Evidence, FilterFacts, Format
+from sosmith.gen.report.evidence import Evidence
 from sosmith.gen.report.page import render_page
 from sosmith.model.reference.accuracy import accuracy_percent, error_statistics, sqnr_db
 from sosmith.model.text_files import to_json, write_files
-
-__all__ = [
-    "Alternative",
-    "Evidence",
-    "FilterFacts",
-    "Format",
-    "mask_shortfalls",
-    "summarise",
-    "write_report",
-]
 
 
 def mask_shortfalls(facts: FilterFacts, measures: ResponseMeasures) -> list[str]:

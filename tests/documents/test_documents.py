@@ -16,7 +16,7 @@ from click.testing import CliRunner
 from tests.house import ROOMS, WITH_SUB_ROOMS, file_table, picture
 
 from sosmith.cli import cli
-from sosmith.gen.instrument.vehicle_report import parameters_markdown
+from sosmith.gen.instrument.vehicle_report import parameters_json
 from sosmith.gen.reload.register_map import markdown
 from sosmith.model.calibration.measurement_store import SCHEMA
 from sosmith.model.vehicle.parameters import built_in
@@ -169,8 +169,18 @@ def test_the_schema_is_the_one_of_the_store() -> None:
     assert _SCHEMA.findall(CALIBRATION.read_text(encoding="utf-8")) == [schema()]
 
 
+def parameter_table() -> str:
+    """Return the built-in parameters of the vehicle with unit and source, in Markdown."""
+    rows = [
+        f"| `{path}` | {entry['value']:g} {entry['unit'] if entry['unit'] != '1' else ''}".rstrip()
+        + f" | {entry['source']} |\n"
+        for path, entry in parameters_json(built_in()).items()
+    ]
+    return "| parameter | value | source |\n|---|---|---|\n" + "".join(rows)
+
+
 def test_the_parameters_of_the_vehicle_are_those_of_its_file() -> None:
-    assert _PARAMETERS.findall(VEHICLE.read_text(encoding="utf-8")) == [parameters_markdown(built_in())]
+    assert _PARAMETERS.findall(VEHICLE.read_text(encoding="utf-8")) == [parameter_table()]
 
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
@@ -197,4 +207,4 @@ if __name__ == "__main__":
     ARCHITECTURE.write_text(with_house(ARCHITECTURE.read_text(encoding="utf-8")), encoding="utf-8")
     renew(REGISTERS, _REGISTERS, markdown())
     renew(CALIBRATION, _SCHEMA, schema())
-    renew(VEHICLE, _PARAMETERS, parameters_markdown(built_in()))
+    renew(VEHICLE, _PARAMETERS, parameter_table())

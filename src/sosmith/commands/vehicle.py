@@ -71,7 +71,9 @@ def vehicle(
         note(f"wrote {write_parameters}")
         return
     given = built_in() if parameters is None else load(parameters)
-    from sosmith.gen.instrument.vehicle_report import vehicle_csv, vehicle_json, vehicle_run
+    from sosmith.gen.instrument.vehicle_report import parameters_json, vehicle_csv, vehicle_json, vehicle_run
+    from sosmith.gen.paper.figures import read_paper_figures
+    from sosmith.gen.paper.vehicle_comparison import comparison_json, run_comparison
 
     with show_progress() as step:
         step("running over the track")
@@ -91,12 +93,14 @@ def vehicle(
             note(f"wrote {path}")
     if not made.limits.kept:
         note(_warning(made))
+    tables = run_comparison(made, read_paper_figures())
     if as_json:
-        print_json(vehicle_json(made))
+        beside = {"comparison": comparison_json(tables), "parameters": parameters_json(made.parameters)}
+        print_json(vehicle_json(made) | beside)
     else:
         from sosmith.commands.tables.vehicle import print_run
 
-        print_run(made)
+        print_run(made, tables)
 
 
 def _warning(made: VehicleRun) -> str:

@@ -11,7 +11,7 @@ from sosmith.gen.instrument.amplitude_spectrum import amplitude_spectrum, attenu
 from sosmith.gen.instrument.vehicle_report import vehicle_csv, vehicle_run
 from sosmith.gen.paper.comparison import Comparison
 from sosmith.gen.paper.figures import read_paper_figures
-from sosmith.gen.paper.vehicle_comparison import comparison
+from sosmith.gen.paper.vehicle_comparison import comparison, run_comparison
 from sosmith.model.vehicle.motion import Motion
 from sosmith.model.vehicle.parameters import built_in
 
@@ -109,6 +109,7 @@ def test_only_the_papers_track_speed_and_rate_are_compared() -> None:
     given = built_in()
     short = replace(given, track=replace(given.track, curve=10.0, run_out=0.0))
     usual = {"track": "paper", "speed": 20.0, "sample_rate": 100.0, "irregularities": "none", "seed": 1}
-    assert list(vehicle_run(short, **usual).comparison) == [5, 6, 7, 8]
+    figures = read_paper_figures()
+    assert list(run_comparison(vehicle_run(short, **usual), figures)) == [5, 6, 7, 8]
     for change in ({"track": "tangent"}, {"speed": 25.0}, {"sample_rate": 99.0}):
-        assert vehicle_run(short, **usual | change).comparison == {}
+        assert run_comparison(vehicle_run(short, **usual | change), figures) == {}

@@ -19,11 +19,13 @@ from scipy import signal
 
 from sosmith.gen import quantity
 from sosmith.gen.filter import response
+from sosmith.gen.filter.response import FilterFacts
 from sosmith.gen.fpga.boards import find_board
 from sosmith.gen.fpga.synthesis import Netlist
 from sosmith.gen.report import plots
+from sosmith.gen.report.evidence import Alternative, Evidence, Format
 from sosmith.gen.report.page import render_page
-from sosmith.gen.report.report import Alternative, Evidence, FilterFacts, Format, summarise, write_report
+from sosmith.gen.report.report import summarise, write_report
 
 Array = npt.NDArray[np.float64]
 

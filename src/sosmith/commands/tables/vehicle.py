@@ -2,25 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from rich.table import Table
 
 from sosmith.commands.tables.console import TableConsole, new_table
 from sosmith.gen.instrument.vehicle_report import VehicleRun, largest
+from sosmith.gen.paper.comparison import Comparison
 from sosmith.model.vehicle.linear_motion import Mode
 
 SWINGING = 0.999
 """Damping ratio from which on a mode is not listed by itself: its motion is gone before it comes back."""
 
 
-def print_run(made: VehicleRun) -> None:
+def print_run(made: VehicleRun, tables: Mapping[int, tuple[Comparison, ...]]) -> None:
     """Print modes, largest motions and, where the run allows it, the comparison with the paper."""
     console = TableConsole()
     for name, modes in (("Lateral", made.lateral_modes), ("Vertical", made.vertical_modes)):
         console.print(_modes_table(f"{name} modes at {made.speed:g} m/s", modes))
     console.print(_wheelsets_table(made))
     console.print(_bodies_table(made))
-    if made.comparison:
-        console.print(_comparison_table(made))
+    if tables:
+        console.print(_comparison_table(tables))
 
 
 def _modes_table(title: str, modes: tuple[Mode, ...]) -> Table:
@@ -65,11 +68,11 @@ def _bodies_table(made: VehicleRun) -> Table:
     return table
 
 
-def _comparison_table(made: VehicleRun) -> Table:
+def _comparison_table(tables: Mapping[int, tuple[Comparison, ...]]) -> Table:
     """Figures of the paper and ours, and below them the reasons."""
-    reasons = list(dict.fromkeys(one.explanation for rows in made.comparison.values() for one in rows))
+    reasons = list(dict.fromkeys(one.explanation for rows in tables.values() for one in rows))
     table = new_table("Beside the paper's tables 5 to 8", ["table", "", "unit", "paper", "ours", "label", "why"])
-    for number, rows in made.comparison.items():
+    for number, rows in tables.items():
         for one in rows:
             why = str(reasons.index(one.explanation) + 1)
             table.add_row(str(number), one.quantity, one.unit, one.shown_printed, one.shown, one.label, why)
