@@ -10,7 +10,7 @@ from sosmith.gen.architecture import Architecture, Budget, candidates, fitting, 
 from sosmith.gen.filter.design import Filter, design
 from sosmith.gen.fpga.boards import Board
 from sosmith.gen.realizations.registry import REALIZATIONS
-from sosmith.gen.specification.choices import ERROR_FEEDBACK
+from sosmith.gen.specification.choices import CORES, ERROR_FEEDBACK
 from sosmith.gen.specification.specification import Specification
 from sosmith.gen.word_lengths.quantize import Plan, Quantized, plan, prove, with_realization
 from sosmith.gen.word_lengths.selection import Accept, Selection
@@ -19,6 +19,7 @@ from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.errors import ShortfallError, SpecificationError
 from sosmith.model.port import Port
+from sosmith.model.suggestion import did_you_mean
 
 AUTO = "auto"
 """Realization that stands for the cheapest proven one."""
@@ -162,6 +163,8 @@ def design_core(
 
 
 def _chosen_core(spec: Specification, core: str | None) -> str:
+    if core is not None and core not in CORES:
+        raise SpecificationError(f"the core must be one of {', '.join(CORES)}, not {core}{did_you_mean(core, CORES)}")
     if spec.calibration is None:
         if core not in {None, "filter"}:
             raise SpecificationError(
@@ -173,7 +176,10 @@ def _chosen_core(spec: Specification, core: str | None) -> str:
 
 def _known(wanted: str) -> str:
     if wanted not in {AUTO, *REALIZATIONS}:
-        raise SpecificationError(f"the realization must be {AUTO}, {', '.join(REALIZATIONS)}, not {wanted}")
+        known = (AUTO, *REALIZATIONS)
+        raise SpecificationError(
+            f"the realization must be {', '.join(known)}, not {wanted}{did_you_mean(wanted, known)}"
+        )
     return wanted
 
 

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from sosmith.gen.specification.choices import KINDS
+
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 Band = tuple[float, float]
-
-KINDS = ("lowpass", "highpass", "bandpass", "bandstop")
 
 FLOOR_DB = -400.0
 """Magnitudes below this, such as at a zero on the unit circle, are given as this."""
@@ -141,6 +141,15 @@ def magnitude_db(sos: Array, frequency: Array, sample_rate: float) -> Array:
         denominator = np.abs(_polynomial(section[3:], omega))
         total += 20 * np.log10(np.maximum(numerator, tiny) / np.maximum(denominator, tiny))
     return np.maximum(total, FLOOR_DB)
+
+
+def complex_response(sos: Array, frequency: Array, sample_rate: float) -> Complex:
+    """Complex frequency response; parameters as for `magnitude_db`, `frequency` of any shape."""
+    omega = 2 * np.pi * frequency / sample_rate
+    total = np.ones(omega.shape, dtype=np.complex128)
+    for section in sos:
+        total *= _polynomial(section[:3], omega) / _polynomial(section[3:], omega)
+    return total
 
 
 def group_delay(sos: Array, frequency: Array, sample_rate: float) -> Array:

@@ -157,7 +157,24 @@ def load(path: Path) -> Specification:
         For the first thing that is wrong, in one sentence: the file, the path of the key or the line, what
         would be right and what was found.
     """
-    tree = _read_toml(path)
+    return from_tree(_read_toml(path), path)
+
+
+def from_tree(tree: dict[str, Any], path: Path) -> Specification:
+    """Check a specification that has been read already.
+
+    Parameters
+    ----------
+    tree : dict
+        As `tomllib` gives it, with every float as `decimal.Decimal`.
+    path : Path
+        Its name in messages; `calibration.data` is found from the folder of this path.
+
+    Raises
+    ------
+    SpecificationError
+        As `load`.
+    """
     try:
         document = parse(tree)
         check(document)
