@@ -22,8 +22,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from sosmith.model.arrays import Codes
 from sosmith.model.errors import ShortfallError, ToolError
-from sosmith.model.port import Codes
 from sosmith.sim.simulators import Simulator, find_simulator
 
 _POLL_SECONDS = 0.05

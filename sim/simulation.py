@@ -22,8 +22,8 @@ from sosmith.gen.output.manifest import manifest, section_entries
 from sosmith.gen.report.evidence import Alternative, Evidence, Format
 from sosmith.gen.specification.choices import ERROR_FEEDBACK
 from sosmith.gen.word_lengths.quantize import Quantized, with_realization
+from sosmith.model.arrays import Codes, Values
 from sosmith.model.errors import SpecificationError
-from sosmith.model.port import Codes, Values
 from sosmith.model.reference.golden import calibrated, filtered
 from sosmith.model.text_files import write_files
 from sosmith.model.traces.trace import Trace

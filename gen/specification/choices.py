@@ -1,4 +1,4 @@
-"""The names that a specification chooses from: families, kinds, methods, realizations, architectures, cores."""
+"""The names that a specification chooses from: families, kinds, methods, realizations, architectures, cores, inputs."""
 
 FAMILIES = ("butterworth", "chebyshev1", "chebyshev2", "elliptic", "bessel")
 KINDS = ("lowpass", "highpass", "bandpass", "bandstop")
@@ -11,3 +11,6 @@ CORES = ("instrument", "filter", "calibration")
 
 ERROR_FEEDBACK = ("df1", "df1_ef1", "df1_ef2")
 """Realizations that differ only in the error feedback, and so can be compared at the same word lengths."""
+
+CALIBRATION_INPUTS = ("voltage", "temperature")
+"""Inputs of the calibration polynomial, in the order of its indices."""

@@ -11,14 +11,16 @@ from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from sosmith.gen.specification.rules import CALIBRATION_INPUTS, check
-from sosmith.gen.specification.schema import Document, FilterTable, InputTable, OutputTable, parse
+from sosmith.gen.specification.choices import CALIBRATION_INPUTS
 from sosmith.gen.specification.values import UnfitError
 from sosmith.gen.specification.wear_limits import WearSpec
 from sosmith.model.errors import SpecificationError
 from sosmith.model.port import Port
+
+if TYPE_CHECKING:
+    from sosmith.gen.specification.schema import Document, FilterTable, InputTable, OutputTable
 
 MAX_BYTES = 1 << 16
 """Largest specification in bytes; a real one has one or two thousand."""
@@ -175,6 +177,10 @@ def from_tree(tree: dict[str, Any], path: Path) -> Specification:
     SpecificationError
         As `load`.
     """
+    # pydantic takes a while to load: a file that is missing or no TOML is refused without it.
+    from sosmith.gen.specification.rules import check
+    from sosmith.gen.specification.schema import parse
+
     try:
         document = parse(tree)
         check(document)

@@ -17,11 +17,11 @@ from pathlib import Path
 
 import numpy as np
 
+from sosmith.model.arrays import Values
 from sosmith.model.calibration.acceptance import REQUIRED_R
 from sosmith.model.calibration.least_squares import Solution, Sums, Term
 from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.errors import SpecificationError
-from sosmith.model.port import Values
 from sosmith.model.tables.csv_table import CsvTable, check_rows, read_csv_table
 
 COLUMNS = ("clearance_mm", "voltage_V", "temperature_C")

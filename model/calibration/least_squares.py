@@ -19,8 +19,8 @@ from operator import mul, sub
 
 import numpy as np
 
+from sosmith.model.arrays import Values
 from sosmith.model.calibration.polynomial import Polynomial
-from sosmith.model.port import Values
 
 DIGITS = 150
 """Digits of the decimal arithmetic. `MIN_SINE` lets through a matrix that costs some 40 of them."""

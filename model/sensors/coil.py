@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from sosmith.model.port import Values
+from sosmith.model.arrays import Values
 
 REFERENCE_TEMPERATURE = 20.0
 """Temperature in degC at which the parameters hold, the paper's reference."""

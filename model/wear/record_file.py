@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
+from sosmith.model.arrays import Values
 from sosmith.model.errors import SpecificationError
-from sosmith.model.port import Values
 from sosmith.model.tables.csv_table import check_rows, csv_header, read_csv_table
 from sosmith.model.traces.signal_file import unit_of
 from sosmith.model.traces.trace_file import CHANNEL, rows_of_channel

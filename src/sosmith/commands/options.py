@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
-from sosmith.gen.fpga.boards import BOARDS, Board, find_board
+from sosmith.gen.fpga.boards import BOARDS, find_board
 from sosmith.gen.specification.choices import CORES, ERROR_FEEDBACK, REALIZATIONS
 from sosmith.model.suggestion import did_you_mean
-
-if TYPE_CHECKING:
-    from sosmith.gen.core import CoreDesign
 
 
 class OneOf(click.Choice[str]):
@@ -37,6 +34,7 @@ WIDTHS_OF = click.option(
 BOARD = click.option(
     "--board",
     metavar="BOARD",
+    callback=lambda ctx, parameter, name: None if name is None else find_board(name).name,
     help=f"What it is meant for: an automatic choice of the architecture heeds its multipliers. {', '.join(BOARDS)}.",
 )
 SEED = click.option(
@@ -49,11 +47,6 @@ SECONDS = click.option(
 )
 
 
-def default_folder(made: CoreDesign) -> Path:
-    """Return the folder for what is made of a core, if none is named."""
-    return Path("build") / made.spec.name
-
-
-def board_named(name: str | None) -> Board | None:
-    """Return the board of an option, None if it is not given."""
-    return None if name is None else find_board(name)
+def default_folder(name: str) -> Path:
+    """Return the folder for what is made of the specification `name`, if none is given."""
+    return Path("build") / name

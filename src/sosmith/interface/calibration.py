@@ -69,12 +69,16 @@ class Calibration:
         if not 0 <= required_r < 1:
             raise SpecificationError(f"required_r must be 0 or more and less than 1, not {required_r:g}")
         try:
-            columns = [np.asarray(values, dtype=np.float64) for values in (clearance, voltage, temperature)]
-            if len({column.shape for column in columns}) > 1:
-                shapes = ", ".join(str(column.shape) for column in columns[1:] + columns[:1])
-                raise SpecificationError(f"voltage, temperature and clearance must have one shape, not {shapes}")
-            measurements = Measurements(*(column.ravel() for column in columns))
-        except (TypeError, ValueError) as error:
+            d, v, T = (np.asarray(values, dtype=np.float64) for values in (clearance, voltage, temperature))
+        except (TypeError, ValueError):
+            raise SpecificationError("voltage, temperature and clearance must be numbers, not something else") from None
+        if not d.shape == v.shape == T.shape:
+            raise SpecificationError(
+                f"voltage, temperature and clearance must have one shape, not {v.shape}, {T.shape} and {d.shape}"
+            )
+        try:
+            measurements = Measurements(d.ravel(), v.ravel(), T.ravel())
+        except ValueError as error:
             raise SpecificationError(str(error)) from None
         return cls(fit(measurements, required_r, robust=robust), measurements)
 

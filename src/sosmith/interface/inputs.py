@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.stimuli import default_scenario, traces_for
+from sosmith.model.arrays import Codes
 from sosmith.model.errors import SpecificationError
-from sosmith.model.port import Codes
 from sosmith.model.suggestion import did_you_mean
 from sosmith.model.traces.trace import Trace
 

@@ -29,9 +29,9 @@ class Quantity(float):
         made.unit = unit
         return made
 
-    def __getnewargs__(self) -> tuple[float, str]:
+    def __reduce__(self) -> tuple[type[Quantity], tuple[float, str]]:
         """Let copies and pickles keep the unit."""
-        return float(self), self.unit
+        return type(self), (float(self), self.unit)
 
     def __repr__(self) -> str:
         return f"Quantity({float(self)!r}, {self.unit!r})"

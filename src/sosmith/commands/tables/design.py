@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 
 from rich.console import Console
@@ -15,6 +15,8 @@ from sosmith.gen.output.manifest import section_entries
 from sosmith.gen.proof.limit_cycles import limit_cycles, recursions
 from sosmith.gen.specification.wear_limits import WearSpec
 from sosmith.gen.word_lengths.cost import cost_of
+from sosmith.interface.design import Design
+from sosmith.interface.quantity import Quantity
 from sosmith.model.dataflow.program import Program
 from sosmith.model.port import Port
 
@@ -51,7 +53,8 @@ def print_design(made: CoreDesign, *, brief: bool = False) -> None:
     if made.spec.channels > 1:
         overview.add_row("channels", f"{made.spec.channels:,}, each at {float(made.spec.sample_rate):,.6g} Hz")
     console.print(overview)
-    print_budget(console, quantized.budget, datapath.output.lsb, datapath.output.unit, made.spec.max_error)
+    design = Design(made)
+    print_budget(console, design.budget, datapath.output.lsb, design.specification.max_error)
     if brief:
         return
     sections = new_table("Sections", ["section", "coefficients", "input", "states", "output"])
@@ -122,13 +125,11 @@ def _print_limit_cycles(console: Console, made: CoreDesign) -> None:
     console.print(table)
 
 
-def print_budget(console: Console, parts: dict[str, Fraction], lsb: Fraction, unit: str, max_error: Fraction) -> None:
-    """Print the parts of an error bound, in output LSBs, and what is allowed."""
-    budget = new_table(
-        "Error budget, proven for all inputs in range", ["part", escape(unit) or "full scale 1", "output LSB"]
+def print_budget(console: Console, budget: Mapping[str, Quantity], lsb: Fraction, max_error: Quantity) -> None:
+    """Print the parts of an error bound, in the output's unit and in its steps, and what is allowed."""
+    table = new_table(
+        "Error budget, proven for all inputs in range", ["part", escape(max_error.unit) or "full scale 1", "output LSB"]
     )
-    bound = sum(parts.values(), Fraction(0))
-    for part, value in [*parts.items(), ("[bold]sum[/]", bound)]:
-        budget.add_row(part, f"{float(value * lsb):.3g}", f"{float(value):.4f}")
-    budget.add_row("allowed", f"{float(max_error):.3g}", f"{float(max_error / lsb):.4f}")
-    console.print(budget)
+    for part, value in [*budget.items(), ("[bold]sum[/]", sum(budget.values())), ("allowed", max_error)]:
+        table.add_row(part, f"{float(value):.3g}", f"{float(value) / float(lsb):.4f}")
+    console.print(table)
