@@ -17,9 +17,9 @@ from sosmith.gen.core import CoreDesign
 from sosmith.gen.filter.response import FilterFacts
 from sosmith.gen.fpga.boards import Board
 from sosmith.gen.fpga.synthesis import Netlist, synthesize
+from sosmith.gen.output.core_facts import CoreFacts, core_facts
 from sosmith.gen.output.generate import generate
-from sosmith.gen.output.manifest import manifest, section_entries
-from sosmith.gen.report.evidence import Alternative, Evidence, Format
+from sosmith.gen.report.evidence import Alternative, Evidence
 from sosmith.gen.specification.choices import ERROR_FEEDBACK
 from sosmith.gen.word_lengths.quantize import Quantized, with_realization
 from sosmith.model.arrays import Codes, Values
@@ -27,6 +27,7 @@ from sosmith.model.errors import SpecificationError
 from sosmith.model.reference.golden import calibrated, filtered
 from sosmith.model.text_files import write_files
 from sosmith.model.traces.trace import Trace
+from sosmith.sim.cocotb_bench import CocotbBench
 from sosmith.sim.cosimulate import CosimulationResult, cosimulate
 from sosmith.sim.gate_level import with_cell_models
 from sosmith.sim.simulators import check_name
@@ -69,7 +70,8 @@ def simulate(
     with _alone_in(directory):
         for stale in ("report.json", "report.html"):  # of a run of another core, if this one fails
             (directory / stale).unlink(missing_ok=True)
-        generate(design, directory, lambda step: progress(f"generating {step}", 0, 0))
+        facts = core_facts(design)
+        generate(design, directory, lambda step: progress(f"generating {step}", 0, 0), facts=facts)
         source, build_dir, netlist = directory / f"{design.datapath.name}.sv", directory / "simulation", None
         if gates is not None:
             progress(f"synthesizing for {gates.title}", 0, 0)
@@ -77,20 +79,25 @@ def simulate(
             netlist = synthesize(source, design.datapath.name, gates, build_dir)
             source = with_cell_models(netlist, scrambled=not design.spec.hardware.reload)
         progress(f"building with {simulator}", 0, 0)
-        result = cosimulate(
-            source,
-            manifest(design),
-            np.stack([trace.codes for trace in traces], axis=1),
+        bench = CocotbBench(
+            source=source,
+            interface=facts.interface,
             build_dir=build_dir,
             simulator=simulator,
             seed=seed,
             idle=idle,
             stall=stall,
             waves=waves,
+        )
+        result = cosimulate(
+            bench,
+            facts.interface,
+            np.stack([trace.codes for trace in traces], axis=1),
+            seed=seed,
             progress=lambda done, total: progress("co-simulating", done, total),
         )
     progress("comparing", 0, 0)
-    return _evidence(design, traces, result, netlist, seed=seed, wall_seconds=time.monotonic() - started)
+    return _evidence(design, facts, traces, result, netlist, seed=seed, wall_seconds=time.monotonic() - started)
 
 
 @contextmanager
@@ -112,6 +119,7 @@ def _alone_in(directory: Path) -> Iterator[None]:
 
 def _evidence(
     design: CoreDesign,
+    facts: CoreFacts,
     traces: Sequence[Trace],
     result: CosimulationResult,
     netlist: Netlist | None,
@@ -130,7 +138,6 @@ def _evidence(
     sos = None if quantized.filter is None else quantized.filter.sos
     golden = np.stack([filtered(column, sos, output) for column in unfiltered.T], axis=1)
     trace = traces[0]
-    facts = manifest(design)
     low, high = output.decode(np.array([output.lowest, output.highest]))
     evidence = Evidence(
         name=datapath.name,
@@ -141,9 +148,9 @@ def _evidence(
         lsb=float(output.lsb),
         low=float(low),
         high=float(high),
-        bound=facts["error_bound"],
-        bound_parts=facts["error_parts"],
-        proven=facts["error_bound_proven"],
+        bound=facts.error_bound,
+        bound_parts=facts.error_parts,
+        proven=True,
         max_error=float(design.spec.max_error),
         time=trace.time,
         truth=_stacked([trace.truth for trace in traces]),
@@ -156,30 +163,19 @@ def _evidence(
         samples=received.size,
         channels=len(traces),
         cycles=result.cycles,
-        latency_cycles=facts["latency_cycles"],
+        latency_cycles=facts.interface.latency_cycles,
         simulator=result.simulator,
         seed=seed,
         gates=netlist,
         tools=result.tools if netlist is None else {**result.tools, "yosys": netlist.version},
         wall_seconds=wall_seconds,
         cycles_per_second=result.cycles_per_second,
-        realization=quantized.realization if quantized.sections else "none",
-        architecture=design.architecture.name,
-        why=" ".join(f"{reason}." for reason in design.reasons.values()),
-        formats=[
-            Format(
-                node=f"{row['stage']}.{row['node']}",
-                notation=row["format"],
-                low=row["low"],
-                high=row["high"],
-                unit=row["unit"],
-            )
-            for row in facts["formats"]
-        ],
-        sections=[
-            entry | {"realization": quantized.realization} for s in quantized.sections for entry in section_entries(s)
-        ],
-        limit_cycles=facts["limit_cycles"],
+        realization=facts.realization or "none",
+        architecture=facts.architecture,
+        why=" ".join(f"{reason}." for reason in facts.reasons.values()),
+        formats=facts.formats,
+        sections=facts.sections,
+        limit_cycles=facts.limit_cycles,
         filter=_filter_facts(quantized),
         alternatives=_alternatives(quantized, codes, golden),
     )

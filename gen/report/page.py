@@ -6,16 +6,16 @@ Every text that comes from outside (names, units, descriptions) passes through `
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from fractions import Fraction
 from html import escape
 from importlib.resources import files
 from typing import Any
 
 from sosmith.gen.filter.response import FilterFacts
 from sosmith.gen.fpga.synthesis import Netlist
+from sosmith.gen.output.core_facts import NodeFormat
 from sosmith.gen.quantity import count, decibels, duration, plain_number, quantity, scale, unit_symbol
 from sosmith.gen.report import plots
-from sosmith.gen.report.evidence import Evidence, Format
+from sosmith.gen.report.evidence import Evidence
 
 Summary = Mapping[str, Any]
 
@@ -322,14 +322,14 @@ def _limit_cycles_table(evidence: Evidence) -> str:
     """Tell what each section's rounding can keep up by itself, at the section's own output."""
     rows = []
     for found in evidence.limit_cycles:
-        weights = [f"{float(Fraction(weight)):.4g}" for weight in found["lyapunov"] or ()]
+        weights = [f"{float(weight):.4g}" for weight in found.lyapunov or ()]
         rows.append(
             (
-                text(found["section"]),
-                "none, proven" if found["none"] else amount(found["largest"], evidence.unit),
-                "" if found["none"] else _lsb(found["largest"] / evidence.lsb),
-                amount(found["dead_band"], evidence.unit) if found["dead_band"] else "none",
-                _lsb(found["dead_band"] / evidence.lsb) if found["dead_band"] else "",
+                text(found.section),
+                "none, proven" if found.none else amount(found.largest, evidence.unit),
+                "" if found.none else _lsb(found.largest / evidence.lsb),
+                amount(found.dead_band, evidence.unit) if found.dead_band else "none",
+                _lsb(found.dead_band / evidence.lsb) if found.dead_band else "",
                 text(", ".join(weights)) or "none exist",
             )
         )
@@ -414,39 +414,35 @@ def _filter_section(facts: FilterFacts, measures: Mapping[str, float | None]) ->
 def _coefficient_table(evidence: Evidence) -> str:
     rows = []
     for section in evidence.sections:
-        name = section["name"]
-        if section["realization"] != evidence.realization:
-            name = f"{name}, {section['realization']}"
-        for index, coefficient in enumerate(section["coefficients"]):
-            title = text(name) if index == 0 else ""
+        for index, coefficient in enumerate(section.coefficients):
+            title = text(section.name) if index == 0 else ""
             rows.append(
                 (
                     title,
-                    f"<code>{text(coefficient['name'])}</code>",
-                    f"<code>{text(format(coefficient['integer'], ','))}</code>".replace("-", "−"),
-                    text(coefficient["frac"]),
-                    f"<code>{text(format(float(coefficient['value']), '.10g'))}</code>".replace("-", "−"),
+                    f"<code>{text(coefficient.name)}</code>",
+                    f"<code>{text(format(coefficient.integer, ','))}</code>".replace("-", "−"),
+                    text(coefficient.frac),
+                    f"<code>{text(format(coefficient.value, '.10g'))}</code>".replace("-", "−"),
                 )
             )
     head = ("section", "", "integer", "fractional bits", "value")
     return table(head, rows, numbers=(2, 3, 4))
 
 
-def _format_table(formats: Sequence[Format]) -> str:
+def _format_table(formats: Sequence[NodeFormat]) -> str:
     """List the formats by stage, folded up if they are many: few readers look for more than one."""
     rows, previous = [], ""
     for row in formats:
-        stage, _, signal = row.node.partition(".")
         rows.append(
             (
-                "" if stage == previous else text(stage),
-                text(signal),
-                f"<code>{text(row.notation)}</code>",
+                "" if row.stage == previous else text(row.stage),
+                text(row.node),
+                f"<code>{text(row.format)}</code>",
                 amount(row.low, row.unit),
                 amount(row.high, row.unit),
             )
         )
-        previous = stage
+        previous = row.stage
     unfolded = " open" if len(formats) <= 24 else ""
     listing = table(("stage", "signal", "format", "from", "to"), rows, numbers=(3, 4))
     title = f"Number formats along the way: {count(len(formats), 'signal')}"

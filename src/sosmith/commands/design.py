@@ -57,7 +57,7 @@ def design_command(
     else:
         from sosmith.commands.tables.design import print_design
 
-        print_design(made.core)
+        print_design(made)
 
 
 @click.command("generate")

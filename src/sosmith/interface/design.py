@@ -16,9 +16,10 @@ from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.filter.response import complex_response
 from sosmith.gen.fpga.boards import find_board
 from sosmith.gen.output.certificate import certificate
+from sosmith.gen.output.core_facts import CoreFacts, core_facts
 from sosmith.gen.output.generate import generate
-from sosmith.gen.output.manifest import manifest, section_entries
-from sosmith.gen.word_lengths.cost import Cost, cost_of
+from sosmith.gen.output.manifest import manifest
+from sosmith.gen.word_lengths.cost import Cost
 from sosmith.interface.certificate import Certificate, Progress, Proof
 from sosmith.interface.inputs import codes_of, encoded, traces_of
 from sosmith.interface.notebook import table_html
@@ -177,25 +178,24 @@ class Design:
         """The filter's sections, in the order of the cascade."""
         return tuple(
             Section(
-                name=entry["name"],
-                coefficients={c["name"]: Coefficient(c["integer"], c["frac"]) for c in entry["coefficients"]},
-                b=tuple(entry["b"]),
-                a=tuple(entry["a"]),
-                formats={"input": entry["input"], **entry["states"], "output": entry["output"]},
+                name=section.name,
+                coefficients={c.name: Coefficient(c.integer, c.frac) for c in section.coefficients},
+                b=section.b,
+                a=section.a,
+                formats={"input": section.input, **section.states, "output": section.output},
             )
-            for section in self.core.quantized.sections
-            for entry in section_entries(section)
+            for section in self.facts.sections
         )
 
-    @cached_property
+    @property
     def cost(self) -> Cost:
         """Counts before synthesis, those of the parallel architecture: `multipliers`, `adder_bits`, `luts`, ..."""
-        return cost_of(self.core.datapath)
+        return self.facts.cost
 
     @cached_property
     def manifest(self) -> dict[str, Any]:
         """What a program around the core has to know: the content of ``<name>.json``."""
-        return manifest(self.core)
+        return manifest(self.facts)
 
     @cached_property
     def certificate(self) -> Certificate:
@@ -357,6 +357,11 @@ class Design:
         )
         progress("writing the report", 0, 0)
         return Report.written(self.core, traces, evidence, place)
+
+    @cached_property
+    def facts(self) -> CoreFacts:
+        """All facts about the core that manifest and report tell."""
+        return core_facts(self.core)
 
     def _in_units(self, steps: Any) -> Quantity:
         """Turn steps of the output into its unit."""
