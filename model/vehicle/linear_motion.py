@@ -1,4 +1,4 @@
-"""Linear mechanical systems: assembled from springs and dampers, their modes, their exact response."""
+"""Linear mechanical systems: assembly from springs and dampers, modes, exact response."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class Mode:
-    """A mode of free motion, exp(growth t) cos(2 pi frequency t).
+    """A mode of free vibration, exp(growth t) cos(2 pi frequency t).
 
     Attributes
     ----------
     frequency : float
-        In Hz; 0 for a motion that dies away or grows without swinging.
+        Frequency in Hz; 0 for a mode that decays or grows without oscillating.
     growth : float
-        Real part of the eigenvalue in 1/s; below 0 if the motion dies away.
+        Real part of the eigenvalue in 1/s; negative if the mode decays.
     coordinate : str
-        The kind of coordinate with the most of the kinetic energy: its name without numbers, since in a symmetric
-        system rounding alone would decide between twins.
+        The kind of coordinate with the largest share of kinetic energy: a coordinate's name without numbers, since in
+        a symmetric system only rounding would distinguish equal coordinates.
     """
 
     frequency: float
@@ -39,21 +39,21 @@ class Mode:
 
     @property
     def damping(self) -> float:
-        """Damping ratio: minus the real part over the magnitude of the eigenvalue, 1 without swinging."""
+        """Damping ratio: minus the real part over the magnitude of the eigenvalue; 1 without oscillation."""
         size = float(np.hypot(self.growth, 2 * np.pi * self.frequency))
         return -self.growth / size if size else 0.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LinearSystem:
-    """The equations mass q'' + damping q' + stiffness q = force.
+    """The equations of motion mass q'' + damping q' + stiffness q = force.
 
     Attributes
     ----------
     names : tuple of str
         Names of the n coordinates.
     mass, damping, stiffness : ndarray, shape (n, n)
-        Matrices in SI units; the mass is symmetric and positive definite.
+        Matrices in SI units; the mass matrix is symmetric and positive definite.
     """
 
     names: tuple[str, ...]
@@ -62,7 +62,7 @@ class LinearSystem:
     stiffness: Array
 
     def state_matrix(self) -> Array:
-        """Matrix A of x' = A x + (0, mass^-1 force) for the state x = (q, q'), shape (2 n, 2 n)."""
+        """Return the matrix A of x' = A x + (0, mass^-1 force) for the state x = (q, q'), shape (2 n, 2 n)."""
         return evaluate(lambda: _doubles(self._state_matrix()))
 
     def _state_matrix(self) -> arb_mat:
@@ -72,13 +72,13 @@ class LinearSystem:
         return _blocks([[none, one], [-mass.solve(stiffness), -mass.solve(damping)]])
 
     def modes(self) -> tuple[Mode, ...]:
-        """All modes by rising frequency and growth; of each conjugate pair one, so n to 2 n of them."""
+        """Return all modes by rising frequency, then growth; one per conjugate pair, so n to 2 n modes."""
         kinds = [" ".join(word for word in name.split(" ") if not word.isdigit()) for name in self.names]
         found = []
         values, vectors = np.linalg.eig(self.state_matrix())
         for frequency, growth in evaluate(self._eigenvalues):
             nearest = int(np.argmin(np.hypot(values.real - growth, values.imag - 2 * np.pi * frequency)))
-            # displacements stand first; their rates of change are only a factor off
+            # displacements come first; velocities differ only by a factor
             energy = dict.fromkeys(kinds, 0.0)
             for kind, mass, moved in zip(kinds, np.diag(self.mass), vectors[: len(kinds), nearest], strict=True):
                 energy[kind] += float(mass * abs(moved) ** 2)
@@ -107,25 +107,25 @@ class LinearSystem:
         ]
 
     def energy(self, displacement: Array, velocity: Array) -> Array:
-        """Kinetic and elastic energy in J over time, shape (m,), of motions of shape (m, n).
+        """Return kinetic plus elastic energy in J, shape (m,), of motions of shape (m, n).
 
-        An energy only if the stiffness is symmetric.
+        It is an energy only if the stiffness matrix is symmetric.
         """
         kinetic = np.einsum("ti,ij,tj->t", velocity, self.mass, velocity)
         elastic = np.einsum("ti,ij,tj->t", displacement, self.stiffness, displacement)
         return np.asarray((kinetic + elastic) / 2)
 
     def respond(self, force: Array, step: float, start: tuple[Array, Array] | None = None) -> tuple[Array, Array]:
-        """Motion under a force that is linear between its samples: exact but for rounding.
+        """Return the motion under a force that is linear between its samples, exact except for rounding.
 
         Parameters
         ----------
         force : ndarray, shape (m, n)
             Force on each coordinate at times 0, step, 2 step, ...
         step : float
-            In s.
+            Time step in s.
         start : pair of ndarray, shape (n,), optional
-            Displacements and velocities at time 0; otherwise rest.
+            Displacements and velocities at time 0; zero by default.
 
         Returns
         -------
@@ -139,11 +139,11 @@ class LinearSystem:
         return states[:, :n], states[:, n:]
 
     def _transition(self, step: float) -> tuple[Array, Array, Array]:
-        """Factors of the state, of the force and of the force's change in the state one step later."""
+        """Return the factors of the state, the force and its change over a step, in the state one step later."""
         n = len(self.names)
         none, one = _balls(np.zeros((n, n))), _balls(np.eye(n))
         inputs = _blocks([[none], [_balls(self.mass).inv()]])
-        # x' = A x + B u with u' = constant over a step: Van Loan's block exponential holds all three factors
+        # x' = A x + B u with u' = constant over a step: Van Loan's block exponential gives all three factors
         small = arb(step)
         block = _blocks(
             [
@@ -176,9 +176,9 @@ def _doubles(matrix: arb_mat) -> Array:
 
 
 def _accumulate(move: Array, push: Array, first: Array) -> Array:
-    """States of x[k + 1] = move x[k] + push[k] from x[0] = first, shape (m + 1, d) for pushes of shape (m, d).
+    """Return the states of x[k + 1] = move x[k] + push[k] from x[0] = first, shape (m + 1, d) for push of shape (m, d).
 
-    All of about sqrt(m) blocks step along side by side from zero; then each gets what the end of the one before adds.
+    About sqrt(m) blocks advance in parallel from zero; then each gets the contribution of the previous block's end.
     """
     count, width = push.shape
     size = max(1, math.isqrt(count))
@@ -203,10 +203,10 @@ def _thirds(n: int) -> tuple[slice, slice, slice]:
 
 
 class Suspension:
-    """Matrices of springs and dampers between named coordinates, built element by element.
+    """Stiffness and damping matrices of springs and dampers between named coordinates, built element by element.
 
     An element with the elongation u = sum of factor * coordinate adds k u^2 / 2 to the elastic energy and c u'^2 / 2
-    to the dissipation, so the matrices are symmetric and take no energy out of nothing, whatever the elements.
+    to the dissipation. The matrices are therefore symmetric and passive for any set of elements.
     """
 
     def __init__(self, names: Sequence[str]) -> None:
@@ -216,7 +216,7 @@ class Suspension:
         self.damping: Array = np.zeros_like(self.stiffness)
 
     def add(self, elongation: Mapping[str, float], stiffness: float, damping: float = 0.0, count: int = 1) -> None:
-        """Add `count` equal springs in N/m and dampers in N s/m with this elongation."""
+        """Add `count` equal springs in N/m and dampers in N s/m with this `elongation`."""
         for (one, a), (other, b) in itertools.product(elongation.items(), repeat=2):
             place = self._index[one], self._index[other]
             self.stiffness[place] += count * stiffness * a * b
