@@ -33,6 +33,7 @@ from matplotlib.figure import Figure
 
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.output.verilog import to_rtlil, to_verilog
+from sosmith.gen.picture import settled
 from sosmith.gen.specification.specification import load
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -480,7 +481,7 @@ def plot(record: Figures) -> str:
         figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=3, fontsize="small")
         text = io.StringIO()
         figure.savefig(text, format="svg", metadata={"Date": None})
-    return "\n".join(line.rstrip() for line in text.getvalue().splitlines()) + "\n"
+    return settled(text.getvalue())
 
 
 def document(record: Figures) -> dict[str, str]:

@@ -19,6 +19,7 @@ from scipy import signal
 
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.filter.design import decay_length
+from sosmith.gen.picture import settled
 from sosmith.gen.proof.linear_model import linear_model
 from sosmith.gen.realizations.noise import minimum_gain, second_order_modes
 from sosmith.gen.realizations.registry import REALIZATIONS, SectionFormat
@@ -164,7 +165,7 @@ def plot(curves: dict[str, list[float] | str]) -> str:
         axes.legend()
         text = io.StringIO()
         figure.savefig(text, format="svg", metadata={"Date": None})
-    return "\n".join(line.rstrip() for line in text.getvalue().splitlines()) + "\n"
+    return settled(text.getvalue())
 
 
 def slope_table(curves: dict[str, list[float] | str]) -> str:

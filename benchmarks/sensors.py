@@ -19,6 +19,7 @@ from matplotlib.figure import Figure
 
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.paper.figures import read_paper_figures
+from sosmith.gen.picture import settled
 from sosmith.gen.specification.specification import load
 from sosmith.gen.stimuli import bench_of
 from sosmith.model.arrays import Values
@@ -185,7 +186,7 @@ def drawn(width: float, height: float, paint: Callable[[Figure], None]) -> str:
         paint(figure)
         text = io.StringIO()
         figure.savefig(text, format="svg", metadata={"Date": None})
-    return "\n".join(line.rstrip() for line in text.getvalue().splitlines()) + "\n"
+    return settled(text.getvalue())
 
 
 def sensors_picture(figure: Figure) -> None:
