@@ -150,7 +150,7 @@ def other_set(
     hardware : CoreDesign
         What the core was made from.
     ideal, polynomial
-        As for `sosmith.gen.word_lengths.quantize.with_constants`.
+        As for `sosmith.gen.reload.other_constants.with_constants`.
     calibrated : tuple of (int, int) or None
         Lowest and highest code of each input that the calibration covers; None for the core's own. The parallel
         architecture goes on to judge by its own range, so that the other must hold it.
