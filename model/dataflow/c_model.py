@@ -133,7 +133,7 @@ def _wear_declaration(datapath: Datapath) -> str:
 
 
 def _wear_definition(datapath: Datapath) -> str:
-    """Return the function that judges wear, which alone depends on a channel's number."""
+    """Return the function that judges wear, the only one that depends on the channel's number."""
     if not datapath.wear:
         return ""
     rows = ", ".join(f"{{{warning}, {critical}}}" for warning, critical in datapath.wear)
@@ -157,7 +157,7 @@ def _judge_wear(datapath: Datapath) -> str:
 
 
 def state_count(datapath: Datapath) -> int:
-    """Count the state words of one channel."""
+    """Return the number of states of one channel."""
     return sum(len(stage.graph.delays) for stage in datapath.stages)
 
 
@@ -188,7 +188,7 @@ def _result(datapath: Datapath) -> str:
 
 
 def _exported(datapath: Datapath, index: int) -> list[int]:
-    """Nodes of a stage that others need: its outputs and, of the last stage, what the output stage clamps."""
+    """Return the nodes of a stage that others need: its outputs and, of the last stage, the value before the clamp."""
     graph = datapath.stages[index].graph
     exported = set(graph.outputs)
     if index == len(datapath.stages) - 1 and (node := graph.nodes[graph.outputs[0]]).op is Op.CLAMP:
@@ -204,7 +204,7 @@ def _wires(datapath: Datapath) -> str:
 
 
 def _stages(datapath: Datapath) -> str:
-    """One function for each stage."""
+    """Return one function for each stage."""
     text = []
     wires = [f"{port.name}_code" for port in datapath.inputs]
     offset = 0
@@ -244,7 +244,7 @@ def _stage_lines(graph: Graph, index: int, wires: list[str], offset: int) -> lis
 
 
 def _status(datapath: Datapath) -> str:
-    """Expression of the flags."""
+    """Return the C expression of the status."""
     last = datapath.stages[-1].graph
     node = last.nodes[last.outputs[0]]
     conditions: dict[Flag, list[str]] = {flag: [] for flag in Flag}
@@ -262,14 +262,14 @@ def _status(datapath: Datapath) -> str:
     return f"(uint8_t)({' | '.join(terms)})"
 
 
-_UNROLLED = 4  # samples; four spare the processor the moves of x[n-1] to x[n-2], more gain nothing
+_UNROLLED = 4  # samples: four save the processor the moves from x[n-1] to x[n-2], more gain nothing
 
 
 def _block(datapath: Datapath) -> str:
     """Return the functions for many samples.
 
-    Without status, each stage works one sample behind the stage before it, as in a pipeline: then none waits for
-    another, which a processor hides only where its window of instructions is long enough for the whole chain.
+    Without status, each stage works one sample behind the stage before it, as in a pipeline, so that none waits for
+    another. A processor could hide such waits only if its window of instructions held the whole chain.
     """
     name, inputs, behind = datapath.name, datapath.inputs, len(datapath.stages) - 1
     codes = [f"in[(n * channels + c) * {len(inputs)} + {i}]" for i in range(len(inputs))]

@@ -1,13 +1,13 @@
-"""Integer dataflow graphs: the one description of a datapath that everything else is made from.
+"""Integer dataflow graphs: the one description of a datapath, from which everything else is made.
 
 A graph is a list of nodes in the order of computation. A node carries an integer `code` with
 `frac` fraction bits, so its value is ``code * 2**-frac``, and the integer range ``low..high`` that
 the code never leaves. The exact interpreter here, the C model (`sosmith.model.dataflow.c_model`) and the
-hardware (`sosmith.hdl.ranked_logic`) all walk the same nodes.
+hardware (`sosmith.hdl.pipelined_logic`) all walk the same nodes.
 
-The usual quantizer is FLOOR, which drops lower bits and costs nothing; the bits it drops are FRACTION.
-Rounding to nearest, ties upward, is the addition of a half before it. TRUNCATE drops bits of the magnitude,
-which never makes a value larger: a recursion that cannot gain energy then comes to rest.
+The usual quantizer is FLOOR, which drops lower bits and costs nothing; FRACTION is the bits that it drops.
+Rounding to nearest, ties upward, adds a half before it. TRUNCATE drops bits of the magnitude, which never makes
+a value larger: a recursion that cannot gain energy then comes to rest.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from fractions import Fraction
 
 
 class Op(Enum):
-    """What a node does with its operands."""
+    """Operation of a node."""
 
     INPUT = "input"
     CONSTANT = "constant"
@@ -29,11 +29,11 @@ class Op(Enum):
     SCALE = "scale"  # multiplies by the constant parameter * 2**-parameter_frac
     MULTIPLY = "multiply"
     FLOOR = "floor"  # to `frac` fraction bits, by dropping the others
-    FRACTION = "fraction"  # what FLOOR to parameter fraction bits drops: a - floor(a), never negative
+    FRACTION = "fraction"  # what FLOOR to `parameter` fraction bits drops: a - floor(a), never negative
     TRUNCATE = "truncate"  # to `frac` fraction bits, towards zero
     CLAMP = "clamp"  # limits to low..high
     BOUND = "bound"  # states that the value stays in low..high; no logic
-    DELAY = "delay"  # the operand of the sample before; 0 at reset
+    DELAY = "delay"  # the operand at the sample before; 0 at reset
 
 
 @dataclass(frozen=True)
@@ -43,17 +43,17 @@ class Node:
     Attributes
     ----------
     op : Op
-        What it does.
+        The operation.
     operands : tuple of int
-        Indices of its operands in the graph; the operand of a DELAY may come later.
+        Indices of the operands in the graph; that of a DELAY may come later.
     frac : int
         Fraction bits of the result; negative for multiples of a power of two.
     low, high : int
         Range of the result's code.
     parameter, parameter_frac : int
-        Constant of CONSTANT, SCALE and SHIFT; fraction bits that FLOOR would keep, for FRACTION.
+        Constant of CONSTANT, SCALE and SHIFT; for FRACTION, the fraction bits that FLOOR would keep.
     name : str
-        Name for people and for the hardware, ``""`` for a passing result.
+        Name in documents and in the hardware, ``""`` for an intermediate result.
     """
 
     op: Op
@@ -86,12 +86,12 @@ class Node:
 
 
 class RangeError(ArithmeticError):
-    """A value left the range its node states: an overflow in hardware."""
+    """A value left the range that its node states: an overflow in hardware."""
 
 
 @dataclass(frozen=True)
 class Graph:
-    """A frozen dataflow graph with named inputs and outputs and its delays as state.
+    """A frozen dataflow graph; its delays are its state.
 
     Attributes
     ----------
@@ -134,7 +134,7 @@ class Graph:
         Raises
         ------
         RangeError
-            If any node's code leaves the range it states.
+            If a node's code leaves the range that the node states.
         """
         codes: list[int] = []
         supply = iter(inputs)
@@ -153,7 +153,7 @@ class Graph:
         return [codes[i] for i in self.outputs]
 
     def run(self, samples: Iterable[Sequence[int]], state: list[int] | None = None) -> list[list[int]]:
-        """Compute a run of samples from `state` (reset if None); the slow, exact reference."""
+        """Compute samples in a row from `state`, or from reset if None; the slow, exact reference."""
         memory = self.reset() if state is None else state
         return [self.step(sample, memory) for sample in samples]
 
@@ -236,7 +236,13 @@ class GraphBuilder:
         return self._append(Node(Op.DELAY, (-1,), frac, min(low, 0), max(high, 0), name=name))
 
     def connect(self, delay: Wire, source: Wire) -> None:
-        """Make `source` of this sample the value of `delay` at the next."""
+        """Make `source` at this sample the value of `delay` at the next.
+
+        Raises
+        ------
+        ValueError
+            If `delay` is connected already, or `source` has another format or a wider range.
+        """
         state, node = self[delay], self[source]
         if state.op is not Op.DELAY or state.operands != (-1,):
             raise ValueError(f"wire must be an unconnected delay, not {state.op.value} {state.name!r}")
@@ -252,12 +258,12 @@ class GraphBuilder:
         return delay
 
     def add(self, a: Wire, b: Wire, name: str = "") -> Wire:
-        """Add exactly; the result has the longer fraction of the two."""
+        """Add exactly; the result has the longer of the two fractions."""
         frac, (al, ah), (bl, bh) = self._align(a, b)
         return self._append(Node(Op.ADD, (a.index, b.index), frac, al + bl, ah + bh, name=name))
 
     def subtract(self, a: Wire, b: Wire, name: str = "") -> Wire:
-        """Subtract `b` from `a` exactly; the result has the longer fraction of the two."""
+        """Subtract `b` from `a` exactly; the result has the longer of the two fractions."""
         frac, (al, ah), (bl, bh) = self._align(a, b)
         return self._append(Node(Op.SUBTRACT, (a.index, b.index), frac, al - bh, ah - bl, name=name))
 
@@ -289,10 +295,16 @@ class GraphBuilder:
         )
 
     def combine(self, terms: Iterable[tuple[int, Wire]], name: str = "") -> Wire:
-        """Sum small integer multiples of wires exactly; each factor must be 0 or plus or minus a power of two."""
+        """Add multiples of wires exactly; each factor must be 0 or plus or minus a power of two.
+
+        Raises
+        ------
+        ValueError
+            If a factor is another number.
+        """
         total: Wire | None = None
         ordered = [term for term in terms if term[0]]
-        # The first of those that are added comes first: a negation is needed only where everything is subtracted.
+        # A term that is added comes first: a negation is needed only if all terms are subtracted.
         first = next((k for k, (factor, _) in enumerate(ordered) if factor > 0), 0)
         for factor, wire in [*ordered[first : first + 1], *ordered[:first], *ordered[first + 1 :]]:
             size = abs(factor)
@@ -308,7 +320,7 @@ class GraphBuilder:
         return self.named(total, name)
 
     def named(self, wire: Wire, name: str) -> Wire:
-        """Give a passing result a name for people and for the hardware."""
+        """Name an intermediate result, unless it has a name."""
         if name and not self[wire].name:
             self._nodes[wire.index] = replace(self[wire], name=name)
         return wire
@@ -324,7 +336,7 @@ class GraphBuilder:
         return self._append(Node(Op.FLOOR, (a.index,), frac, node.low >> shift, node.high >> shift, name=name))
 
     def fraction(self, a: Wire, frac: int, name: str = "") -> Wire:
-        """Return what `floor` to `frac` fraction bits drops, exactly; at least 0 and below ``2**-frac``."""
+        """Return what `floor` to `frac` fraction bits drops, exactly: at least 0 and below ``2**-frac``."""
         node = self[a]
         shift = node.frac - frac
         if shift <= 0:
@@ -341,7 +353,7 @@ class GraphBuilder:
         return self._append(Node(Op.TRUNCATE, (a.index,), frac, low, high, name=name))
 
     def round(self, a: Wire, frac: int, name: str = "") -> Wire:
-        """Round to nearest with ties upward; exact if `a` has no more than `frac` fraction bits."""
+        """Round to nearest, ties upward; exact if `a` has no more than `frac` fraction bits."""
         if self[a].frac <= frac:
             return self.floor(a, frac, name)
         return self.floor(self.add(a, self.constant(1, frac + 1)), frac, name)
@@ -351,7 +363,7 @@ class GraphBuilder:
         return self._append(Node(Op.CLAMP, (a.index,), self[a].frac, low, high, name=name))
 
     def bound(self, a: Wire, low: int, high: int, name: str = "") -> Wire:
-        """State that the code stays in `low`..`high`, known from outside (a peak gain), and so narrow it."""
+        """State that the code stays in `low`..`high`, as is known from peak gains, and narrow its range to that."""
         node = self[a]
         return self._append(Node(Op.BOUND, (a.index,), node.frac, max(low, node.low), min(high, node.high), name=name))
 

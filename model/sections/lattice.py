@@ -18,9 +18,9 @@ a small rest, and only the rest is multiplied by. For poles near z = 1 or z = -1
 them to a small fraction of their distance from there.
 
 The waves that enter a delay, and the one that the inner section reflects, are truncated towards zero. An adaptor
-gains no energy, ``G1 a1**2 + G2 a2**2`` with port conductances in the ratio 1 - g to 1 + g, and nothing gains
-any by truncation: without input a section comes to rest (Fettweis 1986). What leaves a section is not part of
-any loop; it is rounded to nearest.
+gains no energy, ``G1 a1**2 + G2 a2**2`` with port conductances in the ratio 1 - g to 1 + g, and truncation adds
+none: without input a section comes to rest (Fettweis 1986). The output of a section is not part of any loop; it is
+rounded to nearest.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from sosmith.model.dataflow.graph import Graph, GraphBuilder, Wire
 from sosmith.model.sections.state_space import Coefficient
 
 LANES = ("upper", "lower")
-"""Names of the two branches, and of the waves on them."""
+"""Names of the branches, and of the waves on them."""
 
 
 class Format(NamedTuple):
@@ -60,18 +60,18 @@ class Adaptor(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Allpass:
-    """An allpass section of first or second order, with its words.
+    """An allpass section of first or second order, with the formats of its signals.
 
     Attributes
     ----------
     adaptors : tuple of Adaptor
-        The only one, or the outer and the inner.
+        The only adaptor, or the outer and the inner one.
     states : tuple of Format
-        Of the wave in each adaptor's delay.
+        Format of the wave in each adaptor's delay.
     inner : Format
-        Of the wave that the inner adaptor reflects; unused without one.
+        Format of the wave that the inner adaptor reflects; unused without one.
     output : Format
-        Of what leaves the section.
+        Format of the output.
     """
 
     adaptors: tuple[Adaptor, ...]
@@ -108,7 +108,7 @@ class LatticeStage:
     lanes : tuple of Allpass or None
         The sections in the upper and in the lower branch; None for a wire.
     entries : tuple of Format
-        Of the two waves that arrive, or of the one that drives both branches.
+        Formats of the two waves that arrive, or of the one that drives both branches.
     """
 
     name: str
@@ -134,8 +134,9 @@ class LatticeStage:
     def graph(self) -> Graph:
         """The stage as a dataflow graph with the outputs ``upper_y`` and ``lower_y``.
 
-        The quantized waves of a section are named ``upper_x1_sum``, ``upper_x2_sum``, ``upper_inner_sum`` and
-        ``upper_y_sum``, what is kept of them ``upper_x1_next``, ``upper_x2_next``, ``upper_inner`` and ``upper_y``.
+        The waves of a section before their quantizers are named ``upper_x1_sum``, ``upper_x2_sum``,
+        ``upper_inner_sum`` and ``upper_y_sum``, and behind them ``upper_x1_next``, ``upper_x2_next``, ``upper_inner``
+        and ``upper_y``.
         """
         g = GraphBuilder()
         names = ("x",) if len(self.entries) == 1 else LANES
@@ -159,7 +160,7 @@ class LatticeJoin:
     signs : tuple of int
         s0 and s1, each 1 or -1.
     entries : tuple of Format
-        Of the two waves that arrive.
+        Formats of the two waves that arrive.
     """
 
     name: str
@@ -211,7 +212,7 @@ def _section(g: GraphBuilder, x: Wire, section: Allpass, lane: str) -> Wire:
 
 
 def _adaptor(g: GraphBuilder, a1: Wire, a2: Wire, adaptor: Adaptor, name: str) -> tuple[Wire, Wire]:
-    """Return b1 and b2. As b1 - b2 = a2 - a1, one of them is close to a wave that arrives, the other follows."""
+    """Return b1 and b2: the one that is close to a wave that arrives, and the other from b1 - b2 = a2 - a1."""
     difference = g.subtract(a2, a1)
     product = _product(g, difference, adaptor.rest, name)
     if adaptor.near > 0:
@@ -224,7 +225,7 @@ def _adaptor(g: GraphBuilder, a1: Wire, a2: Wire, adaptor: Adaptor, name: str) -
 
 
 def _product(g: GraphBuilder, wire: Wire, by: Coefficient, name: str) -> Sequence[tuple[int, Wire]]:
-    """Sign and what is to be added or subtracted; nothing for a coefficient of zero."""
+    """Return the product of `wire` with a coefficient as a sign and a wire, or nothing for a coefficient of zero."""
     size = abs(by.integer)
     if not size:
         return []

@@ -19,7 +19,7 @@ from sosmith.model.sections.direct_form import DirectForm1, Product
 
 
 class StatedRanges(Proof):
-    """Every node's code is in its range while its pipeline stage holds a sample; for a BOUND, its operand's code is.
+    """Every node's code is in its range while its pipeline stage holds a sample; of a BOUND, the operand's code is.
 
     Parameters
     ----------
