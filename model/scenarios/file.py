@@ -16,8 +16,10 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
+from sosmith.model.arithmetic.elementary import exp
+from sosmith.model.arrays import Values
 from sosmith.model.errors import SpecificationError
-from sosmith.model.port import Port, Values
+from sosmith.model.port import Port
 from sosmith.model.random_streams import Streams, streams
 from sosmith.model.scenarios.catalogue import LIMIT_SAMPLES
 from sosmith.model.scenarios.plateaus import READING_PART, plateau_samples
@@ -286,7 +288,7 @@ def temperature_profile(excerpt: ExcerptTable, time: Values) -> Values:
     if last is None:
         return np.full(len(time), first)
     if excerpt.time_constant is not None:
-        return np.asarray(last + (first - last) * np.exp(-time / excerpt.time_constant))
+        return np.asarray(last + (first - last) * exp(-time / excerpt.time_constant))
     return np.asarray(first + (last - first) * time / max(time[-1], 1e-300))
 
 

@@ -18,7 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from sosmith.model.port import Values
+from sosmith.model.arithmetic.elementary import exp
+from sosmith.model.arrays import Values
 
 REFERENCE_TEMPERATURE = 20.0
 """Temperature in degC at which the parameters hold: the paper's reference temperature."""
@@ -82,7 +83,7 @@ class Coil:
         """Return the magnitude of the impedance in ohm."""
         warmer = np.asarray(temperature, dtype=np.float64) - REFERENCE_TEMPERATURE
         reactance = 2 * np.pi * self.frequency * self.inductance  # kHz times mH is ohm
-        near = np.exp(-np.asarray(clearance, dtype=np.float64) / self.decay)
+        near = exp(-np.asarray(clearance, dtype=np.float64) / self.decay)
         relative = 1 + self.inductance_drift * warmer - self.depth * (1 + self.depth_drift * warmer) * near
         resistance = reactance / self.quality * (1 + self.copper * warmer)
         return np.hypot(reactance * relative, resistance)

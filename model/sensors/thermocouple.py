@@ -11,8 +11,9 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from sosmith.model.arithmetic.elementary import exp
+from sosmith.model.arrays import Values
 from sosmith.model.errors import SpecificationError
-from sosmith.model.port import Values
 
 TEMPERATURE_RANGE = (-270.0, 1372.0)
 """Temperatures in degC at which the emf is defined."""
@@ -98,9 +99,7 @@ def thermocouple_emf(temperature: npt.ArrayLike) -> Values:
     polyval = np.polynomial.polynomial.polyval
     a0, a1, a2 = _BUMP
     below, above = np.minimum(t, 0.0), np.maximum(t, 0.0)  # each branch within its own range, to avoid overflow
-    return np.where(
-        t < 0, polyval(below, _BELOW_ZERO), polyval(above, _ABOVE_ZERO) + a0 * np.exp(a1 * (above - a2) ** 2)
-    )
+    return np.where(t < 0, polyval(below, _BELOW_ZERO), polyval(above, _ABOVE_ZERO) + a0 * exp(a1 * (above - a2) ** 2))
 
 
 def thermocouple_temperature(emf: npt.ArrayLike) -> Values:

@@ -6,10 +6,11 @@ import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 import numpy.typing as npt
-from flint import arb, arb_mat
+from flint import acb, arb, arb_mat, fmpq, fmpq_mat
 
 from sosmith.model.arithmetic.correct_rounding import evaluate, nearest_double
 from sosmith.model.arithmetic.matrices import power, product
@@ -72,18 +73,38 @@ class LinearSystem:
 
     def modes(self) -> tuple[Mode, ...]:
         """Return all modes by rising frequency, then growth; one per conjugate pair, so n to 2 n modes."""
-        values, vectors = np.linalg.eig(self.state_matrix())
         kinds = [" ".join(word for word in name.split(" ") if not word.isdigit()) for name in self.names]
         found = []
-        for value, vector in zip(values, vectors.T, strict=True):
-            if value.imag >= 0:
-                # displacements come first; velocities differ only by a factor
-                energy = dict.fromkeys(kinds, 0.0)
-                for kind, mass, moved in zip(kinds, np.diag(self.mass), vector[: len(kinds)], strict=True):
-                    energy[kind] += float(mass * abs(moved) ** 2)
-                most = max(kinds, key=lambda kind: energy[kind])
-                found.append(Mode(frequency=float(value.imag / (2 * np.pi)), growth=float(value.real), coordinate=most))
+        values, vectors = np.linalg.eig(self.state_matrix())
+        for frequency, growth in evaluate(self._eigenvalues):
+            nearest = int(np.argmin(np.hypot(values.real - growth, values.imag - 2 * np.pi * frequency)))
+            # displacements come first; velocities differ only by a factor
+            energy = dict.fromkeys(kinds, 0.0)
+            for kind, mass, moved in zip(kinds, np.diag(self.mass), vectors[: len(kinds), nearest], strict=True):
+                energy[kind] += float(mass * abs(moved) ** 2)
+            most = max(kinds, key=lambda kind: energy[kind])
+            found.append(Mode(frequency=frequency, growth=growth, coordinate=most))
         return tuple(sorted(found, key=lambda mode: (mode.frequency, mode.growth)))
+
+    def _eigenvalues(self) -> list[tuple[float, float]]:
+        """Frequency in Hz and growth in 1/s of every eigenvalue that is real or above the real axis.
+
+        They are roots of the characteristic polynomial, whose coefficients are exact: so close modes and those that
+        stand still are told apart.
+        """
+        mass, damping, stiffness = (_rationals(matrix) for matrix in (self.mass, self.damping, self.stiffness))
+        n = len(self.names)
+        turned, slowed = mass.solve(stiffness).tolist(), mass.solve(damping).tolist()
+        rows = [[fmpq(0)] * n + [fmpq(int(i == j)) for j in range(n)] for i in range(n)]
+        rows += [[-value for value in (*pull, *drag)] for pull, drag in zip(turned, slowed, strict=True)]
+        # The library's own types leave out the multiplicities.
+        roots = cast("list[tuple[acb, int]]", fmpq_mat(rows).charpoly().numer().complex_roots())
+        return [
+            (nearest_double(root.imag / (2 * arb.pi())), nearest_double(root.real))
+            for root, count in roots
+            if root.imag.is_zero() or root.imag > 0
+            for _ in range(count)
+        ]
 
     def energy(self, displacement: Array, velocity: Array) -> Array:
         """Return kinetic plus elastic energy in J, shape (m,), of motions of shape (m, n).
@@ -140,10 +161,14 @@ def _balls(matrix: Array) -> arb_mat:
     return arb_mat(len(matrix), matrix.shape[1], [arb(value) for value in matrix.ravel().tolist()])
 
 
+def _rationals(matrix: Array) -> fmpq_mat:
+    return fmpq_mat([[fmpq(*value.as_integer_ratio()) for value in row] for row in matrix.tolist()])
+
+
 def _blocks(blocks: Sequence[Sequence[arb_mat]]) -> arb_mat:
     """Make one matrix of blocks."""
-    rows = [[part.tolist() for part in line] for line in blocks]
-    return arb_mat([sum((part[k] for part in line), []) for line in rows for k in range(len(line[0]))])
+    lines = [[part.tolist() for part in line] for line in blocks]
+    return arb_mat([list(itertools.chain(*parts)) for line in lines for parts in zip(*line, strict=True)])
 
 
 def _doubles(matrix: arb_mat) -> Array:
