@@ -3,7 +3,7 @@
 A graph is a list of nodes in the order of computation. A node carries an integer `code` with
 `frac` fraction bits, so its value is ``code * 2**-frac``, and the integer range ``low..high`` that
 the code never leaves. The exact interpreter here, the C model (`sosmith.model.dataflow.c_model`) and the
-hardware (`sosmith.hdl.ranked_logic`) all walk the same nodes.
+hardware (`sosmith.hdl.pipelined_logic`) all walk the same nodes.
 
 The usual quantizer is FLOOR, which drops lower bits and costs nothing; the bits it drops are FRACTION.
 Rounding to nearest, ties upward, is the addition of a half before it. TRUNCATE drops bits of the magnitude,
