@@ -21,7 +21,8 @@ from sosmith.gen.output.core_facts import CoreFacts, core_facts
 from sosmith.gen.output.generate import generate
 from sosmith.gen.realizations.registry import ERROR_FEEDBACK
 from sosmith.gen.report.evidence import Alternative, Evidence
-from sosmith.gen.word_lengths.quantize import Quantized, with_realization
+from sosmith.gen.word_lengths.other_realization import with_realization
+from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.model.errors import SpecificationError
 from sosmith.model.port import Codes, Values
 from sosmith.model.reference.golden import calibrated, filtered

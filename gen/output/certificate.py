@@ -35,7 +35,7 @@ from sosmith.gen.verifier.certificate_file import (
     on_grid,
 )
 from sosmith.gen.word_lengths.cascade import ideal_sections
-from sosmith.gen.word_lengths.quantize import Quantized
+from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.model.dataflow.datapath import Stage
 from sosmith.model.dataflow.graph import Node
 from sosmith.model.port import Port
@@ -110,7 +110,7 @@ def _claims(quantized: Quantized, ideal: Sequence[TransferFunction]) -> ClaimsEn
         gain = closer.gain
         budget["filter coefficients"], budget["filter rounding"] = closer.coefficients, closer.rounding
         for part in budget.keys() & {"calibration", "input scaling"}:
-            budget[part] = quantized.entry_error * gain
+            budget[part] = quantized.input_error * gain
         sections = tuple(_gains(s.name, m) for s, m in zip(quantized.sections, models, strict=True))
     return ClaimsEntry(budget=budget, bound=sum(budget.values(), Fraction(0)), peak_gain=gain, sections=sections)
 

@@ -17,7 +17,7 @@ from sosmith.gen.quantity import quantity
 from sosmith.gen.reload.other_constants import with_constants
 from sosmith.gen.reload.transient import transient
 from sosmith.gen.specification.specification import Specification
-from sosmith.gen.word_lengths.quantize import Quantized
+from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.hdl import folded
 from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.dataflow.datapath import Datapath

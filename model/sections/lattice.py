@@ -31,19 +31,11 @@ from fractions import Fraction
 from functools import cached_property
 from typing import NamedTuple
 
-from sosmith.model.dataflow.graph import Graph, GraphBuilder, Wire
+from sosmith.model.dataflow.graph import Graph, GraphBuilder, Range, Wire
 from sosmith.model.sections.state_space import Coefficient
 
 LANES = ("upper", "lower")
 """Names of the two branches, and of the waves on them."""
-
-
-class Format(NamedTuple):
-    """Fraction bits, smallest and largest code of a signal."""
-
-    frac: int
-    low: int
-    high: int
 
 
 class Adaptor(NamedTuple):
@@ -66,18 +58,18 @@ class Allpass:
     ----------
     adaptors : tuple of Adaptor
         The only one, or the outer and the inner.
-    states : tuple of Format
+    states : tuple of Range
         Of the wave in each adaptor's delay.
-    inner : Format
+    inner : Range
         Of the wave that the inner adaptor reflects; unused without one.
-    output : Format
+    output : Range
         Of what leaves the section.
     """
 
     adaptors: tuple[Adaptor, ...]
-    states: tuple[Format, ...]
-    inner: Format
-    output: Format
+    states: tuple[Range, ...]
+    inner: Range
+    output: Range
 
     def __post_init__(self) -> None:
         if len(self.adaptors) not in {1, 2} or len(self.states) != len(self.adaptors):
@@ -107,13 +99,13 @@ class LatticeStage:
         Name of the stage.
     lanes : tuple of Allpass or None
         The sections in the upper and in the lower branch; None for a wire.
-    entries : tuple of Format
+    entries : tuple of Range
         Of the two waves that arrive, or of the one that drives both branches.
     """
 
     name: str
     lanes: tuple[Allpass | None, Allpass | None]
-    entries: tuple[Format, ...]
+    entries: tuple[Range, ...]
 
     @cached_property
     def coefficients(self) -> dict[str, tuple[int, int]]:
@@ -158,13 +150,13 @@ class LatticeJoin:
         Name of the stage.
     signs : tuple of int
         s0 and s1, each 1 or -1.
-    entries : tuple of Format
+    entries : tuple of Range
         Of the two waves that arrive.
     """
 
     name: str
     signs: tuple[int, int]
-    entries: tuple[Format, Format]
+    entries: tuple[Range, Range]
 
     @property
     def coefficients(self) -> dict[str, tuple[int, int]]:

@@ -15,7 +15,8 @@ from tests.gen.word_lengths.test_quantize import plain
 
 from sosmith.gen.filter.design import decay_length
 from sosmith.gen.proof.linear_model import linear_model
-from sosmith.gen.realizations.registry import REALIZATIONS, Row, SectionFormat
+from sosmith.gen.realizations.registry import REALIZATIONS, Row
+from sosmith.gen.realizations.section_format import SectionFormat
 from sosmith.gen.word_lengths.ordering import NoisySection, Norm, arrange, best_order
 
 NORMS: tuple[Norm, ...] = ("l1", "l2", "linf")
