@@ -36,7 +36,7 @@ from sosmith.sim.simulators import check_name
 _Kind = TypeVar("_Kind", bound=np.generic)
 
 Progress = Callable[[str, int, int], None]
-"""Told the step, what is done of it and the total; a total of 0 means that only the step's name is known."""
+"""Called with the name of the step, the amount done and the total; the total is 0 where the amount is not known."""
 
 
 def simulate(

@@ -91,9 +91,9 @@ def _substitution(port: Port, count: int) -> list[list[Fraction]]:
 def input_stages(
     polynomial: Polynomial | None, inputs: Sequence[Port], output: Port, allowed: Fraction
 ) -> tuple[InputStage, ...]:
-    """Make the input stage with the fewest fraction bits whose error is at most `allowed` output LSBs, and coarser ones.
+    """Make the input stage with the fewest fraction bits that keeps to the error `allowed`, and coarser ones.
 
-    Each of those that follow has a fraction bit less than the one before. Without a polynomial, an input stage scales
+    The error is in output LSBs. Each of those that follow has a fraction bit less than the one before. Without a polynomial, an input stage scales
     the input to output LSBs; it is empty where the factor is a power of two.
 
     Raises

@@ -39,7 +39,7 @@ _ATTEMPTS = 4
 
 @dataclass(frozen=True, kw_only=True)
 class Plan:
-    """Formats chosen in double precision, not proven yet.
+    """Formats chosen in double precision, not yet proven.
 
     Attributes
     ----------

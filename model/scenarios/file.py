@@ -124,7 +124,7 @@ def emulate_file(
     """Make the trace of a scenario file for one channel of a core.
 
     Readings are marked where the filter has settled: from the beginning of each excerpt and from the end of each fault
-    on, and of clearances in steps the last part of each (`sosmith.model.scenarios.catalogue.READING_PART`).
+    on, and of clearances in steps the last part of each (`sosmith.model.scenarios.plateaus.READING_PART`).
 
     Parameters
     ----------
