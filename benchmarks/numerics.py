@@ -27,9 +27,9 @@ from sosmith.gen.realizations.state_space import minimum_noise
 from sosmith.gen.specification.specification import load
 from sosmith.gen.stimuli import traces_for
 from sosmith.gen.word_lengths.cost import LUTS_OF_A_BLOCK, cost_of
+from sosmith.model.arrays import Codes
 from sosmith.model.dataflow.graph import Op
 from sosmith.model.errors import ShortfallError
-from sosmith.model.port import Codes
 from sosmith.model.reference.golden import calibrated, filtered
 
 ROOT = Path(__file__).resolve().parent.parent

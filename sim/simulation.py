@@ -19,12 +19,12 @@ from sosmith.gen.fpga.boards import Board
 from sosmith.gen.fpga.synthesis import Netlist, synthesize
 from sosmith.gen.output.core_facts import CoreFacts, core_facts
 from sosmith.gen.output.generate import generate
-from sosmith.gen.realizations.registry import ERROR_FEEDBACK
 from sosmith.gen.report.evidence import Alternative, Evidence
+from sosmith.gen.specification.choices import ERROR_FEEDBACK
 from sosmith.gen.word_lengths.other_realization import with_realization
 from sosmith.gen.word_lengths.quantized import Quantized
+from sosmith.model.arrays import Codes, Values
 from sosmith.model.errors import SpecificationError
-from sosmith.model.port import Codes, Values
 from sosmith.model.reference.golden import calibrated, filtered
 from sosmith.model.text_files import write_files
 from sosmith.model.traces.trace import Trace

@@ -13,8 +13,9 @@ from examples.wear_campaign import depot, hardware
 
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.spectrum.filter_table import filter_table
-from sosmith.gen.spectrum.proposal import Content, Proposal, Wish, propose
-from sosmith.gen.spectrum.spectra import SpectrumSettings, spectrum
+from sosmith.gen.spectrum.proposal import Content, Proposal, propose
+from sosmith.gen.spectrum.settings import SpectrumSettings, Wish
+from sosmith.gen.spectrum.spectra import spectrum
 from sosmith.gen.stimuli import bench_of
 from sosmith.model.calibration.polynomial import EQUATION_5A, Polynomial
 from sosmith.model.reference.accuracy import accuracy_percent

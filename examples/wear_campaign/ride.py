@@ -15,8 +15,9 @@ from sosmith.gen.core import CoreDesign
 from sosmith.gen.filter.design import prewarp, unwarp
 from sosmith.gen.filter.response import group_delay, magnitude_db
 from sosmith.gen.spectrum.filter_table import filter_table
-from sosmith.gen.spectrum.proposal import Content, Proposal, Wish, propose
-from sosmith.gen.spectrum.spectra import SpectrumSettings, spectrum
+from sosmith.gen.spectrum.proposal import Content, Proposal, propose
+from sosmith.gen.spectrum.settings import SpectrumSettings, Wish
+from sosmith.gen.spectrum.spectra import spectrum
 from sosmith.gen.stimuli import bench_of
 from sosmith.model.calibration.polynomial import EQUATION_5A
 from sosmith.model.reference.accuracy import accuracy_percent

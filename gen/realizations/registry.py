@@ -157,8 +157,5 @@ REALIZATIONS: dict[str, Realization] = {
 CASCADES = tuple(name for name, realization in REALIZATIONS.items() if realization.cascade)
 """Names of the realizations whose stages are the ideal sections."""
 
-ERROR_FEEDBACK = ("df1", "df1_ef1", "df1_ef2")
-"""Realizations that differ in nothing but the error feedback, and so can be set side by side at the same widths."""
-
 BEST_KEPT = "df1_ef2"
 """Realization whose rounding needs the fewest bits at low cutoffs: where it falls short, its reason tells most."""

@@ -18,10 +18,10 @@ from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
-from scipy import linalg
 
 from sosmith.gen.realizations.coefficients import Rounding
-from sosmith.gen.realizations.noise import StateSystem, minimum_noise_coordinates
+from sosmith.gen.realizations.minimum_noise import least_noise, power_of_two_below, unit_gains
+from sosmith.gen.realizations.noise import StateSystem
 from sosmith.model.dataflow.graph import Range
 from sosmith.model.errors import ShortfallError
 from sosmith.model.sections.state_space import Coefficient, StateSpace
@@ -31,7 +31,6 @@ Row = Sequence[float]
 
 _ROUNDING = 1e-13  # relative size below which an entry of A is but the rounding of this design
 _EQUAL = 2.0**-36  # relative to the squared distance from s: square of an imaginary part that counts as none
-_NOTHING = 1e-9  # relative size below which an entry of B counts as zero
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,17 +94,7 @@ def _minimum_noise(row: tuple[float, ...]) -> StateDesign:
     side, big1, big2 = _about_side(row)
     step = math.sqrt(big2)
     M, B = np.array([[0.0, step], [-step, -big1]]), np.array([0.0, 1.0])
-    start = _completed(row, side, M, B).system
-    T = minimum_noise_coordinates(start.controllability, start.observability)
-    optimal = start.transformed(T)
-    scale, inputs = np.sqrt(np.diag(optimal.controllability)), np.zeros(2)
-    for i, b in enumerate(optimal.B):
-        size = abs(b) / scale[i]
-        if size > _NOTHING * step:
-            inputs[i] = _power_of_two_below(size)
-            scale[i] = b / inputs[i]
-    T = T * scale
-    return _completed(row, side, np.asarray(np.linalg.inv(T) @ M @ T, dtype=np.float64), inputs)
+    return _completed(row, side, *least_noise(side, M, _completed(row, side, M, B).C))
 
 
 @lru_cache(maxsize=256)
@@ -118,21 +107,14 @@ def _normal(row: tuple[float, ...]) -> StateDesign:
     if imaginary > _EQUAL * big2:
         w = math.sqrt(imaginary)
         M, B = np.array([[-big1 / 2, -w], [w, -big1 / 2]]), np.array([0.0, 1.0])
-        return _completed(row, side, M, B * _unit_gain(side, M, B).min())
+        return _completed(row, side, M, B * unit_gains(side, M, B).min())
     # Roots of d**2 + big1 d + big2, the distances of the poles from s: the far one first, without cancellation.
     far = -(big1 + 2 * math.sqrt(max(-imaginary, 0.0))) / 2
     near = big2 / far
     M, B = np.array([[near, 0.0], [1.0, far]]), np.array([1.0, 0.0])
-    gains = _unit_gain(side, M, B)
+    gains = unit_gains(side, M, B)
     M[1, 0] = gains[1] / gains[0]
     return _completed(row, side, M, B * gains[0])
-
-
-def _unit_gain(side: int, M: Array, B: Array) -> Array:
-    """Powers of two that bring the states' standard deviation to one half to one times that of a white input."""
-    A = side * (np.eye(len(B)) + M)
-    K = linalg.solve_discrete_lyapunov(A, np.outer(B, B))
-    return np.array([_power_of_two_below(1 / math.sqrt(variance)) for variance in np.diag(K)])
 
 
 def _is_first_order(row: Row) -> bool:
@@ -142,7 +124,7 @@ def _is_first_order(row: Row) -> bool:
 def _first_order(row: Row) -> StateDesign:
     side = _side(row)
     distance = float(-1 - side * Fraction(row[4]))
-    B = _power_of_two_below(math.sqrt(1 - row[4] ** 2))
+    B = power_of_two_below(math.sqrt(1 - row[4] ** 2))
     C = float(Fraction(row[1]) - Fraction(row[0]) * Fraction(row[4])) / B
     return StateDesign(side, np.array([[distance]]), np.array([B]), np.array([C]), row[0])
 
@@ -170,10 +152,6 @@ def _completed(row: Row, side: int, M: Array, B: Array) -> StateDesign:
     determinant = g1 * k2 - g2 * k1
     C = [(first * k2 - change * g2) / determinant, (change * g1 - first * k1) / determinant]
     return StateDesign(side, M, B, np.array([float(value) for value in C]), row[0])
-
-
-def _power_of_two_below(value: float) -> float:
-    return math.ldexp(0.5, math.frexp(value)[1])
 
 
 def state_space(

@@ -11,14 +11,16 @@ from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from sosmith.gen.specification.rules import CALIBRATION_INPUTS, check
-from sosmith.gen.specification.schema import Document, FilterTable, InputTable, OutputTable, parse
+from sosmith.gen.specification.choices import CALIBRATION_INPUTS
 from sosmith.gen.specification.values import UnfitError
 from sosmith.gen.specification.wear_limits import WearSpec
 from sosmith.model.errors import SpecificationError
 from sosmith.model.port import Port
+
+if TYPE_CHECKING:
+    from sosmith.gen.specification.schema import Document, FilterTable, InputTable, OutputTable
 
 MAX_BYTES = 1 << 16
 """Largest specification in bytes; a real one has one or two thousand."""
@@ -157,7 +159,28 @@ def load(path: Path) -> Specification:
         For the first thing that is wrong, in one sentence: the file, the path of the key or the line, what
         would be right and what was found.
     """
-    tree = _read_toml(path)
+    return from_tree(_read_toml(path), path)
+
+
+def from_tree(tree: dict[str, Any], path: Path) -> Specification:
+    """Check a specification that has been read already.
+
+    Parameters
+    ----------
+    tree : dict
+        As `tomllib` gives it, with every float as `decimal.Decimal`.
+    path : Path
+        Its name in messages; `calibration.data` is found from the folder of this path.
+
+    Raises
+    ------
+    SpecificationError
+        As `load`.
+    """
+    # pydantic takes a while to load: a file that is missing or no TOML is refused without it.
+    from sosmith.gen.specification.rules import check
+    from sosmith.gen.specification.schema import parse
+
     try:
         document = parse(tree)
         check(document)

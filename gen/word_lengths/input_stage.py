@@ -93,8 +93,8 @@ def input_stages(
 ) -> tuple[InputStage, ...]:
     """Make the input stage with the fewest fraction bits that keeps to the error `allowed`, and coarser ones.
 
-    The error is in output LSBs. Each of those that follow has a fraction bit less than the one before. Without a polynomial, an input stage scales
-    the input to output LSBs; it is empty where the factor is a power of two.
+    The error is in output LSBs. Each one that follows has a fraction bit less than the one before. Without a
+    polynomial, an input stage scales the input to output LSBs; it is empty where the factor is a power of two.
 
     Raises
     ------

@@ -171,7 +171,7 @@ def test_numerators_beyond_their_denominator_stay_where_they_are() -> None:
 
 
 def test_too_many_sections_are_refused() -> None:
-    message = "sections must be few enough for their spectra to hold at most 268435456 samples, not 12"
+    message = "sections must be so few that their spectra have at most 268435456 samples, not 12"
     with pytest.raises(ValueError, match=f"^{re.escape(message)}$"):
         arrange(noisy(butterworth(24, 0.01), feedback=0), scale="l1")
 

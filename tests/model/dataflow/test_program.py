@@ -75,7 +75,9 @@ def test_constants_and_words_fit_the_multiplier(digit_bits: int) -> None:
     limit = 1 << digit_bits
     assert all(-limit <= constant < limit for _, _, constant in made.instructions)
     assert {address for opcode, address, _ in made.instructions if opcode in WRITES}.isdisjoint({made.one})
-    states = sorted((location for location in made.locations if location.is_state), key=lambda location: location.address)
+    states = sorted(
+        (location for location in made.locations if location.is_state), key=lambda location: location.address
+    )
     ends = [location.address + location.digits for location in states]
     assert [location.address for location in states] == [0, *ends[:-1]]
     assert made.states == ends[-1]

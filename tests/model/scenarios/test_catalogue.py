@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 from scipy import signal
 
+from sosmith.model.arrays import Values
 from sosmith.model.calibration.polynomial import EQUATION_5A, Polynomial
 from sosmith.model.errors import SpecificationError
-from sosmith.model.port import Port, Values
+from sosmith.model.port import Port
 from sosmith.model.reference.accuracy import accuracy_percent
 from sosmith.model.scenarios.catalogue import SCENARIOS, emulate
 from sosmith.model.scenarios.instrument_signals import TABLE_1_STEPS, TABLE_2_STEPS
