@@ -22,7 +22,8 @@ from sosmith.gen.filter.design import decay_length
 from sosmith.gen.picture import settled
 from sosmith.gen.proof.linear_model import linear_model
 from sosmith.gen.realizations.noise import minimum_gain, second_order_modes
-from sosmith.gen.realizations.registry import REALIZATIONS, SectionFormat
+from sosmith.gen.realizations.registry import REALIZATIONS
+from sosmith.gen.realizations.section_format import SectionFormat
 from sosmith.gen.realizations.state_space import minimum_noise
 from sosmith.gen.specification.specification import load
 from sosmith.gen.stimuli import traces_for

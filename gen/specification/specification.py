@@ -1,6 +1,6 @@
 """The specification: a TOML file in physical units, read exactly and checked before anything is built.
 
-Every number stays exact (`Fraction`) as written. What this version does not carry out yet is refused by name.
+Every number stays exact (`Fraction`) as written. Known values that this version does not support are refused by name.
 """
 
 from __future__ import annotations
@@ -88,13 +88,13 @@ class HardwareSpec:
     Attributes
     ----------
     realization : str
-        "auto", "df1", "df1_ef1" or "df1_ef2".
+        "auto" or a key of `sosmith.gen.realizations.registry.REALIZATIONS`.
     architecture : str
         "auto", "parallel", "folded" or "serial".
     clock : Fraction
         In Hz, at least the sample rate.
     reload : bool
-        Whether coefficients are loadable at run time; False so far.
+        Whether coefficients can be loaded at run time.
     """
 
     realization: str
