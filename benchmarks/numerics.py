@@ -24,12 +24,12 @@ from sosmith.gen.realizations.noise import minimum_gain, second_order_modes
 from sosmith.gen.realizations.registry import REALIZATIONS, SectionFormat
 from sosmith.gen.realizations.state_space import minimum_noise
 from sosmith.gen.specification.specification import load
+from sosmith.gen.stimuli import traces_for
 from sosmith.gen.word_lengths.cost import LUTS_OF_A_BLOCK, cost_of
 from sosmith.model.dataflow.graph import Op
 from sosmith.model.errors import ShortfallError
 from sosmith.model.port import Codes
 from sosmith.model.reference.golden import calibrated, filtered
-from sosmith.sim.simulation import traces_for
 
 ROOT = Path(__file__).resolve().parent.parent
 SPECIFICATIONS = ("audio_lowpass", "flange_wear_locomotive")

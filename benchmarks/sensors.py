@@ -20,6 +20,7 @@ from matplotlib.figure import Figure
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.paper.figures import read_paper_figures
 from sosmith.gen.specification.specification import load
+from sosmith.gen.stimuli import bench_of
 from sosmith.model.calibration.fit import Fit, Measurements, fit
 from sosmith.model.calibration.polynomial import EQUATION_5A, Polynomial
 from sosmith.model.port import Values
@@ -34,7 +35,6 @@ from sosmith.model.sensors.inductive_sensor import FORWARD_MODELS, SystematicErr
 from sosmith.model.sensors.thermocouple import thermocouple_emf, thermocouple_temperature
 from sosmith.model.tables.toml_tables import Table, shown
 from sosmith.model.traces.trace import Trace
-from sosmith.sim.simulation import bench_of
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCUMENT = "docs/sensors.md"

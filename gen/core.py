@@ -209,4 +209,4 @@ def calibrated_codes(inputs: Sequence[Port], fitted: Fit) -> tuple[tuple[int, in
 
 def filter_of(spec: Specification) -> Filter:
     """Design the filter of a specification."""
-    return design(spec.filter, float(spec.sample_rate))
+    return design(spec.filter, spec.sample_rate)

@@ -35,6 +35,14 @@ def slave_members(address_bits: int) -> dict[str, In | Out]:
     }
 
 
+def forward_slave(m: Module, outer: wiring.Component, inner: wiring.Component) -> None:
+    """Connect the AXI4-Lite slave ports of `outer` to those of `inner`, a submodule of it with as many address lines."""
+    for name, member in outer.signature.members.items():
+        if name.startswith("s_axil_"):
+            outside, inside = getattr(outer, name), getattr(inner, name)
+            m.d.comb += outside.eq(inside) if member.flow is Out else inside.eq(outside)
+
+
 class SerialSlave(wiring.Component):
     """AXI4-Lite slave with one data register, which moves bit by bit between the bus and what is behind.
 

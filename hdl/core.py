@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from amaranth.hdl import Cat, ClockDomain, ClockSignal, Const, Module, Mux, ResetSignal, Signal, Value
 from amaranth.lib import wiring
 
-from sosmith.hdl.axi_lite import slave_members
+from sosmith.hdl.axi_lite import forward_slave, slave_members
 from sosmith.hdl.axi_stream import (
     StreamBuffer,
     channel_bits,
@@ -18,9 +18,9 @@ from sosmith.hdl.axi_stream import (
 )
 from sosmith.hdl.constant_banks import NO_CONSTANTS, ConstantBanks, Pair
 from sosmith.hdl.interleaved import InterleavedStage, schedule
-from sosmith.hdl.ranked_logic import banks_in_use
+from sosmith.hdl.pipelined_logic import banks_in_use
 from sosmith.hdl.reload import ReloadPort
-from sosmith.hdl.stage import PipelineStage, rank_count
+from sosmith.hdl.stage import PipelinedStage, pipeline_depth
 from sosmith.hdl.status import at_rail, flag_count, outside_calibration, worn
 from sosmith.model.dataflow.datapath import Datapath, Stage
 from sosmith.model.reload.constants import constants
@@ -28,14 +28,14 @@ from sosmith.model.reload.registers import ADDRESS_BITS
 
 
 def latency_cycles(datapath: Datapath, channels: int = 1) -> int:
-    """Clocks from the edge that accepts a sample to the edge that can hand it on: all ranks, and the buffers."""
-    return sum(_ranks(datapath, channels)) + 1 + (channels > 1) + (len(datapath.wear) > 1)
+    """Clocks from the edge that accepts a sample to the edge that can hand it on: all pipeline stages, and the buffers."""
+    return sum(_depths(datapath, channels)) + 1 + (channels > 1) + (len(datapath.wear) > 1)
 
 
-def _ranks(datapath: Datapath, channels: int) -> list[int]:
+def _depths(datapath: Datapath, channels: int) -> list[int]:
     if channels == 1:
-        return [rank_count(stage.graph) for stage in datapath.stages]
-    return [schedule(stage.graph, channels).count for stage in datapath.stages]
+        return [pipeline_depth(stage.graph) for stage in datapath.stages]
+    return [schedule(stage.graph, channels).depth for stage in datapath.stages]
 
 
 class Core(wiring.Component):
@@ -110,8 +110,8 @@ class Core(wiring.Component):
                 channel = component.o_channel
             valid, taken = component.o_valid, component.o_bank
             codes = [getattr(component, f"o{k}") for k in range(len(graph.outputs))]
-        for rank in range(sum(_ranks(self.datapath, self.channels))):
-            held = Signal(len(status), name=f"status{rank + 1}", reset_less=True)
+        for k in range(sum(_depths(self.datapath, self.channels))):
+            held = Signal(len(status), name=f"status{k + 1}", reset_less=True)
             with m.If(buffer.advance):
                 m.d.sync += held.eq(status)
             status = held
@@ -146,9 +146,9 @@ class Core(wiring.Component):
 
     def _stage(
         self, m: Module, stage: Stage, constants: Mapping[int, Pair], advance: Value
-    ) -> PipelineStage | InterleavedStage:
+    ) -> PipelinedStage | InterleavedStage:
         several = self.channels > 1
-        component = InterleavedStage(stage, self.channels, constants) if several else PipelineStage(stage, constants)
+        component = InterleavedStage(stage, self.channels, constants) if several else PipelinedStage(stage, constants)
         m.submodules[stage.name] = component
         m.d.comb += component.advance.eq(advance)
         return component
@@ -158,9 +158,7 @@ class Core(wiring.Component):
         assert self.fingerprint is not None
         m.submodules.constant_banks = banks
         m.submodules.reload_port = port = ReloadPort(banks.words, design=self.fingerprint)
-        for name in slave_members(ADDRESS_BITS):
-            outer, inner = getattr(self, name), getattr(port, name)
-            m.d.comb += outer.eq(inner) if self.signature.members[name].flow is wiring.Out else inner.eq(outer)
+        forward_slave(m, self, port)
         m.d.comb += [
             bank.eq(port.bank),
             port.may_swap.eq(1),
@@ -172,7 +170,7 @@ class Core(wiring.Component):
         ]
 
     def _source(
-        self, m: Module, stages: list[PipelineStage | InterleavedStage], advance: Value, bank: Value, waiting: Signal
+        self, m: Module, stages: list[PipelinedStage | InterleavedStage], advance: Value, bank: Value, waiting: Signal
     ) -> tuple[Value, Value, Value, Value]:
         """Return whether there is a sample for the first stage, its channel, its bank, and its word.
 

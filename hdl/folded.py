@@ -1,9 +1,42 @@
 """The folded and serial architectures: one multiply-accumulate unit that runs a datapath's program.
 
-Several ranks work on as many instructions at once: fetch, read, multiply, accumulate; the program keeps an
-instruction that reads a word far enough from the one that stores it (`sosmith.model.dataflow.program.HAZARD`).
-In the folded architecture both memories have a register behind them, for speed. In the serial one they have none,
-for size, the multiplication is done by shifts and additions in the accumulator, and the ranks wait for it.
+The unit is a pipeline that holds an instruction in each of its stages. Folded, with words of w = digit_bits + 1 bits::
+
+    stage 1                    2                 3                 4                5
+
+    +-----------+ address  +-----------+
+    |  program  |--------->|   words   |--+--> data -----------+
+    |  memory   |          |           |  |     w              v  2w
+    +-----------+      +-->|           |  |                    * ----> product --> + ---> total --+
+      ^    |           |   +-----------+  |                    ^                   ^        |     |
+      |    |           |                  +--> operand ------->+ PRODUCT           +--------+     |
+    counter|           |                  |      w             |                accumulator_bits  |
+           +-----------|------------------|--- constant ------>+ MULTIPLY                         |
+                       |                  |       w                                               |
+                       |                  +--> given0, given1, .. (GIVE) ---> m_axis_tdata        |
+                       |                                                                          |
+                       +--- low digit (STORE), signed low digit (FINISH), w ----------------------+
+                       +--- digit of s_axis_tdata (TAKE), w
+
+An instruction in pipeline stage 1 has been read from the program memory, in 2 it addresses the words, in 3 its word has
+been read, in 4 it is multiplied, and in 5 it is added up, stored or dropped. A word is written three stages after it is
+read, so that an instruction must follow the one that writes its word by `sosmith.model.dataflow.program.HAZARD`.
+
+Serial has three pipeline stages and no multiplier block: the word is addressed in stage 1 and has been read in stage 2,
+and in stage 3 shifts and additions multiply in the accumulator itself, one clock for each bit of the second factor,
+while the pipeline waits.
+
+As an example, the program in `sosmith.model.dataflow.folding`, which computes ``y = floor(3 / 4 y1 + 4 x)`` with digits
+of 4 bits, for x = 7 and y1 = 28 = 12 + 16 * 1. The sample is found at edge 0; at the edges 6 to 13, pipeline stage 5
+holds the instructions 0 to 7::
+
+    edge                    6       7       8       9      10        11       12      13
+    instruction          take  multiply  drop  nothing  multiply  multiply  store  finish
+    product                      12*12                     7*4      1*12
+    total before the edge   0       0     144       9       9        37       49       3
+
+The digits 1 and 3 are stored: y = 1 + 16 * 3 = 49. The program has 16 instructions, so that `m_axis_tvalid` is high at
+edge 16 + 5 = 21.
 """
 
 from __future__ import annotations
@@ -12,76 +45,78 @@ from amaranth.hdl import Cat, ClockDomain, ClockSignal, Const, Module, Mux, Rese
 from amaranth.lib import wiring
 from amaranth.lib.memory import Memory
 
-from sosmith.hdl.axi_lite import slave_members
+from sosmith.hdl.axi_lite import forward_slave, slave_members
 from sosmith.hdl.axi_stream import channel_bits, core_members, extended, fields
-from sosmith.hdl.ranked_logic import limits
+from sosmith.hdl.instruction import PipelinedInstruction, address_bits, encoded, instruction_bits
+from sosmith.hdl.pipelined_logic import limits
 from sosmith.hdl.reload import ReloadPort
 from sosmith.hdl.status import at_rail, worn
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.graph import Op
-from sosmith.model.dataflow.program import Do, Instruction, Place, Program
+from sosmith.model.dataflow.program import Location, Opcode, Program
 from sosmith.model.reload.registers import ADDRESS_BITS
 
-_FOLDED_RANKS, _SERIAL_RANKS = 5, 3
-
-_DO_BITS = 4
+_FOLDED_DEPTH, _SERIAL_DEPTH = 5, 3
+"""Pipeline stages from the program memory to the accumulator."""
 
 _NO_COLLISIONS = {"no_rw_check": 1}
-"""Of memories: nobody uses what is read at the clock at which that very word is written.
+"""Attribute of memories: no word is used that is read at the clock at which it is written.
 
-`HAZARD` sees to that, and a bank of the program is not written while it is read. Simulators give the old word. Block
-RAMs give anything, and Yosys, unless told that this will do, puts registers and a comparison around them.
+`HAZARD` keeps the program from doing so, and a bank of the program is not written while it is read. At such a clock a
+simulator reads the old word and a block RAM anything; without the attribute, Yosys adds registers and a comparator to
+make both equal.
 """
 
 
 def latency_cycles(program: Program, *, serial: bool) -> int:
-    """Clocks from the edge that finds a sample to the edge that can hand it on; in serial, at most so many."""
-    return program.serial_cycles + _SERIAL_RANKS if serial else len(program.instructions) + _FOLDED_RANKS
+    """Clocks from the edge that finds a sample to the edge that can hand its result on; in serial, an upper bound."""
+    return program.serial_cycles + _SERIAL_DEPTH if serial else len(program.instructions) + _FOLDED_DEPTH
 
 
 _SLICES = {256: 16, 512: 8, 1024: 4, 2048: 2}
-"""Bits that a block RAM of an iCE40 has to a word when it has so many words."""
+"""Width of an iCE40's block RAM, by its number of words."""
 
 
 def reset_cycles(program: Program, channels: int) -> int:
-    """Clocks that the memory takes to be cleared after a reset."""
+    """Clocks after a reset in which the memory is cleared."""
     return memory_depth(program, channels) + (channels > 1)
 
 
 def memory_depth(program: Program, channels: int) -> int:
-    """Words of the memory: those of the program for each channel, the channel's number above the word's."""
+    """Return the number of words of the memory; the upper bits of an address are the channel."""
     return program.words * channels
 
 
 class FoldedCore(wiring.Component):
     """A datapath on one multiply-accumulate unit, for any number of channels in any order.
 
-    Latency: `latency_cycles`. Throughput: one sample of one channel in one clock more. After reset it first clears its
-    memory, one word a clock. A sample is taken as soon as the program has read it: `s_axis_tready` waits for
-    `s_axis_tvalid`, which AXI4-Stream allows. One of a channel that does not exist is taken and dropped.
+    Latency: `latency_cycles`. Throughput: one sample, of any channel, every ``latency_cycles + 1`` clocks. After a
+    reset the core first clears its memory, one word a clock. It accepts a sample once the program has read it:
+    `s_axis_tready` waits for `s_axis_tvalid`, which AXI4-Stream allows. A sample of a channel that does not exist is
+    accepted and dropped.
 
-    With a fingerprint, the program can be loaded anew while the core works: there are two banks for it, and each sample
-    is computed by the one that was active when the core found it.
+    With a fingerprint, the core has two banks for its program, so that another one can be loaded while it works. Each
+    sample is computed by the bank that was active when the core found it.
 
     Parameters
     ----------
     datapath : Datapath
         What it computes.
     program : Program
-        How.
+        The program that computes it.
     serial : bool
         Whether to multiply by shifts and additions instead of a hardware multiplier.
     channels : int
         Number of channels.
     fingerprint : int or None
-        Of the structure, 32 bits; None for a core whose program stays.
+        Fingerprint of the structure, 32 bits; None for a core whose program cannot be loaded.
 
     Members
     -------
     aclk, aresetn, s_axis_*, m_axis_*
-        As of `sosmith.hdl.core.Core`.
+        As in `sosmith.hdl.core.Core`.
     s_axil_*
-        AXI4-Lite slave of `sosmith.hdl.reload.ReloadPort`; only with a fingerprint.
+        AXI4-Lite slave of a `sosmith.hdl.reload.ReloadPort`; only with a fingerprint.
     """
 
     def __init__(
@@ -96,7 +131,7 @@ class FoldedCore(wiring.Component):
         super().__init__(members if fingerprint is None else members | slave_members(ADDRESS_BITS))
 
     def elaborate(self, platform: object) -> Module:
-        """Build the unit around its two memories."""
+        """Build control, pipeline and memories."""
         m = Module()
         m.domains.sync = ClockDomain(local=True)
         m.d.comb += [ClockSignal("sync").eq(self.aclk), ResetSignal("sync").eq(~self.aresetn)]
@@ -104,23 +139,24 @@ class FoldedCore(wiring.Component):
         busy, dropped = Signal(), Signal()
         channel = self._channel(m, busy | clearing, dropped, start)
         counter, fetching = self._control(m, (advance, clearing, start, busy), channel)
-        ranks = self._fetch(m, advance, counter, fetching, self._reload(m, start, busy))
+        pipeline = self._fetch(m, advance, counter, fetching, self._reload(m, start, busy))
         read = Signal(signed(self._word))
-        total = self._accumulate(m, advance, ranks, read)
-        self._remember(m, (advance, clearing), (counter, total, read, channel), ranks)
-        self._hand_out(m, (advance, start), (total, read, channel), ranks)
+        total = self._accumulate(m, advance, pipeline, read)
+        self._remember(m, (advance, clearing), (counter, total, read, channel), pipeline)
+        self._hand_out(m, (advance, start), (total, read, channel), pipeline)
         taken = Signal()
-        last_digit = ranks[-1].counts(sum(place.digits for place in self.program.inputs) - 1)
-        m.d.sync += taken.eq(advance & ranks[-1].valid & ranks[-1].does(Do.TAKE) & last_digit)
+        last_digit = pipeline[-1].is_for(sum(location.digits for location in self.program.inputs) - 1)
+        m.d.sync += taken.eq(advance & pipeline[-1].valid & pipeline[-1].has(Opcode.TAKE) & last_digit)
         m.d.comb += self.s_axis_tready.eq(taken | dropped)
         return m
 
     @property
     def _word(self) -> int:
+        """Width of a word."""
         return self.program.digit_bits + 1
 
     def _channel(self, m: Module, busy: Value, dropped: Signal, start: Signal) -> Signal:
-        """Begin with a sample if its channel exists, else drop it; return the channel's number while it is computed."""
+        """Start on a sample if its channel exists, otherwise drop it; return the channel of the sample in work."""
         found = self.s_axis_tvalid & ~busy
         channel = Signal(channel_bits(self.channels))
         if self.channels == 1:
@@ -136,13 +172,13 @@ class FoldedCore(wiring.Component):
     def _control(
         self, m: Module, control: tuple[Signal, Signal, Signal, Signal], channel: Signal
     ) -> tuple[Signal, Signal]:
-        """Count through all words to clear them after reset, and through the program for each sample.
+        """Count through all words after a reset, to clear them, and through the program for each sample.
 
-        While it clears, the channel's number follows the upper half of the count, a clock late: a channel's word 0
-        comes last.
+        While words are cleared, the channel follows the upper bits of the counter a clock late, so that word 0 of a
+        channel is cleared after its others.
         """
         advance, clearing, start, busy = control
-        count, bits = len(self.program.instructions), _address_bits(self.program)
+        count, bits = len(self.program.instructions), address_bits(self.program)
         counter, fetching = Signal(max((count - 1).bit_length(), bits + len(channel))), Signal()
         is_last = channel == self.channels - 1
         with m.If(clearing):
@@ -162,18 +198,16 @@ class FoldedCore(wiring.Component):
         return counter, fetching
 
     def _is_one(self, address: Value) -> Value:
-        """Whether an address is that of the word of ones, a channel's last one."""
-        return address[: _address_bits(self.program)].all()
+        """Whether an address is that of the word that always holds 1, the last one of a channel."""
+        return address[: address_bits(self.program)].all()
 
     def _reload(self, m: Module, start: Signal, busy: Signal) -> tuple[ReloadPort, Signal] | None:
-        """Return the reload port and the bank that the sample in work uses."""
+        """Return the reload port, and the bank that the sample in work uses."""
         if self.fingerprint is None:
             return None
         depth, bits = len(self.program.instructions), instruction_bits(self.program)
         m.submodules.reload_port = port = ReloadPort(depth, bits=bits, design=self.fingerprint)
-        for name in slave_members(ADDRESS_BITS):
-            outer, inner = getattr(self, name), getattr(port, name)
-            m.d.comb += outer.eq(inner) if self.signature.members[name].flow is wiring.Out else inner.eq(outer)
+        forward_slave(m, self, port)
         bank = Signal(reset_less=True)
         with m.If(start):
             m.d.sync += bank.eq(port.bank)
@@ -182,19 +216,20 @@ class FoldedCore(wiring.Component):
 
     def _fetch(
         self, m: Module, advance: Signal, counter: Signal, fetching: Signal, reload: tuple[ReloadPort, Signal] | None
-    ) -> list[_Rank]:
-        """Read the program; return the ranks, the first one holding what has just been read."""
-        code = [encoded(instruction, self.program) for instruction in self.program.instructions]
-        bits, address_bits = instruction_bits(self.program), _address_bits(self.program)
+    ) -> list[PipelinedInstruction]:
+        """Read the program; return the instructions in the pipeline stages, the one just read first."""
+        codes = [encoded(instruction, self.program) for instruction in self.program.instructions]
         if reload is not None:
-            code += [0] * ((1 << (len(code) - 1).bit_length()) - len(code))
-            code += [0] * len(code)
-        m.submodules.program = program = Memory(shape=bits, depth=len(code), init=code, attrs=_NO_COLLISIONS)
+            codes += [0] * ((1 << (len(codes) - 1).bit_length()) - len(codes))
+            codes += [0] * len(codes)
+        m.submodules.program = program = Memory(
+            shape=instruction_bits(self.program), depth=len(codes), init=codes, attrs=_NO_COLLISIONS
+        )
         fetch = program.read_port()
         m.d.comb += [fetch.addr.eq(counter), fetch.en.eq(advance)]
         if reload is not None:
             port, bank = reload
-            index_bits = (len(code) // 2 - 1).bit_length()
+            index_bits = (len(codes) // 2 - 1).bit_length()
             write = program.write_port()
             m.d.comb += [
                 fetch.addr.eq(Cat(counter[:index_bits], Const(0, max(0, index_bits - len(counter))), bank)),
@@ -203,39 +238,39 @@ class FoldedCore(wiring.Component):
                 write.en.eq(port.write_enable),
             ]
         valid = Signal(name="valid1")
-        ranks = [_Rank(fetch.data, valid, address_bits)]
+        pipeline = [PipelinedInstruction(fetch.data, valid, self.program)]
         with m.If(advance):
             m.d.sync += valid.eq(fetching)
-            for k in range(2, _SERIAL_RANKS + 1 if self.serial else _FOLDED_RANKS + 1):
-                word = Signal(len(fetch.data), name=f"instruction{k}", reset_less=True)
+            for k in range(2, _SERIAL_DEPTH + 1 if self.serial else _FOLDED_DEPTH + 1):
+                code = Signal(len(fetch.data), name=f"instruction{k}", reset_less=True)
                 valid = Signal(name=f"valid{k}")
-                m.d.sync += [word.eq(ranks[-1].word), valid.eq(ranks[-1].valid)]
-                ranks.append(_Rank(word, valid, address_bits))
-        return ranks
+                m.d.sync += [code.eq(pipeline[-1].code), valid.eq(pipeline[-1].valid)]
+                pipeline.append(PipelinedInstruction(code, valid, self.program))
+        return pipeline
 
-    def _accumulate(self, m: Module, advance: Signal, ranks: list[_Rank], read: Signal) -> Signal:
-        """Multiply the word read at the last rank but one, and add the product up at the last."""
-        *_, present, last = ranks
+    def _accumulate(self, m: Module, advance: Signal, pipeline: list[PipelinedInstruction], read: Signal) -> Signal:
+        """Multiply in the last pipeline stage but one, add up in the last; return the accumulator."""
+        *_, present, last = pipeline
         operand = Signal(signed(self._word), reset_less=True)
         factor = Signal(signed(self._word))
         total = Signal(signed(self.program.accumulator_bits))
-        m.d.comb += factor.eq(Mux(present.does(Do.PRODUCT), operand, present.constant))
-        with m.If(advance & self._reading(ranks).does(Do.OPERAND)):
+        m.d.comb += factor.eq(Mux(present.has(Opcode.PRODUCT), operand, present.constant))
+        with m.If(advance & self._reading(pipeline).has(Opcode.OPERAND)):
             m.d.sync += operand.eq(read)
-        multiplies = last.valid & (last.does(Do.MULTIPLY) | last.does(Do.PRODUCT))
+        multiplies = last.valid & (last.has(Opcode.MULTIPLY) | last.has(Opcode.PRODUCT))
         if self.serial:
             self._multiply_serially(m, total, (read, factor), (advance, multiplies))
         else:
-            # No one else looks at this register, so that it can be the multiplier block's own.
+            # Nothing else reads this register, so that it can be the one inside the multiplier block.
             data = Signal(signed(self._word), reset_less=True)
             product = Signal(signed(2 * self._word), reset_less=True)
             m.d.comb += advance.eq(1)
             m.d.sync += [data.eq(read), product.eq(data * factor)]
             with m.If(multiplies):
                 m.d.sync += total.eq(total + product)
-        with m.If(advance & last.valid & (last.does(Do.STORE) | last.does(Do.DROP))):
+        with m.If(advance & last.valid & (last.has(Opcode.STORE) | last.has(Opcode.DROP))):
             m.d.sync += total.eq(total >> self.program.digit_bits)
-        with m.If(advance & last.valid & (last.does(Do.FINISH) | last.does(Do.JUDGE))):
+        with m.If(advance & last.valid & (last.has(Opcode.FINISH) | last.has(Opcode.JUDGE))):
             m.d.sync += total.eq(0)
         return total
 
@@ -244,36 +279,35 @@ class FoldedCore(wiring.Component):
         m: Module,
         control: tuple[Signal, Signal],
         values: tuple[Signal, Signal, Signal, Signal],
-        ranks: list[_Rank],
+        pipeline: list[PipelinedInstruction],
     ) -> None:
-        """Read the words that instructions are about, and write those that they store."""
+        """Read the words at the instructions' addresses, and write those that they store."""
         (advance, clearing), (counter, total, read, channel) = control, values
-        first, last = ranks[0 if self.serial else 1], ranks[-1]
-        take = last.does(Do.TAKE)
-        top = total[self._word - 1] & last.does(Do.FINISH)
+        first, last = pipeline[0 if self.serial else 1], pipeline[-1]
+        take = last.has(Opcode.TAKE)
+        top = total[self._word - 1] & last.has(Opcode.FINISH)
         digit = Mux(take, self._input_digit(last), Cat(total[: self._word - 1], top))
-        stores = take | last.does(Do.STORE) | last.does(Do.FINISH)
-        address_bits = _address_bits(self.program)
+        stores = take | last.has(Opcode.STORE) | last.has(Opcode.FINISH)
         word = self._memory(
             m,
             read=(Cat(first.address, channel), advance),
             write=(
-                Cat(Mux(clearing, counter[:address_bits], last.address), channel),
+                Cat(Mux(clearing, counter[: address_bits(self.program)], last.address), channel),
                 Mux(clearing, self._is_one(counter), digit),
                 clearing | (advance & last.valid & stores),
             ),
         )
         m.d.comb += read.eq(word)
 
-    def _reading(self, ranks: list[_Rank]) -> _Rank:
-        """Instruction that the word just read is about."""
-        return ranks[-2 if self.serial else -3]
+    def _reading(self, pipeline: list[PipelinedInstruction]) -> PipelinedInstruction:
+        """Return the instruction whose word has just been read."""
+        return pipeline[-2 if self.serial else -3]
 
     def _memory(self, m: Module, read: tuple[Value, Value], write: tuple[Value, Value, Value]) -> Value:
         """Make the memory of all channels; return the word read.
 
-        It is cut into slices as wide as a block RAM is where it has that many words: side by side they need no logic,
-        as blocks behind each other would.
+        It is cut into slices as wide as a block RAM of so many words. Block RAMs side by side need no logic; behind
+        each other they would.
         """
         words, depth = self.program.words, memory_depth(self.program, self.channels)
         width = next((bits for most, bits in _SLICES.items() if depth <= most), _SLICES[max(_SLICES)])
@@ -294,15 +328,19 @@ class FoldedCore(wiring.Component):
         return Cat(*slices)
 
     def _hand_out(
-        self, m: Module, control: tuple[Signal, Signal], values: tuple[Signal, Signal, Signal], ranks: list[_Rank]
+        self,
+        m: Module,
+        control: tuple[Signal, Signal],
+        values: tuple[Signal, Signal, Signal],
+        pipeline: list[PipelinedInstruction],
     ) -> None:
-        """Collect the digits of the result, and what is said about it; the last instruction gives the last digit."""
+        """Collect the digits of the result and its status; the last instruction gives the last digit."""
         (advance, start), (total, read, channel) = control, values
-        *_, following, present, last = ranks
-        reading = self._reading(ranks)
+        *_, following, present, last = pipeline
+        reading = self._reading(pipeline)
         given = [Signal(self._word, name=f"given{k}", reset_less=True) for k in range(self.program.output.digits)]
         for k, digit in enumerate(given):
-            with m.If(advance & reading.valid & reading.does(Do.GIVE) & reading.counts(k)):
+            with m.If(advance & reading.valid & reading.has(Opcode.GIVE) & reading.is_for(k)):
                 m.d.sync += digit.eq(read)
         with m.If(advance & present.valid & ~following.valid):
             m.d.sync += self.m_axis_tvalid.eq(1)
@@ -311,8 +349,8 @@ class FoldedCore(wiring.Component):
         rail, outside = Signal(reset_less=True), Signal(reset_less=True)
         with m.If(start):
             m.d.sync += [rail.eq(at_rail(self.datapath.inputs, self.s_axis_tdata)), outside.eq(0)]
-        if self.fingerprint is not None or any(do is Do.JUDGE for do, _, _ in self.program.instructions):
-            with m.If(advance & last.valid & last.does(Do.JUDGE) & total[-1]):
+        if self.fingerprint is not None or any(i.opcode is Opcode.JUDGE for i in self.program.instructions):
+            with m.If(advance & last.valid & last.has(Opcode.JUDGE) & total[-1]):
                 m.d.sync += outside.eq(1)
         code, saturated = self._limited(given)
         m.d.comb += [
@@ -323,9 +361,10 @@ class FoldedCore(wiring.Component):
     def _multiply_serially(
         self, m: Module, total: Signal, factors: tuple[Value, Value], control: tuple[Signal, Value]
     ) -> None:
-        """Add a product to `total` bit by bit of its second factor, the lowest first, as long as there are any.
+        """Add a product to `total`, one clock for each bit of the second factor, the lowest first, until none is left.
 
-        What is left of a negative factor ends as -1: one subtraction. The first factor moves up at each bit.
+        What is left of a negative factor ends as -1, which takes one subtraction. The first factor is shifted up at
+        each clock.
         """
         word = self.program.digit_bits + 1
         advance, multiplies = control
@@ -339,28 +378,29 @@ class FoldedCore(wiring.Component):
         with m.If(advance):
             m.d.sync += [shifted.eq(factors[0]), left.eq(factors[1])]
 
-    def _input_digit(self, rank: _Rank) -> Value:
-        """Digit of the input sample, counted through all ports in the order in which the program takes them."""
+    def _input_digit(self, instruction: PipelinedInstruction) -> Value:
+        """Return the digit of the input sample that a TAKE asks for; digits are numbered through all ports."""
         graph = self.datapath.stages[0].graph
         digits: list[Value] = []
         ports = zip(fields(self.datapath.inputs), graph.inputs, self.program.inputs, strict=True)
-        for field, node, place in ports:
+        for field, node, location in ports:
             code = self.s_axis_tdata[field.offset : field.offset + field.port.bits]
-            padded = Cat(Const(0, place.frac - graph.nodes[node].frac), code)
-            digits += self._split(padded, place, sign=padded[-1] if field.port.signed else Const(0, 1))
+            padded = Cat(Const(0, location.frac - graph.nodes[node].frac), code)
+            digits += self._split(padded, location, sign=padded[-1] if field.port.signed else Const(0, 1))
         found = digits[-1]
         for k, digit in enumerate(digits[:-1]):
-            found = Mux(rank.counts(k), digit, found)
+            found = Mux(instruction.is_for(k), digit, found)
         return found
 
-    def _split(self, value: Value, place: Place, sign: Value) -> list[Value]:
+    def _split(self, value: Value, location: Location, sign: Value) -> list[Value]:
+        """Return the digits of a value, the lowest first, each as wide as a word."""
         bits = self.program.digit_bits
-        whole = Cat(value, *([sign] * max(0, bits * place.digits + 1 - len(value))))
-        low = [Cat(whole[bits * k : bits * (k + 1)], Const(0, 1)) for k in range(place.digits - 1)]
-        return [*low, whole[bits * (place.digits - 1) : bits * place.digits + 1]]
+        whole = Cat(value, *([sign] * max(0, bits * location.digits + 1 - len(value))))
+        low = [Cat(whole[bits * k : bits * (k + 1)], Const(0, 1)) for k in range(location.digits - 1)]
+        return [*low, whole[bits * (location.digits - 1) : bits * location.digits + 1]]
 
     def _limited(self, given: list[Signal]) -> tuple[Value, Value]:
-        """Return the output code from its digits, limited to the port's range, and whether it had to be."""
+        """Return the output code from its digits, limited to the port's range, and whether it had to be limited."""
         bits, output = self.program.digit_bits, self.datapath.output
         value = Cat(*(digit[:bits] for digit in given), given[-1][-1]).as_signed()
         graph = self.datapath.stages[-1].graph
@@ -369,45 +409,10 @@ class FoldedCore(wiring.Component):
         above: Value = Const(0, 1)
         code: Value = value
         if last.op is Op.CLAMP:
-            if self.fingerprint is None:  # another program may have other ranges
+            if self.fingerprint is None:  # a program loaded later may have other ranges
                 node = graph.nodes[last.operands[0]]
                 value = value[: node.width + (not node.signed)].as_signed()
             below, above = limits(last, value)
             code = Mux(below, Const(last.low), Mux(above, Const(last.high), value))
         cut = code[: output.bits]
         return (cut.as_signed() if output.signed else cut), below | above
-
-
-class _Rank:
-    """An instruction on its way, and whether there is one."""
-
-    def __init__(self, word: Value, valid: Value, address_bits: int) -> None:
-        self.word = word
-        self.valid = valid
-        self.address = word[_DO_BITS : _DO_BITS + address_bits]
-        self.constant = word[_DO_BITS + address_bits :].as_signed()
-
-    def does(self, do: Do) -> Value:
-        """Whether it does `do`."""
-        return self.word[:_DO_BITS] == list(Do).index(do)
-
-    def counts(self, digit: int) -> Value:
-        """Whether its constant is the number of a digit."""
-        number = self.constant[:8]
-        return number == digit if digit else ~number.any()  # as a comparison with 0, Verilator warns of it
-
-
-def _address_bits(program: Program) -> int:
-    return (program.words - 1).bit_length()
-
-
-def instruction_bits(program: Program) -> int:
-    """Width of an instruction in the program's memory."""
-    return _DO_BITS + _address_bits(program) + program.digit_bits + 1
-
-
-def encoded(instruction: Instruction, program: Program) -> int:
-    """Instruction as the program's memory has it: what to do lowest, then the address, then the constant."""
-    do, address, constant = instruction
-    upper = address | (constant % (1 << program.digit_bits + 1)) << _address_bits(program)
-    return list(Do).index(do) | upper << _DO_BITS

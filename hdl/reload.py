@@ -7,7 +7,7 @@ from amaranth.lib import wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
-from sosmith.hdl.axi_lite import BITS, SerialSlave, slave_members
+from sosmith.hdl.axi_lite import BITS, SerialSlave, forward_slave, slave_members
 from sosmith.hdl.serial_crc import SerialCrc
 from sosmith.model.reload.registers import (
     ADDRESS_BITS,
@@ -93,9 +93,7 @@ class ReloadPort(wiring.Component):
         """Build the port around the slave."""
         m = Module()
         m.submodules.slave = slave = SerialSlave(ADDRESS_BITS)
-        for name in slave_members(ADDRESS_BITS):
-            outer, inner = getattr(self, name), getattr(slave, name)
-            m.d.comb += outer.eq(inner) if self.signature.members[name].flow is Out else inner.eq(outer)
+        forward_slave(m, self, slave)
         m.submodules.checksum = crc = SerialCrc()
         turns = _is_at(slave, CRC)
         m.d.comb += [

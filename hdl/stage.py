@@ -1,8 +1,6 @@
-"""One stage of a datapath in hardware: its state, and its logic in one to three register ranks.
+"""A stage of a datapath for one channel: its logic in one to three pipeline stages, and its state.
 
-Where a stage has a recursion, only what depends on the newest sample that it remembers has to be done within a clock.
-What depends on the input alone, and what depends on older samples, is done and registered a rank before; the delay
-of the loop proper then is all that limits the clock.
+EXAMPLE
 """
 
 from __future__ import annotations
@@ -14,43 +12,43 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from sosmith.hdl.constant_banks import NO_CONSTANTS, Pair
-from sosmith.hdl.ranked_logic import RankedLogic, banks_in_use, limits, shape_of
+from sosmith.hdl.pipelined_logic import PipelinedLogic, banks_in_use, limits, shape_of
 from sosmith.model.dataflow.datapath import Stage
 from sosmith.model.dataflow.graph import Graph, Node, Op
 
-PLAIN = {Op.INPUT, Op.CONSTANT, Op.DELAY, Op.SHIFT, Op.FLOOR, Op.FRACTION, Op.BOUND}
-"""What takes no time in hardware."""
+NO_LOGIC = {Op.INPUT, Op.CONSTANT, Op.DELAY, Op.SHIFT, Op.FLOOR, Op.FRACTION, Op.BOUND}
+"""Operations that are wires or registers only and take no time."""
 
 
-def rank_count(graph: Graph) -> int:
-    """Register ranks of a stage, 1 to 3."""
-    return max(_ranks(graph)) + 1
+def pipeline_depth(graph: Graph) -> int:
+    """Return the number of pipeline stages that `graph` takes, 1 to 3."""
+    return max(pipeline_stages(graph)) + 1
 
 
-def _ranks(graph: Graph) -> list[int]:
-    """Rank of each node.
+def pipeline_stages(graph: Graph) -> list[int]:
+    """Return the pipeline stage of each node, 0 to 2.
 
-    What no recursion reaches comes first. Then comes what depends on a recursion only through states that are at
-    least two samples old, so that it can be had a rank before it is needed; and last the rest of the loop.
+    First comes what no recursion reaches. Then comes what depends on a recursion only through states that are at least
+    two samples old, which are known a clock before they are needed; and last the rest of the loop.
     """
     loop = _recursive(graph)
     late = _late(graph, loop)
-    ranks = [0] * len(graph.nodes)
-    for part, whole in ((loop, set(range(len(ranks)))), (late, loop)):
-        if part and any(graph.nodes[i].op not in PLAIN for i in whole - part):
+    stages = [0] * len(graph.nodes)
+    for part, whole in ((loop, set(range(len(stages)))), (late, loop)):
+        if part and any(graph.nodes[i].op not in NO_LOGIC for i in whole - part):
             for i in part:
-                ranks[i] += 1
-    return ranks
+                stages[i] += 1
+    return stages
 
 
-def _known_early(graph: Graph, ranks: list[int]) -> set[int]:
-    """Find sums without a product of their rank that are added to one with a product.
+def _known_early(graph: Graph, stages: list[int]) -> set[int]:
+    """Return the sums without a product of their pipeline stage that are added to one with a product.
 
-    They are kept apart in synthesis, which would else delay the product by adding up everything at once.
+    Synthesis has to keep them apart: it would otherwise merge all additions into one and delay the product by that.
     """
     products: set[int] = set()
     for index, node in enumerate(graph.nodes):
-        own = [i for i in node.operands if ranks[i] == ranks[index] and node.op is not Op.DELAY]
+        own = [i for i in node.operands if stages[i] == stages[index] and node.op is not Op.DELAY]
         if node.op in {Op.SCALE, Op.MULTIPLY} or products & set(own):
             products.add(index)
     return {
@@ -58,12 +56,12 @@ def _known_early(graph: Graph, ranks: list[int]) -> set[int]:
         for index, node in enumerate(graph.nodes)
         if index in products and node.op in {Op.ADD, Op.SUBTRACT}
         for i in node.operands
-        if i not in products and ranks[i] == ranks[index] and graph.nodes[i].op in {Op.ADD, Op.SUBTRACT}
+        if i not in products and stages[i] == stages[index] and graph.nodes[i].op in {Op.ADD, Op.SUBTRACT}
     }
 
 
 def _recursive(graph: Graph) -> set[int]:
-    """Nodes that depend on a state which depends on itself."""
+    """Return the nodes that depend on a state that depends on itself."""
     sources = {delay: set[int]() for delay in graph.delays}
     while True:
         reached: list[set[int]] = []  # the delays that a node depends on, through any number of samples
@@ -79,7 +77,7 @@ def _recursive(graph: Graph) -> set[int]:
 
 
 def _late(graph: Graph, loop: set[int]) -> set[int]:
-    """Nodes of the loop that depend on the newest of several samples that it remembers; all of it if it has but one."""
+    """Return the nodes of the loop that depend on the newest of the samples that it remembers; all, if that is only one."""
     late = {i for i in graph.delays if i in loop and graph.nodes[i].operands[0] in loop and _is_followed(graph, i)}
     if not late:
         return loop
@@ -89,11 +87,12 @@ def _late(graph: Graph, loop: set[int]) -> set[int]:
 
 
 def _is_new(graph: Graph, user: int, operand: int, late: set[int]) -> bool:
-    """Whether what `user` takes from `operand` can be had in the last rank only."""
+    """Whether `user` can have `operand` in the last pipeline stage only."""
     return operand in late and not (_is_older(graph, operand) and graph.nodes[user].op is not Op.DELAY)
 
 
 def _is_followed(graph: Graph, delay: int) -> bool:
+    """Whether a delay is delayed again."""
     return any(graph.nodes[other].operands[0] == delay for other in graph.delays)
 
 
@@ -103,34 +102,37 @@ def _is_older(graph: Graph, index: int) -> bool:
     return node.op is Op.DELAY and graph.nodes[node.operands[0]].op is Op.DELAY
 
 
-class PipelineStage(wiring.Component):
-    """A stage that takes a sample at every clock at which the pipeline advances.
+class PipelinedStage(wiring.Component):
+    """A datapath stage for one channel.
 
-    Latency: `rank_count` of its graph in clocks of the pipeline. Throughput: one sample per clock.
+    Latency: `pipeline_depth` of its graph, 1 to 3, in clocks at which `advance` is high. Throughput: one sample at each
+    of these clocks.
 
     Parameters
     ----------
     stage : Stage
         What it computes.
     constants : dict of int to Pair
-        Constants that come from one of two banks, by their nodes.
+        Constants that come from one of two banks, by node.
 
     Members
     -------
     i0, i1, .. : In(shape)
         Input codes, in the order of the graph's inputs.
     i_valid : In(1)
-        Whether the inputs hold a sample; without one, the state stays as it is.
-    i_bank, o_bank, uses : In(1), Out(1), Out(2)
-        Bank of the sample that comes in, and of the one that goes out; which banks samples inside use.
+        Whether the inputs hold a sample. The state changes with valid samples only.
+    i_bank, o_bank : In(1), Out(1)
+        Bank that the sample at the inputs uses, and the one at the outputs.
+    uses : Out(2)
+        Whether a sample inside uses the first bank, and the second.
     advance : In(1)
         Whether the pipeline moves at this clock.
     o0, o1, .. : Out(shape)
-        Output codes of the sample before; defined while `o_valid` is high.
+        Output codes, in the order of the graph's outputs; defined while `o_valid` is high.
     o_valid : Out(1)
         Whether the outputs hold a sample.
     o_saturated : Out(1)
-        Whether the stage had to limit it.
+        Whether the output had to be limited to its range.
     """
 
     def __init__(self, stage: Stage, constants: Mapping[int, Pair] = NO_CONSTANTS) -> None:
@@ -146,19 +148,19 @@ class PipelineStage(wiring.Component):
         """Build the logic."""
         m = Module()
         graph = self.stage.graph
-        ranks = _ranks(graph)
-        valid, takes, banks = self._control(m, max(ranks) + 1)
-        apart = _known_early(graph, ranks)
-        ranked = RankedLogic(m, graph, ranks, constants=self.constants, banks=banks, takes=takes, valid=valid)
-        ranked.connect([getattr(self, f"i{k}") for k in range(len(graph.inputs))], apart)
-        at, wires, names = ranked.at, ranked.wires, ranked.names
+        stages = pipeline_stages(graph)
+        valid, takes, banks = self._control(m, max(stages) + 1)
+        apart = _known_early(graph, stages)
+        logic = PipelinedLogic(m, graph, stages, constants=self.constants, banks=banks, takes=takes, valid=valid)
+        logic.connect([getattr(self, f"i{k}") for k in range(len(graph.inputs))], apart)
+        at, wires, names = logic.at, logic.wires, logic.names
         for i in graph.delays:
-            with m.If(takes[ranks[i]]):
-                m.d.sync += wires[i].eq(at(graph.nodes[i].operands[0], ranks[i]))
+            with m.If(takes[stages[i]]):
+                m.d.sync += wires[i].eq(at(graph.nodes[i].operands[0], stages[i]))
         last = len(takes) - 1
         for k, i in enumerate(graph.outputs):
             output = getattr(self, f"o{k}")
-            held = _held(graph, i, wires) if ranks[i] == last else None
+            held = _held(graph, i, wires) if stages[i] == last else None
             if held is not None:
                 m.d.comb += output.eq(held)
             else:
@@ -172,16 +174,16 @@ class PipelineStage(wiring.Component):
                         )
         return m
 
-    def _control(self, m: Module, count: int) -> tuple[list[Value], list[Value], list[Value]]:
-        """Return for each rank whether it is about a sample, whether it takes it at this clock, and its bank."""
+    def _control(self, m: Module, depth: int) -> tuple[list[Value], list[Value], list[Value]]:
+        """Return for each pipeline stage whether it holds a sample, whether its registers load it now, and its bank."""
         valid: list[Value] = [self.i_valid]
         banks: list[Value] = [self.i_bank]
-        for rank in range(1, count + 1):
-            valid.append(Signal(name=f"valid{rank}"))
-            banks.append(Signal(name=f"bank{rank}", reset_less=True))
+        for k in range(1, depth + 1):
+            valid.append(Signal(name=f"valid{k}"))
+            banks.append(Signal(name=f"bank{k}", reset_less=True))
             with m.If(self.advance):
-                m.d.sync += [valid[rank].eq(valid[rank - 1]), banks[rank].eq(banks[rank - 1])]
-        takes: list[Value] = [Signal(name=f"take{rank}") for rank in range(count)]
+                m.d.sync += [valid[k].eq(valid[k - 1]), banks[k].eq(banks[k - 1])]
+        takes: list[Value] = [Signal(name=f"take{k}") for k in range(depth)]
         m.d.comb += [take.eq(self.advance & ready) for take, ready in zip(takes, valid, strict=False)]
         m.d.comb += [self.o_valid.eq(valid[-1]), self.o_bank.eq(banks[-1])]
         m.d.comb += self.uses.eq(banks_in_use(valid[:-1], banks[:-1]))
@@ -189,9 +191,9 @@ class PipelineStage(wiring.Component):
 
 
 def _held(graph: Graph, output: int, wires: list[Value]) -> Value | None:
-    """Output value of the sample before as a function of a state that already holds it, or None.
+    """Return the output of the sample that has just been computed from a state that holds it, or None.
 
-    A section's output is the upper part of its state v, which therefore needs no register of its own.
+    A section's output is the upper part of its state v, so that it needs no register of its own.
     """
     chain: list[Node] = []
     index = output
@@ -210,5 +212,6 @@ def _held(graph: Graph, output: int, wires: list[Value]) -> Value | None:
 
 
 def _drop(graph: Graph, node: Node, value: Value) -> Value:
+    """Return the value of a FLOOR, SHIFT or BOUND from that of its operand."""
     shift = graph.nodes[node.operands[0]].frac - node.frac if node.op is Op.FLOOR else 0
     return value.shift_right(shift)

@@ -17,22 +17,17 @@ from sosmith.gen.core import CoreDesign
 from sosmith.gen.filter.response import FilterFacts
 from sosmith.gen.fpga.boards import Board
 from sosmith.gen.fpga.synthesis import Netlist, synthesize
+from sosmith.gen.output.core_facts import CoreFacts, core_facts
 from sosmith.gen.output.generate import generate
-from sosmith.gen.output.manifest import manifest, section_entries
 from sosmith.gen.realizations.registry import ERROR_FEEDBACK
-from sosmith.gen.report.evidence import Alternative, Evidence, Format
-from sosmith.gen.word_lengths.error_paths import error_responses
+from sosmith.gen.report.evidence import Alternative, Evidence
 from sosmith.gen.word_lengths.quantize import Quantized, with_realization
 from sosmith.model.errors import SpecificationError
 from sosmith.model.port import Codes, Values
 from sosmith.model.reference.golden import calibrated, filtered
-from sosmith.model.scenarios.catalogue import SCENARIOS, emulate
-from sosmith.model.scenarios.file import emulate_file, load_scenario, range_notes
-from sosmith.model.scenarios.run import Bench
-from sosmith.model.scenarios.vehicle_clearance import vehicle_clearance
 from sosmith.model.text_files import write_files
 from sosmith.model.traces.trace import Trace
-from sosmith.model.traces.trace_file import read_traces
+from sosmith.sim.cocotb_bench import CocotbBench
 from sosmith.sim.cosimulate import CosimulationResult, cosimulate
 from sosmith.sim.gate_level import with_cell_models
 from sosmith.sim.simulators import check_name
@@ -41,69 +36,6 @@ _Kind = TypeVar("_Kind", bound=np.generic)
 
 Progress = Callable[[str, int, int], None]
 """Told the step, what is done of it and the total; a total of 0 means that only the step's name is known."""
-
-
-def bench_of(design: CoreDesign) -> Bench:
-    """Make what the scenarios need to know of a core."""
-    quantized = design.quantized
-    return Bench(
-        ports=design.datapath.inputs,
-        output=design.datapath.output,
-        sample_rate=design.spec.sample_rate,
-        polynomial=quantized.polynomial,
-        impulse_response=np.ones(1) if quantized.filter is None else quantized.filter.impulse_response,
-        error_responses=tuple(error_responses(quantized)),
-    )
-
-
-def default_scenario(design: CoreDesign) -> str:
-    """Scenario that shows most of a core, for when none is named."""
-    return "sweep" if design.quantized.polynomial is None else "wear_ramp"
-
-
-def traces_for(design: CoreDesign, source: str, *, seed: int, seconds: float | None = None) -> tuple[Trace, ...]:
-    """Make a trace for every channel from a CSV file, a scenario file (TOML) or a scenario's name.
-
-    Each channel begins a sample later than the one before, and has noise of its own, so that none looks like another.
-    A CSV file with the column channel has each channel's rows as they are; one without goes to all channels.
-
-    Raises
-    ------
-    SpecificationError
-        If the file is unfit or the scenario does not exist for this core.
-    """
-    channels = range(design.spec.channels)
-    if is_scenario_file(source):
-        if seconds is not None:
-            raise SpecificationError(f"--seconds must come with a scenario's name, not with the file {source}")
-        scenario, bench = load_scenario(Path(source)), bench_of(design)
-        traces = [emulate_file(scenario, bench, seed=seed + k, channel=k, vehicle=vehicle_clearance) for k in channels]
-        return tuple(trace.delayed(k) for k, trace in enumerate(traces))
-    if source not in SCENARIOS and (source.lower().endswith(".csv") or Path(source).exists()):
-        if seconds is not None:
-            raise SpecificationError(f"--seconds must come with a scenario, not with the file {source}")
-        given = read_traces(Path(source), design.datapath.inputs, design.spec.sample_rate, len(channels))
-        return given if len(given) == len(channels) else tuple(given[0].delayed(k) for k in channels)
-    bench = bench_of(design)  # an unknown scenario is refused there, with a list of those that fit
-    return tuple(emulate(source, bench, seed=seed + k, seconds=seconds).delayed(k) for k in channels)
-
-
-def is_scenario_file(source: str) -> bool:
-    """Tell whether `source` is the path of a scenario file, and no built-in scenario or trace."""
-    return source not in SCENARIOS and source.lower().endswith(".toml")
-
-
-def notes_on(design: CoreDesign, source: str) -> tuple[str, ...]:
-    """Sentences about what the core's inputs cannot show of a scenario file; none for other sources.
-
-    Raises
-    ------
-    SpecificationError
-        If the file is unfit.
-    """
-    if not is_scenario_file(source):
-        return ()
-    return range_notes(load_scenario(Path(source)), design.datapath.inputs)
 
 
 def simulate(
@@ -138,7 +70,8 @@ def simulate(
     with _alone_in(directory):
         for stale in ("report.json", "report.html"):  # of a run of another core, if this one fails
             (directory / stale).unlink(missing_ok=True)
-        generate(design, directory, lambda step: progress(f"generating {step}", 0, 0))
+        facts = core_facts(design)
+        generate(design, directory, lambda step: progress(f"generating {step}", 0, 0), facts=facts)
         source, build_dir, netlist = directory / f"{design.datapath.name}.sv", directory / "simulation", None
         if gates is not None:
             progress(f"synthesizing for {gates.title}", 0, 0)
@@ -146,20 +79,25 @@ def simulate(
             netlist = synthesize(source, design.datapath.name, gates, build_dir)
             source = with_cell_models(netlist, scrambled=not design.spec.hardware.reload)
         progress(f"building with {simulator}", 0, 0)
-        result = cosimulate(
-            source,
-            manifest(design),
-            np.stack([trace.codes for trace in traces], axis=1),
+        bench = CocotbBench(
+            source=source,
+            interface=facts.interface,
             build_dir=build_dir,
             simulator=simulator,
             seed=seed,
             idle=idle,
             stall=stall,
             waves=waves,
+        )
+        result = cosimulate(
+            bench,
+            facts.interface,
+            np.stack([trace.codes for trace in traces], axis=1),
+            seed=seed,
             progress=lambda done, total: progress("co-simulating", done, total),
         )
     progress("comparing", 0, 0)
-    return _evidence(design, traces, result, netlist, seed=seed, wall_seconds=time.monotonic() - started)
+    return _evidence(design, facts, traces, result, netlist, seed=seed, wall_seconds=time.monotonic() - started)
 
 
 @contextmanager
@@ -181,6 +119,7 @@ def _alone_in(directory: Path) -> Iterator[None]:
 
 def _evidence(
     design: CoreDesign,
+    facts: CoreFacts,
     traces: Sequence[Trace],
     result: CosimulationResult,
     netlist: Netlist | None,
@@ -199,7 +138,6 @@ def _evidence(
     sos = None if quantized.filter is None else quantized.filter.sos
     golden = np.stack([filtered(column, sos, output) for column in unfiltered.T], axis=1)
     trace = traces[0]
-    facts = manifest(design)
     low, high = output.decode(np.array([output.lowest, output.highest]))
     evidence = Evidence(
         name=datapath.name,
@@ -210,9 +148,9 @@ def _evidence(
         lsb=float(output.lsb),
         low=float(low),
         high=float(high),
-        bound=facts["error_bound"],
-        bound_parts=facts["error_parts"],
-        proven=facts["error_bound_proven"],
+        bound=facts.error_bound,
+        bound_parts=facts.error_parts,
+        proven=True,
         max_error=float(design.spec.max_error),
         time=trace.time,
         truth=_stacked([trace.truth for trace in traces]),
@@ -225,30 +163,19 @@ def _evidence(
         samples=received.size,
         channels=len(traces),
         cycles=result.cycles,
-        latency_cycles=facts["latency_cycles"],
+        latency_cycles=facts.interface.latency_cycles,
         simulator=result.simulator,
         seed=seed,
         gates=netlist,
         tools=result.tools if netlist is None else {**result.tools, "yosys": netlist.version},
         wall_seconds=wall_seconds,
         cycles_per_second=result.cycles_per_second,
-        realization=quantized.realization if quantized.sections else "none",
-        architecture=design.architecture.name,
-        why=" ".join(f"{reason}." for reason in design.reasons.values()),
-        formats=[
-            Format(
-                node=f"{row['stage']}.{row['node']}",
-                notation=row["format"],
-                low=row["low"],
-                high=row["high"],
-                unit=row["unit"],
-            )
-            for row in facts["formats"]
-        ],
-        sections=[
-            entry | {"realization": quantized.realization} for s in quantized.sections for entry in section_entries(s)
-        ],
-        limit_cycles=facts["limit_cycles"],
+        realization=facts.realization or "none",
+        architecture=facts.architecture,
+        why=" ".join(f"{reason}." for reason in facts.reasons.values()),
+        formats=facts.formats,
+        sections=facts.sections,
+        limit_cycles=facts.limit_cycles,
         filter=_filter_facts(quantized),
         alternatives=_alternatives(quantized, codes, golden),
     )

@@ -15,6 +15,7 @@ from sosmith.gen.core import CoreDesign
 from sosmith.gen.spectrum.filter_table import filter_table
 from sosmith.gen.spectrum.proposal import Content, Proposal, Wish, propose
 from sosmith.gen.spectrum.spectra import SpectrumSettings, spectrum
+from sosmith.gen.stimuli import bench_of
 from sosmith.model.calibration.polynomial import EQUATION_5A, Polynomial
 from sosmith.model.reference.accuracy import accuracy_percent
 from sosmith.model.reference.golden import calibrated, filtered
@@ -23,7 +24,7 @@ from sosmith.model.scenarios.depot_measurements import measurements_of
 from sosmith.model.scenarios.file import ScenarioFile, emulate_file
 from sosmith.model.sensors.inductive_sensor import SystematicError
 from sosmith.model.traces.trace import Trace
-from sosmith.sim.simulation import Progress, bench_of
+from sosmith.sim.simulation import Progress
 
 Values = npt.NDArray[np.float64]
 

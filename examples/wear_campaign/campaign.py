@@ -11,9 +11,10 @@ from examples.wear_campaign.spread import spread
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.instrument.calibration_report import specification_table
 from sosmith.gen.specification.specification import load
+from sosmith.gen.stimuli import bench_of
 from sosmith.model.calibration.polynomial import EQUATION_5A, Polynomial
 from sosmith.model.scenarios.file import ScenarioFile, emulate_file, load_scenario
-from sosmith.sim.simulation import Progress, bench_of
+from sosmith.sim.simulation import Progress
 
 HERE = Path(__file__).parent
 SCENARIOS = HERE.parent / "scenarios"

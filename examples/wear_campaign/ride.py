@@ -17,6 +17,7 @@ from sosmith.gen.filter.response import group_delay, magnitude_db
 from sosmith.gen.spectrum.filter_table import filter_table
 from sosmith.gen.spectrum.proposal import Content, Proposal, Wish, propose
 from sosmith.gen.spectrum.spectra import SpectrumSettings, spectrum
+from sosmith.gen.stimuli import bench_of
 from sosmith.model.calibration.polynomial import EQUATION_5A
 from sosmith.model.reference.accuracy import accuracy_percent
 from sosmith.model.reference.golden import calibrated, filtered
@@ -28,7 +29,7 @@ from sosmith.model.vehicle.limits import limits
 from sosmith.model.vehicle.parameters import built_in
 from sosmith.model.vehicle.run import run
 from sosmith.model.vehicle.track import curved_track, tangent_track
-from sosmith.sim.simulation import Progress, bench_of
+from sosmith.sim.simulation import Progress
 
 Values = npt.NDArray[np.float64]
 

@@ -1,8 +1,8 @@
-"""Filter design in double precision: from the specification to second-order sections.
+"""Filter design: from the specification to second-order sections whose doubles are the same on every machine.
 
-Minimum order and cutoff of a Butterworth low-pass follow the paper's equations 10 to 13; poles, zeros and
-their pairing come from scipy, or from `sosmith.gen.filter.impulse_invariance` where that method is asked for. Sign
-convention of the sections: scipy's, ``a0 = 1``.
+Minimum order, cutoff, poles, zeros and gains are derived from the specification's numbers in ball arithmetic and
+rounded once; see `sosmith.gen.filter.sections` for what is rounded. Sign convention of the sections: scipy's,
+``a0 = 1``.
 """
 
 from __future__ import annotations
@@ -15,10 +15,16 @@ from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
+from flint import acb, arb, fmpq
 from scipy import signal
 
-from sosmith.gen.filter.impulse_invariance import Aliasing, analog_lowpass, impulse_invariant
+from sosmith.gen.filter.impulse_invariance import Aliasing, aliasing, impulse_invariant
+from sosmith.gen.filter.minimum_order import least_order
+from sosmith.gen.filter.prototypes import Prototype, prototype
+from sosmith.gen.filter.sections import Row, rounded, sections
+from sosmith.gen.filter.transformations import bilinear, unwarped, warped
 from sosmith.gen.specification.specification import FilterSpec
+from sosmith.model.arithmetic.correct_rounding import evaluate, nearest_double, sign
 from sosmith.model.errors import ShortfallError, SpecificationError
 
 Array = npt.NDArray[np.float64]
@@ -26,8 +32,8 @@ Array = npt.NDArray[np.float64]
 _MAX_RESPONSE = 1 << 24  # samples; poles closer to the unit circle than this resolves are refused
 _DECAY = 1e-12  # where an impulse response counts as over, of its envelope
 _COMFORTABLE = 20  # samples per period of the band edge: word lengths hardly fall with fewer
-_SNAP = 1e-9  # relative distance at which a gain counts as one: rounding of the design, not intent
-_SNAP_GIVEN = 1e-14  # the same for given sections, where only the products of their gains are rounded
+_UNITY = 1e-14  # relative distance at which the gain of given sections counts as one: their rounding, not intent
+_GRID = 2048  # frequencies up to half the sample rate at which given sections are looked at
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,7 +125,7 @@ def impulse_response(sos: Array) -> Array:
 
 def decay_length(sos: Array) -> int:
     """Count the samples after which the slowest mode has decayed to 1e-12, with a margin for repeated poles."""
-    radius = max((float(abs(pole)) for row in sos for pole in np.roots([1.0, *row[4:]])), default=0.0)
+    radius = max((_radius(float(row[4]), float(row[5])) for row in sos), default=0.0)
     samples = 64.0 if radius < 1e-3 else 64 + 1.5 * math.log(_DECAY) / math.log(min(radius, 1 - 1e-15))
     if samples > _MAX_RESPONSE:
         raise ShortfallError(
@@ -127,6 +133,12 @@ def decay_length(sos: Array) -> int:
             "close to the unit circle"
         )
     return int(samples)
+
+
+def _radius(a1: float, a2: float) -> float:
+    """Magnitude of the larger pole of a section."""
+    square = Fraction(a1) ** 2 - 4 * Fraction(a2)  # exact: nearly equal poles differ by the root of it
+    return math.sqrt(a2) if square < 0 else (abs(a1) + math.sqrt(square)) / 2
 
 
 def prewarp(frequency: float, sample_rate: float) -> float:
@@ -163,48 +175,74 @@ def minimum_order(
     cutoff : float
         Hz, at -3 dB; the pass-band edge is met exactly, the stop-band edge with what is left over.
     """
-    passband, stopband = prewarp(passband_edge, sample_rate), prewarp(stopband_edge, sample_rate)
-    ripple = 10 ** (0.1 * passband_loss) - 1
-    ratio = math.sqrt((10 ** (0.1 * stopband_loss) - 1) / ripple)
-    order = math.ceil(math.log(ratio) / math.log(stopband / passband))
-    return order, unwarp(passband / ripple ** (1 / (2 * order)), sample_rate)
+    fs = Fraction(sample_rate)
+
+    def found() -> tuple[int, float]:
+        order, (edge,) = least_order(
+            "butterworth",
+            "lowpass",
+            [warped(Fraction(passband_edge), fs)],
+            [warped(Fraction(stopband_edge), fs)],
+            (Fraction(passband_loss), Fraction(stopband_loss)),
+        )
+        return order, nearest_double(unwarped(edge, fs))
+
+    return evaluate(found)
 
 
-def design(spec: FilterSpec, sample_rate: float) -> Filter:
+def design(spec: FilterSpec, sample_rate: Fraction | float) -> Filter:
     """Design the filter of a specification.
+
+    Parameters
+    ----------
+    spec : FilterSpec
+    sample_rate : Fraction or float
+        Hz; taken exactly.
 
     Raises
     ------
     SpecificationError
         If the edges and losses need more poles than can be realised.
     """
-    fs = float(sample_rate)
-    passband_loss = None if spec.passband_loss is None else float(spec.passband_loss)
-    stopband_loss = None if spec.stopband_loss is None else float(spec.stopband_loss)
-    aliasing = None
+    fs = Fraction(sample_rate)
     if spec.sos is not None:
-        sos = np.array([[float(v) for v in row] for row in spec.sos])
-        order, cutoff = sum(2 if row[5] else 1 if row[4] else 0 for row in sos), None
-        family, kind = "sections", _kind_of(sos)
+        given = tuple(tuple(float(value) for value in row) for row in spec.sos)
+        return _filter(spec, fs, "sections", *evaluate(lambda: _normalized(given)), order=_poles(given))
+    order, cutoff = evaluate(lambda: _order_and_cutoff(spec, fs))
+    alias = None
+    if spec.method == "impulse_invariant":
+        assert spec.cutoff is not None  # the specification has checked it
+        ratio = spec.cutoff[0] / fs
+        rows = evaluate(lambda: impulse_invariant(_prototype(spec, order), ratio))
+        alias = evaluate(lambda: aliasing(_prototype(spec, order), ratio))
     else:
-        family, kind = spec.family, spec.kind
-        order, cutoff = _order_and_cutoff(spec, fs)
-        if spec.method == "impulse_invariant":
-            analog = analog_lowpass(family, order, cutoff[0], passband_loss, stopband_loss)
-            sos, aliasing = impulse_invariant(analog, fs)
-        else:
-            sos = _sections(family, kind, order, cutoff, passband_loss, stopband_loss, fs)
+        rows = evaluate(lambda: _bilinear(spec, fs))
+    doubled = 2 if spec.kind in {"bandpass", "bandstop"} else 1
+    return _filter(spec, fs, spec.family, spec.kind, rows, order=doubled * order, cutoff=cutoff, aliasing=alias)
+
+
+def _filter(
+    spec: FilterSpec,
+    fs: Fraction,
+    family: str,
+    kind: str,
+    rows: tuple[Row, ...],
+    *,
+    order: int,
+    cutoff: tuple[float, ...] | None = None,
+    aliasing: Aliasing | None = None,
+) -> Filter:
     return Filter(
-        sample_rate=fs,
+        sample_rate=float(fs),
         family=family,
         kind=kind,
-        order=order * (2 if kind in {"bandpass", "bandstop"} and spec.sos is None else 1),
+        order=order,
         cutoff=cutoff,
         passband_edge=_floats(spec.passband_edge),
         stopband_edge=_floats(spec.stopband_edge),
-        passband_loss=passband_loss,
-        stopband_loss=stopband_loss,
-        rows=tuple(tuple(float(v) for v in row) for row in _normalise(sos, kind, cutoff, fs)),
+        passband_loss=None if spec.passband_loss is None else float(spec.passband_loss),
+        stopband_loss=None if spec.stopband_loss is None else float(spec.stopband_loss),
+        rows=rows,
         aliasing=aliasing,
     )
 
@@ -213,124 +251,81 @@ def _floats(values: Sequence[Fraction] | None) -> tuple[float, ...] | None:
     return None if values is None else tuple(float(v) for v in values)
 
 
-def _scalar(edges: tuple[float, ...]) -> float | tuple[float, ...]:
-    return edges[0] if len(edges) == 1 else edges
-
-
-def _order_and_cutoff(spec: FilterSpec, fs: float) -> tuple[int, tuple[float, ...]]:
+def _order_and_edges(spec: FilterSpec, fs: Fraction) -> tuple[int, tuple[arb, ...]]:
+    """Order of the prototype, and pre-warped edges as the family defines them."""
     if spec.order is not None and spec.cutoff is not None:
-        return spec.order, tuple(float(f) for f in spec.cutoff)
-    passband, stopband = _floats(spec.passband_edge), _floats(spec.stopband_edge)
+        return spec.order, tuple(warped(edge, fs) for edge in spec.cutoff)
     # The specification has checked that these come together.
-    assert passband is not None
-    assert stopband is not None
-    losses = float(spec.passband_loss or 0), float(spec.stopband_loss or 0)
-    if spec.family == "butterworth" and spec.kind == "lowpass":
-        order, single = minimum_order(passband[0], stopband[0], *losses, fs)
-        cutoff: tuple[float, ...] = (single,)
-    else:
-        choose = {
-            "butterworth": signal.buttord,
-            "chebyshev1": signal.cheb1ord,
-            "chebyshev2": signal.cheb2ord,
-            "elliptic": signal.ellipord,
-        }[spec.family]
-        found, natural = choose(_scalar(passband), _scalar(stopband), *losses, fs=fs)
-        order, cutoff = int(found), tuple(float(f) for f in np.atleast_1d(natural))
+    assert spec.passband_edge is not None
+    assert spec.stopband_edge is not None
+    assert spec.passband_loss is not None
+    assert spec.stopband_loss is not None
+    passband, stopband = ([warped(edge, fs) for edge in edges] for edges in (spec.passband_edge, spec.stopband_edge))
+    order, edges = least_order(spec.family, spec.kind, passband, stopband, (spec.passband_loss, spec.stopband_loss))
     limit = 10 if spec.kind in {"bandpass", "bandstop"} else 20
     if order > limit:
         raise SpecificationError(
             f"filter's edges and losses must be met by an order of at most {limit}, not {order}: "
             "widen the transition band or lower stopband_loss"
         )
-    return order, cutoff
+    return order, edges
 
 
-def _sections(
-    family: str,
-    kind: str,
-    order: int,
-    cutoff: tuple[float, ...],
-    passband_loss: float | None,
-    stopband_loss: float | None,
-    fs: float,
-) -> Array:
-    edges = _scalar(cutoff)
-    if family == "butterworth":
-        zpk = signal.butter(order, edges, kind, fs=fs, output="zpk")
-    elif family == "chebyshev1":
-        zpk = signal.cheby1(order, passband_loss, edges, kind, fs=fs, output="zpk")
-    elif family == "chebyshev2":
-        zpk = signal.cheby2(order, stopband_loss, edges, kind, fs=fs, output="zpk")
-    elif family == "elliptic":
-        zpk = signal.ellip(order, passband_loss, stopband_loss, edges, kind, fs=fs, output="zpk")
-    else:
-        zpk = signal.bessel(order, edges, kind, fs=fs, output="zpk", norm="mag")
-    zeros, poles, gain = np.asarray(zpk[0]), np.asarray(zpk[1]), float(zpk[2])
-    if kind in {"lowpass", "highpass"} and len(zeros) == len(poles) and np.all(zeros == zeros[0]):
-        return _equal_zeros(float(zeros[0].real), poles, gain)
-    return np.asarray(signal.zpk2sos(zeros, poles, gain), dtype=np.float64)
+def _order_and_cutoff(spec: FilterSpec, fs: Fraction) -> tuple[int, tuple[float, ...]]:
+    """Order of the prototype, and its edges in Hz."""
+    if spec.order is not None and spec.cutoff is not None:
+        return spec.order, tuple(float(edge) for edge in spec.cutoff)
+    order, edges = _order_and_edges(spec, fs)
+    return order, tuple(nearest_double(unwarped(edge, fs)) for edge in edges)
 
 
-def _equal_zeros(zero: float, poles: npt.NDArray[np.complex128], gain: float) -> Array:
-    """Sections of a filter whose zeros all lie in one place: as many zeros as poles in each.
+def _prototype(spec: FilterSpec, order: int) -> Prototype:
+    return prototype(spec.family, order, spec.passband_loss, spec.stopband_loss)
 
-    scipy.signal.zpk2sos would give a filter of odd order a section of one pole and two zeros, and one of two
-    poles and one zero. Sections come in scipy's order: poles closest to the unit circle last.
+
+def _bilinear(spec: FilterSpec, fs: Fraction) -> tuple[Row, ...]:
+    order, edges = _order_and_edges(spec, fs)
+    digital = bilinear(_prototype(spec, order), spec.kind, edges)
+    return rounded(sections(digital), digital.passing, digital.level)
+
+
+def _poles(rows: Sequence[Row]) -> int:
+    """Count the poles of given sections, without those at the origin."""
+    return sum(2 if row[5] else 1 if row[4] else 0 for row in rows)
+
+
+def _normalized(rows: Sequence[Row]) -> tuple[str, tuple[Row, ...]]:
+    """Kind of given sections, and the sections with unity gain where the filter passes.
+
+    The kind follows from where the gain is largest. What is left of the gain goes to the first section.
     """
-    rows = [(1.0, -zero, 0.0, 1.0, -pole.real, 0.0) for pole in poles if pole.imag == 0]
-    rows.sort(key=lambda row: abs(row[4]))
-    real = [_pair(*rows[i : i + 2]) for i in range(len(rows) % 2, len(rows), 2)]
-    pairs = [
-        (1.0, -2 * zero, zero * zero, 1.0, -2 * pole.real, abs(pole) ** 2)
-        for pole in sorted((p for p in poles if p.imag > 0), key=abs)
-    ]
-    sos = np.array([*rows[: len(rows) % 2], *real, *pairs])
-    sos[0, :3] *= gain
-    return sos
-
-
-def _pair(first: tuple[float, ...], second: tuple[float, ...]) -> tuple[float, ...]:
-    """One second-order section of two first-order ones."""
-    return (*np.polymul(first[:2], second[:2]), *np.polymul(first[3:5], second[3:5]))
-
-
-def _kind_of(sos: Array) -> str:
-    """Name the kind of given sections by where their gain is largest."""
-    _, response = signal.sosfreqz(sos, worN=2048)
-    gain = np.abs(response)
-    dc, nyquist, top = gain[0], gain[-1], gain.max()
+    # cos and sin of the grid from 0 to just below half the sample rate
+    grid = [acb(arb.cos_pi_fmpq(fmpq(k, _GRID)), arb.sin_pi_fmpq(fmpq(k, _GRID))) for k in range(_GRID)]
+    gains = [nearest_double(abs(_response(rows, z))) for z in grid]
+    dc, nyquist, top = gains[0], gains[-1], max(gains)
     if dc >= top / 2:
-        return "bandstop" if nyquist >= top / 2 else "lowpass"
-    return "highpass" if nyquist >= top / 2 else "bandpass"
-
-
-def _normalise(sos: Array, kind: str, cutoff: tuple[float, ...] | None, fs: float) -> Array:
-    """Give each section unity gain where the filter passes; what is left of the gain goes to the first."""
-    if kind in {"lowpass", "bandstop"}:
-        z: complex = 1.0
-    elif kind == "highpass":
-        z = -1.0
-    elif cutoff is not None:
-        centre = math.sqrt(math.prod(math.tan(math.pi * f / fs) for f in cutoff))
-        z = complex(math.cos(2 * math.atan(centre)), math.sin(2 * math.atan(centre)))
+        kind = "bandstop" if nyquist >= top / 2 else "lowpass"
     else:
-        frequencies, response = signal.sosfreqz(sos, worN=2048)
-        z = complex(np.exp(1j * frequencies[np.argmax(np.abs(response))]))
-    result = np.array(sos)
-    total = 1.0
-    for row in result:
-        gain = _gain(row, z)
-        if gain == 0:
+        kind = "highpass" if nyquist >= top / 2 else "bandpass"
+    z = {"lowpass": acb(1), "bandstop": acb(1), "highpass": acb(-1), "bandpass": grid[gains.index(top)]}[kind]
+    made, total = [], arb(1)
+    for row in rows:
+        response = _response([row], z)
+        # with its sign where the response is real, so that a section may turn the sign without loss of its unity gain
+        gain = abs(response) if kind == "bandpass" else response.real
+        if sign(gain) == 0:
+            made.append([arb(b) for b in row[:3]])
             continue
         total *= gain
-        row[:3] /= gain
-    if abs(total - 1) > (_SNAP if cutoff is not None else _SNAP_GIVEN):
-        result[0, :3] *= total
-    return result
+        made.append([arb(b) / gain for b in row[:3]])
+    if abs(nearest_double(total - 1)) > _UNITY:
+        made[0] = [b * total for b in made[0]]
+    numerators = [tuple(nearest_double(b) for b in numerator) for numerator in made]
+    return kind, tuple((*numerator, *row[3:]) for numerator, row in zip(numerators, rows, strict=True))
 
 
-def _gain(row: Array, z: complex) -> float:
-    """Gain of a section at z: with its sign where the response is real, else its magnitude."""
-    response = complex(np.polyval(row[:3], z) / np.polyval(row[3:], z))
-    return response.real if isinstance(z, float) else abs(response)
+def _response(rows: Sequence[Row], z: acb) -> acb:
+    value = acb(1)
+    for b0, b1, b2, _, a1, a2 in rows:
+        value *= ((b0 * z + b1) * z + b2) / ((z + a1) * z + a2)
+    return value

@@ -7,8 +7,7 @@ With the analog filter in partial fractions (simple poles, more poles than zeros
 What the analog filter passes above half the sample rate folds back: `Aliasing` says how much.
 
 The zeros of H(z) are nearly those of Euler's polynomials, and at low cutoffs the sum is by many orders of magnitude
-smaller than its terms. Hence residues, numerator and zeros are computed in ball arithmetic; only the sections'
-coefficients are rounded to double precision.
+smaller than its terms: hence ball arithmetic, with as many bits as that takes.
 
 References
 ----------
@@ -17,23 +16,25 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 
-import numpy as np
-import numpy.typing as npt
 from flint import acb, acb_poly, arb, ctx
-from scipy import signal
 
-Array = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
+from sosmith.gen.filter.prototypes import Prototype
+from sosmith.gen.filter.sections import Row, Section, rounded
+from sosmith.model.arithmetic.correct_rounding import UndecidedError, ball, nearest_double
 
-_PRECISION = 1024
-"""Bits: order 20 at a millionth of the sample rate takes some 400."""
+_GRID = 512
+"""Points of each of the two grids on which responses are compared, one even and one logarithmic."""
 
-_TOLERANCE = 2.0**-200  # of the zeros, relative
+_DECADES = 2
+"""How far the logarithmic grid reaches below the slowest pole."""
 
-_GRID = 4096  # frequencies at which responses are compared
+_UNITY = 1e-9
+"""Relative distance at which the gain at zero frequency counts as one: such an alias is no reason for hardware that
+tells them apart."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,92 +53,142 @@ class Aliasing:
     dc_error: float
 
 
-@dataclass(frozen=True, kw_only=True)
-class AnalogFilter:
-    """Zeros, poles (rad/s) and gain: ``gain * prod(s - zeros) / prod(s - poles)``."""
-
-    zeros: Complex
-    poles: Complex
-    gain: float
-
-
-def analog_lowpass(
-    family: str, order: int, cutoff: float, passband_loss: float | None, stopband_loss: float | None
-) -> AnalogFilter:
-    """Analog low-pass of a family with its edge at `cutoff` Hz, not pre-warped; losses in dB where it needs them."""
-    edge = 2 * np.pi * cutoff
-    make: dict[str, Callable[[], tuple[Complex, Complex, float]]] = {
-        "butterworth": lambda: signal.butter(order, edge, analog=True, output="zpk"),
-        "chebyshev1": lambda: signal.cheby1(order, passband_loss, edge, analog=True, output="zpk"),
-        "chebyshev2": lambda: signal.cheby2(order, stopband_loss, edge, analog=True, output="zpk"),
-        "elliptic": lambda: signal.ellip(order, passband_loss, stopband_loss, edge, analog=True, output="zpk"),
-        "bessel": lambda: signal.bessel(order, edge, analog=True, output="zpk", norm="mag"),
-    }
-    zeros, poles, gain = make[family]()
-    return AnalogFilter(zeros=np.asarray(zeros), poles=np.asarray(poles), gain=float(gain))
-
-
-def impulse_invariant(analog: AnalogFilter, sample_rate: float) -> tuple[Array, Aliasing]:
-    """Sections of the filter that samples the impulse response of `analog`.
+def impulse_invariant(prototype: Prototype, ratio: Fraction) -> tuple[Row, ...]:
+    """Sections of the filter that samples the impulse response of an analog low-pass.
 
     Parameters
     ----------
-    analog : AnalogFilter
+    prototype : Prototype
         More poles than zeros; poles simple, in the left half-plane, at most one of them real.
-    sample_rate : float
-        Hz.
+    ratio : Fraction
+        Cutoff as a part of the sample rate, not pre-warped.
 
     Returns
     -------
-    sos : ndarray, shape (sections, 6)
-        Poles closest to the unit circle last, as scipy has them. Each section has unity gain at zero frequency,
-        except that the first takes what is left of the gain.
-    aliasing : Aliasing
+    tuple of tuple of float
+        (b0, b1, b2, 1, a1, a2); poles closest to the unit circle last, as scipy has them. Each section has unity gain
+        at zero frequency, except that the first takes what is left of the gain.
 
     Raises
     ------
     ValueError
         If there are not more poles than zeros.
+    UndecidedError
+        If the precision is too low.
     """
-    if len(analog.zeros) >= len(analog.poles):
-        raise ValueError(f"zeros must be fewer than the {len(analog.poles)} poles, not {len(analog.zeros)}")
-    with ctx.workprec(_PRECISION):
-        sos = _sections(analog, sample_rate)
-    return sos, _aliasing(analog, sos, sample_rate)
+    sampled = _Sampled.of(prototype, ratio)
+    level = sampled(acb(1)).real
+    made = _sections(sampled.numerator, prototype, sampled.model.scale)
+    return rounded(made, acb(1), arb(1) if abs(nearest_double(level - 1)) < _UNITY else level)
 
 
-def _sections(analog: AnalogFilter, sample_rate: float) -> Array:
-    poles = [(acb(p) / sample_rate).exp() for p in analog.poles]
-    numerator = _numerator(analog, poles, sample_rate)
-    single = [acb_poly([1, -pole.real]) for pole, p in zip(poles, analog.poles, strict=True) if p.imag == 0]
-    pairs = [pole for pole, p in zip(poles, analog.poles, strict=True) if p.imag > 0]
-    groups = _zero_groups(numerator, delayed=len(analog.poles) - len(analog.zeros) > 1)
+def aliasing(prototype: Prototype, ratio: Fraction) -> Aliasing:
+    """Say how far the filter of `impulse_invariant` is from its analog model; parameters and errors as there."""
+    sampled = _Sampled.of(prototype, ratio)
+    model = sampled.model
+    level = prototype.dc_gain
+    dc_error = nearest_double(sampled(acb(1)).real / level - 1)
+    slowest = _smallest([abs(pole) for pole in model.poles])
+    start = _smallest([slowest / arb.pi(), arb(1)]) / 10**_DECADES  # as a part of half the sample rate
+    even = [arb(k) / (_GRID - 1) for k in range(_GRID)]
+    worst, largest = arb(0), arb(0)
+    for place in (*even, *(start ** (1 - place) for place in even)):
+        angle = arb.pi() * place
+        analog, digital = abs(model(acb(0, angle))), abs(sampled(acb(angle.cos(), -angle.sin())))
+        worst, largest = worst.max(abs(analog - digital)), largest.max(analog)
+    return Aliasing(max_deviation=nearest_double(worst / largest), dc_error=dc_error)
+
+
+def _smallest(values: Sequence[arb]) -> arb:
+    first, *others = values
+    for value in others:
+        first = first.min(value)
+    return first
+
+
+@dataclass(frozen=True)
+class _Analog:
+    """``gain * prod(s**2 + w**2) / prod(s - p)``, s in radians per sample; its edge is `scale`."""
+
+    zeros: tuple[arb, ...]
+    poles: tuple[acb, ...]
+    gain: arb
+    scale: arb
+
+    @classmethod
+    def of(cls, prototype: Prototype, scale: arb) -> _Analog:
+        """Move the edge to `scale`."""
+        zeros = tuple(zero * scale for zero in prototype.zeros)
+        real = [acb(pole * scale) for pole in prototype.real_poles]
+        upper = [pole * scale for pole in prototype.pole_pairs]
+        poles = (*real, *upper, *(pole.conjugate() for pole in upper))
+        gain = prototype.dc_gain
+        for pole in poles:
+            gain = (gain * -pole).real if pole.imag.is_zero() else gain * abs(pole)
+        for zero in zeros:
+            gain /= zero**2
+        return cls(zeros, poles, gain, scale)
+
+    def __call__(self, s: acb) -> acb:
+        value = acb(self.gain)
+        for zero in self.zeros:
+            value *= s**2 + zero**2
+        for pole in self.poles:
+            value /= s - pole
+        return value
+
+
+@dataclass(frozen=True)
+class _Sampled:
+    """The digital filter in ``w = z**-1``, and its analog model."""
+
+    numerator: acb_poly
+    denominators: tuple[acb_poly, ...]
+    model: _Analog
+
+    @classmethod
+    def of(cls, prototype: Prototype, ratio: Fraction) -> _Sampled:
+        """Sample the impulse response of a prototype."""
+        if prototype.zeros_at_infinity < 1:
+            raise ValueError(f"zeros must be fewer than the {prototype.order} poles, not {2 * len(prototype.zeros)}")
+        model = _Analog.of(prototype, 2 * arb.pi() * ball(ratio))
+        denominators = tuple(acb_poly([1, -pole.exp()]) for pole in model.poles)
+        return cls(_numerator(model, denominators), denominators, model)
+
+    def __call__(self, w: acb) -> acb:
+        value: acb = self.numerator(w)
+        for denominator in self.denominators:
+            value /= denominator(w)
+        return value
+
+
+def _sections(numerator: acb_poly, prototype: Prototype, scale: arb) -> list[Section]:
+    single = [(pole * scale).exp() for pole in prototype.real_poles]
+    pairs = [(pole * scale).exp() for pole in prototype.pole_pairs]
+    groups = _zero_groups(numerator, delayed=prototype.zeros_at_infinity > 1)
     matched = []
-    for pole in sorted(pairs, key=lambda pole: -float(abs(pole))):
-        groups.sort(key=lambda zeros: min((float(abs(zero - pole)) for zero in zeros[1]), default=np.inf))
-        matched.append((groups.pop(0)[0], acb_poly([1, -2 * pole.real, abs(pole) ** 2])))
-    cascade = [*((acb_poly([1]), denominator) for denominator in single), *matched[::-1]]
-    total = numerator(1) / _product([denominator for _, denominator in cascade])(1)
-    rows: list[list[float]] = []
-    for zeros, denominator in cascade:
-        gain = denominator(1) / zeros(1) * (total if not rows else 1)
-        rows.append([*_doubles(zeros * gain), *_doubles(denominator)])
-    return np.array(rows)
+    for pole in sorted(pairs, key=lambda pole: nearest_double(1 - abs(pole) ** 2)):
+        distances = [
+            min((nearest_double(abs(zero - pole) ** 2) for zero in group.zeros), default=float("inf"))
+            for group in groups
+        ]
+        group = groups.pop(distances.index(min(distances)))
+        matched.append(_section(group, acb_poly([1, -2 * pole.real, abs(pole) ** 2])))
+    return [*(_section(_Group(acb_poly([1]), ()), acb_poly([1, -pole])) for pole in single), *matched[::-1]]
 
 
-def _numerator(analog: AnalogFilter, poles: Sequence[acb], sample_rate: float) -> acb_poly:
-    """Numerator of H in ``w = z**-1``, of one degree less than there are poles."""
+def _numerator(model: _Analog, denominators: Sequence[acb_poly]) -> acb_poly:
+    """Numerator of one degree less than there are poles."""
     total = acb_poly([])
-    for i, pole in enumerate(analog.poles):
-        residue = acb(analog.gain)
-        for zero in analog.zeros:
-            residue *= acb(pole) - acb(zero)
-        for j, other in enumerate(analog.poles):
+    for i, pole in enumerate(model.poles):
+        residue = acb(model.gain)
+        for zero in model.zeros:
+            residue *= pole**2 + zero**2
+        for j, other in enumerate(model.poles):
             if j != i:
-                residue /= acb(pole) - acb(other)
-        others = [acb_poly([1, -digital]) for j, digital in enumerate(poles) if j != i]
-        total += _product(others) * (residue / sample_rate)
-    return acb_poly([total[k].real for k in range(len(poles))])
+                residue /= pole - other
+        total += _product([denominator for j, denominator in enumerate(denominators) if j != i]) * residue
+    return acb_poly([total[k].real for k in range(len(denominators))])
 
 
 def _product(polynomials: Sequence[acb_poly]) -> acb_poly:
@@ -147,8 +198,17 @@ def _product(polynomials: Sequence[acb_poly]) -> acb_poly:
     return result
 
 
-_Group = tuple[acb_poly, list[acb]]
-"""A polynomial in w, and its zeros in the plane of z."""
+@dataclass(frozen=True)
+class _Group:
+    """A factor of the numerator in w, and its zeros in the plane of z."""
+
+    factor: acb_poly
+    zeros: tuple[acb, ...]
+
+
+def _section(group: _Group, denominator: acb_poly) -> Section:
+    first, second = (tuple(polynomial[k].real for k in range(3)) for polynomial in (group.factor, denominator))
+    return Section((first[0], first[1], first[2]), (second[0], second[1], second[2]))
 
 
 def _zero_groups(numerator: acb_poly, *, delayed: bool) -> list[_Group]:
@@ -160,36 +220,29 @@ def _zero_groups(numerator: acb_poly, *, delayed: bool) -> list[_Group]:
     """
     constant = 1 if delayed else 0
     rest = acb_poly([numerator[k] for k in range(constant, numerator.degree() + 1)])
-    zeros = [1 / root for root in rest.roots(tol=_TOLERANCE, maxprec=_PRECISION)]
-    real = sorted((zero for zero in zeros if zero.imag.contains(0)), key=lambda zero: float(abs(zero)))
-    groups: list[_Group] = [(acb_poly([1, -2 * zero.real, abs(zero) ** 2]), [zero]) for zero in zeros if zero.imag > 0]
+    zeros = sorted((1 / root for root in _roots(rest)), key=_size_and_side)
+    real = [zero for zero in zeros if zero.imag.is_zero()]
+    groups = [_Group(acb_poly([1, -2 * zero.real, abs(zero) ** 2]), (zero,)) for zero in zeros if zero.imag > 0]
     while len(real) > 1:
         first, last = real.pop(0), real.pop()
-        groups.append((acb_poly([1, -first.real]) * acb_poly([1, -last.real]), [first, last]))
+        groups.append(_Group(acb_poly([1, -first.real]) * acb_poly([1, -last.real]), (first, last)))
     left_over = _product([acb_poly([1, -zero.real]) for zero in real])
     if delayed or real:
-        groups.append((left_over * acb_poly([0, 1]) if delayed else left_over, real))
+        groups.append(_Group(left_over * acb_poly([0, 1]) if delayed else left_over, tuple(real)))
     return groups
 
 
-def _doubles(polynomial: acb_poly) -> list[float]:
-    coefficients: list[arb] = [polynomial[k].real for k in range(3)]
-    return [float(coefficient.mid()) for coefficient in coefficients]
+def _size_and_side(zero: acb) -> tuple[float, float]:
+    return nearest_double(abs(zero) ** 2), nearest_double(zero.imag)
 
 
-def _aliasing(analog: AnalogFilter, sos: Array, sample_rate: float) -> Aliasing:
-    slow = float(np.abs(analog.poles).min()) / 2 / np.pi
-    linear = np.linspace(0, sample_rate / 2, _GRID)
-    frequencies = np.union1d(linear, np.geomspace(min(slow, sample_rate / 2) / 100, sample_rate / 2, _GRID))
-    model = np.abs(_analog_response(analog, frequencies))
-    made = np.abs(signal.sosfreqz(sos, worN=frequencies, fs=sample_rate)[1])
-    return Aliasing(
-        max_deviation=float(np.abs(made - model).max() / model.max()),
-        dc_error=float(made[0] / model[0] - 1),
-    )
+def _roots(polynomial: acb_poly) -> list[acb]:
+    """Roots of a polynomial with real coefficients, real ones as such.
 
-
-def _analog_response(analog: AnalogFilter, frequencies: Array) -> Complex:
-    return np.asarray(
-        signal.freqs_zpk(analog.zeros, analog.poles, analog.gain, worN=2 * np.pi * frequencies)[1], dtype=np.complex128
-    )
+    The balls are disjoint, so one that meets the real axis holds its own conjugate: it encloses a real root.
+    """
+    try:
+        roots: list[acb] = polynomial.roots(tol=2.0 ** -min(ctx.prec // 2, 1000), maxprec=2 * ctx.prec)
+    except ValueError as error:
+        raise UndecidedError from error
+    return [acb(root.real) if root.imag.contains(0) else root for root in roots]

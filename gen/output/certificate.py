@@ -28,6 +28,7 @@ from sosmith.gen.verifier.certificate_file import (
     GainEntry,
     IdealEntry,
     NodeEntry,
+    Operation,
     PortEntry,
     SectionEntry,
     StageEntry,
@@ -85,7 +86,7 @@ def _stage(stage: Stage) -> StageEntry:
 
 def _node(node: Node) -> NodeEntry:
     return NodeEntry(
-        op=node.op,
+        op=Operation(node.op.value),
         operands=node.operands,
         frac=node.frac,
         low=node.low,

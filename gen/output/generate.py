@@ -7,6 +7,7 @@ from pathlib import Path
 
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.output.certificate import certificate
+from sosmith.gen.output.core_facts import CoreFacts, core_facts
 from sosmith.gen.output.manifest import manifest
 from sosmith.gen.output.verilog import to_rtlil, to_verilog
 from sosmith.gen.reload.register_map import c_registers, systemrdl
@@ -16,11 +17,28 @@ from sosmith.model.dataflow.c_model import c_header, c_source
 from sosmith.model.text_files import to_json, write_files
 
 
-def generate(design: CoreDesign, directory: Path, progress: Callable[[str], None] = lambda step: None) -> list[Path]:
-    """Write SystemVerilog, RTLIL, manifest, certificate and C model into `directory`; return the files' paths.
+def generate(
+    design: CoreDesign,
+    directory: Path,
+    progress: Callable[[str], None] = lambda step: None,
+    *,
+    facts: CoreFacts | None = None,
+) -> list[Path]:
+    """Write SystemVerilog, RTLIL, manifest, certificate and C model; return the paths of the files.
 
-    Of a core that can be reloaded, the registers too: as a C header and in SystemRDL. Two runs on the same
+    For a core whose constants can be loaded, also its registers, as a C header and in SystemRDL. Two runs on the same
     specification write the same bytes.
+
+    Parameters
+    ----------
+    design : CoreDesign
+        The core.
+    directory : Path
+        Folder for the files, made if missing.
+    progress : callable
+        Told the name of each step.
+    facts : CoreFacts or None
+        The facts about the core, if they have been collected already.
 
     Raises
     ------
@@ -41,7 +59,7 @@ def generate(design: CoreDesign, directory: Path, progress: Callable[[str], None
         {
             f"{name}.sv": verilog_text,
             f"{name}.il": rtlil_text,
-            f"{name}.json": to_json(manifest(design)),
+            f"{name}.json": to_json(manifest(facts or core_facts(design))),
             f"{name}.certificate.json": certificate_text(proven),
             f"{name}.c": c_source(datapath),
             f"{name}.h": c_header(datapath),

@@ -189,11 +189,11 @@ def room_of(hardware: CoreDesign) -> int:
     made = hardware.architecture.program
     if made is None or not hardware.quantized.sections:
         return 0
-    places = {place.name: place.frac for place in made.places if place.is_state}
+    fracs = {location.name: location.frac for location in made.locations if location.is_state}
     lifted = with_constants(hardware.quantized, None, None, room=1)
     return min(
         (
-            places[f"{old.name}.{old.graph.nodes[i].name}"] - old.graph.nodes[i].frac
+            fracs[f"{old.name}.{old.graph.nodes[i].name}"] - old.graph.nodes[i].frac
             for old, new in zip(hardware.quantized.sections, lifted.sections, strict=True)
             for i in old.graph.delays
             if new.graph.nodes[i].frac != old.graph.nodes[i].frac
@@ -246,7 +246,7 @@ def check_swap(hardware: CoreDesign, active: OtherSet | None, other: OtherSet) -
 def _use(hardware: CoreDesign, during: Datapath, made: Program | None) -> Fraction:
     """Largest share of what its word holds that a state may take, of those that remember more than the input."""
     shares = []
-    places = {} if made is None else {place.name: place for place in made.places}
+    locations = {} if made is None else {location.name: location for location in made.locations}
     for stage, roomy in zip(during.stages, with_room(hardware.datapath).stages, strict=True):
         for index in stage.graph.delays:
             node = stage.graph.nodes[index]
@@ -254,9 +254,9 @@ def _use(hardware: CoreDesign, during: Datapath, made: Program | None) -> Fracti
                 continue
             (low, high), shift = _word(roomy.graph.nodes[index]), 0
             if made is not None:
-                place = places[f"{stage.name}.{node.name}"]
-                high = (1 << made.digit_bits * place.digits) - 1
-                low, shift = -high - 1, place.frac - node.frac
+                location = locations[f"{stage.name}.{node.name}"]
+                high = (1 << made.digit_bits * location.digits) - 1
+                low, shift = -high - 1, location.frac - node.frac
             shares += [Fraction(node.low << shift, low or -1), Fraction(node.high << shift, high)]
     return max(shares, default=Fraction(0))
 

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from sosmith.gen.filter.response import FilterFacts
 from sosmith.gen.fpga.synthesis import Netlist
+from sosmith.gen.output.core_facts import LimitCycleFacts, NodeFormat, SectionFacts
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
@@ -32,29 +33,6 @@ class Alternative:
     name: str
     max_abs: float
     rms: float
-
-
-@dataclass(frozen=True, kw_only=True)
-class Format:
-    """Number format of one node of the datapath.
-
-    Attributes
-    ----------
-    node : str
-        Name of the node.
-    notation : str
-        The format in words, such as ``s4.20``.
-    low, high : float
-        Smallest and largest value the format holds, in `unit`.
-    unit : str
-        Unit of the node, ``""`` for a plain number.
-    """
-
-    node: str
-    notation: str
-    low: float
-    high: float
-    unit: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -112,14 +90,12 @@ class Evidence:
         Duration and speed of the simulation.
     realization, architecture, why : str
         Structure of the sections, of the hardware, and the reason for the choice (may be empty).
-    formats : sequence of Format
+    formats : sequence of NodeFormat
         Number formats along the datapath.
-    sections : sequence of Mapping
-        As in the manifest: ``name``, ``realization``, ``coefficients`` with ``name``, ``integer``, ``frac``
-        (fractional bits) and ``value`` each.
-    limit_cycles : sequence of Mapping
-        As in the manifest, one for each section: ``section``, ``largest`` and ``dead_band`` in `unit`, ``none``
-        (whether it is proven to come to rest), ``lyapunov`` (weights as texts of rationals, or None).
+    sections : sequence of SectionFacts
+        The filter's sections.
+    limit_cycles : sequence of LimitCycleFacts
+        One for each section, in `unit`.
     shown_channel : int or None
         Channel that the sample arrays are of, where they are of one of several.
     filter : FilterFacts or None
@@ -160,9 +136,9 @@ class Evidence:
     truth: Array | None = None
     reading: Mask | None = None
     unfiltered: Array | None = None
-    formats: Sequence[Format] = ()
-    sections: Sequence[Mapping[str, Any]] = ()
-    limit_cycles: Sequence[Mapping[str, Any]] = ()
+    formats: Sequence[NodeFormat] = ()
+    sections: Sequence[SectionFacts] = ()
+    limit_cycles: Sequence[LimitCycleFacts] = ()
     shown_channel: int | None = None
     filter: FilterFacts | None = None
     gates: Netlist | None = None

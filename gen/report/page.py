@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import Any
 
 from sosmith.gen.filter.response import FilterFacts
@@ -263,14 +262,14 @@ def _limit_cycles_table(evidence: Evidence) -> Table:
     """Tell what each section's rounding can sustain by itself, at the section's own output."""
     rows = []
     for found in evidence.limit_cycles:
-        weights = [f"{float(Fraction(weight)):.4g}" for weight in found["lyapunov"] or ()]
+        weights = [f"{float(weight):.4g}" for weight in found.lyapunov or ()]
         rows.append(
             (
-                found["section"],
-                "none, proven" if found["none"] else amount(found["largest"], evidence.unit),
-                "" if found["none"] else _lsb(found["largest"] / evidence.lsb),
-                amount(found["dead_band"], evidence.unit) if found["dead_band"] else "none",
-                _lsb(found["dead_band"] / evidence.lsb) if found["dead_band"] else "",
+                found.section,
+                "none, proven" if found.none else amount(found.largest, evidence.unit),
+                "" if found.none else _lsb(found.largest / evidence.lsb),
+                amount(found.dead_band, evidence.unit) if found.dead_band else "none",
+                _lsb(found.dead_band / evidence.lsb) if found.dead_band else "",
                 ", ".join(weights) or "none exist",
             )
         )
@@ -332,17 +331,14 @@ def _filter_figures(facts: FilterFacts) -> dict[str, Figure]:
 def _coefficient_table(evidence: Evidence) -> Table:
     rows = []
     for section in evidence.sections:
-        name = section["name"]
-        if section["realization"] != evidence.realization:
-            name = f"{name}, {section['realization']}"
-        for index, coefficient in enumerate(section["coefficients"]):
+        for index, coefficient in enumerate(section.coefficients):
             rows.append(
                 (
-                    name if index == 0 else "",
-                    coefficient["name"],
-                    format(coefficient["integer"], ",").replace("-", "−"),
-                    str(coefficient["frac"]),
-                    format(float(coefficient["value"]), ".10g").replace("-", "−"),
+                    section.name if index == 0 else "",
+                    coefficient.name,
+                    format(coefficient.integer, ",").replace("-", "−"),
+                    str(coefficient.frac),
+                    format(coefficient.value, ".10g").replace("-", "−"),
                 )
             )
     head = ("section", "", "integer", "fractional bits", "value")
@@ -353,10 +349,9 @@ def _format_table(evidence: Evidence) -> Table:
     """List the formats by stage."""
     rows, previous = [], ""
     for row in evidence.formats:
-        stage, _, signal = row.node.partition(".")
-        title = "" if stage == previous else stage
-        rows.append((title, signal, row.notation, amount(row.low, row.unit), amount(row.high, row.unit)))
-        previous = stage
+        title = "" if row.stage == previous else row.stage
+        rows.append((title, row.node, row.format, amount(row.low, row.unit), amount(row.high, row.unit)))
+        previous = row.stage
     return Table(head=("stage", "signal", "format", "from", "to"), rows=rows, numbers=(3, 4), code=(2,))
 
 

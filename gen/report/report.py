@@ -9,6 +9,7 @@ from typing import Any
 
 from sosmith import __version__
 from sosmith.gen.filter.response import MASK_TOLERANCE_DB, FilterFacts, ResponseMeasures, measure_response
+from sosmith.gen.output.manifest import limit_cycle_entry
 from sosmith.gen.quantity import plain_number, quantity
 from sosmith.gen.report.evidence import Evidence
 from sosmith.gen.report.page import render_page
@@ -152,7 +153,7 @@ def summarise(evidence: Evidence) -> dict[str, Any]:
         "alternatives": [
             {"name": other.name, "max_abs": other.max_abs, "rms": other.rms} for other in evidence.alternatives
         ],
-        "limit_cycles": [dict(found) for found in evidence.limit_cycles],
+        "limit_cycles": [limit_cycle_entry(found) for found in evidence.limit_cycles],
         "realization": evidence.realization,
         "architecture": evidence.architecture,
         "cycles_per_second": evidence.cycles_per_second,

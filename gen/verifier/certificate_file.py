@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from enum import Enum
 from fractions import Fraction
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -17,7 +18,6 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainSerializer, ValidationError
 from pydantic_core import ErrorDetails
 
-from sosmith.model.dataflow.graph import Op
 from sosmith.model.errors import SpecificationError
 
 FORMAT = "sosmith certificate 1"
@@ -73,10 +73,31 @@ class PortEntry(_Part):
         return (1 << (self.bits - int(self.signed))) - 1
 
 
-class NodeEntry(_Part):
-    """A node of a dataflow graph, with the meaning that `sosmith.model.dataflow.graph.Node` gives its fields."""
+class Operation(Enum):
+    """What a node does with its operands, by its name in the file."""
 
-    op: Op
+    INPUT = "input"
+    CONSTANT = "constant"
+    ADD = "add"
+    SUBTRACT = "subtract"
+    SHIFT = "shift"  # by 2**parameter: the same code, another binary point
+    SCALE = "scale"  # by the constant parameter * 2**-parameter_frac
+    MULTIPLY = "multiply"
+    FLOOR = "floor"  # down to `frac` fraction bits
+    FRACTION = "fraction"  # what FLOOR to `parameter` fraction bits drops
+    TRUNCATE = "truncate"  # towards zero, to `frac` fraction bits
+    CLAMP = "clamp"  # to low..high
+    BOUND = "bound"  # the value of the operand, which is claimed to stay in low..high
+    DELAY = "delay"  # the operand of the sample before; 0 at reset
+
+
+class NodeEntry(_Part):
+    """A node of a dataflow graph: its value is its code times ``2**-frac``, and the code stays in low..high.
+
+    `operands` are indices of nodes in the same stage; that of a DELAY may come later.
+    """
+
+    op: Operation
     operands: tuple[Index, ...] = ()
     frac: Exponent
     low: Integer

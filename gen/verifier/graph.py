@@ -13,8 +13,7 @@ from functools import cached_property
 
 from flint import fmpq, fmpq_mat, fmpq_poly
 
-from sosmith.gen.verifier.certificate_file import NodeEntry, StageEntry
-from sosmith.model.dataflow.graph import Op
+from sosmith.gen.verifier.certificate_file import NodeEntry, Operation, StageEntry
 from sosmith.model.errors import ShortfallError
 
 Interval = tuple[int, int]
@@ -39,19 +38,19 @@ def label(stage: StageEntry, index: int) -> str:
 
 def inputs_of(stage: StageEntry) -> list[int]:
     """Return the indices of the stage's inputs, in order."""
-    return [index for index, node in enumerate(stage.nodes) if node.op is Op.INPUT]
+    return [index for index, node in enumerate(stage.nodes) if node.op is Operation.INPUT]
 
 
 _OPERANDS = {
-    Op.INPUT: 0,
-    Op.CONSTANT: 0,
-    Op.ADD: 2,
-    Op.SUBTRACT: 2,
-    Op.MULTIPLY: 2,
+    Operation.INPUT: 0,
+    Operation.CONSTANT: 0,
+    Operation.ADD: 2,
+    Operation.SUBTRACT: 2,
+    Operation.MULTIPLY: 2,
 }
 """Numbers of operands; all others take one."""
 
-_PARAMETERS = {Op.CONSTANT: 1, Op.SHIFT: 1, Op.FRACTION: 1, Op.SCALE: 2}
+_PARAMETERS = {Operation.CONSTANT: 1, Operation.SHIFT: 1, Operation.FRACTION: 1, Operation.SCALE: 2}
 """How many of `parameter`, `parameter_frac` an operation uses; the others use none."""
 
 
@@ -70,7 +69,7 @@ def check_graph(stage: StageEntry) -> None:
         name = label(stage, index)
         wanted = _OPERANDS.get(node.op, 1)
         require(len(node.operands) == wanted, f"{name} must have {wanted} operands, not {len(node.operands)}")
-        last = len(stage.nodes) if node.op is Op.DELAY else index
+        last = len(stage.nodes) if node.op is Operation.DELAY else index
         require(all(i < last for i in node.operands), f"{name} must have operands before it, not {node.operands}")
         unused = (node.parameter, node.parameter_frac)[_PARAMETERS.get(node.op, 0) :]
         require(not any(unused), f"{name} must have no parameter that it does not use, not {unused}")
@@ -82,7 +81,7 @@ def check_graph(stage: StageEntry) -> None:
                 (node.low, node.high) == (low, high),
                 f"{name} must have the range {low}..{high}, not {node.low}..{node.high}",
             )
-        elif node.op is Op.CONSTANT:
+        elif node.op is Operation.CONSTANT:
             require(
                 node.low == node.high == node.parameter,
                 f"{name} must have the range of its value {node.parameter}, not {node.low}..{node.high}",
@@ -96,16 +95,16 @@ def check_graph(stage: StageEntry) -> None:
 def _expected(stage: StageEntry, node: NodeEntry, name: str) -> tuple[int, int, int]:
     """Fraction bits and range that a node must have."""
     operands = [stage.nodes[i] for i in node.operands]
-    if node.op is Op.DELAY:
+    if node.op is Operation.DELAY:
         return operands[0].frac, *_delayed(stage, node)
-    if node.op is Op.BOUND:
+    if node.op is Operation.BOUND:
         (of,) = operands
         require(
             of.low <= node.low and node.high <= of.high,
             f"{name} must have a range within {of.low}..{of.high}, not {node.low}..{node.high}",
         )
         return of.frac, node.low, node.high
-    if node.op in {Op.FLOOR, Op.FRACTION, Op.TRUNCATE}:
+    if node.op in {Operation.FLOOR, Operation.FRACTION, Operation.TRUNCATE}:
         dropped = operands[0].frac - _kept(node)
         require(dropped > 0, f"{name} must drop at least one bit, not {dropped}")
         return _dropped_bits(node, operands[0], dropped)
@@ -120,8 +119,8 @@ def _delayed(stage: StageEntry, node: NodeEntry) -> Interval:
     """
     source = stage.nodes[node.operands[0]]
     low, high = min(source.low, 0), max(source.high, 0)
-    if source.op not in {Op.INPUT, Op.DELAY}:
-        inner = stage.nodes[source.operands[0]] if source.op is Op.BOUND else source
+    if source.op not in {Operation.INPUT, Operation.DELAY}:
+        inner = stage.nodes[source.operands[0]] if source.op is Operation.BOUND else source
         low = min(low, node.low) if source.low == inner.low else low
         high = max(high, node.high) if source.high == inner.high else high
     return low, high
@@ -154,31 +153,31 @@ def _multiply(_node: NodeEntry, operands: Sequence[NodeEntry]) -> tuple[int, int
     return a.frac + b.frac, min(ends), max(ends)
 
 
-_RULES: Mapping[Op, Callable[[NodeEntry, Sequence[NodeEntry]], tuple[int, int, int]]] = {
-    Op.ADD: _add,
-    Op.SUBTRACT: _subtract,
-    Op.SHIFT: lambda node, operands: (operands[0].frac - node.parameter, operands[0].low, operands[0].high),
-    Op.SCALE: _scale,
-    Op.MULTIPLY: _multiply,
-    Op.CLAMP: lambda node, operands: (operands[0].frac, node.low, node.high),
+_RULES: Mapping[Operation, Callable[[NodeEntry, Sequence[NodeEntry]], tuple[int, int, int]]] = {
+    Operation.ADD: _add,
+    Operation.SUBTRACT: _subtract,
+    Operation.SHIFT: lambda node, operands: (operands[0].frac - node.parameter, operands[0].low, operands[0].high),
+    Operation.SCALE: _scale,
+    Operation.MULTIPLY: _multiply,
+    Operation.CLAMP: lambda node, operands: (operands[0].frac, node.low, node.high),
 }
 
 
 def _kept(node: NodeEntry) -> int:
-    return node.parameter if node.op is Op.FRACTION else node.frac
+    return node.parameter if node.op is Operation.FRACTION else node.frac
 
 
 def _dropped_bits(node: NodeEntry, of: NodeEntry, count: int) -> tuple[int, int, int]:
     step = 1 << count
-    if node.op is Op.FRACTION:
+    if node.op is Operation.FRACTION:
         return of.frac, 0, step - 1
     ends = [Fraction(of.low, step), Fraction(of.high, step)]
-    if node.op is Op.FLOOR:
+    if node.op is Operation.FLOOR:
         return node.frac, ends[0].__floor__(), ends[1].__floor__()
     return node.frac, int(ends[0]), int(ends[1])
 
 
-Source = tuple[Op, int, int]
+Source = tuple[Operation, int, int]
 """What drives a stage: (INPUT, node, 0), (CONSTANT, node, 0), or what a quantizer drops: (FLOOR or TRUNCATE, the
 undelayed node that is quantized, fraction bits kept). All quantizers of one node to the same bits are one source."""
 
@@ -209,17 +208,17 @@ class Transfer:
                 if isinstance(key, tuple):
                     (op, index, kept), _ = key
                     unit = Fraction(2) ** -nodes[index].frac
-                    if op in {Op.INPUT, Op.CONSTANT}:
+                    if op in {Operation.INPUT, Operation.CONSTANT}:
                         found[key[0]] = nodes[index].low * unit, nodes[index].high * unit
                     else:
                         most = (2 ** (nodes[index].frac - kept) - 1) * unit
-                        found[key[0]] = (Fraction(0) if op is Op.FLOOR else -most), most
-        return dict(sorted(found.items(), key=lambda item: item[0][0] is not Op.INPUT))
+                        found[key[0]] = (Fraction(0) if op is Operation.FLOOR else -most), most
+        return dict(sorted(found.items(), key=lambda item: item[0][0] is not Operation.INPUT))
 
     @property
     def inputs(self) -> list[Source]:
         """The stage's inputs as sources, in order."""
-        return [(Op.INPUT, index, 0) for index in inputs_of(self.stage)]
+        return [(Operation.INPUT, index, 0) for index in inputs_of(self.stage)]
 
     @cached_property
     def denominator(self) -> fmpq_poly:
@@ -247,7 +246,7 @@ class Transfer:
 
     @cached_property
     def _states(self) -> list[_State]:
-        return [index for index, node in enumerate(self.stage.nodes) if node.op is Op.DELAY]
+        return [index for index, node in enumerate(self.stage.nodes) if node.op is Operation.DELAY]
 
     @cached_property
     def _matrix(self) -> list[list[fmpq]]:
@@ -260,31 +259,35 @@ class Transfer:
     def _forms(self) -> list[_Form]:
         forms: list[_Form] = []
         for index, node in enumerate(self.stage.nodes):
-            operands = [] if node.op is Op.DELAY else [forms[i] for i in node.operands]
+            operands = [] if node.op is Operation.DELAY else [forms[i] for i in node.operands]
             forms.append(self._form(index, node, operands))
         return forms
 
     def _form(self, index: int, node: NodeEntry, operands: Sequence[_Form]) -> _Form:
-        if node.op is Op.DELAY:
+        if node.op is Operation.DELAY:
             return {index: fmpq(1)}
-        if node.op in {Op.INPUT, Op.CONSTANT}:
+        if node.op in {Operation.INPUT, Operation.CONSTANT}:
             return {((node.op, index, 0), 0): fmpq(1)}
-        if node.op in {Op.FLOOR, Op.FRACTION, Op.TRUNCATE}:
+        if node.op in {Operation.FLOOR, Operation.FRACTION, Operation.TRUNCATE}:
             root, delay = self._undelayed(node.operands[0])
-            kind = Op.TRUNCATE if node.op is Op.TRUNCATE else Op.FLOOR
+            kind = Operation.TRUNCATE if node.op is Operation.TRUNCATE else Operation.FLOOR
             error: _Form = {((kind, root, _kept(node)), delay): fmpq(1)}
-            return error if node.op is Op.FRACTION else _sum(operands[0], error, fmpq(-1))
-        if node.op in {Op.ADD, Op.SUBTRACT}:
-            return _sum(operands[0], operands[1], fmpq(1 if node.op is Op.ADD else -1))
-        if node.op is Op.BOUND:
+            return error if node.op is Operation.FRACTION else _sum(operands[0], error, fmpq(-1))
+        if node.op in {Operation.ADD, Operation.SUBTRACT}:
+            return _sum(operands[0], operands[1], fmpq(1 if node.op is Operation.ADD else -1))
+        if node.op is Operation.BOUND:
             return operands[0]
-        require(node.op in {Op.SHIFT, Op.SCALE}, f"{label(self.stage, index)} must be linear")
-        factor = fmpq(2) ** node.parameter if node.op is Op.SHIFT else node.parameter * fmpq(2) ** -node.parameter_frac
+        require(node.op in {Operation.SHIFT, Operation.SCALE}, f"{label(self.stage, index)} must be linear")
+        factor = (
+            fmpq(2) ** node.parameter
+            if node.op is Operation.SHIFT
+            else node.parameter * fmpq(2) ** -node.parameter_frac
+        )
         return {key: value * factor for key, value in operands[0].items()}
 
     def _undelayed(self, index: int) -> tuple[int, int]:
         delay = 0
-        while self.stage.nodes[index].op is Op.DELAY:
+        while self.stage.nodes[index].op is Operation.DELAY:
             require(delay < len(self.stage.nodes), f"{label(self.stage, index)} must not be its own source")
             index, delay = self.stage.nodes[index].operands[0], delay + 1
         return index, delay

@@ -13,9 +13,8 @@ from fractions import Fraction
 from itertools import product
 from operator import add
 
-from sosmith.gen.verifier.certificate_file import Certificate, NodeEntry, PortEntry, StageEntry
+from sosmith.gen.verifier.certificate_file import Certificate, NodeEntry, Operation, PortEntry, StageEntry
 from sosmith.gen.verifier.graph import inputs_of, label, require
-from sosmith.model.dataflow.graph import Op
 
 _Polynomial = dict[tuple[int, ...], Fraction]
 """Coefficients by the powers of the variables."""
@@ -62,28 +61,28 @@ def _through(stage: StageEntry, arriving: Sequence[_Value], variables: int) -> l
     supply = iter(arriving)
     values: list[_Value] = []
     for index, node in enumerate(stage.nodes):
-        operands = [values[i] for i in node.operands if node.op is not Op.DELAY]
-        values.append(next(supply) if node.op is Op.INPUT else _value(stage, index, operands, variables))
+        operands = [values[i] for i in node.operands if node.op is not Operation.DELAY]
+        values.append(next(supply) if node.op is Operation.INPUT else _value(stage, index, operands, variables))
     return values
 
 
 def _value(stage: StageEntry, index: int, operands: Sequence[_Value], variables: int) -> _Value:
     node = stage.nodes[index]
-    if node.op is Op.CONSTANT:
+    if node.op is Operation.CONSTANT:
         return _constant(node.parameter * Fraction(2) ** -node.frac, variables)
-    if node.op in {Op.ADD, Op.SUBTRACT}:
-        return operands[0].plus(operands[1], 1 if node.op is Op.ADD else -1)
-    if node.op is Op.MULTIPLY and stage.role == "polynomial":
+    if node.op in {Operation.ADD, Operation.SUBTRACT}:
+        return operands[0].plus(operands[1], 1 if node.op is Operation.ADD else -1)
+    if node.op is Operation.MULTIPLY and stage.role == "polynomial":
         return operands[0].times(operands[1])
-    if node.op is Op.SHIFT:
+    if node.op is Operation.SHIFT:
         return operands[0].times(_constant(Fraction(2) ** node.parameter, variables))
-    if node.op is Op.SCALE:
+    if node.op is Operation.SCALE:
         return operands[0].times(_constant(node.parameter * Fraction(2) ** -node.parameter_frac, variables))
-    if node.op is Op.FLOOR:  # as the middle of what it can drop, give or take half of it
+    if node.op is Operation.FLOOR:  # as the middle of what it can drop, give or take half of it
         half = Fraction(2) ** -node.frac / 2
         return _Value(operands[0].plus(_constant(-half, variables)).exact, operands[0].radius + half)
     require(
-        node.op is Op.CLAMP and stage.role == "output" and stage.outputs == (index,),
+        node.op is Operation.CLAMP and stage.role == "output" and stage.outputs == (index,),
         f"{label(stage, index)} must not be in a {stage.role} stage",
     )
     return operands[0]
@@ -148,7 +147,7 @@ def output_error(certificate: Certificate, stage: StageEntry) -> Fraction:
     """
     port, node = certificate.output, stage.nodes[stage.outputs[0]]
     require(
-        node.op is not Op.CLAMP or (node.low, node.high) == (port.lowest, port.highest),
+        node.op is not Operation.CLAMP or (node.low, node.high) == (port.lowest, port.highest),
         f"the output must be limited to {port.lowest}..{port.highest}, not {node.low}..{node.high}",
     )
     x = _variable(0, 1)

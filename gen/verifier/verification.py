@@ -22,11 +22,10 @@ from math import lcm
 
 from flint import fmpq, fmpq_poly
 
-from sosmith.gen.verifier.certificate_file import Certificate, StageEntry, on_grid
+from sosmith.gen.verifier.certificate_file import Certificate, Operation, StageEntry, on_grid
 from sosmith.gen.verifier.graph import RejectedError, Transfer, check_graph, inputs_of, label, require
 from sosmith.gen.verifier.l1_response import BITS, Inverse, Response, UndecidedError, inverse, is_stable, response
 from sosmith.gen.verifier.polynomial import output_error, polynomial_error
-from sosmith.model.dataflow.graph import Op
 
 Progress = Callable[[str, int, int], None]
 """Told the name of what is being done, how much of it is, and how much there is."""
@@ -227,7 +226,7 @@ class _Cascade:
             progress("sections", index, len(self._models))
             arrived = drives
             for node, entry_of in enumerate(model.stage.nodes):
-                if entry_of.op is Op.BOUND:
+                if entry_of.op is Operation.BOUND:
                     self._check_bound(index, node, arrived)
                     self.ranges += 1
             drives = self._at(index, model.stage.outputs, arrived)

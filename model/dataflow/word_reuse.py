@@ -1,4 +1,19 @@
-"""Lets values of a program that are not needed at the same time have the same words of memory."""
+"""Lets values of a program share words of memory where they are not needed at the same time.
+
+Each value is written and read within a live range of instructions, and lies in a block of consecutive words. Blocks
+whose live ranges do not overlap may share words. As in a linear-scan register allocator, blocks are given addresses in
+the order of their first use, each the lowest one that is free::
+
+    instruction   0   1   2   3   4   5   6
+    a, 2 words    |-------|                    words 0..1
+    b, 1 word         |-----------|            word  2
+    c, 2 words                |-----------|    words 0..1, free again since `a` is dead
+
+>>> a, b, c = WordBlock(0, 2), WordBlock(2, 1), WordBlock(3, 2)
+>>> new, end = packed([(a, LiveRange(0, 2)), (b, LiveRange(1, 4)), (c, LiveRange(3, 6))], start=0)
+>>> new[a], new[b], new[c], end
+(0, 2, 0, 3)
+"""
 
 from __future__ import annotations
 
@@ -6,48 +21,49 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 
-class Extent(NamedTuple):
-    """Words of a value: the lowest address and how many."""
+class WordBlock(NamedTuple):
+    """Consecutive words that hold a value: the lowest address and how many."""
 
     address: int
     words: int
 
 
-class Life(NamedTuple):
-    """First and last place in a program at which a value is written or read."""
+class LiveRange(NamedTuple):
+    """First and last instruction that writes or reads a value."""
 
     first: int
     last: int
 
 
-def packed(values: Sequence[tuple[Extent, Life]], start: int) -> tuple[dict[Extent, int], int]:
-    """Give each value the lowest address from `start` on at which no other is alive at the same time.
+def packed(values: Sequence[tuple[WordBlock, LiveRange]], start: int) -> tuple[dict[WordBlock, int], int]:
+    """Give each block the lowest address from `start` on that no other live block uses.
 
     Parameters
     ----------
-    values : sequence of (Extent, Life)
-        Where values lie, each for itself, and when they are alive.
+    values : sequence of (WordBlock, LiveRange)
+        Blocks, no two of which overlap, and their live ranges.
     start : int
-        First address to be given.
+        Lowest address to be given.
 
     Returns
     -------
-    dict of Extent to int, int
-        New address of each, and the one behind the highest word used.
+    dict of WordBlock to int, int
+        New address of each block, and the first address behind all of them.
     """
-    given: dict[Extent, int] = {}
-    alive: list[tuple[int, int, int]] = []  # address, the one behind, last use
+    given: dict[WordBlock, int] = {}
+    live: list[tuple[int, int, int]] = []  # first address, address behind the last, last use
     end = start
-    for extent, life in sorted(values, key=lambda value: value[1].first):
-        alive = [entry for entry in alive if entry[2] >= life.first]
-        address = _gap(((low, high) for low, high, _ in alive), extent.words, start)
-        given[extent] = address
-        alive.append((address, address + extent.words, life.last))
-        end = max(end, address + extent.words)
+    for block, span in sorted(values, key=lambda value: value[1].first):
+        live = [entry for entry in live if entry[2] >= span.first]
+        address = _gap(((low, high) for low, high, _ in live), block.words, start)
+        given[block] = address
+        live.append((address, address + block.words, span.last))
+        end = max(end, address + block.words)
     return given, end
 
 
 def _gap(taken: Iterable[tuple[int, int]], words: int, start: int) -> int:
+    """Return the lowest address from `start` on with so many free `words`."""
     address = start
     for low, high in sorted(taken):
         if address + words <= low:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sosmith.model.arithmetic.matrices import product
 from sosmith.model.vehicle.linear_motion import Array, LinearSystem, Suspension
 from sosmith.model.vehicle.parameters import Layout, Parameters
 from sosmith.model.vehicle.track import Track
@@ -123,7 +124,7 @@ class LateralDynamics:
         contact_damping = self.system.damping - self.suspension.damping[:count, :count]
         contact_stiffness = self.system.stiffness - self.suspension.stiffness[:count, :count]
         lateral = [k for k, name in enumerate(COORDINATES) if name.endswith("lateral")]
-        force = pose @ contact_stiffness.T + rate[:, lateral] @ contact_damping[:, lateral].T
+        force = product(pose, contact_stiffness.T) + product(rate[:, lateral], contact_damping[:, lateral].T)
         positions = wheelset_positions(given.layout)
         for k in WHEELSETS:
             s = centre + positions[k]

@@ -9,7 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy import linalg
+from flint import arb, arb_mat
+
+from sosmith.model.arithmetic.correct_rounding import evaluate, nearest_double
+from sosmith.model.arithmetic.matrices import power, product
 
 Array = npt.NDArray[np.float64]
 
@@ -59,9 +62,13 @@ class LinearSystem:
 
     def state_matrix(self) -> Array:
         """Matrix A of x' = A x + (0, mass^-1 force) for the state x = (q, q'), shape (2 n, 2 n)."""
+        return evaluate(lambda: _doubles(self._state_matrix()))
+
+    def _state_matrix(self) -> arb_mat:
+        mass, damping, stiffness = (_balls(matrix) for matrix in (self.mass, self.damping, self.stiffness))
         n = len(self.names)
-        inverse = np.linalg.inv(self.mass)
-        return np.block([[np.zeros((n, n)), np.eye(n)], [-inverse @ self.stiffness, -inverse @ self.damping]])
+        none, one = _balls(np.zeros((n, n))), _balls(np.eye(n))
+        return _blocks([[none, one], [-mass.solve(stiffness), -mass.solve(damping)]])
 
     def modes(self) -> tuple[Mode, ...]:
         """All modes by rising frequency and growth; of each conjugate pair one, so n to 2 n of them."""
@@ -104,18 +111,43 @@ class LinearSystem:
         displacement, velocity : ndarray, shape (m, n)
         """
         n = len(self.names)
-        inputs = np.vstack([np.zeros((n, n)), np.linalg.inv(self.mass)])
-        # x' = A x + B u with u' = constant over a step: Van Loan's block exponential holds all three factors
-        block = np.zeros((4 * n, 4 * n))
-        block[: 2 * n, : 2 * n] = self.state_matrix() * step
-        block[: 2 * n, 2 * n : 3 * n] = inputs * step
-        block[2 * n : 3 * n, 3 * n :] = np.eye(n)
-        exponential = linalg.expm(block)
-        move, hold, ramp = (exponential[: 2 * n, part] for part in _thirds(n))
-        push = force[:-1] @ hold.T + np.diff(force, axis=0) @ ramp.T
+        move, hold, ramp = evaluate(lambda: self._transition(step))
+        push = product(force[:-1], hold.T) + product(np.diff(force, axis=0), ramp.T)
         first = np.zeros(2 * n) if start is None else np.concatenate(start)
         states = _accumulate(move, push, first)
         return states[:, :n], states[:, n:]
+
+    def _transition(self, step: float) -> tuple[Array, Array, Array]:
+        """Factors of the state, of the force and of the force's change in the state one step later."""
+        n = len(self.names)
+        none, one = _balls(np.zeros((n, n))), _balls(np.eye(n))
+        inputs = _blocks([[none], [_balls(self.mass).inv()]])
+        # x' = A x + B u with u' = constant over a step: Van Loan's block exponential holds all three factors
+        small = arb(step)
+        block = _blocks(
+            [
+                [self._state_matrix() * small, inputs * small, _balls(np.zeros((2 * n, n)))],
+                [_balls(np.zeros((n, 2 * n))), none, one],
+                [_balls(np.zeros((n, 2 * n))), none, none],
+            ]
+        )
+        exponential = _doubles(block.exp())
+        move, hold, ramp = (exponential[: 2 * n, part] for part in _thirds(n))
+        return move, hold, ramp
+
+
+def _balls(matrix: Array) -> arb_mat:
+    return arb_mat(len(matrix), matrix.shape[1], [arb(value) for value in matrix.ravel().tolist()])
+
+
+def _blocks(blocks: Sequence[Sequence[arb_mat]]) -> arb_mat:
+    """Make one matrix of blocks."""
+    rows = [[part.tolist() for part in line] for line in blocks]
+    return arb_mat([sum((part[k] for part in line), []) for line in rows for k in range(len(line[0]))])
+
+
+def _doubles(matrix: arb_mat) -> Array:
+    return np.array([[nearest_double(value) for value in row] for row in matrix.tolist()], dtype=np.float64)
 
 
 def _accumulate(move: Array, push: Array, first: Array) -> Array:
@@ -129,14 +161,14 @@ def _accumulate(move: Array, push: Array, first: Array) -> Array:
     own = np.zeros((blocks, size, width))
     own.reshape(-1, width)[:count] = push
     for k in range(1, size):
-        own[:, k] += own[:, k - 1] @ move.T
-    over = np.linalg.matrix_power(move, size)
+        own[:, k] += product(own[:, k - 1], move.T)
+    over = power(move, size)
     starts = np.zeros((blocks, width))
     starts[0] = first
     for k in range(1, blocks):
-        starts[k] = over @ starts[k - 1] + own[k - 1, -1]
+        starts[k] = product(over, starts[k - 1, :, np.newaxis])[:, 0] + own[k - 1, -1]
     for k in range(size):
-        starts = starts @ move.T
+        starts = product(starts, move.T)
         own[:, k] += starts
     return np.vstack([first, own.reshape(-1, width)[:count]])
 

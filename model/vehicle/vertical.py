@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sosmith.model.arithmetic.matrices import product
 from sosmith.model.vehicle.lateral import FRAMES, WHEELSETS, axle_positions, frame_of, frame_positions
 from sosmith.model.vehicle.lateral import wheelset_positions as positions_of
 from sosmith.model.vehicle.linear_motion import Array, LinearSystem, Suspension
@@ -63,7 +64,7 @@ class VerticalDynamics:
         """Return the forces of the rails on the coordinates, shape (n, 6)."""
         count = len(COORDINATES)
         stiffness, damping = self.suspension.stiffness[:count, count:], self.suspension.damping[:count, count:]
-        return np.asarray(-height @ stiffness.T - rate @ damping.T)
+        return -product(height, stiffness.T) - product(rate, damping.T)
 
 
 def vertical_dynamics(parameters: Parameters) -> VerticalDynamics:

@@ -5,7 +5,7 @@ from fractions import Fraction
 
 from amaranth.hdl import Const, Module, Mux, Signal, Value
 
-from sosmith.hdl.ranked_logic import shape_of
+from sosmith.hdl.pipelined_logic import shape_of
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.graph import Graph, GraphBuilder, Node, Op
 from sosmith.model.port import Port

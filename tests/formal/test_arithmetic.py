@@ -7,7 +7,7 @@ import pytest
 from amaranth.hdl import Assert, Assume, Const, Module, Signal, Value
 from tests.formal.prover import INDUCTION, Proof, broken, prove
 
-from sosmith.hdl import ranked_logic, stage
+from sosmith.hdl import pipelined_logic, stage
 from sosmith.model.dataflow.graph import GraphBuilder
 from sosmith.model.sections.horner import HornerStep
 
@@ -38,7 +38,7 @@ class Quantizers(Proof):
         g = GraphBuilder()
         v = g.input("v", drop, low, high)
         outputs = [g.floor(v, 0), g.fraction(v, 0), g.truncate(v, 0), g.round(v, 0), g.clamp(v, *limits)]
-        super().__init__(module.PipelineStage(HornerStep("quantizers", g.build(outputs))))
+        super().__init__(module.PipelinedStage(HornerStep("quantizers", g.build(outputs))))
         self.range, self.drop, self.limits = (low, high), drop, limits
 
     def state(self, m: Module) -> None:
@@ -86,8 +86,8 @@ def test_quantizers_are_what_they_are_called(
 
 def on_broken_logic(right: str, wrong: str) -> ModuleType:
     """Return the module of the stage on logic that has `wrong` in place of `right`."""
-    module = broken(stage, "class PipelineStage", "class PipelineStage")  # a copy
-    vars(module)["RankedLogic"] = vars(broken(ranked_logic, right, wrong))["RankedLogic"]
+    module = broken(stage, "class PipelinedStage", "class PipelinedStage")  # a copy
+    vars(module)["PipelinedLogic"] = vars(broken(pipelined_logic, right, wrong))["PipelinedLogic"]
     return module
 
 

@@ -11,8 +11,8 @@ from tests.formal.small import port, resonator
 from tests.gen.proven_stages import Format, Ranges, proven_cascade
 
 from sosmith.gen.realizations.registry import WIDE
-from sosmith.hdl.ranked_logic import unique_names
-from sosmith.hdl.stage import PipelineStage, _ranks
+from sosmith.hdl.pipelined_logic import unique_names
+from sosmith.hdl.stage import PipelinedStage, pipeline_stages
 from sosmith.model.dataflow.datapath import Stage
 from sosmith.model.dataflow.graph import Op
 from sosmith.model.sections.direct_form import DirectForm1, Product
@@ -28,7 +28,7 @@ class StatedRanges(Proof):
     """
 
     def __init__(self, stage: Stage) -> None:
-        super().__init__(PipelineStage(stage))
+        super().__init__(PipelinedStage(stage))
         self.graph = stage.graph
 
     def state(self, m: Module) -> None:
@@ -36,7 +36,7 @@ class StatedRanges(Proof):
         for k, index in enumerate(self.graph.inputs):
             node, code = self.graph.nodes[index], getattr(self.design, f"i{k}")
             m.d.comb += Assume((code >= node.low) & (code <= node.high))
-        names, ranks = unique_names(self.graph), _ranks(self.graph)
+        names, ranks = unique_names(self.graph), pipeline_stages(self.graph)
         for index, node in enumerate(self.graph.nodes):
             if node.op in {Op.INPUT, Op.CONSTANT, Op.SHIFT}:
                 continue

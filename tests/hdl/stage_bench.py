@@ -5,13 +5,13 @@ from typing import Any
 
 from amaranth.sim import Simulator
 
-from sosmith.hdl.stage import PipelineStage
+from sosmith.hdl.stage import PipelinedStage
 from sosmith.model.dataflow.datapath import Stage
 
 
 def run(stage: Stage, samples: list[list[int]], seed: int) -> list[list[int]]:
     """Return the outputs of the hardware with random bubbles and stalls."""
-    dut: Any = PipelineStage(stage)
+    dut: Any = PipelinedStage(stage)
     pace = random.Random(seed)
     results: list[list[int]] = []
 

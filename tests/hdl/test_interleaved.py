@@ -1,4 +1,4 @@
-"""The schedule of a loop that several channels take turns in, and that it is the hardware's."""
+"""The schedule of a recursion that several channels take turns in, and the latency that follows."""
 
 from itertools import pairwise
 
@@ -24,24 +24,24 @@ def test_every_value_is_there_before_it_is_used(realization: str, channels: int)
         assert plan.distance <= channels
         assert plan.reading == (1 if channels <= 16 else 2)
         for index, node in enumerate(graph.nodes):
-            assert 0 <= plan.ranks[index] < plan.count
+            assert 0 <= plan.pipeline_stages[index] < plan.depth
             if node.op is Op.DELAY:
-                told = plan.ranks[index] - plan.reading  # the rank at which the memory is told the channel
-                assert told >= 0
-                assert plan.writes[index] >= told + plan.reading - 1  # block RAM: never written while it is read
-                assert plan.ranks[node.operands[0]] + plan.reading - 1 <= plan.writes[index] < plan.count
+                addressed = plan.pipeline_stages[index] - plan.reading  # where the memory is addressed
+                assert addressed >= 0
+                assert plan.writes[index] >= addressed + plan.reading - 1  # block RAM: never written while it is read
+                assert plan.pipeline_stages[node.operands[0]] + plan.reading - 1 <= plan.writes[index] < plan.depth
                 continue
-            assert all(plan.ranks[i] <= plan.ranks[index] for i in node.operands)
-        assert all(plan.ranks[i] < plan.count for i in graph.outputs)
+            assert all(plan.pipeline_stages[i] <= plan.pipeline_stages[index] for i in node.operands)
+        assert all(plan.pipeline_stages[i] < plan.depth for i in graph.outputs)
 
 
-def test_more_channels_leave_less_to_a_rank() -> None:
+def test_more_channels_make_a_deeper_pipeline() -> None:
     section = graphs("df1_ef2")[-2]
-    ranks = [schedule(section, channels).count for channels in (2, 3, 8)]
-    assert all(few <= more for few, more in pairwise(ranks))
-    assert ranks[0] < ranks[-1]
+    depths = [schedule(section, channels).depth for channels in (2, 3, 8)]
+    assert all(few <= more for few, more in pairwise(depths))
+    assert depths[0] < depths[-1]
 
 
-def test_the_latency_counts_all_ranks_and_both_buffers() -> None:
+def test_the_latency_counts_all_pipeline_stages_and_both_buffers() -> None:
     datapath = example_design("flange_wear_bench.toml", realization="df1_ef2").datapath
-    assert latency_cycles(datapath, 8) == sum(schedule(stage.graph, 8).count for stage in datapath.stages) + 2
+    assert latency_cycles(datapath, 8) == sum(schedule(stage.graph, 8).depth for stage in datapath.stages) + 2

@@ -1,20 +1,22 @@
 """A small hand-written core for the bench: y = x + 3 kept to 12 bits, and the same core broken in many ways."""
 
 from collections.abc import Callable
+from fractions import Fraction
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-MANIFEST: dict[str, Any] = {
-    "name": "stand_in",
-    "latency_cycles": 2,
-    "reset_cycles": 0,
-    "streams": {
-        "s_axis": {"width": 16, "fields": [{"name": "x", "offset": 0, "width": 11, "signed": True}]},
-        "m_axis": {"width": 16, "fields": [{"name": "y", "offset": 0, "width": 12, "signed": True}]},
-    },
-}
+from sosmith.gen.output.core_facts import InterfaceFacts, StreamFacts
+from sosmith.hdl.axi_stream import fields
+from sosmith.model.port import Port
+
+INTERFACE = InterfaceFacts(
+    name="stand_in",
+    inputs=StreamFacts(fields=fields([Port(name="x", bits=11, signed=True, lsb=Fraction(1), zero=Fraction(0))])),
+    outputs=StreamFacts(fields=fields([Port(name="y", bits=12, signed=True, lsb=Fraction(1), zero=Fraction(0))])),
+    reset_cycles=0,
+    latency_cycles=2,
+)
 
 SOUND = """
 module stand_in(input aclk, input aresetn,

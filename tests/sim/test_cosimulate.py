@@ -4,15 +4,31 @@ import re
 import shutil
 import threading
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from tests.sim.stand_in import BROKEN, MANIFEST, SOUND, stimulus, write
+from tests.sim.stand_in import BROKEN, INTERFACE, SOUND, stimulus, write
 
 from sosmith.model.errors import ShortfallError, SpecificationError, ToolError
 from sosmith.sim import simulators
-from sosmith.sim.cosimulate import cosimulate
+from sosmith.sim.bench import Progress
+from sosmith.sim.cocotb_bench import CocotbBench
+from sosmith.sim.cosimulate import CosimulationResult, cosimulate
 from sosmith.sim.simulators import find_simulator
+
+
+def run(
+    source: Path,
+    codes: np.ndarray,
+    *,
+    seed: int = 1,
+    progress: Progress = lambda done, total: None,
+    **options: Any,
+) -> CosimulationResult:
+    """Run codes through the stand-in under cocotb."""
+    bench = CocotbBench(source=source, interface=INTERFACE, seed=seed, **options)
+    return cosimulate(bench, INTERFACE, codes, seed=seed, progress=progress)
 
 
 @pytest.mark.parametrize("simulator", ["verilator", "icarus"])
@@ -20,9 +36,8 @@ def test_a_sound_core_passes(simulator: str, tmp_path: Path) -> None:
     folder = tmp_path / "a folder with spaces"
     folder.mkdir()
     seen: list[tuple[int, int]] = []
-    result = cosimulate(
+    result = run(
         write(folder),
-        MANIFEST,
         stimulus(),
         build_dir=folder / "simulation",
         simulator=simulator,
@@ -37,9 +52,7 @@ def test_a_sound_core_passes(simulator: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("idle_and_stall", [(0.0, 0.0), (0.9, 0.0), (0.0, 0.9), (0.6, 0.6)])
 def test_any_pace(idle_and_stall: tuple[float, float], tmp_path: Path) -> None:
     idle, stall = idle_and_stall
-    result = cosimulate(
-        write(tmp_path), MANIFEST, stimulus(), build_dir=tmp_path, simulator="icarus", idle=idle, stall=stall
-    )
+    result = run(write(tmp_path), stimulus(), build_dir=tmp_path, simulator="icarus", idle=idle, stall=stall)
     assert (result.codes == stimulus() + 3).all()
     if idle == stall == 0:
         assert result.cycles <= 303
@@ -50,52 +63,49 @@ def test_a_broken_core_is_found(what: str, tmp_path: Path) -> None:
     break_it, message = BROKEN[what]
     source = write(tmp_path, break_it(SOUND))
     with pytest.raises(ShortfallError, match=re.escape(message)):
-        cosimulate(source, MANIFEST, stimulus(), build_dir=tmp_path, simulator="icarus", idle=0.5, stall=0.5)
+        run(source, stimulus(), build_dir=tmp_path, simulator="icarus", idle=0.5, stall=0.5)
 
 
 def test_a_wrong_bit_comes_through_as_it_is(tmp_path: Path) -> None:
     """Values are not the bench's business: whoever has the integer model compares."""
     source = write(tmp_path, SOUND.replace("+ 16'sd3", "+ 16'sd2"))
-    result = cosimulate(source, MANIFEST, stimulus(), build_dir=tmp_path, simulator="icarus")
+    result = run(source, stimulus(), build_dir=tmp_path, simulator="icarus")
     assert (result.codes == stimulus() + 2).all()
 
 
 def test_the_same_seed_gives_the_same_run(tmp_path: Path) -> None:
     source = write(tmp_path)
-    cycles = [
-        cosimulate(source, MANIFEST, stimulus(), build_dir=tmp_path, simulator="icarus", seed=seed).cycles
-        for seed in (5, 5, 6)
-    ]
+    cycles = [run(source, stimulus(), build_dir=tmp_path, simulator="icarus", seed=seed).cycles for seed in (5, 5, 6)]
     assert cycles[0] == cycles[1] != cycles[2]
 
 
 def test_an_unchanged_core_is_not_built_again(tmp_path: Path) -> None:
     source = write(tmp_path)
     for _ in range(2):
-        cosimulate(source, MANIFEST, stimulus(20), build_dir=tmp_path, simulator="icarus")
+        run(source, stimulus(20), build_dir=tmp_path, simulator="icarus")
     built = tmp_path / "icarus" / "build" / "built.txt"
     first = built.stat().st_mtime_ns
-    cosimulate(source, MANIFEST, stimulus(20), build_dir=tmp_path, simulator="icarus")
+    run(source, stimulus(20), build_dir=tmp_path, simulator="icarus")
     assert built.stat().st_mtime_ns == first
     source.write_text(SOUND.replace("+ 16'sd3", "+ 16'sd4"))
-    result = cosimulate(source, MANIFEST, stimulus(20), build_dir=tmp_path, simulator="icarus")
+    result = run(source, stimulus(20), build_dir=tmp_path, simulator="icarus")
     assert (result.codes == stimulus(20) + 4).all()
 
 
 def test_a_waveform_on_request(tmp_path: Path) -> None:
-    cosimulate(write(tmp_path), MANIFEST, stimulus(20), build_dir=tmp_path, simulator="verilator", waves=True)
+    run(write(tmp_path), stimulus(20), build_dir=tmp_path, simulator="verilator", waves=True)
     assert list((tmp_path / "verilator").rglob("*.vcd"))
 
 
 def test_two_runs_side_by_side(tmp_path: Path) -> None:
     results: dict[str, np.ndarray] = {}
 
-    def run(name: str) -> None:
+    def run_one(name: str) -> None:
         (tmp_path / name).mkdir()
-        found = cosimulate(write(tmp_path / name), MANIFEST, stimulus(), build_dir=tmp_path / name, simulator="icarus")
+        found = run(write(tmp_path / name), stimulus(), build_dir=tmp_path / name, simulator="icarus")
         results[name] = found.codes
 
-    threads = [threading.Thread(target=run, args=(name,)) for name in ("one", "two")]
+    threads = [threading.Thread(target=run_one, args=(name,)) for name in ("one", "two")]
     for thread in threads:
         thread.start()
     for thread in threads:
@@ -105,7 +115,7 @@ def test_two_runs_side_by_side(tmp_path: Path) -> None:
 
 def test_text_that_is_no_verilog_is_a_tool_failure_with_the_log(tmp_path: Path) -> None:
     with pytest.raises(ToolError, match=r"^icarus .* failed; the end of .*log\.txt:\n(.|\n)*syntax error"):
-        cosimulate(write(tmp_path, "module nonsense"), MANIFEST, stimulus(9), build_dir=tmp_path, simulator="icarus")
+        run(write(tmp_path, "module nonsense"), stimulus(9), build_dir=tmp_path, simulator="icarus")
 
 
 @pytest.mark.parametrize(

@@ -18,11 +18,12 @@ from sosmith.gen.output.generate import generate
 from sosmith.gen.realizations.registry import REALIZATIONS
 from sosmith.gen.report.evidence import Evidence
 from sosmith.gen.report.report import summarise
+from sosmith.gen.stimuli import bench_of, traces_for
 from sosmith.model.errors import ShortfallError
 from sosmith.model.scenarios.catalogue import SCENARIOS
 from sosmith.model.traces.trace import Trace
 from sosmith.sim import simulation
-from sosmith.sim.simulation import bench_of, simulate, traces_for
+from sosmith.sim.simulation import simulate
 
 LOCOMOTIVE = "flange_wear_locomotive.toml"
 SAMPLES_ASKED = 100_000

@@ -7,7 +7,8 @@ import pytest
 from tests.gen.test_architecture import design_in
 
 from sosmith.gen.core import CoreDesign, design_core
-from sosmith.sim.simulation import simulate, traces_for
+from sosmith.gen.stimuli import traces_for
+from sosmith.sim.simulation import simulate
 
 FOLDABLE = ("df1", "df1_ef1", "df1_ef2", "df2t", "delta", "state_space")
 FAST = {

@@ -11,15 +11,17 @@ import pytest
 from tests.gen.designs import EXAMPLES
 
 from sosmith.gen.core import CoreDesign, design_core
+from sosmith.gen.output.core_facts import core_facts
 from sosmith.gen.output.generate import generate
 from sosmith.gen.output.manifest import manifest
 from sosmith.gen.specification.specification import load
 from sosmith.gen.specification.wear_limits import WearSpec
+from sosmith.gen.stimuli import traces_for
 from sosmith.model.dataflow.status import Flag
 from sosmith.model.errors import ShortfallError
 from sosmith.model.port import Port
 from sosmith.sim.lint import icarus_check, lint
-from sosmith.sim.simulation import simulate, traces_for
+from sosmith.sim.simulation import simulate
 
 
 def measurements() -> str:
@@ -151,7 +153,7 @@ def test_wear_leaves_nothing_for_a_linter_or_a_compiler(
     flags = ["-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror", "-c"]
     subprocess.run(["cc", *flags, f"{name}.c"], cwd=tmp_path, check=True)
     (first, *_) = made.spec.wear.clearances() if made.spec.wear is not None else ()
-    entries = manifest(made)["wear"]
+    entries = manifest(core_facts(made))["wear"]
     assert len(entries) == len(made.datapath.wear) == len(initial)
     assert (entries[0]["warning"], entries[0]["critical"]) == first == (3.5, 5.5)
     for entry, codes in zip(entries, made.datapath.wear, strict=True):

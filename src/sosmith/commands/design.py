@@ -17,6 +17,7 @@ from sosmith.commands.options import (
     default_folder,
 )
 from sosmith.gen.core import design_core
+from sosmith.gen.output.core_facts import core_facts
 from sosmith.gen.output.generate import generate as generate_files
 from sosmith.gen.output.manifest import manifest
 from sosmith.gen.specification.specification import example, load
@@ -53,7 +54,7 @@ def design(
             load(spec), core=core, realization=realization, widths_of=widths_of, board=target, progress=step
         )
     if as_json:
-        print_json(manifest(made))
+        print_json(manifest(core_facts(made)))
     else:
         print_design(made)
 

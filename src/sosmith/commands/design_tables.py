@@ -10,8 +10,7 @@ from rich.markup import escape
 
 from sosmith.gen.architecture import Architecture
 from sosmith.gen.core import CoreDesign
-from sosmith.gen.output.manifest import section_entries
-from sosmith.gen.proof.limit_cycles import limit_cycles, recursions
+from sosmith.gen.output.core_facts import LimitCycleFacts, core_facts
 from sosmith.gen.specification.wear_limits import WearSpec
 from sosmith.gen.word_lengths.cost import cost_of
 from sosmith.model.dataflow.program import Program
@@ -55,13 +54,14 @@ def print_design(made: CoreDesign, *, brief: bool = False) -> None:
     if brief:
         return
     sections = new_table("Sections", ["section", "coefficients", "input", "states", "output"])
-    for entry in (entry for section in quantized.sections for entry in section_entries(section)):
-        coefficients = "\n".join(f"{c['name']} = {c['integer']} * 2^-{c['frac']}" for c in entry["coefficients"])
-        states = "\n".join(f"{name} {form}" for name, form in entry["states"].items())
-        sections.add_row(entry["name"], coefficients, entry["input"], states, entry["output"])
-    if quantized.sections:
+    facts = core_facts(made)
+    for section in facts.sections:
+        coefficients = "\n".join(f"{c.name} = {c.integer} * 2^-{c.frac}" for c in section.coefficients)
+        states = "\n".join(f"{name} {form}" for name, form in section.states.items())
+        sections.add_row(section.name, coefficients, section.input, states, section.output)
+    if facts.sections:
         console.print(sections)
-        _print_limit_cycles(console, made)
+        _print_limit_cycles(console, facts.limit_cycles, lsb)
     _print_schedule(console, made.architecture.program)
 
 
@@ -103,22 +103,21 @@ def _print_schedule(console: Console, program: Program | None) -> None:
         f"Schedule: {len(program.instructions)} instructions for each sample of each channel",
         ["from", "clocks", "value", "words"],
     )
-    places = {place.name: f"{place.address}..{place.address + place.digits - 1}" for place in program.places}
+    words = {at.name: f"{at.address}..{at.address + at.digits - 1}" for at in program.locations}
     for name, start, count in program.schedule:
-        table.add_row(str(start), str(count), escape(name), places.get(name, ""))
+        table.add_row(str(start), str(count), escape(name), words.get(name, ""))
     console.print(table)
 
 
-def _print_limit_cycles(console: Console, made: CoreDesign) -> None:
+def _print_limit_cycles(console: Console, cycles: Sequence[LimitCycleFacts], lsb: float) -> None:
     table = new_table(
         "Limit cycles: what a section's own rounding can sustain, in output LSB",
         ["section", "without input", "dead band", "Lyapunov weights"],
     )
-    for name, graph in (pair for section in made.quantized.sections for pair in recursions(section).items()):
-        found = limit_cycles(graph)
-        largest = "none, proven" if found.none else f"up to {float(found.largest):.4g}"
+    for found in cycles:
+        largest = "none, proven" if found.none else f"up to {found.largest / lsb:.4g}"
         weights = ", ".join(f"{float(weight):.4g}" for weight in found.lyapunov or ())
-        table.add_row(name, largest, f"{float(found.dead_band):.4g}", weights or "none exist")
+        table.add_row(found.section, largest, f"{found.dead_band / lsb:.4g}", weights or "none exist")
     console.print(table)
 
 

@@ -26,13 +26,14 @@ from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.fpga.boards import BOARDS
 from sosmith.gen.report.report import write_report
 from sosmith.gen.specification.specification import example, load
+from sosmith.gen.stimuli import bench_of, default_scenario, is_scenario_file, notes_on, traces_for
 from sosmith.model.errors import SpecificationError
 from sosmith.model.scenarios.catalogue import SCENARIOS
 from sosmith.model.scenarios.depot_measurements import measurements_csv, measurements_of
 from sosmith.model.scenarios.file import load_scenario
 from sosmith.model.text_files import write_files
 from sosmith.model.traces.trace_file import traces_csv, write_traces
-from sosmith.sim.simulation import bench_of, default_scenario, is_scenario_file, notes_on, simulate, traces_for
+from sosmith.sim.simulation import simulate
 from sosmith.sim.simulators import check_name
 from sosmith.terminal import (
     JSON_OPTION,

@@ -20,6 +20,7 @@ from tests.gen.word_lengths.test_sweep import REFUSED
 from sosmith.gen.core import design_core
 from sosmith.gen.filter.design import Filter
 from sosmith.gen.output.certificate import certificate
+from sosmith.gen.output.core_facts import core_facts
 from sosmith.gen.output.manifest import manifest
 from sosmith.gen.proof.limit_cycles import limit_cycles, recursions, search_cycles
 from sosmith.gen.proof.linear_model import LinearModel, linear_models
@@ -386,7 +387,7 @@ def test_a_range_too_narrow_is_rejected() -> None:
 
 def test_the_manifest_tells_every_recursion() -> None:
     design = design_core(load(EXAMPLES / "flange_wear_bench.toml"), realization="lattice_wdf")
-    told = manifest(design)
+    told = manifest(core_facts(design))
     assert [entry["name"] for entry in told["sections"]] == ["section0 upper_y", "section0 lower_y", "section1 lower_y"]
     assert [entry["section"] for entry in told["limit_cycles"]] == [entry["name"] for entry in told["sections"]]
     assert all(entry["none"] for entry in told["limit_cycles"])

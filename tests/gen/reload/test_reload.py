@@ -22,7 +22,7 @@ from sosmith.gen.specification.specification import load
 from sosmith.gen.word_lengths.quantize import Quantized
 from sosmith.hdl.folded import encoded
 from sosmith.model.calibration.polynomial import Polynomial
-from sosmith.model.dataflow.program import Do, Program
+from sosmith.model.dataflow.program import Opcode, Program
 from sosmith.model.errors import ShortfallError, SpecificationError
 from sosmith.model.reload.constants import constants, unpacked
 from sosmith.model.reload.registers import CRC, DATA, VERSION
@@ -299,7 +299,7 @@ def test_a_calibration_brings_its_range_along(tmp_path: Path) -> None:
     made = set_for(hardware, wanted)
     assert made.quantized.datapath.calibrated == ((13107, 52429), (0, 51200))
     assert made.program is not None
-    assert sum(do is Do.JUDGE for do, _, _ in made.program.instructions) == 3
+    assert sum(opcode is Opcode.JUDGE for opcode, _, _ in made.program.instructions) == 3
     assert check_swap(hardware, own_set(hardware), made).samples > 0
 
 

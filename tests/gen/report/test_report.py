@@ -8,6 +8,7 @@ import math
 import re
 from collections.abc import Callable
 from dataclasses import replace
+from fractions import Fraction
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -22,8 +23,9 @@ from sosmith.gen.filter import response
 from sosmith.gen.filter.response import FilterFacts
 from sosmith.gen.fpga.boards import find_board
 from sosmith.gen.fpga.synthesis import Netlist
+from sosmith.gen.output.core_facts import CoefficientFacts, LimitCycleFacts, NodeFormat, SectionFacts
 from sosmith.gen.report import plots
-from sosmith.gen.report.evidence import Alternative, Evidence, Format
+from sosmith.gen.report.evidence import Alternative, Evidence
 from sosmith.gen.report.page import render_page
 from sosmith.gen.report.report import summarise, write_report
 
@@ -102,17 +104,22 @@ def evidence(**changes: Any) -> Evidence:
         "cycles_per_second": 6005.0,
         "realization": "df1_ef2",
         "architecture": "parallel",
-        "formats": (Format(node="section 0", notation="s18.14", low=-22.5, high=22.5, unit="mm"),),
+        "formats": (NodeFormat(stage="section0", node="v", format="Q7.14", low=-22.5, high=22.5, unit="mm"),),
         "sections": (
-            {
-                "name": "section 0",
-                "realization": "df1_ef2",
-                "coefficients": [{"name": "a1", "integer": -66026473, "frac": 26, "value": -0.98387}],
-            },
+            SectionFacts(
+                name="section 0",
+                coefficients=(CoefficientFacts(name="a1", integer=-66026473, frac=26, value=-0.98387),),
+            ),
         ),
         "limit_cycles": (
-            {"section": "section 0", "largest": 0.00003, "dead_band": 0.0, "none": False, "lyapunov": None},
-            {"section": "section 1", "largest": 0.00003, "dead_band": 0.000061, "none": True, "lyapunov": ["1", "1/3"]},
+            LimitCycleFacts(section="section 0", largest=0.00003, dead_band=0.0, none=False, lyapunov=None),
+            LimitCycleFacts(
+                section="section 1",
+                largest=0.00003,
+                dead_band=0.000061,
+                none=True,
+                lyapunov=(Fraction(1), Fraction(1, 3)),
+            ),
         ),
         "filter": facts(),
         "alternatives": (Alternative(name="df1", max_abs=0.4, rms=0.1),),
@@ -556,13 +563,11 @@ def test_texts_from_outside_are_escaped() -> None:
     run = evidence(
         name=text(), core=text(), description=text(), scenario=text(), unit=text(), simulator=text(),
         realization=text(), architecture=text(), why=text(), tools={text(): text()}, bound_parts={text(): 0.1},
-        formats=(Format(node=text(), notation=text(), low=0.0, high=1.0, unit=text()),),
+        formats=(NodeFormat(stage=text(), node=text(), format=text(), low=0.0, high=1.0, unit=text()),),
         sections=(
-            {
-                "name": text(),
-                "realization": text(),
-                "coefficients": [{"name": text(), "integer": 1, "frac": 0, "value": 1.0}],
-            },
+            SectionFacts(
+                name=text(), coefficients=(CoefficientFacts(name=text(), integer=1, frac=0, value=1.0),)
+            ),
         ),
         alternatives=(Alternative(name=text(), max_abs=0.4, rms=0.1),),
     )  # fmt: skip
@@ -603,7 +608,7 @@ def test_this_design_is_not_its_own_alternative() -> None:
 
 @pytest.mark.parametrize(("length", "unfolded"), [(24, True), (25, False)])
 def test_many_formats_are_folded_up(length: int, unfolded: bool) -> None:
-    formats = [Format(node=f"stage.n{i}", notation="Q1.15", low=-1.0, high=1.0) for i in range(length)]
+    formats = [NodeFormat(stage="stage", node=f"n{i}", format="Q1.15", low=-1.0, high=1.0) for i in range(length)]
     page = Page(page_of(evidence(formats=formats)))
     assert page.words.count("stage") == 2  # title of the column, and of the first row only
     assert page.words.count("Q1.15") == length

@@ -24,7 +24,7 @@ from sosmith.gen.filter.design import design
 from sosmith.gen.output.certificate import certificate
 from sosmith.gen.realizations.registry import CASCADES, REALIZATIONS
 from sosmith.gen.specification.specification import FilterSpec
-from sosmith.gen.verifier.certificate_file import Certificate, certificate_text, on_grid, read_certificate
+from sosmith.gen.verifier.certificate_file import Certificate, Operation, certificate_text, on_grid, read_certificate
 from sosmith.gen.verifier.l1_response import UndecidedError, inverse, is_stable, response
 from sosmith.gen.verifier.verification import RejectedError, verify
 from sosmith.gen.word_lengths.quantize import Quantized, quantize
@@ -56,6 +56,10 @@ def proven(quantized: Quantized, max_error: Fraction | None = None) -> None:
 
 
 # What is right is proven.
+
+
+def test_the_file_has_a_name_for_every_operation() -> None:
+    assert {operation.value for operation in Operation} == {op.value for op in Op}
 
 
 @pytest.mark.parametrize("realization", REALIZATIONS)

@@ -12,11 +12,11 @@ from tests.gen.designs import ALL, example_design
 
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.folding import FoldingError, program
-from sosmith.model.dataflow.program import HAZARD, Do, Instruction, Program, digits_of
+from sosmith.model.dataflow.program import HAZARD, Instruction, Opcode, Program, digits_of
 
 FOLDABLE = ("df1", "df1_ef1", "df1_ef2", "df2t", "delta", "state_space")
-READS = {Do.MULTIPLY, Do.OPERAND, Do.PRODUCT, Do.GIVE}
-WRITES = {Do.TAKE, Do.STORE, Do.FINISH}
+READS = {Opcode.MULTIPLY, Opcode.OPERAND, Opcode.PRODUCT, Opcode.GIVE}
+WRITES = {Opcode.TAKE, Opcode.STORE, Opcode.FINISH}
 
 
 def stimulus(datapath: Datapath, samples: int) -> np.ndarray:
@@ -49,10 +49,10 @@ def test_a_program_computes_the_same_codes(example: str, realization: str, digit
 def test_a_wrong_constant_is_noticed() -> None:
     datapath = example_design("audio_lowpass.toml", realization="df1_ef2").datapath
     made = program(datapath, 15)
-    place = next(k for k, (do, _, constant) in enumerate(made.instructions) if do is Do.MULTIPLY and constant > 1000)
-    do, address, constant = made.instructions[place]
+    number = next(k for k, i in enumerate(made.instructions) if i.opcode is Opcode.MULTIPLY and i.constant > 1000)
+    opcode, address, constant = made.instructions[number]
     wrong = [*made.instructions]
-    wrong[place] = Instruction(do, address, constant // 2)
+    wrong[number] = Instruction(opcode, address, constant // 2)
     codes = stimulus(datapath, 60)
     assert run(replace(made, instructions=tuple(wrong)), datapath, codes) != datapath.compute_exact(codes)
 
@@ -61,12 +61,12 @@ def test_a_wrong_constant_is_noticed() -> None:
 def test_what_is_read_was_stored_long_enough_before(realization: str) -> None:
     made = program(example_design("flange_wear_locomotive.toml", realization=realization).datapath, 15)
     stored = {}
-    for k, (do, address, _) in enumerate(made.instructions):
-        if do in READS and address in stored:
+    for k, (opcode, address, _) in enumerate(made.instructions):
+        if opcode in READS and address in stored:
             assert k - stored[address] >= HAZARD
-        if do in WRITES:
+        if opcode in WRITES:
             stored[address] = k
-    assert made.instructions[-1].do is Do.GIVE
+    assert made.instructions[-1].opcode is Opcode.GIVE
 
 
 @pytest.mark.parametrize("digit_bits", [10, 15])
@@ -74,20 +74,22 @@ def test_constants_and_words_fit_the_multiplier(digit_bits: int) -> None:
     made = program(example_design("flange_wear_locomotive.toml", realization="df1_ef2").datapath, digit_bits)
     limit = 1 << digit_bits
     assert all(-limit <= constant < limit for _, _, constant in made.instructions)
-    assert {address for do, address, _ in made.instructions if do in WRITES}.isdisjoint({made.one})
-    states = sorted((place for place in made.places if place.is_state), key=lambda place: place.address)
-    ends = [place.address + place.digits for place in states]
-    assert [place.address for place in states] == [0, *ends[:-1]]
+    assert {address for opcode, address, _ in made.instructions if opcode in WRITES}.isdisjoint({made.one})
+    states = sorted(
+        (location for location in made.locations if location.is_state), key=lambda location: location.address
+    )
+    ends = [location.address + location.digits for location in states]
+    assert [location.address for location in states] == [0, *ends[:-1]]
     assert made.states == ends[-1]
-    others = [place for place in made.places if not place.is_state]
-    assert all(made.states <= place.address <= made.one - place.digits for place in others)
+    others = [location for location in made.locations if not location.is_state]
+    assert all(made.states <= location.address <= made.one - location.digits for location in others)
     assert made.words == made.one + 1 == 1 << made.one.bit_length()
 
 
 def test_words_are_used_again() -> None:
     made = program(example_design("flange_wear_locomotive.toml", realization="df1_ef2").datapath, 15)
-    others = [place for place in made.places if not place.is_state]
-    assert made.words - made.states < sum(place.digits for place in others)
+    others = [location for location in made.locations if not location.is_state]
+    assert made.words - made.states < sum(location.digits for location in others)
 
 
 def test_the_schedule_covers_the_program() -> None:
@@ -114,12 +116,12 @@ def test_serial_clocks_are_those_of_the_constants_bits() -> None:
     """One clock a bit, the sign's included; what is left of a negative constant ends as -1."""
     base = program(example_design("audio_lowpass.toml", realization="df1_ef2").datapath, 15)
 
-    def clocks(do: Do, constant: int = 0) -> int:
-        return replace(base, instructions=(Instruction(do, 1, constant),)).serial_cycles
+    def clocks(opcode: Opcode, constant: int = 0) -> int:
+        return replace(base, instructions=(Instruction(opcode, 1, constant),)).serial_cycles
 
-    found = {constant: clocks(Do.MULTIPLY, constant) for constant in (1, 2, 3, 4, 32767, -1, -2, -3, -4, -32768)}
+    found = {constant: clocks(Opcode.MULTIPLY, constant) for constant in (1, 2, 3, 4, 32767, -1, -2, -3, -4, -32768)}
     assert found == {1: 1, 2: 2, 3: 2, 4: 3, 32767: 15, -1: 1, -2: 2, -3: 3, -4: 3, -32768: 16}
-    assert [clocks(do) for do in (Do.STORE, Do.GIVE, Do.NOTHING, Do.PRODUCT)] == [1, 1, 1, 16]
+    assert [clocks(opcode) for opcode in (Opcode.STORE, Opcode.GIVE, Opcode.NOTHING, Opcode.PRODUCT)] == [1, 1, 1, 16]
 
 
 @given(st.integers(-(1 << 44), (1 << 44) - 1))
@@ -135,7 +137,7 @@ def test_a_padded_program_does_nothing_first() -> None:
     made = program(datapath, 15)
     count = len(made.instructions)
     padded = made.padded(count + 7)
-    assert padded.instructions == (*[Instruction(Do.NOTHING)] * 7, *made.instructions)
+    assert padded.instructions == (*[Instruction(Opcode.NOTHING)] * 7, *made.instructions)
     codes = stimulus(datapath, 20)
     assert run(padded, datapath, codes) == datapath.compute_exact(codes)
     with pytest.raises(ValueError, match=rf"^a program must have at most {count - 1} instructions, not {count}$"):
@@ -153,7 +155,7 @@ def test_a_program_takes_over_only_where_everything_fits() -> None:
         ({"accumulator_bits": 20}, rf"bits of the accumulator must be at most 20, not {made.accumulator_bits}"),
         ({"words": 5}, rf"words of memory must be at most 5, not {made.words}"),
         ({"digit_bits": 14}, "digit_bits must be 14, not 15"),
-        ({"places": ()}, r"its states must be \[\], not \[.*\]"),
+        ({"locations": ()}, r"its states must be \[\], not \[.*\]"),
         ({"inputs": ()}, r"digits and fraction bits of its inputs must be \[\], not \[.*\]"),
     ):
         with pytest.raises(FoldingError, match=rf"^to take over, {message}$"):
@@ -164,13 +166,13 @@ def test_a_state_keeps_its_digits() -> None:
     """A program that would need fewer digits for a state takes as many as before: the upper ones hold its sign."""
     datapath = example_design("audio_lowpass.toml", realization="df1_ef2").datapath
     made = program(datapath, 15)
-    wider = tuple(replace(p, digits=p.digits + (p.name == "section1.v1")) for p in made.places)
+    wider = tuple(replace(p, digits=p.digits + (p.name == "section1.v1")) for p in made.locations)
     with pytest.raises(FoldingError, match=r"^to take over, its states must be .*$"):
-        program(datapath, 15, like=replace(made, places=wider))  # the places behind it would have to move
-    last = [p for p in made.places if p.is_state][-1].name
-    wider = tuple(replace(p, digits=p.digits + (p.name == last)) for p in made.places)
-    taken = program(datapath, 15, like=replace(made, places=wider, words=made.words + 1))
-    assert next(p.digits for p in taken.places if p.name == last) == next(p.digits for p in wider if p.name == last)
+        program(datapath, 15, like=replace(made, locations=wider))  # the locations behind it would have to move
+    last = [p for p in made.locations if p.is_state][-1].name
+    wider = tuple(replace(p, digits=p.digits + (p.name == last)) for p in made.locations)
+    taken = program(datapath, 15, like=replace(made, locations=wider, words=made.words + 1))
+    assert next(p.digits for p in taken.locations if p.name == last) == next(p.digits for p in wider if p.name == last)
     codes = stimulus(datapath, 20)
     assert run(taken, datapath, codes) == datapath.compute_exact(codes)
 

@@ -4,7 +4,6 @@ Run as a script, it renews what is generated in them: the output in the README, 
 architecture, the register map, the commands and the schema of the calibration, the vehicle and its parameters.
 """
 
-import ast
 import contextlib
 import re
 import shlex
@@ -14,6 +13,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from tests.house import ROOMS, WITH_SUB_ROOMS, file_table, picture
 
 from sosmith.cli import cli
 from sosmith.gen.instrument.vehicle_report import parameters_json
@@ -21,7 +21,7 @@ from sosmith.gen.reload.register_map import markdown
 from sosmith.model.calibration.measurement_store import SCHEMA
 from sosmith.model.vehicle.parameters import built_in
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 README = ROOT / "README.md"
 ARCHITECTURE = ROOT / "docs" / "architecture.md"
 CALIBRATION = ROOT / "docs" / "calibration.md"
@@ -30,7 +30,6 @@ PRINTING = [CALIBRATION, *(ROOT / "docs" / f"{name}.md" for name in ("spectrum",
 REGISTERS = ROOT / "docs" / "registers.md"
 VEHICLE = ROOT / "docs" / "vehicle.md"
 DOCUMENTS = [README, ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").glob("*.md"))]
-ROOMS = ("model", "hdl", "gen", "sim")
 BY_CI = {"./run demo", "./run test"}
 """Lines that other tests and the set-up on a fresh machine stand for."""
 NEEDS_SIMULATION = ("./run simulate ", "./run compare ")
@@ -42,7 +41,8 @@ _REGISTERS = re.compile(r"(?<=<!-- registers -->\n).*?(?=<!-- end of registers -
 _SCHEMA = re.compile(r"(?<=<!-- schema -->\n).*?(?=<!-- end of schema -->)", re.DOTALL)
 _SHOWN = re.compile(r"```sh\n(?P<lines>[^`]*)```\n\n```text\n(?P<output>[^`]*)```")
 """Lines of a shell, directly followed by what they print."""
-_TABLE = re.compile(r"(?<=\| file \| holds \|\n\|---\|---\|\n).*?(?=\n## )", re.DOTALL)
+_HOUSE = re.compile(r"<!-- (?P<what>picture|files) of (?P<room>\w+) -->\n.*?<!-- end -->", re.DOTALL)
+"""Parts of the architecture that are read off the code."""
 
 
 def shell_lines() -> list[str]:
@@ -94,14 +94,14 @@ def furnish(folder: Path) -> Path:
     return folder
 
 
-def file_table() -> str:
-    """One row for each module of the rooms: its path, and the first line of its docstring."""
-    rows = []
-    for path in (path for room in ROOMS for path in sorted((ROOT / room).glob("*.py")) if path.stem != "__init__"):
-        text = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8")))
-        assert text, f"{path} must have a docstring"
-        rows.append(f"| `{path.relative_to(ROOT)}` | {text.splitlines()[0].rstrip('.').replace('``', '`')} |\n")
-    return "".join(rows)
+def with_house(text: str) -> str:
+    """Renew the pictures of rooms and the tables of files in `text`."""
+
+    def renewed(part: re.Match[str]) -> str:
+        shown = picture(part["room"]) if part["what"] == "picture" else file_table(part["room"])
+        return f"<!-- {part['what']} of {part['room']} -->\n\n{shown}\n<!-- end -->"
+
+    return _HOUSE.sub(renewed, text)
 
 
 @pytest.fixture
@@ -133,9 +133,11 @@ def test_every_line_works(folder: Path) -> None:
             run(line, folder)
 
 
-def test_the_file_table_is_up_to_date() -> None:
-    (shown,) = _TABLE.findall(ARCHITECTURE.read_text(encoding="utf-8"))
-    assert shown == file_table()
+def test_the_architecture_shows_the_code_as_it_is() -> None:
+    shown = ARCHITECTURE.read_text(encoding="utf-8")
+    parts = {(part["what"], part["room"]) for part in _HOUSE.finditer(shown)}
+    assert parts == {("files", room) for room in ROOMS} | {("picture", room) for room in WITH_SUB_ROOMS}
+    assert shown == with_house(shown)
 
 
 def test_the_register_map_is_up_to_date() -> None:
@@ -191,14 +193,6 @@ def test_links_and_paths_lead_somewhere(document: Path) -> None:
     assert missing == []
 
 
-def test_imports_run_one_way() -> None:
-    for height, room in enumerate(ROOMS):
-        above = {*ROOMS[height + 1 :], "cli"}
-        for path in (ROOT / room).glob("*.py"):
-            imported = set(re.findall(r"^\s*(?:from|import) sosmith\.(\w+)", path.read_text(encoding="utf-8"), re.M))
-            assert not imported & above, f"{path} must not import from {imported & above}"
-
-
 def renew(document: Path, part: re.Pattern[str], text: str) -> None:
     """Write a generated part of a document anew."""
     document.write_text(part.sub(lambda _: text, document.read_text(encoding="utf-8")), encoding="utf-8")
@@ -210,7 +204,7 @@ if __name__ == "__main__":
         for document in PRINTING:
             text = document.read_text(encoding="utf-8")
             document.write_text(with_output(text, Path(scratch)), encoding="utf-8")
-    renew(ARCHITECTURE, _TABLE, file_table())
+    ARCHITECTURE.write_text(with_house(ARCHITECTURE.read_text(encoding="utf-8")), encoding="utf-8")
     renew(REGISTERS, _REGISTERS, markdown())
     renew(CALIBRATION, _SCHEMA, schema())
     renew(VEHICLE, _PARAMETERS, parameter_table())

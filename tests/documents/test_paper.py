@@ -13,7 +13,7 @@ from sosmith.gen.paper.comparison import LABELS
 from sosmith.gen.paper.document import paper_files
 from sosmith.gen.paper.figures import read_paper_figures
 
-DOCS = Path(__file__).parents[1] / "docs"
+DOCS = Path(__file__).parents[2] / "docs"
 
 
 def run(*arguments: str) -> Result:

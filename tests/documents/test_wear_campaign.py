@@ -18,7 +18,7 @@ from scipy import signal
 from sosmith.gen.specification.specification import load
 from sosmith.model.scenarios.file import load_scenario
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 HERE = ROOT / "examples" / "wear_campaign"
 OFF = 0.01
 """Points of accuracy that the hardware may be off the golden chain."""

@@ -4,7 +4,7 @@ import pytest
 from tests.gen.designs import example_design
 
 from sosmith.hdl.core import latency_cycles
-from sosmith.hdl.stage import rank_count
+from sosmith.hdl.stage import pipeline_depth
 
 
 @pytest.mark.parametrize(
@@ -18,10 +18,10 @@ from sosmith.hdl.stage import rank_count
 )
 def test_ranks_of_the_audio_low_pass(realization: str, counts: list[int]) -> None:
     datapath = example_design("audio_lowpass.toml", realization=realization).datapath
-    assert [rank_count(stage.graph) for stage in datapath.stages] == counts
+    assert [pipeline_depth(stage.graph) for stage in datapath.stages] == counts
     assert latency_cycles(datapath) == sum(counts) + 1
 
 
 def test_a_polynomial_has_one_rank_a_stage() -> None:
     datapath = example_design("flange_wear_bench.toml", core="calibration").datapath
-    assert {rank_count(stage.graph) for stage in datapath.stages} == {1}
+    assert {pipeline_depth(stage.graph) for stage in datapath.stages} == {1}

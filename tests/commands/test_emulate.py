@@ -9,16 +9,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
+from tests.commands.test_cli import FILTER, INSTRUMENT
+from tests.model.scenarios.scenario_texts import CALIBRATION, PLAIN
 
 from sosmith.cli import cli
 from sosmith.gen.core import design_core
 from sosmith.gen.specification.specification import load
+from sosmith.gen.stimuli import traces_for
 from sosmith.model.errors import SpecificationError
 from sosmith.model.scenarios.file import load_scenario, range_notes
 from sosmith.model.scenarios.vehicle_clearance import vehicle_clearance
-from sosmith.sim.simulation import traces_for
-from tests.model.scenarios.scenario_texts import CALIBRATION, PLAIN
-from tests.test_cli import FILTER, INSTRUMENT
 
 SHORT = PLAIN.replace("seconds = 60", "seconds = 20")
 
@@ -141,7 +141,7 @@ def test_every_channel_has_noise_of_its_own_and_its_own_wear(folder: Path) -> No
 
 @pytest.mark.slow
 def test_the_bench_of_the_paper_in_hardware(folder: Path) -> None:
-    examples = Path(__file__).parents[1] / "examples"
+    examples = Path(__file__).parents[2] / "examples"
     scenario = examples / "scenarios" / "bench_43_50.toml"
     result = run("simulate", str(examples / "flange_wear_bench.toml"), "--trace", str(scenario), "--json", "-o", "out")
     assert result.exit_code == 0, result.output
@@ -153,7 +153,7 @@ def test_the_bench_of_the_paper_in_hardware(folder: Path) -> None:
 
 
 def test_a_specification_for_tread_braking_shows_all_of_its_temperatures() -> None:
-    examples = Path(__file__).parents[1] / "examples" / "scenarios"
+    examples = Path(__file__).parents[2] / "examples" / "scenarios"
     spec = load(examples / "specifications" / "flange_wear_tread_braking.toml")
     assert spec.name == "flange_wear_tread_braking"
     scenario = load_scenario(examples / "tread_braking_200.toml")

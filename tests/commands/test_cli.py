@@ -1,5 +1,6 @@
 """The command line as a user or a script meets it: exit status, stdout, stderr, files."""
 
+import contextlib
 import json
 import os
 import re
@@ -13,12 +14,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.gen.specification.test_bad_specifications import BAD, BASE
 
 from sosmith import __version__
 from sosmith.cli import main
 from sosmith.gen.specification.specification import example
 from sosmith.sim import simulators
-from tests.gen.specification.test_bad_specifications import BAD, BASE
 
 FILTER = """\
 name = "plain"
@@ -45,6 +46,8 @@ max_error = "faithful"
 INSTRUMENT = BASE.replace("order = 7", "order = 1").replace(
     "[[1.16, -0.0036], [0.3672]]", "[[1.16, -0.0036], [0.3672, 0.0006618], [0.05812]]"
 )
+
+STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 PROGRESS = re.compile(r" \d+:\d\d:\d\d$")  # the elapsed time at the end of every line of progress
 """Every line of progress has this bar."""
@@ -88,16 +91,58 @@ def sosmith(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capt
         signal.signal(number, handler)
 
 
-def process(*arguments: str, folder: Path, **options: Any) -> subprocess.Popen[str]:
-    """Start a command as a process of its own; it heeds Ctrl-C, even if a shell keeps the tests in the background."""
-    command = [sys.executable, "-m", "sosmith.cli", *arguments]
-    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE} | options
-    before = signal.getsignal(signal.SIGINT)
-    signal.signal(signal.SIGINT, signal.default_int_handler)  # what is ignored here is ignored by children
-    try:
-        return subprocess.Popen(command, cwd=folder, text=True, **pipes)
-    finally:
-        signal.signal(signal.SIGINT, before)
+def processes_with(variable: str, folder: Path) -> list[int]:
+    """List the processes with `folder` in that variable of their environment; dead ones have none and do not count."""
+    found = []
+    for entry in Path("/proc").glob("[0-9]*"):
+        try:
+            environment = (entry / "environ").read_bytes()
+        except OSError:  # it has ended, or belongs to someone else
+            continue
+        if f"{variable}={folder}".encode() in environment.split(b"\0"):
+            found.append(int(entry.name))
+    return found
+
+
+def wait_for(condition: Callable[[], Any], seconds: float = 60) -> None:
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+Start = Callable[..., subprocess.Popen[str]]
+
+
+@pytest.fixture
+def process(tmp_path: Path) -> Iterator[Start]:
+    """Start commands as processes of their own, in the test's folder; nothing they start outlives the test.
+
+    They take signals as they do by default, even where the tests themselves ignore some: under nohup, or in a shell's
+    background.
+    """
+    mark = {"SOSMITH_TEST": str(tmp_path)}
+    with contextlib.ExitStack() as started:
+
+        def start(*arguments: str, **options: Any) -> subprocess.Popen[str]:
+            command = [sys.executable, "-m", "sosmith.cli", *arguments]
+            pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE} | options
+            # A signal ignored here would be ignored by the child too; one with a handler is at its default there.
+            before = {number: signal.signal(number, signal.default_int_handler) for number in STOPPING}
+            try:
+                return started.enter_context(
+                    subprocess.Popen(command, cwd=tmp_path, text=True, env=os.environ | mark, **pipes)
+                )
+            finally:
+                for number, handler in before.items():
+                    signal.signal(number, handler)
+
+        yield start
+        while left := processes_with("SOSMITH_TEST", tmp_path):
+            for number in left:
+                with contextlib.suppress(ProcessLookupError):  # it has ended meanwhile
+                    os.kill(number, signal.SIGKILL)
+            time.sleep(0.02)
 
 
 def refused(outcome: Outcome, message: str, status: int = 2) -> None:
@@ -610,22 +655,22 @@ def test_reports_side_by_side(sosmith: Command) -> None:
 # What only a process shows.
 
 
-def test_the_reader_of_the_output_may_leave(tmp_path: Path) -> None:
+def test_the_reader_of_the_output_may_leave(process: Start, tmp_path: Path) -> None:
     (tmp_path / "plain.toml").write_text(FILTER, encoding="utf-8")
     for arguments in (["design", "plain.toml"], ["design", "plain.toml", "--json"], ["emulate", "plain.toml", "noise"]):
         reader, writer = os.pipe()
         os.close(reader)
-        running = process(*arguments, folder=tmp_path, stdout=writer)
+        running = process(*arguments, stdout=writer)
         os.close(writer)
         _, errors = running.communicate(timeout=60)
         assert running.returncode == 0
         assert [line for line in errors.splitlines() if not PROGRESS.search(line.rstrip())] == []
 
 
-def test_a_full_disk_is_one_sentence(tmp_path: Path) -> None:
+def test_a_full_disk_is_one_sentence(process: Start, tmp_path: Path) -> None:
     (tmp_path / "plain.toml").write_text(FILTER, encoding="utf-8")
     with Path("/dev/full").open("w") as full:
-        running = process("design", "plain.toml", "--json", folder=tmp_path, stdout=full)
+        running = process("design", "plain.toml", "--json", stdout=full)
         _, errors = running.communicate(timeout=60)
     assert running.returncode == 3
     message = "sosmith: error: the output must be readable and writable, not: No space left on device"
@@ -653,57 +698,37 @@ def test_no_verilator(sosmith: Command, monkeypatch: pytest.MonkeyPatch) -> None
     assert outcome.messages == [f"sosmith: error: {message}"]
 
 
-def simulators_in(folder: Path) -> list[int]:
-    """List the processes of the co-simulation in `folder`; dead ones have no environment and do not count."""
-    found = []
-    for entry in Path("/proc").glob("[0-9]*"):
-        try:
-            environment = (entry / "environ").read_bytes()
-        except OSError:  # it has ended, or belongs to someone else
-            continue
-        if b"SOSMITH_BENCH=" + bytes(folder) in environment:
-            found.append(int(entry.name))
-    return found
-
-
-def wait_for(condition: Callable[[], Any], seconds: float = 60) -> None:
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.02)
-
-
 @pytest.mark.parametrize(
     ("number", "status", "messages"),
     [(signal.SIGINT, 130, ["sosmith: interrupted"]), (signal.SIGTERM, 143, []), (signal.SIGHUP, 129, [])],
 )
 def test_a_signal_in_the_middle_of_the_simulation(
-    number: signal.Signals, status: int, messages: list[str], tmp_path: Path
+    number: signal.Signals, status: int, messages: list[str], process: Start, tmp_path: Path
 ) -> None:
     (tmp_path / "plain.toml").write_text(FILTER, encoding="utf-8")
     arguments = ["simulate", "plain.toml", "--trace", "noise", "--seconds", "500", "--simulator", "icarus", "-o", "out"]
-    running = process(*arguments, folder=tmp_path)
+    running = process(*arguments)
     simulation = tmp_path / "out" / "simulation" / "icarus"
     wait_for((simulation / "progress.txt").exists)
-    assert simulators_in(simulation)
+    assert processes_with("SOSMITH_BENCH", simulation)
     running.send_signal(number)
     output, errors = running.communicate(timeout=30)
     assert running.returncode == status
     assert output == ""
     assert [line for line in errors.splitlines() if line.strip() and not PROGRESS.search(line.rstrip())] == messages
-    wait_for(lambda: not simulators_in(simulation), 5)
+    wait_for(lambda: not processes_with("SOSMITH_BENCH", simulation), 5)
     assert not list((tmp_path / "out").glob("report.*"))
     assert not list((tmp_path / "out").glob(".sosmith-*"))
 
 
-def test_two_runs_in_one_folder_at_once(tmp_path: Path) -> None:
+def test_two_runs_in_one_folder_at_once(process: Start, tmp_path: Path) -> None:
     """The second is refused at once, and the first is none the worse for it."""
     parallel = f'{FILTER}\n[hardware]\narchitecture = "parallel"\n'  # many clocks a second
     (tmp_path / "plain.toml").write_text(parallel, encoding="utf-8")
     arguments = ["simulate", "plain.toml", "--trace", "noise", "--seconds", "80", "--simulator", "icarus", "-o", "out"]
-    first = process(*arguments, folder=tmp_path)
+    first = process(*arguments)
     wait_for((tmp_path / "out" / "simulation").exists)
-    second = process(*arguments, folder=tmp_path)
+    second = process(*arguments)
     output, errors = second.communicate(timeout=60)
     assert first.poll() is None
     assert (second.returncode, output) == (2, "")
@@ -736,8 +761,8 @@ def test_from_another_folder_through_the_installed_command(tmp_path: Path) -> No
     assert sorted(path.name for path in spec.parent.iterdir()) == ["my spec.toml"]
 
 
-def test_demo_walks_the_whole_road(tmp_path: Path) -> None:
-    running = process("demo", "-o", "out", folder=tmp_path)
+def test_demo_walks_the_whole_road(process: Start, tmp_path: Path) -> None:
+    running = process("demo", "-o", "out")
     output, errors = running.communicate(timeout=200)
     assert running.returncode == 0
     words = " ".join(output.split())

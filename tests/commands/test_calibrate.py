@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.commands.invocation import Invocation
+from tests.model.calibration.measuring import readings, write_csv
 
 from sosmith.commands.calibrate import calibrate
 from sosmith.gen.core import design_core
@@ -17,8 +19,6 @@ from sosmith.model.calibration.fit import fit, read_measurements
 from sosmith.model.calibration.measurement_store import open_store
 from sosmith.model.calibration.self_updating import Addition, add, refused_first_file
 from sosmith.model.errors import ShortfallError, SpecificationError
-from tests.invocation import Invocation
-from tests.model.calibration.measuring import readings, write_csv
 
 INVOCATION = Invocation("calibrate", columns=100)
 run, good, refused = INVOCATION.run, INVOCATION.good, INVOCATION.refused

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.commands.invocation import Invocation
 
 from sosmith.model.vehicle.parameters import built_in, built_in_text
-from tests.invocation import Invocation
 
 INVOCATION = Invocation("vehicle", columns=110)
 run, good, refused = INVOCATION.run, INVOCATION.good, INVOCATION.refused

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.commands.invocation import Invocation
 
 from sosmith.gen.filter.design import design
 from sosmith.gen.specification.specification import example, load
 from sosmith.model.errors import ShortfallError
 from sosmith.model.sensors.instrument import sensor_voltage
-from tests.invocation import Invocation
 
 INVOCATION = Invocation("spectrum", columns=120)
 run, good, refused = INVOCATION.run, INVOCATION.good, INVOCATION.refused

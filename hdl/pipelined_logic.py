@@ -1,4 +1,17 @@
-"""A dataflow graph as logic in register ranks: what stages of one channel and of several have in common."""
+"""A dataflow graph as logic spread over pipeline stages: what `PipelinedStage` and `InterleavedStage` share.
+
+Each node is computed in one pipeline stage. A value that a later one needs passes through a register for each pipeline
+stage in between, made when it is first asked for::
+
+    pipeline stage 0      takes[0]      pipeline stage 1      takes[1]      pipeline stage 2
+
+    i0 --+--> node a ---->[a_passed1]------------------------>[a_passed2]-----> node c
+         |                                                                        ^
+         +--> node b ---->[b_passed1]-----> node d ---------->[d_passed2]---------+
+
+Every signal is as wide as the range of its node asks, and signed only if that holds negative codes. Intermediate
+results are exact; bits are dropped only by FLOOR, TRUNCATE and FRACTION.
+"""
 
 from __future__ import annotations
 
@@ -11,78 +24,79 @@ from sosmith.model.dataflow.graph import Graph, Node, Op
 
 
 def shape_of(node: Node) -> Shape:
-    """Shape that holds the range of `node`: unsigned where it cannot be negative."""
+    """Shape that holds the range of `node`: unsigned if it cannot be negative."""
     return Shape(node.width, signed=node.signed)
 
 
-class RankedLogic:
-    """Wires for the nodes of a graph, each in the rank that computes it, and registers that hand them on.
+class PipelinedLogic:
+    """Signals for the nodes of a graph, each in its pipeline stage, and the registers that pass values on.
 
-    What a DELAY holds is left to the caller, who drives its wire.
+    The caller drives the signals of DELAY nodes.
 
     Parameters
     ----------
     m : Module
-        Where the logic goes.
+        Module that the logic is added to.
     graph : Graph
         What is computed.
-    ranks : sequence of int
-        Rank of each node.
+    pipeline_stages : sequence of int
+        Pipeline stage of each node.
     constants : dict of int to Pair
-        Constants that come from one of two banks, by their nodes.
+        Constants that come from one of two banks, by node.
     banks : sequence of Value
-        Bank of the sample that each rank is about.
+        Bank of the sample in each pipeline stage.
     takes : sequence of Value
-        Whether the registers behind each rank are loaded at this clock.
+        Whether the registers behind each pipeline stage are loaded at this clock.
     valid : sequence of Value
-        Whether each rank is about a sample; asked where a rank takes the state of a later one.
+        Whether each pipeline stage holds a sample; asked where one uses a state that belongs to a later one.
 
     Attributes
     ----------
     names : list of str
         Names of the nodes' signals.
     wires : list of Value
-        Values of the nodes in their own ranks, once `connect` has been called.
+        Value of each node in its own pipeline stage, once `connect` has been called.
     """
 
     def __init__(
         self,
         m: Module,
         graph: Graph,
-        ranks: Sequence[int],
+        pipeline_stages: Sequence[int],
         *,
         constants: Mapping[int, Pair],
         banks: Sequence[Value],
         takes: Sequence[Value],
         valid: Sequence[Value],
     ) -> None:
-        self._m, self._graph, self._ranks = m, graph, ranks
+        self._m, self._graph, self._pipeline_stages = m, graph, pipeline_stages
         self._constants, self._banks, self._takes, self._valid = constants, banks, takes, valid
         self._passed: dict[tuple[int, int], Value] = {}
         self.names = unique_names(graph)
         self.wires: list[Value] = []
 
-    def at(self, index: int, rank: int) -> Value:
-        """Value of a node as a rank sees it that belongs to a sample at least as new."""
-        node, own = self._graph.nodes[index], self._ranks[index]
+    def at(self, index: int, pipeline_stage: int) -> Value:
+        """Value of a node for the sample in `pipeline_stage`."""
+        node, own = self._graph.nodes[index], self._pipeline_stages[index]
         if node.op is Op.CONSTANT and index in self._constants:
-            return chosen(self._constants[index], self._banks[rank])
-        if own == rank or node.op is Op.CONSTANT:
+            return chosen(self._constants[index], self._banks[pipeline_stage])
+        if own == pipeline_stage or node.op is Op.CONSTANT:
             return self.wires[index]
-        if own > rank:  # the loop may still be about the sample before, with all its states one sample behind
+        if own > pipeline_stage:
+            # A state that is updated in a later pipeline stage: if the sample before is still there, the update is due.
             return Mux(self._valid[own], self.wires[node.operands[0]], self.wires[index])
-        if (index, rank) not in self._passed:
-            register = Signal(shape_of(node), name=f"{self.names[index]}_passed{rank}", reset_less=True)
-            self._passed[index, rank] = register
-            with self._m.If(self._takes[rank - 1]):
-                self._m.d.sync += register.eq(self.at(index, rank - 1))
-        return self._passed[index, rank]
+        if (index, pipeline_stage) not in self._passed:
+            register = Signal(shape_of(node), name=f"{self.names[index]}_passed{pipeline_stage}", reset_less=True)
+            self._passed[index, pipeline_stage] = register
+            with self._m.If(self._takes[pipeline_stage - 1]):
+                self._m.d.sync += register.eq(self.at(index, pipeline_stage - 1))
+        return self._passed[index, pipeline_stage]
 
     def connect(self, inputs: Sequence[Value], apart: Collection[int] = ()) -> None:
-        """Walk over the graph, given the values of its inputs; the nodes `apart` are kept as they are in synthesis."""
+        """Make the logic of all nodes from the values of the inputs; synthesis must not merge the nodes in `apart`."""
         given = iter(inputs)
         for index, (node, name) in enumerate(zip(self._graph.nodes, self.names, strict=True)):
-            own = self._ranks[index]
+            own = self._pipeline_stages[index]
             if node.op is Op.INPUT:
                 self.wires.append(next(given))
             elif node.op is Op.SHIFT:  # the same code
@@ -98,14 +112,14 @@ class RankedLogic:
 
 
 def banks_in_use(valid: Sequence[Value], banks: Sequence[Value]) -> Value:
-    """Return for each bank whether a sample that is there uses it."""
+    """Return two bits: whether a valid sample uses the first bank, and the second."""
     inside = list(zip(valid, banks, strict=True))
     first, second = (Cat(*(there & (own == bank) for there, own in inside)).any() for bank in (0, 1))
     return Cat(first, second)
 
 
 def unique_names(graph: Graph) -> list[str]:
-    """Name every node's signal: by its own name, with the index where that is missing or taken."""
+    """Return a signal name for each node: its own, with its index added if that is missing or taken."""
     seen: set[str] = set()
     names = []
     for index, node in enumerate(graph.nodes):
@@ -116,9 +130,9 @@ def unique_names(graph: Graph) -> list[str]:
 
 
 def logic(graph: Graph, node: Node, operands: list[Value], factor: Value | None = None) -> Value:
-    """Value of a node from those of its operands; every intermediate result is exact.
+    """Value of a node from the values of its operands; every intermediate result is exact.
 
-    `factor` is what a SCALE multiplies by, where that is not its parameter.
+    `factor` replaces the constant that a SCALE multiplies by.
     """
     fracs = [graph.nodes[i].frac for i in node.operands]
     if node.op is Op.CONSTANT:
@@ -144,9 +158,9 @@ def logic(graph: Graph, node: Node, operands: list[Value], factor: Value | None 
 
 
 def limits(node: Node, operand: Value) -> tuple[Value, Value]:
-    """Whether a CLAMP finds `operand` below its range, and above.
+    """Return whether the operand of a CLAMP is below its range, and whether it is above.
 
-    Where an end of the range is that of so many bits, the bits above them tell; else a comparison does.
+    If the range ends at a power of two, the upper bits of the operand tell; otherwise it takes a comparison.
     """
     low, high = node.low, node.high
     bits = high.bit_length()

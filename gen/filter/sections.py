@@ -1,0 +1,163 @@
+"""Second-order sections of a digital filter: poles paired with zeros, ordered, scaled and rounded to doubles.
+
+The denominators and the places of the zeros are the correctly rounded ones. Gains are set with the rounded denominator:
+what a section passes at its reference frequency is then right to a rounding, however close the poles are to the unit
+circle, where a rounding of a1 or a2 alone would move the gain by much more. All choices compare correctly rounded
+numbers, so that equal distances are equal everywhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from flint import acb, arb
+
+from sosmith.gen.filter.transformations import DigitalFilter
+from sosmith.model.arithmetic.correct_rounding import ball, nearest_double
+
+Row = tuple[float, ...]
+"""(b0, b1, b2, 1, a1, a2)."""
+
+Quadratic = tuple[arb, arb, arb]
+"""Coefficients of 1, 1/z and 1/z**2."""
+
+
+@dataclass(frozen=True)
+class _Root:
+    """A real zero or pole, or one of a conjugate pair; where it is one on the unit circle, `cosine` gives the pair."""
+
+    place: acb
+    real: bool
+    cosine: arb | None = None
+
+    @property
+    def key(self) -> tuple[float, float]:
+        """What pairs are sorted by before anything is chosen, as `scipy.signal.zpk2sos` does."""
+        return nearest_double(self.place.real), 0.0 if self.real else nearest_double(self.place.imag)
+
+
+@dataclass(frozen=True)
+class Section:
+    """A section before it is rounded: polynomials in 1/z with a leading 1, or 1/z where there is a delay."""
+
+    numerator: Quadratic
+    denominator: Quadratic
+
+
+def sections(filter_: DigitalFilter) -> list[Section]:
+    """Pair poles with zeros; poles closest to the unit circle come last.
+
+    Where all zeros lie in one place, every section gets as many zeros as poles. Otherwise pairing and order are those
+    of `scipy.signal.zpk2sos`: the pole closest to the unit circle takes the zeros nearest to it, and so on.
+
+    Raises
+    ------
+    UndecidedError
+        If the precision is too low for a choice.
+    """
+    if not filter_.zero_cosines and len(set(filter_.real_zeros)) == 1:
+        return _with_equal_zeros(filter_, filter_.real_zeros[0])
+    origin = (0,) if len(filter_.real_poles) % 2 else ()  # an odd order is filled up there
+    poles = _sorted([_Root(pole, real=False) for pole in filter_.pole_pairs])
+    poles += _sorted([_Root(acb(pole), real=True) for pole in (*filter_.real_poles, *origin)])
+    zeros = _sorted([_on_circle(cosine) for cosine in filter_.zero_cosines])
+    zeros += _sorted([_Root(acb(zero), real=True) for zero in (*filter_.real_zeros, *origin)])
+    made = []
+    while poles:
+        made.append(_next(poles, zeros))
+    return made[::-1]
+
+
+def rounded(made: Sequence[Section], passing: acb, level: arb) -> tuple[Row, ...]:
+    """Round sections, each scaled to unity gain at one frequency but for the first, which takes the level.
+
+    Parameters
+    ----------
+    made : sequence of Section
+    passing : acb
+        Point on the unit circle where the gain is set.
+    level : arb
+        Gain of all sections together there, positive.
+
+    Raises
+    ------
+    UndecidedError
+        If a number does not round to one double.
+    """
+    rows = []
+    for index, section in enumerate(made):
+        denominator = [nearest_double(value) for value in section.denominator]
+        gain = _magnitude([ball(value) for value in denominator], passing) / _magnitude(section.numerator, passing)
+        if index == 0:
+            gain *= level
+        rows.append((*(nearest_double(gain * value) for value in section.numerator), *denominator))
+    return tuple(rows)
+
+
+def _magnitude(polynomial: Sequence[arb], z: acb) -> arb:
+    c0, c1, c2 = polynomial
+    return abs((c0 * z + c1) * z + c2)
+
+
+def _on_circle(cosine: arb) -> _Root:
+    return _Root(acb(cosine, (1 - cosine**2).sqrt()), real=False, cosine=cosine)
+
+
+def _sorted(roots: list[_Root]) -> list[_Root]:
+    return sorted(roots, key=lambda root: root.key)
+
+
+def _with_equal_zeros(filter_: DigitalFilter, zero: int) -> list[Section]:
+    one, zero_ball = arb(1), arb(0)
+    made = [Section((one, arb(-zero), zero_ball), (one, -pole, zero_ball)) for pole in filter_.real_poles]
+    pairs = sorted(
+        (_Root(pole, real=False) for pole in filter_.pole_pairs), key=lambda pole: (-_margin(pole), pole.key)
+    )
+    return made + [Section((one, arb(-2 * zero), one), _pair(pole)) for pole in pairs]
+
+
+def _next(poles: list[_Root], zeros: list[_Root]) -> Section:
+    """Take the worst pole left, what goes with it, and its zeros; as `scipy.signal.zpk2sos` chooses them."""
+    pole = _taken(poles, min(poles, key=_margin))
+    others = [other for other in poles if other.real]
+    if pole.real and not others:
+        return Section(_two(_nearest(zeros, pole, real=True), None), _two(pole, None))
+    if not pole.real and len(poles) + 1 == len(zeros) and len(others) == 1 and sum(zero.real for zero in zeros) == 1:
+        return Section(_pair(_nearest(zeros, pole, real=False)), _pair(pole))
+    denominator = _two(pole, _taken(poles, min(others, key=_margin))) if pole.real else _pair(pole)
+    zero = _nearest(zeros, pole)
+    numerator = _two(zero, _nearest(zeros, pole, real=True)) if zero.real else _pair(zero)
+    return Section(numerator, denominator)
+
+
+def _margin(pole: _Root) -> float:
+    """``1 - |pole|**2``: how far it is from the unit circle."""
+    return nearest_double(1 - _square(pole.place))
+
+
+def _nearest(zeros: list[_Root], pole: _Root, *, real: bool | None = None) -> _Root:
+    """Take the zero nearest to a pole, of the real or of the complex ones if so asked."""
+    allowed = [zero for zero in zeros if real is None or zero.real == real]
+    return _taken(zeros, min(allowed, key=lambda zero: nearest_double(_square(zero.place - pole.place))))
+
+
+def _taken(roots: list[_Root], chosen: _Root) -> _Root:
+    return roots.pop(next(k for k, root in enumerate(roots) if root is chosen))
+
+
+def _square(value: acb) -> arb:
+    return value.real**2 + value.imag**2
+
+
+def _pair(root: _Root) -> Quadratic:
+    """Polynomial of a conjugate pair."""
+    if root.cosine is not None:
+        return arb(1), -2 * root.cosine, arb(1)
+    return arb(1), -2 * root.place.real, _square(root.place)
+
+
+def _two(root: _Root, other: _Root | None) -> Quadratic:
+    """Polynomial of one real root, or of two."""
+    first, second = root.place.real, other.place.real if other is not None else arb(0)
+    return arb(1), -(first + second), first * second

@@ -1,0 +1,393 @@
+"""Facts about a generated core, collected once for its manifest, its co-simulation and its report."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Any
+
+from sosmith.gen.core import CoreDesign
+from sosmith.gen.filter.impulse_invariance import Aliasing
+from sosmith.gen.proof.limit_cycles import limit_cycles, recursions
+from sosmith.gen.proof.linear_model import linear_model
+from sosmith.gen.reload.register_writes import bank_size
+from sosmith.gen.word_lengths.cost import Cost, cost_of
+from sosmith.hdl.axi_stream import Field, dest_width, fields
+from sosmith.model.dataflow.datapath import Datapath, Stage
+from sosmith.model.dataflow.graph import Graph, Op
+from sosmith.model.dataflow.program import Program
+from sosmith.model.dataflow.status import Flag
+from sosmith.model.port import Port
+from sosmith.model.reload.registers import INTERFACE
+from sosmith.model.sections.direct_form import DirectForm1
+from sosmith.model.sections.horner import HornerStep
+
+
+@dataclass(frozen=True, kw_only=True)
+class StreamFacts:
+    """An AXI4-Stream of a core.
+
+    Attributes
+    ----------
+    fields : tuple of Field
+        Where each quantity lies in ``tdata``, the lowest first.
+    dest_width : int
+        Bits of ``tdest``; 0 without one.
+    flags : mapping of str to int
+        Bit of each flag in ``tuser``, by name; empty without ``tuser``.
+    """
+
+    fields: tuple[Field, ...]
+    dest_width: int = 0
+    flags: Mapping[str, int] = field(default_factory=dict)
+
+    @property
+    def width(self) -> int:
+        """Bits of ``tdata``."""
+        return sum(each.padded for each in self.fields)
+
+
+@dataclass(frozen=True, kw_only=True)
+class InterfaceFacts:
+    """What drives a core from outside needs to know.
+
+    Attributes
+    ----------
+    name : str
+        Name of the top module.
+    inputs, outputs : StreamFacts
+        ``s_axis`` and ``m_axis``.
+    reset_cycles : int
+        Clocks after a reset until the first sample is taken.
+    latency_cycles : int
+        Clocks from the edge that accepts a sample to the edge that can hand its result on, at most.
+    """
+
+    name: str
+    inputs: StreamFacts
+    outputs: StreamFacts
+    reset_cycles: int
+    latency_cycles: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class WearFacts:
+    """Clearances of one channel at which the flags of wear rise, in the output's unit, and their codes."""
+
+    warning: float
+    critical: float
+    codes: tuple[int, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReloadFacts:
+    """What a set of constants for this core has to match, and the files that describe its registers.
+
+    Attributes
+    ----------
+    interface : int
+        Version of the register interface.
+    design : int
+        Fingerprint of everything but the constants.
+    words, word_bits : int
+        Size of a bank of constants.
+    registers : tuple of str
+        Names of the files.
+    """
+
+    interface: int
+    design: int
+    words: int
+    word_bits: int
+    registers: tuple[str, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class CoefficientFacts:
+    """A coefficient of a section: ``value == integer * 2**-frac``."""
+
+    name: str
+    integer: int
+    frac: int
+    value: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class SectionFacts:
+    """One recursion of a section.
+
+    Attributes
+    ----------
+    name : str
+        Name of the section, followed by that of the output where it has several.
+    coefficients : tuple of CoefficientFacts
+        In the order of computation.
+    states : mapping of str to str
+        Q format of each state, by name.
+    b, a : tuple of float, length 3
+        The transfer function that the integers make, in powers of ``z**-1``.
+    input, output : str
+        Q formats.
+    error_feedback : tuple of int or None
+        Weights of the dropped bits of the samples before; None where the realization has none.
+    """
+
+    name: str
+    coefficients: tuple[CoefficientFacts, ...]
+    states: Mapping[str, str] = field(default_factory=dict)
+    b: tuple[float, ...] = ()
+    a: tuple[float, ...] = ()
+    input: str = ""
+    output: str = ""
+    error_feedback: tuple[int, ...] | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class NodeFormat:
+    """Number format of a named node of the datapath.
+
+    Attributes
+    ----------
+    stage, node : str
+        Their names.
+    format : str
+        Q format, such as ``Q4.11`` or ``UQ5.11``.
+    low, high : float
+        Smallest and largest value, in `unit`.
+    unit : str
+        Unit of the node, ``""`` for a plain number.
+    """
+
+    stage: str
+    node: str
+    format: str
+    low: float
+    high: float
+    unit: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LimitCycleFacts:
+    """What the rounding of one recursion can sustain, at its own output.
+
+    Attributes
+    ----------
+    section : str
+        Name of the recursion, as in `SectionFacts`.
+    largest, dead_band : float
+        Bounds, in the unit of the core's output: of a limit cycle without input, and of how far a constant output
+        can stay from its exact value.
+    none : bool
+        Whether it is proven that there is no limit cycle.
+    lyapunov : tuple of Fraction or None
+        Weights of a diagonal Lyapunov function; None where there is none.
+    """
+
+    section: str
+    largest: float
+    dead_band: float
+    none: bool
+    lyapunov: tuple[Fraction, ...] | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class CoreFacts:
+    """Everything about a generated core that its manifest and its report tell.
+
+    Attributes
+    ----------
+    core : str
+        One of `sosmith.gen.core.CORES`.
+    spec : dict
+        The specification as read, in the types of JSON.
+    channels : int
+        Number of channels.
+    interface : InterfaceFacts
+        Streams and clocks.
+    cycles_per_sample : int
+        Clocks from one sample to the next at the highest rate, at most.
+    wear : tuple of WearFacts or None
+        One for all channels, or one for each; None without limits of wear.
+    realization : str or None
+        Name of the realization; None without sections.
+    architecture : str
+        Name of the architecture.
+    program : Program or None
+        What the folded and serial architectures run; None in the parallel one.
+    reload : ReloadFacts or None
+        None where no constants can be loaded.
+    reasons : mapping of str to str
+        Why this realization and this architecture.
+    sections : tuple of SectionFacts
+        In the order of the cascade.
+    formats : tuple of NodeFormat
+        In the order of the datapath.
+    error_bound : float
+        Proven bound on the error, in `unit`.
+    error_parts : mapping of str to float
+        Its parts.
+    unit : str
+        Unit of the output.
+    limit_cycles : tuple of LimitCycleFacts
+        One for each of `sections`.
+    aliasing : Aliasing or None
+        Of an impulse-invariant filter.
+    cost : Cost
+        Operators of the parallel architecture.
+    """
+
+    core: str
+    spec: dict[str, Any]
+    channels: int
+    interface: InterfaceFacts
+    cycles_per_sample: int
+    wear: tuple[WearFacts, ...] | None
+    realization: str | None
+    architecture: str
+    program: Program | None
+    reload: ReloadFacts | None
+    reasons: Mapping[str, str]
+    sections: tuple[SectionFacts, ...]
+    formats: tuple[NodeFormat, ...]
+    error_bound: float
+    error_parts: Mapping[str, float]
+    unit: str
+    limit_cycles: tuple[LimitCycleFacts, ...]
+    aliasing: Aliasing | None
+    cost: Cost
+
+    @property
+    def name(self) -> str:
+        """Name of the core."""
+        return self.interface.name
+
+
+def core_facts(design: CoreDesign) -> CoreFacts:
+    """Collect the facts about a core."""
+    quantized, datapath, architecture = design.quantized, design.datapath, design.architecture
+    output = datapath.output
+    parts = [pair for section in quantized.sections for pair in recursions(section).items()]
+    return CoreFacts(
+        core=design.core,
+        spec=design.spec.source,
+        channels=design.spec.channels,
+        interface=interface_facts(design),
+        cycles_per_sample=architecture.cycles_per_sample,
+        wear=_wear(design),
+        realization=quantized.realization if quantized.sections else None,
+        architecture=architecture.name,
+        program=architecture.program,
+        reload=_reload(design),
+        reasons=design.reasons,
+        sections=tuple(each for section in quantized.sections for each in _sections(section)),
+        formats=tuple(row for stage in datapath.stages for row in _formats(stage, datapath)),
+        error_bound=float(quantized.bound * output.lsb),
+        error_parts={part: float(value * output.lsb) for part, value in quantized.budget.items()},
+        unit=output.unit,
+        limit_cycles=tuple(_limit_cycles(name, graph, output) for name, graph in parts),
+        aliasing=None if quantized.filter is None else quantized.filter.aliasing,
+        cost=cost_of(datapath),
+    )
+
+
+def interface_facts(design: CoreDesign) -> InterfaceFacts:
+    """Collect what drives a core from outside needs to know."""
+    datapath, width = design.datapath, dest_width(design.spec.channels)
+    flags = {flag.name.lower(): flag.value for flag in Flag}
+    return InterfaceFacts(
+        name=datapath.name,
+        inputs=StreamFacts(fields=fields(datapath.inputs), dest_width=width),
+        outputs=StreamFacts(fields=fields((datapath.output,)), dest_width=width, flags=flags),
+        reset_cycles=design.architecture.reset_cycles,
+        latency_cycles=design.architecture.latency_cycles,
+    )
+
+
+def _wear(design: CoreDesign) -> tuple[WearFacts, ...] | None:
+    if design.spec.wear is None:
+        return None
+    clearances = design.spec.wear.clearances()[: len(design.datapath.wear)]
+    return tuple(
+        WearFacts(warning=float(warning), critical=float(critical), codes=tuple(codes))
+        for (warning, critical), codes in zip(clearances, design.datapath.wear, strict=True)
+    )
+
+
+def _sections(section: Stage) -> Sequence[SectionFacts]:
+    """One for each recursion of a section."""
+    feedback = tuple(section.feedback) if isinstance(section, DirectForm1) else None
+    return [_section(name, graph, feedback) for name, graph in recursions(section).items()]
+
+
+def _section(name: str, graph: Graph, feedback: tuple[int, ...] | None) -> SectionFacts:
+    nodes = graph.nodes
+    model = linear_model(graph)
+    b, a = (tuple([*map(float, values), 0.0, 0.0][:3]) for values in (model.transfer, model.denominator))
+    return SectionFacts(
+        name=name,
+        coefficients=tuple(
+            CoefficientFacts(
+                name=node.name.removeprefix("product_"),
+                integer=node.parameter,
+                frac=node.parameter_frac,
+                value=node.parameter / 2**node.parameter_frac,
+            )
+            for node in nodes
+            if node.op is Op.SCALE
+        ),
+        states={nodes[i].name: nodes[i].format for i in graph.delays},
+        b=b,
+        a=a,
+        input=nodes[graph.inputs[0]].format,
+        output=nodes[graph.outputs[0]].format,
+        error_feedback=feedback,
+    )
+
+
+def _limit_cycles(name: str, graph: Graph, output: Port) -> LimitCycleFacts:
+    found = limit_cycles(graph)
+    return LimitCycleFacts(
+        section=name,
+        largest=float(found.largest * output.lsb),
+        dead_band=float(found.dead_band * output.lsb),
+        none=found.none,
+        lyapunov=None if found.lyapunov is None else tuple(found.lyapunov),
+    )
+
+
+def _reload(design: CoreDesign) -> ReloadFacts | None:
+    if design.architecture.fingerprint is None:
+        return None
+    words, bits = bank_size(design.architecture)
+    return ReloadFacts(
+        interface=INTERFACE,
+        design=design.architecture.fingerprint,
+        words=words,
+        word_bits=bits,
+        registers=(f"{design.spec.name}_registers.h", f"{design.spec.name}.rdl"),
+    )
+
+
+def _formats(stage: Stage, datapath: Datapath) -> Sequence[NodeFormat]:
+    """Return the formats of the named nodes of a stage.
+
+    Values inside are in output LSBs, except the polynomial's variables, which are fractions of their range.
+    """
+    variables = {port.name for port in datapath.inputs}
+    rows = []
+    for node in stage.graph.nodes:
+        if node.name:
+            plain = isinstance(stage, HornerStep) and node.name in variables
+            scale = (1.0 if plain else float(datapath.output.lsb)) * 2.0**-node.frac
+            rows.append(
+                NodeFormat(
+                    stage=stage.name,
+                    node=node.name,
+                    format=node.format,
+                    low=node.low * scale,
+                    high=node.high * scale,
+                    unit="" if plain else datapath.output.unit,
+                )
+            )
+    return rows

@@ -1,0 +1,184 @@
+"""Runs a core in a simulator under cocotb, in a process of its own, with random idle and back-pressure."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import platform
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+
+import numpy as np
+
+from sosmith.gen.output.core_facts import InterfaceFacts, StreamFacts
+from sosmith.model.errors import ShortfallError, ToolError
+from sosmith.sim.bench import BenchRun, Progress
+from sosmith.sim.simulators import Simulator, find_simulator
+from sosmith.sim.stream_packing import Beats
+
+_POLL_SECONDS = 0.05
+_LOG_TAIL = 12  # lines of the log that an error shows
+
+
+@dataclass(frozen=True, kw_only=True)
+class CocotbBench:
+    """A bench under cocotb, which also checks the rules of AXI4-Stream.
+
+    Attributes
+    ----------
+    source : Path
+        The SystemVerilog file.
+    interface : InterfaceFacts
+        Streams and clocks of the core.
+    build_dir : Path
+        Folder for the simulation; an unchanged core is not built again.
+    simulator : str
+        ``"verilator"`` or ``"icarus"``.
+    seed : int
+        Seed of the handshakes.
+    idle, stall : float
+        Share of clocks without input and with the output held up, 0 to below 1.
+    waves : bool
+        Leave a waveform in `build_dir`.
+    """
+
+    source: Path
+    interface: InterfaceFacts
+    build_dir: Path
+    simulator: str = "verilator"
+    seed: int = 1
+    idle: float = 0.3
+    stall: float = 0.3
+    waves: bool = False
+
+    @property
+    def name(self) -> str:
+        """Name of the simulator."""
+        return self.simulator
+
+    def run(self, sent: Beats, progress: Progress) -> BenchRun:
+        """Reset the core, send it all of `sent`, and receive as many beats.
+
+        Raises
+        ------
+        ShortfallError
+            If the core breaks a rule of AXI4-Stream; says which and where.
+        ToolError
+            If a tool is missing or fails.
+        """
+        folder = self.build_dir.resolve() / self.simulator
+        folder.mkdir(parents=True, exist_ok=True)
+        with _plain_path(folder) as plain:
+            tool = find_simulator(self.simulator, plain / "bin")
+            self._write_job(plain, tool)
+            lines = (f"{dest:x} {data:x}" for dest, data in zip(sent.tdest.tolist(), sent.tdata.tolist(), strict=True))
+            (plain / "words.txt").write_text("\n".join(lines), encoding="utf-8")
+            _run(plain, tool, len(sent), progress)
+        outcome = json.loads((folder / "result.json").read_text(encoding="utf-8"))
+        if outcome["failure"] is not None:
+            raise ShortfallError(f"{self.interface.name} in {self.simulator}: {outcome['failure']}")
+        return BenchRun(
+            received=_received(folder),
+            cycles=outcome["clocks"],
+            seconds=outcome["seconds"],
+            tools={
+                self.simulator: tool.version,
+                "cocotb": metadata.version("cocotb"),
+                "python": platform.python_version(),
+            },
+        )
+
+    def _write_job(self, folder: Path, tool: Simulator) -> None:
+        for name in ("result.json", "received.txt", "progress.txt"):
+            (folder / name).unlink(missing_ok=True)
+        inputs, outputs = self.interface.inputs, self.interface.outputs
+        ports = ["aclk", "aresetn", *(f"s_axis_{name}" for name in _signals(inputs))]
+        ports += [f"m_axis_{name}" for name in _signals(outputs)]
+        job = {
+            "folder": str(folder),
+            "source": str(folder / "core.sv"),
+            "top": self.interface.name,
+            "simulator": tool.name,
+            "version": tool.version,
+            "seed": self.seed,
+            "waves": self.waves,
+            "ports": ports,
+        }
+        bench = {
+            "tdest": "tdest" in _signals(outputs),
+            "tuser": "tuser" in _signals(outputs),
+            "seed": self.seed,
+            "idle": self.idle,
+            "stall": self.stall,
+            "latency_cycles": self.interface.latency_cycles,
+            "reset_cycles": self.interface.reset_cycles,
+        }
+        (folder / "core.sv").write_bytes(self.source.read_bytes())
+        (folder / "job.json").write_text(json.dumps(job), encoding="utf-8")
+        (folder / "bench.json").write_text(json.dumps(bench), encoding="utf-8")
+
+
+def _signals(stream: StreamFacts) -> list[str]:
+    """Names of the stream's signals, without prefix."""
+    optional = {"tdest": stream.dest_width > 0, "tuser": bool(stream.flags)}
+    return ["tdata", "tvalid", "tready", *(name for name, present in optional.items() if present)]
+
+
+def _received(folder: Path) -> Beats:
+    lines = (folder / "received.txt").read_text(encoding="utf-8").splitlines()
+    rows = [[int(value, 16) for value in line.split()] for line in lines]
+    dest, data, user = zip(*rows, strict=True) if rows else ((), (), ())
+    return Beats(np.array(dest, dtype=np.int64), np.array(data, dtype=np.uint64), np.array(user, dtype=np.uint8))
+
+
+@contextlib.contextmanager
+def _plain_path(folder: Path) -> Iterator[Path]:
+    """Give a folder that makefiles can build in: `folder`, or a passing one if its path has a space or the like."""
+    if re.fullmatch(r"[\w./+-]+", str(folder)):
+        yield folder
+        return
+    with tempfile.TemporaryDirectory(prefix="sosmith-") as scratch:
+        try:
+            yield Path(scratch)
+        finally:
+            shutil.copytree(scratch, folder, dirs_exist_ok=True)
+
+
+def _run(folder: Path, tool: Simulator, total: int, progress: Progress) -> None:
+    """Run the bench's process to its end, however that comes about; it never outlives this call."""
+    log = folder / "log.txt"
+    command = [sys.executable, "-m", "sosmith.sim.bench_process", str(folder)]
+    with log.open("w", encoding="utf-8") as output:
+        # A session of its own: the simulator's and compilers' processes can be ended all together.
+        process = subprocess.Popen(
+            command,
+            stdout=output,
+            stderr=subprocess.STDOUT,
+            stdin=subprocess.DEVNULL,
+            env=tool.environment,
+            cwd=folder,
+            start_new_session=True,
+        )
+        try:
+            while process.poll() is None:
+                time.sleep(_POLL_SECONDS)
+                with contextlib.suppress(OSError, ValueError):
+                    progress(int((folder / "progress.txt").read_text(encoding="utf-8")), total)
+        finally:
+            if process.poll() is None:
+                os.killpg(process.pid, signal.SIGKILL)
+                process.wait()
+    if not (folder / "result.json").exists():
+        tail = "\n".join(log.read_text(encoding="utf-8", errors="replace").splitlines()[-_LOG_TAIL:])
+        raise ToolError(f"{tool.name} {tool.version} failed; the end of {log}:\n{tail}")
+    progress(total, total)

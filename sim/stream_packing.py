@@ -1,0 +1,118 @@
+"""Codes of a core's ports packed into the beats of its streams and back; samples of channels in a random order."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from sosmith.gen.output.core_facts import StreamFacts
+from sosmith.model.errors import ShortfallError
+from sosmith.model.port import Codes
+
+Order = npt.NDArray[np.int64]
+"""Channel of each sample on a stream, shape (samples * channels,)."""
+
+_BLOCK = 8  # samples of each channel that come in turn, then as many shuffled
+
+
+@dataclass(frozen=True, eq=False)
+class Beats:
+    """Transfers on an AXI4-Stream, in order; arrays of the shape (n,).
+
+    Attributes
+    ----------
+    tdest : ndarray of int64
+        Channel; 0 on a stream without ``tdest``.
+    tdata : ndarray of uint64
+        The bus word.
+    tuser : ndarray of uint8
+        Status; 0 on a stream without ``tuser``.
+    """
+
+    tdest: npt.NDArray[np.int64]
+    tdata: npt.NDArray[np.uint64]
+    tuser: npt.NDArray[np.uint8]
+
+    def __len__(self) -> int:
+        """Count the transfers."""
+        return len(self.tdata)
+
+
+def random_order(samples: int, channels: int, seed: int) -> Order:
+    """Draw an order: blocks with the channels in turn alternate with blocks that are shuffled."""
+    rng = np.random.default_rng(seed)
+    blocks = []
+    for start in range(0, samples, _BLOCK):
+        block = np.tile(np.arange(channels), min(_BLOCK, samples - start))
+        blocks.append(rng.permutation(block) if start // _BLOCK % 2 else block)
+    return np.concatenate(blocks)
+
+
+def pack(codes: Codes, order: Order, stream: StreamFacts) -> Beats:
+    """Pack codes into beats: each field is extended by its sign to whole bytes.
+
+    Parameters
+    ----------
+    codes : int64 array, shape (samples, channels, fields)
+        Codes within the ranges of the ports.
+    order : int64 array, shape (samples * channels,)
+        Channel of each beat; the samples of a channel keep their order.
+    stream : StreamFacts
+        The stream, at most 64 bits wide.
+    """
+    if stream.width > 64:
+        raise ValueError(f"stream must be at most 64 bits wide, not {stream.width}")
+    words = np.zeros(len(order), dtype=np.uint64)
+    for column, field in zip(codes[_turns(order), order].T, stream.fields, strict=True):
+        mask = np.uint64((1 << field.padded) - 1)
+        words |= (column.astype(np.uint64) & mask) << np.uint64(field.offset)
+    return Beats(order, words, np.zeros(len(order), dtype=np.uint8))
+
+
+def unpack(beats: Beats, order: Order, stream: StreamFacts) -> tuple[Codes, npt.NDArray[np.uint8]]:
+    """Return the codes of the beats, shape (samples, channels, fields), and their status, shape (samples, channels).
+
+    Raises
+    ------
+    ShortfallError
+        If the number of beats or a beat's channel is not as in `order`, or a field is not extended by its sign to
+        whole bytes.
+    """
+    _check_channels(beats, order)
+    channels = int(order.max()) + 1
+    shape = (len(order) // channels, channels)
+    codes = np.empty((*shape, len(stream.fields)), dtype=np.int64)
+    status = np.empty(shape, dtype=np.uint8)
+    for number, field in enumerate(stream.fields):
+        column = (beats.tdata >> np.uint64(field.offset) & np.uint64((1 << field.padded) - 1)).astype(np.int64)
+        if field.port.signed:
+            column = np.where(column >> (field.padded - 1), column - (1 << field.padded), column)
+        wrong = np.flatnonzero((column < field.port.lowest) | (column > field.port.highest))
+        if len(wrong):
+            word = int(beats.tdata[wrong[0]])
+            raise ShortfallError(
+                f"{field.port.name} must be extended to whole bytes, not {word:#x} at sample {wrong[0]}"
+            )
+        codes[_turns(order), order, number] = column
+    status[_turns(order), order] = beats.tuser
+    return codes, status
+
+
+def _check_channels(beats: Beats, order: Order) -> None:
+    if len(beats) != len(order):
+        raise ShortfallError(f"{len(order)} samples must come out, not {len(beats)}")
+    wrong = np.flatnonzero(beats.tdest != order)
+    if len(wrong):
+        index = wrong[0]
+        raise ShortfallError(f"m_axis_tdest must be {order[index]}, not {beats.tdest[index]}, at output {index}")
+
+
+def _turns(order: Order) -> npt.NDArray[np.int64]:
+    """Index of each sample within its channel, shape as `order`."""
+    turns = np.empty_like(order)
+    for channel in range(int(order.max()) + 1):
+        own = np.flatnonzero(order == channel)
+        turns[own] = np.arange(len(own))
+    return turns
