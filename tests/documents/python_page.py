@@ -11,8 +11,9 @@ import sosmith
 
 TITLE = """# From Python
 
-Written by `python -m tests.documents.test_documents` from the docstrings; nothing here is typed in, and the tests run every
-example. `import sosmith` loads next to nothing: each name brings what it needs when it is first used. Everything is typed.
+Written by `python -m tests.documents.test_documents` from the docstrings; nothing here is typed in, and the tests run
+every example. `import sosmith` loads next to nothing: each name brings what it needs when it is first used. Everything
+is typed.
 
 """
 
@@ -26,9 +27,8 @@ def page() -> str:
     """Return docs/python.md."""
     names = [*ORDER, *(name for name in sosmith.__all__ if name[0] != "_" and name not in {*ORDER, *ERRORS}), *ERRORS]
     first = inspect.getdoc(importlib.import_module("sosmith.interface")) or ""
-    return (
-        TITLE + _markdown(first.split("\n\n", 1)[1]) + "".join(_entry(name, getattr(sosmith, name)) for name in names)
-    )
+    entries = [_entry(name, getattr(sosmith, name)) for name in names]
+    return TITLE + _markdown(first.split("\n\n", 1)[1]) + "".join(entries)
 
 
 def first_example() -> list[str]:
