@@ -6,7 +6,7 @@
                 ^        ^
              crc[0]   not i_turn
 
-    crc <= {i_turn and crc[0], crc[31:1]} xor (feedback ? 0xEDB88320 : 0)     32 bits, at i_shift
+    crc <= {i_turn and crc[0], crc[31:1]} xor (feedback ? polynomial : 0)     32 bits, at i_shift
     o_bit = not crc[0]
 
 Latency: one clock. Throughput: one bit per clock.

@@ -27,9 +27,8 @@ def page() -> str:
     """Return docs/python.md."""
     names = [*ORDER, *(name for name in sosmith.__all__ if name[0] != "_" and name not in {*ORDER, *ERRORS}), *ERRORS]
     first = inspect.getdoc(importlib.import_module("sosmith.interface")) or ""
-    return (
-        TITLE + _markdown(first.split("\n\n", 1)[1]) + "".join(_entry(name, getattr(sosmith, name)) for name in names)
-    )
+    entries = [_entry(name, getattr(sosmith, name)) for name in names]
+    return TITLE + _markdown(first.split("\n\n", 1)[1]) + "".join(entries)
 
 
 def first_example() -> list[str]:

@@ -10,7 +10,7 @@ from tests.formal.prover import Proof, prove
 from tests.formal.small import port, resonator
 from tests.gen.proven_stages import Format, Ranges, proven_cascade
 
-from sosmith.gen.realizations.registry import WIDE
+from sosmith.gen.realizations.section_format import WIDE
 from sosmith.hdl.pipelined_logic import unique_names
 from sosmith.hdl.stage import PipelinedStage, pipeline_stages
 from sosmith.model.dataflow.datapath import Stage
@@ -19,7 +19,7 @@ from sosmith.model.sections.direct_form import DirectForm1, Product
 
 
 class StatedRanges(Proof):
-    """Every node's code is in its range while its pipeline stage holds a sample; for a BOUND, its operand's code is.
+    """Every node's code is in its range while its pipeline stage holds a sample; of a BOUND, the operand's code is.
 
     Parameters
     ----------
