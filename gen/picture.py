@@ -6,10 +6,13 @@ import io
 import itertools
 import re
 from collections.abc import Callable
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-import matplotlib as mpl
-from matplotlib.figure import Figure
+from sosmith.model.errors import SpecificationError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 FORMATS = ("svg", "png")
 """What a picture can be written as."""
@@ -31,6 +34,20 @@ _DPI = 110
 _COORDINATES = re.compile(r'(?<= )(?:d|x|y|x1|x2|y1|y2|cx|cy|width|height|transform|viewBox)="[^"]*"')
 _IDENTIFIER = re.compile(r'(?<= id=")[a-z][0-9a-f]{10}(?=")')
 _LONG = re.compile(r"-?\d+\.\d{4,}")
+
+
+def format_of(path: Path) -> str:
+    """Return which of `FORMATS` the name of a picture's file asks for.
+
+    Raises
+    ------
+    SpecificationError
+        If its name ends in none of them.
+    """
+    file_format = path.suffix.lower().removeprefix(".")
+    if file_format not in FORMATS:
+        raise SpecificationError(f"{path}: the plot's name must end in .svg or .png, not {path.suffix or 'neither'}")
+    return file_format
 
 
 def picture(
@@ -55,6 +72,9 @@ def picture(
     style : dict, optional
         Parameters of matplotlib beside those of all pictures.
     """
+    import matplotlib as mpl
+    from matplotlib.figure import Figure
+
     with mpl.rc_context(_STYLE | {"svg.hashsalt": name} | (style or {})):
         figure = Figure(figsize=size, dpi=_DPI, layout="constrained")
         paint(figure)

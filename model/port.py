@@ -5,12 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import TYPE_CHECKING
 
-import numpy as np
-import numpy.typing as npt
-
-Codes = npt.NDArray[np.int64]
-Values = npt.NDArray[np.float64]
+if TYPE_CHECKING:
+    from sosmith.model.arrays import Codes, Values
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,7 +88,7 @@ class Port:
 
     def decode(self, codes: Codes) -> Values:
         """Return the physical values of `codes` in `unit`, in double precision."""
-        return float(self.zero) + float(self.lsb) * codes.astype(np.float64)
+        return float(self.zero) + float(self.lsb) * codes.astype("float64")
 
     def encode(self, values: Values) -> Codes:
         """Return the codes nearest to physical `values`, saturated to the format.
@@ -100,6 +98,8 @@ class Port:
         ValueError
             If a value is not finite.
         """
+        import numpy as np  # a specification has ports too, and is read without numpy
+
         if not np.all(np.isfinite(values)):
             raise ValueError(f"values of {self.name} must be finite, not {values[~np.isfinite(values)][0]!r}")
         codes = np.floor((np.asarray(values, dtype=np.float64) - float(self.zero)) / float(self.lsb) + 0.5)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -42,6 +41,8 @@ def write_contents(directory: Path, contents: Mapping[str, bytes]) -> list[Path]
                 raise SpecificationError(f"{path}: the output file must be a file, not a folder")
         own = {path.name for path in paths if not path.is_symlink() and (path.is_file() or not path.exists())}
         if own:
+            import tempfile  # only writing needs it
+
             # Unlike tempfile.mkstemp, a file created in a scratch folder has the permissions of the user's umask.
             with tempfile.TemporaryDirectory(prefix=".sosmith-", dir=directory) as scratch:
                 for name in own:

@@ -15,13 +15,12 @@ from fractions import Fraction
 import numpy as np
 import numpy.typing as npt
 
+from sosmith.gen.specification.choices import KINDS
 from sosmith.model.arithmetic.elementary import geometric, log10
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 Band = tuple[float, float]
-
-KINDS = ("lowpass", "highpass", "bandpass", "bandstop")
 
 FLOOR_DB = -400.0
 """Magnitudes below this, such as at a zero on the unit circle, are given as this."""
@@ -151,6 +150,17 @@ def magnitude_db(sos: Array, frequency: Array, sample_rate: float) -> Array:
         denominator = np.hypot(*_polynomial(section[3:], omega))
         total += 20 * log10(np.maximum(numerator, tiny) / np.maximum(denominator, tiny))
     return np.maximum(total, FLOOR_DB)
+
+
+def complex_response(sos: Array, frequency: Array, sample_rate: float) -> Complex:
+    """Complex frequency response; parameters as for `magnitude_db`, `frequency` of any shape."""
+    omega = 2 * np.pi * frequency / sample_rate
+    total = np.ones(omega.shape, dtype=np.complex128)
+    for section in sos:
+        over_real, over_imaginary = _polynomial(section[:3], omega)
+        under_real, under_imaginary = _polynomial(section[3:], omega)
+        total *= (over_real + 1j * over_imaginary) / (under_real + 1j * under_imaginary)
+    return total
 
 
 def group_delay(sos: Array, frequency: Array, sample_rate: float) -> Array:

@@ -22,6 +22,7 @@ import numpy.typing as npt
 from sosmith.gen.realizations.coefficients import Rounding
 from sosmith.gen.realizations.minimum_noise import least_noise, power_of_two_below, unit_gains
 from sosmith.gen.realizations.noise import StateSystem
+from sosmith.model.dataflow.graph import Range
 from sosmith.model.errors import ShortfallError
 from sosmith.model.sections.state_space import Coefficient, StateSpace
 
@@ -160,7 +161,7 @@ def state_space(
     design: Callable[[Row], StateDesign],
     truncating: bool,
     rounding: Rounding,
-    u: tuple[int, int, int],
+    u: Range,
     fracs: Mapping[str, int],
     ranges: Mapping[str, tuple[int, int]],
     wide: tuple[int, int],
@@ -179,8 +180,8 @@ def state_space(
         Whether the states are truncated towards zero, not rounded.
     rounding : Rounding
         Rounds the coefficients.
-    u : tuple of int
-        Fraction bits, smallest and largest code of the input.
+    u : Range
+        Fraction bits and range of the input's code.
     fracs : mapping of str to int
         Fraction bits that are kept of ``x1_sum``, ``x2_sum`` and ``y_sum``. A missing one keeps all where the sum is
         of integer multiples, else as many as the input has.
@@ -202,10 +203,10 @@ def state_space(
     b = tuple(Coefficient(*rounding(f"b{i}", value)) for i, value in enumerate(made.B, start=1))
     c = tuple(Coefficient(*rounding(f"c{i}", value)) for i, value in enumerate(made.C, start=1))
     d = Coefficient(*rounding("d", made.D))
-    x_fracs = [fracs.get(f"x{i + 1}_sum", u[0]) for i in states]
+    x_fracs = [fracs.get(f"x{i + 1}_sum", u.frac) for i in states]
     for i in [*states, *states]:  # twice, as a state that only copies may stand before the one that it copies
         if f"x{i + 1}_sum" not in fracs:
-            x_fracs[i] = _exact_frac([*zip(a[i], x_fracs, strict=True), (b[i], u[0])], u[0])
+            x_fracs[i] = _exact_frac([*zip(a[i], x_fracs, strict=True), (b[i], u.frac)], u.frac)
     try:
         return StateSpace(
             name=name,
@@ -215,12 +216,12 @@ def state_space(
             c=c,
             d=d,
             truncating=truncating,
-            u_frac=u[0],
-            u_low=u[1],
-            u_high=u[2],
+            u_frac=u.frac,
+            u_low=u.low,
+            u_high=u.high,
             x_fracs=tuple(x_fracs),
             x_ranges=tuple(ranges.get(f"x{i + 1}_next", wide) for i in states),
-            y_frac=fracs.get("y_sum", _exact_frac([*zip(c, x_fracs, strict=True), (d, u[0])], u[0])),
+            y_frac=fracs.get("y_sum", _exact_frac([*zip(c, x_fracs, strict=True), (d, u.frac)], u.frac)),
             y_range=ranges.get("y", wide),
         )
     except ValueError as error:

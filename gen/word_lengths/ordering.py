@@ -169,7 +169,9 @@ class _Costs:
 
     def __init__(self, sections: Sequence[NoisySection], scale: Norm, noise: Norm, *, pairing: bool) -> None:
         if not _feasible(sections, pairing=pairing):
-            raise ValueError(f"sections must be few enough for responses of theirs, not {len(sections)}")
+            raise ValueError(
+                f"sections must be so few that their spectra have at most {_MAX_WORK} samples, not {len(sections)}"
+            )
         self._sections = sections
         self._pairing = pairing
         self._scale, self._noise = scale, noise

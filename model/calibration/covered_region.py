@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sosmith.model.arrays import Values
 from sosmith.model.calibration.polynomial import Polynomial
-from sosmith.model.port import Values
 
 GRID = 65
 """Grid points along each axis at which polynomials are compared."""

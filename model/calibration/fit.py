@@ -17,17 +17,15 @@ from pathlib import Path
 
 import numpy as np
 
+from sosmith.model.arrays import Values
+from sosmith.model.calibration.acceptance import REQUIRED_R
 from sosmith.model.calibration.least_squares import Solution, Sums, Term
 from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.errors import SpecificationError
-from sosmith.model.port import Values
 from sosmith.model.tables.csv_table import CsvTable, check_rows, read_csv_table
 
 COLUMNS = ("clearance_mm", "voltage_V", "temperature_C")
 """Columns of a measurement file, in their documented order."""
-
-REQUIRED_R = 0.975
-"""Adjusted r from which a polynomial is accepted (section 2.2 of the paper)."""
 
 MAX_ORDER = 6
 """Highest order tried: 28 terms. The paper needs order 2."""

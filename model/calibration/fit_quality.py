@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sosmith.model.arrays import Values
 from sosmith.model.calibration.covered_region import CoveredRegion
 from sosmith.model.calibration.fit import Fit, Measurements, residuals, root_mean_square, terms_of
 from sosmith.model.calibration.least_squares import Sums
-from sosmith.model.port import Values
 
 CELLS = 10
 """Grid cells along each axis for the share of filled cells."""

@@ -19,8 +19,8 @@ from operator import mul, sub
 
 import numpy as np
 
+from sosmith.model.arrays import Values
 from sosmith.model.calibration.polynomial import Polynomial
-from sosmith.model.port import Values
 
 DIGITS = 150
 """Digits of the decimal arithmetic. A matrix that `MIN_SINE` admits loses about 40 of them."""

@@ -18,18 +18,13 @@ from typing import Any
 
 import openpyxl
 
+from sosmith.model.calibration.acceptance import DEFAULT_RANGES, Range
 from sosmith.model.calibration.fit import COLUMNS
 from sosmith.model.errors import SpecificationError
 from sosmith.model.tables.csv_table import NUMBER, check_separator
 
 DATE_COLUMN = "date"
 """Optional column with the date of each measurement, such as 2024-03-01."""
-
-Range = tuple[float, float]
-"""Lowest and highest valid value."""
-
-DEFAULT_RANGES: tuple[Range, Range, Range] = ((0.0, 16.0), (0.0, 10.0), (0.0, 128.0))
-"""Default ranges of `COLUMNS` in mm, V and degC, as in the example specification."""
 
 _SLIPS: dict[str, tuple[tuple[str, Callable[[float], float]], ...]] = {
     "clearance_mm": (("micrometres", lambda x: x / 1000), ("metres", lambda x: x * 1000)),

@@ -16,8 +16,9 @@ from pathlib import Path
 
 import numpy as np
 
+from sosmith.model.calibration.acceptance import Range
 from sosmith.model.calibration.fit import Measurements
-from sosmith.model.calibration.measurement_files import MeasurementFile, Range, Reading
+from sosmith.model.calibration.measurement_files import MeasurementFile, Reading
 from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.errors import SpecificationError, ToolError
 

@@ -8,13 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
+from sosmith.model.calibration.acceptance import DEFAULT_RANGES, REQUIRED_R, Range
 from sosmith.model.calibration.covered_region import CoveredRegion
-from sosmith.model.calibration.fit import REQUIRED_R, Fit, Measurements, Progress, fit, root_mean_square, untold
+from sosmith.model.calibration.fit import Fit, Measurements, Progress, fit, root_mean_square, untold
 from sosmith.model.calibration.fit_quality import FitQuality, assess
 from sosmith.model.calibration.measurement_files import (
-    DEFAULT_RANGES,
     MeasurementFile,
-    Range,
     Refusal,
     read_measurement_file,
 )

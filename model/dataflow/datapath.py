@@ -12,9 +12,10 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
+from sosmith.model.arrays import Codes
 from sosmith.model.dataflow.compiled import compile_block
 from sosmith.model.dataflow.graph import Graph
-from sosmith.model.port import Codes, Port
+from sosmith.model.port import Port
 
 
 class Stage(Protocol):

@@ -7,8 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import signal
 
+from sosmith.model.arrays import Codes, Values
 from sosmith.model.calibration.polynomial import Polynomial
-from sosmith.model.port import Codes, Port, Values
+from sosmith.model.port import Port
 
 
 def calibrated(codes: Codes, inputs: Sequence[Port], polynomial: Polynomial | None) -> Values:

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from sosmith.model.dataflow.datapath import Datapath, Stage
-from sosmith.model.dataflow.graph import Graph, Node, Op
+from sosmith.model.dataflow.graph import Graph, Node, Op, range_of
 from sosmith.model.port import Port
 from sosmith.model.sections.horner import HornerStep
 
@@ -156,32 +156,19 @@ def _roomy(
             elif stated is not None and index in stated:
                 low, high = stated[index]
             else:
-                low, high = _ends(node, [nodes[i] for i in node.operands], bits.get(index))
+                width = bits.get(index)
+                constant = None if width is None else (-1 << (width - 1), (1 << (width - 1)) - 1)
+                operands = [nodes[i].range for i in node.operands]
+                _, low, high = range_of(_with_spare_bits(node), operands, constant)
             nodes[index] = replace(node, low=low, high=high)
     return replace(graph, nodes=tuple(nodes))
 
 
-def _ends(node: Node, operands: Sequence[Node], bits: int | None) -> tuple[int, int]:
-    constant = (node.parameter, node.parameter) if bits is None else (-1 << (bits - 1), (1 << (bits - 1)) - 1)
-    if node.op is Op.CONSTANT:
-        return constant
-    if node.op in {Op.FRACTION, Op.CLAMP}:
-        return node.low, node.high
-    first = operands[0].low, operands[0].high
-    if node.op is Op.BOUND:
-        return max(node.low << SPARE_BITS, first[0]), min(node.high << SPARE_BITS, first[1])
-    if node.op in {Op.ADD, Op.SUBTRACT}:
-        (a, b), (c, d) = ((o.low << node.frac - o.frac, o.high << node.frac - o.frac) for o in operands)
-        return (a + c, b + d) if node.op is Op.ADD else (a - d, b - c)
-    if node.op in {Op.SCALE, Op.MULTIPLY}:
-        second = constant if node.op is Op.SCALE else (operands[1].low, operands[1].high)
-        products = [x * y for x in first for y in second]
-        return min(products), max(products)
-    if node.op in {Op.FLOOR, Op.TRUNCATE}:
-        shift = operands[0].frac - node.frac
-        up = (1 << shift) - 1 if node.op is Op.TRUNCATE else 0
-        return first[0] >> shift, max(first[1] >> shift, min(first[1] + up >> shift, 0))
-    return first if node.op is not Op.DELAY else (min(first[0], 0), max(first[1], 0))
+def _with_spare_bits(node: Node) -> Node:
+    """Return a BOUND with `SPARE_BITS` more, another node as it is."""
+    if node.op is not Op.BOUND:
+        return node
+    return replace(node, low=node.low << SPARE_BITS, high=node.high << SPARE_BITS)
 
 
 def values_of(datapath: Datapath, loadable: Sequence[Constant]) -> list[int]:

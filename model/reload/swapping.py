@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from sosmith.model.arrays import Codes
 from sosmith.model.dataflow.datapath import Datapath
-from sosmith.model.port import Codes
 
 
 def compute_swapping(first: Datapath, swaps: Sequence[tuple[int, Datapath]], codes: Codes) -> list[int]:

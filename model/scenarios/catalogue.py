@@ -25,6 +25,7 @@ from sosmith.model.scenarios.instrument_signals import (
 )
 from sosmith.model.scenarios.plateaus import stepped_samples
 from sosmith.model.scenarios.run import MIN_SAMPLES, Bench, Emulated, Run
+from sosmith.model.scenarios.summaries import check_scenario
 from sosmith.model.scenarios.worst_case_inputs import all_responses, worst_cases, worst_cases_samples
 from sosmith.model.traces.trace import Trace
 
@@ -40,10 +41,6 @@ class Scenario:
     ----------
     name : str
         Name on the command line.
-    description : str
-        Description in one line.
-    kinds : tuple of str
-        Kinds of core that it is for (`Bench.kind`).
     default_samples : callable
         Returns the default length of the trace for a bench.
     make : callable
@@ -51,8 +48,6 @@ class Scenario:
     """
 
     name: str
-    description: str
-    kinds: tuple[str, ...]
     default_samples: Callable[[Bench], int]
     make: Callable[[Run], Emulated]
 
@@ -82,10 +77,7 @@ def emulate(name: str, bench: Bench, *, seed: int, seconds: float | None = None)
         If no scenario for this kind of core has that name; if the duration is not positive, too short for the scenario
         or above `LIMIT_SAMPLES`; if the seed is negative.
     """
-    fitting = [scenario.name for scenario in SCENARIOS.values() if bench.kind in scenario.kinds]
-    if name not in fitting:
-        core = "a plain filter" if bench.kind == "filter" else "an instrument"
-        raise SpecificationError(f"scenario for {core} must be one of {', '.join(fitting)}, not {name!r}")
+    check_scenario(name, bench.kind)
     if seed < 0:
         raise SpecificationError(f"seed must be 0 or more, not {seed}")
     scenario = SCENARIOS[name]
@@ -117,67 +109,49 @@ SCENARIOS: dict[str, Scenario] = {
     for scenario in (
         Scenario(
             "bench_43_50",
-            "clearance in steps of 1 mm from 1 to 10 mm, 43 to 50 degC (the paper's table 1)",
-            ("instrument",),
             stepped_samples(TABLE_1_STEPS),
             bench_run(TABLE_1_STEPS, (43.0, 50.0)),
         ),
         Scenario(
             "bench_92_96",
-            "clearance in steps of 0.5 or 1 mm from 1 to 10 mm, 92 to 96 degC (the paper's table 2)",
-            ("instrument",),
             stepped_samples(TABLE_2_STEPS),
             bench_run(TABLE_2_STEPS, (92.0, 96.0)),
         ),
         Scenario(
             "temperature_ramp",
-            "20 to 98 degC at a clearance of 5 mm",
-            ("instrument",),
             settlings(10, RAMP_CLEARANCE),
             temperature_ramp,
         ),
         Scenario(
             "wear_ramp",
-            "wear from 2 to 9 mm under vehicle motion at 1.2, 2 and 8 Hz and broadband vibration",
-            ("instrument",),
             settlings(60, WEAR_CLEARANCE[1]),
             wear_ramp,
         ),
         Scenario(
             "worst_case",
-            "extreme codes in the sign pattern that maximizes the filter's output",
-            ("instrument", "filter"),
             lambda bench: worst_cases_samples([bench.impulse_response]),
             lambda run: worst_cases(run, [run.bench.impulse_response]),
         ),
         Scenario(
             "worst_case_errors",
-            "the same for the path of each rounding error through the filter, one after another",
-            ("instrument", "filter"),
             lambda bench: worst_cases_samples(all_responses(bench)),
             lambda run: worst_cases(run, all_responses(run.bench)),
         ),
         Scenario(
             "step",
-            "steps of up to half the range around its middle",
-            ("filter",),
             step_samples,
             step,
         ),
         Scenario(
             "sweep",
-            "sine of 90 % of full scale from zero to 0.49 of the sample rate",
-            ("filter",),
             lambda _bench: 4 * MIN_SAMPLES,
             sweep,
         ),
         Scenario(
             "noise",
-            "white noise, uniform over all codes",
-            ("filter",),
             lambda _bench: 4 * MIN_SAMPLES,
             noise,
         ),
     )
 }
-"""All scenarios by name, in the order in which they are listed to the user."""
+"""How each scenario is made, by name."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sosmith.model.port import Codes, Values
+from sosmith.model.arrays import Codes, Values
 from sosmith.model.scenarios.plateaus import plateaus, stepped_samples
 from sosmith.model.scenarios.run import Bench, Emulated, Run
 

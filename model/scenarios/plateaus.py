@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from sosmith.model.port import Values
+from sosmith.model.arrays import Values
 from sosmith.model.scenarios.run import MAX_SAMPLES, MIN_SAMPLES, Bench, Run
 
 READING_PART = 0.1

@@ -9,9 +9,10 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from sosmith.model.arrays import Codes, Values
 from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.errors import SpecificationError
-from sosmith.model.port import Codes, Port, Values
+from sosmith.model.port import Port
 
 MIN_SAMPLES = 4000
 """Lowest default number of samples of a trace."""

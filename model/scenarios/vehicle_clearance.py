@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from sosmith.model.port import Values
+from sosmith.model.arrays import Values
 from sosmith.model.vehicle.parameters import built_in
 from sosmith.model.vehicle.run import run
 from sosmith.model.vehicle.track import curved_track, tangent_track

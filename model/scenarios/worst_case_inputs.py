@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from sosmith.model.arrays import Codes, Values
 from sosmith.model.calibration.polynomial import Polynomial
-from sosmith.model.port import Codes, Values
 from sosmith.model.scenarios.run import MAX_SAMPLES, MIN_SAMPLES, Bench, Emulated, Run
 
 STRONG_PART = 0.999

@@ -31,19 +31,11 @@ from fractions import Fraction
 from functools import cached_property
 from typing import NamedTuple
 
-from sosmith.model.dataflow.graph import Graph, GraphBuilder, Wire
+from sosmith.model.dataflow.graph import Graph, GraphBuilder, Range, Wire
 from sosmith.model.sections.state_space import Coefficient
 
 LANES = ("upper", "lower")
 """Names of the branches, and of the waves on them."""
-
-
-class Format(NamedTuple):
-    """Fraction bits, smallest and largest code of a signal."""
-
-    frac: int
-    low: int
-    high: int
 
 
 class Adaptor(NamedTuple):
@@ -66,18 +58,18 @@ class Allpass:
     ----------
     adaptors : tuple of Adaptor
         The only adaptor, or the outer and the inner one.
-    states : tuple of Format
-        Format of the wave in each adaptor's delay.
-    inner : Format
-        Format of the wave that the inner adaptor reflects; unused without one.
-    output : Format
-        Format of the output.
+    states : tuple of Range
+        Range of the wave in each adaptor's delay.
+    inner : Range
+        Range of the wave that the inner adaptor reflects; unused without one.
+    output : Range
+        Range of the output.
     """
 
     adaptors: tuple[Adaptor, ...]
-    states: tuple[Format, ...]
-    inner: Format
-    output: Format
+    states: tuple[Range, ...]
+    inner: Range
+    output: Range
 
     def __post_init__(self) -> None:
         if len(self.adaptors) not in {1, 2} or len(self.states) != len(self.adaptors):
@@ -107,13 +99,13 @@ class LatticeStage:
         Name of the stage.
     lanes : tuple of Allpass or None
         The sections in the upper and in the lower branch; None for a wire.
-    entries : tuple of Format
-        Formats of the two waves that arrive, or of the one that drives both branches.
+    entries : tuple of Range
+        Ranges of the two waves that arrive, or of the one that drives both branches.
     """
 
     name: str
     lanes: tuple[Allpass | None, Allpass | None]
-    entries: tuple[Format, ...]
+    entries: tuple[Range, ...]
 
     @cached_property
     def coefficients(self) -> dict[str, tuple[int, int]]:
@@ -159,13 +151,13 @@ class LatticeJoin:
         Name of the stage.
     signs : tuple of int
         s0 and s1, each 1 or -1.
-    entries : tuple of Format
-        Formats of the two waves that arrive.
+    entries : tuple of Range
+        Ranges of the two waves that arrive.
     """
 
     name: str
     signs: tuple[int, int]
-    entries: tuple[Format, Format]
+    entries: tuple[Range, Range]
 
     @property
     def coefficients(self) -> dict[str, tuple[int, int]]:

@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sosmith.model.arithmetic.elementary import exp
-from sosmith.model.port import Values
+from sosmith.model.arrays import Values
 
 REFERENCE_TEMPERATURE = 20.0
 """Temperature in degC at which the parameters hold: the paper's reference temperature."""

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sosmith.model.port import Codes, Port, Values
+from sosmith.model.arrays import Codes, Values
+from sosmith.model.port import Port
 from sosmith.model.random_streams import Streams
 
 

@@ -12,8 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from sosmith.model.arithmetic.elementary import exp
+from sosmith.model.arrays import Values
 from sosmith.model.errors import SpecificationError
-from sosmith.model.port import Values
 
 TEMPERATURE_RANGE = (-270.0, 1372.0)
 """Temperatures in degC at which the emf is defined."""

@@ -6,7 +6,6 @@ a rule about several keys raises `UnfitKeyError`.
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
@@ -16,6 +15,7 @@ from pydantic_core import ErrorDetails
 
 from sosmith.model.errors import SpecificationError
 from sosmith.model.suggestion import did_you_mean
+from sosmith.model.tables.toml_file import read_toml
 
 MAX_BYTES = 1 << 18
 """Largest file size in bytes; real files have a few thousand."""
@@ -62,34 +62,11 @@ def read_tables(path: Path, shape: type[Document]) -> Document:
         If the file cannot be read or is not TOML, and for the first error in its content.
     """
     try:
-        return shape.model_validate(_read_toml(path))
+        return shape.model_validate(read_toml(path, what="the file", max_bytes=MAX_BYTES))
     except ValidationError as error:
         findings = _own(error.errors(include_url=False))
         more = f" (and {len(findings) - 1} more)" if len(findings) > 1 else ""
         raise SpecificationError(f"{path}: {_sentence(shape, findings[0])}{more}") from None
-
-
-def _read_toml(path: Path) -> dict[str, Any]:
-    try:
-        with path.open("rb") as file:
-            content = file.read(MAX_BYTES + 1)
-    except OSError as error:
-        found = (error.strerror or str(error)).lower()
-        raise SpecificationError(f"{path} must be a readable file, not: {found}") from None
-    if len(content) > MAX_BYTES:
-        raise SpecificationError(f"{path} must be at most {MAX_BYTES} bytes, not longer")
-    try:
-        return tomllib.loads(content.decode("utf-8-sig"))
-    except UnicodeDecodeError as error:
-        line = content.count(b"\n", 0, error.start) + 1
-        raise SpecificationError(f"{path}: line {line} must be UTF-8 text") from None
-    except tomllib.TOMLDecodeError as error:
-        problem = str(error)
-        raise SpecificationError(
-            f"{path}: the file must be valid TOML, not a syntax error: {problem[:1].lower()}{problem[1:]}"
-        ) from None
-    except (ValueError, RecursionError):
-        raise SpecificationError(f"{path}: the file must be TOML within reason, not nested or long numbers") from None
 
 
 def _own(findings: list[ErrorDetails]) -> list[ErrorDetails]:

@@ -10,8 +10,9 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from sosmith.model.arrays import Codes, Values
 from sosmith.model.errors import SpecificationError
-from sosmith.model.port import Codes, Port, Values
+from sosmith.model.port import Port
 from sosmith.model.tables.csv_table import CsvTable, check_rows, read_csv_table
 from sosmith.model.text_files import write_files
 from sosmith.model.traces.trace import Trace

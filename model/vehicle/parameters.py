@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from dataclasses import dataclass, field, fields
 from importlib import resources
 from pathlib import Path
@@ -10,6 +9,9 @@ from typing import Any, TypeVar
 
 from sosmith.model.errors import SpecificationError
 from sosmith.model.suggestion import did_you_mean
+from sosmith.model.tables.toml_file import parse_toml, read_toml
+
+_WHAT = "the file of parameters"
 
 MAX_BYTES = 1 << 16
 """Largest file size in bytes; the built-in file has about ten thousand."""
@@ -206,26 +208,16 @@ def load(path: Path) -> Parameters:
         with unit and source, its unit is wrong, its value is not a number in range, or its source has no label; if
         two values contradict each other. The message is one sentence: file, key, what was expected, what was found.
     """
-    try:
-        content = path.read_bytes()
-        if len(content) > MAX_BYTES:
-            raise SpecificationError(f"{path} must be at most {MAX_BYTES:,} bytes long, not {len(content):,}")
-        return parse(content.decode("utf-8-sig"), str(path))
-    except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise SpecificationError(f"{path} must be a readable TOML file ({reason})") from None
-    except UnicodeDecodeError:
-        raise SpecificationError(f"{path} must be a TOML file in UTF-8, not have other bytes") from None
+    tree = read_toml(path, what=_WHAT, max_bytes=MAX_BYTES)
+    return _parameters(tree, str(path))
 
 
 def parse(text: str, name: str) -> Parameters:
     """Read parameters from the text of a file called `name`; raises as `load` does."""
-    try:
-        tree = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise SpecificationError(f"{name} must be valid TOML, not broken ({error})") from None
-    except (ValueError, RecursionError):
-        raise SpecificationError(f"{name} must be TOML within reason, not nested or long numbers") from None
+    return _parameters(parse_toml(text, name, what=_WHAT), name)
+
+
+def _parameters(tree: dict[str, Any], name: str) -> Parameters:
     _check_keys(name, "", tree, list(_TABLES))
     sources: dict[str, str] = {}
     tables = {key: _table(name, key, tree[key], kind, sources) for key, kind in _TABLES.items()}

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from sosmith.model.errors import SpecificationError
+from sosmith.model.vehicle.choices import LEVELS
 from sosmith.model.vehicle.lateral import (
     FRAMES,
     WHEELSETS,
@@ -19,7 +20,7 @@ from sosmith.model.vehicle.linear_motion import Array
 from sosmith.model.vehicle.motion import Motion, clearance_change
 from sosmith.model.vehicle.parameters import Parameters
 from sosmith.model.vehicle.track import Track
-from sosmith.model.vehicle.track_irregularity import LEVELS, Irregularity
+from sosmith.model.vehicle.track_irregularity import Irregularity
 from sosmith.model.vehicle.track_irregularity import irregularity as make_irregularity
 from sosmith.model.vehicle.vertical import vertical_dynamics
 from sosmith.model.vehicle.wheel_rail_contact import creep_coefficients

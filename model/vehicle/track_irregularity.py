@@ -11,9 +11,6 @@ from scipy.interpolate import CubicSpline
 from sosmith.model.vehicle.linear_motion import Array
 from sosmith.model.vehicle.parameters import IrregularityTable
 
-LEVELS = ("low", "high")
-"""Irregularity levels of ERRI B176."""
-
 POINTS = 16
 """Points of a profile per shortest wavelength; the error of its cubic spline is then about 1e-4 of the amplitude."""
 

@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
+from sosmith.model.arrays import Values
 from sosmith.model.errors import SpecificationError
-from sosmith.model.port import Values
 
 MIN_BLOCKS = 8
 """Lowest number of blocks for a rate: with fewer, the interval of a median of slopes has little meaning."""

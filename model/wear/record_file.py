@@ -9,19 +9,14 @@ from pathlib import Path
 
 import numpy as np
 
+from sosmith.model.arrays import Values
 from sosmith.model.errors import SpecificationError
-from sosmith.model.port import Values
 from sosmith.model.tables.csv_table import check_rows, csv_header, read_csv_table
 from sosmith.model.traces.signal_file import unit_of
 from sosmith.model.traces.trace_file import CHANNEL, rows_of_channel
+from sosmith.model.wear.record_columns import CLEARANCES, TIMES
 
 SECONDS_A_DAY = 86400.0
-
-TIMES = {"date": 1.0, "days": 1.0, "time_days": 1.0, "time_d": 1.0, "hours": 1 / 24, "time_h": 1 / 24}
-"""Columns that may hold the time, each with its unit in days; time_s, with 86400 to the day, is handled apart."""
-
-CLEARANCES = ("hardware_mm", "measured_mm", "clearance_mm")
-"""Columns that may hold the clearance in mm; the first one present is used."""
 
 _EPOCH = datetime.datetime(1970, 1, 1, tzinfo=datetime.UTC)
 

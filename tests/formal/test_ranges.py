@@ -10,7 +10,7 @@ from tests.formal.prover import Proof, prove
 from tests.formal.small import port, resonator
 from tests.gen.proven_stages import Format, Ranges, proven_cascade
 
-from sosmith.gen.realizations.registry import WIDE
+from sosmith.gen.realizations.section_format import WIDE
 from sosmith.hdl.pipelined_logic import unique_names
 from sosmith.hdl.stage import PipelinedStage, pipeline_stages
 from sosmith.model.dataflow.datapath import Stage

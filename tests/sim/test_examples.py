@@ -21,7 +21,7 @@ from sosmith.gen.report.evidence import Evidence
 from sosmith.gen.report.report import summarise
 from sosmith.gen.stimuli import bench_of, traces_for
 from sosmith.model.errors import ShortfallError
-from sosmith.model.scenarios.catalogue import SCENARIOS
+from sosmith.model.scenarios.summaries import fitting
 from sosmith.model.traces.trace import Trace
 from sosmith.sim import simulation
 from sosmith.sim.simulation import simulate
@@ -32,7 +32,7 @@ SAMPLES_ASKED = 100_000
 
 
 def scenarios(made: CoreDesign) -> list[str]:
-    return [name for name, scenario in SCENARIOS.items() if bench_of(made).kind in scenario.kinds]
+    return fitting(bench_of(made).kind)
 
 
 def short(trace: Trace, samples: int) -> Trace:

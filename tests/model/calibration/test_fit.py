@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sosmith.model.arrays import Values
 from sosmith.model.calibration.fit import Measurements, candidate_orders, fit, read_measurements
 from sosmith.model.calibration.polynomial import EQUATION_5A, Polynomial
 from sosmith.model.errors import SpecificationError
-from sosmith.model.port import Values
 
 HEADER = "clearance_mm,voltage_V,temperature_C\n"
 

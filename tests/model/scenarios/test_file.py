@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 from tests.model.scenarios.scenario_texts import FAULT, PLAIN
 
+from sosmith.model.arrays import Values
 from sosmith.model.calibration.polynomial import EQUATION_5A
 from sosmith.model.errors import SpecificationError
-from sosmith.model.port import Port, Values
+from sosmith.model.port import Port
 from sosmith.model.scenarios.file import ScenarioFile, emulate_file, load_scenario, range_notes
 from sosmith.model.scenarios.instrument_signals import TABLE_1_STEPS, TABLE_2_STEPS
 from sosmith.model.scenarios.run import Bench

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from sosmith.gen.specification.wear_limits import WearSpec
+from sosmith.model.arrays import Values
 from sosmith.model.errors import SpecificationError
-from sosmith.model.port import Port, Values
+from sosmith.model.port import Port
 from sosmith.model.wear.assessment import WearLimits, WearState, block_medians, judge, last_fall, rate_of
 
 LIMITS = WearLimits(initial=1.5, limit=9, warning=7)
