@@ -12,7 +12,9 @@ from sosmith.gen.fpga.boards import Board
 from sosmith.gen.realizations.registry import REALIZATIONS
 from sosmith.gen.specification.choices import CORES, ERROR_FEEDBACK
 from sosmith.gen.specification.specification import Specification
-from sosmith.gen.word_lengths.quantize import Plan, Quantized, plan, prove, with_realization
+from sosmith.gen.word_lengths.other_realization import with_realization
+from sosmith.gen.word_lengths.quantize import Plan, plan, prove
+from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.gen.word_lengths.selection import Accept, Selection
 from sosmith.model.calibration.fit import Fit, fit, read_measurements
 from sosmith.model.calibration.polynomial import Polynomial

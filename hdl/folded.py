@@ -1,9 +1,42 @@
 """The folded and serial architectures: one multiply-accumulate unit that runs a datapath's program.
 
-Several pipeline work on as many instructions at once: fetch, read, multiply, accumulate; the program keeps an
-instruction that reads a word far enough from the one that stores it (`sosmith.model.dataflow.program.HAZARD`).
-In the folded architecture both memories have a register behind them, for speed. In the serial one they have none,
-for size, the multiplication is done by shifts and additions in the accumulator, and the pipeline wait for it.
+The unit is a pipeline that holds an instruction in each of its stages. Folded, with words of w = digit_bits + 1 bits::
+
+    stage 1                    2                 3                 4                5
+
+    +-----------+ address  +-----------+
+    |  program  |--------->|   words   |--+--> data -----------+
+    |  memory   |          |           |  |     w              v  2w
+    +-----------+      +-->|           |  |                    * ----> product --> + ---> total --+
+      ^    |           |   +-----------+  |                    ^                   ^        |     |
+      |    |           |                  +--> operand ------->+ PRODUCT           +--------+     |
+    counter|           |                  |      w             |                accumulator_bits  |
+           +-----------|------------------|--- constant ------>+ MULTIPLY                         |
+                       |                  |       w                                               |
+                       |                  +--> given0, given1, .. (GIVE) ---> m_axis_tdata        |
+                       |                                                                          |
+                       +--- low digit (STORE), signed low digit (FINISH), w ----------------------+
+                       +--- digit of s_axis_tdata (TAKE), w
+
+An instruction in pipeline stage 1 has been read from the program memory, in 2 it addresses the words, in 3 its word has
+been read, in 4 it is multiplied, and in 5 it is added up, stored or dropped. A word is written three stages after it is
+read, so that an instruction must follow the one that writes its word by `sosmith.model.dataflow.program.HAZARD`.
+
+Serial has three pipeline stages and no multiplier block: the word is addressed in stage 1 and has been read in stage 2,
+and in stage 3 shifts and additions multiply in the accumulator itself, one clock for each bit of the second factor,
+while the pipeline waits.
+
+As an example, the program in `sosmith.model.dataflow.folding`, which computes ``y = floor(3 / 4 y1 + 4 x)`` with digits
+of 4 bits, for x = 7 and y1 = 28 = 12 + 16 * 1. The sample is found at edge 0; at the edges 6 to 13, pipeline stage 5
+holds the instructions 0 to 7::
+
+    edge                    6       7       8       9      10        11       12      13
+    instruction          take  multiply  drop  nothing  multiply  multiply  store  finish
+    product                      12*12                     7*4      1*12
+    total before the edge   0       0     144       9       9        37       49       3
+
+The digits 1 and 3 are stored: y = 1 + 16 * 3 = 49. The program has 16 instructions, so that `m_axis_tvalid` is high at
+edge 16 + 5 = 21.
 """
 
 from __future__ import annotations
@@ -27,61 +60,63 @@ _FOLDED_DEPTH, _SERIAL_DEPTH = 5, 3
 """Pipeline stages from the program memory to the accumulator."""
 
 _NO_COLLISIONS = {"no_rw_check": 1}
-"""Of memories: nobody uses what is read at the clock at which that very word is written.
+"""Attribute of memories: no word is used that is read at the clock at which it is written.
 
-`HAZARD` sees to that, and a bank of the program is not written while it is read. Simulators give the old word. Block
-RAMs give anything, and Yosys, unless told that this will do, puts registers and a comparison around them.
+`HAZARD` keeps the program from doing so, and a bank of the program is not written while it is read. At such a clock a
+simulator reads the old word and a block RAM anything; without the attribute, Yosys adds registers and a comparator to
+make both equal.
 """
 
 
 def latency_cycles(program: Program, *, serial: bool) -> int:
-    """Clocks from the edge that finds a sample to the edge that can hand it on; in serial, at most so many."""
+    """Clocks from the edge that finds a sample to the edge that can hand its result on; in serial, an upper bound."""
     return program.serial_cycles + _SERIAL_DEPTH if serial else len(program.instructions) + _FOLDED_DEPTH
 
 
 _SLICES = {256: 16, 512: 8, 1024: 4, 2048: 2}
-"""Bits that a block RAM of an iCE40 has to a word when it has so many words."""
+"""Width of an iCE40's block RAM, by its number of words."""
 
 
 def reset_cycles(program: Program, channels: int) -> int:
-    """Clocks that the memory takes to be cleared after a reset."""
+    """Clocks after a reset in which the memory is cleared."""
     return memory_depth(program, channels) + (channels > 1)
 
 
 def memory_depth(program: Program, channels: int) -> int:
-    """Words of the memory: those of the program for each channel, the channel's number above the word's."""
+    """Return the number of words of the memory; the upper bits of an address are the channel."""
     return program.words * channels
 
 
 class FoldedCore(wiring.Component):
     """A datapath on one multiply-accumulate unit, for any number of channels in any order.
 
-    Latency: `latency_cycles`. Throughput: one sample of one channel in one clock more. After reset it first clears its
-    memory, one word a clock. A sample is taken as soon as the program has read it: `s_axis_tready` waits for
-    `s_axis_tvalid`, which AXI4-Stream allows. One of a channel that does not exist is taken and dropped.
+    Latency: `latency_cycles`. Throughput: one sample, of any channel, every ``latency_cycles + 1`` clocks. After a
+    reset the core first clears its memory, one word a clock. It accepts a sample once the program has read it:
+    `s_axis_tready` waits for `s_axis_tvalid`, which AXI4-Stream allows. A sample of a channel that does not exist is
+    accepted and dropped.
 
-    With a fingerprint, the program can be loaded anew while the core works: there are two banks for it, and each sample
-    is computed by the one that was active when the core found it.
+    With a fingerprint, the core has two banks for its program, so that another one can be loaded while it works. Each
+    sample is computed by the bank that was active when the core found it.
 
     Parameters
     ----------
     datapath : Datapath
         What it computes.
     program : Program
-        How.
+        The program that computes it.
     serial : bool
         Whether to multiply by shifts and additions instead of a hardware multiplier.
     channels : int
         Number of channels.
     fingerprint : int or None
-        Of the structure, 32 bits; None for a core whose program stays.
+        Fingerprint of the structure, 32 bits; None for a core whose program cannot be loaded.
 
     Members
     -------
     aclk, aresetn, s_axis_*, m_axis_*
-        As of `sosmith.hdl.core.Core`.
+        As in `sosmith.hdl.core.Core`.
     s_axil_*
-        AXI4-Lite slave of `sosmith.hdl.reload.ReloadPort`; only with a fingerprint.
+        AXI4-Lite slave of a `sosmith.hdl.reload.ReloadPort`; only with a fingerprint.
     """
 
     def __init__(
@@ -96,7 +131,7 @@ class FoldedCore(wiring.Component):
         super().__init__(members if fingerprint is None else members | slave_members(ADDRESS_BITS))
 
     def elaborate(self, platform: object) -> Module:
-        """Build the unit around its two memories."""
+        """Build control, pipeline and memories."""
         m = Module()
         m.domains.sync = ClockDomain(local=True)
         m.d.comb += [ClockSignal("sync").eq(self.aclk), ResetSignal("sync").eq(~self.aresetn)]
@@ -117,10 +152,11 @@ class FoldedCore(wiring.Component):
 
     @property
     def _word(self) -> int:
+        """Width of a word."""
         return self.program.digit_bits + 1
 
     def _channel(self, m: Module, busy: Value, dropped: Signal, start: Signal) -> Signal:
-        """Begin with a sample if its channel exists, else drop it; return the channel's number while it is computed."""
+        """Start on a sample if its channel exists, otherwise drop it; return the channel of the sample in work."""
         found = self.s_axis_tvalid & ~busy
         channel = Signal(channel_bits(self.channels))
         if self.channels == 1:
@@ -136,10 +172,10 @@ class FoldedCore(wiring.Component):
     def _control(
         self, m: Module, control: tuple[Signal, Signal, Signal, Signal], channel: Signal
     ) -> tuple[Signal, Signal]:
-        """Count through all words to clear them after reset, and through the program for each sample.
+        """Count through all words after a reset, to clear them, and through the program for each sample.
 
-        While it clears, the channel's number follows the upper half of the count, a clock late: a channel's word 0
-        comes last.
+        While words are cleared, the channel follows the upper bits of the counter a clock late, so that word 0 of a
+        channel is cleared after its others.
         """
         advance, clearing, start, busy = control
         count, bits = len(self.program.instructions), address_bits(self.program)
@@ -162,11 +198,11 @@ class FoldedCore(wiring.Component):
         return counter, fetching
 
     def _is_one(self, address: Value) -> Value:
-        """Whether an address is that of the word of ones, a channel's last one."""
+        """Whether an address is that of the word that always holds 1, the last one of a channel."""
         return address[: address_bits(self.program)].all()
 
     def _reload(self, m: Module, start: Signal, busy: Signal) -> tuple[ReloadPort, Signal] | None:
-        """Return the reload port and the bank that the sample in work uses."""
+        """Return the reload port, and the bank that the sample in work uses."""
         if self.fingerprint is None:
             return None
         depth, bits = len(self.program.instructions), instruction_bits(self.program)
@@ -181,7 +217,7 @@ class FoldedCore(wiring.Component):
     def _fetch(
         self, m: Module, advance: Signal, counter: Signal, fetching: Signal, reload: tuple[ReloadPort, Signal] | None
     ) -> list[PipelinedInstruction]:
-        """Read the program; return the pipeline, the first one holding what has just been read."""
+        """Read the program; return the instructions in the pipeline stages, the one just read first."""
         codes = [encoded(instruction, self.program) for instruction in self.program.instructions]
         if reload is not None:
             codes += [0] * ((1 << (len(codes) - 1).bit_length()) - len(codes))
@@ -213,7 +249,7 @@ class FoldedCore(wiring.Component):
         return pipeline
 
     def _accumulate(self, m: Module, advance: Signal, pipeline: list[PipelinedInstruction], read: Signal) -> Signal:
-        """Multiply the word read at the last rank but one, and add the product up at the last."""
+        """Multiply in the last pipeline stage but one, add up in the last; return the accumulator."""
         *_, present, last = pipeline
         operand = Signal(signed(self._word), reset_less=True)
         factor = Signal(signed(self._word))
@@ -225,7 +261,7 @@ class FoldedCore(wiring.Component):
         if self.serial:
             self._multiply_serially(m, total, (read, factor), (advance, multiplies))
         else:
-            # No one else looks at this register, so that it can be the multiplier block's own.
+            # Nothing else reads this register, so that it can be the one inside the multiplier block.
             data = Signal(signed(self._word), reset_less=True)
             product = Signal(signed(2 * self._word), reset_less=True)
             m.d.comb += advance.eq(1)
@@ -245,7 +281,7 @@ class FoldedCore(wiring.Component):
         values: tuple[Signal, Signal, Signal, Signal],
         pipeline: list[PipelinedInstruction],
     ) -> None:
-        """Read the words that instructions are about, and write those that they store."""
+        """Read the words at the instructions' addresses, and write those that they store."""
         (advance, clearing), (counter, total, read, channel) = control, values
         first, last = pipeline[0 if self.serial else 1], pipeline[-1]
         take = last.has(Opcode.TAKE)
@@ -264,14 +300,14 @@ class FoldedCore(wiring.Component):
         m.d.comb += read.eq(word)
 
     def _reading(self, pipeline: list[PipelinedInstruction]) -> PipelinedInstruction:
-        """Instruction that the word just read is about."""
+        """Return the instruction whose word has just been read."""
         return pipeline[-2 if self.serial else -3]
 
     def _memory(self, m: Module, read: tuple[Value, Value], write: tuple[Value, Value, Value]) -> Value:
         """Make the memory of all channels; return the word read.
 
-        It is cut into slices as wide as a block RAM is where it has that many words: side by side they need no logic,
-        as blocks behind each other would.
+        It is cut into slices as wide as a block RAM of so many words. Block RAMs side by side need no logic; behind
+        each other they would.
         """
         words, depth = self.program.words, memory_depth(self.program, self.channels)
         width = next((bits for most, bits in _SLICES.items() if depth <= most), _SLICES[max(_SLICES)])
@@ -292,9 +328,13 @@ class FoldedCore(wiring.Component):
         return Cat(*slices)
 
     def _hand_out(
-        self, m: Module, control: tuple[Signal, Signal], values: tuple[Signal, Signal, Signal], pipeline: list[PipelinedInstruction]
+        self,
+        m: Module,
+        control: tuple[Signal, Signal],
+        values: tuple[Signal, Signal, Signal],
+        pipeline: list[PipelinedInstruction],
     ) -> None:
-        """Collect the digits of the result, and what is said about it; the last instruction gives the last digit."""
+        """Collect the digits of the result and its status; the last instruction gives the last digit."""
         (advance, start), (total, read, channel) = control, values
         *_, following, present, last = pipeline
         reading = self._reading(pipeline)
@@ -321,9 +361,10 @@ class FoldedCore(wiring.Component):
     def _multiply_serially(
         self, m: Module, total: Signal, factors: tuple[Value, Value], control: tuple[Signal, Value]
     ) -> None:
-        """Add a product to `total` bit by bit of its second factor, the lowest first, as long as there are any.
+        """Add a product to `total`, one clock for each bit of the second factor, the lowest first, until none is left.
 
-        What is left of a negative factor ends as -1: one subtraction. The first factor moves up at each bit.
+        What is left of a negative factor ends as -1, which takes one subtraction. The first factor is shifted up at
+        each clock.
         """
         word = self.program.digit_bits + 1
         advance, multiplies = control
@@ -338,7 +379,7 @@ class FoldedCore(wiring.Component):
             m.d.sync += [shifted.eq(factors[0]), left.eq(factors[1])]
 
     def _input_digit(self, instruction: PipelinedInstruction) -> Value:
-        """Digit of the input sample, counted through all ports in the order in which the program takes them."""
+        """Return the digit of the input sample that a TAKE asks for; digits are numbered through all ports."""
         graph = self.datapath.stages[0].graph
         digits: list[Value] = []
         ports = zip(fields(self.datapath.inputs), graph.inputs, self.program.inputs, strict=True)
@@ -352,13 +393,14 @@ class FoldedCore(wiring.Component):
         return found
 
     def _split(self, value: Value, location: Location, sign: Value) -> list[Value]:
+        """Return the digits of a value, the lowest first, each as wide as a word."""
         bits = self.program.digit_bits
         whole = Cat(value, *([sign] * max(0, bits * location.digits + 1 - len(value))))
         low = [Cat(whole[bits * k : bits * (k + 1)], Const(0, 1)) for k in range(location.digits - 1)]
         return [*low, whole[bits * (location.digits - 1) : bits * location.digits + 1]]
 
     def _limited(self, given: list[Signal]) -> tuple[Value, Value]:
-        """Return the output code from its digits, limited to the port's range, and whether it had to be."""
+        """Return the output code from its digits, limited to the port's range, and whether it had to be limited."""
         bits, output = self.program.digit_bits, self.datapath.output
         value = Cat(*(digit[:bits] for digit in given), given[-1][-1]).as_signed()
         graph = self.datapath.stages[-1].graph
@@ -367,7 +409,7 @@ class FoldedCore(wiring.Component):
         above: Value = Const(0, 1)
         code: Value = value
         if last.op is Op.CLAMP:
-            if self.fingerprint is None:  # another program may have other ranges
+            if self.fingerprint is None:  # a program loaded later may have other ranges
                 node = graph.nodes[last.operands[0]]
                 value = value[: node.width + (not node.signed)].as_signed()
             below, above = limits(last, value)

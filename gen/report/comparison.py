@@ -10,9 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from sosmith.gen.quantity import decibels, plain_number, quantity
-from sosmith.gen.report.page import both_widths, page, text
+from sosmith.gen.report.page import Figure
 from sosmith.gen.report.plots import NARROW, WIDE, ranking_figure
 from sosmith.model.errors import SpecificationError
+from sosmith.model.templates import render
 
 Report = Mapping[str, Any]
 
@@ -196,55 +197,30 @@ def column_names(reports: Sequence[Report]) -> list[str]:
     ]
 
 
-def _cell(row: Row, index: int) -> str:
-    words = text(row.cells[index])
-    if row.key == "passed":
-        kind, mark = ("pass", "✓") if row.values[index] else ("fail", "✗")
-        return f'<td><span class="badge {kind}">{mark} {words}</span></td>'
-    if index in row.best:
-        return f'<td class="best">{words} <span title="best of the row">★</span></td>'
-    return f"<td>{words}</td>"
-
-
-def _table(reports: Sequence[Report]) -> str:
-    titles = "".join(f'<th scope="col">{text(name)}</th>' for name in column_names(reports))
-    lines = [
-        f'<tr><th scope="row">{text(row.title)}</th>{"".join(_cell(row, i) for i in range(len(reports)))}</tr>\n'
-        for row in compare(reports)
-        if row.key != "name"
-    ]
-    return (
-        f'<div class="scroll"><table>\n<thead><tr><th></th>{titles}</tr></thead>\n'
-        f"<tbody>\n{''.join(lines)}</tbody>\n</table></div>\n"
-    )
-
-
-def _ranking(reports: Sequence[Report]) -> str:
-    """Figure of the largest errors, or an empty text where units differ."""
+def _ranking(reports: Sequence[Report]) -> Figure | None:
+    """Figure of the largest errors, or None where units differ."""
     units = {report["error"]["unit"] for report in reports}
     if len(units) > 1 or len(reports) < 2:
-        return ""
+        return None
     rows = [
         (name, float(report["error"]["max_abs"]), "hardware" if report["passed"] else "limit")
         for name, report in zip(column_names(reports), reports, strict=True)
     ]
     unit = units.pop()
-    drawing = both_widths(ranking_figure(rows, [], unit, WIDE), ranking_figure(rows, [], unit, NARROW))
-    return (
-        f"<h2>The largest errors</h2>\n<figure>\n{drawing}<figcaption>Blue passed, orange falls "
-        "short. Mind the scale: each grid line is a step by the same factor.</figcaption></figure>\n"
+    return Figure(
+        drawing=ranking_figure(rows, [], unit, WIDE),
+        narrow=ranking_figure(rows, [], unit, NARROW),
+        caption="Blue passed, orange falls short. Mind the scale: each grid line is a step by the same factor.",
     )
 
 
 def comparison_page(reports: Sequence[Report]) -> str:
     """One HTML page that stands alone, with all reports side by side."""
-    passed = sum(bool(report["passed"]) for report in reports)
-    total = len(reports)
-    verdict = "All of them passed." if passed == total else f"{passed} of {total} passed."
-    body = (
-        f'<header>\n<p class="eyebrow">Comparison of {total} accuracy reports</p>\n'
-        f"<h1>Side by side</h1>\n"
-        f'<p class="lede">{verdict} A star marks the best of a row, where the units agree.</p>\n</header>\n'
-        f"{_table(reports)}{_ranking(reports)}"
+    return render(
+        "sosmith.gen.report",
+        "comparison.html.jinja",
+        names=column_names(reports),
+        passed=sum(bool(report["passed"]) for report in reports),
+        rows=compare(reports),
+        ranking=_ranking(reports),
     )
-    return page("Accuracy reports side by side", body)

@@ -1,12 +1,10 @@
 """The specification: a TOML file in physical units, read exactly and checked before anything is built.
 
-Every number stays exact (`Fraction`) as written. What this version does not carry out yet is refused by name.
+Every number stays exact (`Fraction`) as written. Known values that this version does not support are refused by name.
 """
 
 from __future__ import annotations
 
-import re
-import tomllib
 from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
@@ -18,6 +16,7 @@ from sosmith.gen.specification.values import UnfitError
 from sosmith.gen.specification.wear_limits import WearSpec
 from sosmith.model.errors import SpecificationError
 from sosmith.model.port import Port
+from sosmith.model.tables.toml_file import read_toml
 
 if TYPE_CHECKING:
     from sosmith.gen.specification.schema import Document, FilterTable, InputTable, OutputTable
@@ -88,13 +87,13 @@ class HardwareSpec:
     Attributes
     ----------
     realization : str
-        "auto", "df1", "df1_ef1" or "df1_ef2".
+        "auto" or a key of `sosmith.gen.realizations.registry.REALIZATIONS`.
     architecture : str
         "auto", "parallel", "folded" or "serial".
     clock : Fraction
         In Hz, at least the sample rate.
     reload : bool
-        Whether coefficients are loadable at run time; False so far.
+        Whether coefficients can be loaded at run time.
     """
 
     realization: str
@@ -159,7 +158,10 @@ def load(path: Path) -> Specification:
         For the first thing that is wrong, in one sentence: the file, the path of the key or the line, what
         would be right and what was found.
     """
-    return from_tree(_read_toml(path), path)
+    tree = read_toml(path, what="the specification", max_bytes=MAX_BYTES, parse_float=Decimal)
+    if not tree:
+        raise SpecificationError(f"{path}: the specification must hold the keys of a specification, not nothing")
+    return from_tree(tree, path)
 
 
 def from_tree(tree: dict[str, Any], path: Path) -> Specification:
@@ -192,48 +194,6 @@ def from_tree(tree: dict[str, Any], path: Path) -> Specification:
 def example() -> str:
     """Return the commented example specification, TOML."""
     return Path(__file__).with_name("example.toml").read_text(encoding="utf-8")
-
-
-def _read_toml(path: Path) -> dict[str, Any]:
-    """Read the file as a dict with every float as `Decimal`."""
-    try:
-        with path.open("rb") as file:
-            content = file.read(MAX_BYTES + 1)
-    except OSError as error:
-        found = (error.strerror or str(error)).lower()
-        raise SpecificationError(f"{path}: the specification must be a readable file, not: {found}") from None
-    except ValueError:
-        raise SpecificationError(f"{str(path)!r} must be the path of a file, not an impossible one") from None
-    if len(content) > MAX_BYTES:
-        raise SpecificationError(f"{path}: the specification must be at most {MAX_BYTES} bytes, not longer")
-    try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = content.count(b"\n", 0, error.start) + 1
-        raise SpecificationError(
-            f"{path}: line {line} must be UTF-8 text, not the byte 0x{content[error.start]:02x}"
-        ) from None
-    try:
-        tree = tomllib.loads(text, parse_float=Decimal)
-    except tomllib.TOMLDecodeError as error:
-        raise SpecificationError(f"{path}: {_syntax_error(str(error), text)}") from None
-    except (ValueError, ArithmeticError, RecursionError):
-        # Python's own limits: 4300 digits of an int, 18 of an exponent, some hundred lists in one another.
-        raise SpecificationError(
-            f"{path}: the specification must be TOML within reason, not lists some hundred deep"
-            " or a number too long to read"
-        ) from None
-    if not tree:
-        raise SpecificationError(f"{path}: the specification must hold the keys of a specification, not nothing")
-    return tree
-
-
-def _syntax_error(message: str, text: str) -> str:
-    """Put tomllib's message "Problem (at line 3, column 7)" into our words."""
-    problem, _, place = message.removesuffix(")").rpartition(" (at ")
-    if not re.fullmatch(r"line \d+, column \d+", place):
-        place = f"line {max(len(text.splitlines()), 1)}"  # "end of document"
-    return f"{place} must be valid TOML, not a syntax error: {problem[:1].lower()}{problem[1:]}"
 
 
 def _specification(path: Path, tree: dict[str, Any], document: Document) -> Specification:

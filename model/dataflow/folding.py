@@ -1,13 +1,71 @@
-"""Folds a datapath into a program for one multiply-accumulate unit, the schedule of folded and serial hardware.
+"""Folds a datapath into a program for one multiply-accumulate unit, which folded and serial hardware run.
 
-A sum of products is computed column by column, the lowest first; when a column is complete its low digit is stored and
-the rest carried on by a shift. Dropping a column instead of storing it is the floor that the datapath asks for, so
-nothing is approximate here.
+::
 
-Each value that has to exist is stored with just those fraction bits that bring a quantizer's cut between two
-digits: ``floor(v)`` is then the upper digits of v and what it drops the lower ones, at no cost.
+    graphs of the stages       stored values           sums               columns            instructions
+    +------------------+   +-----------------+   +---------------+   +-----------------+   +---------------+
+    | x, y1, *, +,     |-->| ports, states,  |-->| multiples of  |-->| products digit  |-->| MULTIPLY ..   |
+    | floor, ..        |   | what is cut or  |   | stored digits |   | by digit, by    |   | DROP or STORE |
+    |                  |   | multiplied      |   | and a constant|   | their weight    |   | .. FINISH     |
+    +------------------+   +-----------------+   +---------------+   +-----------------+   +---------------+
 
-The program is made from the graphs of the datapath's stages and nothing else, and computes the same codes.
+- A value is stored if it is a port or a state, or if it is cut, delayed or multiplied as a whole. It gets just enough
+  fraction bits to bring a quantizer's cut between two of its digits: ``floor(v)`` is then the upper digits of v, and
+  what it drops the lower ones, at no cost.
+- A sum is computed column by column, the lowest first. When a column is complete, its low digit is stored and the rest
+  is carried on by a shift. To drop the digit instead is the floor that the datapath asks for, so nothing is
+  approximate.
+- Values that are not needed at the same time share words (`sosmith.model.dataflow.word_reuse`).
+
+The program is made from the graphs alone and computes the same codes.
+
+As an example, ``y(n) = floor(3 / 4 y(n-1) + 4 x(n))`` with digits of 4 bits. x takes one digit, y and its state y1 two:
+
+>>> from types import SimpleNamespace
+>>> from sosmith.model.dataflow.graph import GraphBuilder
+>>> from sosmith.model.port import Port
+>>> g = GraphBuilder()
+>>> x = g.input("x", frac=0, low=-8, high=7)
+>>> y1 = g.delay("y1", frac=0, low=-128, high=127)
+>>> y = g.floor(g.add(g.shift(x, 2), g.scale(y1, 3, frac=2)), frac=0, name="y")
+>>> g.connect(y1, y)
+>>> section = SimpleNamespace(name="section", graph=g.build([y]))
+>>> ports = [Port.from_range(name, bits, Fraction(-1), Fraction(1), signed=True) for name, bits in (("x", 4), ("y", 8))]
+>>> datapath = Datapath(name="example", inputs=(ports[0],), output=ports[1], stages=(section,))
+>>> made = program(datapath, digit_bits=4)
+>>> [(at.name, at.address, at.digits) for at in made.locations]
+[('section.y1', 0, 2), ('section.x', 2, 1), ('section.y', 2, 2)]
+
+3 / 4 is 12 / 16: the products of y1 begin one column below y, which is dropped. 4 is 64 / 16, whose digits are 0 and 4:
+the product of x begins in the column of y's low digit. x is dead once it has been multiplied, so y takes its word:
+
+>>> for number, (opcode, address, constant) in enumerate(made.instructions):
+...     print(f"{number:2}  {opcode.mnemonic:8} {address}  {constant:2}")
+ 0  take     2   0
+ 1  multiply 0  12
+ 2  drop     0   0
+ 3  nothing  0   0
+ 4  multiply 2   4
+ 5  multiply 1  12
+ 6  store    2   0
+ 7  finish   3   0
+ 8  nothing  0   0
+ 9  nothing  0   0
+10  multiply 2   1
+11  store    0   0
+12  multiply 3   1
+13  finish   1   0
+14  give     2   0
+15  give     3   1
+
+The instructions 10 to 13 copy y to its state; a NOTHING keeps one that reads a word far enough from the one that stores
+it. Three samples, by the program and by the graph:
+
+>>> words = made.reset()
+>>> [made.step([code], words, [0]).code for code in (7, 7, -8)]
+[28, 49, 4]
+>>> datapath.compute_exact([[7], [7], [-8]])
+[28, 49, 4]
 """
 
 from __future__ import annotations
@@ -24,7 +82,7 @@ from sosmith.model.dataflow.word_reuse import LiveRange, WordBlock, packed
 
 
 class FoldingError(ValueError):
-    """The datapath has an operation that one multiply-accumulate unit cannot do."""
+    """The datapath cannot be computed by one multiply-accumulate unit."""
 
 
 def program(datapath: Datapath, digit_bits: int, *, like: Program | None = None) -> Program:
@@ -35,15 +93,15 @@ def program(datapath: Datapath, digit_bits: int, *, like: Program | None = None)
     datapath : Datapath
         What is to be computed.
     digit_bits : int
-        Bits of a digit, one less than the multiplier has.
+        Bits of a digit: one less than those of a factor of the multiplier.
     like : Program or None
-        A program that this one is to take over from at any sample, in the same hardware and with its states: locations
-        of the same name get at least as many digits.
+        A program that the new one must be able to take over from at any sample, in the same hardware and with its
+        states: a location gets at least as many digits as the one of the same name.
 
     Raises
     ------
     FoldingError
-        If the datapath has an operation that cannot be folded, or the program cannot take over from `like`.
+        If the datapath has an operation that cannot be folded, or the new program cannot take over from `like`.
     """
     kept = {} if like is None else {location.name: location.digits for location in like.locations}
     least = 0 if like is None else like.words
@@ -55,7 +113,13 @@ def program(datapath: Datapath, digit_bits: int, *, like: Program | None = None)
 
 
 def _check_can_take_over(made: Program, like: Program) -> None:
-    """Check that states lie where they lay, that ports have as many digits, and that everything else has room."""
+    """Check that states and ports are stored alike, and that the rest fits the hardware.
+
+    Raises
+    ------
+    FoldingError
+        If one of them does not.
+    """
     for what, new, old in (
         ("digit_bits", made.digit_bits, like.digit_bits),
         ("its states", _states(made), _states(like)),
@@ -73,7 +137,7 @@ def _check_can_take_over(made: Program, like: Program) -> None:
 
 
 def _states(made: Program) -> list[tuple[str, int, int, int]]:
-    return [(location.name, location.address, location.digits, location.frac) for location in made.locations if location.is_state]
+    return [(at.name, at.address, at.digits, at.frac) for at in made.locations if at.is_state]
 
 
 def _forms(locations: Sequence[Location]) -> list[tuple[int, int]]:
@@ -89,6 +153,7 @@ class _Flat(NamedTuple):
 
 
 def _flattened(datapath: Datapath) -> _Flat:
+    """Join the stages' graphs: the inputs of each become the outputs of the one before."""
     nodes: list[Node] = []
     inputs: list[int] = []
     passed: list[int] = []
@@ -115,7 +180,7 @@ def _flattened(datapath: Datapath) -> _Flat:
 
 
 class _Term(NamedTuple):
-    """Digits `first` to ``first + length - 1`` of the stored value `value`, times the stored value `other` if not -1."""
+    """Digits of a stored value: `length` of them from `first` on; times the stored value `other`, unless that is -1."""
 
     value: int
     first: int
@@ -128,7 +193,7 @@ _Sum = dict[_Term, Fraction]
 
 
 class _Folding:
-    """Works out what to store, where, and in which order to compute it."""
+    """Decides which values to store, where, and in which order to compute them."""
 
     def __init__(
         self, flat: _Flat, digit_bits: int, kept: Mapping[str, int], calibrated: Sequence[tuple[int, int]]
@@ -153,15 +218,15 @@ class _Folding:
         self._one = 0
 
     def program(self, least_words: int) -> Program:
-        """Make the program, for a memory of at least so many words.
+        """Make the program for a memory of at least `least_words` words.
 
-        At first every value has words of its own, and the word of ones comes behind the states.
+        At first every value has words of its own, and the word that always holds 1 follows the states.
         """
         address = states = 0
         for index in sorted(self._stored, key=lambda i: self._nodes[i].op is not Op.DELAY):
             node = self._nodes[index]
             if node.op is not Op.DELAY and address == states:
-                address += 1  # the word of ones
+                address += 1  # the word that always holds 1
             count = self._digits(
                 node.low << (self._fracs[index] - node.frac), node.high << (self._fracs[index] - node.frac)
             )
@@ -203,14 +268,14 @@ class _Folding:
         self._scheduled("output")
 
     def _scheduled(self, name: str) -> None:
-        """Note that all instructions since the last note are about `name`."""
+        """Note that the instructions since the last note compute `name`."""
         start = sum(self._schedule[-1][1:]) if self._schedule else 0
         count = len(self._instructions) - start
         if count:
             self._schedule.append((name, start, count))
 
     def _share_words(self, states: int, least: int) -> int:
-        """Give words to several values where their lives allow it; return how many there are then, a power of two."""
+        """Let values share words where their live ranges allow it; return the number of words, a power of two."""
         uses: dict[int, list[int]] = {}
         for number, (opcode, address, _) in enumerate(self._instructions):
             if opcode not in {Opcode.NOTHING, Opcode.DROP, Opcode.JUDGE}:
@@ -235,7 +300,7 @@ class _Folding:
     # What is stored.
 
     def _find_stored(self) -> set[int]:
-        """Nodes that need a location: ports, states, and whatever is cut, delayed or multiplied as a whole."""
+        """Return the nodes to store: ports, states, and whatever is cut, delayed or multiplied as a whole."""
         stored = {*self._inputs, self._output}
         for index, node in enumerate(self._nodes):
             first = node.operands[0] if node.operands else -1
@@ -256,7 +321,7 @@ class _Folding:
         return {i for i in stored if self._nodes[i].op is not Op.CONSTANT}
 
     def _cut_elsewhere(self) -> set[int]:
-        """FLOOR nodes whose cut does not lie between two digits of the stored value: they need a location of their own."""
+        """Return the FLOOR nodes whose cut is not between two digits of the stored value; they are stored too."""
         return {
             index
             for index, node in enumerate(self._nodes)
@@ -266,7 +331,7 @@ class _Folding:
         }
 
     def _find_fracs(self) -> dict[int, int]:
-        """Fraction bits of each stored code: at least the node's, with its first cut between two digits."""
+        """Return the fraction bits of each stored code: at least its node's, with its first cut between two digits."""
         group = {index: index for index in self._stored}
         for index in self._stored:
             node = self._nodes[index]
@@ -294,6 +359,7 @@ class _Folding:
         return index
 
     def _digits(self, low: int, high: int) -> int:
+        """Return the number of digits that hold the range."""
         count = 1
         while not (-(1 << (self._bits * count)) <= low and high < 1 << (self._bits * count)):
             count += 1
@@ -310,6 +376,7 @@ class _Folding:
         return self._sums[index]
 
     def _definition(self, index: int) -> tuple[_Sum, Fraction]:
+        """Return a node as a sum of stored digits and a constant, from its operands."""
         node = self._nodes[index]
         if node.op is Op.CONSTANT:
             return {}, node.parameter * Fraction(2) ** -node.frac
@@ -334,6 +401,7 @@ class _Folding:
         raise FoldingError(f"the datapath must not {node.op.value} inside to be folded")
 
     def _product(self, a: int, b: int) -> tuple[_Sum, Fraction]:
+        """Return the product of two nodes, one of which may be a constant."""
         for one, other in ((a, b), (b, a)):
             if self._nodes[one].op is Op.CONSTANT:
                 _, factor = self._value(one)
@@ -361,7 +429,7 @@ class _Folding:
     # How they are computed.
 
     def _judge(self, index: int, low: int, high: int) -> None:
-        """Subtract the ends of an input's calibrated range that are not those of its codes, and judge by the sign."""
+        """Compare an input with each end of its calibrated range that is not an end of its codes, by a subtraction."""
         node, location = self._nodes[index], self._locations[index]
         ends = [(low, 1)] * (low > node.low) + [(high, -1)] * (high < node.high)
         for end, sign in ends:
@@ -371,14 +439,14 @@ class _Folding:
                 self._emit(*((Opcode.JUDGE,) if k == location.digits - 1 else (Opcode.DROP,)))
 
     def _sum(self, index: int) -> tuple[_Sum, Fraction]:
-        """Return what a stored value is, in terms of others."""
+        """Return a stored value in terms of other stored values."""
         node = self._nodes[index]
         return self._value(node.operands[0]) if node.op in {Op.FLOOR, Op.DELAY} else self._definition(index)
 
     def _in_order(self) -> Iterator[int]:
-        """Yield values in the order of the datapath, and states as soon as nothing needs what they held before.
+        """Yield values in the order of the datapath, and each state as soon as nothing needs its old value any more.
 
-        The sooner, the shorter the lives of the values that states come from.
+        The sooner that is, the shorter the live range of the value that the state is copied from.
         """
         read = {
             i: {value for term in self._sum(i)[0] for value in (term.value, term.other)}
@@ -401,7 +469,7 @@ class _Folding:
                 yield values.pop(0)
 
     def _evaluate(self, location: Location, total: _Sum, constant: Fraction) -> None:
-        """Emit the columns of a sum, the lowest first, and store those from the location's own on."""
+        """Emit the columns of a sum, the lowest first; drop those below the lowest digit of `location`."""
         terms: list[tuple[_Term, int, Fraction]] = []
         for term, weight in total.items():
             stored = self._locations[term.value]
@@ -430,10 +498,10 @@ class _Folding:
                 self._emit(Opcode.FINISH, location.address + column - below)
 
     def _add_to_column(self, instructions: list[Instruction], column: int, columns: list[list[Instruction]]) -> None:
-        """Put instructions into their column.
+        """Add instructions to a column.
 
-        FINISH keeps ``digit_bits + 1`` bits, so that of a product one column above the top only the lowest bit
-        counts, and nothing of those farther up; the value is known to fit.
+        The value is known to fit its location, and FINISH keeps ``digit_bits + 1`` bits of the top column. So of a
+        product one column above that, only the lowest bit counts, and nothing of those farther up.
         """
         if column < len(columns):
             columns[column] += instructions
@@ -445,6 +513,7 @@ class _Folding:
                 columns[-1].append(instruction._replace(constant=-1 << self._bits))
 
     def _products(self, term: _Term, factor: int) -> Iterator[tuple[list[Instruction], int]]:
+        """Yield the instructions of a term times a constant, product by product, and the column of each."""
         start = self._locations[term.value].address + term.first
         if term.other < 0:
             for j, digit in enumerate(self._constant_digits(factor)):
@@ -463,7 +532,7 @@ class _Folding:
                 yield pair, i + j + shift // self._bits
 
     def _constant_digits(self, value: int) -> list[int]:
-        """Digits of a constant, balanced about zero, unless one digit does."""
+        """Return the digits of a constant: just one if it fits, otherwise balanced about zero."""
         base, half = 1 << self._bits, 1 << (self._bits - 1)
         digits = []
         while value:
@@ -476,7 +545,7 @@ class _Folding:
         return digits
 
     def _emit(self, opcode: Opcode, address: int = 0, constant: int = 0) -> None:
-        """Append an instruction, and before it what keeps it far enough from the one that stores what it reads."""
+        """Append an instruction, and before it NOTHING until it is far enough from the one that stores its word."""
         if opcode in {Opcode.MULTIPLY, Opcode.OPERAND, Opcode.PRODUCT, Opcode.GIVE}:
             for distance, earlier in enumerate(reversed(self._instructions[-HAZARD + 1 :]), start=1):
                 if earlier.opcode in {Opcode.TAKE, Opcode.STORE, Opcode.FINISH} and earlier.address == address:
@@ -485,7 +554,7 @@ class _Folding:
         self._instructions.append(Instruction(opcode, address, constant))
 
     def _accumulator_bits(self) -> int:
-        """Width by interval arithmetic over the program, every digit taking any value; no less than a word has."""
+        """Return the width, by interval arithmetic with any values of the digits; at least that of a word."""
         base = 1 << self._bits
         tops = {p.address + p.digits - 1: self._top_range(i, p) for i, p in self._locations.items()}
         tops[self._one] = (1, 1)
@@ -507,6 +576,7 @@ class _Folding:
         return max((-least - 1).bit_length(), most.bit_length(), self._bits) + 1
 
     def _top_range(self, index: int, location: Location) -> tuple[int, int]:
+        """Return the range of a value's top digit."""
         node = self._nodes[index]
         shift = location.frac - node.frac - self._bits * (location.digits - 1)
         low, high = (_shifted(end, shift) for end in (node.low, node.high))

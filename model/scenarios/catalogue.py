@@ -1,4 +1,4 @@
-"""Emulated traces by name: the paper's runs on the bench, ramps, vehicle motion, worst cases.
+"""Built-in scenarios by name: the paper's bench runs, ramps, vehicle motion, worst cases.
 
 A scenario turns a `Bench` (the core's ports, sample rate and ideal behaviour) and a seed into a `Trace`,
 the same on every run.
@@ -30,21 +30,21 @@ from sosmith.model.scenarios.worst_case_inputs import all_responses, worst_cases
 from sosmith.model.traces.trace import Trace
 
 LIMIT_SAMPLES = 10_000_000
-"""Samples that a trace may have at all, a guard against a slip in the unit: some hundred megabytes."""
+"""Largest number of samples of a trace (several hundred megabytes), to catch durations in a wrong unit."""
 
 
 @dataclass(frozen=True)
 class Scenario:
-    """A named way to make a trace.
+    """A named generator of traces.
 
     Attributes
     ----------
     name : str
         Name on the command line.
     default_samples : callable
-        Length of the trace for a bench, if none is given.
+        Returns the default length of the trace for a bench.
     make : callable
-        Makes codes, truth and reading of the given length.
+        Generates codes, truth and reading of the given length.
     """
 
     name: str
@@ -52,30 +52,30 @@ class Scenario:
     make: Callable[[Run], Emulated]
 
     def default_seconds(self, bench: Bench) -> float:
-        """Duration of the trace in s, if none is given."""
+        """Return the default duration of the trace in s."""
         return self.default_samples(bench) / float(bench.sample_rate)
 
 
 def emulate(name: str, bench: Bench, *, seed: int, seconds: float | None = None) -> Trace:
-    """Make the trace of the scenario `name` for a core.
+    """Generate the trace of the scenario `name` for a core.
 
     Parameters
     ----------
     name : str
-        A key of `SCENARIOS` that fits the core.
+        A key of `SCENARIOS` that is for this kind of core.
     bench : Bench
         The core.
     seed : int
-        Seed of all noise, 0 or more. Same seed, same trace.
+        Seed of all noise, 0 or more. Equal seeds give equal traces.
     seconds : float, optional
-        Duration; by default long enough for the filter to settle where it matters, and from
-        `MIN_SAMPLES` to `MAX_SAMPLES` long.
+        Duration in s; by default long enough for the filter to settle where needed, with `MIN_SAMPLES` to
+        `MAX_SAMPLES` samples.
 
     Raises
     ------
     SpecificationError
-        If no scenario that fits the core has that name; if the duration is not positive, too short for
-        the scenario or above `LIMIT_SAMPLES`; if the seed is negative.
+        If no scenario for this kind of core has that name; if the duration is not positive, too short for the scenario
+        or above `LIMIT_SAMPLES`; if the seed is negative.
     """
     check_scenario(name, bench.kind)
     if seed < 0:

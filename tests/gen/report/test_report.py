@@ -542,6 +542,16 @@ def page_of(run: Evidence) -> str:
     return render_page(run, summarise(run))
 
 
+def test_texts_are_escaped_once(tmp_path: Path) -> None:
+    """The name of a board stands in the verdict and in the facts about the run."""
+    board = replace(find_board("icebreaker"), title="<Ice> & 'Breaker'")
+    page = page_of(evidence(gates=Netlist(board, tmp_path / "netlist.v", {"SB_LUT4": 952}, "0.70")))
+    words = " ".join(Page(page).words)
+    assert "The simulated netlist for the <Ice> & 'Breaker' agrees with its integer model" in words
+    assert "the netlist for the <Ice> & 'Breaker', iCE40 UP5K: 952 SB_LUT4" in words
+    assert "&amp;lt;" not in page
+
+
 def test_texts_from_outside_are_escaped() -> None:
     """Every text that the page takes, each with markup and its own mark, appears in words and not as markup."""
     nasty = "<script>alert('{}')</script>&amp;\"$x$"

@@ -1,7 +1,9 @@
 """A datapath's program computes what its graphs compute, in the words and the accumulator that it states."""
 
+import doctest
 from dataclasses import replace
 from fractions import Fraction
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ from hypothesis import strategies as st
 from tests.formal.small import limiter
 from tests.gen.designs import ALL, example_design
 
+from sosmith.model.dataflow import folding, word_reuse
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.folding import FoldingError, program
 from sosmith.model.dataflow.program import HAZARD, Instruction, Opcode, Program, digits_of
@@ -75,7 +78,9 @@ def test_constants_and_words_fit_the_multiplier(digit_bits: int) -> None:
     limit = 1 << digit_bits
     assert all(-limit <= constant < limit for _, _, constant in made.instructions)
     assert {address for opcode, address, _ in made.instructions if opcode in WRITES}.isdisjoint({made.one})
-    states = sorted((location for location in made.locations if location.is_state), key=lambda location: location.address)
+    states = sorted(
+        (location for location in made.locations if location.is_state), key=lambda location: location.address
+    )
     ends = [location.address + location.digits for location in states]
     assert [location.address for location in states] == [0, *ends[:-1]]
     assert made.states == ends[-1]
@@ -178,3 +183,10 @@ def test_a_state_keeps_its_digits() -> None:
 def test_the_accumulator_holds_a_word_however_small_the_sums() -> None:
     made = program(limiter(), 15)
     assert made.accumulator_bits == 16
+
+
+@pytest.mark.parametrize("module", [folding, word_reuse])
+def test_the_worked_examples_are_true(module: ModuleType) -> None:
+    results = doctest.testmod(module)
+    assert results.attempted > 0
+    assert results.failed == 0

@@ -125,22 +125,28 @@ def test_slips_are_refused(text: str, message: str) -> None:
 
 
 def test_broken_text_is_refused() -> None:
-    assert refusal("[layout").startswith("loco.toml must be valid TOML, not broken (")
+    assert refusal("[layout").startswith("loco.toml: line 1 must be valid TOML, not a syntax error: ")
     for text in ("a = " + 5000 * "[", "a = " + 5000 * "1"):
-        assert refusal(text) == "loco.toml must be TOML within reason, not nested or long numbers"
+        assert refusal(text) == (
+            "loco.toml: the file of parameters must be TOML within reason, "
+            "not lists some hundred deep or a number too long to read"
+        )
 
 
 def test_what_is_no_readable_text_is_refused(tmp_path: Path) -> None:
     missing = tmp_path / "none.toml"
     with pytest.raises(
-        SpecificationError, match=r"none.toml must be a readable TOML file \(no such file or directory\)$"
+        SpecificationError,
+        match=r"none.toml: the file of parameters must be a readable file, not: no such file or directory$",
     ):
         load(missing)
     latin = tmp_path / "latin.toml"
     latin.write_bytes(b"# \xe9")
-    with pytest.raises(SpecificationError, match=r"latin.toml must be a TOML file in UTF-8, not have other bytes$"):
+    with pytest.raises(SpecificationError, match=r"latin.toml: line 1 must be UTF-8 text, not the byte 0xe9$"):
         load(latin)
     large = tmp_path / "large.toml"
     large.write_bytes(b"#" * 65_537)
-    with pytest.raises(SpecificationError, match=r"large.toml must be at most 65,536 bytes long, not 65,537$"):
+    with pytest.raises(
+        SpecificationError, match=r"large.toml: the file of parameters must be at most 65536 bytes, not longer$"
+    ):
         load(large)

@@ -1,0 +1,77 @@
+"""TOML files as dicts, with one sentence for whatever keeps a file from being read."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from sosmith.model.errors import SpecificationError
+
+
+def read_toml(path: Path, *, what: str, max_bytes: int, parse_float: Callable[[str], Any] = float) -> dict[str, Any]:
+    """Read a TOML file.
+
+    Parameters
+    ----------
+    path : Path
+        The file, UTF-8 with or without a byte order mark.
+    what : str
+        What the file is, such as "the specification", for messages.
+    max_bytes : int
+        Size from which on a file is refused.
+    parse_float : callable
+        Makes a number of the text of a TOML float.
+
+    Raises
+    ------
+    SpecificationError
+        If the file cannot be read, is longer than `max_bytes`, or is no TOML.
+    """
+    try:
+        with path.open("rb") as file:
+            content = file.read(max_bytes + 1)
+    except OSError as error:
+        found = (error.strerror or str(error)).lower()
+        raise SpecificationError(f"{path}: {what} must be a readable file, not: {found}") from None
+    except ValueError:
+        raise SpecificationError(f"{str(path)!r} must be the path of a file, not an impossible one") from None
+    if len(content) > max_bytes:
+        raise SpecificationError(f"{path}: {what} must be at most {max_bytes} bytes, not longer")
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        raise SpecificationError(
+            f"{path}: line {line} must be UTF-8 text, not the byte 0x{content[error.start]:02x}"
+        ) from None
+    return parse_toml(text, str(path), what=what, parse_float=parse_float)
+
+
+def parse_toml(text: str, name: str, *, what: str, parse_float: Callable[[str], Any] = float) -> dict[str, Any]:
+    """Parse the `text` of a file called `name`; the other parameters are those of `read_toml`.
+
+    Raises
+    ------
+    SpecificationError
+        If the text is no TOML.
+    """
+    try:
+        return tomllib.loads(text, parse_float=parse_float)
+    except tomllib.TOMLDecodeError as error:
+        raise SpecificationError(f"{name}: {_syntax_error(str(error), text)}") from None
+    except (ValueError, ArithmeticError, RecursionError):
+        # Python's own limits: 4300 digits of an int, 18 of an exponent, some hundred lists in one another.
+        raise SpecificationError(
+            f"{name}: {what} must be TOML within reason, not lists some hundred deep or a number too long to read"
+        ) from None
+
+
+def _syntax_error(message: str, text: str) -> str:
+    """Turn tomllib's message "Problem (at line 3, column 7)" into a sentence."""
+    problem, _, place = message.removesuffix(")").rpartition(" (at ")
+    if not re.fullmatch(r"line \d+, column \d+", place):
+        place = f"line {max(len(text.splitlines()), 1)}"  # "end of document"
+    return f"{place} must be valid TOML, not a syntax error: {problem[:1].lower()}{problem[1:]}"

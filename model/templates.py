@@ -1,0 +1,50 @@
+"""Texts from Jinja templates, which lie beside the module that fills them.
+
+Jinja is loaded when the first text is written: most commands write none, and start sooner without it.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib.resources import files
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+
+
+def render(package: str, template: str, **values: Any) -> str:
+    """Fill a template.
+
+    Values are escaped in templates whose names end in ``.html.jinja``, and only there.
+
+    Parameters
+    ----------
+    package : str
+        Package in whose folder the template lies, such as ``"sosmith.gen.report"``.
+    template : str
+        Name of the file.
+    **values
+        What the template names.
+
+    Raises
+    ------
+    jinja2.UndefinedError
+        If the template names something that is not given.
+    """
+    return _environment(package).get_template(template).render(values)
+
+
+@cache
+def _environment(package: str) -> Environment:
+    from jinja2 import Environment, FunctionLoader, StrictUndefined  # noqa: PLC0415 - see the module's docstring
+
+    folder = files(package)
+    return Environment(
+        loader=FunctionLoader(lambda name: folder.joinpath(name).read_text(encoding="utf-8")),
+        autoescape=lambda name: name is not None and name.endswith(".html.jinja"),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
