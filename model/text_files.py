@@ -30,7 +30,7 @@ def write_files(directory: Path, texts: Mapping[str, str]) -> list[Path]:
 def write_contents(directory: Path, contents: Mapping[str, bytes]) -> list[Path]:
     """Write bytes as `write_files` does texts.
 
-    What is no file of its own is not replaced: a link is followed, a device or a pipe is written into.
+    Only regular files are replaced: a link is followed, and a device or a pipe is written to.
     """
     paths = [directory / name for name in contents]
     try:

@@ -23,8 +23,9 @@ BLOCKS = 40
 """Blocks of a record that has too few days for blocks of a day."""
 
 ROUNDING = 1e-9
-"""So far below a limit, in mm, a reading has reached it: doubles of decimal numbers are off by less, and a step of an
-output code is more."""
+"""How far below a limit, in mm, a reading still counts as having reached it.
+
+Doubles of decimal numbers are off by less, and a step of an output code is more."""
 
 MAX_CORRELATION = 0.95
 """Beyond this the deviations are no scatter about a line: an interval can hardly be wide enough."""
