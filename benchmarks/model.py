@@ -21,7 +21,7 @@ from scipy import signal
 
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.specification.specification import load
-from sosmith.model.port import Codes, Values
+from sosmith.model.arrays import Codes, Values
 
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
 CORES = (("audio_lowpass", "filter"), ("flange_wear_bench", "filter"), ("flange_wear_bench", "instrument"))

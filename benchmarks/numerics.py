@@ -1,6 +1,6 @@
 """Measures every realization and writes docs/numerics.md with its plot: `python -m benchmarks.numerics`.
 
-With `--check` nothing is written; the exit status says whether the document is what this run gives.
+With `--check` nothing is written; the exit status tells whether the document is up to date.
 """
 
 from __future__ import annotations
@@ -19,16 +19,18 @@ from scipy import signal
 
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.filter.design import decay_length
+from sosmith.gen.picture import settled
 from sosmith.gen.proof.linear_model import linear_model
 from sosmith.gen.realizations.noise import minimum_gain, second_order_modes
-from sosmith.gen.realizations.registry import REALIZATIONS, SectionFormat
+from sosmith.gen.realizations.registry import REALIZATIONS
+from sosmith.gen.realizations.section_format import SectionFormat
 from sosmith.gen.realizations.state_space import minimum_noise
 from sosmith.gen.specification.specification import load
 from sosmith.gen.stimuli import traces_for
 from sosmith.gen.word_lengths.cost import LUTS_OF_A_BLOCK, cost_of
+from sosmith.model.arrays import Codes
 from sosmith.model.dataflow.graph import Op
 from sosmith.model.errors import ShortfallError
-from sosmith.model.port import Codes
 from sosmith.model.reference.golden import calibrated, filtered
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -43,7 +45,7 @@ SEED = 1
 
 @dataclass(frozen=True)
 class Row:
-    """One realization of one filter, as the table shows it."""
+    """One realization of one filter: a row of the table."""
 
     coefficient_bits: str
     states: str
@@ -55,7 +57,7 @@ class Row:
 
 
 def stimulus(design: CoreDesign) -> Codes:
-    """White noise, both rails and a small step until they have settled, the worst case of every error path."""
+    """Return white noise, both rails and a small step until settled, and the worst cases of all error paths."""
     assert design.quantized.filter is not None
     (port,) = design.datapath.inputs
     settle = len(design.quantized.filter.impulse_response)
@@ -91,7 +93,7 @@ def measure(design: CoreDesign) -> Row:
 
 
 def table(name: str) -> str:
-    """Markdown table of all realizations of one example's filter."""
+    """Return a Markdown table of all realizations of one example's filter."""
     spec = load(ROOT / "examples" / f"{name}.toml")
     lines = [
         f"Allowed: {float(spec.max_error / spec.output.lsb):.4f} LSB.",
@@ -115,7 +117,7 @@ def table(name: str) -> str:
 
 
 def noise_gain(realization: str, cutoff: float) -> float:
-    """Power gain from all quantizers of one unity-gain low-pass section to its output, each of the same variance."""
+    """Return the noise power gain of a unity-gain low-pass section, from all quantizers with equal variance."""
     words = SectionFormat(coefficient_bits=COEFFICIENT_BITS)
     stage = REALIZATIONS[realization].build(published.lowpass(cutoff, QUALITY), words, "section")
     model = linear_model(stage.graph)
@@ -131,7 +133,7 @@ def noise_gain(realization: str, cutoff: float) -> float:
 
 
 def noise_curve(realization: str) -> list[float] | str:
-    """Noise gain in dB at each of the cutoffs, or why there is none."""
+    """Return the noise gain in dB at each cutoff, or the reason why there is none."""
     try:
         return [10 * float(np.log10(noise_gain(realization, cutoff))) for cutoff in CUTOFFS]
     except ShortfallError as error:
@@ -139,12 +141,12 @@ def noise_curve(realization: str) -> list[float] | str:
 
 
 def slope_of(decibels: list[float]) -> float:
-    """Slope in dB per decade of the cutoff, fitted."""
+    """Return the fitted slope in dB per decade of the cutoff."""
     return float(np.polyfit(np.log10(CUTOFFS), decibels, 1)[0])
 
 
 def plot(curves: dict[str, list[float] | str]) -> str:
-    """SVG of noise gain in dB against cutoff, by realization."""
+    """Return an SVG of noise gain in dB against cutoff, by realization."""
     with matplotlib.rc_context({"svg.hashsalt": "sosmith", "svg.fonttype": "none"}):
         figure = Figure(figsize=(8, 5.5), layout="constrained")
         FigureCanvasSVG(figure)
@@ -152,7 +154,7 @@ def plot(curves: dict[str, list[float] | str]) -> str:
         for style, (realization, decibels) in enumerate(curves.items()):
             if isinstance(decibels, str):
                 continue
-            dashes = ("-", "--", "-.", ":")[style % 4]  # curves lie on each other
+            dashes = ("-", "--", "-.", ":")[style % 4]  # curves overlap
             axes.semilogx(CUTOFFS, decibels, dashes, label=f"{realization} ({slope_of(decibels):+.1f} dB/decade)")
         ends = CUTOFFS[[0, -1]]
         for slope in SLOPES:
@@ -164,11 +166,11 @@ def plot(curves: dict[str, list[float] | str]) -> str:
         axes.legend()
         text = io.StringIO()
         figure.savefig(text, format="svg", metadata={"Date": None})
-    return "\n".join(line.rstrip() for line in text.getvalue().splitlines()) + "\n"
+    return settled(text.getvalue())
 
 
 def slope_table(curves: dict[str, list[float] | str]) -> str:
-    """Markdown table of the slopes."""
+    """Return a Markdown table of the slopes."""
     rows = []
     for name, curve in curves.items():
         slope = curve if isinstance(curve, str) else f"{slope_of(curve):+.1f}"
@@ -177,7 +179,7 @@ def slope_table(curves: dict[str, list[float] | str]) -> str:
 
 
 def jenssen_table() -> str:
-    """Markdown table of the figures for a 10th-order cascade, ours beside the published ones."""
+    """Return a Markdown table of the figures for a 10th-order cascade, ours and the published ones."""
     lines = [
         "| structure | noise gain | published | estimated variance | published | simulated variance | published |",
         "|---|---|---|---|---|---|---|",
@@ -192,7 +194,7 @@ def jenssen_table() -> str:
 
 
 def section_table() -> str:
-    """Markdown table of the least noise of sections, at two cutoffs, beside figure and closed form."""
+    """Return a Markdown table of the least noise of sections at two cutoffs, with published figure and closed form."""
     lines = [
         "| order of the filter | Q of the section | gain at 0.0026 | gain at 0.1 | figure | Q^2/2 + 1/8 |",
         "|---|---|---|---|---|---|",
@@ -208,7 +210,7 @@ def section_table() -> str:
 
 
 def order_table() -> str:
-    """Markdown table of the least noise of whole filters beside its figures."""
+    """Return a Markdown table of the least noise of whole filters, with published figures."""
     lines = ["| order | least noise gain | figure |", "|---|---|---|"]
     for order, figure in enumerate(published.BUTTERWORTH_GAINS, start=1):
         lines.append(f"| {order} | {published.butterworth_gain(order):.6f} | {figure:.6f} |")
@@ -216,25 +218,25 @@ def order_table() -> str:
 
 
 def document() -> dict[str, str]:
-    """Texts of the document and its plot, by path from the root."""
+    """Return the texts of the document and its plot, by path from the root."""
     curves = {name: noise_curve(name) for name, realization in REALIZATIONS.items() if realization.cascade}
     sections = "\n\n".join(f"## {name}\n\n{table(name)}" for name in SPECIFICATIONS)
     text = f"""# Numerics of the realizations, side by side
 
-Written by `python -m benchmarks.numerics`; nothing here is typed in. The filter core alone, within the error that its
-specification allows. The bound is proven for every input. "Worst found" is the largest error of the integer model
+Written by `python -m benchmarks.numerics`; no figure is typed in. The filter core alone, within the allowed error of
+its specification. The bound is proven for every input. "Worst found" is the largest error of the integer model
 against the double-precision golden chain on noise, rails, a small step, and the sign-matched worst cases of the whole
-filter and of every quantizer's way to the output. The area is estimated for an ECP5 in the parallel architecture, a
-multiplier block counted as {LUTS_OF_A_BLOCK} LUT4.
+filter and of the path from every quantizer to the output. The area is estimated for an ECP5 in the parallel
+architecture, a multiplier block counted as {LUTS_OF_A_BLOCK} LUT4.
 
 {sections}
 
 ## Rounding noise against the cutoff
 
-One section of Q = {QUALITY:.5f}, every quantizer at the same width: the noise at the output over that of one quantizer.
-Plain direct forms lose 30 dB for each decade that the cutoff goes down. First-order error feedback loses 10, and so
-does the delta form, whose noise is that of its states. Second-order error feedback loses none, nor do state-space forms
-with scaled states, but for the steps of scaling by powers of two.
+One section of Q = {QUALITY:.5f}, every quantizer with the same word length: output noise relative to the noise of one
+quantizer. Plain direct forms lose 30 dB per decade of lower cutoff. First-order error feedback loses 10 dB, and so does
+the delta form, whose noise is that of its states. Second-order error feedback loses nothing, and neither do state-space
+forms with scaled states, apart from the steps of scaling by powers of two.
 
 ![noise gain](images/noise.svg)
 
@@ -242,8 +244,8 @@ with scaled states, but for the steps of scaling by powers of two.
 
 ## Least noise of any structure
 
-With words that hold their states to equal parts, no coordinates of a state space make less noise than
-(sum of the second-order modes)^2 / n: for a Butterworth section Q^2/2 + 1/8, whatever the cutoff.
+If all state words are scaled equally, no state-space coordinates give less noise than
+(sum of the second-order modes)^2 / n: for a Butterworth section Q^2/2 + 1/8, for any cutoff.
 
 {section_table()}
 
@@ -253,8 +255,8 @@ A whole Butterworth low-pass as one system:
 
 ## Jenssen's table
 
-Butterworth low-pass of order 10 at 0.1 of the sample rate, coefficients of 10 bits, words that hold plus or minus
-{published.DELTA:g} standard deviations of their states; gains, and variances in squares of an LSB, beside those
+Butterworth low-pass of order 10 at 0.1 of the sample rate, 10-bit coefficients, state words that hold plus or minus
+{published.DELTA:g} standard deviations of their states; gains, and variances in squares of an LSB, with those
 published (Jenssen, Design of IIR Filters). The simulation runs {published.SAMPLES:,} samples of uniform noise.
 
 {jenssen_table()}

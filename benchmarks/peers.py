@@ -1,6 +1,6 @@
-"""Other projects' filters, put through the same tools: facts to compare with.
+"""Other projects' filters, measured with the same tools, for comparison.
 
-Fifth-order Butterworth low-pass at 1 kHz for 48 kHz and 16 bits in and out, where nothing else is said. Yosys 0.70 and
+Fifth-order Butterworth low-pass at 1 kHz for 48 kHz and 16 bits in and out, unless stated otherwise. Yosys 0.70 and
 nextpnr-ecp5 for an ECP5-85F, out of context, one seed. Widths, throughput and what can be changed at run time differ.
 """
 
@@ -15,15 +15,15 @@ class Peer(NamedTuple):
     Attributes
     ----------
     project : str
-        Name, with the month of the last commit seen.
+        Name, with the month of the last commit measured.
     what : str
         The design.
     luts, carries, flip_flops, multipliers : int
         LUT4, CCU2C, flip-flops, MULT18X18D.
     fmax : float
-        MHz.
+        Highest clock in MHz.
     error : str
-        Largest error seen on steps and a mixed signal against double precision, in output LSB.
+        Largest measured error against double precision, on steps and a mixed signal, in output LSB.
     """
 
     project: str

@@ -1,7 +1,7 @@
-"""Published figures about roundoff noise, and the systems by which they are found again.
+"""Published figures of roundoff noise, and the systems that reproduce them.
 
-Jenssen's table (Design of IIR Filters, robertgj/DesignOfIIRFilters) has the Butterworth low-pass of order 10 and
-cutoff 0.1 of the sample rate, with 10-bit coefficients and states whose words hold `DELTA` standard deviations.
+Jenssen's table (Design of IIR Filters, robertgj/DesignOfIIRFilters) is for the Butterworth low-pass of order 10 and
+cutoff 0.1 of the sample rate, with 10-bit coefficients and state words that hold `DELTA` standard deviations.
 """
 
 from __future__ import annotations
@@ -29,36 +29,36 @@ JENSSEN = {
     "block optimal, extra bits": (1.10, 1.59, 1.59),
     "global optimal": (1.01, 1.43, 1.43),
 }
-"""Noise gain, estimated and simulated variance in units of the square of an LSB, by structure."""
+"""Noise gain, and estimated and simulated variance in squares of an LSB, by structure."""
 
 BUTTERWORTH_GAINS = (
     *(0.25, 0.375, 0.470495, 0.555541, 0.635414, 0.712132),
     *(0.786704, 0.859728, 0.931582, 1.002514, 1.072699, 1.142265),
 )
-"""Least noise gain of a whole Butterworth low-pass of order 1, 2, .., whatever its cutoff: theory notes, 3.6."""
+"""Least noise gain of a whole Butterworth low-pass of order 1, 2, ..., for any cutoff: theory notes, 3.6."""
 
 SECTION_GAINS = {5: (1.434017, 0.315983), 7: (2.649459, 0.446552, 0.278989)}
-"""Least noise gains of the second-order sections by order of the filter, highest quality first: likewise."""
+"""Least noise gains of the second-order sections by order of the filter, highest Q first, from the same notes."""
 
-DELTA = 4.0  # standard deviations of a signal in half the range of its word
+DELTA = 4.0  # half the range of a word over the standard deviation of its signal
 COEFFICIENT = 512.0
 SAMPLES = 1 << 13
 
 
 def lowpass(cutoff: float, q: float) -> Row:
-    """Butterworth low-pass section of quality `q` by the bilinear transformation."""
+    """Return the Butterworth low-pass section of quality factor `q` by the bilinear transform."""
     u = math.tan(math.pi * cutoff)
     a0 = 1 + u / q + u * u
     return u * u / a0, 2 * u * u / a0, u * u / a0, 1.0, 2 * (u * u - 1) / a0, (1 - u / q + u * u) / a0
 
 
 def qualities(order: int) -> list[float]:
-    """Qualities of the second-order sections of a Butterworth filter, highest first."""
+    """Return the quality factors of the second-order sections of a Butterworth filter, highest first."""
     return [1 / (2 * math.sin(math.pi * k / (2 * order))) for k in range(1, order, 2)]
 
 
 def butterworth(order: int) -> StateSystem:
-    """Whole Butterworth low-pass with a cutoff of 0.1 of the sample rate."""
+    """Return a whole Butterworth low-pass with a cutoff of 0.1 of the sample rate."""
     rows = [lowpass(0.1, q) for q in qualities(order)]
     u = math.tan(math.pi * 0.1)
     single = StateSystem(np.array([[(1 - u) / (1 + u)]]), np.ones(1), np.array([2 * u / (1 + u) ** 2]), u / (1 + u))
@@ -66,12 +66,12 @@ def butterworth(order: int) -> StateSystem:
 
 
 def butterworth_gain(order: int) -> float:
-    """Least noise gain of `butterworth`."""
+    """Return the least noise gain of `butterworth`."""
     return minimum_gain(second_order_modes(butterworth(order)))
 
 
 def jenssen_sections(structure: str) -> list[StateSystem]:
-    """Make the sections of a structure of `JENSSEN`, highest quality first; the global optimum is a single one.
+    """Return the sections of a structure in `JENSSEN`, highest Q first; the global optimum is a single section.
 
     Each state is scaled to a standard deviation of 1/DELTA; coefficients are rounded to 1/512.
     """
@@ -92,10 +92,10 @@ def jenssen_sections(structure: str) -> list[StateSystem]:
 
 
 def _globally_optimal(system: StateSystem) -> StateSystem:
-    """Change a system to coordinates of least noise (Hwang 1977).
+    """Transform a system to coordinates of least noise (Hwang 1977).
 
-    In balanced coordinates both Gramians are the diagonal matrix of the modes; plane rotations then make all the
-    entries of the diagonal equal, one in each step.
+    In balanced coordinates both Gramians are the diagonal matrix of the modes; plane rotations then make all
+    diagonal entries equal, one per step.
     """
     lower = np.linalg.cholesky(system.controllability)
     squares, U = np.linalg.eigh(lower.T @ system.observability @ lower)
@@ -115,7 +115,7 @@ def _globally_optimal(system: StateSystem) -> StateSystem:
 
 
 def extra_bits(structure: str) -> Array:
-    """Bits that the states of each section have beyond those of the structure's narrowest, shape (sections,)."""
+    """Return the extra state bits of each section beyond the narrowest section of the structure, shape (sections,)."""
     sections = jenssen_sections(structure)
     if not structure.endswith("extra bits"):
         return np.zeros(len(sections))
@@ -124,16 +124,16 @@ def extra_bits(structure: str) -> Array:
 
 
 def jenssen_gain(structure: str) -> float:
-    """Noise gain with the rounded coefficients."""
+    """Return the noise gain with rounded coefficients."""
     sections = jenssen_sections(structure)
     noise = cascade(sections).noise.reshape(len(sections), -1).sum(axis=1)
     return float(np.sum(noise * 4.0 ** -extra_bits(structure)))
 
 
 def jenssen_estimate(structure: str) -> float:
-    """Variance of the output: ``(DELTA**2 gain + sum over sections of the energy of what follows) / 12``.
+    """Return the output variance: ``(DELTA**2 gain + sum over sections of the energy of the sections after it) / 12``.
 
-    What follows the last section has an energy of 1. With the output's rounding alone, as Jenssen's text has it, it
+    After the last section this energy is 1. With the rounding of the output alone, as in Jenssen's text, the variance
     would be ``(DELTA**2 gain + 1) / 12``.
     """
     sections = jenssen_sections(structure)
@@ -142,7 +142,7 @@ def jenssen_estimate(structure: str) -> float:
 
 
 def jenssen_simulated(structure: str) -> float:
-    """Variance of the output, measured with uniform noise as input."""
+    """Return the output variance, measured with uniform noise as input."""
     sections, extra = jenssen_sections(structure), extra_bits(structure)
     samples = np.random.default_rng(1).random(SAMPLES) - 0.5
     samples = np.round(samples * 1024 / (samples.std() * DELTA))
@@ -151,7 +151,7 @@ def jenssen_simulated(structure: str) -> float:
 
 
 def _simulate(sections: list[StateSystem], samples: Array, extra: Array, *, rounding: bool) -> Array:
-    """Run a cascade whose states and section outputs are rounded to whole LSBs, states to `extra` bits more."""
+    """Run a cascade with section outputs rounded to integers and states to `extra` fraction bits."""
     states = [np.zeros(len(s.B)) for s in sections]
     units = 2.0**-extra
     results = np.empty(len(samples))

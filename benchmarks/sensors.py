@@ -1,6 +1,6 @@
-"""Draws the pictures of docs/sensors.md and renews its tables: `python -m benchmarks.sensors`.
+"""Draws the pictures of docs/sensors.md and regenerates its tables: `python -m benchmarks.sensors`.
 
-With `--check` nothing is written; the exit status says whether document and pictures are what this run gives.
+With `--check` nothing is written; the exit status tells whether document and pictures are up to date.
 """
 
 from __future__ import annotations
@@ -19,11 +19,12 @@ from matplotlib.figure import Figure
 
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.paper.figures import read_paper_figures
+from sosmith.gen.picture import settled
 from sosmith.gen.specification.specification import load
 from sosmith.gen.stimuli import bench_of
+from sosmith.model.arrays import Values
 from sosmith.model.calibration.fit import Fit, Measurements, fit
 from sosmith.model.calibration.polynomial import EQUATION_5A, Polynomial
-from sosmith.model.port import Values
 from sosmith.model.random_streams import streams
 from sosmith.model.reference.accuracy import accuracy_percent
 from sosmith.model.reference.golden import calibrated, filtered
@@ -41,34 +42,34 @@ DOCUMENT = "docs/sensors.md"
 SCENARIOS = ROOT / "examples" / "scenarios"
 SPECIFICATION = ROOT / "examples" / "flange_wear_bench.toml"
 SEEDS = 100
-"""Seeds that the table of accuracies averages, from 0."""
+"""Number of seeds, from 0, over which the accuracy table averages."""
 
 _PAPER = read_paper_figures()
 TABLE_1, TABLE_2, TABLE_4 = (
     tuple(map(float, _PAPER.numbers(table, "error"))) for table in ("table_1", "table_2", "table_4")
 )
-"""Errors as the paper prints them: before the filter at 43 to 50 and at 92 to 96 degC, and after it at 43 to 50."""
+"""Errors printed in the paper: before the filter at 43 to 50 and at 92 to 96 degC, and after it at 43 to 50 degC."""
 
 ADJUSTED_R_SQUARED = {"bench_43_50": 0.9709, "bench_92_96": 0.9706}
-"""Of equations 4 and 5a."""
+"""Adjusted coefficients of determination of equations 4 and 5a, by the run they apply to."""
 
 PRINTED_ACCURACY = {"bench_43_50": (96.1826, 97.2), "bench_92_96": (96.5, None)}
 """The paper's accuracies in per cent, before and after the filter."""
 
 
 def rms(values: Values) -> float:
-    """Root mean square."""
+    """Return the root mean square."""
     return float(np.sqrt(np.mean(values**2)))
 
 
 def slope(clearance: Values, temperature: float) -> Values:
-    """Slope of equation 5a in mm/V at a clearance in mm."""
+    """Return the slope of equation 5a in mm/V at a clearance in mm."""
     V = sensor_voltage(clearance, temperature)
     return np.asarray((EQUATION_5A(V + 1e-6, temperature) - EQUATION_5A(V - 1e-6, temperature)) / 2e-6)
 
 
 def derived(name: str, *, millimetres: bool) -> dict[str, float]:
-    """Errors of a bench run by the paper's figures: noise in V, systematic error and scatter in mm."""
+    """Derive the errors of a bench run from the paper's figures: noise in V, systematic error and scatter in mm."""
     first = np.array(TABLE_1_STEPS)
     scale = np.ones(10) if millimetres else first
     removed = (np.array(TABLE_1) - np.array(TABLE_4)) * scale
@@ -85,14 +86,14 @@ def derived(name: str, *, millimetres: bool) -> dict[str, float]:
 
 
 def bench_files() -> Iterator[tuple[str, str, dict[str, float]]]:
-    """Name of each bench file, what it is called in the table, and its errors by the paper's figures."""
+    """Yield the name of each bench file, its label in the table, and its errors derived from the paper's figures."""
     for name, what in (("bench_43_50", "43 to 50 °C"), ("bench_92_96", "92 to 96 °C")):
         yield name, f"{what}, fractions", derived(name, millimetres=False)
         yield f"{name}_millimetres", f"{what}, millimetres", derived(name, millimetres=True)
 
 
 def readings_table() -> str:
-    """Markdown table of the errors that follow from the paper's figures."""
+    """Return a Markdown table of the errors derived from the paper's figures."""
     lines = [
         "| run, reading of the tables | noise, V rms | systematic error, mm rms | residual of the regression, mm rms "
         "| of a single measurement, mm rms | file |",
@@ -107,14 +108,14 @@ def readings_table() -> str:
 
 
 def measured(design: CoreDesign, trace: Trace, polynomial: Polynomial = EQUATION_5A) -> tuple[Values, Values]:
-    """Clearance in mm before and after the ideal filter."""
+    """Return the clearance in mm before and after the ideal filter."""
     before = calibrated(trace.codes, trace.ports, polynomial)
     assert design.quantized.filter is not None
     return before, filtered(before, design.quantized.filter.sos, design.datapath.output)
 
 
 def accuracy_table(design: CoreDesign) -> str:
-    """Markdown table of the accuracy over seeds, by calibration."""
+    """Return a Markdown table of the accuracy over seeds, by calibration."""
     head = f"| file | calibration | of {SEEDS} seeds | unfiltered, % | the paper's | filtered, % | the paper's |"
     lines = [head, "|---|---|---|---|---|---|---|"]
     for name, _, _ in bench_files():
@@ -142,14 +143,14 @@ def accuracy_table(design: CoreDesign) -> str:
 
 
 def own_calibration(scenario: ScenarioFile, seed: int) -> Fit:
-    """Fit to the measurements of the scenario's depot, as the paper does."""
+    """Fit the scenario's depot measurements, as the paper does."""
     rows = measurements_of(scenario, seed)
     columns = np.array([(row.clearance_mm, row.voltage_V, row.temperature_C) for row in rows]).T
     return fit(Measurements(*columns))
 
 
 def key_table() -> str:
-    """Markdown tables of all keys of a scenario file."""
+    """Return a Markdown table of all keys of a scenario file."""
     lines = ["| key | what it must be | default |", "|---|---|---|"]
     lines += [f"| `{key}` | {what} | {default} |" for key, what, default in _keys(ScenarioDocument, "")]
     return "\n".join(lines)
@@ -176,7 +177,7 @@ def _parts(annotation: object) -> Iterator[type]:
 
 
 def drawn(width: float, height: float, paint: Callable[[Figure], None]) -> str:
-    """Paint a figure and return it as SVG, the same bytes on every run."""
+    """Return a painted figure as SVG, with the same bytes on every run."""
     with matplotlib.rc_context(
         {"svg.hashsalt": "sosmith", "svg.fonttype": "none", "axes.grid": True, "grid.alpha": 0.3}
     ):
@@ -185,11 +186,11 @@ def drawn(width: float, height: float, paint: Callable[[Figure], None]) -> str:
         paint(figure)
         text = io.StringIO()
         figure.savefig(text, format="svg", metadata={"Date": None})
-    return "\n".join(line.rstrip() for line in text.getvalue().splitlines()) + "\n"
+    return settled(text.getvalue())
 
 
 def sensors_picture(figure: Figure) -> None:
-    """Characteristics, the thermocouple's inverse, and systematic errors."""
+    """Draw the sensor characteristics and the error of the thermocouple's inverse."""
     left, right = figure.subplots(1, 2)
     d = np.linspace(0.0, 11.0, 221)
     for name, dashes in (("equation_5a", "-"), ("equation_4", ":"), ("coil", "--")):
@@ -207,7 +208,7 @@ def sensors_picture(figure: Figure) -> None:
 
 
 def scenario_picture(design: CoreDesign, scenario: ScenarioFile, figure: Figure) -> None:
-    """Measured and true clearance and the temperature over one trace."""
+    """Draw measured and true clearance and the temperature over one trace."""
     trace = emulate_file(scenario, bench_of(design), seed=1)
     before, after = measured(design, trace)
     assert trace.truth is not None
@@ -226,7 +227,7 @@ def scenario_picture(design: CoreDesign, scenario: ScenarioFile, figure: Figure)
 
 
 def systematic_picture(figure: Figure) -> None:
-    """Draw some days of a systematic error beside the paper's filtered errors."""
+    """Draw the systematic error on several days, and the paper's filtered errors."""
     axes = figure.subplots()
     d = np.linspace(1.0, 10.0, 181)
     model = SystematicError(rms=derived("bench_43_50", millimetres=False)["systematic"], correlation=2.0)
@@ -239,7 +240,7 @@ def systematic_picture(figure: Figure) -> None:
 
 
 def documents() -> dict[str, str]:
-    """Text of every file that this module writes, by its path."""
+    """Return the text of every file that this module writes, by path."""
     design = design_core(load(SPECIFICATION))
     braking = load_scenario(SCENARIOS / "depot_to_98.toml")
     text = (ROOT / DOCUMENT).read_text(encoding="utf-8")

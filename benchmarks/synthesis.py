@@ -1,7 +1,7 @@
-"""Runs Yosys and nextpnr, as the YoWASP packages bring them, on a generated core and reads what they say.
+"""Runs Yosys and nextpnr from the YoWASP packages on a generated core, and reads their reports.
 
-Only clock and reset are ports of what is placed: the streams of a core are meant to be fed from inside the FPGA, and
-no package has pins for all of them. What hangs on the streams is kept, but their wires are not routed.
+Only clock and reset are ports of the placed design: the streams of a core are meant to be driven from inside the FPGA,
+and no package has pins for all of them. The logic behind the streams is kept, but their wires are not routed.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import Any
 from sosmith.gen.fpga.boards import Board, find_board
 
 GOAL = 200
-"""Clock in MHz that nextpnr is asked for: above what any design reaches, so that it never stops short of its best."""
+"""Target clock for nextpnr in MHz: above what any design reaches, so that it always optimizes fully."""
 
 _UTILIZATION = re.compile(r"^Info:\s+(\w+):\s+(\d+)/\s*(\d+)\s+\d+%$", re.MULTILINE)
 _ERROR = re.compile(r"^ERROR: (.*)$", re.MULTILINE)
@@ -26,33 +26,33 @@ _ERROR = re.compile(r"^ERROR: (.*)$", re.MULTILINE)
 _BOARDS = {"up5k": "icebreaker", "hx8k": "ice40_hx8k_b_evn", "hx1k": "icestick", "ecp5": "ulx3s_25f"}
 
 TARGETS = {name: find_board(board) for name, board in _BOARDS.items()}
-"""Boards whose FPGA, package and speed grade are measured, by the names they have in the record."""
+"""Boards whose FPGA, package and speed grade are measured, by their names in the record."""
 
 _LOGIC = {"ice40": "ICESTORM_LC", "ecp5": "TRELLIS_COMB"}
-"""What nextpnr calls a logic cell."""
+"""Name of a logic cell in nextpnr, by family."""
 
 
 def title(target: Board) -> str:
-    """FPGA of a target and its speed grade, for people."""
+    """Return the name of a target's FPGA with its speed grade."""
     return f"{target.device.title}{f', speed {target.speed}' * bool(target.speed)}"
 
 
 def placer(target: Board) -> str:
-    """Program that places and routes for a target."""
+    """Return the program that places and routes for a target."""
     return f"yowasp-nextpnr-{target.device.family}"
 
 
 @dataclass(frozen=True)
 class Area:
-    """What a core takes after synthesis.
+    """Area of a core after synthesis.
 
     Attributes
     ----------
     luts : int
         LUT4 cells alone.
     all_luts : int
-        On an ECP5 with each carry cell (CCU2C) as two and each LUT RAM cell (TRELLIS_DPR16X4) as four; on an iCE40,
-        where a carry lies beside its LUT4, the same as `luts`.
+        On an ECP5, with each carry cell (CCU2C) counted as two and each LUT RAM cell (TRELLIS_DPR16X4) as four; on an
+        iCE40, where a carry shares the cell of its LUT4, the same as `luts`.
     flip_flops, multipliers, rams : int
         Flip-flops, multiplier blocks, block RAMs.
     """
@@ -78,19 +78,19 @@ class Area:
 
 @dataclass(frozen=True)
 class Placement:
-    """What nextpnr says about one netlist with one seed.
+    """Result of nextpnr for one netlist and one seed.
 
     Attributes
     ----------
     logic : int
-        Logic cells that the packed design takes.
+        Logic cells of the packed design.
     refusal : str or None
-        Why it cannot be placed, in the tool's words.
+        Reason why it cannot be placed, as reported by the tool; None if it was placed.
     fmax : float
-        Highest clock in MHz; 0 where it cannot be placed.
+        Highest clock in MHz; 0 if it cannot be placed.
     path : list of tuple of str and float
-        The slowest path on an ECP5: what it runs through, and the nanoseconds there. Empty for an iCE40, whose
-        carries nextpnr packs with LUT4 and does not tell from them.
+        The slowest path on an ECP5: each element with its delay in ns. Empty for an iCE40, where nextpnr packs carries
+        with LUT4 and does not distinguish them.
     """
 
     logic: int
@@ -100,7 +100,7 @@ class Placement:
 
 
 def run(folder: Path, tool: str, *arguments: str) -> subprocess.CompletedProcess[str]:
-    """Run a tool of this environment in `folder`: it knows only relative paths.
+    """Run a tool of this environment in `folder`; it accepts only relative paths.
 
     Raises
     ------
@@ -114,7 +114,7 @@ def run(folder: Path, tool: str, *arguments: str) -> subprocess.CompletedProcess
 
 
 def version(tool: str) -> str:
-    """Name and version of a tool, as it tells them."""
+    """Return the name and version of a tool, as reported by the tool."""
     told = run(Path.cwd(), tool, "--version")
     found = re.search(r"(Yosys \S+|nextpnr-[\d.]+)", told.stdout + told.stderr)
     assert found
@@ -122,7 +122,7 @@ def version(tool: str) -> str:
 
 
 def synthesize(source: Path, top: str, target: Board) -> dict[str, int]:
-    """Synthesize a SystemVerilog file; return the cells by type. The netlist lies beside it as netlist.json.
+    """Synthesize a SystemVerilog file; return the number of cells by type. The netlist goes to netlist.json beside it.
 
     Raises
     ------
@@ -139,12 +139,12 @@ def synthesize(source: Path, top: str, target: Board) -> dict[str, int]:
 
 
 def place(folder: Path, target: Board, seed: int) -> Placement:
-    """Place and route the netlist in `folder`; several seeds can be at work at the same time.
+    """Place and route the netlist in `folder`; several seeds can run concurrently.
 
     Raises
     ------
     RuntimeError
-        If nextpnr fails without a reason, or sees more than one clock: then a path is missing from its fmax.
+        If nextpnr fails without a reason, or reports more than one clock, because its fmax then misses a path.
     """
     device, file = target.device, f"report{seed}.json"
     options = (device.placer, "--package", target.package, *(("--speed", target.speed) if target.speed else ()))
@@ -155,7 +155,7 @@ def place(folder: Path, target: Board, seed: int) -> Placement:
     if done.returncode:
         errors = _ERROR.findall(done.stderr + done.stdout)
         if not errors:
-            raise RuntimeError(f"{placer(target)} must place the netlist or say why not: {done.stderr[-500:]}")
+            raise RuntimeError(f"{placer(target)} must place the netlist or give a reason, not: {done.stderr[-500:]}")
         excess = [f"{cell} {count} of {there}" for cell, count, there in found if int(count) > int(there)]
         return Placement(logic, f"{', '.join(excess) or 'no room'}: {errors[0]}", 0.0, [])
     report = json.loads((folder / file).read_text(encoding="utf-8"))
@@ -169,7 +169,7 @@ def place(folder: Path, target: Board, seed: int) -> Placement:
 
 
 def _slowest(report: dict[str, Any], netlist: dict[str, Any]) -> list[tuple[str, float]]:
-    """Read the slowest path between registers, the steps through one carry chain or several LUT4 in a row as one."""
+    """Return the slowest path between registers, with consecutive steps through carry cells or LUT4 merged."""
     (clock,) = report["fmax"]
     (path,) = (p["path"] for p in report["critical_paths"] if p["from"].endswith(clock) and p["to"].endswith(clock))
     top = next(module for module in netlist["modules"].values() if "top" in module["attributes"])
@@ -194,5 +194,5 @@ def _slowest(report: dict[str, Any], netlist: dict[str, Any]) -> list[tuple[str,
 
 
 def _register(cell: str) -> str:
-    """Name of a register from that of one of its flip-flops."""
+    """Return the name of a register from that of one of its flip-flops."""
     return cell.split("_TRELLIS_FF", maxsplit=1)[0]

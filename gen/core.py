@@ -9,18 +9,19 @@ from functools import partial
 from sosmith.gen.architecture import Architecture, Budget, candidates, fitting, reason_for
 from sosmith.gen.filter.design import Filter, design
 from sosmith.gen.fpga.boards import Board
-from sosmith.gen.realizations.registry import ERROR_FEEDBACK, REALIZATIONS
+from sosmith.gen.realizations.registry import REALIZATIONS
+from sosmith.gen.specification.choices import CORES, ERROR_FEEDBACK
 from sosmith.gen.specification.specification import Specification
-from sosmith.gen.word_lengths.quantize import Plan, Quantized, plan, prove, with_realization
+from sosmith.gen.word_lengths.other_realization import with_realization
+from sosmith.gen.word_lengths.quantize import Plan, plan, prove
+from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.gen.word_lengths.selection import Accept, Selection
 from sosmith.model.calibration.fit import Fit, fit, read_measurements
 from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.errors import ShortfallError, SpecificationError
 from sosmith.model.port import Port
-
-CORES = ("instrument", "filter", "calibration")
-"""What can be generated of a specification: all of it, or one part."""
+from sosmith.model.suggestion import did_you_mean
 
 AUTO = "auto"
 """Realization that stands for the cheapest proven one."""
@@ -37,7 +38,7 @@ class CoreDesign:
     spec : Specification
         What was asked for.
     core : str
-        One of `CORES`.
+        One of `sosmith.gen.specification.choices.CORES`.
     quantized : Quantized
         The datapath, with the ideal filter and polynomial it stands for.
     architecture : Architecture
@@ -77,7 +78,7 @@ def design_core(
     spec : Specification
         What is asked for.
     core : str or None
-        One of `CORES`; None takes all that the specification has.
+        One of `sosmith.gen.specification.choices.CORES`; None takes all that the specification has.
     realization : str or None
         Overrides the specification's.
     widths_of : str or None
@@ -164,6 +165,8 @@ def design_core(
 
 
 def _chosen_core(spec: Specification, core: str | None) -> str:
+    if core is not None and core not in CORES:
+        raise SpecificationError(f"the core must be one of {', '.join(CORES)}, not {core}{did_you_mean(core, CORES)}")
     if spec.calibration is None:
         if core not in {None, "filter"}:
             raise SpecificationError(
@@ -175,7 +178,10 @@ def _chosen_core(spec: Specification, core: str | None) -> str:
 
 def _known(wanted: str) -> str:
     if wanted not in {AUTO, *REALIZATIONS}:
-        raise SpecificationError(f"the realization must be {AUTO}, {', '.join(REALIZATIONS)}, not {wanted}")
+        known = (AUTO, *REALIZATIONS)
+        raise SpecificationError(
+            f"the realization must be {', '.join(known)}, not {wanted}{did_you_mean(wanted, known)}"
+        )
     return wanted
 
 

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import io
+import itertools
+import re
 from collections.abc import Callable
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-import matplotlib as mpl
-from matplotlib.figure import Figure
+from sosmith.model.errors import SpecificationError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 FORMATS = ("svg", "png")
 """What a picture can be written as."""
@@ -25,6 +30,24 @@ _STYLE: dict[Any, Any] = {  # as typed, rc_context wants the names of its parame
 }
 
 _DPI = 110
+
+_COORDINATES = re.compile(r'(?<= )(?:d|x|y|x1|x2|y1|y2|cx|cy|width|height|transform|viewBox)="[^"]*"')
+_IDENTIFIER = re.compile(r'(?<= id=")[a-z][0-9a-f]{10}(?=")')
+_LONG = re.compile(r"-?\d+\.\d{4,}")
+
+
+def format_of(path: Path) -> str:
+    """Return which of `FORMATS` the name of a picture's file asks for.
+
+    Raises
+    ------
+    SpecificationError
+        If its name ends in none of them.
+    """
+    file_format = path.suffix.lower().removeprefix(".")
+    if file_format not in FORMATS:
+        raise SpecificationError(f"{path}: the plot's name must end in .svg or .png, not {path.suffix or 'neither'}")
+    return file_format
 
 
 def picture(
@@ -49,12 +72,33 @@ def picture(
     style : dict, optional
         Parameters of matplotlib beside those of all pictures.
     """
+    import matplotlib as mpl
+    from matplotlib.figure import Figure
+
     with mpl.rc_context(_STYLE | {"svg.hashsalt": name} | (style or {})):
         figure = Figure(figsize=size, dpi=_DPI, layout="constrained")
         paint(figure)
         stream = io.BytesIO()
         figure.savefig(stream, format=file_format, metadata={"Date": None} if file_format == "svg" else {})
     content = stream.getvalue()
-    if file_format == "svg":  # the writer leaves blanks at the ends of lines
-        content = b"\n".join(line.rstrip() for line in content.splitlines()) + b"\n"
-    return content
+    return settled(content.decode("utf-8")).encode("utf-8") if file_format == "svg" else content
+
+
+def settled(svg: str, prefix: str = "") -> str:
+    """Rid an SVG of what depends on the machine: digits that nobody sees, and identifiers made from them.
+
+    Coordinates keep three decimals, a thousandth of a point: logarithmic axes take their last bits from numpy, which
+    has other ones for other processors. matplotlib's identifiers are hashes of coordinates with all their digits;
+    here they are numbered, after `prefix`, in the order in which they are defined. Lines lose the blanks at their
+    ends.
+    """
+    numbers = itertools.count(1)
+    names = {found: f"{prefix}{found[0]}{next(numbers)}" for found in dict.fromkeys(_IDENTIFIER.findall(svg))}
+    svg = re.sub(r"\b[a-z][0-9a-f]{10}\b", lambda found: names.get(found[0], found[0]), svg)
+    svg = _COORDINATES.sub(lambda attribute: _LONG.sub(_thousandths, attribute[0]), svg)
+    return "\n".join(line.rstrip() for line in svg.splitlines()) + "\n"
+
+
+def _thousandths(number: re.Match[str]) -> str:
+    shown = f"{float(number[0]):.3f}".rstrip("0").rstrip(".")
+    return "0" if shown == "-0" else shown

@@ -1,1 +1,1 @@
-"""Amaranth components: datapath stages, cascades and the AXI4-Stream faces around them."""
+"""Amaranth components: datapath stages, the cores made of them, their AXI4-Stream and AXI4-Lite interfaces."""

@@ -1,4 +1,18 @@
-"""AXI4-Lite: a slave for few registers and few gates, which hands data on bit by bit."""
+"""AXI4-Lite: a slave for a few registers, small because it moves data bit by bit.
+
+::
+
+                 awaddr, araddr                                 o_index, o_writes
+    s_axil_* ------------------> [index, writes] -------------> o_check -- i_refuse
+                 wdata  32                                      o_word  32
+             ------------------> [word] >> 1 -----------------> o_bit
+                 rdata  32        ^    |                        o_count   5
+             <--------------------|----+                        o_shift
+                                  +----------------------------- i_bit
+
+    idle --AW--> taking --W--> checking --> shifting, 32 + 1 clocks --> answering --B--> idle
+      +---------AR--------------^   +---------- refused ----------------^       --R-->
+"""
 
 from __future__ import annotations
 
@@ -7,11 +21,11 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 BITS = 32
-"""Width of the data bus."""
+"""Width of the data bus, and of its words."""
 
 
 def slave_members(address_bits: int) -> dict[str, In | Out]:
-    """AXI4-Lite slave members of a component, of `address_bits` address lines."""
+    """Return the AXI4-Lite slave members of a component with `address_bits` address lines."""
     return {
         "s_axil_awaddr": In(address_bits),
         "s_axil_awprot": In(3),
@@ -36,7 +50,7 @@ def slave_members(address_bits: int) -> dict[str, In | Out]:
 
 
 def forward_slave(m: Module, outer: wiring.Component, inner: wiring.Component) -> None:
-    """Connect the AXI4-Lite slave ports of `outer` to those of `inner`, a submodule of it with as many address lines."""
+    """Connect the AXI4-Lite slave ports of `outer` to those of `inner`, a submodule with as many address lines."""
     for name, member in outer.signature.members.items():
         if name.startswith("s_axil_"):
             outside, inside = getattr(outer, name), getattr(inner, name)
@@ -44,14 +58,14 @@ def forward_slave(m: Module, outer: wiring.Component, inner: wiring.Component) -
 
 
 class SerialSlave(wiring.Component):
-    """AXI4-Lite slave with one data register, which moves bit by bit between the bus and what is behind.
+    """AXI4-Lite slave with one data register, which passes data on bit by bit.
 
-    It does one access at a time; reads and writes that wait take turns. Addresses and data of writes may come in
-    either order. A write of less than all bytes is refused, protection bits are ignored, the lowest two address
-    bits too. Refused accesses answer SLVERR, and reads of that kind with arbitrary data.
+    Reads and writes that wait take turns. The address and the data of a write may come in either order. A write of less
+    than all bytes is refused; protection bits and the lowest two address bits are ignored. A refused access is answered
+    with SLVERR, and a refused read with arbitrary data.
 
-    No combinational path leads from an input of the bus to an output of it. Latency: a read answers 35 or 36 clocks
-    after it is asked for, a write 36 or 37; refused, 2 to 4 clocks. Throughput: one access at a time.
+    No combinational path leads from an input of the bus to an output. Latency: a read is answered 35 or 36 clocks after
+    its request, a write 36 or 37; a refused access after 2 to 4. Throughput: one access at a time.
 
     Parameters
     ----------
@@ -61,31 +75,31 @@ class SerialSlave(wiring.Component):
     Members
     -------
     s_axil_awaddr, .., s_axil_rready
-        The bus, by AXI4-Lite's rules.
+        The bus, by the rules of AXI4-Lite.
     o_index : Out(address_bits - 2)
-        Register that is accessed: its address without the lowest two bits. Defined from `o_check` on.
+        Index of the register: its address without the lowest two bits. Defined from `o_check` on.
     o_writes : Out(1)
-        Whether it is written. Defined from `o_check` on.
+        Whether the access is a write. Defined from `o_check` on.
     o_check : Out(1)
-        High for one clock before anything else happens: with `i_refuse` the access is refused.
+        High for the first clock of an access.
     i_refuse : In(1)
-        Whether to refuse the access. Looked at with `o_check`.
+        Whether to refuse the access; sampled with `o_check`.
     o_refused, o_start : Out(1)
-        High with `o_check`: the access is refused, or goes on.
+        High with `o_check`: the access is refused, or starts.
     o_word : Out(32)
-        The whole data of a write, with `o_start` only.
+        Data of a write; defined while `o_start` is high.
     o_shift : Out(1)
         High for 32 clocks, one for each bit.
     o_count : Out(5)
-        Bit that these are about, the lowest first.
+        Number of the bit, the lowest first.
     o_bit : Out(1)
-        That bit of a write.
+        Bit number `o_count` of a write.
     i_bit : In(1)
-        That bit of a read, one clock later.
+        Bit number `o_count` of a read, one clock later.
     o_last : Out(1)
-        High for one clock after all bits.
+        High for one clock after the last bit.
     i_fail : In(1)
-        Whether to answer SLVERR nevertheless. Looked at with `o_last`.
+        Whether to answer SLVERR after all; sampled with `o_last`.
     """
 
     def __init__(self, address_bits: int) -> None:
@@ -112,7 +126,7 @@ class SerialSlave(wiring.Component):
         )
 
     def elaborate(self, platform: object) -> Module:
-        """Build the one machine, a register for each of its states."""
+        """Build the state machine, with a register for each state."""
         m = Module()
         idle, taking, checking, shifting, answering = (
             Signal(name=name, init=name == "idle") for name in ("idle", "taking", "checking", "shifting", "answering")
@@ -122,7 +136,7 @@ class SerialSlave(wiring.Component):
         count = Signal(range(BITS + 1))
         writes, partial, failed = Signal(), Signal(), Signal()
         with m.If(idle):
-            # Reads and writes are offered a turn each, so that no ready depends on a valid.
+            # Reads and writes take turns at being ready, so that no ready depends on a valid.
             m.d.sync += [writes.eq(~writes), partial.eq(0), count.eq(0)]
             with m.If(writes & self.s_axil_awvalid):
                 m.d.sync += [index.eq(self.s_axil_awaddr[2:]), writes.eq(1), idle.eq(0), taking.eq(1)]
@@ -137,7 +151,7 @@ class SerialSlave(wiring.Component):
             m.d.comb += [self.o_refused.eq(refused), self.o_start.eq(~refused)]
             m.d.sync += [checking.eq(0), failed.eq(refused), shifting.eq(~refused), answering.eq(refused)]
         with m.If(shifting):
-            # One clock more than there are bits: what comes back from a memory is a clock late.
+            # One clock more than there are bits: a bit from a memory is a clock late.
             m.d.comb += [self.o_last.eq(count[-1]), self.o_shift.eq(~count[-1])]
             m.d.sync += [word.eq(Cat(word[1:], self.i_bit)), count.eq(count + 1)]
         with m.If(self.o_last):

@@ -1,4 +1,16 @@
-"""AXI4-Stream: a core's ports, where fields lie on the bus, and the buffer that cuts back-pressure off the inputs."""
+"""AXI4-Stream: a core's ports, the fields on the bus, and a buffer that keeps back-pressure from the inputs.
+
+::
+
+    source                                                          sink
+    i_data, i_valid --+-------------------------+--> [head] --> o_data
+      width           |                         |    width
+                      +--> [second] --> o_next--+    [o_valid] --> o_valid
+                             width                     ^
+    advance <-- not [full]                             +--- o_ready
+
+`second` is used while the sink stalls: it takes the one word that the source delivers before it sees `advance` low.
+"""
 
 from __future__ import annotations
 
@@ -15,19 +27,19 @@ from sosmith.model.port import Port
 
 @dataclass(frozen=True)
 class Field:
-    """A port's place on a stream: `offset` of its lowest bit; it is extended to whole bytes."""
+    """A port on a stream, extended to whole bytes: `offset` is that of its lowest bit."""
 
     port: Port
     offset: int
 
     @property
     def padded(self) -> int:
-        """Bits it takes on the bus."""
+        """Width on the bus, in bits."""
         return 8 * self.port.bytes
 
 
 def fields(ports: Sequence[Port]) -> tuple[Field, ...]:
-    """Lay `ports` out on a stream, the first one lowest."""
+    """Return the fields of `ports` on a stream, the first one lowest."""
     placed: list[Field] = []
     offset = 0
     for port in ports:
@@ -37,22 +49,22 @@ def fields(ports: Sequence[Port]) -> tuple[Field, ...]:
 
 
 def width(ports: Sequence[Port]) -> int:
-    """Width of ``tdata`` for `ports`, in bits."""
+    """Return the width of ``tdata`` for `ports`, in bits."""
     return sum(field.padded for field in fields(ports))
 
 
 def channel_bits(channels: int) -> int:
-    """Bits that number `channels` channels; 0 for one."""
+    """Return the width of a channel's number; 0 for one channel."""
     return (channels - 1).bit_length()
 
 
 def dest_width(channels: int) -> int:
-    """Width of ``tdest``, whole bytes; 0 for one channel, which has none."""
+    """Return the width of ``tdest`` in whole bytes; 0 for one channel, which has none."""
     return -(-channel_bits(channels) // 8) * 8
 
 
 def core_members(inputs: Sequence[Port], output: Port, channels: int = 1) -> dict[str, In | Out]:
-    """Clock, reset and the two streams of a core."""
+    """Return the members of a core: clock, reset and the two streams."""
     members: dict[str, In | Out] = {
         "aclk": In(1),
         "aresetn": In(1),
@@ -70,7 +82,7 @@ def core_members(inputs: Sequence[Port], output: Port, channels: int = 1) -> dic
 
 
 def extended(code: Value, bits: int) -> Value:
-    """Extend `code` to `bits` bits by its sign."""
+    """Return `code` extended to `bits` bits, by its sign if it is signed."""
     if len(code) >= bits:
         return code
     top = code[-1] if code.shape().signed else 0
@@ -78,28 +90,28 @@ def extended(code: Value, bits: int) -> Value:
 
 
 class StreamBuffer(wiring.Component):
-    """Two-entry buffer that no combinational path crosses, between a pipeline and an AXI4-Stream peer.
+    """Buffer of two words between a pipeline and an AXI4-Stream peer, without a combinational path across.
 
-    The source may move while `advance` is high, which depends on registers only; a word that it delivers then is
-    never lost. Latency: one clock. Throughput: one word per clock.
+    The source may move while `advance` is high, which comes from a register; a word that it delivers then is never
+    lost. Latency: one clock. Throughput: one word per clock.
 
     Parameters
     ----------
     width : int
-        Bits of a word.
+        Width of a word, in bits.
 
     Members
     -------
     i_data : In(width)
         Word from the source.
     i_valid : In(1)
-        Whether there is one; taken if `advance` is high.
+        Whether there is one; it is taken if `advance` is high.
     advance : Out(1)
         Whether the source may move at this clock.
     o_data, o_valid, o_ready
-        The sink, by AXI4-Stream's rules: `o_data` stays while `o_valid` is high and `o_ready` is low.
+        The sink, by the rules of AXI4-Stream: `o_data` stays while `o_valid` is high and `o_ready` is low.
     o_next : Out(width)
-        The word behind, if there is one: while `advance` is low.
+        The second word; there is one while `advance` is low.
     """
 
     def __init__(self, width: int) -> None:

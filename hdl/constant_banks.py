@@ -1,4 +1,15 @@
-"""Two banks of registers for the constants of the parallel architecture; samples use one, the other can be filled."""
+"""Two banks of registers for the constants of the parallel architecture: samples use one while the other is filled.
+
+::
+
+                                      bank 0                bank 1
+    write_address --> word =? ---> [bank0_constant0]    [bank1_constant0] --+
+    write_data    --- 32 --------> [bank0_constant1]    [bank1_constant1] --+--> Mux(bank of the sample) --> stage
+    write_bank    --------------->  ..                   ..               --+        `chosen`
+
+A constant wider than 32 bits is written in several words, the lowest first. A write takes one clock; the constants can
+be used in every clock.
+"""
 
 from __future__ import annotations
 
@@ -12,33 +23,34 @@ from amaranth.lib.wiring import In
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.reload.constants import Constant, packed, values_of
 
-_WORD = 32
+_WORD_BITS = 32
 
 Pair = tuple[Value, Value]
 """A constant in the first bank and in the second."""
 
 NO_CONSTANTS: Mapping[int, Pair] = MappingProxyType({})
-"""For a stage whose constants stay."""
+"""For a stage without loadable constants."""
 
 
 class ConstantBanks(wiring.Component):
-    """The constants of a datapath, twice.
+    """The loadable constants of a datapath, twice.
 
-    The second bank holds anything until it has been filled. Reset touches neither.
+    The first bank starts with the constants of the datapath, the second with zeros; a reset changes neither. Latency: a
+    word is there one clock after its write. Throughput: one word per clock.
 
     Parameters
     ----------
     datapath : Datapath
-        Whose constants the first bank begins with.
+        The datapath.
     loadable : tuple of Constant
-        Which they are.
+        Its loadable constants.
 
     Members
     -------
     write_enable : In(1)
         Whether a word is written at this clock.
     write_bank : In(1)
-        Into which bank.
+        Number of the bank that is written.
     write_address : In
         Number of the word in the bank.
     write_data : In(32)
@@ -62,22 +74,22 @@ class ConstantBanks(wiring.Component):
                 "write_enable": In(1),
                 "write_bank": In(1),
                 "write_address": In(range(self.words)),
-                "write_data": In(_WORD),
+                "write_data": In(_WORD_BITS),
             }
         )
 
     def of_stage(self, stage: int) -> dict[int, Pair]:
-        """Return the constants of a stage by their nodes."""
+        """Return the constants of stage number `stage`, by node."""
         pairs = zip(self.loadable, self._registers, strict=True)
         return {constant.node: (first, second) for constant, (first, second) in pairs if constant.stage == stage}
 
     def elaborate(self, platform: object) -> Module:
-        """Build the logic that writes."""
+        """Build the logic that writes the registers."""
         m = Module()
         word = 0
         for constant, pair in zip(self.loadable, self._registers, strict=True):
-            for low in range(0, constant.bits, _WORD):
-                high = min(low + _WORD, constant.bits)
+            for low in range(0, constant.bits, _WORD_BITS):
+                high = min(low + _WORD_BITS, constant.bits)
                 for bank, register in enumerate(pair):
                     writes = self.write_enable & (self.write_bank == bank) & _is(self.write_address, word)
                     with m.If(writes):
@@ -87,7 +99,7 @@ class ConstantBanks(wiring.Component):
 
 
 def _is(address: Value, word: int) -> Value:
-    """Whether `address` is `word`; not by ``==``, as Yosys writes ``== 0`` as ``!``, to which Verilator objects."""
+    """Whether `address` is `word`, without ``==``: Yosys writes ``== 0`` as ``!``, of which Verilator warns."""
     return Cat(bit if word >> k & 1 else ~bit for k, bit in enumerate(address)).all()
 
 

@@ -1,4 +1,30 @@
-"""The parallel architecture: a datapath's stages in a pipeline between two AXI4-Stream faces."""
+"""The parallel architecture: a datapath's stages in a pipeline between two AXI4-Stream interfaces.
+
+With one channel, as in the bench example of a calibration and a filter::
+
+                      row_power1    column_power2       section0      output_stage    output_buffer
+    s_axis_tdata --+---> stage ------> stage ---- .. ---> stage -- .. --> stage ------> StreamBuffer ---> m_axis_tdata
+                   |    1 clock       1 clock         1 to 3 clocks      1 clock    +->   1 clock    ---> m_axis_tuser
+                   |                                                                |      |
+                   +--> status --[status1]---[status2]-- ..  one for each clock ----+      |
+                                                                                           |
+    s_axis_tready <--------------------------- advance <-----------------------------------+
+
+Every datapath stage has one to three pipeline stages, `sosmith.hdl.stage`; all of them move at the clocks at which
+`advance`, a register of the output buffer, is high.
+
+Several channels take the stages of `sosmith.hdl.interleaved`, whose states lie in memories, and an input buffer, which
+holds back a sample of a channel whose last one is still in a recursion::
+
+    s_axis_tdata --> input_buffer ----------------> stages --> output_buffer --> m_axis_tdata
+    s_axis_tdest       1 clock       |       ^                                   m_axis_tdest
+                          ^          v       | valid
+                          |        [near0] [near1] ..   the channels of the last samples
+                          |          |       |
+                          +-- waits--+-------+   one of them is that of the sample in front
+
+With loadable constants, `sosmith.hdl.constant_banks` has them twice, and each sample takes its bank along.
+"""
 
 from __future__ import annotations
 
@@ -28,11 +54,12 @@ from sosmith.model.reload.registers import ADDRESS_BITS
 
 
 def latency_cycles(datapath: Datapath, channels: int = 1) -> int:
-    """Clocks from the edge that accepts a sample to the edge that can hand it on: all pipeline stages, and the buffers."""
+    """Clocks from the edge that accepts a sample to the edge that can hand its result on, without a stall."""
     return sum(_depths(datapath, channels)) + 1 + (channels > 1) + (len(datapath.wear) > 1)
 
 
 def _depths(datapath: Datapath, channels: int) -> list[int]:
+    """Return the number of pipeline stages of each datapath stage."""
     if channels == 1:
         return [pipeline_depth(stage.graph) for stage in datapath.stages]
     return [schedule(stage.graph, channels).depth for stage in datapath.stages]
@@ -41,10 +68,10 @@ def _depths(datapath: Datapath, channels: int) -> list[int]:
 class Core(wiring.Component):
     """A datapath in the parallel architecture: every operation has its own hardware.
 
-    Latency: `latency_cycles` of the datapath, with no stall. Throughput: one sample per clock. With several channels,
-    samples may come in any order; one of a channel that came just before waits until the loop has let that one out,
-    for at most as many clocks as there are channels. A sample of a channel that does not exist is taken and dropped.
-    After reset, several channels take a clock each to be cleared.
+    Latency: `latency_cycles` of the datapath, without a stall. Throughput: one sample per clock. With several channels,
+    samples may come in any order; one that comes too soon after another of its channel waits, for fewer clocks than
+    there are channels. A sample of a channel that does not exist is accepted and dropped. After a reset, the states of
+    several channels are cleared in one clock each.
 
     Parameters
     ----------
@@ -53,8 +80,8 @@ class Core(wiring.Component):
     channels : int
         Number of channels.
     fingerprint : int or None
-        Of the structure, 32 bits; None for a core whose constants stay. Otherwise they can be loaded while it works:
-        each sample is computed by the bank that was active when the core took it.
+        Fingerprint of the structure, 32 bits; None for a core whose constants cannot be loaded. Otherwise they can be
+        loaded while the core works: each sample is computed with the bank that was active when the core accepted it.
 
     Members
     -------
@@ -67,11 +94,11 @@ class Core(wiring.Component):
     m_axis_tdata, m_axis_tvalid, m_axis_tready
         Output samples: one field, extended likewise.
     m_axis_tuser : Out(8)
-        Status of the output sample, bits as of `sosmith.model.dataflow.status.Flag`.
+        Status of the output sample; the bits are those of `sosmith.model.dataflow.status.Flag`.
     s_axis_tdest, m_axis_tdest
-        Number of the sample's channel, in whole bytes; only with several channels.
+        Channel of the sample, in whole bytes; only with several channels.
     s_axil_*
-        AXI4-Lite slave of `sosmith.hdl.reload.ReloadPort`; only with a fingerprint.
+        AXI4-Lite slave of a `sosmith.hdl.reload.ReloadPort`; only with a fingerprint.
     """
 
     def __init__(self, datapath: Datapath, channels: int = 1, fingerprint: int | None = None) -> None:
@@ -117,7 +144,7 @@ class Core(wiring.Component):
             status = held
         code, saturated = codes[0], stages[-1].o_saturated
         coming = channel
-        if len(self.datapath.wear) > 1:  # a clock to find the limits of the channel
+        if len(self.datapath.wear) > 1:  # it takes a clock to read the limits of the channel
             valid, code, status, saturated, channel = self._delayed(
                 m, buffer.advance, [valid, code, status, saturated, channel]
             )
@@ -138,7 +165,7 @@ class Core(wiring.Component):
         return m
 
     def _delayed(self, m: Module, advance: Value, values: list[Value]) -> list[Value]:
-        """Return the values, the first one valid or not, a clock of the pipeline later."""
+        """Return the values a clock of the pipeline later; the first is the valid bit, which alone is reset."""
         later = [Signal(value.shape(), name=f"judged{k}", reset_less=k > 0) for k, value in enumerate(values)]
         with m.If(advance):
             m.d.sync += [register.eq(value) for register, value in zip(later, values, strict=True)]
@@ -154,7 +181,7 @@ class Core(wiring.Component):
         return component
 
     def _reload(self, m: Module, banks: ConstantBanks, bank: Signal, uses: Value) -> None:
-        """Connect the reload port to the banks; `uses` are pairs of bits, which of the banks samples use."""
+        """Connect the reload port to the banks; `uses` are pairs of bits: whether samples use bank 0, and bank 1."""
         assert self.fingerprint is not None
         m.submodules.constant_banks = banks
         m.submodules.reload_port = port = ReloadPort(banks.words, design=self.fingerprint)
@@ -172,9 +199,9 @@ class Core(wiring.Component):
     def _source(
         self, m: Module, stages: list[PipelinedStage | InterleavedStage], advance: Value, bank: Value, waiting: Signal
     ) -> tuple[Value, Value, Value, Value]:
-        """Return whether there is a sample for the first stage, its channel, its bank, and its word.
+        """Return whether there is a sample for the first stage, its channel, its bank, and its codes.
 
-        `bank` is that of samples that are taken now; `waiting` is told which banks those use that wait.
+        `bank` is that of samples accepted now. `waiting` is driven with the banks that waiting samples use.
         """
         interleaved = [component for component in stages if isinstance(component, InterleavedStage)]
         if not interleaved:
@@ -189,7 +216,7 @@ class Core(wiring.Component):
             m.d.sync += cleared.eq(cleared + 1)
             with m.If(cleared == self.channels - 1):
                 m.d.sync += clearing.eq(0)
-        # Samples on their way whose states are not written yet: those of the last clocks, farther than any one stage's.
+        # Samples whose states may not have been written yet: as many of the last ones as the slowest stage asks.
         waits: Value = Const(0, 1)
         near: list[tuple[Value, Value]] = []
         distance = max(component.schedule.distance for component in interleaved)

@@ -9,7 +9,8 @@
         signed,         a bits: a word     `sosmith.model.dataflow.program.Opcode`
       digit_bits + 1    of one channel
 
-With digits of 15 bits and 64 words for each channel, an instruction has 26 bits.
+With digits of 15 bits and 64 words for each channel, an instruction has 26 bits. `Opcode` is an `IntEnum` of Python, as
+`sosmith.model` does without Amaranth, which derives the width of the field from it.
 """
 
 from __future__ import annotations

@@ -1,6 +1,38 @@
 """A stage of a datapath for several channels that take turns: its recursion is pipelined through them.
 
-EXAMPLE
+The states lie in memories, one word for each channel. While one channel's sample is in the recursion, those of the
+others follow, so that the recursion may take several clocks. `schedule` spreads the operations over pipeline stages: it
+makes these as short as it can while the same channel may still come again once every other one has had its turn. A
+memory is addressed a pipeline stage before its state is used, and written once the next value is there.
+
+As an example, the recursion of `sosmith.hdl.stage`, ``v(n) = x(n) + x(n-1) - floor(v(n-2) / 4) + floor(v(n-1) / 2)``,
+for 3 channels, with widths in bits::
+
+    stage 0             stage 1                  stage 2                   stage 3
+
+    i0 --------------[x_passed1]---> + -----[early_passed2]--> - ---[older_passed3]--> + ---[v_register]---> o0
+     2                               ^      3                  ^    4                  ^  |            5
+      |                              | 2                   floor(/4)               floor(/2)
+      v data                         |                         | 5                     | 5|
+    +----------+  read               |        +----------+     |       +----------+    |  |
+    | x1, 3x2  |---------------------+        | v2, 3x5  |-----+       | v1, 3x5  |----+  |
+    +----------+                              +----------+             +----------+       |
+      ^ address                                 ^      ^                 ^      ^ data    |
+      i_channel                    address in 1 |      | data: v1        |      +---------+
+                                   [channel1] --+                        +-- [channel2], address in 2
+
+Both memories of v are written in stage 3, addressed by [channel3]. As that of v2 is addressed in stage 1, a channel may
+come again 3 - 1 + 1 = 3 samples later, `Schedule.distance`; `sosmith.hdl.core` holds back a sample that comes too soon.
+The channels 0, 1, 2, 0, 1 with the codes 1, 1, -2, 1, 1 give::
+
+    clock            0    1    2    3    4    5    6    7    8
+    i_channel        0    1    2    0    1
+    i0               1    1   -2    1    1
+    o_channel                            0    1    2    0    1
+    o0                                   1    1   -2    2    2
+
+The latency is 4 clocks. The same recursion takes 3 pipeline stages for 2 channels, and 6 for 17, whose block RAM has a
+register before it and one behind.
 """
 
 from __future__ import annotations
@@ -144,8 +176,8 @@ def _time(graph: Graph, node: Node) -> int:
 class InterleavedStage(wiring.Component):
     """A datapath stage for several channels.
 
-    Latency: `Schedule.depth` in clocks at which `advance` is high. Throughput: one sample at each of these clocks, of any
-    channel whose last sample came at least `Schedule.distance` of them before.
+    Latency: `Schedule.depth` in clocks at which `advance` is high. Throughput: one sample at each of these clocks, of
+    any channel whose last sample came at least `Schedule.distance` of them before.
 
     Parameters
     ----------

@@ -1,4 +1,19 @@
-"""The reload port: new contents for a core's second bank over AXI4-Lite, checked by a CRC, swapped between samples."""
+"""The reload port: new contents for a core's idle bank over AXI4-Lite, checked by a CRC, swapped between samples.
+
+::
+
+                  +-------------+  o_word 32                                  bits
+    s_axil_* <--->| SerialSlave |---------------------------------> write_data ----> idle bank of the core
+      32          +-------------+                    [taken] -----> write_address, write_enable
+                    |  ^ i_bit
+              o_bit |  +---------------- words: ID, LAYOUT, DESIGN, VERSION of each bank, bit by bit
+                    v  |
+                  +-----------+ o_bit
+                  | SerialCrc |----> = ? ----> [pending] ---- may_swap ----> [bank] ----> bank
+                  +-----------+        [outcome]
+
+    VERSION -----> DATA, once for each word -----> CRC -----> pending -----> bank changes, between two samples
+"""
 
 from __future__ import annotations
 
@@ -28,14 +43,14 @@ from sosmith.model.reload.registers import (
 
 
 class ReloadPort(wiring.Component):
-    """Fills the bank of a core that is not active, and makes it active if it has arrived as it should.
+    """Fills the idle bank of a core, and makes it the active one if its contents have arrived without an error.
 
     The registers are those of `sosmith.model.reload.registers`. A load is a write of ``VERSION``, one of ``DATA`` for
-    each word of the bank, and one of ``CRC``. Any refused write ends it. Only a load whose words are complete and whose
-    CRC is right asks for a swap: `pending` is high from then on until a clock in which `may_swap` is high.
+    each word of the bank, and one of ``CRC``. A refused write ends it. Only a load with all its words and the right CRC
+    asks for a swap: `pending` is then high until a clock in which `may_swap` is high.
 
-    A reset ends a load and drops a pending swap. It does not touch what is active, nor its version, because it
-    could not restore the memories: a core goes on with the set that it has.
+    A reset ends a load and drops a pending swap. It changes neither the active bank nor its version, because it could
+    not restore the memories: the core goes on with the set that it has.
 
     Latency and throughput: those of `sosmith.hdl.axi_lite.SerialSlave`.
 
@@ -44,9 +59,9 @@ class ReloadPort(wiring.Component):
     depth : int
         Words of a bank, 1 to 65535.
     bits : int
-        Bits of a word that are used, 1 to 32.
+        Used bits of a word, 1 to 32.
     design : int
-        Fingerprint that ``DESIGN`` reads.
+        Fingerprint of the core, which ``DESIGN`` reads.
 
     Members
     -------
@@ -55,17 +70,17 @@ class ReloadPort(wiring.Component):
     write_enable : Out(1)
         High for one clock for each word.
     write_address : Out(range(depth))
-        Its place in the bank that is not `bank`.
+        Number of the word in the idle bank.
     write_data : Out(bits)
         The word.
     bank : Out(1)
-        Bank of the samples accepted from now on: one accepted in this clock uses what this is in this clock.
+        The active bank: that of a sample accepted in this clock.
     pending : Out(1)
-        Whether a swap is asked for. The core must give leave within finite time.
+        Whether a swap is due. The core must allow it within finite time.
     may_swap : In(1)
         Whether `bank` may change at the end of this clock.
     shadow_free : In(1)
-        Low while a sample on its way still uses the bank that is not `bank`; no load can begin then.
+        Whether no sample inside the core uses the idle bank. While it is low, no load can begin.
     """
 
     def __init__(self, depth: int, *, bits: int = BITS, design: int = 0) -> None:
@@ -90,7 +105,7 @@ class ReloadPort(wiring.Component):
         )
 
     def elaborate(self, platform: object) -> Module:
-        """Build the port around the slave."""
+        """Build the slave, the CRC, the control of a load, and what can be read."""
         m = Module()
         m.submodules.slave = slave = SerialSlave(ADDRESS_BITS)
         forward_slave(m, self, slave)
@@ -111,7 +126,7 @@ class ReloadPort(wiring.Component):
         return m
 
     def _load(self, m: Module, slave: SerialSlave, crc: SerialCrc) -> tuple[Signal, Signal]:
-        """Follow a load from its beginning to its end; return whether there is one, and how the last one ended."""
+        """Control a load from its beginning to its end; return whether one is going on, and how the last one ended."""
         loading, outcome = Signal(), Signal(Outcome)
         taken = Signal(range(self.depth + 1))
         complete = taken == self.depth
@@ -145,8 +160,8 @@ class ReloadPort(wiring.Component):
         return loading, outcome
 
     def _read(self, m: Module, slave: SerialSlave, crc: SerialCrc, bank: Signal, load: Value) -> None:
-        """Give what is read, bit by bit: constants and versions from a memory, the rest a clock late like these."""
-        seen_bank, seen_pending = Signal(), Signal()  # a swap must not show half-way through
+        """Answer reads bit by bit: constants and versions from a memory, the rest a clock late as these are."""
+        seen_bank, seen_pending = Signal(), Signal()  # a swap must not show in the middle of a read
         with m.If(slave.o_check):
             m.d.sync += [seen_bank.eq(bank), seen_pending.eq(self.pending)]
         init = [word >> bit & 1 for word in self._rows() for bit in range(BITS)]
@@ -166,7 +181,7 @@ class ReloadPort(wiring.Component):
         m.d.comb += slave.i_bit.eq(Mux(_is_at(slave, STATUS) | _is_at(slave, CRC), other, fetch.data))
 
     def _rows(self) -> list[int]:
-        """Words of the memory that is read: a row for each register, two for the version, one for each bank."""
+        """Return the words of that memory: a row for each register, and two for the version, one for each bank."""
         assert VERSION.index % 2 == 0  # the bank is the lowest bit of the row
         assert VERSION.index + 1 == DATA.index  # which cannot be read
         layout = INTERFACE << LAYOUT.field("INTERFACE").low | self.depth << LAYOUT.field("WORDS").low
@@ -184,7 +199,7 @@ def _writes(slave: SerialSlave, register: Register) -> Value:
 
 
 def _bit_of(word: Value, index: Value) -> Value:
-    """Select a bit of `word`, which must have a power of two of them."""
+    """Return a bit of `word`, whose width must be a power of two."""
     bits = list(word)
     for select in index:
         bits = [Mux(select, high, low) for low, high in zip(bits[::2], bits[1::2], strict=True)]

@@ -1,4 +1,21 @@
-"""The CRC-32 of IEEE 802.3, one bit a clock."""
+"""The CRC-32 of IEEE 802.3, one bit per clock.
+
+::
+
+    i_bit ---> xor ---> and ---> feedback
+                ^        ^
+             crc[0]   not i_turn
+
+    crc <= {i_turn and crc[0], crc[31:1]} xor (feedback ? polynomial : 0)     32 bits, at i_shift
+    o_bit = not crc[0]
+
+Latency: one clock. Throughput: one bit per clock.
+
+`amaranth.lib.crc` with a data width of one bit computes the same, but shows all 32 bits at once: to read them one by
+one, as the AXI4-Lite slave needs them, takes a multiplexer. Turning the register instead, this one takes 16 LUT4 of an
+iCE40 where that takes 63, and 76 of an ECP5 where that takes 88, with 32 flip-flops each (Yosys, `synth_ice40` and
+`synth_ecp5`).
+"""
 
 from __future__ import annotations
 
@@ -10,26 +27,26 @@ BITS = 32
 """Width of the CRC."""
 
 _POLYNOMIAL = 0xEDB88320
-"""The lowest power in the highest bit: data enters with the lowest bit first."""
+"""Its lowest power is the highest bit, as data enters with the lowest bit first."""
 
 
 class SerialCrc(wiring.Component):
-    """CRC-32 as of IEEE 802.3 and ``zlib.crc32``, of bytes that come with the lowest bit first.
+    """CRC-32 of IEEE 802.3, as ``zlib.crc32``, of bytes that arrive with the lowest bit first.
 
     Latency: one clock. Throughput: one bit per clock.
 
     Members
     -------
     i_clear : In(1)
-        Begin anew, as if nothing had come.
+        Start anew.
     i_shift : In(1)
-        Take `i_bit` in; or with `i_turn` go to the next bit of the CRC, which is back at its first after 32.
+        Add `i_bit` to the CRC; or, with `i_turn`, go on to its next bit. After 32 of these it is back at the first.
     i_turn : In(1)
-        Read the CRC instead of adding to it.
+        Whether the CRC is being read.
     i_bit : In(1)
         The next bit.
     o_bit : Out(1)
-        Bit of the CRC of all that has come, the lowest first.
+        Bit of the CRC of all bits so far, the lowest first.
     """
 
     def __init__(self) -> None:

@@ -1,6 +1,50 @@
 """A stage of a datapath for one channel: its logic in one to three pipeline stages, and its state.
 
-EXAMPLE
+Only what depends on the newest sample that a recursion remembers has to be done within one clock. What depends on the
+input alone, and then what depends on older samples, is computed and registered a pipeline stage before; the delay of
+what is left is all that limits the clock.
+
+As an example, ``v(n) = x(n) + x(n-1) - floor(v(n-2) / 4) + floor(v(n-1) / 2)``, with the width of each signal in bits;
+names in brackets are registers, and so are the states x1, v1 and v2::
+
+    pipeline stage 0       pipeline stage 1                        pipeline stage 2
+
+                               floor(/4) <--- Mux(valid2, v1, v2) <--- [v2] <------+
+                                   | 3                          5        5         |
+      +--> [x1] -+                 |                               floor(/2) <-----+
+      |      2   v                 v                                   v 4         |
+    i0+--------> +--[passed1]----> - ----------------[passed2]-------> + ---> [v1]-+--> o0
+     2         3          3      4                         4         5      5
+
+    i_valid --------[valid1]-------------------------[valid2]------------> [valid3] --> o_valid
+
+The state v2 belongs to pipeline stage 2, which may still hold the sample before. Its update is due then: the value that
+it is about to take is v1.
+
+With x = -2 at each clock, from reset on, the output is valid three clocks after the input::
+
+    clock            0    1    2    3    4    5
+    i0              -2   -2   -2   -2   -2   -2
+    passed1          -   -2   -4   -4   -4   -4     x(n) + x(n-1)
+    Mux              -    0    0   -2   -5   -6     v(n-2)
+    passed2          -    -   -2   -4   -3   -2     less floor(v(n-2) / 4)
+    v1, o0           0    0    0   -2   -5   -6
+    o_valid          0    0    0    1    1    1
+
+>>> from sosmith.model.dataflow.graph import GraphBuilder
+>>> g = GraphBuilder()
+>>> x = g.input("x", frac=0, low=-2, high=1)
+>>> v1 = g.delay("v1", frac=0, low=-12, high=11)
+>>> v2 = g.previous(v1, "v2")
+>>> early = g.add(x, g.previous(x, "x1"), "early")
+>>> older = g.subtract(early, g.floor(g.shift(v2, -2), frac=0), "older")
+>>> v = g.bound(g.add(older, g.floor(g.shift(v1, -1), frac=0)), -12, 11, "v")
+>>> g.connect(v1, v)
+>>> graph = g.build([v])
+>>> [(node.name, node.width, k) for node, k in zip(graph.nodes, pipeline_stages(graph)) if node.name]
+[('x', 2, 0), ('v1', 5, 2), ('v2', 5, 2), ('x1', 2, 0), ('early', 3, 0), ('older', 4, 1), ('v', 5, 2)]
+>>> graph.run([[-2]] * 3)
+[[-2], [-5], [-6]]
 """
 
 from __future__ import annotations
@@ -77,7 +121,7 @@ def _recursive(graph: Graph) -> set[int]:
 
 
 def _late(graph: Graph, loop: set[int]) -> set[int]:
-    """Return the nodes of the loop that depend on the newest of the samples that it remembers; all, if that is only one."""
+    """Return the nodes of the loop that depend on the newest sample that it remembers, or all if there is but one."""
     late = {i for i in graph.delays if i in loop and graph.nodes[i].operands[0] in loop and _is_followed(graph, i)}
     if not late:
         return loop

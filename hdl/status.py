@@ -1,4 +1,15 @@
-"""The flags beside a result, as of `sosmith.model.dataflow.status.Flag`."""
+"""The status flags of a result, in the order of `sosmith.model.dataflow.status.Flag`.
+
+::
+
+    s_axis_tdata --+--> at_rail -------------> input_at_rail       bit 0
+                   +--> outside_calibration -> outside_calibration     1   `Core`; `FoldedCore` lets its program judge
+    output code  --+--> CLAMP of the stage --> output_saturated        2
+                   +--> worn: >= limits -----> wear_warning            3
+      channel ----> memory of the limits       wear_critical           4   if each channel has its own
+
+All are combinational, but for the memory of limits: it takes one clock.
+"""
 
 from __future__ import annotations
 
@@ -13,12 +24,12 @@ from sosmith.model.port import Port
 
 
 def at_rail(inputs: Sequence[Port], tdata: Value) -> Value:
-    """Whether an input's code is the lowest or the highest there is, `Flag.INPUT_AT_RAIL`."""
+    """Whether an input's code is the lowest or the highest of its port, `Flag.INPUT_AT_RAIL`."""
     found: Value = Const(0, 1)
     for field in fields(inputs):
         code = tdata[field.offset : field.offset + field.port.bits]
         body = code[:-1]
-        # Both rails have equal bits below the top one; signed or not, the top bit says which of them can be.
+        # At a rail, all bits below the top one are equal; the top bit says which rail that would be.
         ones, zeros = (code[-1], ~code[-1]) if not field.port.signed else (~code[-1], code[-1])
         found = found | (body.all() & ones) | (~body.any() & zeros)
     return found
@@ -38,15 +49,15 @@ def outside_calibration(datapath: Datapath, tdata: Value) -> Value:
 
 
 def flag_count(datapath: Datapath) -> int:
-    """Count the flags that the hardware can set: without limits of wear, not the last two."""
+    """Return the number of flags that the hardware can set: without limits of wear, all but the last two."""
     return 5 if datapath.wear else 3
 
 
 def worn(m: Module, datapath: Datapath, code: Value, channel: Value, enable: Value) -> Value:
-    """Whether an output code has reached the warning and the limit of wear; nothing if they are not judged.
+    """Return two bits: whether an output code has reached the warning, and the limit of wear; none without limits.
 
-    If each channel has limits of its own, these come out of a memory: `code` must be of the channel that `channel`
-    had at the clock before with `enable`.
+    If each channel has limits of its own, these are read from a memory: `code` must belong to the channel that
+    `channel` was at the last clock with `enable`.
     """
     if not datapath.wear:
         return Const(0, 0)

@@ -1,1 +1,1 @@
-"""Numbers and signals: formats, datapaths and their bit-true computation, golden chain, calibration, sensors."""
+"""Bit-true arithmetic, its double-precision reference, and the emulated instrument that feeds it."""

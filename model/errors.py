@@ -1,7 +1,7 @@
 """The errors a user can cause, and the exit status each one ends the program with.
 
-Every message is one sentence a user can act on: it names the file, key or line, what was found
-and what would be right. The command line is the only place that catches them.
+Every message is one sentence that the user can act on: it names the file, key or line, what was expected
+and what was found. Only the command line catches these errors.
 """
 
 
@@ -18,12 +18,12 @@ class ShortfallError(SosmithError):
 
 
 class SpecificationError(SosmithError):
-    """Bad usage, a bad specification or bad measurement data."""
+    """A usage error, an invalid specification or invalid measurement data."""
 
     exit_status = 2
 
 
 class ToolError(SosmithError):
-    """A tool outside this package (simulator, compiler) is missing or failed."""
+    """An external tool (simulator, compiler) is missing or failed."""
 
     exit_status = 3

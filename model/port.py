@@ -1,36 +1,34 @@
-"""Physical meaning of an integer at the edge of a core: ``value = zero + lsb * code``."""
+"""Physical meaning of the integer code at a core's input or output: ``value = zero + lsb * code``."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import TYPE_CHECKING
 
-import numpy as np
-import numpy.typing as npt
-
-Codes = npt.NDArray[np.int64]
-Values = npt.NDArray[np.float64]
+if TYPE_CHECKING:
+    from sosmith.model.arrays import Codes, Values
 
 
 @dataclass(frozen=True, kw_only=True)
 class Port:
-    """An input or output quantity of a core and its integer format.
+    """An input or output of a core: its quantity and its integer format.
 
     Attributes
     ----------
     name : str
-        Name of the quantity, also the name of its field on the stream.
+        Name of the quantity and of its field in the stream.
     bits : int
         Width of the code in bits, 2 to 32.
     signed : bool
-        Two's complement if true, else unsigned.
+        Whether codes are two's complement; otherwise they are unsigned.
     lsb : Fraction
-        Physical size of one code step, in `unit`, positive.
+        Physical value of one LSB, in `unit`; positive.
     zero : Fraction
         Physical value of code 0, in `unit`.
     unit : str
-        Physical unit, ``""`` for a plain number.
+        Physical unit; ``""`` for a dimensionless quantity.
     """
 
     name: str
@@ -50,9 +48,9 @@ class Port:
     def from_range(
         cls, name: str, bits: int, low: Fraction, high: Fraction, *, signed: bool = False, unit: str = ""
     ) -> Port:
-        """Make the port whose codes divide the range [low, high) into ``2**bits`` equal steps.
+        """Return the port whose codes divide [low, high) into ``2**bits`` equal steps.
 
-        A signed port needs a symmetric range (``low == -high``) and then has ``zero == 0``.
+        The range of a signed port must be symmetric (``low == -high``); its `zero` is 0.
         """
         if not low < high:
             raise ValueError(f"range must rise from low to high, not {float(low)!r} to {float(high)!r}")
@@ -79,27 +77,29 @@ class Port:
 
     @property
     def bytes(self) -> int:
-        """Whole bytes that the code takes on an AXI4-Stream."""
+        """Bytes that the code occupies on an AXI4-Stream."""
         return (self.bits + 7) // 8
 
     def enclosing(self, low: float, high: float) -> tuple[int, int]:
-        """Return the lowest and the highest code of the values from `low` to `high`, as far as there are any."""
+        """Return the ends of the smallest code range that holds `low` to `high`, limited to the format."""
         ends = (math.floor((Fraction(low) - self.zero) / self.lsb), math.ceil((Fraction(high) - self.zero) / self.lsb))
         first, last = (min(max(end, self.lowest), self.highest) for end in ends)
         return first, last
 
     def decode(self, codes: Codes) -> Values:
-        """Physical values of `codes` in double precision, in `unit`."""
-        return float(self.zero) + float(self.lsb) * codes.astype(np.float64)
+        """Return the physical values of `codes` in `unit`, in double precision."""
+        return float(self.zero) + float(self.lsb) * codes.astype("float64")
 
     def encode(self, values: Values) -> Codes:
-        """Nearest codes of physical `values`, limited to the range of the format.
+        """Return the codes nearest to physical `values`, saturated to the format.
 
         Raises
         ------
         ValueError
             If a value is not finite.
         """
+        import numpy as np  # a specification has ports too, and is read without numpy
+
         if not np.all(np.isfinite(values)):
             raise ValueError(f"values of {self.name} must be finite, not {values[~np.isfinite(values)][0]!r}")
         codes = np.floor((np.asarray(values, dtype=np.float64) - float(self.zero)) / float(self.lsb) + 0.5)

@@ -1,4 +1,4 @@
-"""Independent random generators by name, so that what one part draws never shifts the numbers of another."""
+"""Independent random generators by name, so that draws in one part of a model do not change those in another."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ from collections.abc import Callable
 import numpy as np
 
 Streams = Callable[[str], np.random.Generator]
-"""Gives the generator of a name."""
+"""Maps a name to its random generator."""
 
 
 def streams(seed: int, *scope: str) -> Streams:
-    """Make the generators of one seed and scope; the same seed, scope and name give the same numbers.
+    """Return the generators of a seed and scope: equal seed, scope and name give equal numbers.
 
     Parameters
     ----------
     seed : int
-        0 or more.
+        Seed, 0 or more.
     *scope : str
-        What the names belong to, such as ``"excerpt 2"``.
+        Prefix that separates equal names, such as ``"excerpt 2"``.
     """
 
     def stream(name: str) -> np.random.Generator:
@@ -28,5 +28,5 @@ def streams(seed: int, *scope: str) -> Streams:
 
 
 def one_stream(generator: np.random.Generator) -> Streams:
-    """Give `generator` for every name: the draws come in the order of the calls."""
+    """Return `generator` for every name, so that draws follow the order of the calls."""
     return lambda _: generator

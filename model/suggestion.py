@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable
 
 
@@ -11,5 +10,7 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
 
     To be put at the end of a message about an unknown name.
     """
+    import difflib  # only what is unknown needs it
+
     closest = difflib.get_close_matches(name, list(known), n=1)
     return f" (did you mean {closest[0]}?)" if closest else ""

@@ -1,9 +1,8 @@
-"""Writes files so that an interruption leaves each of them old or new, never half; devices and pipes as they come."""
+"""Atomic file writing: after an interruption each file has its old or its new content."""
 
 from __future__ import annotations
 
 import json
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -12,25 +11,27 @@ from sosmith.model.errors import SpecificationError
 
 
 def write_files(directory: Path, texts: Mapping[str, str]) -> list[Path]:
-    """Write `texts` (by file name) into `directory`, made if missing: all prepared first, then moved into place.
+    """Write `texts`, keyed by file name, into `directory`: write all to a scratch folder, then move them into place.
+
+    The directory is created if it does not exist.
 
     Returns
     -------
     list of Path
-        The files, in the order of `texts`.
+        Paths of the files, in the order of `texts`.
 
     Raises
     ------
     SpecificationError
-        If the folder cannot be made or written, or a file's name is taken by a folder; nothing is written then.
+        If the directory cannot be created or written, or a folder has the name of a file. Nothing is written then.
     """
     return write_contents(directory, {name: text.encode() for name, text in texts.items()})
 
 
 def write_contents(directory: Path, contents: Mapping[str, bytes]) -> list[Path]:
-    """Write bytes as `write_files` does texts.
+    """Write `contents` (bytes) as `write_files` writes texts.
 
-    Only regular files are replaced: a link is followed, and a device or a pipe is written to.
+    Only regular files are replaced: links are followed, devices and pipes are written to.
     """
     paths = [directory / name for name in contents]
     try:
@@ -40,7 +41,9 @@ def write_contents(directory: Path, contents: Mapping[str, bytes]) -> list[Path]
                 raise SpecificationError(f"{path}: the output file must be a file, not a folder")
         own = {path.name for path in paths if not path.is_symlink() and (path.is_file() or not path.exists())}
         if own:
-            # Files in a scratch folder get the permissions that the user's umask gives any new file.
+            import tempfile  # only writing needs it
+
+            # Unlike tempfile.mkstemp, a file created in a scratch folder has the permissions of the user's umask.
             with tempfile.TemporaryDirectory(prefix=".sosmith-", dir=directory) as scratch:
                 for name in own:
                     (Path(scratch) / name).write_bytes(contents[name])
@@ -60,5 +63,5 @@ def write_contents(directory: Path, contents: Mapping[str, bytes]) -> list[Path]
 
 
 def to_json(tree: Any) -> str:
-    """JSON text with a stable layout; refuses NaN and infinities."""
+    """Return `tree` as JSON text with a fixed layout; raises ValueError for NaN and infinities."""
     return json.dumps(tree, indent=2, ensure_ascii=False, allow_nan=False) + "\n"

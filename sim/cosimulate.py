@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sosmith.gen.output.core_facts import InterfaceFacts
-from sosmith.model.port import Codes
+from sosmith.model.arrays import Codes
 from sosmith.sim.bench import Bench, Progress
 from sosmith.sim.stream_packing import pack, random_order, unpack
 

@@ -19,11 +19,12 @@ from sosmith.gen.fpga.boards import Board
 from sosmith.gen.fpga.synthesis import Netlist, synthesize
 from sosmith.gen.output.core_facts import CoreFacts, core_facts
 from sosmith.gen.output.generate import generate
-from sosmith.gen.realizations.registry import ERROR_FEEDBACK
 from sosmith.gen.report.evidence import Alternative, Evidence
-from sosmith.gen.word_lengths.quantize import Quantized, with_realization
+from sosmith.gen.specification.choices import ERROR_FEEDBACK
+from sosmith.gen.word_lengths.other_realization import with_realization
+from sosmith.gen.word_lengths.quantized import Quantized
+from sosmith.model.arrays import Codes, Values
 from sosmith.model.errors import SpecificationError
-from sosmith.model.port import Codes, Values
 from sosmith.model.reference.golden import calibrated, filtered
 from sosmith.model.text_files import write_files
 from sosmith.model.traces.trace import Trace
@@ -35,7 +36,7 @@ from sosmith.sim.simulators import check_name
 _Kind = TypeVar("_Kind", bound=np.generic)
 
 Progress = Callable[[str, int, int], None]
-"""Told the step, what is done of it and the total; a total of 0 means that only the step's name is known."""
+"""Called with the name of the step, the amount done and the total; the total is 0 where the amount is not known."""
 
 
 def simulate(

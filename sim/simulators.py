@@ -13,6 +13,7 @@ from importlib import metadata
 from pathlib import Path
 
 from sosmith.model.errors import SpecificationError, ToolError
+from sosmith.model.suggestion import did_you_mean
 
 OLDEST_VERILATOR = (5, 32)
 """First version seen to build cocotb 2.1's main program; Debian 12's 5.006 does not."""
@@ -75,7 +76,8 @@ def check_name(name: str) -> None:
     if name == "cxxrtl":
         raise SpecificationError("simulator cxxrtl is not yet available: use verilator or icarus")
     if name not in {"verilator", "icarus"}:
-        raise SpecificationError(f"simulator must be verilator or icarus, not {name}")
+        hint = did_you_mean(name, ("verilator", "icarus"))
+        raise SpecificationError(f"simulator must be verilator or icarus, not {name}{hint}")
 
 
 def _find_icarus() -> Simulator:

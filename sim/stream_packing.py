@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from sosmith.gen.output.core_facts import StreamFacts
+from sosmith.model.arrays import Codes
 from sosmith.model.errors import ShortfallError
-from sosmith.model.port import Codes
 
 Order = npt.NDArray[np.int64]
 """Channel of each sample on a stream, shape (samples * channels,)."""

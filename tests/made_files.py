@@ -6,10 +6,11 @@ Run as a script: ``python -m tests.made_files FOLDER [SUBJECT ...]`` makes all s
 from __future__ import annotations
 
 import json
+import re
 import sys
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 from click.testing import CliRunner
 
@@ -112,6 +113,10 @@ SPECIFICATIONS = _specifications()
 EXAMPLES = tuple(sorted(path.stem for path in (ROOT / "examples").glob("*.toml")))
 
 
+_SPEED = re.compile(r"[\d,.]+ cycles/s|(?<=clock cycles in )[^<]*(?= with)")
+"""What a page tells of the duration of the simulation."""
+
+
 def _print(*arguments: str) -> str:
     """Carry out a command; return what it prints on stdout."""
     result = CliRunner(env={"COLUMNS": "100"}).invoke(cli, arguments)
@@ -135,23 +140,27 @@ def _design(name: str, folder: Path) -> None:
     (folder / name / "design.txt").write_text(_print("design", path, "--json"), encoding="utf-8")
 
 
-def _without_speed(report: Any) -> Any:
-    return {key: value for key, value in report.items() if key not in {"cycles_per_second", "wall_seconds"}}
-
-
 def _report(name: str, folder: Path) -> None:
-    """Make the report of a short co-simulation, and its page; the speed in them is no figure of the design."""
-    into = folder / f"report_{name}"
-    _print("simulate", _specification(name, folder), "--seconds", "0.02", "-o", str(into))
-    report = json.loads((into / "report.json").read_text(encoding="utf-8"))
-    (folder / f"{name}.report.json").write_text(json.dumps(_without_speed(report), indent=1), encoding="utf-8")
+    """Make the report of a short co-simulation, and its page, without the speed in them."""
+    with tempfile.TemporaryDirectory() as scratch:
+        _print("simulate", _specification(name, folder), "--seconds", "0.005", "-o", scratch)
+        report = json.loads((Path(scratch) / "report.json").read_text(encoding="utf-8"))
+        page = (Path(scratch) / "report.html").read_text(encoding="utf-8")
+    for key in ("cycles_per_second", "wall_seconds"):
+        del report[key]
+    (folder / "report.json").write_text(json.dumps(report, indent=1), encoding="utf-8")
+    (folder / "report.html").write_text(_SPEED.sub("", page), encoding="utf-8")
+
+
+def _paper(folder: Path) -> None:
+    _print("paper", "-o", str(folder / "paper.md"))
 
 
 def _commands(folder: Path) -> None:
     """Make the pictures and documents that commands draw."""
     examples = ROOT / "examples"
-    _print("paper", "-o", str(folder / "paper.md"))
-    (folder / "vehicle.json").write_text(_print("vehicle", "--json", "--plot", str(folder / "vehicle.svg")))
+    vehicle = _print("vehicle", "--json", "--plot", str(folder / "vehicle.svg"))
+    (folder / "vehicle.json").write_text(vehicle, encoding="utf-8")
     wheel = str(examples / "wear/wheel.csv")
     limits = ["--initial", "1.5", "--warning", "7", "--limit", "9", "--sensor-range", "10.5"]
     wear = _print("wear", wheel, *limits, "--json", "--plot", str(folder / "wear.svg"))
@@ -161,6 +170,7 @@ def _commands(folder: Path) -> None:
 SUBJECTS: dict[str, Callable[[Path], None]] = {
     **{name: (lambda folder, name=name: _design(name, folder)) for name in (*EXAMPLES, *SPECIFICATIONS)},
     "report": lambda folder: _report("audio_lowpass", folder),
+    "paper": _paper,
     "commands": _commands,
 }
 

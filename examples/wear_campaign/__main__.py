@@ -1,8 +1,8 @@
-"""From measurements in the depot to wear on the instrument's screen: `python -m examples.wear_campaign`.
+"""The wear campaign, from depot measurements to wear: `python -m examples.wear_campaign`.
 
-Emulated measurements go into the store and are fitted; filters follow from spectra; hardware is generated and runs
-in the simulator; and the accuracy stands beside the paper's. Some ten minutes. Writes campaign.md, campaign.json,
-pictures, specifications, hardware and reports. With --document, docs/campaign.md, its pictures and outcome.json too.
+Emulated measurements are stored and fitted; filters are designed from spectra; hardware is generated and simulated; its
+accuracy is compared with the paper's. Takes about ten minutes. Writes campaign.md, campaign.json, pictures,
+specifications, hardware and reports; with --document also docs/campaign.md, its pictures and outcome.json.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ def main() -> None:
     """Run the campaign."""
     parser = argparse.ArgumentParser(prog="python -m examples.wear_campaign", description=__doc__)
     parser.add_argument("-o", "--output", type=Path, default=Path("build/wear_campaign"), help="folder for all files")
-    parser.add_argument("--seeds", type=int, help="count of seeds, at least 2, instead of that in campaign.toml")
+    parser.add_argument("--seeds", type=int, help="number of seeds, at least 2, instead of that in campaign.toml")
     parser.add_argument("--simulator", choices=("verilator", "icarus"), help="instead of that in campaign.toml")
-    parser.add_argument("--document", action="store_true", help="write docs/campaign.md and its pictures too")
+    parser.add_argument("--document", action="store_true", help="also write docs/campaign.md and its pictures")
     arguments = parser.parse_args()
     settings = tomllib.loads((HERE / "campaign.toml").read_text(encoding="utf-8"))
     settings |= {name: value for name, value in vars(arguments).items() if name in settings and value is not None}

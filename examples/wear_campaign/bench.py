@@ -1,4 +1,4 @@
-"""The paper's runs on the bench (section 3.3), over many seeds and through the hardware."""
+"""The paper's bench runs (section 3.3), over many seeds and in the simulated hardware."""
 
 from __future__ import annotations
 
@@ -13,8 +13,9 @@ from examples.wear_campaign import depot, hardware
 
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.spectrum.filter_table import filter_table
-from sosmith.gen.spectrum.proposal import Content, Proposal, Wish, propose
-from sosmith.gen.spectrum.spectra import SpectrumSettings, spectrum
+from sosmith.gen.spectrum.proposal import Content, Proposal, propose
+from sosmith.gen.spectrum.settings import SpectrumSettings, Wish
+from sosmith.gen.spectrum.spectra import spectrum
 from sosmith.gen.stimuli import bench_of
 from sosmith.model.calibration.polynomial import EQUATION_5A, Polynomial
 from sosmith.model.reference.accuracy import accuracy_percent
@@ -29,12 +30,12 @@ from sosmith.sim.simulation import Progress
 Values = npt.NDArray[np.float64]
 
 PAPER_FILTER = hardware.filter_by_order(5, 0.5751308)
-"""Filter of the paper's equations 16 to 19 (examples/flange_wear_bench.toml says where its cutoff comes from)."""
+"""Filter of the paper's equations 16 to 19; examples/flange_wear_bench.toml derives its cutoff."""
 
 
 @dataclass(frozen=True)
 class Run:
-    """Accuracies in per cent by equation 7 of one run on the bench."""
+    """Accuracies of one bench run, in per cent by equation 7."""
 
     seed: int
     unfiltered: float
@@ -58,7 +59,7 @@ def without(scenario: ScenarioFile, *what: str) -> ScenarioFile:
 def accuracies(
     scenario: ScenarioFile, bench: Bench, sos: Values, seed: int, polynomial: Polynomial
 ) -> tuple[float, float]:
-    """Accuracy before and after the ideal filter."""
+    """Return the accuracy before and after the ideal filter."""
     trace = emulate_file(scenario, bench, seed=seed)
     raw = calibrated(trace.codes, bench.ports, polynomial)
     smooth = filtered(raw, sos, bench.output)
@@ -72,7 +73,7 @@ def over_seeds(
     progress: Callable[[int], None],
     design_for: Callable[[Polynomial], CoreDesign] | None = None,
 ) -> list[Run]:
-    """Run the bench once for each seed: depot, fit, trace, filter, and the hardware's integers if asked for."""
+    """Run the bench for each seed: depot, fit, trace, filter and, on request, the hardware's integer model."""
     bench, runs = bench_of(made), []
     sos = made.quantized.filter.sos
     for seed in seeds:
@@ -90,7 +91,7 @@ def over_seeds(
 
 
 def sources(scenario: ScenarioFile, made: CoreDesign, seeds: range) -> dict[str, list[float]]:
-    """Accuracy behind the filter if one source of error after another is taken away, for each seed."""
+    """Return the accuracy after the filter for each seed, with one source of error removed at a time."""
     bench, sos = bench_of(made), made.quantized.filter.sos
     found: dict[str, list[float]] = {}
     for seed in seeds:
@@ -110,7 +111,7 @@ def sources(scenario: ScenarioFile, made: CoreDesign, seeds: range) -> dict[str,
 def from_spectra(
     scenario: ScenarioFile, made: CoreDesign, seed: int, tolerance: float, passband: float
 ) -> tuple[Proposal, str]:
-    """Propose a filter from the spectra of a run before any filter; return it with its table."""
+    """Propose a filter from the spectra of an unfiltered run; return it with its table."""
     bench = bench_of(made)
     trace = emulate_file(scenario, bench, seed=seed)
     raw = calibrated(trace.codes, bench.ports, made.quantized.polynomial)
@@ -128,12 +129,12 @@ def from_spectra(
 def through_hardware(
     scenario: ScenarioFile, made: CoreDesign, seed: int, folder: Path, simulator: str, progress: Progress
 ) -> dict[str, Any]:
-    """Run one seed through the generated hardware."""
+    """Run one seed in the generated hardware."""
     return hardware.run(made, [emulate_file(scenario, bench_of(made), seed=seed)], folder, simulator, progress)
 
 
 def signals(trace: Trace, made: CoreDesign) -> dict[str, Values]:
-    """Time in s and clearances in mm of a run: true, measured, and behind the filter."""
+    """Return time in s and clearances in mm of a run: true, measured, and filtered."""
     bench = bench_of(made)
     raw = calibrated(trace.codes, bench.ports, made.quantized.polynomial)
     smooth = filtered(raw, made.quantized.filter.sos, bench.output)

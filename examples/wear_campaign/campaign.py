@@ -1,4 +1,4 @@
-"""The steps of the campaign in their order; what comes out is a tree of numbers, and series for the pictures."""
+"""The steps of the campaign in order; the result is a tree of numbers, and series for the pictures."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ HERE = Path(__file__).parent
 SCENARIOS = HERE.parent / "scenarios"
 
 REALIZATION = "df1_ef2"
-"""Of the hardware whose integers are computed for every seed: one that is quickly designed; the bound is the same."""
+"""Realization of the hardware that is computed for every seed: quick to design, with the same bound."""
 
 
 def carry_out(settings: dict[str, Any], folder: Path, progress: Progress) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -33,7 +33,7 @@ def carry_out(settings: dict[str, Any], folder: Path, progress: Progress) -> tup
 
 
 def bench_campaign(settings: dict[str, Any], folder: Path, progress: Progress) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Run the bench: store, fit, filter from spectra, hardware; then many seeds."""
+    """Run the bench: store, fit, filter from spectra, hardware; then all seeds."""
     own, seed, seeds = settings["bench"], settings["seed"], range(1, settings["seeds"] + 1)
     rows, series = [], {}
     for name in own["scenarios"]:
@@ -149,7 +149,7 @@ def ride_campaign(settings: dict[str, Any], folder: Path, progress: Progress) ->
 def week_campaign(
     settings: dict[str, Any], filter_table: str, folder: Path, progress: Progress
 ) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Live through the week."""
+    """Run the week in service."""
     own = settings["week"]
     scenario = load_scenario(SCENARIOS / f"{own['scenario']}.toml")
     found = week.live(scenario, filter_table, own, settings["seed"], folder, settings["simulator"], progress)

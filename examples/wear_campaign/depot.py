@@ -1,4 +1,4 @@
-"""Measurements of the depot: taken by scenario file, kept in the store, fitted anew day by day."""
+"""Depot measurements: generated from a scenario file, stored, and fitted again each day."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from sosmith.model.text_files import write_files
 
 
 def into_store(scenario: ScenarioFile, seed: int, folder: Path, sensor: str) -> list[Calibration]:
-    """Add the measurements of each day as a file of its own; return the calibration after each."""
+    """Add the measurements of each day as a separate file; return the calibration after each day."""
     folder.mkdir(parents=True, exist_ok=True)
     store = folder / "measurements.sqlite"
     store.unlink(missing_ok=True)
@@ -32,6 +32,6 @@ def into_store(scenario: ScenarioFile, seed: int, folder: Path, sensor: str) -> 
 
 
 def fitted(rows: tuple[DepotMeasurement, ...]) -> Fit:
-    """Fit to the measurements of all days at once, as the store does after the last."""
+    """Fit the measurements of all days at once, as the store does after the last day."""
     clearance, voltage, temperature = (np.array([getattr(row, name) for row in rows]) for name in COLUMNS)
     return fit(Measurements(clearance=clearance, voltage=voltage, temperature=temperature, source="the depot"))

@@ -1,4 +1,4 @@
-"""The campaign's document in Markdown, made from its tree of numbers and nothing else."""
+"""The campaign's document in Markdown, generated from its tree of numbers only."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from examples.wear_campaign.pictures import stated
 from sosmith.gen.paper.figures import read_paper_figures
 
 WIDTH = 120
-"""Characters of a line."""
+"""Line length in characters."""
 
 CAUSES = {
     "all errors": "everything",
@@ -28,9 +28,10 @@ def document(results: dict[str, Any]) -> str:
     settings = results["settings"]
     parts = [
         "# The wear campaign",
-        "Made by `python -m examples.wear_campaign --document`; every figure comes out of that run. All errors of the "
-        "sensors stand in `examples/scenarios/` and `examples/wear_campaign/`, each with the figure of the paper it "
-        "follows from or marked as assumed; none was fitted to a result. Accuracy is the paper's equation 7: 100 % "
+        "Made by `python -m examples.wear_campaign --document`; every figure is a result of that run. All "
+        "sensor errors are listed in `examples/scenarios/` and `examples/wear_campaign/`, each with the figure of the "
+        "paper that it is derived from, or marked as assumed; none was fitted to a result. Accuracy is the paper's "
+        "equation 7: 100 % "
         "minus "
         "the mean of |measured - true| / true over the readings.",
         _bench(results["bench"], settings),
@@ -41,7 +42,7 @@ def document(results: dict[str, Any]) -> str:
 
 
 def _wrapped(block: str) -> str:
-    """Break the lines of a paragraph, or of each point of a list; tables, pictures and headings stay as they are."""
+    """Wrap a paragraph, or each item of a list; leave tables, pictures and headings unchanged."""
     if block.startswith(("|", "!", "#")):
         return block
     return "\n".join(
@@ -84,11 +85,12 @@ def _bench(found: dict[str, Any], settings: dict[str, Any]) -> str:
         "## On the bench",
         "The paper's section 3.3: clearance in steps, at 43 to 50 and at 92 to 96 degC, 6 samples a second. For "
         "each of "
-        f"{count} seeds the depot measures for ten days, the calibration is fitted by equation 3, and the run goes "
-        f"through it and the filter. The paper's abstract states {unfiltered:g} % without and {filtered:g} % with "
+        f"{count} seeds the depot measures for ten days, the calibration is fitted by equation 3, and the run "
+        f"is evaluated with it and the filter. The paper's abstract states {unfiltered:g} % without and {filtered:g} "
+        "% with "
         "its filter. "
-        f"Ours: the mean over seeds with its {share:.0f} % interval, and between which accuracies {share:.0f} % of "
-        "single runs lie; the last column is the largest difference between hardware and golden chain, in points.",
+        f"Ours: the mean over seeds with its {share:.0f} % interval, and the range that contains {share:.0f} % of the "
+        "single runs; the last column is the largest difference between hardware and golden chain, in points.",
         _table(
             [
                 "run",
@@ -102,18 +104,18 @@ def _bench(found: dict[str, Any], settings: dict[str, Any]) -> str:
             rows,
         ),
         "![Accuracy of every seed, with means and the paper's figures](images/campaign_bench.svg)",
-        f"Through the generated hardware in the simulator (seed {settings['seed']}): "
-        + ("every sample is that of the integer model" if exact else "NOT EVERY SAMPLE IS THAT OF THE INTEGER MODEL")
+        f"In the simulated hardware (seed {settings['seed']}), "
+        + ("every sample equals the integer model" if exact else "NOT EVERY SAMPLE EQUALS THE INTEGER MODEL")
         + f". Over all seeds the hardware's integers are within {worst:.4f} points of the golden chain.",
         "![Errors of one run of each scenario](images/campaign_runs.svg)",
         "### Where the error comes from",
-        "The same runs and the paper's filter, with one source of error after another taken away. The first two "
+        "The same runs with the paper's filter, with one source of error removed at a time. The first two "
         "columns "
         "read the paper's tables as fractions, as equation 7 has them, the last two as millimetres "
-        "(`examples/scenarios/bench_43_50.toml` says what follows from either).",
+        "(`examples/scenarios/bench_43_50.toml` derives both).",
         _table(["filtered, %", *(_short(name) for name in names)], cause_rows),
         _findings(found, unfiltered, filtered),
-        "The rule of the paper, the smallest orders with an adjusted r of 0.975, decides by chance here: in some "
+        "The rule of the paper, the smallest orders with an adjusted r of 0.975, depends on chance here: for some "
         "seeds a "
         "linear fit passes and is kept.",
         _table(
@@ -136,14 +138,14 @@ def _bench(found: dict[str, Any], settings: dict[str, Any]) -> str:
 
 
 def _printed(scenario: str) -> str:
-    """Say what the paper states for this run: without and with its filter, where it has a table."""
+    """Return the paper's accuracies for this run, without and with its filter, as far as it has a table."""
     figures = read_paper_figures()
     tables = ("table_1", "table_4") if "43_50" in scenario else ("table_2",)
     return ", ".join(f"{float(figures.number(name, 'accuracy')):g} ({name.replace('_', ' ')})" for name in tables)
 
 
 def _findings(found: dict[str, Any], unfiltered: float, filtered: float) -> str:
-    """Say for each run whether it reaches the paper's figures, and what costs most."""
+    """Return for each run whether it reaches the paper's figures, and the largest source of error."""
     lines = []
     for row in found["runs"]:
         if row["filter"] != "the paper's":
@@ -157,11 +159,11 @@ def _findings(found: dict[str, Any], unfiltered: float, filtered: float) -> str:
         largest = max(gains, key=lambda what: gains[what])
         filter_gain = row["golden"]["mean"] - row["unfiltered"]["mean"]
         smaller = gains["no noise"] < gains["no systematic error of the run"]
-        why = ": it takes away noise only, which costs less than the systematic error" if smaller else ""
+        why = ": it removes only noise, which costs less than the systematic error" if smaller else ""
         lines.append(
             f"- {_scenario(row)}: unfiltered {_against(row['unfiltered'], unfiltered)}, filtered "
             f"{_against(row['golden'], filtered)}. The filter changes the mean by {filter_gain:+.2f} points{why}. "
-            f"Most is gained {CAUSES[largest]}: {gains[largest]:+.2f} points."
+            f"The largest gain is {CAUSES[largest]}: {gains[largest]:+.2f} points."
         )
     return "\n".join(lines)
 
@@ -198,7 +200,7 @@ def _ride(found: dict[str, Any], settings: dict[str, Any]) -> str:
         for row in found["runs"]
     ]
     valid = found["validity"]
-    kept = "keeps the model within its limits" if valid["tangent_kept"] else "leads beyond its limits as well"
+    kept = "keeps the model within its limits" if valid["tangent_kept"] else "exceeds its limits as well"
     paper, spectra = found["filters"][0], found["filters"][-1]
     attenuated, ratio = paper["attenuation"]["the paper's pass edge"], spectra["delay"] / paper["delay"]
     offsets = {row["scenario"]: row["mean_after"] for row in found["runs"] if row["filter"] == "from spectra"}
@@ -209,7 +211,7 @@ def _ride(found: dict[str, Any], settings: dict[str, Any]) -> str:
         "over the "
         "paper's curve with its single irregularity, both with random irregularities of the low level; true "
         "clearance 5 mm, "
-        "noise of the sensor, and an exact calibration, so that what is left is what motion does. Three filters at "
+        "noise of the sensor, and an exact calibration, so that only the effect of motion remains. Three filters at "
         f"{settings['ride']['sample_rate']:g} Hz: the paper's of tables 9 and 10; one with the paper's 0.02 dB at 10 "
         "Hz, "
         "correctly pre-warped; and one that `sosmith spectrum` would propose from these rides "
@@ -227,17 +229,17 @@ def _ride(found: dict[str, Any], settings: dict[str, Any]) -> str:
             ],
             runs,
         ),
-        "![Clearance over both rides, measured and behind each filter](images/campaign_ride.svg)",
+        "![Clearance over both rides, measured and after each filter](images/campaign_ride.svg)",
         "A filter at the paper's stated pass edge lets the motion of the vehicle through: hunting and the "
         "irregularity lie "
-        f"far below 10 Hz. The paper's own coefficients remove it, with {attenuated:.0f} dB at that very edge, and pay "
-        f"with their delay. The filter from spectra has {100 * ratio:.0f} % of that delay. "
-        f"What no filter removes is the steady offset of a curve: behind the last filter the mean error is {told}.",
+        f"far below 10 Hz. The paper's own coefficients remove it, with {attenuated:.0f} dB at that edge, at the "
+        f"cost of delay. The filter from spectra has {100 * ratio:.0f} % of that delay. "
+        f"No filter removes the steady offset of a curve: after the last filter the mean error is {told}.",
         "The model is linear. On the paper's curve, with its irregularity of 20 mm, the leading wheelset goes "
-        f"{valid['beyond_flange']:.0f} mm beyond where its flange would have stopped it, for "
-        f"{100 * valid['beyond_share']:.0f} % of the ride, and asks for {valid['friction_used']:.1f} times the "
-        "friction "
-        f"that there is: take the numbers of the curve as those of the model. Tangent track {kept}.",
+        f"{valid['beyond_flange']:.0f} mm beyond flange contact, which it exceeds for "
+        f"{100 * valid['beyond_share']:.0f} % of the ride, and needs {valid['friction_used']:.1f} times the "
+        "available "
+        f"friction: the numbers for the curve are those of the model only. Tangent track {kept}.",
     ]
     return "\n\n".join(lines)
 
@@ -269,11 +271,12 @@ def _week(found: dict[str, Any], settings: dict[str, Any]) -> str:
     rate, low, high = told["rate"]
     lines = [
         "## A week in service",
-        f"`examples/scenarios/{settings['week']['scenario']}.toml`: an ageing sensor, every morning measurements in "
-        "the depot, a refit of the store, and the proof that `sosmith reload` asks for before the new coefficients may "
-        "be loaded; then journeys with motion and tread braking. Accuracies are of the integer model with the day's "
-        "coefficients, from reset each day; the load itself is not simulated here; the last column is the share of "
-        "readings with the flag `wear_warning`, which stands for "
+        f"`examples/scenarios/{settings['week']['scenario']}.toml`: an ageing sensor. Every morning there are "
+        "measurements in the depot, a refit, and the proof by `sosmith reload` that must succeed before the new "
+        "coefficients are "
+        "loaded; then journeys with motion and tread braking. Accuracies are those of the integer model with the day's "
+        "coefficients, from reset each day; the load itself is not simulated here. The last column is the share of "
+        "readings with the flag `wear_warning`, which means "
         f"{told['warning']:g} mm of wear.",
         _table(
             [
@@ -293,16 +296,17 @@ def _week(found: dict[str, Any], settings: dict[str, Any]) -> str:
         "![Wear over the week, and accuracy by calibration](images/campaign_week.svg)",
         f"Mean accuracy over the days: {mean['first']:.2f} % with the calibration of day 0, {mean['updated']:.2f} % "
         "with "
-        f"the one that is updated, {mean['factory']:.2f} % with equation 5a. The last is what the emulated sensor was "
-        f"before it aged, which nobody knows of a real one. A day of {found['days'][0]['measurements']} measurements "
-        "with the scatter that follows from the paper's adjusted r makes an uncertain calibration.",
-        f"At the end the wear reads {told['wear']:.3f} mm, its rate is {rate:.3f} mm a day ({low:.3f} to {high:.3f}), "
+        f"the updated one, {mean['factory']:.2f} % with equation 5a. The last is the emulated sensor "
+        f"before ageing, which is unknown for a real sensor. A day of {found['days'][0]['measurements']} measurements "
+        "with the scatter derived from the paper's adjusted r gives an uncertain calibration.",
+        f"At the end the measured wear is {told['wear']:.3f} mm, its rate {rate:.3f} mm per day ({low:.3f} to "
+        f"{high:.3f}), "
         f"state {told['state']}; at that rate the limit of {told['limit']:g} mm is {_days(told['life'])} away. The "
         "true "
-        f"rate over the week was {_true_rate(found):.3f} mm a day.",
-        f"The first day ran in the simulator with equation 5a: {found['simulated']['samples']:,} samples, "
+        f"rate over the week was {_true_rate(found):.3f} mm per day.",
+        f"The first day was simulated with equation 5a: {found['simulated']['samples']:,} samples, "
         + ("all" if found["simulated"]["bit_exact"] else "NOT ALL")
-        + " as the integer model has them.",
+        + " equal to the integer model.",
     ]
     return "\n\n".join(lines)
 

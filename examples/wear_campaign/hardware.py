@@ -1,4 +1,4 @@
-"""From calibration and filter to hardware that runs in the simulator."""
+"""From calibration and filter to simulated hardware."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ HERE = Path(__file__).parent
 
 @dataclass(frozen=True, kw_only=True)
 class Wear:
-    """The table ``[wear]``, in mm."""
+    """The table ``[wear]`` of a specification, in mm."""
 
     initial: float = 1.5
     warning: float = 7.0
@@ -29,13 +29,13 @@ class Wear:
 
 
 def calibration_table(polynomial: Polynomial) -> str:
-    """Table ``[calibration]`` of a polynomial; its numbers read back as the same doubles."""
+    """Return the table ``[calibration]`` of a polynomial; its numbers read back exactly."""
     rows = [[float(a) for a in row] for row in polynomial.coefficients]
     return f"[calibration]\ncoefficients = {rows}\n"
 
 
 def filter_by_order(order: int, cutoff: float) -> str:
-    """Table ``[filter]`` of a Butterworth low-pass with its cutoff in Hz."""
+    """Return the table ``[filter]`` of a Butterworth low-pass with its cutoff in Hz."""
     return f'[filter]\nfamily = "butterworth"\nkind = "lowpass"\norder = {order}\ncutoff = {cutoff!r}\n'
 
 
@@ -70,12 +70,12 @@ def specification(
 def instrument(
     folder: Path, name: str, sample_rate: float, calibration: str, filter_table: str, **options: Any
 ) -> CoreDesign:
-    """Write a specification as `specification` does, and design it."""
+    """Write a specification with `specification`, and design it."""
     return design_core(load(specification(folder, name, sample_rate, calibration, filter_table, **options)))
 
 
 def run(made: CoreDesign, traces: Sequence[Trace], folder: Path, simulator: str, progress: Progress) -> dict[str, Any]:
-    """Run the hardware on one trace for each channel, write its report, and return what the report says.
+    """Run the hardware on one trace for each channel, write its report, and return the figures of the report.
 
     Raises
     ------
@@ -90,7 +90,7 @@ def run(made: CoreDesign, traces: Sequence[Trace], folder: Path, simulator: str,
 
 
 def told(summary: dict[str, Any]) -> dict[str, Any]:
-    """Pick what the campaign's document tells of a run in the simulator."""
+    """Return the figures of a simulated run that the campaign's document shows."""
     return {
         "samples": summary["samples"],
         "bit_exact": summary["bit_exact"],

@@ -18,11 +18,11 @@ SETTLED_FROM = 20.0
 """Time in s from which the rides are drawn."""
 
 POINTS = 900
-"""Points that a long curve is thinned to."""
+"""Largest number of points of a curve; longer ones are decimated."""
 
 
 def pictures(results: dict[str, Any], series: dict[str, Any]) -> dict[str, bytes]:
-    """Draw all pictures; return the files by name."""
+    """Draw all pictures; return their files by name."""
     painted: dict[str, tuple[float, Callable[[Figure], None]]] = {
         "bench": (3.4, lambda figure: bench(figure, results["bench"])),
         "runs": (3.4, lambda figure: runs(figure, series["bench"])),
@@ -64,12 +64,12 @@ def bench(figure: Figure, results: dict[str, Any]) -> None:
 
 
 def stated(figures: PaperFigures) -> tuple[float, float]:
-    """Accuracies in per cent that the paper's abstract states: without and with the filter."""
+    """Return the accuracies in per cent of the paper's abstract: without and with the filter."""
     return float(figures.number("abstract", "accuracy")), float(figures.number("abstract", "filtered_accuracy"))
 
 
 def runs(figure: Figure, series: dict[str, Any]) -> None:
-    """Show one run of each scenario: error before and behind the filter."""
+    """Draw one run of each scenario: error before and after the filter."""
     for axes, (name, signals) in zip(figure.subplots(1, 2), series.items(), strict=True):
         time = signals["time"]
         axes.plot(time, 1000 * (signals["measured"] - signals["true"]), color=GREY, lw=0.6, label="before the filter")
@@ -82,7 +82,7 @@ def runs(figure: Figure, series: dict[str, Any]) -> None:
 
 
 def ride(figure: Figure, results: dict[str, Any], series: dict[str, Any]) -> None:
-    """Show the rides: clearance before and behind each filter."""
+    """Draw the rides: clearance before and after each filter."""
     rides = list(dict.fromkeys(row["scenario"] for row in results["runs"]))
     all_axes = figure.subplots(len(rides), 1, sharex=True)
     for axes, name in zip(np.atleast_1d(all_axes), rides, strict=True):
@@ -106,7 +106,7 @@ def ride(figure: Figure, results: dict[str, Any], series: dict[str, Any]) -> Non
 
 
 def week(figure: Figure, results: dict[str, Any], series: dict[str, Any]) -> None:
-    """Show the wear of the week, and accuracies day by day."""
+    """Draw the wear of the week, and the accuracy of each day."""
     left, right = figure.subplots(1, 2)
     found = series["week"]
     initial = found.limits.initial

@@ -1,4 +1,4 @@
-"""The vehicle on track: what its motion does to the measurement, and what each of three filters leaves of it."""
+"""The vehicle on track: the effect of its motion on the measurement, and how well three filters remove it."""
 
 from __future__ import annotations
 
@@ -15,8 +15,9 @@ from sosmith.gen.core import CoreDesign
 from sosmith.gen.filter.design import prewarp, unwarp
 from sosmith.gen.filter.response import group_delay, magnitude_db
 from sosmith.gen.spectrum.filter_table import filter_table
-from sosmith.gen.spectrum.proposal import Content, Proposal, Wish, propose
-from sosmith.gen.spectrum.spectra import SpectrumSettings, spectrum
+from sosmith.gen.spectrum.proposal import Content, Proposal, propose
+from sosmith.gen.spectrum.settings import SpectrumSettings, Wish
+from sosmith.gen.spectrum.spectra import spectrum
 from sosmith.gen.stimuli import bench_of
 from sosmith.model.calibration.polynomial import EQUATION_5A
 from sosmith.model.reference.accuracy import accuracy_percent
@@ -34,18 +35,18 @@ from sosmith.sim.simulation import Progress
 Values = npt.NDArray[np.float64]
 
 PAPER_FILTER = hardware.filter_by_order(7, 0.2587802)
-"""Filter of the paper's tables 9 and 10 (examples/flange_wear_locomotive.toml says where its cutoff comes from)."""
+"""Filter of the paper's tables 9 and 10; examples/flange_wear_locomotive.toml derives its cutoff."""
 
 SETTLED = 0.01
-"""Part of a step that is left when the filter counts as settled."""
+"""Remaining fraction of a step at which the filter counts as settled."""
 
 NOTABLE = {"hunting": 1.2, "irregularity": 2.0, "the paper's pass edge": 10.0}
-"""Frequencies in Hz whose attenuation is shown: bogie mode and the paper's 10 m irregularity at 20 m/s."""
+"""Frequencies in Hz for which the attenuation is shown: bogie mode, and the paper's 10 m irregularity at 20 m/s."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Result:
-    """One filter on one ride. Errors in mm against the true clearance, over the ride without its lead-in."""
+    """One filter on one ride. Errors are in mm against the true clearance, without the lead-in."""
 
     filter: str
     describe: str
@@ -68,13 +69,13 @@ class Result:
 
 
 def prewarped(order: int, edge: float, loss: float, sample_rate: float) -> str:
-    """Table ``[filter]`` of the Butterworth low-pass that loses `loss` dB at `edge` Hz: equations 10 and 13."""
+    """Return the table ``[filter]`` of the Butterworth low-pass with `loss` dB at `edge` Hz, by equations 10 and 13."""
     analog = prewarp(edge, sample_rate) / (10 ** (0.1 * loss) - 1) ** (1 / (2 * order))
     return hardware.filter_by_order(order, float(f"{unwarp(analog, sample_rate):.9g}"))
 
 
 def trace_of(scenario: ScenarioFile, bench: Bench, seed: int, lead_in: float) -> Trace:
-    """Make the trace; every sample behind the first `lead_in` seconds, in which filters settle, is a reading."""
+    """Generate the trace; every sample after the first `lead_in` seconds, in which filters settle, is a reading."""
     trace = emulate_file(scenario, bench, seed=seed, vehicle=vehicle_clearance)
     return replace(trace, reading=trace.time >= lead_in)
 
@@ -82,7 +83,7 @@ def trace_of(scenario: ScenarioFile, bench: Bench, seed: int, lead_in: float) ->
 def from_spectra(
     scenarios: list[ScenarioFile], bench: Bench, seed: int, lead_in: float, tolerance: float
 ) -> tuple[Proposal, str]:
-    """Propose a filter from the spectra of the rides, true and measured; return it with its table."""
+    """Propose a filter from the true and measured spectra of the rides; return it with its table."""
     contents, rate, settings = [], float(bench.sample_rate), SpectrumSettings()
     for scenario in scenarios:
         trace = trace_of(scenario, bench, seed, lead_in)
@@ -111,7 +112,7 @@ def ride(
     simulator: str,
     progress: Progress,
 ) -> Result:
-    """Run one filter through one ride: in double precision, and in the generated hardware."""
+    """Run one filter on one ride: in double precision and in the generated hardware."""
     bench = bench_of(made)
     trace, ideal = trace_of(scenario, bench, seed, lead_in), made.quantized.filter
     before = calibrated(trace.codes, bench.ports, EQUATION_5A)
@@ -146,7 +147,7 @@ def ride(
 
 
 def validity(sample_rate: float) -> dict[str, float | bool]:
-    """Tell how far the leading wheelset leaves the linear model on the curve: mm beyond its flange, friction."""
+    """Return how far the leading wheelset exceeds the linear model on the curve: mm beyond flange contact, friction."""
     parameters = built_in()
     track = curved_track(parameters.track)
     motion = run(parameters, track, speed=SPEED, sample_rate=sample_rate, irregularity=IRREGULARITY, seed=1)

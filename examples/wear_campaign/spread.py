@@ -10,7 +10,7 @@ from scipy import stats
 
 
 class Spread(TypedDict):
-    """Of a quantity over seeds: its mean, the confidence interval of the mean, and the middle share of single runs."""
+    """A quantity over seeds: its mean, the confidence interval of the mean, and the central range of single runs."""
 
     mean: float
     low: float
@@ -20,10 +20,10 @@ class Spread(TypedDict):
 
 
 def spread(values: Sequence[float], confidence: float) -> Spread:
-    """Describe values of independent seeds, at least two.
+    """Summarize the values of at least two independent seeds.
 
-    The mean's interval is Student's; the single runs' are the quantiles that leave out (1 - `confidence`) / 2 on either
-    side.
+    The interval of the mean is Student's; the range of single runs lies between the quantiles that exclude
+    (1 - `confidence`) / 2 on each side.
     """
     array = np.asarray(values, dtype=np.float64)
     half = float(stats.t.ppf((1 + confidence) / 2, len(array) - 1) * array.std(ddof=1) / np.sqrt(len(array)))

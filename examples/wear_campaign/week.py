@@ -1,4 +1,4 @@
-"""A week in service: the sensor ages, the calibration follows, and the wear is told from what the hardware reads."""
+"""A week in service: the sensor ages, the calibration follows, and wear is estimated from the hardware's readings."""
 
 from __future__ import annotations
 
@@ -28,15 +28,15 @@ from sosmith.sim.simulation import Progress
 Values = npt.NDArray[np.float64]
 
 RATE = 100.0
-"""Sample rate in Hz, the paper's section 5.4."""
+"""Sample rate in Hz, from the paper's section 5.4."""
 
 MAX_ERROR = 0.0005
-"""Of hardware that calibrations are loaded into, in mm: two LSB, which leaves room for other coefficients."""
+"""Allowed error in mm of the reloadable hardware: two LSB, which leaves room for other coefficients."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Day:
-    """One day. Accuracies in per cent by equation 7, of the hardware's integers at the readings of the day."""
+    """One day. Accuracies are in per cent by equation 7, of the integer model at the readings of the day."""
 
     day: int
     calibration: Calibration
@@ -52,7 +52,7 @@ class Day:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Week:
-    """The week, and what is told of the wheel at its end."""
+    """The week, and the wear assessment at its end."""
 
     days: list[Day]
     report: WearReport
@@ -72,7 +72,7 @@ def live(
     simulator: str,
     progress: Progress,
 ) -> Week:
-    """Go through the week: each morning depot, refit, proof and reload; then the day's journeys."""
+    """Run the week: each morning depot, refit, proof and reload; then the journeys of the day."""
     calibrations = depot.into_store(scenario, seed, folder, settings["sensor"])
     initial = scenario.document.wear.initial_clearance
     wear = hardware.Wear(initial=initial, warning=settings["warning"], limit=settings["limit"])
@@ -100,11 +100,11 @@ def live(
             loaded.append(swap.made.quantized.datapath)
         except ShortfallError as error:
             verdict = f"refused: {error}"
-            loaded.append(loaded[-1] if loaded else factory.datapath)  # goes on with what it has
+            loaded.append(loaded[-1] if loaded else factory.datapath)  # keeps the active set
         own = [k for k, excerpt in enumerate(excerpts) if int(excerpt.day) == number]
         span = slice(starts[own[0]], starts[own[-1] + 1])
         part = replace(trace, codes=trace.codes[span], truth=trace.truth[span], reading=trace.reading[span])
-        if number == 0:  # a day is enough for the simulator: the others run the same hardware
+        if number == 0:  # one simulated day is enough: the others run the same hardware
             summary = hardware.run(factory, [part], folder, simulator, progress)
 
         def accuracy(datapath: Datapath, part: Trace = part) -> float:

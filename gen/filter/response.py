@@ -7,16 +7,20 @@ frequency) lose no accuracy.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 
 import numpy as np
 import numpy.typing as npt
 
+from sosmith.gen.specification.choices import KINDS
+from sosmith.model.arithmetic.elementary import geometric, log10
+
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 Band = tuple[float, float]
-
-KINDS = ("lowpass", "highpass", "bandpass", "bandstop")
 
 FLOOR_DB = -400.0
 """Magnitudes below this, such as at a zero on the unit circle, are given as this."""
@@ -25,7 +29,7 @@ MASK_TOLERANCE_DB = 1e-3
 """By how much a response may miss its mask. A minimum-order design meets one edge of the mask with equality,
 so rounding the coefficients puts it a hair to either side of it."""
 
-HALF_POWER_DB = 10 * np.log10(2)
+HALF_POWER_DB = 10 * math.log10(2)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,10 +103,15 @@ class ResponseMeasures:
     largest_pole_radius: float
 
 
-def _polynomial(coefficients: Array, omega: Array) -> Complex:
-    """Evaluate ``c0 + c1 z^-1 + c2 z^-2`` on the unit circle."""
-    z1 = np.exp(-1j * omega)
-    return np.asarray(coefficients[0] + z1 * (coefficients[1] + z1 * coefficients[2]), dtype=np.complex128)
+def _polynomial(coefficients: Array, omega: Array) -> tuple[Array, Array]:
+    """Real and imaginary part of ``c0 + c1 z^-1 + c2 z^-2`` on the unit circle.
+
+    Not in complex numbers, whose products differ among machines in numpy.
+    """
+    c0, c1, c2 = (float(c) for c in coefficients)
+    cos, sin = np.cos(omega), np.sin(omega)
+    inner_real, inner_imag = c1 + c2 * cos, -c2 * sin
+    return c0 + cos * inner_real + sin * inner_imag, cos * inner_imag - sin * inner_real
 
 
 def _polynomial_delay(coefficients: Array, omega: Array) -> Array:
@@ -114,11 +123,11 @@ def _polynomial_delay(coefficients: Array, omega: Array) -> Array:
     c = np.trim_zeros(coefficients, "b")
     if len(c) and (np.array_equal(c, c[::-1]) or np.array_equal(c, -c[::-1])):
         return np.full(omega.shape, (len(c) - 1) / 2)
-    value = _polynomial(coefficients, omega)
-    vanishes = np.abs(value) < 1e-13 * np.sum(np.abs(coefficients))
-    slope = _polynomial(coefficients * np.arange(3), omega)
-    delay = np.real(slope / np.where(vanishes, 1.0, value))
-    return np.where(vanishes, np.nan, delay)
+    real, imag = _polynomial(coefficients, omega)
+    vanishes = np.hypot(real, imag) < 1e-13 * np.sum(np.abs(coefficients))
+    slope_real, slope_imag = _polynomial(coefficients * np.arange(3), omega)
+    square = np.where(vanishes, 1.0, real * real + imag * imag)
+    return np.where(vanishes, np.nan, (slope_real * real + slope_imag * imag) / square)
 
 
 def magnitude_db(sos: Array, frequency: Array, sample_rate: float) -> Array:
@@ -137,10 +146,21 @@ def magnitude_db(sos: Array, frequency: Array, sample_rate: float) -> Array:
     total = np.zeros(omega.shape)
     tiny = 10 ** (FLOOR_DB / 20)
     for section in sos:
-        numerator = np.abs(_polynomial(section[:3], omega))
-        denominator = np.abs(_polynomial(section[3:], omega))
-        total += 20 * np.log10(np.maximum(numerator, tiny) / np.maximum(denominator, tiny))
+        numerator = np.hypot(*_polynomial(section[:3], omega))
+        denominator = np.hypot(*_polynomial(section[3:], omega))
+        total += 20 * log10(np.maximum(numerator, tiny) / np.maximum(denominator, tiny))
     return np.maximum(total, FLOOR_DB)
+
+
+def complex_response(sos: Array, frequency: Array, sample_rate: float) -> Complex:
+    """Complex frequency response; parameters as for `magnitude_db`, `frequency` of any shape."""
+    omega = 2 * np.pi * frequency / sample_rate
+    total = np.ones(omega.shape, dtype=np.complex128)
+    for section in sos:
+        over_real, over_imaginary = _polynomial(section[:3], omega)
+        under_real, under_imaginary = _polynomial(section[3:], omega)
+        total *= (over_real + 1j * over_imaginary) / (under_real + 1j * under_imaginary)
+    return total
 
 
 def group_delay(sos: Array, frequency: Array, sample_rate: float) -> Array:
@@ -162,8 +182,22 @@ def group_delay(sos: Array, frequency: Array, sample_rate: float) -> Array:
 
 def _roots(polynomials: Array) -> Complex:
     """Roots of the rows ``c0 + c1 z^-1 + c2 z^-2`` in z, without those at the origin and at infinity."""
-    roots = [np.roots(np.trim_zeros(row)) for row in polynomials]
-    return np.concatenate(roots).astype(np.complex128)
+    roots = [root for row in polynomials.tolist() for root in _quadratic_roots(np.trim_zeros(np.array(row)).tolist())]
+    return np.array(roots, dtype=np.complex128)
+
+
+def _quadratic_roots(coefficients: Sequence[float]) -> list[complex]:
+    """Roots of ``c0 z^2 + c1 z + c2`` or ``c0 z + c1``, the larger of two real ones first."""
+    if len(coefficients) < 3:
+        return [complex(-c1 / coefficients[0]) for c1 in coefficients[1:]]
+    c0, c1, c2 = coefficients
+    # exact: roots close to each other are told apart by it
+    square = float(Fraction(c1) ** 2 - 4 * Fraction(c0) * Fraction(c2))
+    if square < 0:
+        real, imag = -c1 / (2 * c0), math.sqrt(-square) / abs(2 * c0)
+        return [complex(real, imag), complex(real, -imag)]
+    far = -(c1 + math.copysign(math.sqrt(square), c1)) / 2
+    return [complex(far / c0), complex(c2 / far)]
 
 
 def poles(sos: Array) -> Complex:
@@ -182,14 +216,14 @@ def frequency_grid(facts: FilterFacts, points: int = 1200) -> Array:
     edges = [f for pair in (facts.passband_edge, facts.stopband_edge, facts.cutoff) if pair for f in pair]
     lowest = min(edges) if edges else _lowest_pole_frequency(facts)
     start = min(lowest, nyquist / 2) / 100
-    grid = np.geomspace(start, nyquist, points)
-    grid[-1] = nyquist
+    grid = geometric(start, nyquist, points)
     return np.unique(np.concatenate([grid, [f for f in edges if f < nyquist]]))
 
 
 def _lowest_pole_frequency(facts: FilterFacts) -> float:
     """Distance of the nearest pole from z = 1, as a frequency in Hz: where the response starts to bend."""
-    distances = np.abs(poles(facts.ideal_sos) - 1)
+    found = poles(facts.ideal_sos) - 1
+    distances = np.hypot(found.real, found.imag)
     distance = float(np.min(distances)) if len(distances) else 1.0
     return max(distance, 1e-9) * facts.sample_rate / (2 * np.pi)
 
@@ -267,10 +301,11 @@ def measure_response(facts: FilterFacts) -> ResponseMeasures:
     bands = passbands(facts)
     inside = _within(grid, bands) if bands else ideal >= level - HALF_POWER_DB
     stop = _within(grid, stopbands(facts))
+    found: list[complex] = poles(facts.quantized_sos).tolist()
     return ResponseMeasures(
         max_deviation_db_passband=float(np.max(np.abs(quantized - ideal)[inside])),
         stopband_attenuation_db=float(level - np.max(quantized[stop])) if stop.any() else None,
         passband_loss_db=float(level - np.min(quantized[inside])),
         passband_gain_db=float(np.max(quantized[inside]) - level),
-        largest_pole_radius=float(np.max(np.abs(poles(facts.quantized_sos)), initial=0.0)),
+        largest_pole_radius=max((math.hypot(pole.real, pole.imag) for pole in found), default=0.0),
     )

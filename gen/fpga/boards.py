@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from sosmith.model.errors import SpecificationError
+from sosmith.model.suggestion import did_you_mean
 
 _LUTS = {"SB_LUT4": 1, "LUT4": 1, "CCU2C": 2, "TRELLIS_DPR16X4": 4}
 """LUT4 that a cell takes."""
@@ -177,5 +178,6 @@ def find_board(name: str) -> Board:
         If there is none; lists those that there are.
     """
     if name not in BOARDS:
-        raise SpecificationError(f"the board must be one of {', '.join(BOARDS)}, not {name}")
+        hint = did_you_mean(name, BOARDS)
+        raise SpecificationError(f"the board must be one of {', '.join(BOARDS)}, not {name}{hint}")
     return BOARDS[name]

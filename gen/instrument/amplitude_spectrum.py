@@ -28,7 +28,8 @@ def amplitude_spectrum(values: Array, sample_rate: float) -> tuple[Array, Array]
         Of the sine wave at each frequency, in the unit of `values`; at 0 Hz the mean's magnitude.
     """
     n = len(values)
-    amplitude = 2 / n * np.abs(np.fft.rfft(values, axis=0))
+    spectrum = np.fft.rfft(values, axis=0)
+    amplitude = 2 / n * np.hypot(spectrum.real, spectrum.imag)
     amplitude[0] /= 2
     if n % 2 == 0:
         amplitude[-1] /= 2
@@ -38,9 +39,9 @@ def amplitude_spectrum(values: Array, sample_rate: float) -> tuple[Array, Array]
 def ripple(values: Array, sample_rate: float, frequency: float) -> float:
     """Amplitude at one frequency in Hz, up to half the sample rate, of a motion of shape (n,)."""
     n = len(values)
-    turned = np.exp(-2j * math.pi * frequency / sample_rate * np.arange(n))
+    angle = 2 * math.pi * frequency / sample_rate * np.arange(n)
     sides = 1 if frequency in (0, sample_rate / 2) else 2
-    return float(sides / n * abs(np.dot(turned, values)))
+    return sides / n * math.hypot(float(np.sum(np.cos(angle) * values)), float(np.sum(np.sin(angle) * values)))
 
 
 def attenuation(delta: float) -> float:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from sosmith.model.vehicle.choices import TRACK_NAMES
 from sosmith.model.vehicle.lateral import lateral_dynamics
 from sosmith.model.vehicle.limits import Limits, limits
 from sosmith.model.vehicle.linear_motion import Mode
@@ -17,7 +18,7 @@ from sosmith.model.vehicle.run import run
 from sosmith.model.vehicle.track import curved_track, tangent_track
 from sosmith.model.vehicle.vertical import vertical_dynamics
 
-TRACKS = {"paper": curved_track, "tangent": tangent_track}
+TRACKS = dict(zip(TRACK_NAMES, (curved_track, tangent_track), strict=True))
 """Tracks by name."""
 
 

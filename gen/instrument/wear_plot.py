@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from sosmith.gen.picture import picture
 from sosmith.gen.report.plots import envelope
-from sosmith.model.port import Values
+from sosmith.model.arrays import Values
 from sosmith.model.wear.assessment import WearReport, block_medians
 
 _BLUE, _RED, _AMBER, _GREY = "#2563a8", "#b4432f", "#c08a1e", "#8a8a8a"

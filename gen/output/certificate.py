@@ -35,7 +35,7 @@ from sosmith.gen.verifier.certificate_file import (
     on_grid,
 )
 from sosmith.gen.word_lengths.cascade import ideal_sections
-from sosmith.gen.word_lengths.quantize import Quantized
+from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.model.dataflow.datapath import Stage
 from sosmith.model.dataflow.graph import Node
 from sosmith.model.port import Port
@@ -43,8 +43,8 @@ from sosmith.model.sections.horner import HornerStep
 from sosmith.model.sections.output import OutputStage
 
 _FINER_BITS = 88
-"""By so many bits a claim is computed more closely than the search for word lengths needs, so that two ways of
-computing it fall into the same step of the grid."""
+"""Bits by which a claim is computed more precisely than the search for word lengths needs, so that two methods fall
+into the same step of the grid."""
 
 
 def certificate(quantized: Quantized, max_error: Fraction) -> Certificate:
@@ -103,14 +103,12 @@ def _claims(quantized: Quantized, ideal: Sequence[TransferFunction]) -> ClaimsEn
     sections: tuple[GainEntry, ...] = ()
     if quantized.sections:
         models = [linear_models(section.graph) for section in quantized.sections]
-        entry = quantized.sections[0].graph
-        node = entry.nodes[entry.inputs[0]]
-        unit = Fraction(2) ** -node.frac
-        closer = _closer(models, ideal, node.low * unit, node.high * unit)
+        (x,) = quantized.sections[0].graph.input_ranges
+        closer = _closer(models, ideal, *x.limits)
         gain = closer.gain
         budget["filter coefficients"], budget["filter rounding"] = closer.coefficients, closer.rounding
         for part in budget.keys() & {"calibration", "input scaling"}:
-            budget[part] = quantized.entry_error * gain
+            budget[part] = quantized.input_error * gain
         sections = tuple(_gains(s.name, m) for s, m in zip(quantized.sections, models, strict=True))
     return ClaimsEntry(budget=budget, bound=sum(budget.values(), Fraction(0)), peak_gain=gain, sections=sections)
 

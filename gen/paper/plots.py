@@ -25,6 +25,7 @@ from sosmith.gen.paper.seventh_order import (
     table_9_filter,
 )
 from sosmith.gen.picture import picture
+from sosmith.model.arithmetic.elementary import geometric
 
 _BLUE, _RED, _GREEN, _GREY = "#2563a8", "#b4432f", "#2f8a57", "#8a8a8a"
 _COLOURS = (_BLUE, _RED, _GREEN)
@@ -131,7 +132,7 @@ def _poles(figure: Figure, figures: PaperFigures) -> None:
 
 def _responses(axes: Axes, responses: list[tuple[str, Digital, float]], lowest: float) -> None:
     for (label, filter_, rate), colour, dashes in zip(responses, _COLOURS, ("-", "--", ":"), strict=False):
-        frequencies = np.geomspace(lowest, 0.499 * rate, 250)
+        frequencies = geometric(lowest, 0.499 * rate, 250)
         gains = [gain_db(*filter_, float(Fraction(f)), rate) for f in frequencies]
         axes.semilogx(frequencies, gains, dashes, color=colour, label=label)
     axes.set(xlabel="frequency (Hz)", ylabel="gain (dB)")

@@ -7,7 +7,7 @@ from fractions import Fraction
 
 from sosmith.gen.paper.comparison import Comparison, Part, compare, plain, table
 from sosmith.gen.paper.figures import PaperFigures
-from sosmith.model.calibration.fit import REQUIRED_R
+from sosmith.model.calibration.acceptance import REQUIRED_R
 from sosmith.model.calibration.polynomial import Polynomial
 
 _VOLTAGES = (0.0, 2.0, 5.0, 8.0, 10.0)  # V

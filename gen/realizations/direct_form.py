@@ -13,6 +13,7 @@ from scipy import signal
 
 from sosmith.gen.filter.design import decay_length
 from sosmith.gen.realizations.coefficients import Rounding
+from sosmith.model.dataflow.graph import Range
 from sosmith.model.errors import ShortfallError
 from sosmith.model.sections.direct_form import DirectForm1, Product
 
@@ -146,7 +147,7 @@ def direct_form(
     name: str,
     feedback_order: int,
     rounding: Rounding,
-    x: tuple[int, int, int],
+    x: Range,
     fracs: Mapping[str, int],
     ranges: Mapping[str, tuple[int, int]],
     wide: tuple[int, int],
@@ -163,8 +164,8 @@ def direct_form(
         0, 1 or 2.
     rounding : Rounding
         Rounds the coefficients.
-    x : tuple of int
-        Fraction bits, smallest and largest code of the input.
+    x : Range
+        Fraction bits and range of the input's code.
     fracs : mapping of str to int
         Fraction bits that are kept of v, as many as x has where missing, and of ``taps_A1`` and the like, all where
         missing.
@@ -189,10 +190,10 @@ def direct_form(
             products=fitted,
             integer_part=integer_part,
             feedback=(0, 0),
-            x_frac=x[0],
-            x_low=x[1],
-            x_high=x[2],
-            y_frac=fracs.get("v", x[0]),
+            x_frac=x.frac,
+            x_low=x.low,
+            x_high=x.high,
+            y_frac=fracs.get("v", x.frac),
             v_low=v_range[0],
             v_high=v_range[1],
         )

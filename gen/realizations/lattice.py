@@ -17,8 +17,9 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
+from sosmith.model.dataflow.graph import Range
 from sosmith.model.errors import ShortfallError
-from sosmith.model.sections.lattice import LANES, Adaptor, Allpass, Format, LatticeJoin, LatticeStage
+from sosmith.model.sections.lattice import LANES, Adaptor, Allpass, LatticeJoin, LatticeStage
 from sosmith.model.sections.state_space import Coefficient
 
 Row = Sequence[float]
@@ -169,7 +170,7 @@ def lattice_stage(
     *,
     name: str,
     rounding: Rounding,
-    entries: Sequence[tuple[int, int, int]],
+    entries: Sequence[Range],
     fracs: Mapping[str, int],
     ranges: Mapping[str, tuple[int, int]],
     wide: tuple[int, int],
@@ -184,9 +185,8 @@ def lattice_stage(
         Its name.
     rounding : callable
         Rounds the coefficients.
-    entries : sequence of tuple of int
-        Fraction bits, smallest and largest code of each input; where there is but one for two branches, it
-        drives both.
+    entries : sequence of Range
+        Fraction bits and range of each input's code; a single one drives both branches.
     fracs : mapping of str to int
         Fraction bits that are kept of ``upper_x1_sum`` and the like; those of the lane's input where missing.
     ranges : mapping of str to tuple of int
@@ -199,14 +199,13 @@ def lattice_stage(
     ShortfallError
         If the rounded coefficients are unstable.
     """
-    arrived = [Format(*entry) for entry in entries]
-    upper, lower = (arrived * 2)[:2]
+    upper, lower = ([*entries] * 2)[:2]
     if isinstance(part, LatticeSigns):
         return LatticeJoin(name=name, signs=part.signs, entries=(upper, lower))
 
-    def section(lane: str, denominator: Denominator, entry: Format) -> Allpass:
-        def form(kept: str, bounded: str) -> Format:
-            return Format(fracs.get(f"{lane}_{kept}", entry.frac), *ranges.get(f"{lane}_{bounded}", wide))
+    def section(lane: str, denominator: Denominator, entry: Range) -> Allpass:
+        def form(kept: str, bounded: str) -> Range:
+            return Range(fracs.get(f"{lane}_{kept}", entry.frac), *ranges.get(f"{lane}_{bounded}", wide))
 
         ideal = _adaptors(denominator)
         names = ("g",) if len(ideal) == 1 else ("g1", "g2")
@@ -229,7 +228,7 @@ def lattice_stage(
         )
     except ValueError as error:
         raise ShortfallError(f"{name} must be stable with its coefficients rounded: {error}") from None
-    return LatticeStage(name=name, lanes=(first, second), entries=tuple(arrived))
+    return LatticeStage(name=name, lanes=(first, second), entries=tuple(entries))
 
 
 def _adaptors(denominator: Denominator) -> list[tuple[int, float]]:

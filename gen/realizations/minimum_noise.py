@@ -1,7 +1,7 @@
 """Second-order sections in the coordinates with the least roundoff noise, the same doubles on every machine.
 
-The theory is that of `sosmith.gen.realizations.noise`. Here the Gramians are exact rationals, and what follows from them
-is rounded correctly.
+The theory is that of `sosmith.gen.realizations.noise`. Here the Gramians are exact rationals, and what follows from
+them is rounded correctly.
 """
 
 from __future__ import annotations

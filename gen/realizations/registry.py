@@ -5,22 +5,19 @@ A realization is named here once. Word lengths, proof, C model, hardware, report
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any, Protocol
 
-from sosmith.gen.realizations.coefficients import Rounding
 from sosmith.gen.realizations.direct_form import direct_form
 from sosmith.gen.realizations.lattice import Part, lattice_parts, lattice_stage
+from sosmith.gen.realizations.section_format import WIDE, SectionFormat
 from sosmith.gen.realizations.state_space import StateDesign, minimum_noise, normal, state_space
 from sosmith.gen.realizations.transposed import transposed_form
 from sosmith.model.dataflow.datapath import Stage
 
 Row = Sequence[float]
 """b0, b1, b2, 1, a1, a2 of an ideal section."""
-
-WIDE = 1 << 256
-"""Limit of a code whose range is not known yet; it never meets hardware."""
 
 
 class Section(Stage, Protocol):
@@ -35,42 +32,6 @@ class Section(Stage, Protocol):
     def optional_quantizers(self) -> tuple[str, ...]:
         """Names of the nodes of which bits may be dropped without need."""
         ...
-
-
-@dataclass(frozen=True, kw_only=True)
-class SectionFormat:
-    """Everything about a section's words.
-
-    Attributes
-    ----------
-    x_frac, x_low, x_high : int
-        Fraction bits and range of the input's code.
-    beside : tuple of tuple of int
-        The same of each further input.
-    coefficient_bits : int
-        Significant bits of each coefficient.
-    coefficients : mapping of str to tuple of int
-        Integer and fraction bits of the coefficients, by name, that take another value than the nearest.
-    fracs : mapping of str to int
-        Fraction bits kept by each quantizer, by the name of the node that it quantizes. Empty, they keep as many as
-        the input has; else those that are missing keep all, because with none nothing was left there to drop.
-    ranges : mapping of str to tuple of int
-        Range of the code of every node whose range is stated, by its name; `WIDE` where missing.
-    """
-
-    x_frac: int = 0
-    x_low: int = -WIDE
-    x_high: int = WIDE
-    beside: tuple[tuple[int, int, int], ...] = ()
-    coefficient_bits: int
-    coefficients: Mapping[str, tuple[int, int]] = field(default_factory=dict)
-    fracs: Mapping[str, int] = field(default_factory=dict)
-    ranges: Mapping[str, tuple[int, int]] = field(default_factory=dict)
-
-    @property
-    def rounding(self) -> Rounding:
-        """How coefficients become integers."""
-        return Rounding(self.coefficient_bits, self.coefficients)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,15 +61,15 @@ class Realization:
 
 
 def _direct_form(order: int) -> Callable[[Row, SectionFormat, str], Section]:
-    def build(row: Row, words: SectionFormat, name: str) -> Section:
+    def build(row: Row, form: SectionFormat, name: str) -> Section:
         return direct_form(
             row,
             name=name,
             feedback_order=order,
-            rounding=words.rounding,
-            x=(words.x_frac, words.x_low, words.x_high),
-            fracs=words.fracs,
-            ranges=words.ranges,
+            rounding=form.rounding,
+            x=form.x,
+            fracs=form.fracs,
+            ranges=form.ranges,
             wide=(-WIDE, WIDE),
         )
 
@@ -116,15 +77,15 @@ def _direct_form(order: int) -> Callable[[Row, SectionFormat, str], Section]:
 
 
 def _transposed_form(*, delta: bool) -> Callable[[Row, SectionFormat, str], Section]:
-    def build(row: Row, words: SectionFormat, name: str) -> Section:
+    def build(row: Row, form: SectionFormat, name: str) -> Section:
         return transposed_form(
             row,
             name=name,
             delta=delta,
-            rounding=words.rounding,
-            x=(words.x_frac, words.x_low, words.x_high),
-            fracs=words.fracs,
-            ranges=words.ranges,
+            rounding=form.rounding,
+            x=form.x,
+            fracs=form.fracs,
+            ranges=form.ranges,
             wide=(-WIDE, WIDE),
         )
 
@@ -134,30 +95,30 @@ def _transposed_form(*, delta: bool) -> Callable[[Row, SectionFormat, str], Sect
 def _state_space(
     design: Callable[[Row], StateDesign], *, truncating: bool
 ) -> Callable[[Row, SectionFormat, str], Section]:
-    def build(row: Row, words: SectionFormat, name: str) -> Section:
+    def build(row: Row, form: SectionFormat, name: str) -> Section:
         return state_space(
             row,
             name=name,
             design=design,
             truncating=truncating,
-            rounding=words.rounding,
-            u=(words.x_frac, words.x_low, words.x_high),
-            fracs=words.fracs,
-            ranges=words.ranges,
+            rounding=form.rounding,
+            u=form.x,
+            fracs=form.fracs,
+            ranges=form.ranges,
             wide=(-WIDE, WIDE),
         )
 
     return build
 
 
-def _lattice(part: Part, words: SectionFormat, name: str) -> Section:
+def _lattice(part: Part, form: SectionFormat, name: str) -> Section:
     return lattice_stage(
         part,
         name=name,
-        rounding=words.rounding,
-        entries=((words.x_frac, words.x_low, words.x_high), *words.beside),
-        fracs=words.fracs,
-        ranges=words.ranges,
+        rounding=form.rounding,
+        entries=(form.x, *form.beside),
+        fracs=form.fracs,
+        ranges=form.ranges,
         wide=(-WIDE, WIDE),
     )
 
@@ -195,9 +156,6 @@ REALIZATIONS: dict[str, Realization] = {
 
 CASCADES = tuple(name for name, realization in REALIZATIONS.items() if realization.cascade)
 """Names of the realizations whose stages are the ideal sections."""
-
-ERROR_FEEDBACK = ("df1", "df1_ef1", "df1_ef2")
-"""Realizations that differ in nothing but the error feedback, and so can be set side by side at the same widths."""
 
 BEST_KEPT = "df1_ef2"
 """Realization whose rounding needs the fewest bits at low cutoffs: where it falls short, its reason tells most."""

@@ -18,10 +18,11 @@ from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
-from scipy import linalg
 
 from sosmith.gen.realizations.coefficients import Rounding
-from sosmith.gen.realizations.noise import StateSystem, minimum_noise_coordinates
+from sosmith.gen.realizations.minimum_noise import least_noise, power_of_two_below, unit_gains
+from sosmith.gen.realizations.noise import StateSystem
+from sosmith.model.dataflow.graph import Range
 from sosmith.model.errors import ShortfallError
 from sosmith.model.sections.state_space import Coefficient, StateSpace
 
@@ -30,7 +31,6 @@ Row = Sequence[float]
 
 _ROUNDING = 1e-13  # relative size below which an entry of A is but the rounding of this design
 _EQUAL = 2.0**-36  # relative to the squared distance from s: square of an imaginary part that counts as none
-_NOTHING = 1e-9  # relative size below which an entry of B counts as zero
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,17 +94,7 @@ def _minimum_noise(row: tuple[float, ...]) -> StateDesign:
     side, big1, big2 = _about_side(row)
     step = math.sqrt(big2)
     M, B = np.array([[0.0, step], [-step, -big1]]), np.array([0.0, 1.0])
-    start = _completed(row, side, M, B).system
-    T = minimum_noise_coordinates(start.controllability, start.observability)
-    optimal = start.transformed(T)
-    scale, inputs = np.sqrt(np.diag(optimal.controllability)), np.zeros(2)
-    for i, b in enumerate(optimal.B):
-        size = abs(b) / scale[i]
-        if size > _NOTHING * step:
-            inputs[i] = _power_of_two_below(size)
-            scale[i] = b / inputs[i]
-    T = T * scale
-    return _completed(row, side, np.asarray(np.linalg.inv(T) @ M @ T, dtype=np.float64), inputs)
+    return _completed(row, side, *least_noise(side, M, _completed(row, side, M, B).C))
 
 
 @lru_cache(maxsize=256)
@@ -117,21 +107,14 @@ def _normal(row: tuple[float, ...]) -> StateDesign:
     if imaginary > _EQUAL * big2:
         w = math.sqrt(imaginary)
         M, B = np.array([[-big1 / 2, -w], [w, -big1 / 2]]), np.array([0.0, 1.0])
-        return _completed(row, side, M, B * _unit_gain(side, M, B).min())
+        return _completed(row, side, M, B * unit_gains(side, M, B).min())
     # Roots of d**2 + big1 d + big2, the distances of the poles from s: the far one first, without cancellation.
     far = -(big1 + 2 * math.sqrt(max(-imaginary, 0.0))) / 2
     near = big2 / far
     M, B = np.array([[near, 0.0], [1.0, far]]), np.array([1.0, 0.0])
-    gains = _unit_gain(side, M, B)
+    gains = unit_gains(side, M, B)
     M[1, 0] = gains[1] / gains[0]
     return _completed(row, side, M, B * gains[0])
-
-
-def _unit_gain(side: int, M: Array, B: Array) -> Array:
-    """Powers of two that bring the states' standard deviation to one half to one times that of a white input."""
-    A = side * (np.eye(len(B)) + M)
-    K = linalg.solve_discrete_lyapunov(A, np.outer(B, B))
-    return np.array([_power_of_two_below(1 / math.sqrt(variance)) for variance in np.diag(K)])
 
 
 def _is_first_order(row: Row) -> bool:
@@ -141,7 +124,7 @@ def _is_first_order(row: Row) -> bool:
 def _first_order(row: Row) -> StateDesign:
     side = _side(row)
     distance = float(-1 - side * Fraction(row[4]))
-    B = _power_of_two_below(math.sqrt(1 - row[4] ** 2))
+    B = power_of_two_below(math.sqrt(1 - row[4] ** 2))
     C = float(Fraction(row[1]) - Fraction(row[0]) * Fraction(row[4])) / B
     return StateDesign(side, np.array([[distance]]), np.array([B]), np.array([C]), row[0])
 
@@ -171,10 +154,6 @@ def _completed(row: Row, side: int, M: Array, B: Array) -> StateDesign:
     return StateDesign(side, M, B, np.array([float(value) for value in C]), row[0])
 
 
-def _power_of_two_below(value: float) -> float:
-    return math.ldexp(0.5, math.frexp(value)[1])
-
-
 def state_space(
     row: Row,
     *,
@@ -182,7 +161,7 @@ def state_space(
     design: Callable[[Row], StateDesign],
     truncating: bool,
     rounding: Rounding,
-    u: tuple[int, int, int],
+    u: Range,
     fracs: Mapping[str, int],
     ranges: Mapping[str, tuple[int, int]],
     wide: tuple[int, int],
@@ -201,8 +180,8 @@ def state_space(
         Whether the states are truncated towards zero, not rounded.
     rounding : Rounding
         Rounds the coefficients.
-    u : tuple of int
-        Fraction bits, smallest and largest code of the input.
+    u : Range
+        Fraction bits and range of the input's code.
     fracs : mapping of str to int
         Fraction bits that are kept of ``x1_sum``, ``x2_sum`` and ``y_sum``. A missing one keeps all where the sum is
         of integer multiples, else as many as the input has.
@@ -224,10 +203,10 @@ def state_space(
     b = tuple(Coefficient(*rounding(f"b{i}", value)) for i, value in enumerate(made.B, start=1))
     c = tuple(Coefficient(*rounding(f"c{i}", value)) for i, value in enumerate(made.C, start=1))
     d = Coefficient(*rounding("d", made.D))
-    x_fracs = [fracs.get(f"x{i + 1}_sum", u[0]) for i in states]
+    x_fracs = [fracs.get(f"x{i + 1}_sum", u.frac) for i in states]
     for i in [*states, *states]:  # twice, as a state that only copies may stand before the one that it copies
         if f"x{i + 1}_sum" not in fracs:
-            x_fracs[i] = _exact_frac([*zip(a[i], x_fracs, strict=True), (b[i], u[0])], u[0])
+            x_fracs[i] = _exact_frac([*zip(a[i], x_fracs, strict=True), (b[i], u.frac)], u.frac)
     try:
         return StateSpace(
             name=name,
@@ -237,12 +216,12 @@ def state_space(
             c=c,
             d=d,
             truncating=truncating,
-            u_frac=u[0],
-            u_low=u[1],
-            u_high=u[2],
+            u_frac=u.frac,
+            u_low=u.low,
+            u_high=u.high,
             x_fracs=tuple(x_fracs),
             x_ranges=tuple(ranges.get(f"x{i + 1}_next", wide) for i in states),
-            y_frac=fracs.get("y_sum", _exact_frac([*zip(c, x_fracs, strict=True), (d, u[0])], u[0])),
+            y_frac=fracs.get("y_sum", _exact_frac([*zip(c, x_fracs, strict=True), (d, u.frac)], u.frac)),
             y_range=ranges.get("y", wide),
         )
     except ValueError as error:

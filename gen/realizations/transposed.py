@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from sosmith.gen.realizations.coefficients import Rounding
 from sosmith.gen.realizations.direct_form import pole_side, products
+from sosmith.model.dataflow.graph import Range
 from sosmith.model.errors import ShortfallError
 from sosmith.model.sections.transposed_form import Limits, TransposedForm
 
@@ -19,7 +20,7 @@ def transposed_form(
     name: str,
     delta: bool,
     rounding: Rounding,
-    x: tuple[int, int, int],
+    x: Range,
     fracs: Mapping[str, int],
     ranges: Mapping[str, Limits],
     wide: Limits,
@@ -36,8 +37,8 @@ def transposed_form(
         In the delta operator about the side of the unit circle where its poles lie, not in the shift operator.
     rounding : Rounding
         Rounds the coefficients.
-    x : tuple of int
-        Fraction bits, smallest and largest code of the input.
+    x : Range
+        Fraction bits and range of the input's code.
     fracs : mapping of str to int
         Fraction bits that the quantizers of v, t1 and t2 keep. Empty, they keep as many as the input has; else those
         that are missing keep all, because with none nothing was left there to drop.
@@ -56,7 +57,7 @@ def transposed_form(
     made, integer_part = products(row, rounding, name, side)
     operator = side if delta else 0
     exponent = _delta_exponent(row, operator)
-    state_fracs = (fracs.get("t1"), fracs.get("t2")) if fracs else (x[0], x[0])
+    state_fracs = (fracs.get("t1"), fracs.get("t2")) if fracs else (x.frac, x.frac)
     # Without x(n) in it, y(n) is s1, which is quantized already.
     output = "v" if any(product.x[0] for product in made) else "t1"
     try:
@@ -66,10 +67,10 @@ def transposed_form(
             integer_part=integer_part,
             operator=operator,
             delta_exponent=exponent,
-            x_frac=x[0],
-            x_low=x[1],
-            x_high=x[2],
-            y_frac=fracs.get(output, _exact_frac(x[0], fracs, exponent)),
+            x_frac=x.frac,
+            x_low=x.low,
+            x_high=x.high,
+            y_frac=fracs.get(output, _exact_frac(x.frac, fracs, exponent)),
             state_fracs=state_fracs,
             v_range=ranges.get("v", wide),
             t1_range=ranges.get("t1", wide),

@@ -8,12 +8,12 @@ from fractions import Fraction
 from typing import cast
 
 from sosmith.gen.filter.design import Filter
-from sosmith.gen.proof.linear_model import linear_models
-from sosmith.gen.realizations.registry import REALIZATIONS, WIDE, Section, SectionFormat
-from sosmith.gen.word_lengths.cascade import cascade, format_of, formats_of, parts_of, stages_of
-from sosmith.gen.word_lengths.input_stage import EntryStages, horner_error, normalised
-from sosmith.gen.word_lengths.quantize import Plan, Quantized, assembled, gain_of
-from sosmith.gen.word_lengths.search import Signal, Words
+from sosmith.gen.realizations.registry import REALIZATIONS, Section
+from sosmith.gen.realizations.section_format import SectionFormat, unknown_range
+from sosmith.gen.word_lengths.cascade import cascade, chosen_formats, parts_of, stages_of
+from sosmith.gen.word_lengths.input_stage import InputStage, horner_error, normalised
+from sosmith.gen.word_lengths.quantize import gain_of
+from sosmith.gen.word_lengths.quantized import Quantized, assembled
 from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.errors import ShortfallError
 from sosmith.model.sections.horner import HornerPolynomial, HornerStep, Variable
@@ -49,48 +49,41 @@ def with_constants(
     ShortfallError
         If the filter or polynomial does not have this structure, or is unstable with these fraction bits.
     """
-    entry = _entry_with(made, polynomial)
+    before = _input_stage(made, polynomial)
     filled = ideal or made.filter
     sections: Sequence[Section] = ()
     proof = None
     if filled is not None:
         if ideal is not None:
             filled = _ranked(ideal, cast("Filter", made.filter), made.realization)
-        words = _lifted(_words_of(made), finer)
+        formats = _lifted(chosen_formats(made.sections), finer)
         if ideal is not None:
-            words = _words_with(words, made, filled)
-        words = _lifted(words, room - finer)
-        sections, proof = cascade(filled, made.realization, words, entry.signal)
+            formats = _with_coefficients_of(filled, formats, made.realization)
+        formats = _lifted(formats, room - finer)
+        sections, proof = cascade(filled, made.realization, formats, before.output)
     datapath = made.datapath
     found = assembled(
-        Plan(
-            name=datapath.name,
-            inputs=datapath.inputs,
-            output=datapath.output,
-            max_error=made.bound * datapath.output.lsb,
-            ideal=filled,
-            polynomial=polynomial or made.polynomial,
-            realization=made.realization,
-            gain=Fraction(1) if filled is None else gain_of(filled),
-            share=Fraction(0),
-            entries=(entry,),
-            search=None,
-            start=None,
-        ),
-        entry,
-        sections,
-        proof,
+        name=datapath.name,
+        inputs=datapath.inputs,
+        output=datapath.output,
+        ideal=filled,
+        polynomial=polynomial or made.polynomial,
+        realization=made.realization,
+        gain=Fraction(1) if filled is None else gain_of(filled),
+        input_stage=before,
+        sections=sections,
+        proof=proof,
     )
     return replace(found, datapath=replace(found.datapath, calibrated=datapath.calibrated, wear=datapath.wear))
 
 
-def _entry_with(made: Quantized, polynomial: Polynomial | None) -> EntryStages:
-    """Make what stands before the sections, for another polynomial if it is not None."""
+def _input_stage(made: Quantized, polynomial: Polynomial | None) -> InputStage:
+    """Make the input stage, for another polynomial if it is not None."""
     datapath = made.datapath
     stages = tuple(stage for stage in datapath.stages if isinstance(stage, HornerStep))
     if polynomial is None or made.polynomial is None:
-        node = datapath.stages[len(stages)].graph.nodes[datapath.stages[len(stages)].graph.inputs[0]]
-        return EntryStages(stages=stages, signal=Signal(node.frac, node.low, node.high), error=made.entry_error)
+        behind = datapath.stages[len(stages)].graph
+        return InputStage(stages=stages, output=behind.input_ranges[0], error=made.input_error)
     room = [len(row) for row in normalised(made.polynomial, datapath.inputs, datapath.output)]
     exact = normalised(polynomial, datapath.inputs, datapath.output)
     counts = [len(row) for row in exact]
@@ -100,13 +93,14 @@ def _entry_with(made: Quantized, polynomial: Polynomial | None) -> EntryStages:
     filled = tuple(
         (*row, *[zero] * (most - len(row))) for row, most in zip([*exact, *[()] * len(room)], room, strict=False)
     )
-    frac = format_of(stages[-1]).frac
+    frac = stages[-1].graph.output_ranges[0].frac
     horner = HornerPolynomial(
         coefficients=tuple(tuple(round(c * 2**frac) for c in row) for row in filled),
         frac=frac,
         variables=tuple(Variable(name=p.name, bits=p.bits, signed=p.signed) for p in datapath.inputs),
     )
-    return EntryStages(stages=horner.stages, signal=format_of(horner.stages[-1]), error=horner_error(filled, horner))
+    (output,) = horner.stages[-1].graph.output_ranges
+    return InputStage(stages=horner.stages, output=output, error=horner_error(filled, horner))
 
 
 def _ranked(ideal: Filter, like: Filter, realization: str) -> Filter:
@@ -123,37 +117,23 @@ def _nearness(row: Sequence[float]) -> tuple[bool, float]:
     return row[5] != 0, row[5]
 
 
-def _words_of(made: Quantized) -> list[Words]:
-    """Coefficients of all sections, and fraction bits that their quantizers keep."""
-    words = []
-    for section in made.sections:
-        models = linear_models(section.graph)
-        kept = {s.name: s.kept for model in models for s in model.sources if s.kept is not None}
-        words.append(Words(section.coefficients, {"v": formats_of(section)[0].frac} | kept))
-    return words
-
-
-def _lifted(words: Sequence[Words], bits: int) -> list[Words]:
+def _lifted(formats: Sequence[SectionFormat], bits: int) -> list[SectionFormat]:
     """Write all coefficients with `bits` more fraction bits, of the same value."""
     return [
-        replace(w, coefficients={name: (code << bits, frac + bits) for name, (code, frac) in w.coefficients.items()})
-        for w in words
+        replace(f, coefficients={name: (code << bits, frac + bits) for name, (code, frac) in f.coefficients.items()})
+        for f in formats
     ]
 
 
-def _words_with(words: Sequence[Words], made: Quantized, ideal: Filter) -> list[Words]:
-    """Return `words` with the coefficients of another filter, rounded to the fraction bits of these."""
-    exact = stages_of(
-        ideal,
-        made.realization,
-        [SectionFormat(coefficient_bits=_DOUBLE)] * len(parts_of(ideal, made.realization)),
-        Signal(0, -WIDE, WIDE),
-    )
-    names, wanted = ([list(w.coefficients) for w in words], [list(stage.coefficients) for stage in exact])
+def _with_coefficients_of(ideal: Filter, formats: Sequence[SectionFormat], realization: str) -> list[SectionFormat]:
+    """Return `formats` with the coefficients of another filter, rounded to the fraction bits of these."""
+    nearest = [SectionFormat(coefficient_bits=_DOUBLE)] * len(parts_of(ideal, realization))
+    exact = stages_of(ideal, realization, nearest, unknown_range(0))
+    names, wanted = ([list(f.coefficients) for f in formats], [list(stage.coefficients) for stage in exact])
     if names != wanted:
         raise ShortfallError(f"the filter's sections must have the coefficients {names}, not {wanted}")
     result = []
-    for old, stage in zip(words, exact, strict=True):
+    for old, stage in zip(formats, exact, strict=True):
         coefficients = {}
         for name, (integer, frac) in stage.coefficients.items():
             kept = old.coefficients[name][1]

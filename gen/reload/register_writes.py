@@ -9,8 +9,8 @@ from sosmith.gen.architecture import Architecture
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.reload.reload import OtherSet, Swap, parallel_bank
 from sosmith.gen.reload.transient import RESIDUE
-from sosmith.hdl import folded
 from sosmith.hdl.axi_lite import BITS
+from sosmith.hdl.instruction import encoded, instruction_bits
 from sosmith.model.reload.constants import constants
 from sosmith.model.reload.registers import CRC, DATA, VERSION, Register
 
@@ -19,7 +19,7 @@ def bank_size(architecture: Architecture) -> tuple[int, int]:
     """Return the number of words in a bank of a core, and the bits of each that are used."""
     made = architecture.program
     if made is not None:
-        return len(made.instructions), folded.instruction_bits(made)
+        return len(made.instructions), instruction_bits(made)
     return sum(constant.words for constant in constants(architecture.datapath)), BITS
 
 
@@ -40,7 +40,7 @@ def register_writes(hardware: CoreDesign, made: OtherSet, version: int) -> list[
     if made.program is None:
         words = parallel_bank(hardware, made)
     else:
-        words = [folded.encoded(instruction, made.program) for instruction in made.program.instructions]
+        words = [encoded(instruction, made.program) for instruction in made.program.instructions]
     crc = zlib.crc32(b"".join(word.to_bytes(4, "little") for word in (version, *words)))
     return [(VERSION, version), *((DATA, word) for word in words), (CRC, crc)]
 

@@ -1,4 +1,4 @@
-"""Other coefficients for hardware that exists: made in its formats, proven anew, and refused where they do not fit.
+"""Coefficients for existing hardware: made in its formats, proven again, and refused where they do not fit.
 
 Ranges and bound of a set are proven for a core that runs from reset with it. What a swap hands on is a state that
 another set made, so a swap is proven too: that nothing wraps from the first sample on, whatever the input was and will
@@ -17,7 +17,7 @@ from sosmith.gen.quantity import quantity
 from sosmith.gen.reload.other_constants import with_constants
 from sosmith.gen.reload.transient import transient
 from sosmith.gen.specification.specification import Specification
-from sosmith.gen.word_lengths.quantize import Quantized
+from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.hdl import folded
 from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.dataflow.datapath import Datapath
@@ -150,7 +150,7 @@ def other_set(
     hardware : CoreDesign
         What the core was made from.
     ideal, polynomial
-        As for `sosmith.gen.word_lengths.quantize.with_constants`.
+        As for `sosmith.gen.reload.other_constants.with_constants`.
     calibrated : tuple of (int, int) or None
         Lowest and highest code of each input that the calibration covers; None for the core's own. The parallel
         architecture goes on to judge by its own range, so that the other must hold it.

@@ -23,7 +23,7 @@ from sosmith.gen.proof.cascade_proof import INPUT, Drives, Key, Lane, cascade_ho
 from sosmith.gen.proof.linear_model import LinearModel, linear_models
 from sosmith.gen.proof.peak_gain import Drive, Extent, Horizon, Response, extent, impulse
 from sosmith.gen.realizations.registry import Section
-from sosmith.gen.word_lengths.quantize import Quantized
+from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.model.dataflow.graph import Graph, Node, Op
 from sosmith.model.errors import ShortfallError
 

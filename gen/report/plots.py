@@ -30,6 +30,7 @@ from sosmith.gen.filter.response import (
     stopbands,
     zeros,
 )
+from sosmith.gen.picture import settled
 from sosmith.gen.quantity import quantity, scale
 from sosmith.gen.report.evidence import Evidence
 
@@ -87,7 +88,7 @@ def _draw(name: str, title: str, width: int, height: int, paint: Callable[[Figur
         paint(figure)
         stream = io.StringIO()
         figure.savefig(stream, format="svg", metadata={"Date": None})
-    return _embed(stream.getvalue(), title, width, height)
+    return _embed(settled(stream.getvalue(), f"{name}-{width}-"), title, width, height)
 
 
 def _embed(svg: str, title: str, width: int, height: int) -> str:

@@ -9,11 +9,9 @@ import math
 from collections.abc import Sequence
 from fractions import Fraction
 
-from sosmith.gen.specification.schema import FAMILIES, KINDS, MAX_ORDER, Document, FilterTable, InputTable
+from sosmith.gen.specification.choices import CALIBRATION_INPUTS, FAMILIES, KINDS
+from sosmith.gen.specification.schema import MAX_ORDER, Document, FilterTable, InputTable
 from sosmith.gen.specification.values import UnfitError, identifier, key_text, listed, literal, one_of
-
-CALIBRATION_INPUTS = ("voltage", "temperature")
-"""Inputs of the calibration polynomial, in the order of its indices."""
 
 MARGIN = Fraction(1, 10**6)
 """Least distance of a band edge from 0 and from half the sample rate, as a part of the sample rate.

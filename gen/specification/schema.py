@@ -12,6 +12,7 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field, PlainValidator, ValidationError
 from pydantic_core import ErrorDetails
 
+from sosmith.gen.specification.choices import ARCHITECTURES, FAMILIES, KINDS, METHODS, REALIZATIONS
 from sosmith.gen.specification.values import (
     ABOVE_ZERO,
     IDENTIFIER,
@@ -34,12 +35,6 @@ from sosmith.gen.specification.values import (
     whole,
 )
 from sosmith.model.suggestion import did_you_mean
-
-FAMILIES = ("butterworth", "chebyshev1", "chebyshev2", "elliptic", "bessel")
-KINDS = ("lowpass", "highpass", "bandpass", "bandstop")
-METHODS = ("bilinear", "impulse_invariant")
-REALIZATIONS = ("auto", "df1", "df1_ef1", "df1_ef2", "df2t", "delta", "state_space", "normal", "lattice_wdf")
-ARCHITECTURES = ("auto", "parallel", "folded", "serial")
 
 MAX_ORDER = 20
 """Highest order of the digital filter, ten second-order sections."""

@@ -1,6 +1,6 @@
 """The specification: a TOML file in physical units, read exactly and checked before anything is built.
 
-Every number stays exact (`Fraction`) as written. What this version does not carry out yet is refused by name.
+Every number stays exact (`Fraction`) as written. Known values that this version does not support are refused by name.
 """
 
 from __future__ import annotations
@@ -9,15 +9,17 @@ from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from sosmith.gen.specification.rules import CALIBRATION_INPUTS, check
-from sosmith.gen.specification.schema import Document, FilterTable, InputTable, OutputTable, parse
+from sosmith.gen.specification.choices import CALIBRATION_INPUTS
 from sosmith.gen.specification.values import UnfitError
 from sosmith.gen.specification.wear_limits import WearSpec
 from sosmith.model.errors import SpecificationError
 from sosmith.model.port import Port
 from sosmith.model.tables.toml_file import read_toml
+
+if TYPE_CHECKING:
+    from sosmith.gen.specification.schema import Document, FilterTable, InputTable, OutputTable
 
 MAX_BYTES = 1 << 16
 """Largest specification in bytes; a real one has one or two thousand."""
@@ -85,13 +87,13 @@ class HardwareSpec:
     Attributes
     ----------
     realization : str
-        "auto", "df1", "df1_ef1" or "df1_ef2".
+        "auto" or a key of `sosmith.gen.realizations.registry.REALIZATIONS`.
     architecture : str
         "auto", "parallel", "folded" or "serial".
     clock : Fraction
         In Hz, at least the sample rate.
     reload : bool
-        Whether coefficients are loadable at run time; False so far.
+        Whether coefficients can be loaded at run time.
     """
 
     realization: str
@@ -159,6 +161,28 @@ def load(path: Path) -> Specification:
     tree = read_toml(path, what="the specification", max_bytes=MAX_BYTES, parse_float=Decimal)
     if not tree:
         raise SpecificationError(f"{path}: the specification must hold the keys of a specification, not nothing")
+    return from_tree(tree, path)
+
+
+def from_tree(tree: dict[str, Any], path: Path) -> Specification:
+    """Check a specification that has been read already.
+
+    Parameters
+    ----------
+    tree : dict
+        As `tomllib` gives it, with every float as `decimal.Decimal`.
+    path : Path
+        Its name in messages; `calibration.data` is found from the folder of this path.
+
+    Raises
+    ------
+    SpecificationError
+        As `load`.
+    """
+    # pydantic takes a while to load: a file that is missing or no TOML is refused without it.
+    from sosmith.gen.specification.rules import check
+    from sosmith.gen.specification.schema import parse
+
     try:
         document = parse(tree)
         check(document)

@@ -13,6 +13,7 @@ from fractions import Fraction
 from typing import TypeVar
 
 from sosmith.gen.specification.verilog_names import KEYWORDS, MAX_NAME, is_identifier
+from sosmith.model.suggestion import did_you_mean
 
 Item = TypeVar("Item")
 
@@ -170,7 +171,8 @@ def choice(names: Sequence[str]) -> Callable[[object], str]:
 
     def read(value: object) -> str:
         if not isinstance(value, str) or value not in names:
-            raise UnfitError(one_of(names), literal(value))
+            hint = did_you_mean(value, names) if isinstance(value, str) else ""
+            raise UnfitError(one_of(names), f"{literal(value)}{hint}")
         return value
 
     return read

@@ -14,6 +14,7 @@ from sosmith.gen.filter.response import magnitude_db
 from sosmith.gen.picture import picture
 from sosmith.gen.spectrum.proposal import Proposal
 from sosmith.gen.spectrum.spectra import Array, Spectrum
+from sosmith.model.arithmetic.elementary import geometric
 
 _COLOURS = ("#2563a8", "#b4432f", "#2f8f4e", "#8a5fb0", "#c08a1e", "#4a9aa8")
 _RED, _GREY = "#b4432f", "#8a8a8a"
@@ -98,7 +99,7 @@ def _shade(axes: Axes, proposal: Proposal, lowest: float, highest: float) -> Non
 
 def _draw_response(axes: Axes, proposal: Proposal, lowest: float, highest: float) -> None:
     made = proposal.filter
-    frequency: Array = np.geomspace(lowest, highest, 1200)
+    frequency: Array = geometric(lowest, highest, 1200)
     bottom = -max(40.0, 2 * proposal["stopband_loss"])
     axes.plot(frequency, magnitude_db(made.sos, frequency, made.sample_rate), color=_COLOURS[0])
     for ends, border, end in (

@@ -21,68 +21,12 @@ from sosmith.gen.specification.rules import MARGIN
 from sosmith.gen.specification.schema import MAX_ORDER
 from sosmith.gen.specification.specification import FilterSpec
 from sosmith.gen.spectrum.prediction import Content, Prediction, band_rms, predict
+from sosmith.gen.spectrum.settings import PASSBAND_LOSS, Wish
 from sosmith.gen.spectrum.spectra import Array, Spectrum
 from sosmith.model.errors import ShortfallError, SpecificationError
 
-TOLERANCE = 0.1
-"""Error allowed at the output, mm, unless said otherwise; assumed: about 1 % of the 9 mm of wear in the paper's
-section 6."""
-
-COVERAGE = 2.0
-"""Times the rms error that the tolerance has to cover: 95 % of the errors of a normal distribution (JCGM 100:2008,
-section 6.3.3)."""
-
-PASSBAND_LOSS = 0.1
-"""Loss up to the pass edge, dB, where the wanted signal would bear more: the paper's choice in section 4.1."""
-
 MIN_STOPBAND_LOSS = 3.02
 """Loss from the stop edge on, dB, where the disturbance would need less: the cutoff then lies below the stop edge."""
-
-PARTS = 4
-"""Parts of the error."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Wish:
-    """What is asked of the filter.
-
-    Attributes
-    ----------
-    tolerance : float
-        Error allowed at the output, in the unit of the signals, positive; beside it stand the offset, which no filter
-        removes, and the delay.
-    coverage : float
-        How many times the rms error has to lie within the tolerance, positive.
-    passband : float or None
-        Pass edge, Hz; None takes it from the true signals' spectra.
-    passband_loss : float or None
-        Loss up to the pass edge, dB; None takes it from the wanted signals' amplitude.
-
-    Raises
-    ------
-    SpecificationError
-        If a value is none of these.
-    """
-
-    tolerance: float = TOLERANCE
-    coverage: float = COVERAGE
-    passband: float | None = None
-    passband_loss: float | None = None
-
-    def __post_init__(self) -> None:
-        for name, value, unit in (
-            ("tolerance", self.tolerance, ""),
-            ("coverage", self.coverage, ""),
-            ("passband", self.passband, " of Hz"),
-            ("passband-loss", self.passband_loss, " of dB"),
-        ):
-            if value is not None and not 0 < value < math.inf:
-                raise SpecificationError(f"{name} must be a positive number{unit}, not {value:g}")
-
-    @property
-    def share(self) -> float:
-        """Rms error that each of the four parts may have."""
-        return self.tolerance / (self.coverage * math.sqrt(PARTS))
 
 
 @dataclass(frozen=True, kw_only=True)

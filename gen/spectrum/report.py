@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from sosmith.gen.spectrum.prediction import Prediction
-from sosmith.gen.spectrum.proposal import Proposal, Wish
-from sosmith.gen.spectrum.spectra import Spectrum, SpectrumSettings
+from sosmith.gen.spectrum.proposal import Proposal
+from sosmith.gen.spectrum.settings import SpectrumSettings, Wish
+from sosmith.gen.spectrum.spectra import Spectrum
 from sosmith.gen.spectrum.trial import Trial
 from sosmith.model.traces.signal_file import SignalFile
 

@@ -8,61 +8,16 @@ import numpy as np
 import numpy.typing as npt
 from scipy import signal, stats
 
+from sosmith.gen.spectrum.settings import SpectrumSettings
 from sosmith.model.errors import SpecificationError
 
 Array = npt.NDArray[np.float64]
-
-WINDOWS = ("hann", "hamming", "blackman", "blackmanharris", "flattop", "boxcar")
-DETRENDS = ("linear", "constant", "none")
 
 SEGMENTS = 8
 """Segments that a signal is cut into, before overlap, unless their length is given: 15 averages at half overlap."""
 
 MIN_SEGMENT = 16
 """Samples that a segment must have."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class SpectrumSettings:
-    """How spectra are estimated.
-
-    Attributes
-    ----------
-    window : str
-        One of `WINDOWS`. Hann's, at an overlap of one half, loses little of the data, and its side lobes fall fast.
-    segment : float or None
-        Length of a segment, s; None takes an eighth of the signal.
-    overlap : float
-        Share of a segment that the next one overlaps, 0 to 0.95.
-    detrend : str
-        One of `DETRENDS`: what is taken away from each segment first. A straight line passes a low-pass filter with
-        unity gain at zero frequency unchanged but for the delay, so it is no part of what a mask has to heed.
-    confidence : float
-        Probability of the confidence interval, between 0 and 1.
-
-    Raises
-    ------
-    SpecificationError
-        If a value is none of these.
-    """
-
-    window: str = "hann"
-    segment: float | None = None
-    overlap: float = 0.5
-    detrend: str = "linear"
-    confidence: float = 0.95
-
-    def __post_init__(self) -> None:
-        if self.window not in WINDOWS:
-            raise SpecificationError(f"window must be one of {', '.join(WINDOWS)}, not {self.window!r}")
-        if self.detrend not in DETRENDS:
-            raise SpecificationError(f"detrend must be one of {', '.join(DETRENDS)}, not {self.detrend!r}")
-        if self.segment is not None and not 0 < self.segment < np.inf:
-            raise SpecificationError(f"segment must be a positive number of seconds, not {self.segment:g}")
-        if not 0 <= self.overlap <= 0.95:
-            raise SpecificationError(f"overlap must be 0 to 0.95 of a segment, not {self.overlap:g}")
-        if not 0 < self.confidence < 1:
-            raise SpecificationError(f"confidence must be between 0 and 1, not {self.confidence:g}")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -1,4 +1,4 @@
-"""A filter's stages, built for given words and proven, and the stage behind them."""
+"""A filter's stages, built in given formats and proven."""
 
 from __future__ import annotations
 
@@ -12,15 +12,9 @@ from sosmith.gen.filter.design import Filter
 from sosmith.gen.proof.cascade_proof import CascadeProof, StageModel, TransferFunction, prove_cascade
 from sosmith.gen.proof.linear_model import linear_models
 from sosmith.gen.proof.peak_gain import Extent
-from sosmith.gen.realizations.registry import REALIZATIONS, WIDE, Section, SectionFormat
-from sosmith.gen.word_lengths.search import Signal, Words
-from sosmith.model.dataflow.datapath import Stage
-from sosmith.model.port import Port
-from sosmith.model.sections.output import OutputStage
-
-MAX_BITS = 40
-"""Significant bits of a coefficient that are tried; as many fraction bits of a signal at most: no useful design lies
-beyond."""
+from sosmith.gen.realizations.registry import REALIZATIONS, Section
+from sosmith.gen.realizations.section_format import SectionFormat, unknown_range
+from sosmith.model.dataflow.graph import Range
 
 
 def ideal_sections(ideal: Filter) -> list[TransferFunction]:
@@ -37,82 +31,54 @@ def _shortened(values: Sequence[Fraction]) -> tuple[Fraction, ...]:
     return tuple(values[: end + 1])
 
 
-def values_of(signal: Signal) -> tuple[Fraction, Fraction]:
-    """Return the lowest and the highest value of a signal, in output LSBs."""
-    unit = Fraction(2) ** -signal.frac
-    return signal.low * unit, signal.high * unit
-
-
 def parts_of(ideal: Filter, realization: str) -> Sequence[Any]:
     """Return what the realization makes its stages from, one for each."""
     return REALIZATIONS[realization].parts(ideal.rows)
 
 
-def wide(ideal: Filter, realization: str, bits: int) -> list[StageModel]:
-    """Models of the stages with every quantizer at whole output LSBs and no ranges."""
+def unquantized(ideal: Filter, realization: str, bits: int) -> list[StageModel]:
+    """Models of the stages with coefficients of `bits` significant bits; quantizers keep whole output LSBs."""
     formats = [SectionFormat(coefficient_bits=bits)] * len(parts_of(ideal, realization))
-    return [linear_models(stage.graph) for stage in stages_of(ideal, realization, formats, Signal(0, -WIDE, WIDE))]
+    return [linear_models(stage.graph) for stage in stages_of(ideal, realization, formats, unknown_range(0))]
 
 
 def cascade(
-    ideal: Filter, realization: str, words: Sequence[Words], signal: Signal
+    ideal: Filter, realization: str, formats: Sequence[SectionFormat], x: Range
 ) -> tuple[list[Section], CascadeProof]:
-    """Build the stages, prove their ranges, and build them again with these."""
-    formats = [
-        SectionFormat(coefficient_bits=w.coefficient_bits, coefficients=w.coefficients, fracs=w.fracs) for w in words
-    ]
-    stages = stages_of(ideal, realization, formats, Signal(signal.frac, -WIDE, WIDE))
-    proof = prove_cascade([linear_models(s.graph) for s in stages], ideal_sections(ideal), *values_of(signal))
+    """Build the stages for an input in `x`, prove their ranges, and build them again with these."""
+    stages = stages_of(ideal, realization, formats, unknown_range(x.frac))
+    proof = prove_cascade([linear_models(s.graph) for s in stages], ideal_sections(ideal), *x.limits)
+    proven = list(formats)
     for k, (stage, extents) in enumerate(zip(stages, proof.nodes, strict=True)):
         nodes = stage.graph.nodes
         ranges = {nodes[i].name: _codes(extent, nodes[i].frac) for i, extent in extents.items()}
-        formats[k] = replace(formats[k], ranges=ranges)
-    return stages_of(ideal, realization, formats, signal), proof
+        proven[k] = replace(formats[k], ranges=ranges)
+    return stages_of(ideal, realization, proven, x), proof
 
 
-def stages_of(ideal: Filter, realization: str, formats: Sequence[SectionFormat], signal: Signal) -> list[Section]:
+def stages_of(ideal: Filter, realization: str, formats: Sequence[SectionFormat], x: Range) -> list[Section]:
     """Build the stages one after the other, each for what the one before hands on."""
     build = REALIZATIONS[realization].build
-    first, beside = signal, list[Signal]()
+    first, beside = x, list[Range]()
     stages: list[Section] = []
     for k, (part, form) in enumerate(zip(parts_of(ideal, realization), formats, strict=True)):
-        entry = replace(form, x_frac=first.frac, x_low=first.low, x_high=first.high, beside=tuple(beside))
-        stages.append(build(part, entry, f"section{k}"))
-        first, *beside = formats_of(stages[-1])
+        stages.append(build(part, replace(form, x=first, beside=tuple(beside)), f"section{k}"))
+        first, *beside = stages[-1].graph.output_ranges
     return stages
+
+
+def chosen_formats(sections: Sequence[Section]) -> list[SectionFormat]:
+    """Return the coefficients of all sections and the fraction bits that their quantizers keep."""
+    formats = []
+    for section in sections:
+        models = linear_models(section.graph)
+        kept = {s.name: s.kept for model in models for s in model.sources if s.kept is not None}
+        fracs = {"v": section.graph.output_ranges[0].frac} | kept
+        formats.append(SectionFormat(coefficients=section.coefficients, fracs=fracs))
+    return formats
 
 
 def _codes(extent: Extent, frac: int) -> tuple[int, int]:
     """Range of codes that holds all values of an extent."""
     unit = Fraction(2) ** frac
     return math.floor(extent.low * unit), math.ceil(extent.high * unit)
-
-
-def formats_of(stage: Stage) -> list[Signal]:
-    """Return the formats of all outputs of a stage."""
-    nodes = stage.graph.nodes
-    return [Signal(nodes[i].frac, nodes[i].low, nodes[i].high) for i in stage.graph.outputs]
-
-
-def format_of(stage: Stage) -> Signal:
-    """Format of the only output."""
-    (form,) = formats_of(stage)
-    return form
-
-
-def output_stage(signal: Signal, output: Port) -> tuple[OutputStage, Fraction]:
-    """Make the last stage and tell its error: half an LSB where anything is rounded, and the offset's own rounding."""
-    frac = max(signal.frac, 0)
-    exact = -output.zero / output.lsb * 2**frac
-    offset = round(exact)
-    rounding = Fraction(1, 2) if signal.frac > 0 else Fraction(0)
-    stage = OutputStage(
-        offset=offset,
-        offset_frac=frac,
-        x_frac=signal.frac,
-        x_low=signal.low,
-        x_high=signal.high,
-        low=output.lowest,
-        high=output.highest,
-    )
-    return stage, rounding + abs(exact - offset) / 2**frac

@@ -1,4 +1,4 @@
-"""Words that give every part of the error budget the same share, by exact figures."""
+"""Formats that give every part of the error budget the same share, by exact figures."""
 
 from __future__ import annotations
 
@@ -7,22 +7,57 @@ from collections.abc import Mapping, Sequence
 from fractions import Fraction
 
 from sosmith.gen.filter.design import Filter
-from sosmith.gen.proof.cascade_proof import coefficient_extent, rounding_gains
-from sosmith.gen.realizations.registry import BEST_KEPT, WIDE, SectionFormat
-from sosmith.gen.word_lengths.cascade import MAX_BITS, ideal_sections, stages_of, values_of, wide
-from sosmith.gen.word_lengths.search import MIN_BITS, Signal, Words
+from sosmith.gen.proof.cascade_proof import CascadeProof, coefficient_extent, rounding_gains
+from sosmith.gen.realizations.registry import BEST_KEPT, Section
+from sosmith.gen.realizations.section_format import SectionFormat, unknown_range
+from sosmith.gen.word_lengths.bit_limits import MAX_BITS, MIN_BITS
+from sosmith.gen.word_lengths.cascade import cascade, ideal_sections, parts_of, stages_of, unquantized
+from sosmith.model.dataflow.graph import Range
 from sosmith.model.errors import ShortfallError
 
 _Fracs = list[dict[str, int]]
 
 
-def coefficient_bits(ideal: Filter, realization: str, signal: Signal, share: Fraction) -> int:
+def equally_shared(
+    ideal: Filter, realization: str, x: Range, share: Fraction
+) -> tuple[Sequence[Section], CascadeProof]:
+    """Choose formats with equal shares for coefficients and rounding, and prove the stages.
+
+    Parameters
+    ----------
+    ideal : Filter
+        The filter.
+    realization : str
+        A key of `REALIZATIONS`.
+    x : Range
+        What enters the filter.
+    share : Fraction
+        Error allowed to each part, in output LSBs.
+
+    Raises
+    ------
+    ShortfallError
+        If no formats within the limits keep to the error allowed, or the filter cannot be realized so.
+    """
+    parts_of(ideal, realization)  # refused here, not for want of bits, if it cannot be realized so
+    bits = _coefficient_bits(ideal, realization, x, share)
+    fracs = _fraction_bits(ideal, realization, bits, share)
+    while True:
+        sections, proof = cascade(ideal, realization, _rounded(ideal, realization, bits, fracs), x)
+        if proof.rounding.magnitude <= share:
+            return sections, proof
+        # A quantizer's error is not centred.
+        finer = [{name: frac + 1 for name, frac in sources.items()} for sources in fracs]
+        fracs = _within_limits(finer, ideal, realization, share)
+
+
+def _coefficient_bits(ideal: Filter, realization: str, x: Range, share: Fraction) -> int:
     """Fewest significant bits whose proven effect stays within `share`."""
-    sections, ends = ideal_sections(ideal), values_of(signal)
+    sections = ideal_sections(ideal)
     bits = MIN_BITS
     while bits <= MAX_BITS:
         try:
-            error = coefficient_extent(wide(ideal, realization, bits), sections, *ends).magnitude
+            error = coefficient_extent(unquantized(ideal, realization, bits), sections, *x.limits).magnitude
         except ShortfallError:
             bits += 1  # unstable with so few bits
             continue
@@ -36,15 +71,15 @@ def coefficient_bits(ideal: Filter, realization: str, signal: Signal, share: Fra
     )
 
 
-def fraction_bits(ideal: Filter, realization: str, bits: int, share: Fraction) -> list[dict[str, int]]:
+def _fraction_bits(ideal: Filter, realization: str, bits: int, share: Fraction) -> list[dict[str, int]]:
     """Fraction bits of every quantizer so that all their errors together stay within `share`."""
-    unit = rounding_gains(wide(ideal, realization, bits))
+    unit = rounding_gains(unquantized(ideal, realization, bits))
     count = sum(map(len, unit))
     fracs = [
         {name: max(0, math.ceil(math.log2(error * count / share))) if error else 0 for name, error in sources.items()}
         for sources in unit
     ]
-    within_limits(fracs, ideal, realization, share)
+    _within_limits(fracs, ideal, realization, share)
     # An equal split wastes up to a bit each; give back what the sum allows, the first section first.
     for sources, errors in zip(fracs, unit, strict=True):
         for name in sources:
@@ -54,7 +89,7 @@ def fraction_bits(ideal: Filter, realization: str, bits: int, share: Fraction) -
     return fracs
 
 
-def within_limits(fracs: _Fracs, ideal: Filter, realization: str, share: Fraction) -> _Fracs:
+def _within_limits(fracs: _Fracs, ideal: Filter, realization: str, share: Fraction) -> _Fracs:
     """Return `fracs` unless there are more than may be."""
     if max((frac for sources in fracs for frac in sources.values()), default=0) > MAX_BITS:
         better = [] if realization == BEST_KEPT else [f"set hardware.realization to {BEST_KEPT}"]
@@ -76,11 +111,13 @@ def _total(fracs: Sequence[Mapping[str, int]], unit: Sequence[Mapping[str, Fract
     )
 
 
-def rounded(ideal: Filter, realization: str, bits: int, fracs: Sequence[Mapping[str, int]]) -> list[Words]:
-    """Words of stages whose coefficients all have the same significant bits."""
+def _rounded(ideal: Filter, realization: str, bits: int, fracs: Sequence[Mapping[str, int]]) -> list[SectionFormat]:
+    """Return formats of stages whose coefficients all have the same significant bits."""
     formats = [SectionFormat(coefficient_bits=bits)] * len(fracs)
-    stages = stages_of(ideal, realization, formats, Signal(0, -WIDE, WIDE))
-    return [Words(stage.coefficients, kept) for stage, kept in zip(stages, fracs, strict=True)]
+    stages = stages_of(ideal, realization, formats, unknown_range(0))
+    return [
+        SectionFormat(coefficients=stage.coefficients, fracs=kept) for stage, kept in zip(stages, fracs, strict=True)
+    ]
 
 
 def _remedy(ideal: Filter, *first: str) -> str:

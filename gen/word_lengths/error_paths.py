@@ -14,7 +14,7 @@ from scipy import signal
 
 from sosmith.gen.filter.design import decay_length
 from sosmith.gen.proof.linear_model import LinearModel, Source, linear_models
-from sosmith.gen.word_lengths.quantize import Quantized
+from sosmith.gen.word_lengths.quantized import Quantized
 
 Array = npt.NDArray[np.float64]
 

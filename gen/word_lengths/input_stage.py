@@ -6,10 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-from sosmith.gen.word_lengths.cascade import MAX_BITS, format_of
-from sosmith.gen.word_lengths.search import Signal
+from sosmith.gen.word_lengths.bit_limits import MAX_BITS
+from sosmith.gen.word_lengths.cost import area_of
 from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.dataflow.datapath import Stage
+from sosmith.model.dataflow.graph import Range
 from sosmith.model.errors import ShortfallError
 from sosmith.model.port import Port
 from sosmith.model.sections.horner import HornerPolynomial, Variable
@@ -22,12 +23,27 @@ _IDENTITY = Polynomial(((Fraction(0),), (Fraction(1),)))
 
 
 @dataclass(frozen=True, kw_only=True)
-class EntryStages:
-    """What may stand before the sections: its stages, the signal that they give, and its error in output LSBs."""
+class InputStage:
+    """What stands before the sections.
+
+    Attributes
+    ----------
+    stages : tuple of Stage
+        Its stages; empty where the sections take the input as it is.
+    output : Range
+        Fraction bits and range of what it hands to the sections.
+    error : Fraction
+        Bound on its error, in output LSBs; exact.
+    """
 
     stages: tuple[Stage, ...]
-    signal: Signal
+    output: Range
     error: Fraction
+
+    @property
+    def area(self) -> int:
+        """Estimated area."""
+        return sum(area_of(stage.graph) for stage in self.stages)
 
 
 def needs_scaling(port: Port, output: Port) -> bool:
@@ -72,12 +88,13 @@ def _substitution(port: Port, count: int) -> list[list[Fraction]]:
     return powers
 
 
-def entries(
+def input_stages(
     polynomial: Polynomial | None, inputs: Sequence[Port], output: Port, allowed: Fraction
-) -> tuple[EntryStages, ...]:
-    """Choose stages with the fewest fraction bits whose error stays below `allowed` output LSBs, and with fewer.
+) -> tuple[InputStage, ...]:
+    """Make the input stage with the fewest fraction bits that keeps to the error `allowed`, and coarser ones.
 
-    Without a polynomial, they scale the input to output LSBs; there are none where that is a power of two.
+    The error is in output LSBs. Each one that follows has a fraction bit less than the one before. Without a
+    polynomial, an input stage scales the input to output LSBs; it is empty where the factor is a power of two.
 
     Raises
     ------
@@ -87,17 +104,17 @@ def entries(
     if polynomial is None and not needs_scaling(inputs[0], output):
         exponent = _exponent_of_two(inputs[0].lsb / output.lsb)
         assert exponent is not None
-        signal = Signal(-exponent, inputs[0].lowest, inputs[0].highest)
-        return (EntryStages(stages=(), signal=signal, error=Fraction(0)),)
+        output_range = Range(-exponent, inputs[0].lowest, inputs[0].highest)
+        return (InputStage(stages=(), output=output_range, error=Fraction(0)),)
     coefficients = normalised(polynomial or _IDENTITY, inputs, output)
     variables = tuple(Variable(name=p.name, bits=p.bits, signed=p.signed) for p in inputs)
-    made: list[EntryStages] = []
+    made: list[InputStage] = []
     for frac in range(MAX_BITS + 1):
         integers = tuple(tuple(round(c * 2**frac) for c in row) for row in coefficients)
         horner = HornerPolynomial(coefficients=integers, frac=frac, variables=variables)
         error = horner_error(coefficients, horner)
         stages = horner.stages
-        made.insert(0, EntryStages(stages=stages, signal=format_of(stages[-1]), error=error))
+        made.insert(0, InputStage(stages=stages, output=stages[-1].graph.output_ranges[0], error=error))
         if error <= allowed:
             return tuple(made[:_COARSER])
     raise ShortfallError(

@@ -169,7 +169,9 @@ class _Costs:
 
     def __init__(self, sections: Sequence[NoisySection], scale: Norm, noise: Norm, *, pairing: bool) -> None:
         if not _feasible(sections, pairing=pairing):
-            raise ValueError(f"sections must be few enough for responses of theirs, not {len(sections)}")
+            raise ValueError(
+                f"sections must be so few that their spectra have at most {_MAX_WORK} samples, not {len(sections)}"
+            )
         self._sections = sections
         self._pairing = pairing
         self._scale, self._noise = scale, noise
@@ -197,7 +199,9 @@ class _Costs:
     def cost(self, after: _Placed, last: int) -> float:
         """Cost of the section whose denominator is `last`, by what has been placed together with it."""
         gain, power = self._gain_to(after), 2 if self._noise == "l2" else 1
-        return float(sum((gain * error) ** power for error in self._gains_from(after)[last]))
+        total = float(sum((gain * error) ** power for error in self._gains_from(after)[last]))
+        # Sections that mirror each other cost the same: their order must not be left to the rounding of spectra.
+        return float(f"{total:.9g}")
 
     def _product(self, placed: _Placed) -> Spectrum:
         spectrum = np.ones(self._length // 2 + 1, dtype=np.complex128)

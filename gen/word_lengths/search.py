@@ -1,4 +1,4 @@
-"""Trims the words of a cascade until nothing more can be saved: fraction bits of every quantizer, every coefficient.
+"""Trims the formats of a cascade until nothing more can be saved: fraction bits of every quantizer, every coefficient.
 
 From a start that keeps to the error allowed, the step that saves the most estimated area for the error it costs is
 taken, again and again, until no step fits any more. A step drops bits of one quantizer, of the calibration or of one
@@ -26,14 +26,15 @@ from scipy import signal
 from sosmith.gen.filter.design import decay_length
 from sosmith.gen.proof.linear_model import Source, linear_model
 from sosmith.gen.realizations.coefficients import lowest_terms, round_significant
-from sosmith.gen.realizations.registry import REALIZATIONS, Section, SectionFormat
+from sosmith.gen.realizations.registry import REALIZATIONS, Section
+from sosmith.gen.realizations.section_format import SectionFormat, unknown_range
+from sosmith.gen.word_lengths.bit_limits import MIN_BITS
 from sosmith.gen.word_lengths.cost import MULTIPLIER_BITS, area_of
+from sosmith.gen.word_lengths.input_stage import InputStage
+from sosmith.model.dataflow.graph import Range
 from sosmith.model.errors import ShortfallError
 
 Array = npt.NDArray[np.float64]
-
-MIN_BITS = 4
-"""Significant bits of a coefficient that are tried first."""
 
 _EXACT_BITS = 50
 """Significant bits of a coefficient that count as exact."""
@@ -42,81 +43,33 @@ _STEPS = (1, 2, 3)
 """Bits that one step may drop: several, because a shorter fraction may pay only once it is the shortest."""
 
 
-class Signal(NamedTuple):
-    """Fraction bits, smallest and largest code of a signal."""
-
-    frac: int
-    low: int
-    high: int
-
-
 @dataclass(frozen=True)
-class Words:
-    """Words of one section.
+class Choice:
+    """Index of the input stage, and the formats of every section, as far as they are free."""
 
-    Attributes
-    ----------
-    coefficients : mapping of str to tuple of int
-        Integer and fraction bits of each coefficient, by name.
-    fracs : mapping of str to int
-        Fraction bits that each quantizer keeps, by the name of the node that it quantizes.
-    """
-
-    coefficients: Mapping[str, tuple[int, int]]
-    fracs: Mapping[str, int]
-
-    @property
-    def coefficient_bits(self) -> int:
-        """Significant bits of the longest coefficient."""
-        return max((abs(integer).bit_length() for integer, _ in self.coefficients.values()), default=0)
-
-    def with_frac(self, name: str, frac: int) -> Words:
-        """Return the same with other fraction bits of one quantizer."""
-        return replace(self, fracs={**self.fracs, name: frac})
-
-    def with_coefficient(self, name: str, value: tuple[int, int]) -> Words:
-        """Return the same with another value of one coefficient."""
-        return replace(self, coefficients={**self.coefficients, name: value})
+    input_stage: int
+    formats: tuple[SectionFormat, ...]
 
 
-@dataclass(frozen=True)
-class Entry:
-    """One choice for everything before the sections.
+class _Input(NamedTuple):
+    """What an input stage hands to the sections, its error at the filter's output in LSBs, and its area."""
 
-    Attributes
-    ----------
-    signal : Signal
-        What enters the sections.
-    error : float
-        Error at the filter's output in output LSBs.
-    area : float
-        Estimated area.
-    """
-
-    signal: Signal
+    x: Range
     error: float
     area: float
 
 
-@dataclass(frozen=True)
-class Choice:
-    """Index of the entry, and the words of every section."""
-
-    entry: int
-    words: tuple[Words, ...]
-
-
 @dataclass(frozen=True, eq=False)
 class _Base:
-    """Words that others differ from in a few coefficients, and the deviation and error that theirs make."""
+    """Formats that others differ from in a few coefficients, and the deviation and error that theirs make."""
 
-    words: tuple[Words, ...]
+    formats: tuple[SectionFormat, ...]
     deviation: Array
     error: float
 
 
 class Search:
-    """Looks for the words of a cascade.
+    """Looks for the formats of a cascade.
 
     Parameters
     ----------
@@ -124,8 +77,10 @@ class Search:
         b0, b1, b2, 1, a1, a2 of each section.
     realization : str
         A key of `REALIZATIONS`.
-    entries : sequence of Entry
+    input_stages : sequence of InputStage
         What may stand before the sections, each a little coarser than the one before.
+    gain : Fraction
+        Gain of the filter, by which their errors count at its output.
 
     Raises
     ------
@@ -133,18 +88,20 @@ class Search:
         If a section cannot be built, or its response does not end in time.
     """
 
-    def __init__(self, rows: Sequence[Sequence[float]], realization: str, entries: Sequence[Entry]) -> None:
+    def __init__(
+        self, rows: Sequence[Sequence[float]], realization: str, input_stages: Sequence[InputStage], gain: Fraction
+    ) -> None:
         self._build = REALIZATIONS[realization].build
         self._rows = rows
-        self._entries = entries
-        entry = entries[0].signal
-        self._ends = entry.low * 2.0**-entry.frac, entry.high * 2.0**-entry.frac
+        self._inputs = [_Input(s.output, float(s.error * gain), s.area) for s in input_stages]
+        x = self._inputs[0].x
+        self._ends = x.low * 2.0**-x.frac, x.high * 2.0**-x.frac
         self._estimates = _estimates(rows, realization, self._ends)
         self._base: _Base | None = None
-        self._known: dict[tuple[object, ...], tuple[float, Signal, dict[str, int]]] = {}
+        self._known: dict[tuple[object, ...], tuple[float, Range, dict[str, int]]] = {}
 
     def start(self, share: float, most: int) -> Choice | None:
-        """Find words whose coefficients and whose quantizers each keep their error within `share` output LSBs.
+        """Find formats whose coefficients and whose quantizers each keep their error within `share` output LSBs.
 
         Every coefficient has the same significant bits; the quantizers share what is allowed equally. None if a
         coefficient or a quantizer would need more than `most` bits.
@@ -159,11 +116,13 @@ class Search:
             return None
         bits = MIN_BITS
         while bits <= most:
-            words = tuple(
-                Words({name: round_significant(value, bits) for name, value in e.ideal.items()}, kept)
+            formats = tuple(
+                SectionFormat(
+                    coefficients={name: round_significant(value, bits) for name, value in e.ideal.items()}, fracs=kept
+                )
                 for e, kept in zip(self._estimates, fracs, strict=True)
             )
-            choice = Choice(0, words)
+            choice = Choice(0, formats)
             error = self.coefficient_error(choice)
             if error <= share and self._is_stable(choice):
                 return choice
@@ -172,19 +131,19 @@ class Search:
         return None
 
     def trimmed(self, start: Choice, allowed: float) -> Choice:
-        """Trim the words until nothing more can be saved.
+        """Trim the formats until nothing more can be saved.
 
         Parameters
         ----------
         start : Choice
-            Words to begin with.
+            Formats to begin with.
         allowed : float
-            Error of entry, coefficients and rounding together, in output LSBs.
+            Error of input stage, coefficients and rounding together, in output LSBs.
         """
         choice, error, area = start, self.error(start), self.area(start)
         while error <= allowed:
             deviation = self._deviation(choice, None)
-            self._base = _Base(choice.words, deviation, max(map(abs, _limits(deviation, self._ends))))
+            self._base = _Base(choice.formats, deviation, max(map(abs, _limits(deviation, self._ends))))
             best: tuple[float, Choice, float, float] | None = None
             for candidate in self._steps(choice):
                 saved = area - self.area(candidate)
@@ -202,44 +161,45 @@ class Search:
         return choice
 
     def _steps(self, choice: Choice) -> Iterator[Choice]:
-        for index in range(choice.entry + 1, min(choice.entry + 1 + len(_STEPS), len(self._entries))):
-            yield replace(choice, entry=index)
-        signal_in = self._entries[choice.entry].signal
-        for k, words in enumerate(choice.words):
-            _, signal_out, fits = self._section(k, signal_in, words)
-            for changed in self._changes(k, words, fits):
-                yield replace(choice, words=(*choice.words[:k], changed, *choice.words[k + 1 :]))
-            signal_in = signal_out
+        first = choice.input_stage + 1
+        for index in range(first, min(first + len(_STEPS), len(self._inputs))):
+            yield replace(choice, input_stage=index)
+        x = self._inputs[choice.input_stage].x
+        for k, form in enumerate(choice.formats):
+            _, y, fits = self._section(k, x, form)
+            for changed in self._changes(k, form, fits):
+                yield replace(choice, formats=(*choice.formats[:k], changed, *choice.formats[k + 1 :]))
+            x = y
 
-    def _changes(self, k: int, words: Words, fits: Mapping[str, int]) -> Iterator[Words]:
-        """Yield words of section k with fewer bits in one place; an operand that is too long may fit with `fits`."""
-        for name, frac in words.fracs.items():
+    def _changes(self, k: int, form: SectionFormat, fits: Mapping[str, int]) -> Iterator[SectionFormat]:
+        """Yield formats of section k with fewer bits in one place; an operand that is too long may fit with `fits`."""
+        for name, frac in form.fracs.items():
             for step in _STEPS:
                 if frac >= step:
-                    yield words.with_frac(name, frac - step)
+                    yield form.with_frac(name, frac - step)
         for name, frac in fits.items():
-            yield words.with_frac(name, frac)
-        for name, (integer, frac) in words.coefficients.items():
+            yield form.with_frac(name, frac)
+        for name, (integer, frac) in form.coefficients.items():
             for step in _STEPS:
                 exact = self._estimates[k].ideal[name] * 2.0 ** (frac - step)
                 if abs(integer).bit_length() > step + 1:
                     for neighbour in {math.floor(exact), math.ceil(exact)} - {0}:
-                        yield words.with_coefficient(name, lowest_terms(neighbour, frac - step))
+                        yield form.with_coefficient(name, lowest_terms(neighbour, frac - step))
 
     def error(self, choice: Choice) -> float:
-        """Estimated error of entry, coefficients and rounding together, in output LSBs."""
+        """Estimated error of input stage, coefficients and rounding together, in output LSBs."""
         rounding = sum(
             estimate.gains.get(name, 0.0) * 2.0**-frac
-            for estimate, words in zip(self._estimates, choice.words, strict=True)
-            for name, frac in words.fracs.items()
+            for estimate, form in zip(self._estimates, choice.formats, strict=True)
+            for name, frac in form.fracs.items()
         )
-        return self._entries[choice.entry].error + rounding + self.coefficient_error(choice)
+        return self._inputs[choice.input_stage].error + rounding + self.coefficient_error(choice)
 
     def coefficient_error(self, choice: Choice) -> float:
         """Estimated error of the coefficients in output LSBs."""
         base = self._base
         if base is not None and all(
-            a.coefficients is b.coefficients for a, b in zip(choice.words, base.words, strict=True)
+            a.coefficients is b.coefficients for a, b in zip(choice.formats, base.formats, strict=True)
         ):
             return base.error
         return max(map(abs, _limits(self._deviation(choice, base), self._ends)))
@@ -247,9 +207,9 @@ class Search:
     def _deviation(self, choice: Choice, base: _Base | None) -> Array:
         """Deviation of the impulse response by the coefficients, from that of `base` on."""
         response = np.zeros(1) if base is None else base.deviation
-        for k, (estimate, words) in enumerate(zip(self._estimates, choice.words, strict=True)):
-            before = None if base is None else base.words[k].coefficients
-            for name, (integer, frac) in words.coefficients.items():
+        for k, (estimate, form) in enumerate(zip(self._estimates, choice.formats, strict=True)):
+            before = None if base is None else base.formats[k].coefficients
+            for name, (integer, frac) in form.coefficients.items():
                 start = estimate.ideal[name]
                 if before is not None:
                     if before[name] == (integer, frac):
@@ -262,41 +222,39 @@ class Search:
         return self.area(choice) < math.inf
 
     def area(self, choice: Choice) -> float:
-        """Estimated area of the entry and the sections, infinite where rounded coefficients are unstable."""
-        return self._entries[choice.entry].area + sum(area for area, _ in self._built_sections(choice))
+        """Estimated area of the input stage and the sections, infinite where rounded coefficients are unstable."""
+        return self._inputs[choice.input_stage].area + sum(area for area, _ in self._built_sections(choice))
 
-    def output(self, choice: Choice) -> Signal:
+    def output(self, choice: Choice) -> Range:
         """Return what leaves the last section, its range estimated."""
         *_, (_, passed) = self._built_sections(choice)
         return passed
 
-    def _built_sections(self, choice: Choice) -> Iterator[tuple[float, Signal]]:
-        passed = self._entries[choice.entry].signal
-        for k, words in enumerate(choice.words):
-            area, passed, _ = self._section(k, passed, words)
+    def _built_sections(self, choice: Choice) -> Iterator[tuple[float, Range]]:
+        passed = self._inputs[choice.input_stage].x
+        for k, form in enumerate(choice.formats):
+            area, passed, _ = self._section(k, passed, form)
             yield area, passed
 
-    def _section(self, k: int, entry: Signal, words: Words) -> tuple[float, Signal, dict[str, int]]:
+    def _section(self, k: int, x: Range, form: SectionFormat) -> tuple[float, Range, dict[str, int]]:
         """Area and output of section k, and the fraction bits with which each long operand would fit a multiplier."""
-        key = (k, entry, tuple(words.coefficients.items()), tuple(words.fracs.items()))
+        key = (k, x, tuple(form.coefficients.items()), tuple(form.fracs.items()))
         if key not in self._known:
             try:
-                self._known[key] = self._built(k, entry, words)
+                self._known[key] = self._built(k, x, form)
             except ShortfallError:
-                self._known[key] = math.inf, entry, {}
+                self._known[key] = math.inf, x, {}
         return self._known[key]
 
-    def _built(self, k: int, entry: Signal, words: Words) -> tuple[float, Signal, dict[str, int]]:
-        formats = SectionFormat(
-            coefficient_bits=_EXACT_BITS, coefficients=words.coefficients, fracs=words.fracs, x_frac=entry.frac
-        )
+    def _built(self, k: int, x: Range, form: SectionFormat) -> tuple[float, Range, dict[str, int]]:
+        form = replace(form, x=unknown_range(x.frac))
         name = f"section{k}"
         ranges = {}
-        for node in self._build(self._rows[k], formats, name).graph.nodes:
+        for node in self._build(self._rows[k], form, name).graph.nodes:
             if node.name in self._estimates[k].limits:
-                low, high = self._estimates[k].limits_of(node.name, words.fracs)
+                low, high = self._estimates[k].limits_of(node.name, form.fracs)
                 ranges[node.name] = math.floor(low * 2.0**node.frac), math.ceil(high * 2.0**node.frac)
-        section = self._build(self._rows[k], replace(formats, ranges=ranges, x_low=entry.low, x_high=entry.high), name)
+        section = self._build(self._rows[k], replace(form, ranges=ranges, x=x), name)
         graph = section.graph
         output = graph.nodes[graph.outputs[0]]
         operands = {node.name: node for node in graph.nodes if node.name in section.optional_quantizers}
@@ -305,7 +263,7 @@ class Search:
             for name, node in operands.items()
             if node.width > MULTIPLIER_BITS
         }
-        return area_of(graph), Signal(output.frac, output.low, output.high), fits
+        return area_of(graph), output.range, fits
 
 
 @dataclass(frozen=True, eq=False)

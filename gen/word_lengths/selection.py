@@ -7,7 +7,8 @@ from collections.abc import Callable
 
 from sosmith.gen.realizations.registry import BEST_KEPT, REALIZATIONS
 from sosmith.gen.word_lengths.cost import LUTS_OF_A_BLOCK, cost_of
-from sosmith.gen.word_lengths.quantize import Plan, Quantized, prove
+from sosmith.gen.word_lengths.quantize import Plan, prove
+from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.errors import ShortfallError
 

@@ -1,7 +1,8 @@
 """Elementary functions of arrays, value by value in the C library's scalar functions.
 
-numpy's own have one implementation for each set of vector instructions, and their last bits differ. The same goes for
-products and magnitudes of complex arrays; sums, products and square roots of real arrays are the same everywhere.
+numpy's exponential, logarithms, powers and arc functions have an implementation for each set of vector instructions,
+and their last bits differ. The same goes for products and magnitudes of complex arrays. Its sine, cosine, hypotenuse,
+square root, Fourier transform, and sums and products of real arrays have only one.
 """
 
 from __future__ import annotations
@@ -13,16 +14,6 @@ import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
-
-
-def sin(values: npt.ArrayLike) -> Array:
-    """Sine of every value, in radians."""
-    return _each(math.sin, values)
-
-
-def cos(values: npt.ArrayLike) -> Array:
-    """Cosine of every value, in radians."""
-    return _each(math.cos, values)
 
 
 def exp(values: npt.ArrayLike) -> Array:

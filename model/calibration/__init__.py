@@ -1,1 +1,1 @@
-"""From measurements to the calibration polynomial, and how good it is."""
+"""Calibration: measurements, the polynomial fitted to them, and the quality of the fit."""

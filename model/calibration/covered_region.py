@@ -1,4 +1,4 @@
-"""The part of the plane of voltage and temperature that measurements cover, and how far polynomials differ there."""
+"""The region of voltage and temperature that measurements cover, and the difference of polynomials over it."""
 
 from __future__ import annotations
 
@@ -7,31 +7,31 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sosmith.model.arrays import Values
 from sosmith.model.calibration.polynomial import Polynomial
-from sosmith.model.port import Values
 
 GRID = 65
-"""Points along each axis at which polynomials are compared."""
+"""Grid points along each axis at which polynomials are compared."""
 
 Point = tuple[float, float]
 
 
 @dataclass(frozen=True)
 class CoveredRegion:
-    """The convex hull of measurements: between them a polynomial is interpolated, outside extrapolated.
+    """The convex hull of the measurements: inside it a polynomial interpolates, outside it extrapolates.
 
     Attributes
     ----------
     corners : tuple of Point
-        Voltage in V and temperature in degC of the corners, counterclockwise; no three lie on a line. Fewer
-        than three if all measurements lie on a line.
+        Voltage in V and temperature in degC of the corners, counterclockwise; no three are collinear. Fewer
+        than three if all measurements are collinear.
     """
 
     corners: tuple[Point, ...]
 
     @classmethod
     def of(cls, voltage: Values, temperature: Values) -> CoveredRegion:
-        """Region of measurements at these voltages and temperatures, shape (n,) each."""
+        """Return the region of measurements at `voltage` and `temperature`, each of shape (n,)."""
         points = sorted(set(zip(voltage.tolist(), temperature.tolist(), strict=True)))
         lower, upper = _half(points), _half(reversed(points))
         return cls(tuple(lower[:-1] + upper[:-1]) or tuple(points))
@@ -43,7 +43,7 @@ class CoveredRegion:
         return sum(a[0] * b[1] - b[0] * a[1] for a, b in zip(self.corners, following, strict=True)) / 2
 
     def points(self) -> tuple[Values, Values]:
-        """Voltages and temperatures of a grid inside, and of the corners."""
+        """Return the voltages and temperatures of the grid points inside the region and of its corners."""
         (v_low, t_low), (v_high, t_high) = np.min(self.corners, axis=0), np.max(self.corners, axis=0)
         v, t = (
             axis.ravel() for axis in np.meshgrid(np.linspace(v_low, v_high, GRID), np.linspace(t_low, t_high, GRID))
@@ -55,13 +55,13 @@ class CoveredRegion:
         return np.concatenate((v[inside], corner_v)), np.concatenate((t[inside], corner_t))
 
     def largest_difference(self, one: Polynomial, other: Polynomial) -> float:
-        """Largest difference of two polynomials in mm, over the `points` of the region."""
+        """Return the largest absolute difference of two polynomials over `points`, in mm."""
         v, t = self.points()
         return float(np.max(np.abs(one(v, t) - other(v, t))))
 
 
 def _half(points: Iterable[Point]) -> list[Point]:
-    """Corners of the hull from the first to the last of sorted points, all turning left (Andrew's monotone chain)."""
+    """Return the half hull from the first to the last of sorted points, turning left (Andrew's monotone chain)."""
     chain: list[Point] = []
     for point in points:
         while len(chain) > 1 and _turn(chain[-2], chain[-1], point) <= 0:

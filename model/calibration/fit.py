@@ -1,11 +1,11 @@
 """Regression of the clearance on voltage and temperature, from reference measurements.
 
-The paper's method (section 2.2): least squares for the coefficients (equations 2 and 3), starting with
-the linear polynomial, orders raised until the adjusted coefficient of correlation reaches 0.975; the
-smallest polynomial that reaches it is kept.
+The paper's method (section 2.2): fit by least squares (equations 2 and 3), start with the linear polynomial,
+raise the orders until the adjusted coefficient of correlation reaches 0.975, and keep the smallest polynomial
+that reaches it.
 
-Equation 3 is the normal equations. `Sums` adds them up exactly and solves them without loss, so the same
-measurements give the same bits everywhere and in any order. On request, outliers are weighted down.
+Equation 3 states the normal equations. `Sums` accumulates them exactly and solves them in high precision, so the
+same measurements give the same bits on every machine and in any order. A robust fit weights outliers down.
 """
 
 from __future__ import annotations
@@ -17,62 +17,60 @@ from pathlib import Path
 
 import numpy as np
 
+from sosmith.model.arrays import Values
+from sosmith.model.calibration.acceptance import REQUIRED_R
 from sosmith.model.calibration.least_squares import Solution, Sums, Term
 from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.errors import SpecificationError
-from sosmith.model.port import Values
 from sosmith.model.tables.csv_table import CsvTable, check_rows, read_csv_table
 
 COLUMNS = ("clearance_mm", "voltage_V", "temperature_C")
-"""The columns of a measurement file, in the order of the contract."""
-
-REQUIRED_R = 0.975
-"""Adjusted r at which a polynomial is accepted (the paper's section 2.2)."""
+"""Columns of a measurement file, in their documented order."""
 
 MAX_ORDER = 6
-"""Highest total order tried: 28 terms, far beyond the paper's second order."""
+"""Highest order tried: 28 terms. The paper needs order 2."""
 
 HUBER = 1.345
-"""Residual, in standard deviations, from which a robust fit weights a measurement down.
+"""Residual, in standard deviations, above which a robust fit reduces the weight of a measurement.
 
-Huber's constant: 95 % of the efficiency of least squares where the errors are normal.
+Huber's constant: 95 % of the efficiency of least squares for normally distributed errors.
 """
 
 NORMAL_CONSISTENCY = 1.4826
-"""Standard deviation of a normal error over the median of its absolute value."""
+"""Ratio of the standard deviation of a normal error to the median of its magnitude."""
 
 MIN_SCATTER = 1e-6
-"""Standard deviation in mm taken at least: a nanometre, finer than anything measured."""
+"""Lower limit of the estimated standard deviation in mm: 1 nm, finer than any measurement here."""
 
 WEIGHT_STEPS = 1024
-"""Weights are whole multiples of one over this, so that rounds of weighting end."""
+"""Weights are multiples of 1/1024, so that the reweighting iteration reaches a fixed point or a cycle."""
 
 MAX_ROUNDS = 25
-"""Rounds of weighting after which the weights are taken as they are; some ten are usual, but steps can alternate."""
+"""Limit on reweighting iterations. About ten are usual, but weights can cycle."""
 
 
 Progress = Callable[[int, int], None]
-"""Is told how much is done, and of how much."""
+"""Callback that receives the number of steps done and their total."""
 
 
 def untold(done: int, total: int) -> None:
-    """Take progress and tell nobody."""
+    """Ignore progress."""
 
 
 @dataclass(frozen=True, eq=False)
 class Measurements:
-    """Reference measurements, one element of every array per measurement.
+    """Reference measurements; every array has one element per measurement.
 
     Attributes
     ----------
     clearance : ndarray, shape (n,)
-        Micrometer reading in mm, not negative.
+        Micrometer reading in mm, 0 or more.
     voltage : ndarray, shape (n,)
         Sensor voltage in V.
     temperature : ndarray, shape (n,)
         Temperature at the sensor in degC.
     source : str
-        Where they come from, for messages.
+        Origin of the measurements, for messages.
     """
 
     clearance: Values
@@ -89,12 +87,12 @@ class Measurements:
                 raise ValueError(f"{name} must be finite, not {values[~np.isfinite(values)][0]}")
 
     def __len__(self) -> int:
-        """Count of measurements."""
+        """Return the number of measurements."""
         return len(self.clearance)
 
     @property
     def covered(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Least and largest voltage and temperature."""
+        """Lowest and highest voltage in V, and lowest and highest temperature in degC."""
         voltage, temperature = (
             (float(values.min()), float(values.max())) for values in (self.voltage, self.temperature)
         )
@@ -103,16 +101,16 @@ class Measurements:
 
 @dataclass(frozen=True)
 class Trial:
-    """Orders that were tried, and how well they fit.
+    """The orders of one fitted polynomial, and its quality.
 
     Attributes
     ----------
     orders : tuple of int
         Highest powers (m, n) of voltage and temperature.
     terms : int
-        Count of coefficients.
+        Number of coefficients.
     adjusted_r_squared : float
-        Adjusted coefficient of determination; at most 1, negative for a useless model.
+        Adjusted coefficient of determination; at most 1, and negative for a model worse than the mean.
     """
 
     orders: tuple[int, int]
@@ -121,7 +119,7 @@ class Trial:
 
     @property
     def adjusted_r(self) -> float:
-        """Root of the adjusted R squared; 0 where that is negative."""
+        """Square root of the adjusted R squared, or 0 if that is negative."""
         return math.sqrt(max(self.adjusted_r_squared, 0.0))
 
 
@@ -132,17 +130,17 @@ class Fit:
     Attributes
     ----------
     polynomial : Polynomial
-        Clearance in mm; every coefficient is a double, so printing it loses nothing.
+        Clearance in mm; every coefficient is exactly a double.
     accepted : Trial
-        Orders and quality of `polynomial`.
+        The orders of `polynomial` and its quality.
     rms : float
-        Root mean square residual in mm, over all measurements with equal weight.
+        Root mean square residual in mm, over all measurements, unweighted.
     rejected : tuple of Trial
-        The smaller polynomials that fell short, in the order they were tried.
+        The smaller polynomials that were not good enough, in the order in which they were tried.
     covered : tuple of (float, float)
-        Least and largest voltage in V and temperature in degC of the measurements.
+        Lowest and highest voltage in V and temperature in degC of the measurements.
     weights : tuple of float
-        Weight of each measurement, in (0, 1]; empty where all have the same, as without `robust`.
+        Weight of each measurement, in (0, 1]; empty if the fit is not robust.
     """
 
     polynomial: Polynomial
@@ -169,12 +167,12 @@ class Fit:
 
 
 def read_measurements(path: Path) -> Measurements:
-    """Read the CSV file with the columns clearance_mm, voltage_V and temperature_C, in any order.
+    """Read a CSV file with the columns clearance_mm, voltage_V and temperature_C, in any order.
 
     Raises
     ------
     SpecificationError
-        As `read_csv_table`; if a clearance is negative; if a row repeats another one.
+        As for `read_csv_table`; if a clearance is negative; if two rows are equal.
     """
     table = read_csv_table(path, COLUMNS, required=COLUMNS)
     clearance, voltage, temperature = (table.column(name) for name in COLUMNS)
@@ -188,7 +186,7 @@ def _refuse_repeated_row(table: CsvTable) -> None:
     for index, row in enumerate(table.values.tolist()):
         line = first_line.setdefault(tuple(row), table.lines[index])
         if line != table.lines[index]:
-            raise table.refuse(index, f"row must be a measurement of its own, not a duplicate of line {line}")
+            raise table.refuse(index, f"row must be a new measurement, not a duplicate of line {line}")
 
 
 def fit(
@@ -200,28 +198,28 @@ def fit(
 ) -> Fit:
     """Find the smallest polynomial whose adjusted r reaches `required_r`.
 
-    1. Orders (m, n) are tried by rising count of terms from (1, 1) on; among equals the lower total
-       order first, then the lower order in temperature. The terms of (m, n) are ``V**i T**j`` with
-       i <= m, j <= n, i + j <= max(m, n): equation 5b is (1, 1), equations 4 and 5a are (2, 1).
-    2. Least squares give the coefficients and the residual sum of squares RSS.
+    1. Orders (m, n) are tried from (1, 1) on by rising number of terms, then by rising max(m, n), then by
+       rising n. The terms of (m, n) are ``V**i T**j`` with i <= m, j <= n, i + j <= max(m, n): equation 5b
+       is (1, 1), equations 4 and 5a are (2, 1).
+    2. Least squares gives the coefficients and the residual sum of squares RSS.
     3. With N measurements, p terms and the total sum of squares TSS,
-       ``adjusted R**2 = 1 - (RSS / (N - p)) / (TSS / (N - 1))`` and r is its root.
+       ``adjusted R**2 = 1 - (RSS / (N - p)) / (TSS / (N - 1))``, and r is its square root.
 
-    Orders that the measurements cannot determine are passed over: too few rows, or too few different
-    values of a variable.
+    Orders that the measurements cannot determine are skipped: too few rows, or too few distinct values of a
+    variable.
 
-    With `robust`, step 2 weights each measurement by ``min(1, HUBER * s / |residual|)``, where s is the scatter by
-    the median of the absolute residuals, until the weights stay (Huber's M-estimate by iterated weighting).
-    RSS and TSS are weighted likewise. A measurement that is far off both in clearance and in voltage or temperature
-    can still pull the fit towards itself: its leverage tells.
+    With `robust`, step 2 weights each measurement by ``min(1, HUBER * s / |residual|)``, where s is the scatter
+    estimated from the median absolute residual, and repeats until the weights no longer change (Huber's M-estimator
+    by iteratively reweighted least squares). RSS and TSS are weighted likewise. An outlier in clearance that is also
+    far out in voltage or temperature can still pull the fit towards itself; its leverage shows that.
 
-    `progress` is called with how many of how many orders have been tried.
+    `progress` receives the number of orders tried and the number of all orders.
 
     Raises
     ------
     SpecificationError
-        If there are fewer measurements than the linear polynomial needs; if a quantity does not vary, or
-        voltage and temperature only together; if no polynomial up to `MAX_ORDER` is good enough.
+        If there are fewer measurements than the linear polynomial needs; if a quantity does not vary, or voltage and
+        temperature vary only together; if no polynomial up to `MAX_ORDER` reaches `required_r`.
     """
     _check_variation(measurements)
     count = len(measurements)
@@ -255,17 +253,17 @@ def fit(
 
 
 def residuals(measurements: Measurements, polynomial: Polynomial) -> Values:
-    """Measured clearance minus that of `polynomial`, in mm, shape (n,)."""
+    """Return measured clearance minus fitted clearance in mm, shape (n,)."""
     return measurements.clearance - polynomial(measurements.voltage, measurements.temperature)
 
 
 def root_mean_square(values: Values) -> float:
-    """Root of the mean square; the sum is rounded once, so that it is the same on every machine."""
+    """Return the root mean square. The sum is rounded once, so the result is the same on every machine."""
     return math.sqrt(math.fsum(values**2) / len(values))
 
 
 _Minimize = Callable[[tuple[Term, ...]], tuple[Solution, tuple[float, ...]] | None]
-"""From terms to coefficients and weights, or None if the measurements do not determine them."""
+"""Maps terms to coefficients and weights; None if the measurements do not determine them."""
 
 
 def _least_squares(measurements: Measurements) -> _Minimize:
@@ -296,7 +294,7 @@ def _huber(measurements: Measurements) -> _Minimize:
             weights = np.maximum(np.rint(exact * WEIGHT_STEPS), 1.0) / WEIGHT_STEPS
             again = [k for k, (_, earlier) in enumerate(rounds) if np.array_equal(weights, earlier)]
             if again or len(rounds) == MAX_ROUNDS:
-                # Once weights come again, so do the rounds from there on; weights that stay are a turn of one round.
+                # Equal weights repeat every later iteration: the weights cycle, a fixed point being a cycle of one.
                 last = again[0] + (MAX_ROUNDS - 1 - again[0]) % (len(rounds) - again[0]) if again else -1
                 solution, weights = rounds[last]
                 return solution, tuple(weights.tolist())
@@ -306,13 +304,13 @@ def _huber(measurements: Measurements) -> _Minimize:
 
 
 def candidate_orders() -> tuple[tuple[int, int], ...]:
-    """Orders (m, n) in the sequence in which `fit` tries them."""
+    """Return the orders (m, n) in the sequence in which `fit` tries them."""
     every = [(m, n) for m in range(1, MAX_ORDER + 1) for n in range(1, MAX_ORDER + 1)]
     return tuple(sorted(every, key=lambda orders: (len(terms_of(orders)), max(orders), orders[1])))
 
 
 def terms_of(orders: tuple[int, int]) -> tuple[Term, ...]:
-    """Powers (i, j) of voltage and temperature that a polynomial of `orders` has."""
+    """Return the powers (i, j) of voltage and temperature in a polynomial of `orders`."""
     m, n = orders
     return tuple((i, j) for i in range(m + 1) for j in range(n + 1) if i + j <= max(m, n))
 

@@ -1,4 +1,4 @@
-"""How far a fitted calibration can be trusted: residuals, leverage, cross-validated error, coverage."""
+"""Quality of a fitted calibration: residuals, leverage, cross-validated error, coverage."""
 
 from __future__ import annotations
 
@@ -7,37 +7,36 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sosmith.model.arrays import Values
 from sosmith.model.calibration.covered_region import CoveredRegion
 from sosmith.model.calibration.fit import Fit, Measurements, residuals, root_mean_square, terms_of
 from sosmith.model.calibration.least_squares import Sums
-from sosmith.model.port import Values
 
 CELLS = 10
-"""Cells along each axis in which measurements are counted."""
+"""Grid cells along each axis for the share of filled cells."""
 
 HIGH_LEVERAGE = 3.0
-"""Multiple of the mean leverage from which a measurement is called out (a rule of thumb)."""
+"""Multiple of the mean leverage above which a measurement is reported (a rule of thumb)."""
 
 _ALONE = 1e-9
-"""Part of a measurement's own residual, below which it determines a coefficient alone."""
+"""Value of ``1 - leverage`` below which a measurement alone determines a coefficient."""
 
 
 @dataclass(frozen=True, eq=False)
 class FitQuality:
-    """Figures of a fit, one element of every array per measurement.
+    """Quality of a fit; every array has one element per measurement.
 
     Attributes
     ----------
     residual : ndarray, shape (n,)
         Measured minus fitted clearance in mm.
     leverage : ndarray, shape (n,)
-        How much of its own fitted value a measurement determines, from 0 to 1; they add up to the count of
-        coefficients.
+        Weight of a measurement in its own fitted value, from 0 to 1; the sum is the number of coefficients.
     region : CoveredRegion
-        Where the measurements lie.
+        Region that the measurements cover.
     filled_cells : float
-        Share of `CELLS` by `CELLS` equal cells between least and largest voltage and temperature that hold a
-        measurement.
+        Share of the cells that hold a measurement, in a grid of `CELLS` by `CELLS` over the range of voltage and
+        temperature.
     """
 
     residual: Values
@@ -47,10 +46,10 @@ class FitQuality:
 
     @property
     def cross_validated(self) -> float | None:
-        """Root mean square error in mm at each measurement of the fit to all others.
+        """Root mean square error in mm by leave-one-out cross-validation.
 
-        None if that is not defined, because a measurement determines a coefficient alone. In a robust fit the
-        weights are those of the fit to all.
+        None if it is undefined because a measurement alone determines a coefficient. For a robust fit, the weights
+        of the full fit are used.
         """
         if np.any(1.0 - self.leverage < _ALONE):
             return None
@@ -58,16 +57,16 @@ class FitQuality:
 
     @property
     def high_leverage(self) -> tuple[int, ...]:
-        """Indices of measurements with more than `HIGH_LEVERAGE` times the mean leverage."""
+        """Indices of measurements whose leverage is above `HIGH_LEVERAGE` times the mean."""
         return tuple(np.flatnonzero(self.leverage > HIGH_LEVERAGE * self.leverage.mean()).tolist())
 
     def largest_residuals(self, count: int) -> tuple[int, ...]:
-        """Pick the indices of the largest residuals, the largest first."""
+        """Return the indices of the `count` largest residuals by magnitude, largest first."""
         return tuple(np.argsort(-np.abs(self.residual), kind="stable")[:count].tolist())
 
 
 def assess(measurements: Measurements, fit: Fit) -> FitQuality:
-    """Work out the figures of `fit`, which has to come from these `measurements`."""
+    """Assess `fit`, which must have been fitted to `measurements`."""
     region = CoveredRegion.of(measurements.voltage, measurements.temperature)
     return FitQuality(
         residuals(measurements, fit.polynomial), _leverage(measurements, fit), region, _filled_cells(measurements)
@@ -75,7 +74,10 @@ def assess(measurements: Measurements, fit: Fit) -> FitQuality:
 
 
 def _leverage(measurements: Measurements, fit: Fit) -> Values:
-    """Diagonal of the hat matrix, ``w x' N**-1 x`` with ``N = L D L'``: z = L**-1 x, then the sum of z**2 / D."""
+    """Return the diagonal of the hat matrix, ``w x' N**-1 x``.
+
+    With ``N = L D L'`` and ``z = L**-1 x`` it is w times the sum of ``z**2 / D``.
+    """
     weights = np.array(fit.weights) if fit.weights else np.ones(len(measurements))
     terms = terms_of(fit.orders)
     sums = Sums(measurements.clearance, measurements.voltage, measurements.temperature, weights)

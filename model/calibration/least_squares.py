@@ -1,9 +1,9 @@
 """Least squares for a polynomial of two variables, the same to the last bit on every machine.
 
-The sums of the normal equations (the paper's equation 3) are exact: doubles are integers times a power of two,
-and integers are added without rounding, so neither the order of the measurements nor the machine matters. The
-equations are then solved in decimal arithmetic of `DIGITS` digits, which the condition of the matrix cannot eat
-up: that is why squaring it does no harm here. Only finished coefficients become doubles, each rounded once.
+The sums of the normal equations (equation 3 of the paper) are exact: doubles are integers times a power of two,
+and integers add without rounding, so the result depends neither on the order of the measurements nor on the machine.
+The equations are then solved in decimal arithmetic with `DIGITS` digits. These are enough for the squared condition
+number of the normal equations. Only the final coefficients are rounded to doubles, once each.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ from operator import mul, sub
 
 import numpy as np
 
+from sosmith.model.arrays import Values
 from sosmith.model.calibration.polynomial import Polynomial
-from sosmith.model.port import Values
 
 DIGITS = 150
-"""Digits of the decimal arithmetic. `MIN_SINE` lets through a matrix that costs some 40 of them."""
+"""Digits of the decimal arithmetic. A matrix that `MIN_SINE` admits loses about 40 of them."""
 
 MIN_SINE = 1e-10
-"""Sine of the angle between a term and the span of those before it, below which it is not determined.
+"""Sine of the angle between a term and the span of the terms before it, below which the term counts as dependent.
 
-Five digits above the rounding of the doubles, so that terms which depend on each other except for rounding count
-as dependent, and well below what measurable variation of both variables gives.
+Five digits above double rounding, so that terms that differ only by rounding count as dependent, and well below the
+angle that any measurable variation of both variables gives.
 """
 
 Term = tuple[int, int]
@@ -40,23 +40,23 @@ _CONTEXT = decimal.Context(prec=DIGITS, Emax=decimal.MAX_EMAX, Emin=decimal.MIN_
 
 @dataclass(frozen=True)
 class Solution:
-    """Coefficients that minimize the sum of squares, and how well they do.
+    """The least-squares coefficients and their sums of squares.
 
     Attributes
     ----------
     terms : tuple of Term
-        Powers of V and T that have a coefficient.
+        Powers of V and T, one pair for each coefficient.
     polynomial : Polynomial
-        Every coefficient is the double next to that of the minimum.
+        The polynomial; every coefficient is the exact one rounded to double.
     residual_squares : Decimal
-        Weighted sum of the squared residuals at the minimum, before coefficients were rounded.
+        Weighted sum of squared residuals at the minimum, before the coefficients are rounded.
     total_squares : Decimal
-        Weighted sum of the squared deviations of d from its weighted mean.
+        Weighted sum of squared deviations of d from its weighted mean.
     factor : tuple of tuple of float
         Lower triangle L of ``N = L diag(pivots) L'`` for the matrix N of the normal equations, in the centred
         variables of `Sums.centred`.
     pivots : tuple of float
-        Its pivots, all positive.
+        Pivots of that factorization, all positive.
     """
 
     terms: tuple[Term, ...]
@@ -68,17 +68,17 @@ class Solution:
 
 
 class Sums:
-    """Exact sums ``w V**i T**j`` and ``w d V**i T**j`` over all measurements, made when they are asked for.
+    """Exact sums ``w V**i T**j`` and ``w d V**i T**j`` over all measurements, computed on first use.
 
-    Both variables are centred, so that a narrow range far from zero does not make powers look alike, and halved by
-    powers of two into [-1, 1], which is exact.
+    Both variables are centred, so that powers stay distinct over a narrow range far from zero, and scaled into [-1, 1]
+    by a power of two, which is exact.
 
     Parameters
     ----------
     d, V, T : ndarray, shape (n,)
-        Finite doubles, at least one of each.
+        Finite doubles, n at least 1.
     weights : ndarray, shape (n,), optional
-        Weights of the squares, not negative; 1 if none are given.
+        Weights of the squared residuals, 0 or more; 1 by default.
     """
 
     def __init__(self, d: Values, V: Values, T: Values, weights: Values | None = None) -> None:
@@ -91,7 +91,7 @@ class Sums:
         self._moments: dict[tuple[int, Term], tuple[int, int]] = {}
 
     def reweighted(self, weights: Values) -> Sums:
-        """Give the measurements other weights, shape (n,); only rows whose weight differs are added up, exactly too."""
+        """Return the sums with other weights, shape (n,); only rows whose weight changes are summed again."""
         rows = np.flatnonzero(weights != self._weights)
         if not len(rows):
             return self
@@ -106,7 +106,7 @@ class Sums:
         return other
 
     def _moment(self, power: int, term: Term) -> tuple[int, int]:
-        """Sum of ``w d**power V**i T**j``, V and T centred, as an integer over two to so many bits."""
+        """Return the sum of ``w d**power V**i T**j``, V and T centred, as an integer and its fraction bits."""
         if (power, term) not in self._moments:
             i, j = term
             total = self._part.sum(power, i, j)
@@ -129,11 +129,11 @@ class Sums:
         return Fraction(total, 1 << bits)
 
     def centred(self, V: Values, T: Values) -> tuple[Values, Values]:
-        """Variables in [-1, 1] for the range of the measurements, correct to a rounding."""
+        """Return V and T centred and scaled to [-1, 1] over the range of the measurements, rounded to doubles."""
         return self._x(V), self._y(T)
 
     def solve(self, terms: Sequence[Term]) -> Solution | None:
-        """Minimize over the coefficients of `terms`; None if the measurements do not determine them."""
+        """Solve for the coefficients of `terms`; None if the measurements do not determine them."""
         with decimal.localcontext(_CONTEXT):
             products = [[(a[0] + b[0], a[1] + b[1]) for b in terms] for a in terms]
             sums = {term: self._decimal(0, term) for term in {term for row in products for term in row}}
@@ -163,7 +163,7 @@ class Sums:
             )
 
     def _expand(self, scaled: dict[Term, Decimal]) -> Polynomial:
-        """Polynomial of V and T themselves."""
+        """Return the polynomial in V and T, not centred."""
         m, n = (max(term[axis] for term in scaled) for axis in (0, 1))
         sums = [[Fraction(0)] * (n + 1) for _ in range(m + 1)]
         powers_x, powers_y = [self._x.power(i) for i in range(m + 1)], [self._y.power(j) for j in range(n + 1)]
@@ -178,7 +178,7 @@ class Sums:
 
 
 class _Part:
-    """Sums of ``w d**k x**i y**j`` over some rows; all of them integers, w of either sign."""
+    """Sums of ``w d**k x**i y**j`` over some rows. All are integers; w may have either sign."""
 
     def __init__(self, w: list[int], d: list[int], x: list[int], y: list[int]) -> None:
         self._x, self._y = x, y
@@ -197,7 +197,7 @@ class _Part:
 
 @dataclass(frozen=True)
 class _Centred:
-    """``x = (value - centre) / half`` as ``integers / 2**bits``, in [-1, 1]; `half` is a power of two."""
+    """``x = (value - centre) / half`` in [-1, 1] as ``integers / 2**bits``; `half` is a power of two."""
 
     centre: float
     half: float
@@ -210,20 +210,20 @@ class _Centred:
         centre = low + (high - low) / 2
         exponent = math.ceil(math.log2(max(high - centre, centre - low))) if high > low else 0
         (middle, *integers), bits = _integers(np.concatenate(([centre], values)))
-        # no value is nearer to the centre than 2**-bits, so that bits + exponent is not negative
+        # values differ from the centre by 2**-bits or more, so bits + exponent is not negative
         return cls(centre, 2.0**exponent, [value - middle for value in integers], bits + exponent)
 
     def __call__(self, values: Values) -> Values:
         return (values - self.centre) / self.half
 
     def power(self, exponent: int) -> list[Fraction]:
-        """Coefficients of ``x**exponent`` as a polynomial of the value, from the constant on."""
+        """Return the coefficients of ``x**exponent`` as a polynomial in the value, constant first."""
         centre, half = Fraction(self.centre), Fraction(self.half)
         return [math.comb(exponent, k) * (-centre) ** (exponent - k) / half**exponent for k in range(exponent + 1)]
 
 
 def _integers(values: Values) -> tuple[list[int], int]:
-    """Doubles as integers times ``2**-bits``; returns the integers and `bits`, which is not negative."""
+    """Return doubles as integers times ``2**-bits``: the integers, and `bits`, which is 0 or more."""
     ratios = [value.as_integer_ratio() for value in values.tolist()]
     bits = max(denominator for _, denominator in ratios).bit_length() - 1
     return [numerator << (bits + 1 - denominator.bit_length()) for numerator, denominator in ratios], bits
@@ -234,10 +234,10 @@ def _decimal(value: Fraction) -> Decimal:
 
 
 def _factor(matrix: list[list[Decimal]]) -> tuple[list[list[Decimal]], list[Decimal]] | None:
-    """Factor a symmetric matrix into ``L diag(pivots) L'``; None if a term depends on those before it.
+    """Factor a symmetric matrix into ``L diag(pivots) L'``; None if a term depends on the terms before it.
 
-    Row k of L holds its k entries left of the diagonal of ones. A pivot over the diagonal entry is the square of the
-    sine between the term and the span of those before it.
+    Row k of L holds the k entries left of the unit diagonal. The ratio of a pivot to the diagonal entry is the squared
+    sine of the angle between the term and the span of the terms before it.
     """
     lower: list[list[Decimal]] = []
     pivots: list[Decimal] = []

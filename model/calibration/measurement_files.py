@@ -1,6 +1,6 @@
-"""Reads files of measurements, CSV or XLSX: good rows, and what is wrong with each of the others.
+"""Reads measurements from CSV or XLSX files: the valid rows, and a reason for each rejected row.
 
-`read_measurements` is for a file that has to be right as a whole: it stops at the first flaw.
+`fit.read_measurements`, in contrast, reads a file that must be valid as a whole and stops at the first error.
 """
 
 from __future__ import annotations
@@ -18,37 +18,32 @@ from typing import Any
 
 import openpyxl
 
+from sosmith.model.calibration.acceptance import DEFAULT_RANGES, Range
 from sosmith.model.calibration.fit import COLUMNS
 from sosmith.model.errors import SpecificationError
 from sosmith.model.tables.csv_table import NUMBER, check_separator
 
 DATE_COLUMN = "date"
-"""Optional column with the day of each measurement, as 2024-03-01."""
-
-Range = tuple[float, float]
-"""Least and largest value that can be right."""
-
-DEFAULT_RANGES: tuple[Range, Range, Range] = ((0.0, 16.0), (0.0, 10.0), (0.0, 128.0))
-"""Ranges of `COLUMNS` in mm, V and degC: those of the example specification."""
+"""Optional column with the date of each measurement, such as 2024-03-01."""
 
 _SLIPS: dict[str, tuple[tuple[str, Callable[[float], float]], ...]] = {
     "clearance_mm": (("micrometres", lambda x: x / 1000), ("metres", lambda x: x * 1000)),
     "voltage_V": (("millivolts", lambda x: x / 1000), ("microvolts", lambda x: x / 1e6)),
     "temperature_C": (("kelvins", lambda x: x - 273.15), ("degrees Fahrenheit", lambda x: (x - 32) / 1.8)),
 }
-"""Units that a number out of range may be in."""
+"""Wrong units that an out-of-range number may be in, each with its conversion to the right one."""
 
 
 @dataclass(frozen=True)
 class Reading:
-    """One good row.
+    """One valid row.
 
     Attributes
     ----------
     line : int
-        Its line in the file, or row in the sheet, counted from 1.
+        Line in the file, or row in the sheet, from 1.
     date : str
-        Day of the measurement as in 2024-03-01.
+        Date of the measurement, such as 2024-03-01.
     values : tuple of float
         Clearance in mm, voltage in V, temperature in degC.
     """
@@ -58,14 +53,14 @@ class Reading:
     values: tuple[float, float, float]
 
     def sha256(self, sensor: str) -> str:
-        """Hash over sensor, date and the exact values, in hexadecimal."""
+        """Return the SHA-256 of sensor name, date and exact values, in hexadecimal."""
         text = "\n".join([sensor, self.date, *(value.hex() for value in self.values)])
         return hashlib.sha256(text.encode()).hexdigest()
 
 
 @dataclass(frozen=True)
 class Refusal:
-    """A row that cannot be right: its line, and a sentence that says why."""
+    """A rejected row: its line, and a sentence with the reason."""
 
     line: int
     reason: str
@@ -73,18 +68,18 @@ class Refusal:
 
 @dataclass(frozen=True)
 class MeasurementFile:
-    """What a file holds.
+    """The rows of a file.
 
     Attributes
     ----------
     path : Path
         The file.
     sha256 : str
-        Hash over its bytes, in hexadecimal.
+        SHA-256 of the file, in hexadecimal.
     readings : tuple of Reading
-        The good rows, in the order of the file.
+        The valid rows, in the order of the file.
     refusals : tuple of Refusal
-        The others, likewise.
+        The rejected rows, in the order of the file.
     """
 
     path: Path
@@ -96,24 +91,24 @@ class MeasurementFile:
 def read_measurement_file(
     path: Path, date: str, ranges: tuple[Range, Range, Range] = DEFAULT_RANGES
 ) -> MeasurementFile:
-    """Read the columns clearance_mm, voltage_V, temperature_C and, if there, date, from a CSV or XLSX file.
+    """Read the columns clearance_mm, voltage_V, temperature_C and, if present, date, from a CSV or XLSX file.
 
-    Of a workbook the first sheet is read, and of formulas the value that was stored with them.
+    Of a workbook, the first sheet is read, with the stored values of formulas.
 
     Parameters
     ----------
     path : Path
         File whose name ends in ``.csv`` (UTF-8) or ``.xlsx``.
     date : str
-        Day of measurements that have no date of their own.
+        Date of measurements that have none in the file.
     ranges : tuple of Range
-        Least and largest clearance in mm, voltage in V and temperature in degC that can be right.
+        Lowest and highest valid clearance in mm, voltage in V and temperature in degC.
 
     Raises
     ------
     SpecificationError
-        If the file cannot be read, is of another kind, or has no header with the three columns. What is wrong with
-        single rows is in `MeasurementFile.refusals` instead.
+        If the file cannot be read, is of another kind, or its header lacks one of the three columns. Errors in
+        single rows go to `MeasurementFile.refusals` instead.
     """
     try:
         content = path.read_bytes()
@@ -131,25 +126,25 @@ def read_measurement_file(
     for line, cells in rows:
         reader.take(line, cells)
     if not reader.readings and not reader.refusals:
-        raise SpecificationError(f"{path} must hold rows of numbers below its header, not the header only")
+        raise SpecificationError(f"{path} must hold rows of numbers below its header, not only the header")
     sha256 = hashlib.sha256(content).hexdigest()
     return MeasurementFile(path, sha256, tuple(reader.readings), tuple(reader.refusals))
 
 
 def parse_date(text: str) -> str:
-    """Check a day written as 2024-03-01, and return it.
+    """Return `text` if it is a date such as 2024-03-01.
 
     Raises
     ------
     SpecificationError
-        If it is none.
+        If it is not.
     """
     try:
         if datetime.date.fromisoformat(text).isoformat() == text:
             return text
     except ValueError:
         pass
-    raise SpecificationError(f"date must be a day as in 2024-03-01, not {text!r}")
+    raise SpecificationError(f"date must be a date such as 2024-03-01, not {text!r}")
 
 
 def _blank(cells: Sequence[Any]) -> bool:
@@ -157,7 +152,7 @@ def _blank(cells: Sequence[Any]) -> bool:
 
 
 def _trimmed(cells: Sequence[Any], least: int) -> Sequence[Any]:
-    """Leave out empty cells at the end of a row, as workbooks have them, down to `least` cells."""
+    """Drop empty cells at the end of a row, as workbooks have them, but keep at least `least` cells."""
     end = len(cells)
     while end > least and _blank(cells[end - 1 : end]):
         end -= 1
@@ -185,10 +180,10 @@ def _csv_rows(path: Path, content: bytes) -> Iterator[tuple[int, Sequence[Any]]]
 def _xlsx_rows(path: Path, content: bytes) -> Iterator[tuple[int, Sequence[Any]]]:
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # it warns of styles and extensions that do not matter here
+            warnings.simplefilter("ignore")  # warnings about styles and extensions, which are not read
             book = openpyxl.load_workbook(io.BytesIO(content), read_only=True, data_only=True)
             yield from enumerate(book.worksheets[0].iter_rows(values_only=True), start=1)
-    except Exception as error:  # of the archive, of XML, or whatever damage leads openpyxl into
+    except Exception as error:  # damaged files raise errors of zipfile, of XML, or any other
         raise SpecificationError(f"{path} must be an XLSX workbook, not damaged ({error})") from None
 
 
@@ -204,15 +199,15 @@ def _check_header(where: str, names: Sequence[Any]) -> None:
                 f"{where}: column must be one of {', '.join(known)}, with the unit in its name, not {name or ''!r}"
             )
         if names.count(name) > 1:
-            raise SpecificationError(f"{where}: column {name} must be there once, not {names.count(name)} times")
+            raise SpecificationError(f"{where}: column {name} must appear once, not {names.count(name)} times")
     for name in COLUMNS:
         if name not in names:
-            raise SpecificationError(f"{where}: column {name} must be there, not missing among {', '.join(names)}")
+            raise SpecificationError(f"{where}: column {name} must be present, not missing from {', '.join(names)}")
 
 
 @dataclass
 class _Rows:
-    """Sorts rows into good ones and others."""
+    """Sorts rows into valid and rejected ones."""
 
     names: Sequence[Any]
     date: str
@@ -222,7 +217,7 @@ class _Rows:
     first_lines: dict[tuple[float, ...], int] = field(default_factory=dict)
 
     def take(self, line: int, cells: Sequence[Any]) -> None:
-        """Read one row."""
+        """Add one row to `readings` or to `refusals`."""
         try:
             reading = self._reading(line, cells)
         except SpecificationError as error:
@@ -232,9 +227,7 @@ class _Rows:
         if first == line:
             self.readings.append(reading)
         else:
-            self.refusals.append(
-                Refusal(line, f"row must be a measurement of its own, not a duplicate of line {first}")
-            )
+            self.refusals.append(Refusal(line, f"row must be a new measurement, not a duplicate of line {first}"))
 
     def _reading(self, line: int, cells: Sequence[Any]) -> Reading:
         filled = _trimmed(cells, len(self.names))
@@ -255,7 +248,7 @@ def _number(name: str, cell: Any) -> float:
         raise SpecificationError(f"{name} must be a finite number, not empty")
     if isinstance(cell, bool | str) or not isinstance(cell, int | float) or not abs(cell) <= sys.float_info.max:
         raise SpecificationError(f"{name} must be a finite number, not {_shown(cell)}")
-    return float(cell) + 0.0  # so that -0 and 0 are the same measurement
+    return float(cell) + 0.0  # turns -0 into 0, so that both are the same measurement
 
 
 def _shown(cell: Any) -> str:
@@ -269,7 +262,7 @@ def _date(cell: Any) -> str:
 
 
 def _out_of_range(numbers: Sequence[float], ranges: Iterable[Range]) -> Iterator[str]:
-    """Sentences about the numbers out of their range, with a guess at the cause."""
+    """Yield a sentence for each number out of its range, with a guess at the cause."""
     ranges = tuple(ranges)
     for k, (name, number, (low, high)) in enumerate(zip(COLUMNS, numbers, ranges, strict=True)):
         if low <= number <= high:

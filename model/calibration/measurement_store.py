@@ -1,7 +1,7 @@
-"""The store of measurements and of the calibrations fitted to them: one SQLite file that only ever grows.
+"""The measurement store: measurements and the calibrations fitted to them, in one append-only SQLite file.
 
-Everything that belongs together is written in one transaction, and on disk before it counts: whoever is interrupted
-leaves the store as it was, and writers wait for each other. `docs/calibration.md` describes the tables.
+Each addition is one durable transaction: an interruption leaves the store unchanged, and concurrent writers wait for
+each other. `docs/calibration.md` describes the tables.
 """
 
 from __future__ import annotations
@@ -16,18 +16,19 @@ from pathlib import Path
 
 import numpy as np
 
+from sosmith.model.calibration.acceptance import Range
 from sosmith.model.calibration.fit import Measurements
-from sosmith.model.calibration.measurement_files import MeasurementFile, Range, Reading
+from sosmith.model.calibration.measurement_files import MeasurementFile, Reading
 from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.errors import SpecificationError, ToolError
 
 APPLICATION_ID = 0x534F534D
-"""Marks a SQLite file as a store, in its header."""
+"""SQLite application ID that marks a file as a measurement store."""
 
 SCHEMA_VERSION = 1
 
 PATIENCE = 60.0
-"""Seconds that a writer waits for another one."""
+"""Time in s that a writer waits for another one."""
 
 SCHEMA = (
     """CREATE TABLE sensor (
@@ -86,7 +87,7 @@ _COMPLAINTS = {
 
 @dataclass(frozen=True)
 class StoredMeasurement:
-    """Where a measurement in the store comes from: its number, file, and what that file said."""
+    """A measurement in the store: its number, the name of its file, and its row there."""
 
     number: int
     source: str
@@ -95,28 +96,29 @@ class StoredMeasurement:
 
 @dataclass(frozen=True)
 class Version:
-    """A calibration as it was fitted.
+    """One version of a sensor's calibration.
 
     Attributes
     ----------
     number : int
-        Counts from 1 for each sensor.
+        Number of the version, from 1 for each sensor.
     date : str
-        Day of the fit as in 2024-03-01.
+        Date of the fit, such as 2024-03-01.
     measurements, last_measurement : int
-        Count of measurements it was fitted to: those of the sensor up to this number.
+        Number of measurements it was fitted to, and the number of the last one: all of the sensor up to that one.
     data_sha256 : str
-        Hash over the hashes of these measurements.
+        SHA-256 over the hashes of these measurements.
     required_r : float
-        Adjusted r that was asked for.
+        Adjusted r that was required.
     robust : bool
         Whether outliers were weighted down.
     polynomial : Polynomial
-        Clearance in mm from volts and degC; coefficients are doubles.
+        Clearance in mm from voltage in V and temperature in degC; coefficients are doubles.
     adjusted_r_squared, rms, cross_validated : float
-        As in `Fit` and `FitQuality`; `rms` and `cross_validated` in mm, the latter None where it is not defined.
+        As in `Fit` and `FitQuality`; `rms` and `cross_validated` in mm. The latter is None if it is undefined.
     drift : float or None
-        Largest difference in mm to the version before, over the region that the measurements cover.
+        Largest difference in mm from the previous version, over the region that the measurements cover; None for
+        the first version.
     """
 
     number: int
@@ -134,7 +136,7 @@ class Version:
 
 
 class MeasurementStore:
-    """An open store; see `open_store`."""
+    """An open measurement store; see `open_store`."""
 
     def __init__(self, path: Path, connection: sqlite3.Connection) -> None:
         self.path = path
@@ -142,22 +144,22 @@ class MeasurementStore:
 
     @contextmanager
     def transaction(self) -> Iterator[None]:
-        """Write all or nothing; others wait meanwhile."""
+        """Run the block as one transaction; other writers wait."""
         self._sql.execute("BEGIN IMMEDIATE")
         try:
             yield
         except BaseException:
-            if self._sql.in_transaction:  # SQLite ends it by itself when the disk is full
+            if self._sql.in_transaction:  # on a full disk SQLite has rolled it back already
                 self._sql.execute("ROLLBACK")
             raise
         self._sql.execute("COMMIT")
 
     def sensors(self) -> list[str]:
-        """Names of all sensors."""
+        """Return the names of all sensors, sorted."""
         return [name for (name,) in self._sql.execute("SELECT name FROM sensor ORDER BY name")]
 
     def ranges(self, sensor: str) -> tuple[Range, Range, Range] | None:
-        """Ranges of clearance in mm, voltage in V and temperature in degC; None for a sensor that is not there."""
+        """Return the ranges of clearance in mm, voltage in V and temperature in degC; None for an unknown sensor."""
         row = self._sql.execute(
             "SELECT clearance_low_mm, clearance_high_mm, voltage_low_V, voltage_high_V, temperature_low_C, "
             "temperature_high_C FROM sensor WHERE name = ?",
@@ -166,7 +168,7 @@ class MeasurementStore:
         return None if row is None else ((row[0], row[1]), (row[2], row[3]), (row[4], row[5]))
 
     def set_ranges(self, sensor: str, ranges: tuple[Range, Range, Range]) -> None:
-        """Enter a sensor, or give it other ranges."""
+        """Insert a sensor, or change its ranges."""
         self._sql.execute(
             "INSERT INTO sensor VALUES (NULL, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (name) DO UPDATE SET "
             "(clearance_low_mm, clearance_high_mm, voltage_low_V, voltage_high_V, temperature_low_C, "
@@ -176,7 +178,7 @@ class MeasurementStore:
         )
 
     def source_of(self, sensor: str, sha256: str) -> str | None:
-        """Name under which a file with this hash was added, or None."""
+        """Return the name under which a file with this hash was added, or None."""
         row = self._sql.execute(
             "SELECT name FROM source WHERE sensor = (SELECT id FROM sensor WHERE name = ?) AND sha256 = ?",
             (sensor, sha256),
@@ -184,7 +186,7 @@ class MeasurementStore:
         return None if row is None else str(row[0])
 
     def insert(self, sensor: str, file: MeasurementFile) -> None:
-        """Enter the good rows of a file, none of which may be there already."""
+        """Insert the valid rows of a file, none of which may be in the store already."""
         (sensor_id,) = self._sql.execute("SELECT id FROM sensor WHERE name = ?", (sensor,)).fetchone()
         source = self._sql.execute(
             "INSERT INTO source VALUES (NULL, ?, ?, ?)", (sensor_id, str(file.path), file.sha256)
@@ -198,12 +200,12 @@ class MeasurementStore:
         )
 
     def measurements(self, sensor: str, last: int | None = None) -> list[StoredMeasurement]:
-        """Measurements of a sensor in the order they came, up to the number `last`.
+        """Return the measurements of a sensor in the order in which they were added, up to number `last`.
 
         Raises
         ------
         SpecificationError
-            If one is not what it was when it was added.
+            If a measurement differs from its stored hash.
         """
         found = []
         for number, source, line, date, *values, sha256 in self._sql.execute(
@@ -216,13 +218,13 @@ class MeasurementStore:
             reading = Reading(line, date, (values[0], values[1], values[2]))
             if reading.sha256(sensor) != sha256:
                 raise SpecificationError(
-                    f"{self.path}: measurement {number} must be as it was added, not changed (its hash differs)"
+                    f"{self.path}: measurement {number} must match its stored hash, not differ from it"
                 )
             found.append(StoredMeasurement(number, source, reading))
         return found
 
     def versions(self, sensor: str) -> list[Version]:
-        """Versions of a sensor's calibration, the first one first."""
+        """Return the versions of a sensor's calibration, oldest first."""
         rows = self._sql.execute(
             "SELECT number, date, measurements, last_measurement, data_sha256, required_r, robust, coefficients, "
             "adjusted_r_squared, rms_mm, cross_validated_mm, drift_mm FROM version "
@@ -237,7 +239,7 @@ class MeasurementStore:
         ]
 
     def insert_version(self, sensor: str, version: Version) -> None:
-        """Enter a version; its number must be the next one."""
+        """Insert a version; its number must be the next one."""
         coefficients = [[float(a).hex() for a in row] for row in version.polynomial.coefficients]
         self._sql.execute(
             "INSERT INTO version SELECT id, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ? FROM sensor WHERE name = ?",
@@ -259,12 +261,12 @@ class MeasurementStore:
         )
 
     def check(self) -> None:
-        """Have SQLite check the whole file.
+        """Run SQLite's integrity check on the whole file.
 
         Raises
         ------
         SpecificationError
-            If it finds anything wrong.
+            If it reports an error.
         """
         complaints = [text for (text,) in self._sql.execute("PRAGMA integrity_check")]
         if complaints != ["ok"]:
@@ -273,20 +275,20 @@ class MeasurementStore:
 
 @contextmanager
 def open_store(path: Path, *, create: bool = False) -> Iterator[MeasurementStore]:
-    """Open a store, or with `create` make it where it is not there yet.
+    """Open a store; with `create`, make it if it does not exist.
 
     Raises
     ------
     SpecificationError
-        If there is none, or the file is something else, damaged, or of a later version of sosmith.
+        If there is no store, or the file is not one, is damaged, or has another schema version.
     ToolError
-        If the file cannot be read or written, now or while it is open, or another program keeps it locked.
+        If the file cannot be read or written, or another program keeps it locked; also while it is open.
     """
     if not create and not path.is_file():
-        raise SpecificationError(f"{path} must be a store of measurements; sosmith calibrate add makes one")
+        raise SpecificationError(f"{path} must be an existing store of measurements; sosmith calibrate add creates one")
     try:
         with closing(sqlite3.connect(path, timeout=PATIENCE, isolation_level=None)) as connection:
-            # EXTRA: once a transaction has ended, not even a power failure undoes it.
+            # EXTRA: a committed transaction survives a power failure.
             connection.execute("PRAGMA synchronous = EXTRA")
             connection.execute("PRAGMA foreign_keys = ON")
             store = MeasurementStore(path, connection)
@@ -301,9 +303,9 @@ def open_store(path: Path, *, create: bool = False) -> Iterator[MeasurementStore
 
 
 def _prepare(store: MeasurementStore, connection: sqlite3.Connection) -> None:
-    """Make the tables of an empty file; refuse one that is no store."""
+    """Create the tables in an empty file; reject a file that is not a store."""
     if _pragmas(connection) == (0, 0):
-        with store.transaction():  # another process may just have done it
+        with store.transaction():  # unless another process was faster
             (tables,) = connection.execute("SELECT count(*) FROM sqlite_schema").fetchone()
             if tables == 0:
                 for statement in SCHEMA:
@@ -328,12 +330,12 @@ def _polynomial(coefficients: str) -> Polynomial:
 
 
 def as_measurements(stored: Sequence[StoredMeasurement], source: str) -> Measurements:
-    """Arrays for `fit`; `source` names them in messages."""
+    """Return stored measurements as arrays for `fit`; `source` names them in messages."""
     values = np.array([one.reading.values for one in stored], dtype=np.float64).reshape(-1, 3)
     clearance, voltage, temperature = values.T
     return Measurements(clearance.copy(), voltage.copy(), temperature.copy(), source)
 
 
 def data_sha256(stored: Sequence[StoredMeasurement], sensor: str) -> str:
-    """Hash over the hashes of measurements, in their order."""
+    """Return the SHA-256 over the hashes of measurements, in their order."""
     return hashlib.sha256("\n".join(one.reading.sha256(sensor) for one in stored).encode()).hexdigest()

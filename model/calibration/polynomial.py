@@ -1,4 +1,4 @@
-"""The calibration polynomial in two variables, ``d = sum a[i][j] V**i T**j``."""
+"""The calibration polynomial of two variables, ``d = sum a[i][j] V**i T**j``."""
 
 from __future__ import annotations
 
@@ -9,26 +9,25 @@ from fractions import Fraction
 import numpy as np
 import numpy.typing as npt
 
-from sosmith.model.port import Values
+from sosmith.model.arrays import Values
 
 
 @dataclass(frozen=True)
 class Polynomial:
-    """Clearance as a polynomial of sensor voltage and temperature, equation 1 of the paper.
+    """Clearance as a polynomial in voltage and temperature (equation 1 of the paper).
 
     Attributes
     ----------
     coefficients : tuple of tuple of Fraction
-        ``coefficients[i][j]`` belongs to ``V**i * T**j``, in mm / (V**i degC**j) for the paper's
-        sensors. Rows may be of different length; a coefficient that is not there is zero. A
-        polynomial of one variable has one coefficient in every row.
+        ``coefficients[i][j]`` belongs to ``V**i * T**j``, in mm / (V**i degC**j) for the paper's sensors. Rows may
+        differ in length; missing coefficients are zero. A polynomial in V alone has one coefficient per row.
 
     Raises
     ------
     ValueError
-        If there is no row, or a row without a coefficient.
+        If there is no row, or a row has no coefficient.
     TypeError
-        If a coefficient is no Fraction.
+        If a coefficient is not a Fraction.
     """
 
     coefficients: tuple[tuple[Fraction, ...], ...]
@@ -45,29 +44,29 @@ class Polynomial:
 
     @classmethod
     def from_numbers(cls, rows: Sequence[Iterable[float | str | Fraction]]) -> Polynomial:
-        """Make a polynomial of `rows` of numbers.
+        """Return the polynomial with these `rows` of coefficients.
 
-        A float stands for its exact binary value, a string for its exact decimal one.
+        A float means its exact binary value, a string its exact decimal value.
         """
         return cls(tuple(tuple(Fraction(value) for value in row) for row in rows))
 
     @property
     def orders(self) -> tuple[int, int]:
-        """Highest powers (m, n) of the first and of the second variable."""
+        """Highest powers (m, n) of the first and the second variable."""
         return len(self.coefficients) - 1, max(map(len, self.coefficients)) - 1
 
     def __call__(self, V: npt.ArrayLike, T: npt.ArrayLike = 0.0) -> Values:
-        """Evaluate in double precision, by Horner's rule in `T` for every row, then in `V`.
+        """Evaluate in double precision by Horner's rule, in `T` for each row, then in `V`.
 
         Parameters
         ----------
         V, T : array_like
-            Values of the variables, of shapes that broadcast.
+            Values of the variables; their shapes must broadcast.
 
         Returns
         -------
         ndarray
-            Values of the polynomial, of the common shape.
+            Values of the polynomial, of the broadcast shape.
         """
         v, t = np.broadcast_arrays(np.asarray(V, dtype=np.float64), np.asarray(T, dtype=np.float64))
         result = np.zeros(v.shape)
@@ -79,7 +78,7 @@ class Polynomial:
         return result
 
     def exact(self, V: Fraction, T: Fraction = Fraction(0)) -> Fraction:
-        """Evaluate without any rounding at one point."""
+        """Evaluate exactly at one point."""
         return sum(
             (value * V**i * T**j for i, row in enumerate(self.coefficients) for j, value in enumerate(row)),
             Fraction(0),

@@ -1,4 +1,4 @@
-"""The self-updating calibration: files go in, and every addition makes a new version of the polynomial."""
+"""The self-updating calibration: each file added to the store gives a new version of the polynomial."""
 
 from __future__ import annotations
 
@@ -8,13 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
+from sosmith.model.calibration.acceptance import DEFAULT_RANGES, REQUIRED_R, Range
 from sosmith.model.calibration.covered_region import CoveredRegion
-from sosmith.model.calibration.fit import REQUIRED_R, Fit, Measurements, Progress, fit, root_mean_square, untold
+from sosmith.model.calibration.fit import Fit, Measurements, Progress, fit, root_mean_square, untold
 from sosmith.model.calibration.fit_quality import FitQuality, assess
 from sosmith.model.calibration.measurement_files import (
-    DEFAULT_RANGES,
     MeasurementFile,
-    Range,
     Refusal,
     read_measurement_file,
 )
@@ -28,35 +27,38 @@ from sosmith.model.calibration.measurement_store import (
 from sosmith.model.errors import ShortfallError, SpecificationError
 
 SWAPPED_FITS, SWAPPED_OFF = 2.0, 4.0
-"""A file is taken for swapped if its rms residual, over the version's, is less than the first with clearance and
-voltage exchanged and more than the second as it is. A sensor that has changed fits neither way."""
+"""Thresholds on the rms residual, relative to that of the newest version, for swapped columns.
+
+A file counts as swapped if the ratio is below the first with clearance and voltage exchanged, and above the second
+without. A sensor that has changed fits neither way.
+"""
 
 SWAPPED_ROWS = 4
-"""Rows that it takes to tell."""
+"""Rows needed to detect swapped columns."""
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """A version with everything that its report needs.
+    """A version of the calibration, with what its report needs.
 
     Attributes
     ----------
     sensor : str
         Name of the sensor.
     version : Version
-        The version.
+        The version itself.
     new : bool
-        Whether it was just made; False if nothing had changed since.
+        Whether this call created it; False if nothing had changed since the last version.
     stored : list of StoredMeasurement
-        What it was fitted to.
+        The measurements it was fitted to.
     fit : Fit
         The fit.
     quality : FitQuality
-        Its figures.
+        Quality of the fit.
     ranges : tuple of Range
-        Ranges of the sensor: clearance in mm, voltage in V, temperature in degC.
+        Valid ranges of the sensor: clearance in mm, voltage in V, temperature in degC.
     drift : dict
-        Largest difference in mm to each earlier version, by its number, over the region covered now.
+        Largest difference in mm from each earlier version, by its number, over the region covered now.
     """
 
     sensor: str
@@ -70,25 +72,25 @@ class Calibration:
 
     @property
     def coverage(self) -> float:
-        """Share of the sensor's range of voltage and temperature that lies between measurements."""
+        """Share of the sensor's range of voltage and temperature that the measurements enclose."""
         _, (v_low, v_high), (t_low, t_high) = self.ranges
         return self.quality.region.area / ((v_high - v_low) * (t_high - t_low))
 
 
 @dataclass(frozen=True)
 class Addition:
-    """What became of a file.
+    """Result of adding a file.
 
     Attributes
     ----------
     file : MeasurementFile
-        Its rows, those that are already in the store among the refusals.
+        Its rows; those already in the store count as rejected.
     kept : bool
-        Whether the good rows went into the store.
+        Whether the valid rows were stored.
     calibration : Calibration or None
-        The version that came of it; None if nothing was kept or no polynomial is good enough.
+        The resulting version; None if nothing was stored or no polynomial is good enough.
     shortfall : str
-        Why there is no version although rows were kept; empty otherwise.
+        Reason why there is no version although rows were stored; empty otherwise.
     """
 
     file: MeasurementFile
@@ -109,29 +111,29 @@ def add(
     robust: bool = False,
     progress: Progress = untold,
 ) -> Addition:
-    """Read a file into the store and fit anew, in one transaction.
+    """Add a file to the store and fit again, in one transaction.
 
     Parameters
     ----------
     store : MeasurementStore
-        Where to.
+        The store.
     sensor : str
-        Name of the sensor; entered if it is new.
+        Name of the sensor; created if it is new.
     path : Path
         CSV or XLSX file.
     date : str
-        Day of measurements without a date of their own, and of the version.
+        Date of measurements that have none in the file, and of the version.
     ranges : tuple of Range or None
-        Ranges of clearance in mm, voltage in V and temperature in degC, from now on; None leaves one as it was.
+        New valid ranges of clearance in mm, voltage in V and temperature in degC; None keeps the present one.
     keep_good : bool
-        Whether to keep the good rows of a file that has others.
+        Whether to store the valid rows of a file that also has rejected ones.
     required_r, robust, progress
         As in `fit`.
 
     Raises
     ------
     SpecificationError
-        As `read_measurement_file`; if the file was added before. Nothing is written then.
+        As for `read_measurement_file`; if the file was added before. Nothing is written then.
     """
     _check_sensor(sensor)
     with store.transaction():
@@ -141,7 +143,7 @@ def add(
         file = read_measurement_file(path, date, now)
         earlier = store.source_of(sensor, file.sha256)
         if earlier is not None:
-            raise SpecificationError(f"{path} must be a file of new measurements, not what was added as {earlier}")
+            raise SpecificationError(f"{path} must hold new measurements, not those already added as {earlier}")
         file = _sift(store, sensor, file)
         if not _keeps(file, keep_good=keep_good):
             return Addition(file, False, None, "")
@@ -162,14 +164,14 @@ def refused_first_file(
     ranges: tuple[Range | None, Range | None, Range | None] = (None, None, None),
     keep_good: bool = False,
 ) -> Addition | None:
-    """Read what would be the first file of a store; return what became of it if nothing of it is kept, else None.
+    """Check the first file of a new store: return the result if nothing of it would be stored, else None.
 
-    To be asked before `open_store` makes a store that is not there yet: a file that is refused then leaves none.
+    Call it before `open_store` creates the store, so that a rejected file leaves no empty store behind.
 
     Raises
     ------
     SpecificationError
-        As `read_measurement_file`.
+        As for `read_measurement_file`.
     """
     _check_sensor(sensor)
     file = read_measurement_file(path, date, _ranges_from_now_on(ranges, DEFAULT_RANGES))
@@ -185,7 +187,7 @@ def refit(
     robust: bool = False,
     progress: Progress = untold,
 ) -> Calibration:
-    """Fit to all measurements of a sensor; a new version is made only if anything has changed.
+    """Fit to all measurements of a sensor. A new version is created only if something has changed.
 
     Raises
     ------
@@ -203,12 +205,12 @@ def refit(
 
 
 def find_version(store: MeasurementStore, sensor: str, number: int | None = None) -> Version:
-    """Look a version up, the newest if no number is given.
+    """Return a version; the newest if `number` is None.
 
     Raises
     ------
     SpecificationError
-        If there is no such sensor or version.
+        If the sensor or version does not exist.
     """
     _known(store, sensor)
     versions = store.versions(sensor)
@@ -222,14 +224,14 @@ def find_version(store: MeasurementStore, sensor: str, number: int | None = None
 
 
 def calibration_of(store: MeasurementStore, sensor: str, number: int | None = None) -> Calibration:
-    """Fit a version again from the store, the newest if no number is given.
+    """Reproduce a version from the store; the newest if `number` is None.
 
     Raises
     ------
     SpecificationError
-        As `find_version`.
+        As for `find_version`.
     ShortfallError
-        If it does not come out the same, to the last bit.
+        If the result differs from the stored version in any bit.
     """
     version = find_version(store, sensor, number)
     stored = store.measurements(sensor, version.last_measurement)
@@ -237,11 +239,11 @@ def calibration_of(store: MeasurementStore, sensor: str, number: int | None = No
         again = _calibration(store, sensor, stored, version.date, version.required_r, version.robust, version.number)
     except SpecificationError as error:
         raise ShortfallError(
-            f"version {version.number} of sensor {sensor} must come out the same, not: {error}"
+            f"version {version.number} of sensor {sensor} must be reproducible, not fail: {error}"
         ) from None
     if again.version != version:
         raise ShortfallError(
-            f"version {version.number} of sensor {sensor} must come out the same, not another polynomial"
+            f"version {version.number} of sensor {sensor} must be reproducible, not give another polynomial"
         )
     return again
 
@@ -249,7 +251,7 @@ def calibration_of(store: MeasurementStore, sensor: str, number: int | None = No
 def _known(store: MeasurementStore, sensor: str) -> None:
     sensors = store.sensors()
     if not sensors:
-        raise SpecificationError(f"{store.path} must hold measurements; sosmith calibrate add takes them in")
+        raise SpecificationError(f"{store.path} must hold measurements; sosmith calibrate add adds them")
     if sensor not in sensors:
         raise SpecificationError(f"{store.path}: the sensor must be one of {', '.join(sensors)}, not {sensor}")
 
@@ -267,12 +269,12 @@ def _ranges_from_now_on(
 
 
 def _keeps(file: MeasurementFile, *, keep_good: bool) -> bool:
-    """Whether the good rows of a file are to go into the store."""
+    """Whether the valid rows of a file will be stored."""
     return bool(file.readings) and (keep_good or not file.refusals)
 
 
 def _sift(store: MeasurementStore, sensor: str, file: MeasurementFile) -> MeasurementFile:
-    """Move what is in the store already to the refusals, and everything if two columns are exchanged."""
+    """Reject rows that are already in the store, and every row if two columns are swapped."""
     known = {one.reading.values: one for one in store.measurements(sensor)}
     versions = store.versions(sensor)
     swapped = _swapped(file, versions[-1]) if versions else ""
@@ -282,7 +284,7 @@ def _sift(store: MeasurementStore, sensor: str, file: MeasurementFile) -> Measur
         if reading.values in known:
             one = known[reading.values]
             where = f"measurement {one.number} ({one.source}, line {one.reading.line}, {one.reading.date})"
-            refusals.append(Refusal(reading.line, f"row must be a measurement of its own, not a duplicate of {where}"))
+            refusals.append(Refusal(reading.line, f"row must be a new measurement, not a duplicate of {where}"))
         elif swapped:
             refusals.append(Refusal(reading.line, swapped))
         else:
@@ -292,7 +294,7 @@ def _sift(store: MeasurementStore, sensor: str, file: MeasurementFile) -> Measur
 
 
 def _swapped(file: MeasurementFile, version: Version) -> str:
-    """Sentence about a file that fits the version well only with clearance and voltage exchanged, or nothing."""
+    """Return a sentence if the file fits `version` only with clearance and voltage exchanged, else an empty string."""
     if len(file.readings) < SWAPPED_ROWS:
         return ""
     clearance, voltage, temperature = np.array([reading.values for reading in file.readings]).T
@@ -301,8 +303,8 @@ def _swapped(file: MeasurementFile, version: Version) -> str:
     if exchanged >= SWAPPED_FITS * version.rms or as_it_is <= SWAPPED_OFF * version.rms:
         return ""
     return (
-        "clearance_mm and voltage_V must be in their own columns, not swapped: the file is "
-        f"{as_it_is:.3g} mm rms off version {version.number}, and swapped {exchanged:.3g} mm"
+        "clearance_mm and voltage_V must be in their own columns, not swapped: the rms residual against "
+        f"version {version.number} is {as_it_is:.3g} mm, with the columns swapped {exchanged:.3g} mm"
     )
 
 
@@ -330,7 +332,7 @@ def _calibration(
     number: int,
     progress: Progress = untold,
 ) -> Calibration:
-    """Fit and compare with the versions before `number`."""
+    """Fit, and compare with the versions before `number`."""
     measurements: Measurements = as_measurements(stored, f"{store.path}, sensor {sensor}")
     fitted = fit(measurements, required_r, robust=robust, progress=progress)
     quality = assess(measurements, fitted)

@@ -26,7 +26,7 @@ class Block(Protocol):
     def __call__(
         self, codes: npt.NDArray[np.int64], *, with_status: bool = False
     ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.uint8]]:
-        """Compute output codes and, if asked for, status: both (samples, channels), else the status is empty."""
+        """Compute output codes and status, both of shape (samples, channels); without `with_status`, that is empty."""
         ...
 
 
@@ -35,7 +35,7 @@ _FLAGS = ("-O2", "-std=gnu99", "-shared", "-fPIC")
 
 @functools.lru_cache(maxsize=64)
 def compile_block(datapath: Datapath) -> Block:
-    """Compile `datapath`; the function returned takes codes of the shape (samples, channels, inputs).
+    """Compile the C model of `datapath`; the returned function takes codes of shape (samples, channels, inputs).
 
     Raises
     ------
@@ -61,7 +61,7 @@ def compile_block(datapath: Datapath) -> Block:
         samples, channels, _ = codes.shape
         source = np.ascontiguousarray(codes, dtype=np.int64)
         result = np.empty((samples, channels), dtype=np.int64)
-        # 16 bytes of alignment for states of 128 bits; numpy allocates large arrays so.
+        # States of 128 bits need an alignment of 16 bytes, which numpy's allocator has for large arrays.
         states = np.zeros((channels, state_size // 8), dtype=np.int64)
         status = np.empty((samples, channels) if with_status else (0, 0), dtype=np.uint8)
         function(
@@ -95,5 +95,5 @@ def _load(name: str, header: str, source: str) -> ctypes.CDLL:
         )
         if result.returncode:
             raise ToolError(f"{compiler} failed on the bit-true model: {result.stderr.strip()[-500:]}")
-        # The loader keeps the library mapped after its file is gone.
+        # The library stays mapped after its file has been deleted.
         return ctypes.CDLL(str(library))

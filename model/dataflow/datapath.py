@@ -1,8 +1,7 @@
 """The frozen datapath: a chain of stages between ports, and its bit-true computation.
 
-This object is the one source of truth. The software (`Datapath.compute`), the C model, the hardware
-(`sosmith.hdl.core`) and the manifest are made from the dataflow graphs of its stages and from
-nothing else.
+This object is the one source of truth: the software (`Datapath.compute`), the C model, the hardware
+(`sosmith.hdl.core`) and the manifest are made from the dataflow graphs of its stages alone.
 """
 
 from __future__ import annotations
@@ -13,13 +12,14 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
+from sosmith.model.arrays import Codes
 from sosmith.model.dataflow.compiled import compile_block
 from sosmith.model.dataflow.graph import Graph
-from sosmith.model.port import Codes, Port
+from sosmith.model.port import Port
 
 
 class Stage(Protocol):
-    """A part of a datapath with a name and a dataflow graph."""
+    """A part of a datapath: a name and a dataflow graph."""
 
     @property
     def name(self) -> str:
@@ -51,8 +51,8 @@ class Datapath:
     calibrated : tuple of (int, int)
         Lowest and highest code of each input that the calibration's measurements covered; by default, all codes.
     wear : tuple of (int, int)
-        Lowest output codes whose wear is a warning and is critical: one pair for all channels, or one for each; none if
-        wear is not judged.
+        Lowest output codes at which the wear is a warning, and at which it is critical: one pair for all channels, or
+        one for each; empty if wear is not judged.
     """
 
     name: str
@@ -87,7 +87,7 @@ class Datapath:
     def compute(self, codes: Codes) -> Codes:
         """Compute the output codes for input codes, from reset, bit for bit as the hardware does.
 
-        Compiled from the stages' graphs; the first call of a datapath compiles for some tenths of a second.
+        The C model is compiled at the first call, which takes some tenths of a second.
 
         Parameters
         ----------
@@ -104,7 +104,7 @@ class Datapath:
         ValueError
             If the shape is wrong or a code is outside its port's range.
         ToolError
-            If no C compiler is at hand.
+            If no C compiler is found.
         """
         checked = self._checked(codes)
         block = checked[:, np.newaxis, :] if checked.ndim == 2 else checked
@@ -114,8 +114,8 @@ class Datapath:
     def compute_status(self, codes: Codes) -> npt.NDArray[np.uint8]:
         """Compute the status of each sample, from reset, bit for bit as the hardware does.
 
-        Parameters, errors and shape of the result are those of `compute`, and the channels have to be as many as those
-        whose wear is judged; the bits are those of `sosmith.model.dataflow.status.Flag`.
+        Parameters, errors and the shape of the result are those of `compute`. If each channel has its own limits of
+        wear, there must be as many channels. The bits are those of `sosmith.model.dataflow.status.Flag`.
         """
         checked = self._checked(codes)
         block = checked[:, np.newaxis, :] if checked.ndim == 2 else checked
@@ -127,7 +127,7 @@ class Datapath:
         return status[:, 0] if checked.ndim == 2 else status
 
     def compute_exact(self, codes: Codes) -> list[int]:
-        """Compute one channel in exact integers, checking every node's range; slow.
+        """Compute one channel in exact integers, from reset, and check every node's range; slow.
 
         Raises
         ------

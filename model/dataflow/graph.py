@@ -1,13 +1,13 @@
-"""Integer dataflow graphs: the one description of a datapath that everything else is made from.
+"""Integer dataflow graphs: the one description of a datapath, from which everything else is made.
 
 A graph is a list of nodes in the order of computation. A node carries an integer `code` with
 `frac` fraction bits, so its value is ``code * 2**-frac``, and the integer range ``low..high`` that
 the code never leaves. The exact interpreter here, the C model (`sosmith.model.dataflow.c_model`) and the
-hardware (`sosmith.hdl.ranked_logic`) all walk the same nodes.
+hardware (`sosmith.hdl.pipelined_logic`) all walk the same nodes.
 
-The usual quantizer is FLOOR, which drops lower bits and costs nothing; the bits it drops are FRACTION.
-Rounding to nearest, ties upward, is the addition of a half before it. TRUNCATE drops bits of the magnitude,
-which never makes a value larger: a recursion that cannot gain energy then comes to rest.
+The usual quantizer is FLOOR, which drops lower bits and costs nothing; FRACTION is the bits that it drops.
+Rounding to nearest, ties upward, adds a half before it. TRUNCATE drops bits of the magnitude, which never makes
+a value larger: a recursion that cannot gain energy then comes to rest.
 """
 
 from __future__ import annotations
@@ -16,10 +16,11 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from fractions import Fraction
+from typing import Any, NamedTuple
 
 
 class Op(Enum):
-    """What a node does with its operands."""
+    """Operation of a node."""
 
     INPUT = "input"
     CONSTANT = "constant"
@@ -29,11 +30,25 @@ class Op(Enum):
     SCALE = "scale"  # multiplies by the constant parameter * 2**-parameter_frac
     MULTIPLY = "multiply"
     FLOOR = "floor"  # to `frac` fraction bits, by dropping the others
-    FRACTION = "fraction"  # what FLOOR to parameter fraction bits drops: a - floor(a), never negative
+    FRACTION = "fraction"  # what FLOOR to `parameter` fraction bits drops: a - floor(a), never negative
     TRUNCATE = "truncate"  # to `frac` fraction bits, towards zero
     CLAMP = "clamp"  # limits to low..high
     BOUND = "bound"  # states that the value stays in low..high; no logic
-    DELAY = "delay"  # the operand of the sample before; 0 at reset
+    DELAY = "delay"  # the operand at the sample before; 0 at reset
+
+
+class Range(NamedTuple):
+    """Integer codes that a signal takes: ``code * 2**-frac`` for codes from `low` to `high`."""
+
+    frac: int
+    low: int
+    high: int
+
+    @property
+    def limits(self) -> tuple[Fraction, Fraction]:
+        """Lowest and highest value, exact."""
+        unit = Fraction(2) ** -self.frac
+        return self.low * unit, self.high * unit
 
 
 @dataclass(frozen=True)
@@ -43,17 +58,17 @@ class Node:
     Attributes
     ----------
     op : Op
-        What it does.
+        The operation.
     operands : tuple of int
-        Indices of its operands in the graph; the operand of a DELAY may come later.
+        Indices of the operands in the graph; that of a DELAY may come later.
     frac : int
         Fraction bits of the result; negative for multiples of a power of two.
     low, high : int
         Range of the result's code.
     parameter, parameter_frac : int
-        Constant of CONSTANT, SCALE and SHIFT; fraction bits that FLOOR would keep, for FRACTION.
+        Constant of CONSTANT, SCALE and SHIFT; for FRACTION, the fraction bits that FLOOR would keep.
     name : str
-        Name for people and for the hardware, ``""`` for a passing result.
+        Name in documents and in the hardware, ``""`` for an intermediate result.
     """
 
     op: Op
@@ -64,6 +79,11 @@ class Node:
     parameter: int = 0
     parameter_frac: int = 0
     name: str = ""
+
+    @property
+    def range(self) -> Range:
+        """Fraction bits and range of the result's code."""
+        return Range(self.frac, self.low, self.high)
 
     @property
     def signed(self) -> bool:
@@ -86,12 +106,12 @@ class Node:
 
 
 class RangeError(ArithmeticError):
-    """A value left the range its node states: an overflow in hardware."""
+    """A value left the range that its node states: an overflow in hardware."""
 
 
 @dataclass(frozen=True)
 class Graph:
-    """A frozen dataflow graph with named inputs and outputs and its delays as state.
+    """A frozen dataflow graph; its delays are its state.
 
     Attributes
     ----------
@@ -111,6 +131,16 @@ class Graph:
     def delays(self) -> tuple[int, ...]:
         """Indices of the DELAY nodes: the state, in the order of the nodes."""
         return tuple(i for i, node in enumerate(self.nodes) if node.op is Op.DELAY)
+
+    @property
+    def input_ranges(self) -> tuple[Range, ...]:
+        """Ranges of the inputs, in port order."""
+        return tuple(self.nodes[i].range for i in self.inputs)
+
+    @property
+    def output_ranges(self) -> tuple[Range, ...]:
+        """Ranges of the outputs, in port order."""
+        return tuple(self.nodes[i].range for i in self.outputs)
 
     def reset(self) -> list[int]:
         """State after reset: one zero per delay."""
@@ -134,7 +164,7 @@ class Graph:
         Raises
         ------
         RangeError
-            If any node's code leaves the range it states.
+            If a node's code leaves the range that the node states.
         """
         codes: list[int] = []
         supply = iter(inputs)
@@ -153,7 +183,7 @@ class Graph:
         return [codes[i] for i in self.outputs]
 
     def run(self, samples: Iterable[Sequence[int]], state: list[int] | None = None) -> list[list[int]]:
-        """Compute a run of samples from `state` (reset if None); the slow, exact reference."""
+        """Compute samples in a row from `state`, or from reset if None; the slow, exact reference."""
         memory = self.reset() if state is None else state
         return [self.step(sample, memory) for sample in samples]
 
@@ -200,6 +230,61 @@ _EVALUATE: dict[Op, Callable[[Node, Sequence[int], Sequence[int]], int]] = {
 }
 
 
+def range_of(node: Node, operands: Sequence[Range], constant: tuple[int, int] | None = None) -> Range:
+    """Derive the range of a node's result from those of its operands, by interval arithmetic.
+
+    An INPUT and a CLAMP keep the range that they state; a BOUND keeps what its own and its operand's have in common.
+
+    Parameters
+    ----------
+    node : Node
+        The operation; its fraction bits count for INPUT, CONSTANT, FLOOR and TRUNCATE, its range as said above.
+    operands : sequence of Range
+        Ranges of its operands.
+    constant : tuple of int or None
+        Smallest and largest value that the constant of SCALE or CONSTANT may take; None for the one it has.
+    """
+    known = constant or (node.parameter, node.parameter)
+    if node.op is Op.INPUT:
+        return node.range
+    if node.op is Op.CONSTANT:
+        return Range(node.frac, *known)
+    first = operands[0]
+    if node.op in {Op.ADD, Op.SUBTRACT}:
+        frac, a, b = _common(*operands)
+        return Range(frac, a[0] + b[0], a[1] + b[1]) if node.op is Op.ADD else Range(frac, a[0] - b[1], a[1] - b[0])
+    if node.op in {Op.SCALE, Op.MULTIPLY}:
+        frac, *factor = (node.parameter_frac, *known) if node.op is Op.SCALE else operands[1]
+        products = [x * y for x in (first.low, first.high) for y in factor]
+        return Range(first.frac + frac, min(products), max(products))
+    return _range_of_one(node, first)
+
+
+def _range_of_one(node: Node, of: Range) -> Range:
+    """Range of an operation with one operand and no factor."""
+    if node.op is Op.SHIFT:
+        return Range(of.frac - node.parameter, of.low, of.high)
+    if node.op is Op.FLOOR:
+        return Range(node.frac, of.low >> (of.frac - node.frac), of.high >> (of.frac - node.frac))
+    if node.op is Op.FRACTION:
+        return Range(of.frac, 0, (1 << (of.frac - node.parameter)) - 1)
+    if node.op is Op.TRUNCATE:
+        low, high = (_truncated(end, of.frac - node.frac) for end in (of.low, of.high))
+        return Range(node.frac, low, high)
+    if node.op is Op.CLAMP:
+        return Range(of.frac, node.low, node.high)
+    if node.op is Op.BOUND:
+        return Range(of.frac, max(node.low, of.low), min(node.high, of.high))
+    return Range(of.frac, min(of.low, 0), max(of.high, 0))  # a DELAY begins at zero
+
+
+def _common(first: Range, second: Range) -> tuple[int, tuple[int, int], tuple[int, int]]:
+    """Fraction bits that both ranges can be written with, and their ends with these."""
+    frac = max(first.frac, second.frac)
+    up, down = frac - first.frac, frac - second.frac
+    return frac, (first.low << up, first.high << up), (second.low << down, second.high << down)
+
+
 @dataclass(frozen=True)
 class Wire:
     """Handle to a node while its graph is being built."""
@@ -221,6 +306,13 @@ class GraphBuilder:
         self._nodes.append(node)
         return Wire(len(self._nodes) - 1)
 
+    def _derived(self, op: Op, *operands: Wire, **fields: Any) -> Wire:
+        """Append a node whose fraction bits and range follow from its operands; `fields` are its other attributes."""
+        known = {"frac": 0, "low": 0, "high": 0} | fields
+        node = Node(op, tuple(wire.index for wire in operands), **known)
+        frac, low, high = range_of(node, [self[wire].range for wire in operands])
+        return self._append(replace(node, frac=frac, low=low, high=high))
+
     def input(self, name: str, frac: int, low: int, high: int) -> Wire:
         """Add an input port whose code is in `low`..`high`."""
         wire = self._append(Node(Op.INPUT, (), frac, low, high, name=name))
@@ -236,7 +328,13 @@ class GraphBuilder:
         return self._append(Node(Op.DELAY, (-1,), frac, min(low, 0), max(high, 0), name=name))
 
     def connect(self, delay: Wire, source: Wire) -> None:
-        """Make `source` of this sample the value of `delay` at the next."""
+        """Make `source` at this sample the value of `delay` at the next.
+
+        Raises
+        ------
+        ValueError
+            If `delay` is connected already, or `source` has another format or a wider range.
+        """
         state, node = self[delay], self[source]
         if state.op is not Op.DELAY or state.operands != (-1,):
             raise ValueError(f"wire must be an unconnected delay, not {state.op.value} {state.name!r}")
@@ -253,46 +351,35 @@ class GraphBuilder:
 
     def add(self, a: Wire, b: Wire, name: str = "") -> Wire:
         """Add exactly; the result has the longer fraction of the two."""
-        frac, (al, ah), (bl, bh) = self._align(a, b)
-        return self._append(Node(Op.ADD, (a.index, b.index), frac, al + bl, ah + bh, name=name))
+        return self._derived(Op.ADD, a, b, name=name)
 
     def subtract(self, a: Wire, b: Wire, name: str = "") -> Wire:
         """Subtract `b` from `a` exactly; the result has the longer fraction of the two."""
-        frac, (al, ah), (bl, bh) = self._align(a, b)
-        return self._append(Node(Op.SUBTRACT, (a.index, b.index), frac, al - bh, ah - bl, name=name))
-
-    def _align(self, a: Wire, b: Wire) -> tuple[int, tuple[int, int], tuple[int, int]]:
-        first, second = self[a], self[b]
-        frac = max(first.frac, second.frac)
-        up, down = frac - first.frac, frac - second.frac
-        return frac, (first.low << up, first.high << up), (second.low << down, second.high << down)
+        return self._derived(Op.SUBTRACT, a, b, name=name)
 
     def shift(self, a: Wire, exponent: int) -> Wire:
         """Multiply by ``2**exponent`` exactly, by moving the binary point."""
-        node = self[a]
-        if exponent == 0:
-            return a
-        return self._append(Node(Op.SHIFT, (a.index,), node.frac - exponent, node.low, node.high, parameter=exponent))
+        return a if exponent == 0 else self._derived(Op.SHIFT, a, parameter=exponent)
 
     def scale(self, a: Wire, coefficient: int, frac: int, name: str = "") -> Wire:
         """Multiply by the constant ``coefficient * 2**-frac`` exactly."""
-        node = self[a]
-        ends = sorted((node.low * coefficient, node.high * coefficient))
-        return self._append(Node(Op.SCALE, (a.index,), node.frac + frac, ends[0], ends[1], coefficient, frac, name))
+        return self._derived(Op.SCALE, a, parameter=coefficient, parameter_frac=frac, name=name)
 
     def multiply(self, a: Wire, b: Wire, name: str = "") -> Wire:
         """Multiply two values exactly."""
-        first, second = self[a], self[b]
-        ends = [x * y for x in (first.low, first.high) for y in (second.low, second.high)]
-        return self._append(
-            Node(Op.MULTIPLY, (a.index, b.index), first.frac + second.frac, min(ends), max(ends), name=name)
-        )
+        return self._derived(Op.MULTIPLY, a, b, name=name)
 
     def combine(self, terms: Iterable[tuple[int, Wire]], name: str = "") -> Wire:
-        """Sum small integer multiples of wires exactly; each factor must be 0 or plus or minus a power of two."""
+        """Add multiples of wires exactly; each factor must be 0 or plus or minus a power of two.
+
+        Raises
+        ------
+        ValueError
+            If a factor is another number.
+        """
         total: Wire | None = None
         ordered = [term for term in terms if term[0]]
-        # The first of those that are added comes first: a negation is needed only where everything is subtracted.
+        # A term that is added comes first: a negation is needed only if all terms are subtracted.
         first = next((k for k, (factor, _) in enumerate(ordered) if factor > 0), 0)
         for factor, wire in [*ordered[first : first + 1], *ordered[:first], *ordered[first + 1 :]]:
             size = abs(factor)
@@ -308,52 +395,43 @@ class GraphBuilder:
         return self.named(total, name)
 
     def named(self, wire: Wire, name: str) -> Wire:
-        """Give a passing result a name for people and for the hardware."""
+        """Name an intermediate result, unless it has a name."""
         if name and not self[wire].name:
             self._nodes[wire.index] = replace(self[wire], name=name)
         return wire
 
     def floor(self, a: Wire, frac: int, name: str = "") -> Wire:
         """Drop bits down to `frac` fraction bits; exact if `a` has no more."""
-        node = self[a]
-        shift = node.frac - frac
+        shift = self[a].frac - frac
         if shift < 0:
             return self.add(a, self.constant(0, frac), name)
-        if shift == 0:
-            return self.named(a, name)
-        return self._append(Node(Op.FLOOR, (a.index,), frac, node.low >> shift, node.high >> shift, name=name))
+        return self.named(a, name) if shift == 0 else self._derived(Op.FLOOR, a, frac=frac, name=name)
 
     def fraction(self, a: Wire, frac: int, name: str = "") -> Wire:
-        """Return what `floor` to `frac` fraction bits drops, exactly; at least 0 and below ``2**-frac``."""
-        node = self[a]
-        shift = node.frac - frac
-        if shift <= 0:
-            return self.constant(0, node.frac, name)
-        return self._append(Node(Op.FRACTION, (a.index,), node.frac, 0, (1 << shift) - 1, parameter=frac, name=name))
+        """Return what `floor` to `frac` fraction bits drops, exactly: at least 0 and below ``2**-frac``."""
+        if self[a].frac <= frac:
+            return self.constant(0, self[a].frac, name)
+        return self._derived(Op.FRACTION, a, parameter=frac, name=name)
 
     def truncate(self, a: Wire, frac: int, name: str = "") -> Wire:
         """Round towards zero to `frac` fraction bits; exact if `a` has no more."""
-        node = self[a]
-        shift = node.frac - frac
-        if shift <= 0:
+        if self[a].frac <= frac:
             return self.floor(a, frac, name)
-        low, high = _truncated(node.low, shift), _truncated(node.high, shift)
-        return self._append(Node(Op.TRUNCATE, (a.index,), frac, low, high, name=name))
+        return self._derived(Op.TRUNCATE, a, frac=frac, name=name)
 
     def round(self, a: Wire, frac: int, name: str = "") -> Wire:
-        """Round to nearest with ties upward; exact if `a` has no more than `frac` fraction bits."""
+        """Round to nearest, ties upward; exact if `a` has no more than `frac` fraction bits."""
         if self[a].frac <= frac:
             return self.floor(a, frac, name)
         return self.floor(self.add(a, self.constant(1, frac + 1)), frac, name)
 
     def clamp(self, a: Wire, low: int, high: int, name: str = "") -> Wire:
         """Limit the code to `low`..`high`."""
-        return self._append(Node(Op.CLAMP, (a.index,), self[a].frac, low, high, name=name))
+        return self._derived(Op.CLAMP, a, low=low, high=high, name=name)
 
     def bound(self, a: Wire, low: int, high: int, name: str = "") -> Wire:
-        """State that the code stays in `low`..`high`, known from outside (a peak gain), and so narrow it."""
-        node = self[a]
-        return self._append(Node(Op.BOUND, (a.index,), node.frac, max(low, node.low), min(high, node.high), name=name))
+        """State that the code stays in `low`..`high`, known from a peak gain, and narrow its range to that."""
+        return self._derived(Op.BOUND, a, low=low, high=high, name=name)
 
     def build(self, outputs: Sequence[Wire]) -> Graph:
         """Freeze the graph.

@@ -134,7 +134,7 @@ class Program:
 
     @property
     def serial_cycles(self) -> int:
-        """Clocks of all instructions when a multiplication takes one for each bit of its second factor; an upper bound."""
+        """Clocks of all instructions, at most, if a multiplication takes one for each bit of its second factor."""
         return sum(map(self._serial_cycles, self.instructions))
 
     def _serial_cycles(self, instruction: Instruction) -> int:

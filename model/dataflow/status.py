@@ -1,15 +1,15 @@
-"""Status flags of a sample: what the hardware hands on beside the output code, one bit each."""
+"""Status flags of a sample, one bit each, that go with its output code."""
 
 from __future__ import annotations
 
 from enum import IntEnum
 
 STATUS_BITS = 8
-"""Width of ``tuser``: a whole byte; bits that are no flag are 0."""
+"""Width of ``tuser``, a whole byte; bits without a flag are 0."""
 
 
 class Flag(IntEnum):
-    """Number of a flag's bit."""
+    """Number of the bit of each flag."""
 
     INPUT_AT_RAIL = 0
     OUTSIDE_CALIBRATION = 1
@@ -19,7 +19,7 @@ class Flag(IntEnum):
 
     @property
     def meaning(self) -> str:
-        """The flag in words."""
+        """The meaning of the flag, in a sentence."""
         return _MEANINGS[self]
 
 

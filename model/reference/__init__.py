@@ -1,1 +1,1 @@
-"""The double-precision golden chain, and the measures that hold the hardware against it."""
+"""The golden model in double precision, and measures of accuracy against it."""

@@ -1,4 +1,4 @@
-"""Measures of accuracy: the paper's percentage, statistics of an error, signal to error ratio."""
+"""Measures of accuracy: the paper's percentage, error statistics, signal to quantization noise ratio."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from sosmith.model.port import Values
+from sosmith.model.arrays import Values
 
 
 @dataclass(frozen=True)
 class ErrorStatistics:
-    """Statistics of an error signal, all in its own unit.
+    """Statistics of an error signal, in the unit of the signal.
 
     Attributes
     ----------
@@ -22,9 +22,9 @@ class ErrorStatistics:
     rms : float
         Root mean square.
     mean : float
-        Mean, the systematic part.
+        Mean: the systematic error.
     worst : int
-        Index of the first sample with the largest magnitude, in the order of the flattened signal.
+        Index of the first sample with the largest magnitude, in the flattened signal.
     """
 
     max_abs: float
@@ -34,27 +34,27 @@ class ErrorStatistics:
 
 
 def accuracy_percent(measured: Values, truth: Values, reading: npt.NDArray[np.bool_] | None = None) -> float:
-    """Accuracy by equation 7 of the paper: 100 % minus the mean percentage error.
+    """Return the accuracy by equation 7 of the paper: 100 % minus the mean percentage error.
 
-    The error of one reading is ``|measured - truth| / |truth|``. The percentages printed in the paper's
-    tables 1, 2 and 4 are not comparable: they leave out the division and are 100 times the error in mm.
+    The error of one reading is ``|measured - truth| / |truth|``. The percentages in the paper's tables
+    1, 2 and 4 are not comparable: they omit the division and are 100 times the error in mm.
 
     Parameters
     ----------
     measured, truth : ndarray, shape (n,) or (n, channels)
         Measured and true values in the same unit.
     reading : ndarray of bool, shape as these, optional
-        The samples that count; without it all of them.
+        Samples to include; all by default.
 
     Returns
     -------
     float
-        Per cent; 100 without any error, negative if the mean error is above 100 %.
+        Accuracy in per cent; 100 for no error, negative if the mean error is above 100 %.
 
     Raises
     ------
     ValueError
-        If the shapes differ, no sample counts, or the true value of one that counts is zero.
+        If the shapes differ, no sample is included, or an included true value is zero.
     """
     _check_same_shape("truth", truth, measured)
     if reading is not None:
@@ -68,12 +68,12 @@ def accuracy_percent(measured: Values, truth: Values, reading: npt.NDArray[np.bo
 
 
 def error_statistics(error: Values) -> ErrorStatistics:
-    """Statistics of the error signal `error` of any shape.
+    """Return the statistics of an error signal of any shape.
 
     Raises
     ------
     ValueError
-        If it has no sample.
+        If `error` has no sample.
     """
     if not error.size:
         raise ValueError("error must have at least one sample, not none")
@@ -88,13 +88,12 @@ def error_statistics(error: Values) -> ErrorStatistics:
 
 
 def sqnr_db(reference: Values, error: Values) -> float | None:
-    """Signal to quantization noise ratio in dB, ``10 log10(sum reference**2 / sum error**2)``.
+    """Return the signal to quantization noise ratio in dB, ``10 log10(sum reference**2 / sum error**2)``.
 
     Returns
     -------
     float or None
-        None where the ratio is not finite: no error at all, or a reference of nothing but zeros.
-        JSON has no infinity.
+        None where the ratio is not finite: no error, or a reference of zeros only. JSON has no infinity.
 
     Raises
     ------

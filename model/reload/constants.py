@@ -1,7 +1,7 @@
-"""The constants of a datapath that can be loaded at run time, in the words of a bank.
+"""The constants of a datapath that can be loaded at run time, and the words of a bank that hold them.
 
-They are what the parallel architecture multiplies by, and the coefficients of the polynomial; other constants belong
-to the structure. Each has the bits of its value and some more, so that another value of about the same size fits.
+They are the factors of the parallel architecture and the coefficients of the polynomial; other constants belong to the
+structure. Each is wider than its value takes, so that another value of about the same size fits.
 """
 
 from __future__ import annotations
@@ -10,28 +10,28 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from sosmith.model.dataflow.datapath import Datapath, Stage
-from sosmith.model.dataflow.graph import Graph, Node, Op
+from sosmith.model.dataflow.graph import Graph, Node, Op, range_of
 from sosmith.model.port import Port
 from sosmith.model.sections.horner import HornerStep
 
 SPARE_BITS = 1
-"""Bits that a constant has more than its value takes with its sign."""
+"""Bits of a constant beyond those of its value and sign."""
 
-_WORD = 32
+_WORD_BITS = 32
 
 
 @dataclass(frozen=True)
 class Constant:
-    """A constant: where it is, and its width in bits, the sign's included.
+    """A loadable constant: where it is, and its width.
 
     Attributes
     ----------
     stage, node : int
-        Place of the stage in the datapath, and of the node in its graph.
+        Index of the stage in the datapath, and of the node in its graph.
     name : str
         ``<stage>.<node>``.
     bits : int
-        Width in two's complement.
+        Width in two's complement, in bits.
     """
 
     stage: int
@@ -41,15 +41,17 @@ class Constant:
 
     @property
     def words(self) -> int:
-        """Words of 32 bits that it takes in a bank."""
-        return -(-self.bits // _WORD)
+        """Number of words of 32 bits that it takes in a bank."""
+        return -(-self.bits // _WORD_BITS)
 
 
 def constants(datapath: Datapath) -> tuple[Constant, ...]:
     """Return the constants that can be loaded, in the order in which a bank holds them."""
     return tuple(
-        Constant(place, index, f"{stage.name}.{node.name or f'node{index}'}", _signed_bits(node.parameter) + SPARE_BITS)
-        for place, stage in enumerate(datapath.stages)
+        Constant(
+            number, index, f"{stage.name}.{node.name or f'node{index}'}", _signed_bits(node.parameter) + SPARE_BITS
+        )
+        for number, stage in enumerate(datapath.stages)
         for index, node in enumerate(stage.graph.nodes)
         if _is_loadable(stage, node)
     )
@@ -65,7 +67,7 @@ def _signed_bits(value: int) -> int:
 
 @dataclass(frozen=True)
 class RoomyStage:
-    """A stage whose ranges hold what any constants that fit may make."""
+    """A stage whose ranges hold the results of all constants that can be loaded."""
 
     name: str
     graph: Graph
@@ -74,15 +76,15 @@ class RoomyStage:
 def with_room(datapath: Datapath) -> Datapath:
     """Return `datapath` with ranges for hardware whose constants can be loaded.
 
-    Products and sums hold whatever a constant of its width may make. Ranges that are proven, not computed, have
-    `SPARE_BITS` more bits: a set whose own proven ranges are wider is not to be loaded, nor one whose output leaves
-    its port's range where nothing limits it.
+    Products and sums hold the results of any constant of the width. Ranges that are proven, not computed, get
+    `SPARE_BITS` more bits: a set must not be loaded if its own proven ranges are wider, or if its output can leave the
+    range of the port where nothing limits it.
     """
     widths = {(constant.stage, constant.node): constant.bits for constant in constants(datapath)}
     stages: list[Stage] = []
     ends = [(port.lowest, port.highest) for port in datapath.inputs]
-    for place, stage in enumerate(datapath.stages):
-        bits = {node: width for (number, node), width in widths.items() if number == place}
+    for number, stage in enumerate(datapath.stages):
+        bits = {node: width for (owner, node), width in widths.items() if owner == number}
         graph = _roomy(stage.graph, ends, bits)
         ends = [(graph.nodes[i].low, graph.nodes[i].high) for i in graph.outputs]
         stages.append(_with_graph(stage, graph))
@@ -91,7 +93,7 @@ def with_room(datapath: Datapath) -> Datapath:
 
 
 def _ending(graph: Graph, port: Port) -> Graph:
-    """Return the last stage with a result no wider than its port: where nothing limits it, sets must keep to that."""
+    """Return the last stage with the range of its output cut to the port's, to which every set has to keep."""
     (output,) = graph.outputs
     nodes = list(graph.nodes)
     node = nodes[output]
@@ -100,15 +102,15 @@ def _ending(graph: Graph, port: Port) -> Graph:
 
 
 def with_ranges(datapath: Datapath, ranges: Sequence[Mapping[str, tuple[int, int]]]) -> Datapath:
-    """Return `datapath` with other ranges for what is proven, not computed, and all others made anew from these.
+    """Return `datapath` with other proven ranges, and all computed ranges derived from these.
 
     Parameters
     ----------
     datapath : Datapath
-        What is computed.
+        The datapath.
     ranges : sequence of mapping of str to (int, int)
-        For each stage the smallest and largest codes of its inputs and BOUND nodes, by name, as far as they change.
-        An input's range is at least that of the output before it, and may be wider: delays hold what came earlier.
+        For each stage, the smallest and largest code of each input and BOUND node that changes, by name. The range of
+        an input is at least that of the output before it; it may be wider, since delays hold earlier values.
 
     Raises
     ------
@@ -131,7 +133,7 @@ def with_ranges(datapath: Datapath, ranges: Sequence[Mapping[str, tuple[int, int
 
 
 def _with_graph(stage: Stage, graph: Graph) -> Stage:
-    """Return a stage with other ranges; one of the polynomial stays one, for its constants can be loaded."""
+    """Return a stage with another graph; one of the polynomial keeps its type, since its constants can be loaded."""
     return replace(stage, graph=graph) if isinstance(stage, HornerStep) else RoomyStage(stage.name, graph)
 
 
@@ -141,9 +143,9 @@ def _roomy(
     bits: Mapping[int, int],
     stated: Mapping[int, tuple[int, int]] | None = None,
 ) -> Graph:
-    """Compute all ranges but those that are `stated` anew; once more for each delay in a row.
+    """Compute all ranges anew, except those in `stated`.
 
-    A delay comes before what it remembers.
+    As a delay comes before its operand, this takes one more pass for each delay in a row.
     """
     nodes = list(graph.nodes)
     for _ in range(len(graph.delays) + 1):
@@ -154,32 +156,19 @@ def _roomy(
             elif stated is not None and index in stated:
                 low, high = stated[index]
             else:
-                low, high = _ends(node, [nodes[i] for i in node.operands], bits.get(index))
+                width = bits.get(index)
+                constant = None if width is None else (-1 << (width - 1), (1 << (width - 1)) - 1)
+                operands = [nodes[i].range for i in node.operands]
+                _, low, high = range_of(_with_spare_bits(node), operands, constant)
             nodes[index] = replace(node, low=low, high=high)
     return replace(graph, nodes=tuple(nodes))
 
 
-def _ends(node: Node, operands: Sequence[Node], bits: int | None) -> tuple[int, int]:
-    constant = (node.parameter, node.parameter) if bits is None else (-1 << (bits - 1), (1 << (bits - 1)) - 1)
-    if node.op is Op.CONSTANT:
-        return constant
-    if node.op in {Op.FRACTION, Op.CLAMP}:
-        return node.low, node.high
-    first = operands[0].low, operands[0].high
-    if node.op is Op.BOUND:
-        return max(node.low << SPARE_BITS, first[0]), min(node.high << SPARE_BITS, first[1])
-    if node.op in {Op.ADD, Op.SUBTRACT}:
-        (a, b), (c, d) = ((o.low << node.frac - o.frac, o.high << node.frac - o.frac) for o in operands)
-        return (a + c, b + d) if node.op is Op.ADD else (a - d, b - c)
-    if node.op in {Op.SCALE, Op.MULTIPLY}:
-        second = constant if node.op is Op.SCALE else (operands[1].low, operands[1].high)
-        products = [x * y for x in first for y in second]
-        return min(products), max(products)
-    if node.op in {Op.FLOOR, Op.TRUNCATE}:
-        shift = operands[0].frac - node.frac
-        up = (1 << shift) - 1 if node.op is Op.TRUNCATE else 0
-        return first[0] >> shift, max(first[1] >> shift, min(first[1] + up >> shift, 0))
-    return first if node.op is not Op.DELAY else (min(first[0], 0), max(first[1], 0))
+def _with_spare_bits(node: Node) -> Node:
+    """Return a BOUND with `SPARE_BITS` more, another node as it is."""
+    if node.op is not Op.BOUND:
+        return node
+    return replace(node, low=node.low << SPARE_BITS, high=node.high << SPARE_BITS)
 
 
 def values_of(datapath: Datapath, loadable: Sequence[Constant]) -> list[int]:
@@ -188,7 +177,7 @@ def values_of(datapath: Datapath, loadable: Sequence[Constant]) -> list[int]:
 
 
 def packed(values: Sequence[int], loadable: Sequence[Constant]) -> list[int]:
-    """Return the words of a bank: each constant extended by its sign to whole words, the lowest first.
+    """Return the words of a bank: each constant sign-extended to whole words, the lowest word first.
 
     Raises
     ------
@@ -199,12 +188,12 @@ def packed(values: Sequence[int], loadable: Sequence[Constant]) -> list[int]:
     for value, constant in zip(values, loadable, strict=True):
         if _signed_bits(value) > constant.bits:
             raise ValueError(f"{constant.name} must fit {constant.bits} bits, not {value}")
-        words += [value >> _WORD * k & (1 << _WORD) - 1 for k in range(constant.words)]
+        words += [value >> _WORD_BITS * k & (1 << _WORD_BITS) - 1 for k in range(constant.words)]
     return words
 
 
 def unpacked(words: Sequence[int], loadable: Sequence[Constant]) -> list[int]:
-    """Return the constants' values from the words of a bank, as hardware takes them: bits beyond a width do not count.
+    """Return the constants in the words of a bank as the hardware sees them, without the bits beyond their widths.
 
     Raises
     ------
@@ -214,10 +203,10 @@ def unpacked(words: Sequence[int], loadable: Sequence[Constant]) -> list[int]:
     count = sum(constant.words for constant in loadable)
     if len(words) != count:
         raise ValueError(f"a bank must have {count} words, not {len(words)}")
-    values, place = [], 0
+    values, start = [], 0
     for constant in loadable:
-        whole = sum(word << _WORD * k for k, word in enumerate(words[place : place + constant.words]))
+        whole = sum(word << _WORD_BITS * k for k, word in enumerate(words[start : start + constant.words]))
         code = whole & ((1 << constant.bits) - 1)
         values.append(code - (code >> (constant.bits - 1) << constant.bits))
-        place += constant.words
+        start += constant.words
     return values

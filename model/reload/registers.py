@@ -1,6 +1,6 @@
-"""The registers of a reloadable core: one description for hardware, host, C header and documents.
+"""The registers of a reloadable core, described once for hardware, host, C header and documents.
 
-All are 32 bits wide; a register's address is four times its place in `REGISTERS`.
+All are 32 bits wide; the address of a register is four times its index in `REGISTERS`.
 """
 
 from __future__ import annotations
@@ -9,27 +9,27 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 MAGIC = int.from_bytes(b"SOSM", "little")
-"""What ``ID`` reads: the letters SOSM, the first one in the lowest byte."""
+"""Value of ``ID``: the letters SOSM, the first one in the lowest byte."""
 
 INTERFACE = 1
-"""Version of this description, as ``LAYOUT`` reads."""
+"""Version of this register map, in ``LAYOUT``."""
 
 MAX_WORDS = (1 << 16) - 1
-"""Words of a bank at most: what ``LAYOUT`` can tell."""
+"""Most words of a bank: what the field of ``LAYOUT`` holds."""
 
 
 class Outcome(IntEnum):
     """How the last load ended."""
 
     NONE = 0  # no load has ended since reset
-    ACCEPTED = 1  # its CRC was right; active as soon as nothing is pending
-    WRONG_CRC = 2  # the CRC of what arrived is not the one that was written
+    ACCEPTED = 1  # its CRC was right; active once no swap is pending
+    WRONG_CRC = 2  # the CRC of the words is not the one that was written
     BROKEN_OFF = 3  # a write was refused before the load was complete
 
 
 @dataclass(frozen=True)
 class Field:
-    """Bits of a register: the lowest one, how many, what they mean, and their values where these have names."""
+    """A field of a register: its lowest bit, its width, its meaning, and the names of its values, if they have any."""
 
     name: str
     low: int
@@ -39,17 +39,17 @@ class Field:
 
     @property
     def mask(self) -> int:
-        """The bits, where they lie in the register."""
+        """Mask of the field's bits in the register."""
         return ((1 << self.bits) - 1) << self.low
 
     def of(self, word: int) -> int:
-        """Take the field out of a register's `word`."""
+        """Return the field of a register's value `word`."""
         return (word & self.mask) >> self.low
 
 
 @dataclass(frozen=True)
 class Register:
-    """A register: whether it can be read and written, what that does, and its fields; without any it is one number."""
+    """A register: whether it can be read and written, what that does, and its fields; without any, it is one number."""
 
     name: str
     reads: bool
@@ -65,12 +65,12 @@ class Register:
             end = field.low + field.bits
 
     def field(self, name: str) -> Field:
-        """Find a field by its name."""
+        """Return the field `name`."""
         return next(field for field in self.fields if field.name == name)
 
     @property
     def index(self) -> int:
-        """Place in `REGISTERS`."""
+        """Index in `REGISTERS`."""
         return REGISTERS.index(self)
 
     @property
@@ -134,4 +134,4 @@ REGISTERS = (ID, LAYOUT, DESIGN, STATUS, VERSION, DATA, CRC)
 """All registers, by ascending address."""
 
 ADDRESS_BITS = (4 * len(REGISTERS) - 1).bit_length()
-"""Address lines of the slave."""
+"""Number of address lines of the slave."""

@@ -1,1 +1,1 @@
-"""Scenarios: input traces made from a description, with their truth."""
+"""Scenarios: input traces generated from a description, with their true values."""

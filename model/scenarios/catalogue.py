@@ -1,4 +1,4 @@
-"""Emulated traces by name: the paper's runs on the bench, ramps, vehicle motion, worst cases.
+"""Built-in scenarios by name: the paper's bench runs, ramps, vehicle motion, worst cases.
 
 A scenario turns a `Bench` (the core's ports, sample rate and ideal behaviour) and a seed into a `Trace`,
 the same on every run.
@@ -25,67 +25,59 @@ from sosmith.model.scenarios.instrument_signals import (
 )
 from sosmith.model.scenarios.plateaus import stepped_samples
 from sosmith.model.scenarios.run import MIN_SAMPLES, Bench, Emulated, Run
+from sosmith.model.scenarios.summaries import check_scenario
 from sosmith.model.scenarios.worst_case_inputs import all_responses, worst_cases, worst_cases_samples
 from sosmith.model.traces.trace import Trace
 
 LIMIT_SAMPLES = 10_000_000
-"""Samples that a trace may have at all, a guard against a slip in the unit: some hundred megabytes."""
+"""Largest number of samples of a trace (several hundred megabytes), to catch durations in a wrong unit."""
 
 
 @dataclass(frozen=True)
 class Scenario:
-    """A named way to make a trace.
+    """A named generator of traces.
 
     Attributes
     ----------
     name : str
         Name on the command line.
-    description : str
-        One line for the user.
-    kinds : tuple of str
-        Kinds of core it fits (`Bench.kind`).
     default_samples : callable
-        Length of the trace for a bench, if none is given.
+        Returns the default length of the trace for a bench.
     make : callable
-        Makes codes, truth and reading of the given length.
+        Generates codes, truth and reading of the given length.
     """
 
     name: str
-    description: str
-    kinds: tuple[str, ...]
     default_samples: Callable[[Bench], int]
     make: Callable[[Run], Emulated]
 
     def default_seconds(self, bench: Bench) -> float:
-        """Duration of the trace in s, if none is given."""
+        """Return the default duration of the trace in s."""
         return self.default_samples(bench) / float(bench.sample_rate)
 
 
 def emulate(name: str, bench: Bench, *, seed: int, seconds: float | None = None) -> Trace:
-    """Make the trace of the scenario `name` for a core.
+    """Generate the trace of the scenario `name` for a core.
 
     Parameters
     ----------
     name : str
-        A key of `SCENARIOS` that fits the core.
+        A key of `SCENARIOS` that is for this kind of core.
     bench : Bench
         The core.
     seed : int
-        Seed of all noise, 0 or more. Same seed, same trace.
+        Seed of all noise, 0 or more. Equal seeds give equal traces.
     seconds : float, optional
-        Duration; by default long enough for the filter to settle where it matters, and from
-        `MIN_SAMPLES` to `MAX_SAMPLES` long.
+        Duration in s; by default long enough for the filter to settle where needed, with `MIN_SAMPLES` to
+        `MAX_SAMPLES` samples.
 
     Raises
     ------
     SpecificationError
-        If no scenario that fits the core has that name; if the duration is not positive, too short for
-        the scenario or above `LIMIT_SAMPLES`; if the seed is negative.
+        If no scenario for this kind of core has that name; if the duration is not positive, too short for the scenario
+        or above `LIMIT_SAMPLES`; if the seed is negative.
     """
-    fitting = [scenario.name for scenario in SCENARIOS.values() if bench.kind in scenario.kinds]
-    if name not in fitting:
-        core = "a plain filter" if bench.kind == "filter" else "an instrument"
-        raise SpecificationError(f"scenario for {core} must be one of {', '.join(fitting)}, not {name!r}")
+    check_scenario(name, bench.kind)
     if seed < 0:
         raise SpecificationError(f"seed must be 0 or more, not {seed}")
     scenario = SCENARIOS[name]
@@ -117,67 +109,49 @@ SCENARIOS: dict[str, Scenario] = {
     for scenario in (
         Scenario(
             "bench_43_50",
-            "clearance in steps of 1 mm from 1 to 10 mm, 43 to 50 degC (the paper's table 1)",
-            ("instrument",),
             stepped_samples(TABLE_1_STEPS),
             bench_run(TABLE_1_STEPS, (43.0, 50.0)),
         ),
         Scenario(
             "bench_92_96",
-            "clearance in steps of 0.5 or 1 mm from 1 to 10 mm, 92 to 96 degC (the paper's table 2)",
-            ("instrument",),
             stepped_samples(TABLE_2_STEPS),
             bench_run(TABLE_2_STEPS, (92.0, 96.0)),
         ),
         Scenario(
             "temperature_ramp",
-            "20 to 98 degC at a clearance of 5 mm",
-            ("instrument",),
             settlings(10, RAMP_CLEARANCE),
             temperature_ramp,
         ),
         Scenario(
             "wear_ramp",
-            "wear from 2 to 9 mm under vehicle motion at 1.2, 2 and 8 Hz and broadband vibration",
-            ("instrument",),
             settlings(60, WEAR_CLEARANCE[1]),
             wear_ramp,
         ),
         Scenario(
             "worst_case",
-            "extreme codes in the sign pattern that drives the filter's output furthest",
-            ("instrument", "filter"),
             lambda bench: worst_cases_samples([bench.impulse_response]),
             lambda run: worst_cases(run, [run.bench.impulse_response]),
         ),
         Scenario(
             "worst_case_errors",
-            "the same for the way of every rounding error through the filter to the output, one after another",
-            ("instrument", "filter"),
             lambda bench: worst_cases_samples(all_responses(bench)),
             lambda run: worst_cases(run, all_responses(run.bench)),
         ),
         Scenario(
             "step",
-            "steps of up to half the range around its middle",
-            ("filter",),
             step_samples,
             step,
         ),
         Scenario(
             "sweep",
-            "sine of 90 % of full scale from zero to 0.49 of the sample rate",
-            ("filter",),
             lambda _bench: 4 * MIN_SAMPLES,
             sweep,
         ),
         Scenario(
             "noise",
-            "white noise, uniform over all codes",
-            ("filter",),
             lambda _bench: 4 * MIN_SAMPLES,
             noise,
         ),
     )
 }
-"""Every scenario by name, in the order in which they are listed to the user."""
+"""How each scenario is made, by name."""

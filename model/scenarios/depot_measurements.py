@@ -1,4 +1,4 @@
-"""Measurements taken by hand in the depot, as a scenario file describes them, for the calibration's store."""
+"""Emulated measurements taken by hand in the depot, as described in a scenario file, for the measurement store."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ from sosmith.model.random_streams import streams
 from sosmith.model.scenarios.file import ScenarioFile
 
 DIGITS = 6
-"""Decimals that are written."""
+"""Number of decimals written."""
 
 
 @dataclass(frozen=True)
 class DepotMeasurement:
-    """One row.
+    """One measurement.
 
     Attributes
     ----------
     clearance_mm : float
-        Read from the micrometer.
+        Micrometer reading.
     voltage_V : float
-        Of the inductive sensor, read from a voltmeter.
+        Voltmeter reading at the inductive sensor.
     temperature_C : float
-        Shown by the thermocouple.
+        Reading of the thermocouple channel.
     date : str
-        Day as in 2024-03-01.
+        Date such as 2024-03-01.
     """
 
     clearance_mm: float
@@ -39,17 +39,18 @@ class DepotMeasurement:
 
 
 def measurements_of(scenario: ScenarioFile, seed: int) -> tuple[DepotMeasurement, ...]:
-    """Take the measurements of the table ``[calibration]``: each day, temperature, clearance and repetition.
+    """Generate the measurements of the table ``[calibration]``, for each day, temperature, clearance and repetition.
 
-    A voltmeter averages over many periods of the mains, so that hum and broadband noise do not reach it. What is left
-    is the sensor's state of the day, and the scatter of the single measurement: by default of the recorded clearance,
-    as the error term of the paper's equation 1 has it, or else of the clearance that the sensor sees.
+    A voltmeter averages over many mains periods, so hum and broadband noise do not appear. What remains is the
+    state of the sensor on that day and the scatter of each measurement: by default in the recorded clearance, like the
+    error term in the paper's equation 1, otherwise in the clearance at the sensor.
 
     Parameters
     ----------
     scenario : ScenarioFile
+        The scenario.
     seed : int
-        0 or more; with the same seed, the sensor is the one of the traces.
+        Seed, 0 or more; with the seed of a trace, the sensor is the same as in the trace.
 
     Raises
     ------
@@ -68,7 +69,7 @@ def measurements_of(scenario: ScenarioFile, seed: int) -> tuple[DepotMeasurement
         state = inductive.state(day, streams(seed, "life of the sensor"))
         scatter = streams(seed, "depot")(f"scatter of day {day!r}").normal(0.0, table.scatter, len(true))
         in_clearance = table.scatter_in == "clearance"
-        # A micrometer shows no less than contact.
+        # A micrometer cannot read less than contact.
         recorded = np.maximum(true + scatter, 0.0) if in_clearance else true
         seen = true if in_clearance else true + scatter
         voltage = inductive.steady_voltage(seen, temperature, state)
@@ -82,7 +83,7 @@ def measurements_of(scenario: ScenarioFile, seed: int) -> tuple[DepotMeasurement
 
 
 def measurements_csv(rows: tuple[DepotMeasurement, ...]) -> str:
-    """Text of a CSV file that `sosmith calibrate add` takes."""
+    """Return the measurements as CSV text for `sosmith calibrate add`."""
     lines = [",".join((*COLUMNS, DATE_COLUMN))]
     lines += [f"{row.clearance_mm!r},{row.voltage_V!r},{row.temperature_C!r},{row.date}" for row in rows]
     return "\n".join(lines) + "\n"

@@ -1,7 +1,7 @@
-"""Scenario files: days of operation as TOML, and the traces that they make for a core.
+"""Scenario files: days of operation described in TOML, and the traces generated from them.
 
-What a file can say is in `sosmith.model.scenarios.schema`. Time is cut between excerpts: the trace is one excerpt after
-another, its truth the clearance without the vehicle's motion.
+The format is defined in `sosmith.model.scenarios.schema`. A trace is the concatenation of all excerpts; its true value
+is the clearance without vehicle motion.
 """
 
 from __future__ import annotations
@@ -16,8 +16,10 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
+from sosmith.model.arithmetic.elementary import exp
+from sosmith.model.arrays import Values
 from sosmith.model.errors import SpecificationError
-from sosmith.model.port import Port, Values
+from sosmith.model.port import Port
 from sosmith.model.random_streams import Streams, streams
 from sosmith.model.scenarios.catalogue import LIMIT_SAMPLES
 from sosmith.model.scenarios.plateaus import READING_PART, plateau_samples
@@ -38,38 +40,38 @@ from sosmith.model.tables.toml_tables import read_tables
 from sosmith.model.traces.trace import Trace
 
 VEHICLE = "vehicle"
-"""What `motion_from` says for the motion that the vehicle model makes."""
+"""Value of `motion_from` that selects the motion of the vehicle model."""
 
 TRACKS = {"tangent": "tangent", "braking": "tangent", "curve": "paper"}
-"""Track that the vehicle runs on during each operation: straight, or the paper's curve."""
+"""Track for each operation of a moving vehicle: straight, or the paper's curve."""
 
 MIN_STEADY = 200
-"""Samples that an excerpt without a duration has at least."""
+"""Lowest number of samples for reading in an excerpt without a given duration."""
 
 _SENSORS = ("inductive", "thermocouple")
-"""What faults call the sensors, in the order of the core's inputs."""
+"""Names of the sensors in fault tables, in the order of the core's inputs."""
 
 
 class VehicleMotion(Protocol):
-    """Motion of the vehicle as the sensor sees it."""
+    """Motion of the vehicle at the sensor."""
 
     def __call__(self, track: str, time: Values, seed: int) -> Values:
-        """Return the change of the clearance in mm at the `time` in s, shape (n,), on one of the values of `TRACKS`."""
+        """Return the change of the clearance in mm at `time` in s, shape (n,), on `track`, a value of `TRACKS`."""
         ...
 
 
 @dataclass(frozen=True, kw_only=True)
 class ScenarioFile:
-    """A scenario as read from its file.
+    """A scenario read from a file.
 
     Attributes
     ----------
     path : Path
-        The file; its name without the extension names the trace.
+        The file; the trace is named after it, without the extension.
     document : ScenarioDocument
-        What it says.
+        Its content.
     sensors : Sensors
-        The sensors it describes.
+        The sensors that it describes.
     """
 
     path: Path
@@ -77,12 +79,12 @@ class ScenarioFile:
     sensors: Sensors
 
     def clearance(self, day: float, channel: int = 0) -> float:
-        """Return the true clearance in mm on a `day`: the initial one and the wear until then.
+        """Return the true clearance in mm on `day`: the initial clearance plus wear.
 
         Raises
         ------
         SpecificationError
-            If the file has wear for fewer channels, or none at all.
+            If the file does not describe the wear of this channel.
         """
         document = self.document
         tables = document.channel or (() if document.wear is None else (document.wear,) * (channel + 1))
@@ -91,7 +93,7 @@ class ScenarioFile:
         return tables[channel].initial_clearance + wear_on(tables[channel], day)
 
     def refuse(self, what: str) -> SpecificationError:
-        """Error about this file; `what` is a sentence from its subject on."""
+        """Return an error about this file; `what` is the sentence after the file's name."""
         return SpecificationError(f"{self.path}: {what}")
 
 
@@ -101,15 +103,14 @@ def load_scenario(path: Path) -> ScenarioFile:
     Raises
     ------
     SpecificationError
-        For the first thing that is wrong, in one sentence: the file, the path of the key, what would be right and what
-        was found.
+        For the first error, in one sentence: the file, the path of the key, what was expected and what was found.
     """
     document = read_tables(path, ScenarioDocument)
     return ScenarioFile(path=path, document=document, sensors=_sensors(document))
 
 
 def wear_on(table: WearTable, day: float) -> float:
-    """Wear in mm on a `day`; breakpoints are joined by straight lines, and hold before the first and after the last."""
+    """Return the wear in mm on `day`; interpolated linearly between breakpoints and constant beyond them."""
     if table.rate is not None:
         return table.rate * day
     if table.rate_per_1000_km is not None and table.km_per_day is not None:
@@ -121,10 +122,10 @@ def wear_on(table: WearTable, day: float) -> float:
 def emulate_file(
     scenario: ScenarioFile, bench: Bench, *, seed: int, channel: int = 0, vehicle: VehicleMotion | None = None
 ) -> Trace:
-    """Make the trace of a scenario file for one channel of a core.
+    """Generate the trace of a scenario file for one channel of a core.
 
-    Readings are marked where the filter has settled: from the beginning of each excerpt and from the end of each fault
-    on, and of clearances in steps the last part of each (`sosmith.model.scenarios.catalogue.READING_PART`).
+    Readings are marked where the filter has settled after the beginning of the excerpt and after each fault. For
+    clearances in steps, they are in the last part of each step (`sosmith.model.scenarios.plateaus.READING_PART`).
 
     Parameters
     ----------
@@ -132,17 +133,17 @@ def emulate_file(
     bench : Bench
         The core.
     seed : int
-        Seed of all chance, 0 or more. Same seed, same trace.
+        Seed of all randomness, 0 or more. Equal seeds give equal traces.
     channel : int, optional
-        Channel whose wear counts.
+        Channel whose wear is used.
     vehicle : VehicleMotion, optional
         Vehicle model, for excerpts with ``motion_from = "vehicle"``.
 
     Raises
     ------
     SpecificationError
-        If the core is no instrument, the seed negative, an excerpt too short for the filter to settle, a fault outside
-        its excerpt, a file of motion unfit, or the trace longer than `LIMIT_SAMPLES`.
+        If the core is not an instrument, the seed is negative, an excerpt is too short for the filter to settle, a
+        fault lies outside its excerpt, a motion file is invalid, or the trace is longer than `LIMIT_SAMPLES`.
     """
     if bench.kind != "instrument":
         raise scenario.refuse("the core must be an instrument with a voltage input, not a plain filter")
@@ -154,14 +155,14 @@ def emulate_file(
         seconds = sum(plan.samples for plan in plans) / float(bench.sample_rate)
         most = LIMIT_SAMPLES / float(bench.sample_rate)
         raise scenario.refuse(
-            f"all excerpts must take at most {most:.6g} s, {LIMIT_SAMPLES} samples, not {seconds:.6g}"
+            f"all excerpts together must last at most {most:.6g} s, {LIMIT_SAMPLES} samples, not {seconds:.6g}"
         )
     parts = [_part(scenario, bench, plan, seed, vehicle) for plan in plans]
     reading = np.concatenate([part.reading for part in parts])
     if not reading.any():
         least = min(plan.settling for plan in plans) / float(bench.sample_rate)
         raise scenario.refuse(
-            "some excerpt must be longer without a fault than the filter takes to settle, "
+            "one excerpt or more must last longer without a fault than the filter takes to settle, "
             f"{least:.6g} s or more, not none"
         )
     return Trace(
@@ -176,7 +177,7 @@ def emulate_file(
 
 
 def range_notes(scenario: ScenarioFile, ports: Sequence[Port]) -> tuple[str, ...]:
-    """Sentences about temperatures and stuck codes in the file that an input of the core cannot show."""
+    """Return a sentence for each temperature and stuck code in the file that is outside the range of a core's input."""
     notes = []
     for k, excerpt in enumerate(scenario.document.excerpt):
         where = f"{scenario.path}: excerpt[{k}]"
@@ -198,15 +199,15 @@ def _temperature_notes(excerpt: ExcerptTable, port: Port) -> Iterator[str]:
     if min(ends) < low or max(ends) > high:
         reached = max(ends) if max(ends) > high else min(ends)
         yield (
-            f"reaches {reached:g} degC, but the temperature input of the core ends at "
-            f"{high if reached > high else low:g} degC: there its code stands still, and the clearance is calibrated "
+            f"reaches {reached:g} degC, but the range of the core's temperature input ends at "
+            f"{high if reached > high else low:g} degC: its code saturates there, and the clearance is calibrated "
             "for the wrong temperature; widen the range in [input.temperature]"
         )
 
 
 @dataclass(frozen=True, eq=False)
 class _Plan:
-    """One excerpt: its place in the file, the true clearance, where it is read, samples until the filter settles."""
+    """One excerpt: index in the file, true clearance, mask of readings, samples until the filter settles."""
 
     index: int
     excerpt: ExcerptTable
@@ -270,7 +271,7 @@ def _part(scenario: ScenarioFile, bench: Bench, plan: _Plan, seed: int, vehicle:
         faults=faults,
     )
     faulty = faults.marks(plan.samples)
-    # What a fault has left in the filter may be as large as the output's whole range.
+    # A fault can leave an error as large as the whole output range in the filter.
     span = float(bench.output.lsb) * (bench.output.highest - bench.output.lowest)
     last_fault = np.maximum.accumulate(np.where(faulty, np.arange(plan.samples), -LIMIT_SAMPLES))
     recovered = np.arange(plan.samples) - last_fault > bench.settling(span)
@@ -278,16 +279,16 @@ def _part(scenario: ScenarioFile, bench: Bench, plan: _Plan, seed: int, vehicle:
 
 
 def temperature_profile(excerpt: ExcerptTable, time: Values) -> Values:
-    """Temperature in degC at the `time` in s from the excerpt's beginning, shape (n,).
+    """Return the temperature in degC at `time` in s since the beginning of the excerpt, shape (n,).
 
-    With a time constant it approaches `temperature_to` exponentially, as a body does that is heated or cooled at a
-    constant rate; without one it reaches it on a straight line at the last sample.
+    With a time constant it approaches `temperature_to` exponentially, like a body heated by constant power; without one
+    it reaches `temperature_to` linearly at the last sample.
     """
     first, last = excerpt.temperature, excerpt.temperature_to
     if last is None:
         return np.full(len(time), first)
     if excerpt.time_constant is not None:
-        return np.asarray(last + (first - last) * np.exp(-time / excerpt.time_constant))
+        return np.asarray(last + (first - last) * exp(-time / excerpt.time_constant))
     return np.asarray(first + (last - first) * time / max(time[-1], 1e-300))
 
 
@@ -317,11 +318,11 @@ def _motion(
     check_rows(
         table,
         np.concatenate([[False], np.diff(clock) <= 0]),
-        lambda k: f"time_s must be above {clock[k - 1]:g} s, the row before, not {clock[k]:g} s",
+        lambda k: f"time_s must be above the {clock[k - 1]:g} s of the previous row, not {clock[k]:g} s",
     )
     if clock[0] > 0 or clock[-1] < time[-1]:
         raise SpecificationError(
-            f"{table.path}: time_s must reach from 0 to the {time[-1]:.6g} s of excerpt[{plan.index}], "
+            f"{table.path}: time_s must extend from 0 to the {time[-1]:.6g} s of excerpt[{plan.index}], "
             f"not from {clock[0]:.6g} to {clock[-1]:.6g}"
         )
     return motion + np.interp(time, clock, table.column("clearance_mm"))

@@ -1,4 +1,4 @@
-"""Signals of the instrument: clearance and temperature through sensors, noise and converters to codes."""
+"""Test signals for the instrument: clearance and temperature, converted to codes by noisy sensors."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
-from sosmith.model.port import Codes, Values
+from sosmith.model.arrays import Codes, Values
 from sosmith.model.random_streams import one_stream
 from sosmith.model.scenarios.plateaus import plateaus
 from sosmith.model.scenarios.run import MAX_SAMPLES, MIN_SAMPLES, Bench, Emulated, Run
@@ -20,16 +20,16 @@ TABLE_2_STEPS = tuple(d / 2 for d in range(2, 21) if d != 11)
 """Clearances in mm of the run at 92 to 96 degC (the paper's table 2, which has no 5.5 mm)."""
 
 RAMP_TEMPERATURE = (20.0, 98.0)
-"""First and last temperature in degC of the temperature ramp: the paper's range of measurements."""
+"""First and last temperature in degC of the temperature ramp: the range of the paper's measurements."""
 
 RAMP_CLEARANCE = 5.0
-"""Clearance in mm during the temperature ramp, the middle of the sensor's range."""
+"""Clearance in mm during the temperature ramp: the middle of the sensor's range."""
 
 WEAR_CLEARANCE = (2.0, 9.0)
-"""First and last clearance in mm of the wear ramp; with the motion it stays within the sensor's 10 mm."""
+"""First and last clearance in mm of the wear ramp; with motion added it stays within the sensor's 10 mm."""
 
 WEAR_TEMPERATURE = (43.0, 50.0)
-"""First and last temperature in degC of the wear ramp: the paper's first run."""
+"""First and last temperature in degC of the wear ramp: those of the paper's first run."""
 
 MOTION = ((1.2, 0.5), (2.0, 0.3), (8.0, 0.1))
 """Frequency in Hz and amplitude in mm of the vehicle's motion at the sensor.
@@ -44,7 +44,7 @@ MOTION_NOISE = 0.05
 
 
 def bench_run(levels: tuple[float, ...], temperature: tuple[float, float]) -> Callable[[Run], Emulated]:
-    """Make a run on the bench: clearances in mm, each held long enough, from a first to a last temperature in degC."""
+    """Return a run over clearances in mm, each held until the filter has settled, over a temperature ramp in degC."""
 
     def make(run: Run) -> Emulated:
         clearance = plateaus(run, levels, levels)
@@ -55,14 +55,14 @@ def bench_run(levels: tuple[float, ...], temperature: tuple[float, float]) -> Ca
 
 
 def temperature_ramp(run: Run) -> Emulated:
-    """Warm the sensor at one clearance; read once the filter has settled. Refuses a trace that is too short."""
+    """Warm the sensor at constant clearance; read after the filter has settled. Raises if the trace is too short."""
     clearance = np.full(run.samples, RAMP_CLEARANCE)
     reading = _settled(run, RAMP_CLEARANCE)
     return Emulated(_sense(run, clearance, run.between(RAMP_TEMPERATURE)), clearance, reading)
 
 
 def wear_ramp(run: Run) -> Emulated:
-    """Wear under the motion of the vehicle; read once the filter has settled. Refuses a trace that is too short."""
+    """Wear under vehicle motion; read after the filter has settled. Raises if the trace is too short."""
     wear = run.between(WEAR_CLEARANCE)
     motion = sum(
         (amplitude * np.sin(2 * np.pi * frequency * run.time) for frequency, amplitude in MOTION),
@@ -73,7 +73,7 @@ def wear_ramp(run: Run) -> Emulated:
 
 
 def settlings(count: int, step: float) -> Callable[[Bench], int]:
-    """Make the default length of `count` settling times after a step in the output's unit."""
+    """Return a function for a default length of `count` settling times, for a `step` in the output's unit."""
 
     def samples(bench: Bench) -> int:
         return min(max(count * bench.settling(step), MIN_SAMPLES), MAX_SAMPLES)
@@ -82,12 +82,12 @@ def settlings(count: int, step: float) -> Callable[[Bench], int]:
 
 
 def _sense(run: Run, clearance: Values, temperature: Values) -> Codes:
-    """Codes of the noisy sensors; the ADC saturates."""
+    """Return the codes of the noisy sensors; the ADC saturates."""
     return Sensors().codes(clearance, temperature, run.time, run.bench.ports, one_stream(run.rng))
 
 
 def _settled(run: Run, step: float) -> npt.NDArray[np.bool_]:
-    """Mark the samples after the filter has settled from a first step; refuse a trace without any."""
+    """Mark the samples after the filter has settled from an initial step; raise if there are none."""
     settling = run.bench.settling(step)
     if settling >= run.samples:
         raise run.refuse_length(settling + 1, "the filter has to settle")

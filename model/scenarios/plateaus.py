@@ -1,4 +1,4 @@
-"""Plateaus: levels that are held until the filter has settled on each."""
+"""Plateaus: levels that are held until the filter has settled."""
 
 from __future__ import annotations
 
@@ -9,34 +9,34 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from sosmith.model.port import Values
+from sosmith.model.arrays import Values
 from sosmith.model.scenarios.run import MAX_SAMPLES, MIN_SAMPLES, Bench, Run
 
 READING_PART = 0.1
-"""Last part of each plateau in which the micrometer is read; the paper reads once, more average the noise."""
+"""Last fraction of each plateau, in which it is read. The paper reads once; more readings average the noise."""
 
 
 @dataclass(frozen=True, eq=False)
 class Plateaus:
-    """Levels over time, shape (n,), and the samples, shape (n,), in the last `READING_PART` of each."""
+    """Levels over time, shape (n,), and a mask, shape (n,), of the last `READING_PART` of each plateau."""
 
     values: Values
     reading: npt.NDArray[np.bool_]
 
 
 def plateau_samples(bench: Bench, levels: tuple[float, ...]) -> int:
-    """Count the samples of a plateau in whose last part the filter has settled."""
+    """Return the length in samples of a plateau in whose last part the filter has settled."""
     step = float(np.max(np.abs(np.diff(levels, prepend=0.0))))
     return math.ceil((bench.settling(step) + 1) / (1 - READING_PART))
 
 
 def plateaus(run: Run, levels: tuple[float, ...], heights: tuple[float, ...]) -> Plateaus:
-    """Hold each of `levels` equally long; `heights` are the levels in the output's unit.
+    """Hold each of `levels` for the same time; `heights` are the levels in the output's unit.
 
     Raises
     ------
     SpecificationError
-        If the trace is too short for the filter to settle on each.
+        If the trace is too short for the filter to settle on each level.
     """
     length = run.samples // len(levels)
     least = plateau_samples(run.bench, heights)
@@ -49,7 +49,7 @@ def plateaus(run: Run, levels: tuple[float, ...], heights: tuple[float, ...]) ->
 
 
 def stepped_samples(levels: tuple[float, ...]) -> Callable[[Bench], int]:
-    """Make the default length of plateaus on `levels`, in the output's unit."""
+    """Return a function for the default length of plateaus on `levels` in the output's unit."""
 
     def samples(bench: Bench) -> int:
         least = math.ceil(MIN_SAMPLES / len(levels))

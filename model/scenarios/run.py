@@ -1,4 +1,4 @@
-"""What a scenario works on: the core that it drives, one call of it, and what it makes."""
+"""Inputs and outputs of a scenario: the core it drives, one call, and the resulting signals."""
 
 from __future__ import annotations
 
@@ -9,20 +9,21 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from sosmith.model.arrays import Codes, Values
 from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.errors import SpecificationError
-from sosmith.model.port import Codes, Port, Values
+from sosmith.model.port import Port
 
 MIN_SAMPLES = 4000
-"""Samples that a trace has at least, unless its length is given."""
+"""Lowest default number of samples of a trace."""
 
 MAX_SAMPLES = 60_000
-"""Samples that a trace has at most, unless its length is given: a co-simulation of tens of seconds."""
+"""Highest default number of samples of a trace: a co-simulation of tens of seconds."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Bench:
-    """What a scenario needs to know of the core.
+    """Properties of the core that a scenario needs.
 
     Attributes
     ----------
@@ -30,22 +31,21 @@ class Bench:
         Inputs: voltage in V and, if there are two, temperature in degC for an instrument; any one input
         for a plain filter.
     output : Port
-        Output; its LSB says when the filter has settled.
+        Output; the filter counts as settled within half its LSB.
     sample_rate : Fraction
         Samples per second.
     polynomial : Polynomial, optional
-        Calibration; without it the core is a plain filter.
+        Calibration; None for a plain filter.
     impulse_response : ndarray, shape (n,)
-        Impulse response of the ideal filter, long enough for the rest not to matter; ``[1.0]`` for a
-        core without a filter.
+        Impulse response of the ideal filter, up to a negligible remainder; ``[1.0]`` for a core without a filter.
     error_responses : tuple of ndarray, shape (m,)
-        Impulse response from each rounding inside the filter to its output; none for a core without a filter.
+        Impulse response from each quantizer inside the filter to its output; empty for a core without a filter.
 
     Raises
     ------
     ValueError
-        If the count of ports does not fit, an impulse response is empty or not finite, or the sample
-        rate is not positive.
+        If the number of ports is wrong, an impulse response is empty or not finite, or the sample rate is not
+        positive.
     """
 
     ports: tuple[Port, ...]
@@ -73,10 +73,10 @@ class Bench:
         return "filter" if self.polynomial is None else "instrument"
 
     def settling(self, step: float) -> int:
-        """Count the samples after a step of the input until the output stays within half an output LSB.
+        """Return the samples from an input step until the output stays within half an output LSB of its final value.
 
-        `step` is in the output's unit. The response differs from its last value by at most `step`
-        times the sum of the magnitudes of the impulse response still to come.
+        `step` is in the output's unit. The output differs from its final value by at most `step` times the sum of the
+        magnitudes of the remaining impulse response.
         """
         to_come = np.cumsum(np.abs(self.impulse_response[::-1]))[::-1]
         return int(np.count_nonzero(to_come[1:] * step > float(self.output.lsb) / 2))
@@ -84,18 +84,18 @@ class Bench:
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """One call of a scenario: where, how long, and the source of all chance.
+    """One call of a scenario: its core, length and source of randomness.
 
     Attributes
     ----------
     name : str
-        The scenario's.
+        Name of the scenario.
     bench : Bench
         The core.
     samples : int
         Length of the trace, at least 1.
     rng : Generator
-        Where all noise comes from.
+        Source of all randomness.
     """
 
     name: str
@@ -105,7 +105,7 @@ class Run:
 
     @cached_property
     def progress(self) -> Values:
-        """0 at the first sample, 1 at the last, shape (n,)."""
+        """Linear ramp from 0 at the first sample to 1 at the last, shape (n,)."""
         return np.arange(self.samples) / max(self.samples - 1, 1)
 
     @property
@@ -114,11 +114,11 @@ class Run:
         return np.arange(self.samples) / float(self.bench.sample_rate)
 
     def between(self, ends: tuple[float, float]) -> Values:
-        """Draw a straight line over the whole trace, shape (n,)."""
+        """Return a linear ramp between `ends` over the whole trace, shape (n,)."""
         return ends[0] + (ends[1] - ends[0]) * self.progress
 
     def refuse_length(self, least: int, why: str) -> SpecificationError:
-        """Make the error about a trace that must have at least `least` samples; `why` goes in parentheses."""
+        """Return the error for a trace with fewer than `least` samples; `why` is the reason, in parentheses."""
         rate = float(self.bench.sample_rate)
         return SpecificationError(
             f"seconds must be at least {least / rate:.6g} for {self.name} ({why}), not {self.samples / rate:.6g}"
@@ -127,15 +127,16 @@ class Run:
 
 @dataclass(frozen=True, eq=False)
 class Emulated:
-    """What a scenario makes.
+    """Signals generated by a scenario.
 
     Attributes
     ----------
     codes : ndarray of int64, shape (n, n_inputs)
+        Input codes of the core.
     truth : ndarray, shape (n,), optional
-        In the unit of the core's output.
+        True values, in the unit of the core's output.
     reading : ndarray of bool, shape (n,), optional
-        The samples at which truth and measurement are compared.
+        Samples at which the measurement is compared with `truth`.
     """
 
     codes: Codes

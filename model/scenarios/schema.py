@@ -1,4 +1,4 @@
-"""Shape of a scenario file: its tables, their keys, and what each key takes. To add a key, add it to its table."""
+"""Format of a scenario file: its tables, their keys and permitted values. To add a key, add it to its table."""
 
 from __future__ import annotations
 
@@ -10,36 +10,40 @@ from pydantic import Field, model_validator
 from sosmith.model.tables.toml_tables import Table, UnfitKeyError, shown
 
 MIN_CLEARANCE = 0.01
+"""Smallest clearance in mm: above 0, where accuracy in per cent is undefined."""
+
 MAX_CLEARANCE = 25.0
-"""Least and largest clearance in mm; the paper's sensor ends at 10.5, and accuracy has no meaning at 0."""
+"""Largest clearance in mm; the paper's sensor ends at 10.5."""
 
 TEMPERATURES = (-40.0, 400.0)
-"""Lowest and highest temperature in degC: a winter night, and twice what tread braking reaches (200 degC)."""
+"""Lowest and highest temperature in degC: a winter night, and twice the 200 degC of tread braking."""
 
 MAX_DAY = 36_500.0
+"""Largest number of a day: a hundred years."""
+
 MAX_SECONDS = 1e6
 """Longest excerpt in s."""
 
 MOVING = ("tangent", "curve", "braking")
-"""Operations during which the vehicle runs."""
+"""Operations during which the vehicle moves."""
 
 Operation = Literal["bench", "depot", "tangent", "curve", "braking"]
 
 
 def quantity(unit: str, low: float, high: float, default: Any = ...) -> Any:
-    """Field of a number of `unit` from `low` to `high`."""
+    """Return a field for a number of `unit` from `low` to `high`."""
     what = f"a number of {unit}" if unit else "a number"
     return Field(default, ge=low, le=high, description=f"{what} from {low:g} to {high:g}")
 
 
 def numbers(unit: str, low: float, high: float, default: Any = ..., least: int = 1, most: int = 1000) -> Any:
-    """Field of a list of numbers."""
+    """Return a field for a list of `least` to `most` numbers of `unit` from `low` to `high`."""
     what = f"a list of {least} to {most} numbers of {unit} from {low:g} to {high:g}"
     return Field(default, min_length=least, max_length=most, strict=False, description=what)
 
 
 def table(default: Any, what: str) -> Any:
-    """Field of a table with defaults."""
+    """Return a field for a table with defaults."""
     return Field(default_factory=default, description=f"a table {what}")
 
 
@@ -132,7 +136,7 @@ class SensorsTable(Table):
 
 
 class WearTable(Table):
-    """``[wear]``, or ``[[channel]]``: initial clearance and growth, by a rate or by breakpoints."""
+    """``[wear]`` or ``[[channel]]``: initial clearance, and wear by a rate or by breakpoints."""
 
     initial_clearance: float = quantity("mm", MIN_CLEARANCE, MAX_CLEARANCE)
     rate: float | None = quantity("mm per day", 0.0, 10.0, None)
@@ -149,15 +153,15 @@ class WearTable(Table):
             found = ", ".join(ways) or "none of them"
             raise UnfitKeyError("", "given by one of rate, rate_per_1000_km and history", found)
         if (self.rate_per_1000_km is None) != (self.km_per_day is None):
-            raise UnfitKeyError("km_per_day", "given beside rate_per_1000_km, and only there", shown(self.km_per_day))
+            raise UnfitKeyError("km_per_day", "given if and only if rate_per_1000_km is given", shown(self.km_per_day))
         days = [day for day, _ in self.history or ()]
         if sorted(set(days)) != days:
-            raise UnfitKeyError("history", "a list whose days rise", shown(days))
+            raise UnfitKeyError("history", "a list of pairs with rising days", shown(days))
         return self
 
 
 class CalibrationTable(Table):
-    """``[calibration]``: the measurements that are taken by hand in the depot."""
+    """``[calibration]``: the measurements taken by hand in the depot."""
 
     days: tuple[Day, ...] = numbers("days", 0.0, MAX_DAY)
     clearances: tuple[Clearance, ...] = numbers("mm", MIN_CLEARANCE, MAX_CLEARANCE)
@@ -169,7 +173,7 @@ class CalibrationTable(Table):
     @model_validator(mode="after")
     def _check(self) -> Self:
         if self.repeats > 1 and not self.scatter:
-            # The store takes a measurement that is there already for the same one, entered twice.
+            # The store rejects equal measurements as duplicates.
             raise UnfitKeyError("repeats", "1 where scatter is 0", shown(self.repeats))
         for name in ("days", "clearances", "temperatures"):
             values = getattr(self, name)
@@ -193,14 +197,14 @@ class FaultTable(Table):
         if self.kind == "open" and self.sensor != "thermocouple":
             raise UnfitKeyError("kind", "missing or stuck for the inductive sensor", "'open'")
         if (self.kind == "missing") != (self.share is not None):
-            raise UnfitKeyError("share", 'given if kind is "missing", and only then', shown(self.share))
+            raise UnfitKeyError("share", 'given if and only if kind is "missing"', shown(self.share))
         if self.code is not None and self.kind != "stuck":
-            raise UnfitKeyError("code", "there only where kind is stuck", shown(self.code))
+            raise UnfitKeyError("code", 'given only if kind is "stuck"', shown(self.code))
         return self
 
 
 class ExcerptTable(Table):
-    """``[[excerpt]]``: some time out of a day."""
+    """``[[excerpt]]``: a period of time on one day."""
 
     day: float = quantity("days", 0.0, MAX_DAY, 0.0)
     operation: Operation = Field(description=one_of("bench", "depot", *MOVING))
@@ -225,16 +229,16 @@ class ExcerptTable(Table):
     @model_validator(mode="after")
     def _check(self) -> Self:
         if self.time_constant is not None and self.temperature_to is None:
-            raise UnfitKeyError("time_constant", "there only beside temperature_to", shown(self.time_constant))
+            raise UnfitKeyError("time_constant", "given only together with temperature_to", shown(self.time_constant))
         if self.motion and self.motion_from is not None:
-            raise UnfitKeyError("motion_from", "missing where motion is given", shown(self.motion_from))
+            raise UnfitKeyError("motion_from", "left out where motion is given", shown(self.motion_from))
         moved = [key for key in ("motion", "motion_from", "vibration") if getattr(self, key)]
         if moved and self.operation not in MOVING:
             raise UnfitKeyError(
-                moved[0], f"missing where operation is {self.operation}", shown(getattr(self, moved[0]))
+                moved[0], f"left out where operation is {self.operation}", shown(getattr(self, moved[0]))
             )
         if self.clearances is not None and self.operation in MOVING:
-            raise UnfitKeyError("clearances", f"missing where operation is {self.operation}", shown(self.clearances))
+            raise UnfitKeyError("clearances", f"left out where operation is {self.operation}", shown(self.clearances))
         return self
 
 
@@ -242,7 +246,7 @@ class ScenarioDocument(Table):
     """The whole file."""
 
     description: str = Field(min_length=1, max_length=200, description="a text of 1 to 200 characters")
-    start: datetime.date = Field(datetime.date(2024, 1, 1), description="a date as 2024-03-01, that of day 0")
+    start: datetime.date = Field(datetime.date(2024, 1, 1), description="a date such as 2024-03-01, that of day 0")
     sensors: SensorsTable = Field(description="a table [sensors]")
     wear: WearTable | None = Field(None, description="a table [wear]")
     channel: tuple[WearTable, ...] = Field((), strict=False, description="tables [[channel]], one for each channel")
@@ -254,11 +258,11 @@ class ScenarioDocument(Table):
     @model_validator(mode="after")
     def _check(self) -> Self:
         if self.wear is not None and self.channel:
-            raise UnfitKeyError("channel", "missing where [wear] is given", shown(self.channel))
+            raise UnfitKeyError("channel", "left out where [wear] is given", shown(self.channel))
         if self.start.toordinal() + MAX_DAY > datetime.date.max.toordinal():
             latest = datetime.date.fromordinal(datetime.date.max.toordinal() - int(MAX_DAY))
-            raise UnfitKeyError("start", f"a date until {latest}, so that the last day is one too", shown(self.start))
+            raise UnfitKeyError("start", f"a date up to {latest}, so that every day has a date", shown(self.start))
         wearing = [k for k, excerpt in enumerate(self.excerpt) if excerpt.clearances is None]
         if wearing and self.wear is None and not self.channel:
-            raise UnfitKeyError(f"excerpt[{wearing[0]}].clearances", "there where there is no [wear]", "missing")
+            raise UnfitKeyError(f"excerpt[{wearing[0]}].clearances", "given where there is no [wear]", "missing")
         return self

@@ -1,4 +1,4 @@
-"""The vehicle's motion as a scenario file takes it: change of the clearance at one sensor, at the paper's speed."""
+"""Vehicle motion for scenario files: the change of clearance at one sensor, at the paper's speed."""
 
 from __future__ import annotations
 
@@ -6,41 +6,41 @@ from dataclasses import replace
 
 import numpy as np
 
-from sosmith.model.port import Values
+from sosmith.model.arrays import Values
 from sosmith.model.vehicle.parameters import built_in
 from sosmith.model.vehicle.run import run
 from sosmith.model.vehicle.track import curved_track, tangent_track
 
 SPEED = 20.0
-"""Of the vehicle in m/s, as in section 5.1 of the paper."""
+"""Speed of the vehicle in m/s, as in section 5.1 of the paper."""
 
 IRREGULARITY = "low"
 """Level of the random irregularities."""
 
 WHEELSET = 0
-"""Wheelset whose right flange the sensor faces: the leading one."""
+"""Index of the wheelset whose right flange the sensor faces: the leading one."""
 
 MIN_RATE = 1.0
-"""Lowest sample rate in Hz that the model takes."""
+"""Lowest sample rate in Hz of the vehicle model."""
 
 
 def vehicle_clearance(track: str, time: Values, seed: int) -> Values:
-    """Change of the clearance in mm on the track "paper", its curve, or "tangent", shape as `time`.
+    """Return the change of the clearance in mm on the paper's curve or on tangent track, of the shape of `time`.
 
-    Where the time goes on behind the end of the track, so does the track, straight.
+    The track is extended straight as far as `time` requires.
 
     Parameters
     ----------
     track : {"paper", "tangent"}
     time : ndarray, shape (n,)
-        In s, equally spaced from 0.
+        Time in s, equally spaced from 0.
     seed : int
-        Of the random irregularities, 0 or more.
+        Seed of the random irregularities, 0 or more.
 
     Raises
     ------
     SpecificationError
-        As `sosmith.model.vehicle.run.run`.
+        As for `sosmith.model.vehicle.run.run`.
     """
     parameters = built_in()
     rate = (len(time) - 1) / time[-1] if len(time) > 1 else MIN_RATE

@@ -1,4 +1,4 @@
-"""Inputs that drive a filter's output, or the way of an error to it, as far as any input can."""
+"""Worst-case inputs: those that maximize a filter's output, or the response of an error path to it."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from sosmith.model.arrays import Codes, Values
 from sosmith.model.calibration.polynomial import Polynomial
-from sosmith.model.port import Codes, Values
 from sosmith.model.scenarios.run import MAX_SAMPLES, MIN_SAMPLES, Bench, Emulated, Run
 
 STRONG_PART = 0.999
-"""Share of an impulse response's magnitudes that a worst case of the error paths keeps: the rest is a long tail."""
+"""Share of the sum of an impulse response's magnitudes that is kept; the rest is a long tail."""
 
 
 def sign_matched(response: Values) -> npt.NDArray[np.bool_]:
-    """Tell at which samples an input must be at its high end to drive what has this impulse response furthest.
+    """Return at which samples an input must be at its high end to maximize the output with this impulse response.
 
-    The pattern is that of the signs of the reversed response, so that at its last sample every term
-    ``h[k] x[n - k]`` is at its largest, followed by the same with the ends exchanged.
+    The pattern follows the signs of the reversed response, so that at its last sample every term ``h[k] x[n - k]`` is
+    at its maximum. The same pattern with low and high exchanged follows.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ def sign_matched(response: Values) -> npt.NDArray[np.bool_]:
 
 
 def worst_cases(run: Run, responses: Sequence[Values]) -> Emulated:
-    """Drive to the extremes in the patterns of `responses` in turn, over and over; long ones lose their tails."""
+    """Repeat the patterns of `responses` in turn, at the extreme codes; long responses lose their tails."""
     low, high = _extreme_codes(run.bench)
     most = max(run.samples // (2 * len(responses)), 1)
     pattern = np.concatenate([sign_matched(response[:most]) for response in responses])
@@ -43,33 +43,33 @@ def worst_cases(run: Run, responses: Sequence[Values]) -> Emulated:
 
 
 def worst_cases_samples(responses: Sequence[Values]) -> int:
-    """Count the samples in which `worst_cases` shows whole patterns."""
+    """Return the number of samples in which `worst_cases` completes every pattern."""
     patterns = 2 * len(responses) * max(map(len, responses))
     return min(patterns * math.ceil(MIN_SAMPLES / patterns), MAX_SAMPLES)
 
 
 def _strong(response: Values) -> Values:
-    """First part of a response that holds `STRONG_PART` of its magnitudes."""
+    """Return the beginning of a response, up to `STRONG_PART` of the sum of its magnitudes."""
     so_far = np.cumsum(np.abs(response))
     return response[: int(np.searchsorted(so_far, STRONG_PART * so_far[-1])) + 1]
 
 
 def all_responses(bench: Bench) -> list[Values]:
-    """Responses to the input and to every rounding, each without its long tail."""
+    """Return the responses to the input and to every quantizer, each without its long tail."""
     return [_strong(response) for response in (bench.impulse_response, *bench.error_responses)]
 
 
 def _extreme_codes(bench: Bench) -> tuple[Codes, Codes]:
-    """Input codes, shape (n_inputs,), that give the filter its lowest and its highest input."""
+    """Return the input codes, shape (n_inputs,), that give the lowest and the highest filter input."""
     if bench.polynomial is None:
         return np.array([bench.ports[0].lowest]), np.array([bench.ports[0].highest])
     return _lowest_codes(bench, bench.polynomial, 1.0), _lowest_codes(bench, bench.polynomial, -1.0)
 
 
 def _lowest_codes(bench: Bench, polynomial: Polynomial, sign: float) -> Codes:
-    """Codes that minimise ``sign * polynomial``: a grid over all codes, then ever finer ones around its best.
+    """Return the codes that minimize ``sign * polynomial``: on a grid over all codes, then on finer grids.
 
-    With 257 points per axis the first grid tells the valleys of a polynomial of low order apart.
+    With 257 points per axis, the first grid separates the valleys of a low-order polynomial.
     """
     low = np.array([port.lowest for port in bench.ports])
     high = np.array([port.highest for port in bench.ports])

@@ -9,17 +9,17 @@ The recursion is split into a multiplier-free integer part and products whose co
              - k1 e(n-1) - k2 e(n-2) + h (1 + k1 + k2)
     y(n) = floor(v(n)),  e(n) = v(n) - y(n)
 
-with h half an LSB of y. The constant makes the quantizer round on average: it centres the error, and
-it vanishes where the error feedback has a zero at z = 1, so that there dropping bits costs nothing.
-Where (m1, m2) = (k1, k2), the state y + e is v itself, one register and one addition.
+with h half an LSB of y. The constant centres the error, so that the quantizer rounds on average. It vanishes where
+the error feedback has a zero at z = 1: dropping bits costs nothing there. Where (m1, m2) = (k1, k2), the state y + e is
+v itself, one register and one addition.
 
-For a low-pass section with unity gain at zero frequency, two products do::
+A low-pass section with unity gain at zero frequency needs two products only::
 
     v(n) = 2 v(n-1) - v(n-2) - A1 (y(n-1) - y(n-2)) + A2 ((x(n) + 2 x(n-1) + x(n-2)) / 4 - y(n-2))
     A1 = 2 + a1,  A2 = 1 + a1 + a2
 
-The tap sum of a product may be quantized too, with first-order error feedback: it then fits the operand of a
-hardware multiplier, and because c_i is small and the error differenced, next to nothing of it reaches the output.
+The tap sum of a product may be quantized too, with first-order error feedback, to fit the operand of a hardware
+multiplier. As c_i is small and the error is differenced, next to nothing of it reaches the output.
 
 A1 and A2 keep their relative precision in few bits however low the cutoff, and the gain at zero
 frequency is exactly one whatever they are rounded to.
@@ -57,9 +57,9 @@ class Product:
     shift : int
         Right shift of the tap sum, exact.
     kept : int or None
-        Fraction bits kept of the tap sum, what is dropped being added at the next sample; None keeps all.
+        Fraction bits that are kept of the tap sum; what is dropped is added at the next sample. None keeps all.
     range : tuple of int or None
-        Smallest and largest code of the tap sum before bits are dropped, known from peak gains.
+        Smallest and largest code of the tap sum before bits are dropped, from peak gains.
     """
 
     name: str
@@ -89,7 +89,7 @@ class Product:
 
     @property
     def is_sum(self) -> bool:
-        """Whether there is more than one tap."""
+        """Whether it has more than one tap."""
         return sum(map(bool, (*self.x, *self.y))) > 1
 
 
@@ -112,7 +112,7 @@ class DirectForm1:
     y_frac : int
         Fraction bits of the output.
     v_low, v_high : int
-        Range of the code of v, known from peak gains; v has `total_frac` fraction bits.
+        Range of the code of v, from peak gains; v has `total_frac` fraction bits.
     """
 
     name: str
@@ -167,7 +167,7 @@ class DirectForm1:
         v1 = g.delay("v1", frac, self.v_low, self.v_high)
         past = [v1, g.previous(v1, "v2")] if self._order > 1 else [v1]
         taps_y = [g.floor(v, self.y_frac, f"y{i}") for i, v in enumerate(past, start=1)]
-        # Products that need y(n-1) are known last and are added last.
+        # Products that need y(n-1) are ready last and are added last.
         products: list[tuple[bool, tuple[int, Wire]]] = []
         for product in self.products:
             taps = [*zip(product.x, taps_x, strict=False), *zip(product.y, taps_y, strict=False)]
@@ -195,7 +195,7 @@ class DirectForm1:
 
     @property
     def optional_quantizers(self) -> tuple[str, ...]:
-        """Names of the nodes of which bits may be dropped without need."""
+        """Names of the nodes that may be quantized but need not be."""
         return tuple(p.operand for p in self.products if p.is_sum)
 
     @property
@@ -215,7 +215,7 @@ class DirectForm1:
 
 
 def _operand(g: GraphBuilder, product: Product, taps: Wire) -> Wire:
-    """State the range of a tap sum and drop those of its bits that are not kept."""
+    """State the range of a tap sum, and drop the bits that are not kept."""
     frac = g[taps].frac
     kept = frac if product.kept is None else min(frac, product.kept)
     if kept < frac:

@@ -1,8 +1,8 @@
 """The bivariate calibration polynomial in integers, by nested Horner.
 
-The variables arrive as ADC codes read as fractions: ``u = code * 2**-bits``, so that |u| <= 1 whatever
-the physical range, and every coefficient has the same weight in the error. Rows are evaluated in the
-second variable, all at once, then the result in the first::
+The variables are ADC codes read as fractions, ``u = code * 2**-bits``, so that |u| <= 1 whatever the
+physical range, and every coefficient has the same weight in the error. All rows are evaluated in the second
+variable at once, then their results in the first::
 
     r_i = (.. (c_in t + c_i(n-1)) t + ..) t + c_i0        one stage for each power of t
     d   = (.. (r_m u + r_(m-1)) u + ..) u + r_0           one stage for each power of u
@@ -20,7 +20,7 @@ from sosmith.model.dataflow.graph import Graph, GraphBuilder, Node, Wire
 
 @dataclass(frozen=True, kw_only=True)
 class Variable:
-    """An input of the polynomial: its name, width in bits, and whether the code is signed."""
+    """An input of the polynomial: name, width in bits, and whether its code is signed."""
 
     name: str
     bits: int
@@ -39,7 +39,7 @@ class Variable:
 
 @dataclass(frozen=True)
 class HornerStep:
-    """One pipeline stage of the polynomial."""
+    """One stage of the polynomial; a stage of a datapath."""
 
     name: str
     graph: Graph
@@ -73,7 +73,7 @@ class HornerPolynomial:
 
     @cached_property
     def stages(self) -> tuple[HornerStep, ...]:
-        """The pipeline stages, in order; the last one's output is the polynomial's value."""
+        """The stages, in order; the output of the last one is the value of the polynomial."""
         steps: list[HornerStep] = []
         rows: dict[int, Node] = {}  # rows that hold a computed value, not just their constant yet
         for power in range(max(map(len, self.coefficients)) - 1, 0, -1):
@@ -92,7 +92,7 @@ class HornerPolynomial:
         return g.constant(self.coefficients[i][j], self.frac, f"c{i}{j}")
 
     def _row_step(self, rows: dict[int, Node], power: int) -> HornerStep:
-        """Multiply every row that has got so far by t and add the coefficient of ``t**(power - 1)``."""
+        """Multiply every row of degree `power` or more by t, and add the coefficient of ``t**(power - 1)``."""
         g = GraphBuilder()
         u, t = self._variable(g, 0), self._variable(g, 1)
         so_far = _row_inputs(g, rows)
@@ -105,7 +105,7 @@ class HornerPolynomial:
         return _step(g, f"row_power{power}", keep, so_far, rows)
 
     def _column_step(self, rows: dict[int, Node], power: int, *, first: bool) -> HornerStep:
-        """Multiply the top row by u and add the row below; hand the rest on."""
+        """Multiply the top row by u and add the row below; pass the other rows on."""
         g = GraphBuilder()
         u = self._variable(g, 0)
         if first and len(self.variables) > 1:
@@ -127,7 +127,7 @@ def _row_inputs(g: GraphBuilder, rows: dict[int, Node]) -> dict[int, Wire]:
 
 
 def _step(g: GraphBuilder, name: str, keep: list[Wire], so_far: dict[int, Wire], rows: dict[int, Node]) -> HornerStep:
-    """Close a stage and leave in `rows` what it hands on."""
+    """Finish a stage, and set `rows` to those that it passes on."""
     rows.clear()
     rows.update({i: g[wire] for i, wire in sorted(so_far.items())})
     return HornerStep(name, g.build([*keep, *(wire for _, wire in sorted(so_far.items()))]))

@@ -18,9 +18,9 @@ a small rest, and only the rest is multiplied by. For poles near z = 1 or z = -1
 them to a small fraction of their distance from there.
 
 The waves that enter a delay, and the one that the inner section reflects, are truncated towards zero. An adaptor
-gains no energy, ``G1 a1**2 + G2 a2**2`` with port conductances in the ratio 1 - g to 1 + g, and nothing gains
-any by truncation: without input a section comes to rest (Fettweis 1986). What leaves a section is not part of
-any loop; it is rounded to nearest.
+gains no energy, ``G1 a1**2 + G2 a2**2`` with port conductances in the ratio 1 - g to 1 + g, and truncation adds
+none: without input a section comes to rest (Fettweis 1986). The output of a section is not part of any loop; it is
+rounded to nearest.
 """
 
 from __future__ import annotations
@@ -31,19 +31,11 @@ from fractions import Fraction
 from functools import cached_property
 from typing import NamedTuple
 
-from sosmith.model.dataflow.graph import Graph, GraphBuilder, Wire
+from sosmith.model.dataflow.graph import Graph, GraphBuilder, Range, Wire
 from sosmith.model.sections.state_space import Coefficient
 
 LANES = ("upper", "lower")
-"""Names of the two branches, and of the waves on them."""
-
-
-class Format(NamedTuple):
-    """Fraction bits, smallest and largest code of a signal."""
-
-    frac: int
-    low: int
-    high: int
+"""Names of the branches, and of the waves on them."""
 
 
 class Adaptor(NamedTuple):
@@ -60,24 +52,24 @@ class Adaptor(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Allpass:
-    """An allpass section of first or second order, with its words.
+    """An allpass section of first or second order, with the formats of its signals.
 
     Attributes
     ----------
     adaptors : tuple of Adaptor
-        The only one, or the outer and the inner.
-    states : tuple of Format
-        Of the wave in each adaptor's delay.
-    inner : Format
-        Of the wave that the inner adaptor reflects; unused without one.
-    output : Format
-        Of what leaves the section.
+        The only adaptor, or the outer and the inner one.
+    states : tuple of Range
+        Range of the wave in each adaptor's delay.
+    inner : Range
+        Range of the wave that the inner adaptor reflects; unused without one.
+    output : Range
+        Range of the output.
     """
 
     adaptors: tuple[Adaptor, ...]
-    states: tuple[Format, ...]
-    inner: Format
-    output: Format
+    states: tuple[Range, ...]
+    inner: Range
+    output: Range
 
     def __post_init__(self) -> None:
         if len(self.adaptors) not in {1, 2} or len(self.states) != len(self.adaptors):
@@ -107,13 +99,13 @@ class LatticeStage:
         Name of the stage.
     lanes : tuple of Allpass or None
         The sections in the upper and in the lower branch; None for a wire.
-    entries : tuple of Format
-        Of the two waves that arrive, or of the one that drives both branches.
+    entries : tuple of Range
+        Ranges of the two waves that arrive, or of the one that drives both branches.
     """
 
     name: str
     lanes: tuple[Allpass | None, Allpass | None]
-    entries: tuple[Format, ...]
+    entries: tuple[Range, ...]
 
     @cached_property
     def coefficients(self) -> dict[str, tuple[int, int]]:
@@ -134,8 +126,9 @@ class LatticeStage:
     def graph(self) -> Graph:
         """The stage as a dataflow graph with the outputs ``upper_y`` and ``lower_y``.
 
-        The quantized waves of a section are named ``upper_x1_sum``, ``upper_x2_sum``, ``upper_inner_sum`` and
-        ``upper_y_sum``, what is kept of them ``upper_x1_next``, ``upper_x2_next``, ``upper_inner`` and ``upper_y``.
+        The waves of a section before their quantizers are named ``upper_x1_sum``, ``upper_x2_sum``,
+        ``upper_inner_sum`` and ``upper_y_sum``, and behind them ``upper_x1_next``, ``upper_x2_next``, ``upper_inner``
+        and ``upper_y``.
         """
         g = GraphBuilder()
         names = ("x",) if len(self.entries) == 1 else LANES
@@ -158,13 +151,13 @@ class LatticeJoin:
         Name of the stage.
     signs : tuple of int
         s0 and s1, each 1 or -1.
-    entries : tuple of Format
-        Of the two waves that arrive.
+    entries : tuple of Range
+        Ranges of the two waves that arrive.
     """
 
     name: str
     signs: tuple[int, int]
-    entries: tuple[Format, Format]
+    entries: tuple[Range, Range]
 
     @property
     def coefficients(self) -> dict[str, tuple[int, int]]:
@@ -211,7 +204,7 @@ def _section(g: GraphBuilder, x: Wire, section: Allpass, lane: str) -> Wire:
 
 
 def _adaptor(g: GraphBuilder, a1: Wire, a2: Wire, adaptor: Adaptor, name: str) -> tuple[Wire, Wire]:
-    """Return b1 and b2. As b1 - b2 = a2 - a1, one of them is close to a wave that arrives, the other follows."""
+    """Return b1 and b2: the one that is close to a wave that arrives, and the other from b1 - b2 = a2 - a1."""
     difference = g.subtract(a2, a1)
     product = _product(g, difference, adaptor.rest, name)
     if adaptor.near > 0:
@@ -224,7 +217,7 @@ def _adaptor(g: GraphBuilder, a1: Wire, a2: Wire, adaptor: Adaptor, name: str) -
 
 
 def _product(g: GraphBuilder, wire: Wire, by: Coefficient, name: str) -> Sequence[tuple[int, Wire]]:
-    """Sign and what is to be added or subtracted; nothing for a coefficient of zero."""
+    """Return the product of `wire` with a coefficient as a sign and a wire, or nothing for a coefficient of zero."""
     size = abs(by.integer)
     if not size:
         return []

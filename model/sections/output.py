@@ -1,4 +1,4 @@
-"""The last stage: from output LSBs with guard bits to the output code, limited to its range."""
+"""The last stage of a datapath: from output LSBs with guard bits to the output code, limited to its range."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from sosmith.model.dataflow.graph import Graph, GraphBuilder
 
 @dataclass(frozen=True, kw_only=True)
 class OutputStage:
-    """Subtract the code of the range's lower end, round to whole output LSBs, saturate.
+    """Adds an offset, rounds to whole output LSBs, and saturates; a stage of a datapath.
 
     Attributes
     ----------
     offset, offset_frac : int
-        What is added before rounding, in units of ``2**-offset_frac`` output LSBs.
+        What is added before rounding: minus the lower end of the range, in units of ``2**-offset_frac`` output LSBs.
     x_frac, x_low, x_high : int
         Fraction bits and range of the input's code, in output LSBs.
     low, high : int

@@ -1,4 +1,4 @@
-"""State-space sections in integers: one quantizer at each state and one at the output.
+"""State-space sections in integers, with a quantizer at each state and one at the output.
 
 With the input u, the states x and the output y::
 
@@ -48,7 +48,7 @@ class StateSpace:
     a : tuple of tuple of Coefficient
         Rows of A, the diagonal without its integer part; one row for each state.
     integer_part : tuple of int
-        What the diagonal of A has besides; each 0, 1 or -1.
+        Integer part of the diagonal of A; each 0, 1 or -1.
     b, c : tuple of Coefficient
         One for each state.
     d : Coefficient
@@ -60,11 +60,11 @@ class StateSpace:
     x_fracs : tuple of int
         Fraction bits of the states.
     x_ranges : tuple of tuple of int
-        Smallest and largest code of each state, known from peak gains.
+        Smallest and largest code of each state, from peak gains.
     y_frac : int
         Fraction bits of the output.
     y_range : tuple of int
-        Smallest and largest code of the output, likewise.
+        Smallest and largest code of the output, from peak gains.
     """
 
     name: str
@@ -111,7 +111,7 @@ class StateSpace:
 
     @property
     def optional_quantizers(self) -> tuple[str, ...]:
-        """Names of the nodes of which bits may be dropped without need: none."""
+        """Names of the nodes that may be quantized but need not be: none."""
         return ()
 
     @property
@@ -132,7 +132,7 @@ class StateSpace:
     def graph(self) -> Graph:
         """The section as a dataflow graph with the input ``u`` and the output ``y``.
 
-        The quantized sums are named ``x1_sum``, ``x2_sum`` and ``y_sum``, what is kept of them ``x1_next``,
+        The sums before their quantizers are named ``x1_sum``, ``x2_sum`` and ``y_sum``, and behind them ``x1_next``,
         ``x2_next`` and ``y``.
         """
         g = GraphBuilder()
@@ -154,7 +154,7 @@ class StateSpace:
 
 
 _Term = tuple[int, Wire]
-"""Sign and what is added or subtracted."""
+"""Sign of a summand, and its wire."""
 
 
 def _products(g: GraphBuilder, factors: Sequence[tuple[str, Coefficient, Wire]]) -> list[_Term]:

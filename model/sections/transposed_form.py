@@ -14,11 +14,11 @@ of s1. A first-order section has s1 alone.
 
 The quantization errors reach the output through ``(1 - g w)**2 / A`` from y, ``w (1 - g w) / A`` from s1 and
 ``Delta w**2 / A`` from s2, with ``w = 1 / z``; one power of ``1 - g w`` less in a first-order section. (Delta
-form of Kauraniemi, Laakso, Hartimo and Ovaska 1998.) A half before the quantizer centres the error, where
-the path does not have a zero at z = 1 already.
+form of Kauraniemi, Laakso, Hartimo and Ovaska 1998.) A half is added before a quantizer to centre its error, unless
+the path has a zero at z = 1 already.
 
-With exact states and g = 0 or 1, the output is bit for bit that of the direct form I with the error feedback
-``(-2 g, g**2)``, or ``(-g, 0)`` in a first-order section: `TransposedForm.direct`.
+With exact states and g = 0 or 1, the output equals that of the direct form I with the error feedback
+``(-2 g, g**2)``, or ``(-g, 0)`` in a first-order section, bit for bit: `TransposedForm.direct`.
 """
 
 from __future__ import annotations
@@ -44,21 +44,21 @@ class TransposedForm:
     name : str
         Name of the section.
     products : tuple of Product
-        The coefficients with their taps in the direct form; each is multiplied with x and with y if it taps both.
+        The coefficients with their taps in the direct form; one that taps both x and y is multiplied with each.
     integer_part : tuple of int
         (m1, m2), the multiplier-free part of (a1, a2).
     operator : int
-        g above: 0, 1 or -1.
+        The g above: 0, 1 or -1.
     delta_exponent : int
-        Delta is two to this power.
+        Base-2 logarithm of Delta.
     x_frac, x_low, x_high : int
         Fraction bits and range of the input's code.
     y_frac : int
         Fraction bits of the output.
     state_fracs : tuple of int or None
-        Fraction bits that s1 and s2 keep at most; None keeps all.
+        Most fraction bits that s1 and s2 keep; None keeps all.
     v_range, t1_range, t2_range : tuple of int
-        Ranges of the codes of y, s1 and s2 before their quantizers, known from peak gains.
+        Ranges of the codes of y, s1 and s2 before their quantizers, from peak gains.
     """
 
     name: str
@@ -78,11 +78,11 @@ class TransposedForm:
     def __post_init__(self) -> None:
         if self.operator not in {-1, 0, 1}:
             raise ValueError(f"operator must be -1, 0 or 1, not {self.operator!r}")
-        assert self.direct.is_stable  # its construction refuses what is not
+        assert self.direct.is_stable  # its constructor refuses unstable coefficients
 
     @property
     def order(self) -> int:
-        """1 or 2."""
+        """Order of the section, 1 or 2."""
         return 2 if self.integer_part[1] or any(p.y[1] or p.x[2] for p in self.products) else 1
 
     @property
@@ -92,12 +92,12 @@ class TransposedForm:
 
     @property
     def optional_quantizers(self) -> tuple[str, ...]:
-        """Names of the nodes of which bits may be dropped without need: none."""
+        """Names of the nodes that may be quantized but need not be: none."""
         return ()
 
     @cached_property
     def direct(self) -> DirectForm1:
-        """The direct form I with the same coefficients, the same formats of x and y, and the same error path of y."""
+        """The direct form I with the same coefficients, formats of x and y, and error path of y."""
         g = self.operator
         section = DirectForm1(
             name=self.name,
@@ -136,7 +136,7 @@ class TransposedForm:
         return g.build([y])
 
     def _products_of(self, g: GraphBuilder, operand: str, wire: Wire) -> list[_Terms]:
-        """Multiply `wire`, which is x or y, with all it meets; return the terms of v, t1 and t2."""
+        """Multiply x or y by its coefficients; return the products as terms of v, t1 and t2."""
         totals: list[_Terms] = [[] for _ in range(self.order + 1)]
         for p in self.products:
             weights = self._weights(p, operand)
@@ -148,7 +148,7 @@ class TransposedForm:
         return totals
 
     def _quantized(self, g: GraphBuilder, total: Wire, k: int, frac: int) -> Wire:
-        """Quantize v (k = 0), t1 or t2 to `frac` fraction bits, its range stated; center the error if its path asks."""
+        """State the range of v (k = 0), t1 or t2, and quantize it; centre the error unless its path does."""
         passes_constants = self.operator != 1 or k == self.order
         if passes_constants and g[total].frac > frac:
             total = g.add(total, g.constant(1, frac + 1, f"half{k}"))
@@ -156,7 +156,7 @@ class TransposedForm:
         return g.floor(g.bound(total, *limits, name), frac, "" if k else "y")
 
     def _weights(self, product: Product, operand: str) -> tuple[int, ...]:
-        """Factors with which a product adds to v, t1 and t2."""
+        """Return the factors of a product in v, t1 and t2."""
         return self._rewritten(*product.x) if operand == "x" else self._rewritten(0, *product.y)
 
     @property
@@ -165,13 +165,13 @@ class TransposedForm:
         return 0, *self._rewritten(1, *self.integer_part)[1:]
 
     def _rewritten(self, p0: int, p1: int, p2: int) -> tuple[int, ...]:
-        """Coefficients in powers of ``z - g`` of ``p0 z**2 + p1 z + p2``, or of ``p0 z + p1`` at first order."""
+        """Return ``p0 z**2 + p1 z + p2``, or ``p0 z + p1`` at first order, in powers of ``z - g``."""
         g = self.operator
         return (p0, g * p0 + p1) if self.order == 1 else (p0, 2 * g * p0 + p1, g * g * p0 + g * p1 + p2)
 
     @property
     def _exponents(self) -> tuple[int, ...]:
-        """Each state stands for itself times two to this power."""
+        """Base-2 logarithms of the weights of the states: 1 and Delta."""
         return (0, self.delta_exponent)[: self.order]
 
     @property
@@ -180,7 +180,7 @@ class TransposedForm:
 
     @cached_property
     def _state_fracs(self) -> tuple[tuple[int, int], ...]:
-        """Fraction bits of t1 and t2, exact, and those that s1 and s2 keep of them."""
+        """Fraction bits of the exact t1 and t2, and those that s1 and s2 keep."""
         fracs: list[tuple[int, int]] = []
         carried: list[int] = []
         for k in range(self.order, 0, -1):
@@ -192,7 +192,7 @@ class TransposedForm:
         return tuple(fracs)
 
     def _fracs_added(self, k: int) -> list[int]:
-        """Fraction bits of everything that x and y add to v (k = 0), t1 or t2."""
+        """Return the fraction bits of all products of x and y in v (k = 0), t1 or t2."""
         fracs = [self.y_frac - _trailing_zeros(self._integers[k])] if self._integers[k] else []
         for operand, frac in (("x", self.x_frac), ("y", self.y_frac)):
             for p in self.products:
@@ -206,7 +206,7 @@ def _trailing_zeros(number: int) -> int:
 
 
 def _powers(number: int) -> list[int]:
-    """Fewest signed powers of two that sum to `number`: its non-adjacent form."""
+    """Return the non-adjacent form of `number`: the fewest signed powers of two that add up to it."""
     powers = []
     unit = 1
     while number:

@@ -1,1 +1,1 @@
-"""Emulated sensors: coil, thermocouple, what digitizes them, and their faults."""
+"""Emulated sensors: coil, thermocouple, analog-to-digital converters, and their faults."""

@@ -1,4 +1,4 @@
-"""The analog-to-digital converter: physical values to the codes of a port, with its errors and its faults."""
+"""The analog-to-digital converter: from physical values to the codes of a port, with errors and faults."""
 
 from __future__ import annotations
 
@@ -7,26 +7,27 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sosmith.model.port import Codes, Port, Values
+from sosmith.model.arrays import Codes, Values
+from sosmith.model.port import Port
 from sosmith.model.random_streams import Streams
 
 
 @dataclass(frozen=True, kw_only=True)
 class Digitizer:
-    """Errors of a converter, all zero for an ideal one, which then gives the codes of `Port.encode`.
+    """An analog-to-digital converter with errors; with all errors zero it gives the codes of `Port.encode`.
 
     ``code = round((1 + gain_error) * x + offset + inl * sin(2 pi u))`` with x the ideal code before rounding and u its
-    place between the lowest code, 0, and the highest, 1; what is beyond them is clipped.
+    position from 0 at the lowest code to 1 at the highest. Codes saturate at both ends.
 
     Attributes
     ----------
     offset : float
-        In LSB.
+        Offset error in LSB.
     gain_error : float
-        As a ratio, about code 0.
+        Gain error as a ratio, about code 0.
     inl : float
-        Peak of the integral nonlinearity in LSB: an S, zero at both ends and in the middle, as after a fit
-        to the end points.
+        Peak of the integral nonlinearity in LSB: an S-shaped curve, zero at both ends and in the middle (end-point
+        fit).
     """
 
     offset: float = 0.0
@@ -34,7 +35,7 @@ class Digitizer:
     inl: float = 0.0
 
     def codes(self, port: Port, values: Values) -> Codes:
-        """Codes of physical `values` in the unit of `port`.
+        """Return the codes of physical `values` in the unit of `port`.
 
         Raises
         ------
@@ -51,16 +52,17 @@ class Digitizer:
 
 @dataclass(frozen=True, kw_only=True)
 class CodeFault:
-    """A fault of a converter over some samples.
+    """A fault of a converter during a range of samples.
 
     Attributes
     ----------
     start, stop : int
-        First sample, and the first one after the fault.
+        First sample with the fault, and first one after it.
     share : float
-        Share of the samples that go missing, each by chance; 1 for a code that is stuck.
+        Probability that a sample is lost; 1 for a stuck code.
     code : int, optional
-        Code that it is stuck at; without it a sample and hold gives the last code before, at the start of a trace 0.
+        Code that the converter is stuck at. Without it, a lost sample repeats the previous code; code 0 at the start
+        of a trace.
     """
 
     start: int
@@ -69,7 +71,7 @@ class CodeFault:
     code: int | None = None
 
     def applied(self, codes: Codes, port: Port, chance: Streams) -> Codes:
-        """Return the codes, shape (n,), with the fault in them; `chance` is used for shares below 1."""
+        """Return `codes`, shape (n,), with the fault applied; `chance` is used if `share` is below 1."""
         index = np.arange(len(codes))
         lost = (index >= self.start) & (index < self.stop)
         if self.share < 1:
@@ -81,7 +83,7 @@ class CodeFault:
 
 
 def with_faults(codes: Codes, port: Port, faults: Sequence[CodeFault], chance: Streams) -> Codes:
-    """Codes, shape (n,), with one fault after another in them."""
+    """Return `codes`, shape (n,), with all faults applied in order."""
     for fault in faults:
         codes = fault.applied(codes, port, chance)
     return codes

@@ -9,37 +9,37 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
+from sosmith.model.arrays import Values
 from sosmith.model.calibration.polynomial import EQUATION_4, EQUATION_5A, Polynomial
-from sosmith.model.port import Values
 from sosmith.model.random_streams import Streams
 from sosmith.model.sensors.coil import Coil
 
 VOLTAGE_NOISE = 0.01
-"""Broadband noise of the inductive sensor's voltage, V rms.
+"""Broadband noise of the inductive sensor's voltage in V rms.
 
-From the paper: its errors before (table 1) and after (table 4) the low-pass filter, read as millimetres, differ by
-8.8 um rms. Divided by the slope of equation 5a at each of the ten clearances (46.5 degC), this is 10.5 mV. Read as
-fractions of the clearance, as equation 7 has them, they differ by 64 um rms, and the noise is 48 mV.
+From the paper: its errors before (table 1) and after (table 4) the low-pass filter, taken as millimetres, differ by
+8.8 um rms. Divided by the slope of equation 5a at each of the ten clearances (46.5 degC), this is 10.5 mV. Taken as
+fractions of the clearance, as in equation 7, they differ by 64 um rms, and the noise is 48 mV.
 """
 
 HARMONICS = 64
-"""Cosines that a systematic error is made of; more would not change its statistics."""
+"""Number of cosines in the sum that models a systematic error; more do not change its statistics."""
 
 
 class ForwardModel(Protocol):
     """Voltage in V of an ideal sensor from clearance in mm and temperature in degC."""
 
     def __call__(self, clearance: npt.ArrayLike, temperature: npt.ArrayLike) -> Values:
-        """Return the voltage, of the common shape of both."""
+        """Return the voltage in V, of the broadcast shape."""
         ...
 
 
 @dataclass(frozen=True)
 class InverseRegression:
-    """A regression of second order in the voltage, such as equations 4 and 5a of the paper, solved for the voltage.
+    """A regression of order 2 in the voltage, such as equations 4 and 5a of the paper, solved for the voltage.
 
-    The root is the one on the rising branch. Where the clearance is below the least one that the regression can take at
-    that temperature, the voltage is that of the least one.
+    Of the two roots, the one on the rising branch is taken. A clearance below the minimum of the regression at that
+    temperature gives the voltage at the minimum.
     """
 
     polynomial: Polynomial
@@ -60,33 +60,34 @@ class InverseRegression:
 
 
 sensor_voltage = InverseRegression(EQUATION_5A)
-"""The sensor as equation 5a of the paper describes it, without noise; positive from 1.09 mm on at 20 degC."""
+"""The sensor described by equation 5a of the paper, without noise; at 20 degC its voltage is positive above 1.09 mm."""
 
 FORWARD_MODELS: dict[str, ForwardModel] = {
     "equation_4": InverseRegression(EQUATION_4),
     "equation_5a": sensor_voltage,
     "coil": Coil(),
 }
-"""Forward models by the name that a scenario file gives them."""
+"""Forward models by their name in scenario files."""
 
 
 @dataclass(frozen=True)
 class Mains:
-    """Hum of the mains in the voltage.
+    """Mains hum in the voltage.
 
     Attributes
     ----------
     frequency : float
-        Of the fundamental in Hz. Sampled as it is: at 100 Hz, 50 Hz becomes an alternation, at 6 Hz a line at 2 Hz.
+        Frequency of the fundamental in Hz. It aliases: sampled at 100 Hz, 50 Hz alternates from sample to sample;
+        sampled at 6 Hz, it appears at 2 Hz.
     amplitudes : tuple of float
-        Peak values in V of the fundamental and its harmonics, in order.
+        Peak amplitudes in V of the fundamental and its harmonics, in order.
     """
 
     frequency: float = 50.0
     amplitudes: tuple[float, ...] = ()
 
     def __call__(self, time: Values, chance: Streams) -> Values:
-        """Hum in V at the times in s; each line has a random phase."""
+        """Return the hum in V at `time` in s; each harmonic has a random phase."""
         hum = np.zeros(len(time))
         if self.amplitudes:
             phases = chance("mains").uniform(0, 2 * np.pi, len(self.amplitudes))
@@ -97,14 +98,14 @@ class Mains:
 
 @dataclass(frozen=True)
 class Ageing:
-    """Drift of the voltage over days: ``V * (1 + gain) + offset``, both zero on day 0.
+    """Drift of the voltage over days: ``V * (1 + gain) + offset``, with zero gain and offset on day 0.
 
     Attributes
     ----------
     offset_per_day, gain_per_day : float
-        Steady drift in V per day, and per day.
+        Constant drift of the offset in V per day, and of the gain per day.
     offset_walk, gain_walk : float
-        Standard deviation of a random walk's daily step, in V and as a ratio.
+        Standard deviation of the daily step of a random walk, of the offset in V and of the gain as a ratio.
     """
 
     offset_per_day: float = 0.0
@@ -113,39 +114,39 @@ class Ageing:
     gain_walk: float = 0.0
 
     def at(self, day: float, chance: Streams) -> tuple[float, float]:
-        """Offset in V and gain on a `day`, 0 or more; between whole days the walk is a straight line."""
+        """Return offset in V and gain on `day`, 0 or more; the walk is linear between whole days."""
         offset = self.offset_per_day * day + self.offset_walk * _walk(day, chance("ageing of the offset"))
         gain = self.gain_per_day * day + self.gain_walk * _walk(day, chance("ageing of the gain"))
         return offset, gain
 
 
 def _walk(day: float, generator: np.random.Generator) -> float:
-    """Position of a random walk of unit steps, the same for a day whatever other days are asked for."""
+    """Return the position of a random walk of unit steps; it does not depend on which other days are requested."""
     steps = generator.normal(size=int(day) + 1)
     return float(np.sum(steps[:-1]) + (day - int(day)) * steps[-1])
 
 
 @dataclass(frozen=True)
 class SystematicError:
-    """What stays the same over the run of a day and no filter removes: lack of fit, setting, drift of the day.
+    """Error that is constant over one day and that no filter removes: lack of fit, setting error, daily drift.
 
-    A smooth random curve over the clearance with the same standard deviation everywhere, a new one on each day: a sum
-    of cosines of random frequency and phase, which tends to a Gaussian process with the covariance
+    A smooth random function of the clearance with uniform standard deviation, drawn anew for each day. It is a sum of
+    cosines of random frequency and phase, which approximates a Gaussian process with the covariance
     ``rms**2 * exp(-(difference / correlation)**2 / 2)``.
 
     Attributes
     ----------
     rms : float
-        In mm of clearance.
+        Standard deviation in mm of clearance.
     correlation : float
-        Distance in mm over which the error changes.
+        Correlation length in mm of clearance.
     """
 
     rms: float = 0.0
     correlation: float = 2.0
 
     def on(self, day: float, chance: Streams) -> Callable[[Values], Values]:
-        """Return the error in mm as a function of the clearance in mm on the whole day that `day` is in."""
+        """Return the error in mm as a function of the clearance in mm; it is the same throughout the day."""
         if not self.rms:
             return np.zeros_like
         generator = chance(f"systematic error of day {int(day)}")
@@ -154,7 +155,7 @@ class SystematicError:
         scale = self.rms * np.sqrt(2 / HARMONICS)
 
         def error(clearance: Values) -> Values:
-            total = np.zeros_like(clearance)  # one by one: all at once would take 64 times the memory of a long trace
+            total = np.zeros_like(clearance)  # term by term: all at once take 64 times the memory of the trace
             for frequency, phase in zip(frequencies, phases, strict=True):
                 total += np.cos(frequency * clearance + phase)
             return np.asarray(scale * total)
@@ -164,7 +165,7 @@ class SystematicError:
 
 @dataclass(frozen=True)
 class InductiveState:
-    """What the days have made of a sensor: offset in V, gain as a ratio, and an error in mm over the clearance."""
+    """State of an aged sensor: offset in V, gain as a ratio, and error in mm as a function of clearance in mm."""
 
     offset: float = 0.0
     gain: float = 0.0
@@ -173,22 +174,22 @@ class InductiveState:
 
 @dataclass(frozen=True, kw_only=True)
 class InductiveSensor:
-    """The sensor with its errors.
+    """The inductive sensor with its errors.
 
     Attributes
     ----------
     model : ForwardModel
-        Nonlinearity and temperature drift.
+        Ideal characteristic, with its nonlinearity and temperature dependence.
     noise : float
         Broadband noise in V rms.
     mains : Mains
-        Hum.
+        Mains hum.
     ageing : Ageing
         Drift over days.
     systematic_error : SystematicError
-        Error of a day's run.
+        Error that is constant over one day.
     output_range : tuple of float, optional
-        Lowest and highest voltage in V that the output stage can give; without it any.
+        Lowest and highest voltage in V of the output stage; unlimited by default.
     """
 
     model: ForwardModel = sensor_voltage
@@ -199,19 +200,19 @@ class InductiveSensor:
     output_range: tuple[float, float] | None = None
 
     def state(self, day: float, chance: Streams) -> InductiveState:
-        """Return what the sensor has become on a `day`, 0 or more; `chance` is that of its whole life."""
+        """Return the state on `day`, 0 or more; `chance` must be that of the sensor's whole life."""
         offset, gain = self.ageing.at(day, chance)
         return InductiveState(offset, gain, self.systematic_error.on(day, chance))
 
     def steady_voltage(self, clearance: Values, temperature: Values, state: InductiveState) -> Values:
-        """Voltage in V without noise and hum, from arrays of clearance in mm and temperature in degC."""
+        """Return the voltage in V without noise and hum, from clearance in mm and temperature in degC."""
         ideal = self.model(clearance + state.error(clearance), temperature)
         return self._limited(ideal * (1 + state.gain) + state.offset)
 
     def voltage(
         self, clearance: Values, temperature: Values, time: Values, state: InductiveState, chance: Streams
     ) -> Values:
-        """Voltage in V over the `time` in s, with noise and hum; arrays of one shape (n,)."""
+        """Return the voltage in V at `time` in s, with noise and hum; all arrays have the shape (n,)."""
         disturbance = chance("inductive noise").normal(0.0, self.noise, len(time)) + self.mains(time, chance)
         return self._limited(self.steady_voltage(clearance, temperature, state) + disturbance)
 

@@ -1,4 +1,4 @@
-"""The instrument's sensors as one object: inductive sensor, thermometer, and what digitizes them."""
+"""The instrument's sensors as one object: inductive sensor, thermometer, and their converters."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from sosmith.model.port import Codes, Port, Values
+from sosmith.model.arrays import Codes, Values
+from sosmith.model.port import Port
 from sosmith.model.random_streams import Streams
 from sosmith.model.sensors.digitizer import CodeFault, Digitizer, with_faults
 from sosmith.model.sensors.inductive_sensor import VOLTAGE_NOISE, InductiveSensor, InductiveState, sensor_voltage
@@ -18,12 +19,12 @@ __all__ = ["TEMPERATURE_NOISE", "VOLTAGE_NOISE", "SensorFaults", "Sensors", "sen
 
 @dataclass(frozen=True, kw_only=True)
 class SensorFaults:
-    """Faults during a measurement.
+    """Sensor faults during a measurement.
 
     Attributes
     ----------
     voltage, temperature : tuple of CodeFault
-        Faults of the codes of each channel.
+        Faults of the voltage codes and of the temperature codes.
     open_thermocouple : tuple of slice
         Samples during which the thermocouple is disconnected.
     """
@@ -33,7 +34,7 @@ class SensorFaults:
     open_thermocouple: tuple[slice, ...] = ()
 
     def marks(self, samples: int) -> np.typing.NDArray[np.bool_]:
-        """Mark the samples, shape (samples,), at which any fault is on."""
+        """Return a mask, shape (samples,), of the samples with any fault."""
         index = np.arange(samples)
         spans = [(fault.start, fault.stop) for fault in (*self.voltage, *self.temperature)]
         spans += [(span.start, span.stop) for span in self.open_thermocouple]
@@ -45,14 +46,14 @@ class SensorFaults:
 
 @dataclass(frozen=True, kw_only=True)
 class Sensors:
-    """What turns clearance and temperature into the codes of a core.
+    """The sensors that turn clearance and temperature into a core's input codes.
 
     Attributes
     ----------
     inductive : InductiveSensor
     thermometer : Thermometer
     voltage_digitizer : Digitizer
-        Errors of the converter whose codes the voltage port takes.
+        Converter of the voltage, with its errors.
     """
 
     inductive: InductiveSensor = field(default_factory=InductiveSensor)
@@ -70,18 +71,18 @@ class Sensors:
         state: InductiveState | None = None,
         faults: SensorFaults | None = None,
     ) -> Codes:
-        """Codes of the ports, shape (n, n_ports).
+        """Return the codes of the ports, shape (n, n_ports).
 
         Parameters
         ----------
         clearance, temperature, time : ndarray, shape (n,)
-            Clearance in mm with all motion, temperature in degC, time in s.
+            Clearance in mm including motion, temperature in degC, time in s.
         ports : sequence of Port
             Voltage in V and, if there are two, temperature in degC.
         chance : Streams
-            Source of noise; without faults the inductive sensor draws first.
+            Source of randomness; without faults the inductive sensor draws first.
         state : InductiveState, optional
-            What the days have made of the inductive sensor; by default it is new.
+            State of the inductive sensor; that of a new one by default.
         faults : SensorFaults, optional
         """
         faults = faults or SensorFaults()

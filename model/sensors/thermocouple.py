@@ -1,9 +1,9 @@
-"""Type K thermocouple by ITS-90: emf from temperature, temperature from emf, and the cold junction.
+"""Type K thermocouple by ITS-90: emf from temperature, temperature from emf, cold junction compensation.
 
 Emfs are in mV, temperatures in degC. The coefficients are those of NIST Monograph 175 (Standard Reference Database 60),
-compared digit by digit with five public copies. They stand here, and no package is imported for them: of the two on
-PyPI, thermocouples_reference dates from 2014, and thermocouple-its90 works without numpy, on single numbers; both
-solve for the temperature by iteration, where an instrument uses NIST's inverse polynomials.
+compared digit by digit with five public copies. No package is used for them: of the two on PyPI,
+thermocouples_reference dates from 2014, and thermocouple-its90 handles single numbers only, without numpy. Both solve
+for the temperature by iteration, whereas an instrument uses NIST's inverse polynomials.
 """
 
 from __future__ import annotations
@@ -11,17 +11,18 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from sosmith.model.arithmetic.elementary import exp
+from sosmith.model.arrays import Values
 from sosmith.model.errors import SpecificationError
-from sosmith.model.port import Values
 
 TEMPERATURE_RANGE = (-270.0, 1372.0)
 """Temperatures in degC at which the emf is defined."""
 
 EMF_RANGE = (-5.891, 54.886)
-"""Emfs in mV that the inverse polynomials take: -200 and 1372 degC, rounded to 1 uV as NIST has them."""
+"""Range in mV of the inverse polynomials: -200 to 1372 degC, rounded to 1 uV as NIST states it."""
 
 INVERSE_ERROR = {(-200.0, 0.0): (-0.02, 0.04), (0.0, 500.0): (-0.05, 0.04), (500.0, 1372.0): (-0.05, 0.06)}
-"""Error in degC of the inverse polynomials over each range of temperature in degC, as NIST states it."""
+"""Lowest and highest error in degC of the inverse polynomials by temperature range in degC, as NIST states it."""
 
 _BELOW_ZERO = (
     0.0,
@@ -49,7 +50,7 @@ _ABOVE_ZERO = (
     -0.121047212750e-25,
 )
 _BUMP = (0.118597600000e00, -0.118343200000e-03, 0.126968600000e03)
-"""a0 in mV, a1 in 1/degC**2 and a2 in degC of the term a0 exp(a1 (t - a2)**2) from 0 degC on."""
+"""a0 in mV, a1 in 1/degC**2 and a2 in degC of the term a0 exp(a1 (t - a2)**2), used from 0 degC upward."""
 
 _INVERSE = (
     (
@@ -78,45 +79,43 @@ _INVERSE = (
     (-1.318058e02, 4.830222e01, -1.646031, 5.464731e-02, -9.650715e-04, 8.802193e-06, -3.110810e-08),
 )
 _INVERSE_FROM = (0.0, 20.644)
-"""Emfs in mV from which the second and the third polynomial of the inverse are valid."""
+"""Lower limits in mV of the second and the third inverse polynomial."""
 
 
 def thermocouple_emf(temperature: npt.ArrayLike) -> Values:
-    """Emf in mV with the cold junction at 0 degC: the reference function of ITS-90.
+    """Return the emf in mV with the cold junction at 0 degC: the reference function of ITS-90.
 
     Parameters
     ----------
     temperature : array_like
-        In degC, within `TEMPERATURE_RANGE`.
+        Temperature in degC, within `TEMPERATURE_RANGE`.
 
     Raises
     ------
     SpecificationError
-        If a temperature is outside that range, or no number.
+        If a temperature is outside that range or is NaN.
     """
     t = _within("temperature", temperature, TEMPERATURE_RANGE, "degC")
     polyval = np.polynomial.polynomial.polyval
     a0, a1, a2 = _BUMP
-    below, above = np.minimum(t, 0.0), np.maximum(t, 0.0)  # each branch within its own range, against overflow
-    return np.where(
-        t < 0, polyval(below, _BELOW_ZERO), polyval(above, _ABOVE_ZERO) + a0 * np.exp(a1 * (above - a2) ** 2)
-    )
+    below, above = np.minimum(t, 0.0), np.maximum(t, 0.0)  # each branch within its own range, to avoid overflow
+    return np.where(t < 0, polyval(below, _BELOW_ZERO), polyval(above, _ABOVE_ZERO) + a0 * exp(a1 * (above - a2) ** 2))
 
 
 def thermocouple_temperature(emf: npt.ArrayLike) -> Values:
-    """Temperature in degC from the emf with the cold junction at 0 degC: NIST's inverse polynomials.
+    """Return the temperature in degC for an emf with the cold junction at 0 degC: NIST's inverse polynomials.
 
-    They differ from the inverse of `thermocouple_emf` by no more than `INVERSE_ERROR`.
+    They differ from the exact inverse of `thermocouple_emf` by at most `INVERSE_ERROR`.
 
     Parameters
     ----------
     emf : array_like
-        In mV, within `EMF_RANGE`.
+        Emf in mV, within `EMF_RANGE`.
 
     Raises
     ------
     SpecificationError
-        If an emf is outside that range, or no number.
+        If an emf is outside that range or is NaN.
     """
     e = _within("emf", emf, EMF_RANGE, "mV")
     polyval = np.polynomial.polynomial.polyval
@@ -126,23 +125,23 @@ def thermocouple_temperature(emf: npt.ArrayLike) -> Values:
 
 
 def loop_emf(temperature: npt.ArrayLike, cold_junction: npt.ArrayLike) -> Values:
-    """Emf in mV at the terminals, E(temperature) - E(cold junction); both in degC.
+    """Return the emf in mV at the terminals, E(temperature) - E(cold junction); both temperatures in degC.
 
     Raises
     ------
     SpecificationError
-        As `thermocouple_emf`.
+        As for `thermocouple_emf`.
     """
     return np.asarray(thermocouple_emf(temperature) - thermocouple_emf(cold_junction))
 
 
 def compensated_temperature(emf: npt.ArrayLike, cold_junction: npt.ArrayLike) -> Values:
-    """Temperature in degC from the emf in mV at the terminals and the temperature of the cold junction in degC.
+    """Return the temperature in degC from the emf in mV at the terminals and the cold junction temperature in degC.
 
     Raises
     ------
     SpecificationError
-        As `thermocouple_temperature`, of the sum of both emfs.
+        As for `thermocouple_temperature`, of the sum of both emfs.
     """
     return thermocouple_temperature(np.asarray(emf, dtype=np.float64) + thermocouple_emf(cold_junction))
 

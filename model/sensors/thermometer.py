@@ -1,4 +1,4 @@
-"""The temperature channel: a type K thermocouple with its converter and linearization, or an ideal thermometer."""
+"""The temperature channel: a type K thermocouple with converter and linearization, or an ideal thermometer."""
 
 from __future__ import annotations
 
@@ -9,20 +9,21 @@ from typing import Protocol
 
 import numpy as np
 
-from sosmith.model.port import Codes, Port, Values
+from sosmith.model.arrays import Codes, Values
+from sosmith.model.port import Port
 from sosmith.model.random_streams import Streams
 from sosmith.model.sensors.digitizer import CodeFault, Digitizer, with_faults
 from sosmith.model.sensors.thermocouple import EMF_RANGE, loop_emf, thermocouple_emf, thermocouple_temperature
 
 TEMPERATURE_NOISE = 0.1
-"""Broadband noise of the thermocouple channel, degC rms.
+"""Broadband noise of the thermocouple channel in degC rms.
 
-Assumed: about 4 uV at the 41.4 uV/degC of a type K thermocouple near 60 degC (ITS-90), after the
-averaging of a slow channel. It moves equation 5a by less than 0.4 um, well below the voltage's noise.
+Assumed: about 4 uV at the 41.4 uV/degC of a type K thermocouple near 60 degC (ITS-90), after averaging in a slow
+channel. It moves equation 5a by less than 0.4 um, well below the voltage's noise.
 """
 
 EMF_PORT = Port.from_range("emf", 19, Fraction("-78.125"), Fraction("78.125"), signed=True, unit="mV")
-"""Converter of the emf: 19 bits over +-78.125 mV, as the MAX31856 thermocouple converter has it at a gain of 8."""
+"""Converter of the emf: 19 bits over +-78.125 mV, as in the MAX31856 thermocouple converter at a gain of 8."""
 
 
 class Thermometer(Protocol):
@@ -31,7 +32,7 @@ class Thermometer(Protocol):
     def codes(
         self, temperature: Values, port: Port, chance: Streams, faults: Sequence[CodeFault], open_loop: Sequence[slice]
     ) -> Codes:
-        """Codes of the temperature port, shape (n,), from the true temperature in degC.
+        """Return the codes of the temperature port, shape (n,), for the true temperature in degC.
 
         Parameters
         ----------
@@ -39,7 +40,7 @@ class Thermometer(Protocol):
         port : Port
             Temperature input of the core, in degC.
         chance : Streams
-            Source of noise.
+            Source of randomness.
         faults : sequence of CodeFault
             Faults of the port's codes.
         open_loop : sequence of slice
@@ -48,18 +49,18 @@ class Thermometer(Protocol):
         ...
 
     def steady(self, temperature: Values) -> Values:
-        """Temperature in degC that is shown without noise."""
+        """Return the indicated temperature in degC without noise."""
         ...
 
 
 @dataclass(frozen=True, kw_only=True)
 class IdealThermometer:
-    """The true temperature with broadband noise; disconnected, it shows the highest code.
+    """The true temperature with broadband noise; when disconnected, it gives the highest code.
 
     Attributes
     ----------
     noise : float
-        In degC rms.
+        Noise in degC rms.
     """
 
     noise: float = TEMPERATURE_NOISE
@@ -67,7 +68,7 @@ class IdealThermometer:
     def codes(
         self, temperature: Values, port: Port, chance: Streams, faults: Sequence[CodeFault], open_loop: Sequence[slice]
     ) -> Codes:
-        """As `Thermometer.codes`."""
+        """As for `Thermometer.codes`."""
         shown = temperature + chance("temperature noise").normal(0.0, self.noise, len(temperature))
         codes = port.encode(shown)
         for samples in open_loop:
@@ -75,26 +76,26 @@ class IdealThermometer:
         return with_faults(codes, port, faults, chance)
 
     def steady(self, temperature: Values) -> Values:
-        """As `Thermometer.steady`."""
+        """As for `Thermometer.steady`."""
         return temperature
 
 
 @dataclass(frozen=True, kw_only=True)
 class ThermocoupleChain:
-    """Type K thermocouple: emf, noise, converter, cold junction compensation, linearization by NIST's inverse.
+    """Type K thermocouple channel: emf, noise, converter, cold junction compensation, linearization by NIST's inverse.
 
     Attributes
     ----------
     noise : float
-        Noise at the input in uV rms.
+        Input noise in uV rms.
     cold_junction : float
         True temperature of the cold junction in degC.
     cold_junction_error : float
-        By how much the compensation believes it warmer, in degC.
+        Error of the compensation in degC; positive if it takes the cold junction to be warmer than it is.
     port : Port
-        Converter of the emf in mV.
+        Format of the emf converter, in mV.
     digitizer : Digitizer
-        Its errors.
+        Errors of that converter.
     """
 
     noise: float = 4.0
@@ -106,7 +107,7 @@ class ThermocoupleChain:
     def codes(
         self, temperature: Values, port: Port, chance: Streams, faults: Sequence[CodeFault], open_loop: Sequence[slice]
     ) -> Codes:
-        """As `Thermometer.codes`; with an open thermocouple the bias current drives the converter to its upper end."""
+        """As for `Thermometer.codes`; an open thermocouple lets the bias current drive the converter to full scale."""
         emf = loop_emf(temperature, self.cold_junction)
         emf = emf + chance("thermocouple noise").normal(0.0, self.noise / 1000, len(emf))
         emf_codes = self.digitizer.codes(self.port, emf)
@@ -115,10 +116,10 @@ class ThermocoupleChain:
         return with_faults(port.encode(self._linearized(self.port.decode(emf_codes))), port, faults, chance)
 
     def steady(self, temperature: Values) -> Values:
-        """As `Thermometer.steady`; without the converter."""
+        """As for `Thermometer.steady`; without the converter."""
         return self._linearized(loop_emf(temperature, self.cold_junction))
 
     def _linearized(self, emf: Values) -> Values:
-        """Temperature in degC, limited to the range of the inverse polynomials."""
+        """Return the temperature in degC, limited to the range of the inverse polynomials."""
         compensation = thermocouple_emf(self.cold_junction + self.cold_junction_error)
         return thermocouple_temperature(np.clip(emf + compensation, *EMF_RANGE))

@@ -1,1 +1,1 @@
-"""Tables from files: CSV with its rows checked, TOML with the keys of every table."""
+"""Tables from files: CSV with checked rows, TOML with checked keys."""

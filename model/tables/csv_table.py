@@ -1,4 +1,4 @@
-"""Strict reading of CSV files that hold numbers; every refusal names the file and the line."""
+"""Strict reader for CSV files of numbers; every error names the file and the line."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from sosmith.model.arrays import Values
 from sosmith.model.errors import SpecificationError
-from sosmith.model.port import Values
 
-# float() would also take "nan", "1_000" and digits of other scripts.
+# float() would also accept "nan", "1_000" and digits of other scripts.
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 LARGEST = 1e100
-"""Largest magnitude of a number: sums of squares of such numbers are still doubles, and none has a physical meaning."""
+"""Largest magnitude of a number; sums of squares below it do not overflow, and no physical value is above it."""
 
 MAX_SHOWN = 60
-"""Characters of a wrong cell that a message shows."""
+"""Longest cell, in characters, that a message quotes in full."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,13 +34,13 @@ class CsvTable:
     Attributes
     ----------
     path : Path
-        File the table was read from.
+        File that the table was read from.
     header : tuple of str
-        Names of the columns, all different.
+        Column names, all different.
     values : ndarray, shape (n_rows, n_columns)
         Cells; at least one row.
     lines : tuple of int
-        Line of the file, counted from 1, on which each row ends.
+        Line of the file, from 1, on which each row ends.
     """
 
     path: Path
@@ -53,20 +53,20 @@ class CsvTable:
         return column in self.header
 
     def column(self, name: str) -> Values:
-        """Cells of the column `name`, shape (n_rows,)."""
+        """Return the cells of column `name`, shape (n_rows,)."""
         return np.asarray(self.values[:, self.header.index(name)])
 
     def take(self, rows: npt.NDArray[np.intp]) -> CsvTable:
-        """Return the table of the rows of these indices, in their order."""
+        """Return a table of the rows with these indices, in their order."""
         return CsvTable(self.path, self.header, self.values[rows], tuple(self.lines[row] for row in rows))
 
     def refuse(self, row: int, what: str) -> SpecificationError:
-        """Error about the row of index `row`; `what` is a sentence from its subject on."""
+        """Return an error about row index `row`; `what` is the sentence after file and line."""
         return SpecificationError(f"{self.path}, line {self.lines[row]}: {what}")
 
 
 Reader = Callable[[str], float]
-"""Makes a number of a cell; raises ValueError with what the cell must be."""
+"""Converts a cell to a number; raises ValueError with what the cell must be."""
 
 
 def read_csv_table(
@@ -74,25 +74,25 @@ def read_csv_table(
 ) -> CsvTable:
     """Read a CSV file of numbers with one header line.
 
-    Blank lines are skipped, spaces around a cell and a byte order mark do not matter.
+    Blank lines, spaces around cells and a byte order mark are ignored.
 
     Parameters
     ----------
     path : Path
         File to read, UTF-8.
     known : sequence of str
-        Names that a column may have.
+        Permitted column names.
     required : sequence of str
-        Names that must be there.
+        Required column names.
     readers : mapping of str to Reader, optional
-        How to read the cells of a column that holds something else than plain numbers.
+        Readers for columns whose cells are not plain numbers.
 
     Raises
     ------
     SpecificationError
-        If the file cannot be read or is no UTF-8 text; if it is empty or has a header only; if a
-        column is unknown, missing or there twice; if a row has too few or too many cells; if a cell
-        is no finite number, or one beyond `LARGEST`. One sentence with the file and, where there is one, the line.
+        If the file cannot be read or is not UTF-8 text; if it is empty or has only a header; if a column is unknown,
+        missing or repeated; if a row has too few or too many cells; if a cell is not a finite number of magnitude up
+        to `LARGEST`. The message is one sentence with the file and, if there is one, the line.
     """
     reader = csv.reader(io.StringIO(_read_text(path), newline=""), strict=True)
     rows: list[list[float]] = []
@@ -116,14 +116,14 @@ def read_csv_table(
             f"{path}, line {reader.line_num}: row must be valid CSV, not broken ({error})"
         ) from None
     if not header:
-        raise SpecificationError(f"{path} must hold a header line and rows of numbers, not nothing")
+        raise SpecificationError(f"{path} must hold a header line and rows of numbers, not be empty")
     if not rows:
-        raise SpecificationError(f"{path} must hold rows of numbers below its header, not the header only")
+        raise SpecificationError(f"{path} must hold rows of numbers below its header, not only the header")
     return CsvTable(path, header, np.array(rows, dtype=np.float64), tuple(lines))
 
 
 def csv_header(path: Path) -> list[str]:
-    """Names in the first line that is not blank; none if it cannot be read, as `read_csv_table` then says."""
+    """Return the names in the first line that is not blank; none if unreadable, which `read_csv_table` then reports."""
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
             for cells in csv.reader(file, strict=True):
@@ -136,22 +136,20 @@ def csv_header(path: Path) -> list[str]:
 
 
 def check_separator(where: str, header: Sequence[str]) -> None:
-    """Refuse a header that holds a single cell because other characters than commas separate the names.
+    """Reject a header with a single cell because another character than the comma separates the names.
 
     Raises
     ------
     SpecificationError
-        If it does; `where` begins the sentence.
+        If so; the message begins with `where`.
     """
     for separator, name in ((";", "semicolons"), ("\t", "tabs")):
         if len(header) == 1 and separator in header[0]:
-            raise SpecificationError(
-                f"{where}: cells must be separated by commas, with points in decimal numbers, not by {name}"
-            )
+            raise SpecificationError(f"{where}: cells must be separated by commas, with decimal points, not by {name}")
 
 
 def check_rows(table: CsvTable, bad: npt.NDArray[np.bool_], what: Callable[[int], str]) -> None:
-    """Refuse the first row that `bad` marks, with the sentence that `what` makes of its index.
+    """Reject the first row marked in `bad`, with the message that `what` returns for its index.
 
     Raises
     ------
@@ -183,10 +181,10 @@ def _check_header(where: str, header: Sequence[str], known: Sequence[str], requi
         if name not in known:
             raise SpecificationError(f"{where}: column must be one of {', '.join(known)}, not {name!r}")
         if count > 1:
-            raise SpecificationError(f"{where}: column {name} must be there once, not {count} times")
+            raise SpecificationError(f"{where}: column {name} must appear once, not {count} times")
     for name in required:
         if name not in header:
-            raise SpecificationError(f"{where}: column {name} must be there, not missing among {', '.join(header)}")
+            raise SpecificationError(f"{where}: column {name} must be present, not missing from {', '.join(header)}")
 
 
 def _number(where: str, column: str, cell: str, readers: Mapping[str, Reader]) -> float:

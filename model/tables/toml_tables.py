@@ -1,6 +1,6 @@
-"""TOML files of checked tables: every refusal names file and key, what would be right and what was found.
+"""TOML files of checked tables: every error names the file and the key, what was expected and what was found.
 
-A file's shape is a pydantic model made of `Table`. Each field has a description that can be read after "must be";
+The shape of a file is a pydantic model built from `Table`. Each field has a description that reads on from "must be";
 a rule about several keys raises `UnfitKeyError`.
 """
 
@@ -18,23 +18,23 @@ from sosmith.model.suggestion import did_you_mean
 from sosmith.model.tables.toml_file import read_toml
 
 MAX_BYTES = 1 << 18
-"""Largest file in bytes; a real one has some thousand."""
+"""Largest file size in bytes; real files have a few thousand."""
 
 MAX_SHOWN = 60
-"""Characters of a wrong value that a message shows."""
+"""Longest value, in characters, that a message quotes in full."""
 
 
 class UnfitKeyError(ValueError):
-    """Keys that do not go together.
+    """Keys that contradict each other.
 
     Parameters
     ----------
     where : str
-        Path of the key, seen from the table that has the rule.
+        Path of the key, relative to the table with the rule.
     expected : str
-        What would be right, to be read after "must be".
+        What was expected; reads on from "must be".
     found : str
-        What stands there.
+        What was found.
     """
 
     def __init__(self, where: str, expected: str, found: str) -> None:
@@ -45,7 +45,7 @@ class UnfitKeyError(ValueError):
 
 
 class Table(BaseModel):
-    """A table: only its own keys, of just the types it says, immutable."""
+    """An immutable table that accepts only its own keys, with strict types."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False, hide_input_in_errors=True)
 
@@ -54,12 +54,12 @@ Document = TypeVar("Document", bound=Table)
 
 
 def read_tables(path: Path, shape: type[Document]) -> Document:
-    """Read the file `path` as a table of that `shape`.
+    """Read the file `path` as a table of type `shape`.
 
     Raises
     ------
     SpecificationError
-        If the file cannot be read or is no TOML, and for the first thing in it that does not fit.
+        If the file cannot be read or is not TOML, and for the first error in its content.
     """
     try:
         return shape.model_validate(read_toml(path, what="the file", max_bytes=MAX_BYTES))
@@ -70,9 +70,9 @@ def read_tables(path: Path, shape: type[Document]) -> Document:
 
 
 def _own(findings: list[ErrorDetails]) -> list[ErrorDetails]:
-    """Put unknown keys first, often the slip behind missing ones, and keys before those of tables inside.
+    """Sort errors: unknown keys first, which often explain missing ones, and outer keys before inner ones.
 
-    Leave out that a list is too short where it is so only because items of it do not fit.
+    Drop the error that a list is too short if it is so only because items in it are invalid.
     """
     own = [
         finding
@@ -97,7 +97,7 @@ def _sentence(shape: type[Table], finding: ErrorDetails) -> str:
     assert field.description, f"{where} must have a description"
     found = "missing" if finding["type"] == "missing" else shown(finding["input"])
     inside = _path_text(path[_last_name(path) + 1 :])
-    if inside:  # the description is that of the whole list
+    if inside:  # the description is of the whole list
         whole = _path_text(path[: _last_name(path) + 1])
         return f"{whole} must be {field.description}, not one with {found} at {inside}"
     return f"{where} must be {field.description}, not {found}"
@@ -119,7 +119,7 @@ def _path_text(path: tuple[int | str, ...]) -> str:
 
 
 def _field_at(shape: type[Table], path: tuple[int | str, ...]) -> tuple[type[Table], FieldInfo | None]:
-    """Find the last named field on a path, and the table it is in."""
+    """Return the table and the field of the last key in `path`."""
     field = None
     for key in path:
         if isinstance(key, int):
@@ -137,7 +137,7 @@ def _tables_in(annotation: Any) -> list[type[Table]]:
 
 
 def shown(value: object) -> str:
-    """Return a value from a TOML file on one line of bounded length."""
+    """Return a value from a TOML file as one line of limited length."""
     match value:
         case None:
             text = "missing"

@@ -1,1 +1,1 @@
-"""Traces of codes and signals of sensors, as arrays and as files."""
+"""Traces of input codes and sensor signals, as arrays and as files."""

@@ -1,4 +1,4 @@
-"""Signals over time in a CSV file: a measured clearance with or without its truth, motion of a vehicle."""
+"""Signals over time in a CSV file: measured clearance, with or without its true value, or vehicle motion."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from sosmith.model.arrays import Values
 from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.errors import SpecificationError
-from sosmith.model.port import Values
 from sosmith.model.tables.csv_table import CsvTable, check_rows, csv_header, read_csv_table
 from sosmith.model.traces.trace_file import CHANNEL, PHYSICAL_COLUMNS, TIME_TOLERANCE, rows_of_channel
 
 TIME = "time_s"
 READING = "reading"
 DISTANCE = "distance_m"
-"""Where the vehicle is, which rises all the time: no signal unless it is chosen."""
+"""Column with the position of the vehicle; it rises throughout, so it is a signal only if it is selected."""
 CALIBRATED = "calibrated clearance"
-"""Name of the signal that the calibration polynomial makes of voltage and temperature."""
+"""Name of the signal that the calibration polynomial gives for voltage and temperature."""
 
 TRUTHS = ("truth", "truth_mm", "true_clearance_mm")
-"""Columns that are the truth wherever they stand; `clearance_mm` is beside voltage and temperature only."""
+"""Columns that hold the true value in any file; `clearance_mm` does so only beside voltage and temperature."""
 
 MIN_ROWS = 64
-"""Rows that a file must have: below, no spectrum has both a resolution and an average worth the name."""
+"""Lowest number of rows: a spectrum of fewer has neither usable resolution nor usable averaging."""
 
 _UNITS = {
     "mm": ("mm", 1.0),
@@ -41,25 +41,25 @@ _UNITS = {
     "mrad": ("mrad", 1.0),
     "deg": ("mrad", 1e3 * np.pi / 180),
 }
-"""Unit and factor by the last part of a column's name, so that lengths and angles have one unit each."""
+"""Unit and conversion factor by the suffix of a column's name; lengths and angles are converted to one unit each."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Signal:
-    """One signal of a file at even steps of time.
+    """One signal of a file, uniformly sampled.
 
     Attributes
     ----------
     name : str
-        Column, or `CALIBRATED`; in a file of several channels with the channel's number.
+        Name of the column, or `CALIBRATED`; with the channel's number if the file has the column channel.
     unit : str
-        Unit of the values: mm, mrad, V or degC; empty where the column's name ends in none.
+        Unit of the values: mm, mrad, V or degC; empty if the column's name has no unit.
     values : ndarray, shape (n,)
-        What was measured or simulated.
+        Measured or simulated values.
     truth : ndarray, shape (n,), optional
-        What an ideal measurement would show, in the same unit.
+        True values, in the same unit.
     reading : ndarray of bool, shape (n,), optional
-        Rows at which truth and measurement are compared.
+        Rows at which `values` are compared with `truth`.
     """
 
     name: str
@@ -78,9 +78,9 @@ class SignalFile:
     path : Path
         The file.
     sha256 : str
-        Hash over its bytes, hexadecimal.
+        SHA-256 of the file, in hexadecimal.
     sample_rate : float
-        Rows per second, Hz, to nine digits.
+        Sample rate in Hz, to nine digits.
     signals : tuple of Signal
         At least one, each with at least `MIN_ROWS` values.
     """
@@ -100,10 +100,10 @@ def read_signal_file(
 ) -> SignalFile:
     """Read a CSV file with the column time_s and at least one column of values.
 
-    A trace with voltage_V and temperature_C holds one signal, the clearance that `polynomial` makes of them, with
-    clearance_mm as its truth where that is there. Any other file holds one signal for each column whose name ends in a
-    unit (_mm, _um, _m, _V, _mV, _C, _rad, _mrad, _deg), with the truth in one of `TRUTHS`. Columns of codes and
-    `DISTANCE` are left alone. A file with the column channel holds all that for each of its channels.
+    A trace with voltage_V and temperature_C gives one signal, the clearance by `polynomial`, with clearance_mm as its
+    true value if present. Any other file gives one signal per column whose name ends in a unit (_mm, _um, _m, _V, _mV,
+    _C, _rad, _mrad, _deg), with the true value in one of `TRUTHS`. Columns of codes and `DISTANCE` are ignored. A file
+    with the column channel gives these signals for each channel.
 
     Parameters
     ----------
@@ -112,18 +112,18 @@ def read_signal_file(
     polynomial : Polynomial
         Clearance in mm from voltage in V and temperature in degC.
     columns : sequence of str
-        The columns to take as signals, whatever their names, instead of the above.
+        Columns to read as signals, whatever their names; by default those above.
     truth : str, optional
-        The column with the truth, likewise.
+        Column with the true value; by default as above.
     channels : sequence of int
-        The channels to take, instead of all; a file without the column channel holds channel 0.
+        Channels to read; all by default. A file without the column channel has only channel 0.
 
     Raises
     ------
     SpecificationError
-        As `read_csv_table`; if a column or channel asked for is not there, a channel is no integer or a name tells no
-        unit; if a channel has too few rows; if its time does not rise in even steps, the same for all; if reading is
-        neither 0 nor 1. One sentence with the file and the line.
+        As for `read_csv_table`; if a requested column or channel is missing, a channel number is not an integer, or a
+        name has no unit; if a channel has too few rows; if time steps are not uniform or differ between channels; if
+        reading is neither 0 nor 1. The message is one sentence with the file and the line.
     """
     header = csv_header(path)
     for name in (*columns, *([truth] if truth else [])):
@@ -153,25 +153,25 @@ def read_signal_file(
 
 
 def _parts(table: CsvTable, channels: Sequence[int]) -> dict[str, CsvTable]:
-    """Return the rows of each channel by " of channel N"; of a file without the column, all rows by nothing."""
+    """Return the rows of each channel, keyed by " of channel N"; without the column, all rows, keyed by ""."""
     if CHANNEL not in table:
         if set(channels) - {0}:
             raise SpecificationError(
-                f"{table.path} must have the column {CHANNEL}, not only {', '.join(table.header)}, for others than 0"
+                f"{table.path} must have the column {CHANNEL} for channels above 0, not only {', '.join(table.header)}"
             )
         return {"": table}
     number = table.column(CHANNEL)
     check_rows(
         table,
         (number % 1 != 0) | (number < 0),
-        lambda k: f"{CHANNEL} must be an integer from 0 on, not {number[k]:g}",
+        lambda k: f"{CHANNEL} must be an integer of 0 or more, not {number[k]:g}",
     )
     chosen = sorted(set(channels)) or np.unique(number).astype(int).tolist()
     return {f" of channel {channel}": rows_of_channel(table, channel) for channel in chosen}
 
 
 def unit_of(column: str) -> tuple[str, float]:
-    """Return the unit that the name of a column ends in, and the factor to it; ``("", 1.0)`` if it names none.
+    """Return the unit of a column by its name, and the factor that converts to it; ``("", 1.0)`` if it has none.
 
     Examples
     --------
@@ -187,15 +187,15 @@ def _sample_rate(table: CsvTable) -> float:
     check_rows(
         table,
         np.concatenate([[False], step <= 0]),
-        lambda k: f"{TIME} must be above {time[k - 1]:g} s, the row before, not {time[k]:g} s",
+        lambda k: f"{TIME} must be above the {time[k - 1]:g} s of the previous row, not {time[k]:g} s",
     )
     period = float(np.median(step))
     check_rows(
         table,
         np.concatenate([[False], np.abs(step - period) > TIME_TOLERANCE * period]),
-        lambda k: f"{TIME} must be {period:.6g} s after the row before, as most rows are, not {step[k - 1]:.6g} s",
+        lambda k: f"{TIME} must be {period:.6g} s after the previous row, like most rows, not {step[k - 1]:.6g} s",
     )
-    # over the whole length, rounding of the single times does not count
+    # taken over the whole length, to average out rounding of single times
     return float(f"{(len(time) - 1) / (time[-1] - time[0]):.9g}")
 
 
@@ -212,14 +212,14 @@ def _signals(table: CsvTable, polynomial: Polynomial, columns: Sequence[str], tr
     chosen = columns or [name for name in table.header if name not in aside and not name.endswith("_code")]
     if not chosen:
         raise SpecificationError(
-            f"{table.path} must have a column of values beside {TIME}, not only {', '.join(table.header)}"
+            f"{table.path} must have a column of values besides {TIME}, not only {', '.join(table.header)}"
         )
     signals = []
     for name in chosen:
         unit, factor = unit_of(name)
         if not columns and not unit:
             raise SpecificationError(
-                f"{table.path}: column must end in its unit (_{', _'.join(_UNITS)}) or be chosen by --column, "
+                f"{table.path}: column must end in its unit (_{', _'.join(_UNITS)}) or be selected by --column, "
                 f"not {name!r}"
             )
         signals.append(_with_truth(table, Signal(name=name, unit=unit, values=factor * table.column(name)), truth))
@@ -227,7 +227,7 @@ def _signals(table: CsvTable, polynomial: Polynomial, columns: Sequence[str], tr
 
 
 def _with_truth(table: CsvTable, signal: Signal, truth: str | None) -> Signal:
-    """Add the truth to a signal that has its unit; a truth without a unit goes with every signal."""
+    """Add the true value to a signal of its unit; a true value without a unit applies to every signal."""
     if truth is None or signal.name == truth:
         return signal
     unit, factor = unit_of(truth)

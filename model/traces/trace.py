@@ -1,4 +1,4 @@
-"""Traces: the input codes of a core over time, with the truth behind them."""
+"""Traces: the input codes of a core over time, with the true values they represent."""
 
 from __future__ import annotations
 
@@ -8,17 +8,18 @@ from fractions import Fraction
 import numpy as np
 import numpy.typing as npt
 
-from sosmith.model.port import Codes, Port, Values
+from sosmith.model.arrays import Codes, Values
+from sosmith.model.port import Port
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Trace:
-    """Input codes of a core, one row per sample period. All arrays are read-only.
+    """Input codes of a core, one row per sample. All arrays are read-only.
 
     Attributes
     ----------
     name : str
-        Name of the scenario or file.
+        Name of the scenario or the file.
     ports : tuple of Port
         Inputs, in the order of the columns of `codes`.
     sample_rate : Fraction
@@ -26,17 +27,17 @@ class Trace:
     codes : ndarray of int64, shape (n, n_inputs)
         Codes within the ports' ranges; at least one sample.
     truth : ndarray, shape (n,), optional
-        What an ideal measurement would show, in the unit of the core's output.
+        True values: the result of an ideal measurement, in the unit of the core's output.
     reading : ndarray of bool, shape (n,), optional
-        The samples at which truth and measurement are compared.
+        Samples at which the measurement is compared with `truth`.
     seed : int, optional
-        Seed that a generated trace came from.
+        Seed of a generated trace.
 
     Raises
     ------
     ValueError
-        If there is no sample, a shape does not fit, a code is out of range, a true value is not finite, or
-        the sample rate is not positive.
+        If there is no sample, a shape is wrong, a code is out of range, a true value is not finite, or the sample
+        rate is not positive.
     """
 
     name: str
@@ -74,7 +75,7 @@ class Trace:
         object.__setattr__(self, name, array)
 
     def __len__(self) -> int:
-        """Count of samples."""
+        """Return the number of samples."""
         return len(self.codes)
 
     @property
@@ -83,7 +84,7 @@ class Trace:
         return np.arange(len(self), dtype=np.float64) / float(self.sample_rate)
 
     def delayed(self, samples: int) -> Trace:
-        """Return the same trace, of the same length, beginning `samples` later; its first sample is held until then."""
+        """Return the trace delayed by `samples`, with equal length; the first sample is held until then."""
         source = np.maximum(np.arange(len(self)) - samples, 0)
         return replace(
             self,
@@ -93,6 +94,6 @@ class Trace:
         )
 
     def values(self) -> Values:
-        """Physical values of the codes in the ports' units, shape (n, n_inputs)."""
+        """Return the physical values of the codes in the ports' units, shape (n, n_inputs)."""
         decoded = [port.decode(column) for port, column in zip(self.ports, self.codes.T, strict=True)]
         return np.stack(decoded, axis=1)

@@ -10,25 +10,26 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from sosmith.model.arrays import Codes, Values
 from sosmith.model.errors import SpecificationError
-from sosmith.model.port import Codes, Port, Values
+from sosmith.model.port import Port
 from sosmith.model.tables.csv_table import CsvTable, check_rows, read_csv_table
 from sosmith.model.text_files import write_files
 from sosmith.model.traces.trace import Trace
 
 CHANNEL = "channel"
-"""Column with the number of a row's channel, from 0; a file without it holds one channel."""
+"""Column with the channel number of a row, from 0; a file without it has one channel."""
 
 PHYSICAL_COLUMNS = {"voltage": "voltage_V", "temperature": "temperature_C"}
-"""Columns of the paper's sensors; those of every other input have the input's name."""
+"""Names of the physical columns of the paper's sensors; that of any other input is the input's name."""
 
 TIME_TOLERANCE = 0.01
-"""Relative deviation of a time step from the sample period that a file may have."""
+"""Largest relative deviation of a time step from the sample period in a file."""
 
 
 @dataclass(frozen=True)
 class _Columns:
-    """Names of the columns of a trace file."""
+    """Column names of a trace file."""
 
     physical: tuple[str, ...]
     codes: tuple[str, ...]
@@ -47,7 +48,7 @@ class _Columns:
         for index, name in enumerate(columns.all):
             if name in columns.all[:index]:
                 raise SpecificationError(
-                    f"input names must differ from the other columns of a trace file, not give {name!r} twice"
+                    f"input names must differ from the other columns of a trace file, not repeat {name!r}"
                 )
         return columns
 
@@ -57,22 +58,22 @@ class _Columns:
 
 
 def traces_csv(traces: Sequence[Trace]) -> str:
-    """Text of the traces of a core's channels as CSV, the same on every run.
+    """Return the traces of a core's channels as CSV text, the same on every run.
 
-    Columns: time_s; channel, if there are several; for each input its physical value (voltage_V, temperature_C, or the
-    input's name); for each input its code (``<input>_code``); clearance_mm, called truth unless the core has two
-    inputs, and reading (0 or 1), where the traces have them. Rows go by time, then by channel. Numbers read back to the
-    same doubles.
+    Columns: time_s; channel, if there are several; the physical value of each input (voltage_V, temperature_C, or the
+    input's name); the code of each input (``<input>_code``); if the traces have them, the true value (clearance_mm for
+    two inputs, truth for one) and reading (0 or 1). Rows are sorted by time, then by channel. Numbers are written so
+    that they read back exactly.
 
     Parameters
     ----------
     traces : sequence of Trace
-        One for each channel, all with the same ports, length and parts.
+        One per channel, all with the same ports and length, and all with or without truth and reading.
 
     Raises
     ------
     SpecificationError
-        If an input has the name of another column.
+        If an input's name is that of another column.
     """
     header = _Columns.of(traces[0].ports)
     names = [header.time, *([header.channel] if len(traces) > 1 else []), *header.physical, *header.codes]
@@ -96,37 +97,37 @@ def _rows(trace: Trace, channel: str | None) -> list[str]:
 
 
 def write_traces(path: Path, traces: Sequence[Trace]) -> None:
-    """Write `traces_csv` to `path`; the file appears complete or not at all.
+    """Write `traces_csv` to `path` atomically.
 
     Raises
     ------
     SpecificationError
-        As `traces_csv`, or if the file cannot be written.
+        As for `traces_csv`; if the file cannot be written.
     """
     write_files(path.parent, {path.name: traces_csv(traces)})
 
 
 def read_traces(path: Path, ports: tuple[Port, ...], sample_rate: Fraction, channels: int = 1) -> tuple[Trace, ...]:
-    """Read a trace file for a core with the inputs `ports`, running at `sample_rate` in Hz for each of its `channels`.
+    """Read a trace file for a core with the inputs `ports` and the `sample_rate` in Hz of each of its `channels`.
 
-    Every input needs its code column or its physical column (see `traces_csv`). Where only the
-    physical column is there, the port's format quantizes it as an ADC does: nearest code, saturating at
-    the ends of the range. Where both are there, the code counts and the other must agree with it.
-    time_s, channel, the truth and reading are optional; a trace has the file's name without its extension.
-    Rows of one channel are in the order of time; those of different channels may stand in any order.
+    Every input needs its code column or its physical column (see `traces_csv`). A physical column alone is quantized
+    as by an ADC: to the nearest code, saturated to the range. If both are present, the code is used, and the physical
+    value must agree with it. The columns time_s, channel, truth or clearance_mm, and reading are optional. A trace is
+    named after its file, without the extension. Rows of one channel must be in chronological order; channels may be
+    interleaved in any order.
 
     Returns
     -------
     tuple of Trace
-        One for each channel, all of the same length; from a file without the column channel, one only.
+        One per channel, all of equal length; a single one if the file has no column channel.
 
     Raises
     ------
     SpecificationError
-        As `read_csv_table`; if an input has no column; if a code is no integer or out of range, or
-        contradicts the physical value; if time_s does not increase by one sample period from row to
-        row of a channel within `TIME_TOLERANCE`; if reading is neither 0 nor 1; if a channel is no integer from 0 to
-        one less than `channels`, has no row, or more than another.
+        As for `read_csv_table`; if an input has no column; if a code is not an integer, is out of range, or contradicts
+        the physical value; if time_s does not increase by one sample period per row of a channel, within
+        `TIME_TOLERANCE`; if reading is neither 0 nor 1; if a channel number is not an integer from 0 to
+        ``channels - 1``; if a channel has no row, or more rows than another.
     """
     columns = _Columns.of(ports)
     table = read_csv_table(path, columns.all)
@@ -135,12 +136,12 @@ def read_traces(path: Path, ports: tuple[Port, ...], sample_rate: Fraction, chan
 
 
 def rows_of_channel(table: CsvTable, channel: int) -> CsvTable:
-    """Return the rows of one channel of a table with the column channel.
+    """Return the rows of one channel from a table with the column channel.
 
     Raises
     ------
     SpecificationError
-        If it has none.
+        If the channel has no row.
     """
     number = table.column(CHANNEL)
     own = np.flatnonzero(number == channel)
@@ -167,13 +168,13 @@ def _by_channel(table: CsvTable, channels: int) -> list[CsvTable]:
     check_rows(
         table,
         beyond,
-        lambda k: f"{CHANNEL} {number[k]:g} must end with its row {length}, as channel {shortest} does, not go on",
+        lambda k: f"{CHANNEL} {number[k]:g} must end after row {length}, like channel {shortest}, not continue",
     )
     return [table.take(some) for some in rows]
 
 
 def _allowed(channels: int) -> str:
-    return "0, the core's only one" if channels == 1 else f"an integer from 0 to {channels - 1}"
+    return "0, the core's only channel" if channels == 1 else f"an integer from 0 to {channels - 1}"
 
 
 def _trace(table: CsvTable, columns: _Columns, ports: tuple[Port, ...], sample_rate: Fraction) -> Trace:
@@ -196,8 +197,8 @@ def _trace(table: CsvTable, columns: _Columns, ports: tuple[Port, ...], sample_r
 def _check_time(table: CsvTable, time: Values, sample_rate: Fraction) -> None:
     period = 1 / float(sample_rate)
     step = np.concatenate([[period], np.diff(time)])
-    before = "the row of this channel before" if CHANNEL in table else "the row before"
-    check_rows(table, step <= 0, lambda k: f"time_s must be above {time[k - 1]}, {before}, not {time[k]}")
+    before = "the previous row of this channel" if CHANNEL in table else "the previous row"
+    check_rows(table, step <= 0, lambda k: f"time_s must be above {time[k - 1]}, the value in {before}, not {time[k]}")
     check_rows(
         table,
         np.abs(step - period) > TIME_TOLERANCE * period,

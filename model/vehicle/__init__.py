@@ -1,1 +1,1 @@
-"""The locomotive on its track: parameters, dynamics, motion, and the clearance that follows."""
+"""The locomotive on its track: parameters, dynamics, motion, and the resulting clearance."""

@@ -1,4 +1,4 @@
-"""Lateral dynamics of a six-axle locomotive: 21 coordinates, linear, and what the track does to them."""
+"""Lateral dynamics of a six-axle locomotive: a linear model with 21 coordinates, excited by the track."""
 
 from __future__ import annotations
 
@@ -21,56 +21,56 @@ COORDINATES = (
     *(f"frame {k + 1} {motion}" for k in FRAMES for motion in ("lateral", "yaw", "roll")),
     *(f"body {motion}" for motion in ("lateral", "yaw", "roll")),
 )
-"""The 21 coordinates, in m and rad: lateral to the left, yaw to the left, roll with the left side up."""
+"""The 21 coordinates in m and rad. Positive: lateral to the left, yaw to the left, roll with the left side up."""
 
 ROLLS = tuple(f"wheelset {k + 1} roll" for k in WHEELSETS)
-"""Prescribed by the track: a wheelset rolls with it."""
+"""Roll angles of the wheelsets, prescribed by the track."""
 
 
 def frame_of(wheelset: int) -> int:
-    """Index of the frame that a wheelset belongs to."""
+    """Return the index of the frame that a wheelset belongs to."""
     return wheelset // 3
 
 
 def axle_positions(layout: Layout) -> Array:
-    """Distance in m of each wheelset ahead of its frame's centre, shape (6,); the centre halves the wheelbase."""
+    """Return the distance in m of each wheelset ahead of the middle of its wheelbase, shape (6,)."""
     half = (layout.outer_axle_spacing + layout.inner_axle_spacing) / 2
     middle = half - layout.outer_axle_spacing
     return np.array([half, middle, -half, half, -middle, -half])
 
 
 def frame_positions(layout: Layout) -> Array:
-    """Distance in m of each frame's centre ahead of the body's, shape (2,)."""
+    """Return the distance in m of each frame's centre ahead of the body's, shape (2,)."""
     return np.array([layout.bogie_distance / 2, -layout.bogie_distance / 2])
 
 
 def wheelset_positions(layout: Layout) -> Array:
-    """Distance in m of each wheelset ahead of the body's centre, shape (6,)."""
+    """Return the distance in m of each wheelset ahead of the body's centre, shape (6,)."""
     return axle_positions(layout) + np.repeat(frame_positions(layout), 3)
 
 
 def wheelset_load(parameters: Parameters) -> float:
-    """Load in N of one wheelset on its rails; all six carry the same."""
+    """Return the load in N of one wheelset on the rails; all six are equal."""
     return parameters.total_mass * GRAVITY / 6
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LateralDynamics:
-    """The lateral equations at one speed, and the forces of a track on them.
+    """The lateral equations of motion at one speed, and the track forces in them.
 
-    Positions are counted across the straight line that goes on from the track's beginning, so that inertia needs no
-    extra terms in curves; `relative` takes the track off again.
+    Lateral positions are measured from the straight line that extends the beginning of the track, so that curves
+    need no extra inertia terms; subtracting `track_pose` gives positions relative to the track.
 
     Attributes
     ----------
     parameters : Parameters
-        Of the vehicle.
+        Parameters of the vehicle.
     speed : float
-        In m/s.
+        Speed in m/s.
     system : LinearSystem
-        Suspension and contacts, with the coordinates `COORDINATES`.
+        Suspension and contacts, in `COORDINATES`.
     suspension : Suspension
-        Springs and dampers alone, with the coordinates `COORDINATES` and `ROLLS`.
+        Springs and dampers only, in `COORDINATES` and `ROLLS`.
     """
 
     parameters: Parameters
@@ -79,7 +79,7 @@ class LateralDynamics:
     suspension: Suspension
 
     def _places(self) -> Array:
-        """Distance ahead of the body's centre and height above the rails for each coordinate, shape (21, 2)."""
+        """Return distance ahead of the body's centre and height above the rails in m per coordinate, shape (21, 2)."""
         given = self.parameters
         ahead = [*np.repeat(wheelset_positions(given.layout), 2), *np.repeat(frame_positions(given.layout), 3), 0, 0, 0]
         height = np.repeat(
@@ -88,19 +88,19 @@ class LateralDynamics:
         return np.stack([ahead, height], axis=1)
 
     def track_pose(self, track: Track, centre: Array) -> Array:
-        """Where the coordinates would be if the vehicle were one with the track, shape (n, 21).
+        """Return the coordinates of a vehicle that follows the track exactly, shape (n, 21).
 
         Parameters
         ----------
         track : Track
         centre : ndarray, shape (n,)
-            Distance of the body's centre in m.
+            Position of the body's centre along the track in m.
         """
         pose, _ = self._poses(track, centre)
         return pose
 
     def _poses(self, track: Track, centre: Array) -> tuple[Array, Array]:
-        """Pose of the track at each coordinate, and its change with time."""
+        """Return the pose of the track at each coordinate, and its time derivative."""
         gauge = 2 * self.parameters.wheelset.contact_half_spacing
         pose = np.zeros((len(centre), len(COORDINATES)))
         rate = np.zeros_like(pose)
@@ -116,11 +116,11 @@ class LateralDynamics:
         return pose, self.speed * rate
 
     def forces(self, track: Track, irregularity: Irregularity | None, centre: Array) -> Array:
-        """Return the forces of a track, shape (n, 21), with the body's centre at `centre` in m, shape (n,)."""
+        """Return the track forces, shape (n, 21), with the body's centre at `centre` in m, shape (n,)."""
         given, count = self.parameters, len(COORDINATES)
         gauge = 2 * given.wheelset.contact_half_spacing
         pose, rate = self._poses(track, centre)
-        # contacts and preload act on what is relative to the track; creep along the rail on the absolute yaw rate
+        # contacts and preload act on motion relative to the track; longitudinal creep acts on the absolute yaw rate
         contact_damping = self.system.damping - self.suspension.damping[:count, :count]
         contact_stiffness = self.system.stiffness - self.suspension.stiffness[:count, :count]
         lateral = [k for k, name in enumerate(COORDINATES) if name.endswith("lateral")]
@@ -142,7 +142,7 @@ class LateralDynamics:
 
 
 def lateral_dynamics(parameters: Parameters, speed: float) -> LateralDynamics:
-    """Assemble the lateral equations at `speed` m/s."""
+    """Assemble the lateral equations of motion at `speed` in m/s."""
     suspension = lateral_suspension(parameters)
     count = len(COORDINATES)
     damping = suspension.damping[:count, :count].copy()
@@ -169,7 +169,7 @@ def lateral_dynamics(parameters: Parameters, speed: float) -> LateralDynamics:
 
 
 def primary_elongation(parameters: Parameters, wheelset: int) -> dict[str, float]:
-    """Lateral elongation of the primary suspension: wheelset less frame, at the axle's height."""
+    """Return the lateral elongation of the primary suspension: wheelset minus frame, at axle height."""
     below = parameters.frame.centre_height - parameters.wheelset.rolling_radius
     w, f = f"wheelset {wheelset + 1}", f"frame {frame_of(wheelset) + 1}"
     ahead = float(axle_positions(parameters.layout)[wheelset])
@@ -177,7 +177,7 @@ def primary_elongation(parameters: Parameters, wheelset: int) -> dict[str, float
 
 
 def lateral_suspension(parameters: Parameters) -> Suspension:
-    """Primary and secondary suspension between `COORDINATES` and `ROLLS`."""
+    """Return the primary and secondary suspension in `COORDINATES` and `ROLLS`."""
     made = Suspension(COORDINATES + ROLLS)
     primary, secondary = parameters.primary, parameters.secondary
     for k in WHEELSETS:
@@ -221,10 +221,10 @@ def lateral_suspension(parameters: Parameters) -> Suspension:
 
 
 def _preload(parameters: Parameters) -> Array:
-    """Stiffness of the static load on the springs: what stands on springs below its centre tends to topple.
+    """Return the geometric stiffness of the static spring loads: a mass supported below its centre tends to tip over.
 
-    A mass that rolls by p lifts the attachments a height h below its centre by h p^2 / 2, so the load P on them does
-    the work P h p^2 / 2.
+    If a mass rolls by p, attachments at a height h below its centre rise by h p^2 / 2, so the load P on them does the
+    work P h p^2 / 2.
     """
     stiffness = np.zeros((len(COORDINATES), len(COORDINATES)))
     body, frame, secondary = parameters.body, parameters.frame, parameters.secondary

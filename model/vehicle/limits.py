@@ -1,4 +1,4 @@
-"""Where a run leaves what a linear model can tell: wheels beyond their flanges, creep beyond friction."""
+"""Where a run leaves the validity of the linear model: flange contact, and creep forces above friction."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from sosmith.model.vehicle.track import Track
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Limits:
-    """How far each wheelset goes beyond the model; nothing is cut off at these limits.
+    """How far each wheelset exceeds the limits of the linear model, which does not enforce them.
 
     Attributes
     ----------
     beyond_flange : ndarray, shape (6,)
-        Largest way in m of the wheelset past the place where its flange would touch the rail; below 0 it stays clear.
+        Largest lateral displacement in m beyond first flange contact; negative if there is no contact.
     beyond_flange_share : ndarray, shape (6,)
-        Share of the time that it is past it, 0 to 1.
+        Share of time with flange contact, 0 to 1.
     friction_used : ndarray, shape (6,)
-        Largest creep force over the friction that the wheel's load gives; above 1 the wheel would slide.
+        Largest ratio of creep force to available friction force; above 1 the wheel would slide.
     friction_exceeded_share : ndarray, shape (6,)
-        Share of the time that it is above 1.
+        Share of time with a ratio above 1, 0 to 1.
     """
 
     beyond_flange: Array
@@ -41,7 +41,7 @@ class Limits:
 
 
 def limits(parameters: Parameters, track: Track, motion: Motion) -> Limits:
-    """Find where flanges would have touched and creep would have saturated."""
+    """Check a run for flange contact and saturated creep."""
     ahead = wheelset_positions(parameters.layout)
     place = motion.distance[:, np.newaxis] + ahead - ahead[0]
     room = parameters.sensor.flange_clearance + track.widening_at(place) / 2

@@ -1,4 +1,4 @@
-"""Motion of the vehicle over time, and the clearance that a sensor on the bogie frame sees of it."""
+"""Motion of the vehicle over time, and the change of clearance at a sensor on the bogie frame."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from sosmith.model.vehicle.parameters import Parameters
 class Motion:
     """Motion at n times, in SI units. Lateral and yaw are positive to the left, roll with the left side up.
 
-    Lateral, yaw and roll count from the designed track at the place of each part: from its middle, its direction, its
-    cant. Vertical counts from the height of the rails before the curve, so it holds the cant.
+    Lateral, yaw and roll are relative to the designed track at each part: to its centre line, direction and cant.
+    Vertical is relative to the height of the rails before the curve, so it includes the cant.
 
     Attributes
     ----------
     time : ndarray, shape (n,)
-        In s, from 0, when the first wheelset is at the beginning of the track.
+        Time in s, 0 when the first wheelset is at the beginning of the track.
     distance : ndarray, shape (n,)
-        Of the first wheelset, in m.
+        Distance of the first wheelset in m.
     wheelset_lateral, wheelset_yaw, wheelset_vertical : ndarray, shape (n, 6)
         In m, rad and m.
     frame_lateral, frame_yaw, frame_roll, frame_vertical, frame_pitch : ndarray, shape (n, 2)
@@ -32,16 +32,16 @@ class Motion:
     body_lateral, body_yaw, body_roll, body_vertical, body_pitch : ndarray, shape (n,)
         In m and rad.
     wheelset_yaw_to_frame : ndarray, shape (n, 6)
-        Yaw of the wheelsets relative to their frames in rad; in a curve not the difference of the two above.
+        Yaw of the wheelsets relative to their frames in rad. In a curve this is not the difference of the two above.
     left_wheel_rise, right_wheel_rise : ndarray, shape (n, 6)
-        How much a wheel's centre rises above the rails by conicity, in m.
+        Rise of the wheel's centre above the rails due to conicity, in m.
     clearance_mm : ndarray, shape (n, 6)
-        Change of the clearance in mm at a sensor that faces the flange of the right wheel; what it reads is its
-        clearance at rest plus this. At the left wheel it is the same with the other sign.
+        Change of the clearance in mm at a sensor that faces the flange of the right wheel, to be added to the
+        clearance at rest. At the left wheel it has the opposite sign.
     lateral_to_rails : ndarray, shape (n, 6)
-        Lateral position of the wheelsets relative to the rails with their irregularities, in m.
+        Lateral position of the wheelsets relative to the rails, including irregularities, in m.
     creep_force : ndarray, shape (n, 6)
-        Resultant of longitudinal and lateral creep force in N, the same at both wheels of a wheelset.
+        Resultant of longitudinal and lateral creep force in N, equal at both wheels of a wheelset.
     """
 
     time: Array
@@ -71,7 +71,7 @@ class Motion:
             getattr(self, one.name).setflags(write=False)
 
     def columns(self) -> Iterator[tuple[str, Array]]:
-        """Every motion with its name and unit, such as ``wheelset1_lateral_mm``, for a table."""
+        """Yield every motion with a column name that includes the unit, such as ``wheelset1_lateral_mm``."""
         yield "time_s", self.time
         yield "distance_m", self.distance
         for part, count in (("wheelset", 6), ("frame", 2), ("body", 1)):
@@ -97,17 +97,18 @@ def clearance_change(
     frame_yaw: Array,
     frame_roll: Array,
 ) -> Array:
-    """Change of the clearance in mm at the right wheels' sensors, shape (n, 6).
+    """Return the change of the clearance in mm at the right wheels' sensors, shape (n, 6).
 
-    Positions count from one straight line, not from the curved track. The sensor is one with the frame; at the axle's
-    height and `sensor.arm` ahead of the axle it looks from the field side at the flank of the flange, across the
-    track. At the right wheel the clearance there grows by
+    Positions refer to a straight line, not to the curved track. The sensor is fixed to the frame. At axle height
+    and `sensor.arm` ahead of the axle, it faces the flank of the flange from the field side, across the track. At the
+    right wheel the clearance grows by
 
         y_w + arm psi_w - (y_f + (a + arm) psi_f + h roll_f) - slope l (psi_w - psi_f),
 
-    with a the axle's place ahead of the frame's centre, h that centre's height above the axle, l the half distance of
-    the wheels: yaw moves the wheel along the track by l (psi_w - psi_f) too, and a flank that leans by `flank_slope`
-    passes sideways by it. Relative vertical motion changes nothing to first order, as the paper (5.1) says.
+    with a the distance of the axle ahead of the frame's centre, h the height of that centre above the axle, and l half
+    the distance of the wheels: yaw also moves the wheel along the track by l (psi_w - psi_f), which the slope of the
+    flank turns into a lateral displacement. Relative vertical motion has no first-order effect, as the paper (5.1)
+    says.
 
     Parameters
     ----------

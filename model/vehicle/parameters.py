@@ -1,4 +1,4 @@
-"""Parameters of locomotive, track and irregularities: a TOML file with a unit and a source for every number."""
+"""Parameters of locomotive, track and irregularities, from a TOML file with unit and source of every number."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ from sosmith.model.tables.toml_file import parse_toml, read_toml
 _WHAT = "the file of parameters"
 
 MAX_BYTES = 1 << 16
-"""Largest file in bytes; the built-in one has ten thousand."""
+"""Largest file size in bytes; the built-in file has about ten thousand."""
 
 LABELS = ("[published]", "[paper]", "[from memory]", "[derived]", "[assumed]")
-"""How a source begins."""
+"""Labels that a source may begin with."""
 
 _LARGEST = 1e12
-"""No quantity here is larger in its SI unit: a guard against a slip."""
+"""Upper limit of every quantity in its SI unit, to catch mistyped values."""
 
 
 def _quantity(unit: str, text: str, *, zero: bool = False, below: float = _LARGEST) -> Any:
-    """Make a field in `unit`: positive, or also zero, and less than `below`."""
+    """Return a field for a quantity in `unit`: positive, or 0 if `zero`, and less than `below`."""
     return field(metadata={"unit": unit, "text": text, "zero": zero, "below": below})
 
 
 @dataclass(frozen=True, kw_only=True)
 class Layout:
-    """Where axles and bogies are along the vehicle; the bogies mirror each other."""
+    """Positions of axles and bogies along the vehicle; the bogies are mirror images."""
 
     bogie_distance: float = _quantity("m", "between the bogies' centres")
     outer_axle_spacing: float = _quantity("m", "outer to middle axle of a bogie")
@@ -39,7 +39,7 @@ class Layout:
 
 @dataclass(frozen=True, kw_only=True)
 class Wheelset:
-    """One wheelset with the part of its motor that it carries."""
+    """One wheelset, with its share of the motor's mass."""
 
     mass: float = _quantity("kg", "mass")
     yaw_inertia: float = _quantity("kg m^2", "moment of inertia about the vertical")
@@ -50,7 +50,7 @@ class Wheelset:
 
 @dataclass(frozen=True, kw_only=True)
 class Contact:
-    """Contact ellipse at a reference load, and Kalker's coefficients for it."""
+    """Contact ellipse at a reference load, and its Kalker coefficients."""
 
     reference_load: float = _quantity("N", "load of a wheel")
     longitudinal_semi_axis: float = _quantity("m", "semi-axis along the rail")
@@ -106,7 +106,7 @@ class Secondary:
 
 @dataclass(frozen=True, kw_only=True)
 class Sensor:
-    """Where a sensor on the bogie frame looks at the flange."""
+    """Position of the sensor on the bogie frame relative to the flange."""
 
     arm: float = _quantity("m", "distance ahead of the axle")
     flank_slope: float = _quantity("1", "lateral over radial direction of the flange's flank", zero=True)
@@ -115,7 +115,7 @@ class Sensor:
 
 @dataclass(frozen=True, kw_only=True)
 class TrackTable:
-    """Tangent, spiral, curve to the left, spiral, tangent; and a single lateral irregularity at its beginning."""
+    """Tangent, spiral, curve to the left, spiral, tangent, with a single lateral irregularity at the beginning."""
 
     tangent: float = _quantity("m", "length before the curve", zero=True, below=1e5)
     spiral: float = _quantity("m", "length of either transition", below=1e5)
@@ -144,14 +144,14 @@ class IrregularityTable:
 
 @dataclass(frozen=True, kw_only=True)
 class Parameters:
-    """Everything the vehicle's motion follows from, in SI units.
+    """All parameters of the vehicle's motion, in SI units.
 
     Attributes
     ----------
     layout, wheelset, contact, frame, body, primary, secondary, sensor, track, irregularities
         The tables of the file.
     sources : dict of str
-        Source of each number by its path, such as ``wheelset.mass``; begins with one of `LABELS`.
+        Source of each number by its path, such as ``wheelset.mass``; each begins with one of `LABELS`.
     """
 
     layout: Layout
@@ -189,31 +189,31 @@ T = TypeVar("T")
 
 
 def built_in_text() -> str:
-    """Text of the built-in file, a locomotive of the class HXD1C as far as known."""
+    """Return the text of the built-in file: a locomotive of class HXD1C, as far as its parameters are known."""
     return (resources.files("sosmith.model.vehicle") / "locomotive.toml").read_text(encoding="utf-8")
 
 
 def built_in() -> Parameters:
-    """Read the built-in parameters."""
+    """Return the built-in parameters."""
     return parse(built_in_text(), "locomotive.toml")
 
 
 def load(path: Path) -> Parameters:
-    """Read a file of parameters; it has to hold every one.
+    """Read a parameter file; it must contain every parameter.
 
     Raises
     ------
     SpecificationError
-        If the file cannot be read or is no TOML; if a table or key is unknown or missing; if an entry is no value with
-        unit and source, its unit is not the right one, its value is no number in range, its source has no label, or
-        two values do not go together. One sentence: file, key, what would be right and what was found.
+        If the file cannot be read or is not TOML; if a table or key is unknown or missing; if an entry is not a value
+        with unit and source, its unit is wrong, its value is not a number in range, or its source has no label; if
+        two values contradict each other. The message is one sentence: file, key, what was expected, what was found.
     """
     tree = read_toml(path, what=_WHAT, max_bytes=MAX_BYTES)
     return _parameters(tree, str(path))
 
 
 def parse(text: str, name: str) -> Parameters:
-    """Read parameters from the text of a file called `name`; refuses as `load` does."""
+    """Read parameters from the text of a file called `name`; raises as `load` does."""
     return _parameters(parse_toml(text, name, what=_WHAT), name)
 
 
@@ -268,7 +268,7 @@ def _value(where: str, entry: Any, rule: Any) -> float:
 
 
 def _check_together(name: str, parameters: Parameters) -> None:
-    """Refuse what is impossible together."""
+    """Reject values that contradict each other."""
     layout, track, waves = parameters.layout, parameters.track, parameters.irregularities
     wheelbase = layout.outer_axle_spacing + layout.inner_axle_spacing
     if layout.bogie_distance <= wheelbase:

@@ -1,4 +1,4 @@
-"""A run of the locomotive over a track: from parameters, speed and seed to its motion."""
+"""A run of the locomotive over a track: from parameters, track, speed and seed to its motion."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from sosmith.model.errors import SpecificationError
+from sosmith.model.vehicle.choices import LEVELS
 from sosmith.model.vehicle.lateral import (
     FRAMES,
     WHEELSETS,
@@ -19,16 +20,16 @@ from sosmith.model.vehicle.linear_motion import Array
 from sosmith.model.vehicle.motion import Motion, clearance_change
 from sosmith.model.vehicle.parameters import Parameters
 from sosmith.model.vehicle.track import Track
-from sosmith.model.vehicle.track_irregularity import LEVELS, Irregularity
+from sosmith.model.vehicle.track_irregularity import Irregularity
 from sosmith.model.vehicle.track_irregularity import irregularity as make_irregularity
 from sosmith.model.vehicle.vertical import vertical_dynamics
 from sosmith.model.vehicle.wheel_rail_contact import creep_coefficients
 
 MIN_RATE = 1000.0
-"""Samples per second inside, at least: the track is taken as linear between them (at 20 m/s, 20 mm)."""
+"""Lowest internal sample rate in Hz; the track is taken as linear between samples (20 mm apart at 20 m/s)."""
 
 RUN_IN = 200.0
-"""Way in m before the beginning of a track with random irregularities, on which the start from rest dies away."""
+"""Run-in distance in m before a track with random irregularities, on which the starting transient decays."""
 
 SPEEDS = (1.0, 100.0)
 """Lowest and highest speed in m/s: linear creep has no meaning at rest."""
@@ -37,7 +38,7 @@ RATES = (1.0, 20_000.0)
 """Lowest and highest sample rate in Hz."""
 
 LIMIT_SAMPLES = 5_000_000
-"""Samples inside that a run may have, a guard against a slip in the unit."""
+"""Largest number of internal samples of a run, to catch values in a wrong unit."""
 
 
 def run(
@@ -49,32 +50,32 @@ def run(
     irregularity: str | None = None,
     seed: int = 1,
 ) -> Motion:
-    """Run over a track at constant speed, until its first wheelset is at the end.
+    """Run over a track at constant speed until the first wheelset reaches its end.
 
-    Lateral and vertical equations are linear and solved exactly, with forces that are linear between samples of at
-    least `MIN_RATE`. There is no flange contact and no limit to creep; `sosmith.model.vehicle.limits` tells where
-    they would have acted.
+    The lateral and vertical equations are linear and are solved exactly for forces that are linear between samples at
+    `MIN_RATE` or more. Flange contact and creep saturation are not modelled; `sosmith.model.vehicle.limits` reports
+    where they would occur.
 
     Parameters
     ----------
     parameters : Parameters
-        Of the vehicle and the irregularities.
+        Parameters of the vehicle and the irregularities.
     track : Track
         Course, cant and single irregularity.
     speed : float
-        In m/s, within `SPEEDS`.
+        Speed in m/s, within `SPEEDS`.
     sample_rate : float
-        Of the motion in Hz, within `RATES`.
+        Sample rate of the motion in Hz, within `RATES`.
     irregularity : {None, "low", "high"}, optional
-        Random irregularities on top.
+        Level of random irregularities, added to the single one.
     seed : int, optional
-        Of the random irregularities, 0 or more.
+        Seed of the random irregularities, 0 or more.
 
     Raises
     ------
     SpecificationError
-        If speed, sample rate, irregularity or seed are not as above, the run is too long, or the vehicle is unstable
-        at that speed.
+        If speed, sample rate, irregularity or seed is out of range, the run is too long, or the vehicle is unstable at
+        that speed.
     """
     _check("speed", speed, SPEEDS, "m/s")
     _check("sample rate", sample_rate, RATES, "Hz")
@@ -88,8 +89,8 @@ def run(
     behind = math.floor(track.length / (speed * step) + 1e-9)
     if before + behind > LIMIT_SAMPLES:
         raise SpecificationError(
-            f"the run must have at most {LIMIT_SAMPLES:,} samples inside, not {before + behind:,}: "
-            "a shorter track, more speed or a lower sample rate"
+            f"the run must take at most {LIMIT_SAMPLES:,} internal samples, not {before + behind:,}: "
+            "shorten the track, raise the speed or lower the sample rate"
         )
     lateral = lateral_dynamics(parameters, speed)
     growing = max(mode.growth for mode in lateral.system.modes())
@@ -113,7 +114,7 @@ def _check(name: str, value: float, allowed: tuple[float, float], unit: str) -> 
 
 
 def _reach(parameters: Parameters, track: Track) -> float:
-    """Distance in m between the first and the last place that a wheel touches."""
+    """Return the distance in m between the first and the last wheel contact of the run."""
     positions = wheelset_positions(parameters.layout)
     return RUN_IN + 1.0 + float(positions[0] - positions[-1]) + track.length
 
@@ -175,7 +176,7 @@ def _motion(
 def _creep_force(
     lateral: LateralDynamics, track: Track, centre: Array, relative: Array, rate: Array, to_rails: Array
 ) -> Array:
-    """Resultant creep force of a wheel in N, shape (n, 6)."""
+    """Return the resultant creep force of a wheel in N, shape (n, 6)."""
     parameters, speed = lateral.parameters, lateral.speed
     wheelset = parameters.wheelset
     creep = creep_coefficients(parameters.contact, wheelset_load(parameters) / 2)

@@ -1,4 +1,4 @@
-"""Track: its course, cant and single lateral irregularity along the distance."""
+"""Track geometry along the distance: course, cant, and a single lateral irregularity."""
 
 from __future__ import annotations
 
@@ -15,20 +15,21 @@ from sosmith.model.vehicle.parameters import TrackTable
 class Track:
     """A track whose curvature and cant are continuous and piecewise linear.
 
-    Before its beginning and behind its end it goes on straight and without cant change.
+    Before its beginning and after its end it continues straight, with constant cant.
 
     Attributes
     ----------
     corners : ndarray, shape (k,)
-        Distances in m at which the slopes of curvature and cant change, rising; the first is 0, the last the length.
+        Distances in m at which the slopes of curvature and cant change, rising; the first is 0, the last is the length.
     curvature : ndarray, shape (k,)
-        There, in 1/m; to the left positive.
+        Curvature at the corners in 1/m, positive to the left.
     cant : ndarray, shape (k,)
-        There, in m: how much the outer rail is raised; in a curve to the left that is the right one.
+        Cant at the corners in m: height of the outer rail above the inner; in a curve to the left the right rail is
+        the outer one.
     irregularity, irregularity_length : float
-        Amplitude to the left and length in m of one lateral irregularity (1 - cos)/2 at the beginning.
+        Amplitude (to the left) and length in m of one lateral irregularity (1 - cos)/2 at the beginning.
     gauge_widening : float
-        In m, where the curvature is largest; in proportion elsewhere.
+        Gauge widening in m at the largest curvature; proportional to the curvature elsewhere.
     """
 
     corners: Array
@@ -49,47 +50,47 @@ class Track:
 
     @property
     def length(self) -> float:
-        """In m."""
+        """Length in m."""
         return float(self.corners[-1])
 
     def curvature_at(self, distance: Array) -> Array:
-        """Curvature in 1/m."""
+        """Return the curvature in 1/m."""
         return np.asarray(self._curvature(distance))
 
     def heading_at(self, distance: Array) -> Array:
-        """Direction of the track in rad, to the left positive, 0 at the beginning."""
+        """Return the direction of the track in rad, positive to the left, 0 at the beginning."""
         turned = self._curvature.antiderivative()
         return np.asarray(turned(distance) - turned(0.0))
 
     def offset_at(self, distance: Array) -> Array:
-        """Lateral way of the track in m, in the approximation of small angles: curvature integrated twice."""
+        """Return the lateral offset of the track in m for small angles: the curvature integrated twice."""
         turned = self._curvature.antiderivative()
         moved = turned.antiderivative()
         return np.asarray(moved(distance) - moved(0.0) - turned(0.0) * distance)
 
     def cant_at(self, distance: Array) -> Array:
-        """Cant in m."""
+        """Return the cant in m."""
         return np.asarray(self._cant(distance))
 
     def cant_slope_at(self, distance: Array) -> Array:
-        """Change of the cant in m per m; at a corner that behind it."""
+        """Return the slope of the cant in m per m; at a corner, the slope after it."""
         return np.asarray(self._cant.derivative()(distance))
 
     def irregularity_at(self, distance: Array) -> Array:
-        """Single lateral irregularity in m, to the left."""
+        """Return the single lateral irregularity in m, positive to the left."""
         inside = (distance > 0) & (distance < self.irregularity_length)
         wave = (1 - np.cos(2 * np.pi * distance / self.irregularity_length)) / 2
         return np.asarray(np.where(inside, self.irregularity * wave, 0.0))
 
     def widening_at(self, distance: Array) -> Array:
-        """Gauge widening in m."""
+        """Return the gauge widening in m."""
         largest = float(np.abs(self.curvature).max())
         share = np.abs(self.curvature_at(distance)) / largest if largest else np.zeros_like(distance)
         return self.gauge_widening * share
 
 
 def curved_track(table: TrackTable) -> Track:
-    """Tangent, spiral, curve to the left, spiral and tangent, as in section 5.1 of the paper."""
+    """Return a track of tangent, spiral, curve to the left, spiral and tangent, as in section 5.1 of the paper."""
     lengths = np.array([table.tangent, table.spiral, table.curve, table.spiral, table.run_out])
     inside = np.array([0.0, 0.0, 1.0, 1.0, 0.0, 0.0])
     corners, first = np.unique(np.concatenate([[0.0], np.cumsum(lengths)]), return_index=True)
@@ -105,7 +106,7 @@ def curved_track(table: TrackTable) -> Track:
 
 
 def tangent_track(table: TrackTable) -> Track:
-    """Straight track of the same length, with the single irregularity and nothing else."""
+    """Return a straight track of the same length, with only the single irregularity."""
     length = table.tangent + 2 * table.spiral + table.curve + table.run_out
     return Track(
         corners=np.array([0.0, length]),

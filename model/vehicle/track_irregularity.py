@@ -1,4 +1,4 @@
-"""Random irregularities of the track: a published power spectral density, and profiles made from it by a seed."""
+"""Random track irregularities: a published power spectral density, and random profiles synthesized from it."""
 
 from __future__ import annotations
 
@@ -11,19 +11,16 @@ from scipy.interpolate import CubicSpline
 from sosmith.model.vehicle.linear_motion import Array
 from sosmith.model.vehicle.parameters import IrregularityTable
 
-LEVELS = ("low", "high")
-"""Levels of disturbance of ERRI B176."""
-
 POINTS = 16
-"""Points per shortest wave of a profile; its cubic spline is then right to some 1e-4 of the wave's amplitude."""
+"""Points of a profile per shortest wavelength; the error of its cubic spline is then about 1e-4 of the amplitude."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Spectrum:
     """One-sided power spectral density S = A Oc^2 / ((O^2 + Or^2)(O^2 + Oc^2)) between two wavenumbers.
 
-    The form is that of the German spectra of ERRI B176 (Guo, Xia, De Roeck and Liu 2012, as quoted in the program
-    TTB-2D, which takes it as one-sided too; Claus and Schiehlen 1997, from memory). With Or = 0 it is the American
+    The formula is that of the German spectra in ERRI B176 (Guo, Xia, De Roeck and Liu 2012, as quoted in the program
+    TTB-2D, which also takes it as one-sided; Claus and Schiehlen 1997, from memory). With Or = 0 it is the American
     formula of the Federal Railroad Administration for level and alignment.
 
     Attributes
@@ -33,7 +30,7 @@ class Spectrum:
     upper, lower : float
         Oc and Or in rad/m.
     band : pair of float
-        Smallest and largest wavenumber in rad/m; nothing is outside.
+        Lowest and highest wavenumber in rad/m; the density is zero outside.
     """
 
     amplitude: float
@@ -42,7 +39,7 @@ class Spectrum:
     band: tuple[float, float]
 
     def density(self, wavenumber: Array) -> Array:
-        """Density in m^2/(rad/m) at wavenumbers in rad/m."""
+        """Return the density in m^2/(rad/m) at wavenumbers in rad/m."""
         squared = wavenumber**2
         value = self.amplitude * self.upper**2 / ((squared + self.lower**2) * (squared + self.upper**2))
         return np.asarray(np.where((wavenumber >= self.band[0]) & (wavenumber <= self.band[1]), value, 0.0))
@@ -50,12 +47,12 @@ class Spectrum:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Profile:
-    """A random profile over `distance`, periodic beyond; the same for every speed and sample rate.
+    """A random profile over `distance`, continued periodically; it does not depend on speed or sample rate.
 
     Attributes
     ----------
     distance, height : ndarray, shape (n,)
-        In m, equally spaced; the last point is the first one of the next period.
+        In m, equally spaced; the last point is the first of the next period.
     """
 
     distance: Array
@@ -66,24 +63,24 @@ class Profile:
         object.__setattr__(self, "_spline", CubicSpline(self.distance, self.height, bc_type="periodic"))
 
     def at(self, distance: Array) -> Array:
-        """Height in m."""
+        """Return the height in m."""
         return np.asarray(self._spline(distance))
 
     def slope_at(self, distance: Array) -> Array:
-        """Change of the height in m per m."""
+        """Return the slope of the height in m per m."""
         return np.asarray(self._spline(distance, 1))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Irregularity:
-    """Alignment (lateral, to the left) and level (upward) of a track, the mean of both rails."""
+    """Alignment (lateral, positive to the left) and level (positive upward) of a track, each the mean of both rails."""
 
     alignment: Profile
     level: Profile
 
 
 def spectra(table: IrregularityTable, level: str) -> tuple[Spectrum, Spectrum]:
-    """Spectra of alignment and level for one of `LEVELS`."""
+    """Return the spectra of alignment and level for one of `LEVELS`."""
     band = 2 * math.pi / table.longest_wavelength, 2 * math.pi / table.shortest_wavelength
     amplitudes = {
         "low": (table.alignment_low, table.level_low),
@@ -97,10 +94,10 @@ def spectra(table: IrregularityTable, level: str) -> tuple[Spectrum, Spectrum]:
 
 
 def synthesize(spectrum: Spectrum, length: float, generator: np.random.Generator) -> Profile:
-    """Make a profile of at least `length` m: harmonics of its period with random phases.
+    """Synthesize a profile of at least `length` m from harmonics of its period with random phases.
 
-    Height is the sum of sqrt(2 S(O) dO) cos(O s + phase) over O = dO, 2 dO, ... (Shinozuka and Jan 1972, from memory),
-    so its periodogram is the density itself.
+    The height is the sum of sqrt(2 S(O) dO) cos(O s + phase) over O = dO, 2 dO, ... (Shinozuka and Jan 1972, from
+    memory), so its periodogram equals the density.
     """
     step = 2 * math.pi / spectrum.band[1] / POINTS
     count = 2 * math.ceil(length / step / 2)
@@ -113,7 +110,7 @@ def synthesize(spectrum: Spectrum, length: float, generator: np.random.Generator
 
 
 def irregularity(table: IrregularityTable, level: str, length: float, seed: int) -> Irregularity:
-    """Make both profiles for one of `LEVELS`, independent of each other and the same for the same seed."""
+    """Synthesize both profiles for one of `LEVELS`: independent of each other, equal for equal seeds."""
     alignment, vertical = spectra(table, level)
     first, second = np.random.SeedSequence(seed).spawn(2)
     return Irregularity(

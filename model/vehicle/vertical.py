@@ -1,4 +1,4 @@
-"""Vertical dynamics of a six-axle locomotive: bounce and pitch of frames and body on prescribed rails."""
+"""Vertical dynamics of a six-axle locomotive: bounce and pitch of frames and body on rigid rails."""
 
 from __future__ import annotations
 
@@ -19,24 +19,24 @@ COORDINATES = (
     "body vertical",
     "body pitch",
 )
-"""The six coordinates, in m and rad: upward, and pitch with the nose down."""
+"""The six coordinates in m and rad. Positive: vertical upward, pitch with the nose down."""
 
 RAILS = tuple(f"wheelset {k + 1} vertical" for k in WHEELSETS)
-"""Prescribed: wheelsets follow the rails, which do not give way."""
+"""Heights of the wheelsets, prescribed by the rails, which are rigid."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class VerticalDynamics:
-    """The vertical equations; they do not depend on the speed.
+    """The vertical equations of motion; they do not depend on the speed.
 
     Attributes
     ----------
     parameters : Parameters
-        Of the vehicle.
+        Parameters of the vehicle.
     system : LinearSystem
-        With the coordinates `COORDINATES`.
+        Equations of motion in `COORDINATES`.
     suspension : Suspension
-        With the coordinates `COORDINATES` and `RAILS`.
+        Springs and dampers in `COORDINATES` and `RAILS`.
     """
 
     parameters: Parameters
@@ -46,9 +46,9 @@ class VerticalDynamics:
     def rails(
         self, track: Track, irregularity: Irregularity | None, centre: Array, speed: float
     ) -> tuple[Array, Array]:
-        """Height of the rails' middle under the wheelsets in m and its change in m/s, shape (n, 6).
+        """Return the height of the track centre under the wheelsets in m and its rate in m/s, shape (n, 6).
 
-        The inner rail keeps its height, so the middle rises by half the cant.
+        The inner rail keeps its height, so the centre rises by half the cant.
         """
         height, rate = np.zeros((len(centre), 6)), np.zeros((len(centre), 6))
         for k, ahead in enumerate(positions_of(self.parameters.layout)):
@@ -61,14 +61,14 @@ class VerticalDynamics:
         return height, speed * rate
 
     def forces(self, height: Array, rate: Array) -> Array:
-        """Return the forces of the rails on the coordinates, shape (n, 6)."""
+        """Return the forces that the rails exert on the coordinates, shape (n, 6)."""
         count = len(COORDINATES)
         stiffness, damping = self.suspension.stiffness[:count, count:], self.suspension.damping[:count, count:]
         return -product(height, stiffness.T) - product(rate, damping.T)
 
 
 def vertical_dynamics(parameters: Parameters) -> VerticalDynamics:
-    """Assemble the vertical equations."""
+    """Assemble the vertical equations of motion."""
     suspension = Suspension(COORDINATES + RAILS)
     primary, secondary = parameters.primary, parameters.secondary
     axles = axle_positions(parameters.layout)

@@ -1,4 +1,4 @@
-"""Linear forces between wheelset and rails: Kalker's creep, conicity, gravitational stiffness."""
+"""Linear forces between wheelset and rails: Kalker's creep forces, conicity, gravitational stiffness."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from sosmith.model.vehicle.linear_motion import Array
 from sosmith.model.vehicle.parameters import Contact
 
 GRAVITY = 9.81
-"""In m/s^2."""
+"""Gravitational acceleration in m/s^2."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Creep:
-    """Kalker's linear coefficients of one wheel.
+    """Kalker's linear creep coefficients of one wheel.
 
-    Force along the rail -f11 * longitudinal creepage; across it -f22 * lateral creepage - f23 * spin; moment about the
-    normal f23 * lateral creepage - f33 * spin.
+    The longitudinal force is -f11 * longitudinal creepage, the lateral force -f22 * lateral creepage - f23 * spin, the
+    moment about the normal f23 * lateral creepage - f33 * spin.
 
     Attributes
     ----------
@@ -37,10 +37,10 @@ class Creep:
 
 
 def creep_coefficients(contact: Contact, load: float) -> Creep:
-    """Kalker's coefficients for a wheel that carries `load` N.
+    """Return Kalker's coefficients for a wheel that carries `load` N.
 
     f11 = G a b C11, f22 = G a b C22, f23 = G (a b)^(3/2) C23, f33 = G (a b)^2 C33 (Kalker 1967), with semi-axes a, b
-    that grow with the cube root of the load (Hertz).
+    proportional to the cube root of the load (Hertz).
     """
     scale = (load / contact.reference_load) ** (1 / 3)
     area = contact.longitudinal_semi_axis * contact.lateral_semi_axis * scale**2
@@ -56,9 +56,9 @@ def creep_coefficients(contact: Contact, load: float) -> Creep:
 def contact_matrices(
     creep: Creep, *, speed: float, conicity: float, rolling_radius: float, half_spacing: float, load: float
 ) -> tuple[Array, Array]:
-    """Damping and stiffness that both contacts give to a wheelset's (lateral, yaw) relative to the track.
+    """Return damping and stiffness from both contacts for a wheelset's (lateral, yaw) relative to the track.
 
-    Lateral to the left and yaw to the left are positive. With V the speed, l the half spacing, r the rolling radius,
+    Lateral and yaw are positive to the left. With V the speed, l the half spacing, r the rolling radius,
     c the conicity and W the load of the wheelset (Garg and Dukkipati 1984, Wickens 2003, both from memory; the
     gravitational terms follow from the roll c y / l of a coned wheelset):
 
@@ -81,5 +81,5 @@ def contact_matrices(
 
 
 def klingel_frequency(speed: float, conicity: float, rolling_radius: float, half_spacing: float) -> float:
-    """Frequency in Hz of a free wheelset that rolls without creep (Klingel 1883): V/(2 pi) sqrt(c / (r l))."""
+    """Return the frequency in Hz of a free wheelset rolling without creep (Klingel 1883): V/(2 pi) sqrt(c / (r l))."""
     return float(speed / (2 * np.pi) * np.sqrt(conicity / (rolling_radius * half_spacing)))

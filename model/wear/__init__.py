@@ -1,1 +1,1 @@
-"""Wear of the flange from records of clearance."""
+"""Flange wear from clearance records."""

@@ -1,4 +1,4 @@
-"""Wear of a wheel flange from its clearance: depth, rate, remaining life, state; equations of the paper's section 6."""
+"""Flange wear from the clearance: depth, rate, remaining life, state (section 6 of the paper)."""
 
 from __future__ import annotations
 
@@ -10,37 +10,39 @@ import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
+from sosmith.model.arrays import Values
 from sosmith.model.errors import SpecificationError
-from sosmith.model.port import Values
 
 MIN_BLOCKS = 8
-"""Blocks that a rate takes: with fewer, the interval of a median of slopes has hardly a meaning."""
+"""Lowest number of blocks for a rate: with fewer, the interval of a median of slopes has little meaning."""
 
 MAX_BLOCKS = 2000
-"""Blocks that a rate may take: the slopes of all pairs are formed, two million here."""
+"""Highest number of blocks for a rate: the slopes of all pairs are computed, two million for this number."""
 
 BLOCKS = 40
-"""Blocks of a record that has too few days for blocks of a day."""
+"""Number of blocks in a record that is too short for blocks of one day."""
 
 ROUNDING = 1e-9
-"""How far below a limit, in mm, a reading still counts as having reached it.
+"""Tolerance in mm: a reading this close below a limit counts as having reached it.
 
-Doubles of decimal numbers are off by less, and a step of an output code is more."""
+It is larger than the rounding of decimal numbers to doubles, and smaller than one LSB of an output.
+"""
 
 MAX_CORRELATION = 0.95
-"""Beyond this the deviations are no scatter about a line: an interval can hardly be wide enough."""
+"""Upper limit of the estimated correlation: above it the deviations are not scatter about a line, and hardly any
+interval is wide enough."""
 
 MIN_FALL = 1 / 20
-"""Part of the limit that a fall of the clearance has at least: what is less may be the season."""
+"""Smallest fall of the clearance that is reported, as a fraction of the wear limit: less may be seasonal."""
 
 _FALL_SCATTERS, _FALL_BLOCKS, _MIN_FALL_BLOCKS = 8, 4, 3
 
 DAY = 1.0
-"""Length of a block unless said otherwise, days: longer than anything a filter or a journey keeps for itself."""
+"""Default length of a block in days: longer than the memory of any filter or the conditions of one journey."""
 
 
 class WearState(StrEnum):
-    """How far the wear has come; the names of the hardware's flags."""
+    """Severity of the wear, named like the hardware's flags."""
 
     GOOD = "good"
     WARNING = "warning"
@@ -49,25 +51,25 @@ class WearState(StrEnum):
 
 @dataclass(frozen=True, kw_only=True)
 class WearLimits:
-    """What a clearance means for a wheel, in mm; the table [wear] of a specification.
+    """How clearance relates to wear, in mm; the table [wear] of a specification.
 
     Attributes
     ----------
     initial : float
         Clearance without wear, s_i; at least 0. The paper's sensor needs 1.5 mm.
     limit : float
-        Wear from which on it is critical, s_w,max. The paper states 9 mm, but for flanges from 33 down to 22 mm, whose
-        difference is 11 mm: take the limit from the railway's own rules.
+        Wear from which it is critical, s_w,max. The paper states 9 mm, but for flanges worn from 33 to 22 mm, a
+        difference of 11 mm: take the limit from the railway's own rules.
     warning : float or None
-        Wear from which on there is a warning, above 0 and below `limit`; None for none.
+        Wear from which there is a warning, above 0 and below `limit`; None for no warning.
     sensor_range : float or None
-        Clearance up to which the sensor can be trusted. If it is less than the clearance at the limit, the wear is
-        critical from there on.
+        Clearance up to which the sensor is valid. If it is below the clearance at the limit, wear is critical from
+        there on.
 
     Raises
     ------
     SpecificationError
-        If a number does not fit.
+        If a value is out of range or contradicts another.
     """
 
     initial: float
@@ -93,17 +95,17 @@ class WearLimits:
 
     @property
     def warning_clearance(self) -> float | None:
-        """Clearance from which on there is a warning, mm."""
+        """Clearance in mm from which there is a warning."""
         return None if self.warning is None else self.initial + self.warning
 
     @property
     def critical_clearance(self) -> float:
-        """Clearance from which on the wear is critical, mm: the limit's, or the sensor's range if that comes first."""
+        """Clearance in mm from which the wear is critical: the lower of the limit and the sensor's range."""
         end = self.initial + self.limit
         return end if self.sensor_range is None else min(end, self.sensor_range)
 
     def state(self, clearance: float) -> WearState:
-        """State at a clearance in mm, without memory, by the comparisons that the hardware makes with its codes."""
+        """Return the state at a clearance in mm by the comparisons that the hardware makes on codes, without memory."""
         if clearance >= self.critical_clearance - ROUNDING:
             return WearState.CRITICAL
         if self.warning_clearance is not None and clearance >= self.warning_clearance - ROUNDING:
@@ -113,25 +115,25 @@ class WearLimits:
 
 @dataclass(frozen=True, kw_only=True)
 class WearRate:
-    """Rate of wear, in mm a day.
+    """Rate of wear in mm per day.
 
     Attributes
     ----------
     rate : float
         Median of the slopes between all pairs of blocks (Theil and Sen).
     low, high : float
-        Interval of the rate at `confidence`, widened for the correlation between blocks.
+        Confidence interval of the rate, widened for the correlation between blocks.
     confidence : float
-        Between 0 and 1.
+        Confidence level, between 0 and 1.
     blocks : int
-        Count of blocks.
+        Number of blocks.
     block : float
-        Length of a block, days.
+        Length of a block in days.
     scatter : float
-        Scatter of the blocks' medians about the line, mm: 1.4826 times the median of the absolute deviations, which
-        for normally distributed ones is the standard deviation.
+        Scatter of the block medians about the line in mm: 1.4826 times the median absolute deviation, which is the
+        standard deviation for normally distributed deviations.
     correlation : float
-        Correlation of the deviations of neighbouring blocks, -1 to 1.
+        Correlation between the deviations of adjacent blocks, -1 to 1.
     """
 
     rate: float
@@ -146,14 +148,14 @@ class WearRate:
 
 @dataclass(frozen=True, kw_only=True)
 class Fall:
-    """A fall of the clearance. Wear makes none: the wheel was turned or changed, or the sensor mounted anew.
+    """A fall of the clearance. Wear does not cause it: the wheel was reprofiled or replaced, or the sensor remounted.
 
     Attributes
     ----------
     size : float
-        By how much, mm.
+        Size of the fall in mm.
     window : float
-        Days from there to the last reading.
+        Days from the fall to the last reading.
     """
 
     size: float
@@ -167,34 +169,34 @@ class WearReport:
     Attributes
     ----------
     limits : WearLimits
-        What it was judged by.
+        Limits that it was assessed against.
     samples : int
-        Count of readings.
+        Number of readings.
     duration : float
-        From the first reading to the last, days.
+        Time from the first reading to the last, in days.
     clearance : float
-        Median of the last block, mm.
+        Median of the last block in mm.
     wear : float
-        ``clearance - initial``, mm: s_w = s_r - s_i. Negative if the initial clearance is too large.
+        ``clearance - initial`` in mm: s_w = s_r - s_i. Negative if the initial clearance is set too large.
     remaining : float
-        Wear from there to the critical clearance, mm; 0 beyond it.
+        Wear left before the critical clearance, in mm; 0 beyond it.
     rate : WearRate
         Rate of wear.
     fall : Fall or None
-        The last fall of the clearance among the blocks that the rate is from, which it makes too small.
+        The last fall of the clearance within the blocks used for the rate. It makes the rate too low.
     life, life_low, life_high : float or None
-        Days from the last reading until the critical clearance at the rate, at the upper end of its interval and at the
-        lower; None where that rate is not above zero, so that no end is in sight.
+        Days from the last reading to the critical clearance, at the rate, at the upper and at the lower end of its
+        interval; None where that rate is zero or negative, so that the clearance is never reached.
     last : float
-        The last reading, mm.
+        The last reading in mm.
     state : WearState
-        State of the last reading: what the flags of the hardware say with it.
+        State of the last reading, as the flags of the hardware show it.
     first_warning, first_critical : float or None
-        Time of the first reading in that state or beyond it, in the time of the record, days.
+        Time of the first reading in that state or a worse one, in days on the time axis of the record.
     warnings, criticals : int
-        Readings of the last block in that state or beyond it: noise makes them come and go near a limit.
+        Number of readings of the last block in that state or a worse one; near a limit, noise toggles the state.
     last_block : int
-        Readings of the last block.
+        Number of readings in the last block.
     """
 
     limits: WearLimits
@@ -220,28 +222,28 @@ class WearReport:
 def block_medians(
     time: Values, clearance: Values, block: float | None
 ) -> tuple[Values, Values, npt.NDArray[np.int64], float]:
-    """Cut a record into blocks of equal length, counted back from its last reading, and take the medians of each.
+    """Divide a record into blocks of equal length, counted back from its last reading, and take their medians.
 
-    Readings close to each other share what the filter remembers and the state of one journey, so they are no
-    independent witnesses of a rate; their median is one.
+    Readings close in time share the filter's memory and the conditions of one journey, so they are not independent
+    samples of a rate; block medians nearly are.
 
     Parameters
     ----------
     time : ndarray, shape (n,)
-        Days, not falling.
+        Time in days, not decreasing.
     clearance : ndarray, shape (n,)
-        mm.
+        Clearance in mm.
     block : float or None
-        Length in days; None takes `DAY`, or a fortieth of a record with fewer than `MIN_BLOCKS` days.
+        Length in days; None means `DAY`, or 1/40 of a record shorter than `MIN_BLOCKS` days.
 
     Returns
     -------
     time, clearance : ndarray, shape (blocks,)
-        Medians of the blocks that hold readings.
+        Medians of the blocks that contain readings.
     count : ndarray, shape (blocks,)
-        Readings of each.
+        Number of readings in each.
     block : float
-        Length of a block, days.
+        Length of a block in days.
     """
     span = float(time[-1] - time[0])
     if block is None:
@@ -252,7 +254,7 @@ def block_medians(
         raise SpecificationError(
             f"block must be at least {span / MAX_BLOCKS:.3g} days for a record of {span:.4g} days, not {block:g} days"
         )
-    number = np.floor((time[-1] - time) / block).astype(np.int64)[::-1]  # rising from the end of the record
+    number = np.floor((time[-1] - time) / block).astype(np.int64)[::-1]  # in reverse order, so that it rises
     edges = np.flatnonzero(np.diff(number)) + 1
     times, values = np.split(time[::-1], edges), np.split(clearance[::-1], edges)
     return (
@@ -264,26 +266,26 @@ def block_medians(
 
 
 def rate_of(time: Values, clearance: Values, block: float, confidence: float) -> WearRate:
-    """Rate of wear by the Theil-Sen slope with its interval (P. K. Sen, J. Am. Stat. Assoc. 63, 1968).
+    """Estimate the rate of wear by the Theil-Sen slope and its interval (P. K. Sen, J. Am. Stat. Assoc. 63, 1968).
 
-    Up to 29 % of the blocks may be wild without the slope being so. Sen's interval takes deviations as independent.
-    Where those of neighbouring blocks correlate by r > 0, it is widened by ``sqrt((1 + r) / (1 - r))``, as the
-    effective count of samples of a first-order autoregression falls (G. V. Bayley and J. M. Hammersley, J. R. Stat.
-    Soc. Suppl. 8, 1946).
+    The slope tolerates up to 29 % of outliers among the blocks. Sen's interval assumes independent deviations. If those
+    of adjacent blocks have a correlation r > 0, the interval is widened by ``sqrt((1 + r) / (1 - r))``, following the
+    effective sample size of a first-order autoregression (G. V. Bayley and J. M. Hammersley, J. R. Stat. Soc. Suppl.
+    8, 1946).
 
     Parameters
     ----------
     time, clearance : ndarray, shape (blocks,)
-        Days and mm, at least `MIN_BLOCKS`.
+        Block medians: time in days and clearance in mm, at least `MIN_BLOCKS` of them.
     block : float
-        Length of a block, days.
+        Length of a block in days.
     confidence : float
-        Between 0 and 1.
+        Confidence level, between 0 and 1.
 
     Raises
     ------
     SpecificationError
-        If there are too few blocks, or the confidence is none.
+        If there are too few blocks, or the confidence level is out of range.
     """
     if not 0 < confidence < 1:
         raise SpecificationError(f"confidence must be between 0 and 1, not {confidence:g}")
@@ -309,10 +311,10 @@ def rate_of(time: Values, clearance: Values, block: float, confidence: float) ->
 
 
 def _correlation(deviation: Values) -> float:
-    """Estimate the correlation of neighbours from deviations about a fitted line.
+    """Estimate the correlation of adjacent values from deviations about a fitted line.
 
-    A fit to n values takes a part of it along, with a line about ``(2 + 4 r) / n`` on average (for a mean see M. G.
-    Kendall, Biometrika 41, 1954), which is given back. The tests count how often the interval then holds the truth.
+    A line fitted to n values biases the estimate by about ``-(2 + 4 r) / n`` (for a mean see M. G. Kendall, Biometrika
+    41, 1954), which is corrected. The tests measure how often the resulting interval covers the true rate.
     """
     energy, count = float(np.sum(deviation**2)), len(deviation)
     if energy == 0:
@@ -322,19 +324,19 @@ def _correlation(deviation: Values) -> float:
 
 
 def last_fall(time: Values, clearance: Values, least: float) -> Fall | None:
-    """Find the last place where the clearance falls and stays down, by the medians of the blocks before and after.
+    """Find the last place where the clearance falls and stays low, from the medians of the blocks before and after.
 
     Parameters
     ----------
     time, clearance : ndarray, shape (blocks,)
-        Days and mm.
+        Block medians: time in days and clearance in mm.
     least : float
-        Size of the smallest fall that counts, mm; beside that it has to stand out of the scatter.
+        Smallest fall to report, in mm; a fall must also exceed the scatter.
 
     Returns
     -------
     Fall or None
-        Its window ends between the two blocks, so far before the last of `time`.
+        Its window extends from between the two blocks to the last of `time`.
     """
     if len(time) < MIN_BLOCKS:
         return None
@@ -348,7 +350,7 @@ def last_fall(time: Values, clearance: Values, least: float) -> Fall | None:
     found = np.flatnonzero(sizes > max(least, _FALL_SCATTERS * scatter))
     if not len(found):
         return None
-    # neighbouring places see the same fall: it is where the steepest step is
+    # adjacent places detect the same fall; it lies at the steepest step
     near = found[found > found[-1] - _FALL_BLOCKS]
     place = int(near[np.argmin(steps[near])])
     return Fall(size=float(sizes[place]), window=float(time[-1] - (time[place] + time[place + 1]) / 2))
@@ -363,41 +365,41 @@ def judge(
     window: float | None = None,
     confidence: float = 0.95,
 ) -> WearReport:
-    """Judge a record of clearances.
+    """Assess the wear from a clearance record.
 
-    The interval of the remaining life takes the ends of the rate's interval, and moves the present clearance by as many
-    of the blocks' scatter as belong to the confidence. It says how long if wear goes on at this rate, no more.
+    The interval of the remaining life follows from the ends of the rate's interval and from the scatter of the present
+    clearance at the same confidence. It assumes that wear continues at this rate.
 
     Parameters
     ----------
     time : ndarray, shape (n,)
-        Days, not falling.
+        Time in days, not decreasing.
     clearance : ndarray, shape (n,)
-        mm, finite.
+        Clearance in mm, finite.
     limits : WearLimits
-        What the clearances mean.
+        Limits to assess against.
     block : float, optional
-        Length of a block, days; see `block_medians`.
+        Length of a block in days; see `block_medians`.
     window : float, optional
-        Take the rate from so many days at the end only.
+        Estimate the rate from this many days at the end of the record only.
     confidence : float
-        Of the intervals, between 0 and 1.
+        Confidence level of the intervals, between 0 and 1.
 
     Raises
     ------
     SpecificationError
-        If the record is empty, not finite, not in order of time, or too short for a rate.
+        If the record is empty, not finite, not in chronological order, or too short for a rate.
     """
     if len(time) != len(clearance) or not len(time):
         raise SpecificationError(
             f"the record must have a time for each clearance, not {len(time)} for {len(clearance)}"
         )
     if not (np.all(np.isfinite(time)) and np.all(np.isfinite(clearance))):
-        raise SpecificationError("the record must hold finite times and clearances, not others")
+        raise SpecificationError("the record must hold finite times and clearances, not NaN or infinity")
     if np.any(np.diff(time) < 0):
-        raise SpecificationError("the record must be in order of time, not go back")
+        raise SpecificationError("the record must be in chronological order, not go back in time")
     if not time[-1] > time[0]:
-        raise SpecificationError("the record must last longer than one moment for a rate of wear, not 0 days")
+        raise SpecificationError("the record must span more than 0 days for a rate of wear, not 0 days")
     if window is not None and not 0 < window < math.inf:
         raise SpecificationError(f"window must be a time above 0 days, not {window:g} days")
     recent = slice(0 if window is None else int(np.searchsorted(time, time[-1] - window)), None)
@@ -440,7 +442,7 @@ def judge(
 
 
 def _life(remaining: float, rate: float, gone: float) -> float | None:
-    """Days until what remains is worn at a rate in mm a day, less the days `gone` already; None if it never is."""
+    """Return the days until `remaining` mm are worn at `rate` in mm per day, minus the days `gone`; None for never."""
     if remaining == 0:
         return 0.0
     life = remaining / rate if rate > 0 else math.inf

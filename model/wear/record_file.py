@@ -1,4 +1,4 @@
-"""Records of clearance over days, from CSV files."""
+"""Clearance records over days, from CSV files."""
 
 from __future__ import annotations
 
@@ -9,19 +9,14 @@ from pathlib import Path
 
 import numpy as np
 
+from sosmith.model.arrays import Values
 from sosmith.model.errors import SpecificationError
-from sosmith.model.port import Values
 from sosmith.model.tables.csv_table import check_rows, csv_header, read_csv_table
 from sosmith.model.traces.signal_file import unit_of
 from sosmith.model.traces.trace_file import CHANNEL, rows_of_channel
+from sosmith.model.wear.record_columns import CLEARANCES, TIMES
 
 SECONDS_A_DAY = 86400.0
-
-TIMES = {"date": 1.0, "days": 1.0, "time_days": 1.0, "time_d": 1.0, "hours": 1 / 24, "time_h": 1 / 24}
-"""Columns that may hold the time, and the days of one unit of them; time_s too, of which 86400 are a day."""
-
-CLEARANCES = ("hardware_mm", "measured_mm", "clearance_mm")
-"""Columns that may hold the clearance in mm, the first that is there."""
 
 _EPOCH = datetime.datetime(1970, 1, 1, tzinfo=datetime.UTC)
 
@@ -35,15 +30,15 @@ class WearRecord:
     path : Path
         The file.
     column : str
-        Column of the clearance.
+        Name of the clearance column.
     time : ndarray, shape (n,)
-        Days; from 1970-01-01 on (UTC) where the file has dates.
+        Time in days; since 1970-01-01 UTC if the file has dates.
     clearance : ndarray, shape (n,)
-        mm.
+        Clearance in mm.
     dated : bool
         Whether the file has dates.
     channels : bool
-        Whether the file tells channels apart.
+        Whether the file has the column channel.
     """
 
     path: Path
@@ -55,12 +50,12 @@ class WearRecord:
 
 
 def parse_moment(text: str) -> float:
-    """Days from 1970-01-01 to a date or a date with a time, ISO 8601; without a zone it is UTC.
+    """Return the days from 1970-01-01 to an ISO 8601 date, with or without a time; without a time zone it is UTC.
 
     Raises
     ------
     ValueError
-        With what was expected, if it is neither.
+        If it is not such a date; the message is what was expected.
 
     Examples
     --------
@@ -70,46 +65,46 @@ def parse_moment(text: str) -> float:
     try:
         moment = datetime.datetime.fromisoformat(text)
     except ValueError:
-        raise ValueError("a date as 2024-03-01 or 2024-03-01T06:30") from None
+        raise ValueError("a date such as 2024-03-01 or 2024-03-01T06:30") from None
     if moment.tzinfo is None:
         moment = moment.replace(tzinfo=datetime.UTC)
     return (moment - _EPOCH).total_seconds() / SECONDS_A_DAY
 
 
 def moment_text(days: float) -> str:
-    """Write a time of a file with dates as a date, with hours and minutes; undoes `parse_moment` to the minute."""
+    """Return days since 1970-01-01 as a date with hours and minutes: the inverse of `parse_moment`, to the minute."""
     moment = _EPOCH + datetime.timedelta(minutes=round(days * 1440))
     return moment.strftime("%Y-%m-%d %H:%M")
 
 
 def read_wear_record(path: Path, column: str | None = None, channel: int = 0) -> WearRecord:
-    """Read a CSV file with one column of times and one of clearances; other columns do not matter.
+    """Read a CSV file with a time column and a clearance column; other columns are ignored.
 
     Parameters
     ----------
     path : Path
         The file, UTF-8.
     column : str, optional
-        Column of the clearance in mm; without it the first of `CLEARANCES` that is there.
+        Name of the clearance column in mm; by default the first of `CLEARANCES` that is present.
     channel : int
-        Channel whose rows count in a file with the column channel; in any other all count.
+        Channel whose rows are read from a file with the column channel; other files are read completely.
 
     Raises
     ------
     SpecificationError
-        As `read_csv_table`; if there is no such column, its name ends in another unit, or times go back; if no row is
-        of the channel. One sentence with the file and the line.
+        As for `read_csv_table`; if there is no such column, its name ends in another unit, times decrease, or the
+        channel has no row. The message is one sentence with the file and the line.
     """
     header = csv_header(path)
-    time_column = _first(path, header, ("time_s", *TIMES), "a column of times")
-    clearance_column = _first(path, header, CLEARANCES if column is None else (column,), "a column of clearances")
+    time_column = _first(path, header, ("time_s", *TIMES), "a time column")
+    clearance_column = _first(path, header, CLEARANCES if column is None else (column,), "a clearance column")
     if clearance_column == time_column:
         raise SpecificationError(
-            f"{path}: the column of clearances must be another than that of the time, {time_column}"
+            f"{path}: the clearance column must differ from the time column, not be {time_column} too"
         )
     unit, factor = unit_of(clearance_column)
     if unit and (unit, factor) != ("mm", 1.0):
-        raise SpecificationError(f"{path}: the column of clearances must be in mm, not {clearance_column}")
+        raise SpecificationError(f"{path}: the clearance column must be in mm, not {clearance_column}")
     ignored = {name: _nothing for name in header if name not in {time_column, clearance_column, CHANNEL}}
     readers = ignored | ({time_column: parse_moment} if time_column == "date" else {})
     table = read_csv_table(path, header, readers=readers)
@@ -119,7 +114,7 @@ def read_wear_record(path: Path, column: str | None = None, channel: int = 0) ->
     check_rows(
         table,
         np.concatenate([[False], np.diff(raw) < 0]),
-        lambda k: f"{time_column} must not be before that of the row before",
+        lambda k: f"{time_column} must be no earlier than in the previous row, not go back",
     )
     return WearRecord(
         path=path,
@@ -137,7 +132,7 @@ def _first(path: Path, header: Sequence[str], names: Sequence[str], what: str) -
             return name
     if header:
         raise SpecificationError(f"{path} must have {what} ({', '.join(names)}), not only {', '.join(header)}")
-    return names[0]  # the file cannot be read, or is empty: `read_csv_table` says so
+    return names[0]  # the file is unreadable or empty; `read_csv_table` reports that
 
 
 def _nothing(text: str) -> float:

@@ -1,19 +1,79 @@
 """From a filter specification and calibration data to fixed-point FPGA hardware.
 
-The rooms of the package, each importing only from those to its right:
-``cli -> sim -> gen -> hdl -> model``.
+The public interface is what `__all__` names; docs/python.md shows all of it. Everything loads on first use, so that
+the import itself takes next to no time. The rooms behind it, each importing only from those to its right:
+``cli -> interface -> sim -> gen -> hdl -> model``.
 """
+
+from __future__ import annotations
 
 import sys
 from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from sosmith.interface.calibration import Calibration
+    from sosmith.interface.certificate import Certificate, Proof
+    from sosmith.interface.comparison import Comparison, compare
+    from sosmith.interface.design import Coefficient, Design, Section, design
+    from sosmith.interface.quantity import Quantity
+    from sosmith.interface.report import Report
+    from sosmith.interface.specification import Specification
+    from sosmith.model.errors import ShortfallError, SosmithError, SpecificationError, ToolError
 
 __version__ = "0.1.0"
+
+__all__ = [
+    "Calibration",
+    "Certificate",
+    "Coefficient",
+    "Comparison",
+    "Design",
+    "Proof",
+    "Quantity",
+    "Report",
+    "Section",
+    "ShortfallError",
+    "SosmithError",
+    "Specification",
+    "SpecificationError",
+    "ToolError",
+    "__version__",
+    "compare",
+    "design",
+]
+
+_MODULES = {
+    "interface.calibration": ("Calibration",),
+    "interface.certificate": ("Certificate", "Proof"),
+    "interface.comparison": ("Comparison", "compare"),
+    "interface.design": ("Coefficient", "Design", "Section", "design"),
+    "interface.quantity": ("Quantity",),
+    "interface.report": ("Report",),
+    "interface.specification": ("Specification",),
+    "model.errors": ("ShortfallError", "SosmithError", "SpecificationError", "ToolError"),
+}
+"""The module that holds each public name; the imports above say the same to type checkers."""
+
+
+def __getattr__(name: str) -> Any:
+    """Load a public name on first use."""
+    for module, names in _MODULES.items():
+        if name in names:
+            value = getattr(import_module(f"sosmith.{module}"), name)
+            globals()[name] = value
+            return value
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    """List the public names, loaded or not."""
+    return sorted({*globals(), *__all__})
 
 
 def main() -> None:
     """Run the `sosmith` command; an interruption ends it in good order even while its modules load."""
     try:
-        command = import_module("sosmith.cli")
+        import_module("sosmith.cli").main()
     except KeyboardInterrupt:
         sys.exit(130)
-    command.main()

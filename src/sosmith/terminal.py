@@ -1,4 +1,4 @@
-"""What all commands share: tables and JSON on stdout, progress and messages on stderr."""
+"""What all commands share: JSON on stdout, progress and messages on stderr."""
 
 from __future__ import annotations
 
@@ -8,13 +8,12 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
-from rich import box
-from rich.console import Console
-from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
-from rich.table import Table
+
+if TYPE_CHECKING:
+    from rich.progress import Progress
 
 JSON_OPTION = click.option("--json", "as_json", is_flag=True, help="Print JSON instead of tables.")
 
@@ -22,13 +21,6 @@ JSON_OPTION = click.option("--json", "as_json", is_flag=True, help="Print JSON i
 def output_option(text: str) -> Callable[[Any], Any]:
     """Make the option ``-o`` with this help."""
     return click.option("-o", "--output", type=click.Path(path_type=Path), help=text)
-
-
-class TableConsole(Console):
-    """Leaves it to `reader_may_leave` when the reader of its output has gone."""
-
-    def on_broken_pipe(self) -> None:
-        raise BrokenPipeError
 
 
 @contextmanager
@@ -76,6 +68,10 @@ class Step:
 @contextmanager
 def show_progress() -> Iterator[Step]:
     """Show steps on stderr while they are carried out."""
+    # rich loads when something is shown: help and refusals do without it.
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
     columns = (
         SpinnerColumn(finished_text="[green]✓[/]"),
         TextColumn("{task.description}", markup=False),
@@ -97,11 +93,3 @@ def note(text: str) -> None:
 def print_json(tree: Any) -> None:
     """Print JSON on stdout."""
     click.echo(json.dumps(tree, indent=2, ensure_ascii=False, allow_nan=False))
-
-
-def new_table(title: str, columns: list[str]) -> Table:
-    """Make a table without rows; without names of columns it has no header."""
-    table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left", title_style="bold", show_header=any(columns))
-    for column in columns:
-        table.add_column(column, overflow="fold")
-    return table

@@ -102,7 +102,7 @@ def test_a_store_that_another_process_makes_meanwhile_is_kept(monkeypatch: pytes
         return refused_first_file(*arguments, **options)
 
     monkeypatch.setattr("sosmith.commands.calibrate.refused_first_file", meanwhile)
-    refused("a.csv must be a file of new measurements, not what was added as a.csv", "add", "a.csv")
+    refused("a.csv must hold new measurements, not those already added as a.csv", "add", "a.csv")
     Path("calibration.db").unlink()
     good("add", "b.csv")
     with open_store(Path("calibration.db")) as opened:
@@ -191,9 +191,12 @@ def test_plots_are_the_same_bytes_twice(name: str, start: bytes) -> None:
 
 
 UNFIT = {
-    "no store": (("history",), "calibration.db must be a store of measurements; sosmith calibrate add makes one"),
+    "no store": (
+        ("history",),
+        "calibration.db must be an existing store of measurements; sosmith calibrate add creates one",
+    ),
     "no file": (("add", "none.csv"), "none.csv must be a readable CSV or XLSX file (no such file or directory)"),
-    "no day": (("add", "a.csv", "--date", "yesterday"), "date must be a day as in 2024-03-01, not 'yesterday'"),
+    "no day": (("add", "a.csv", "--date", "yesterday"), "date must be a date such as 2024-03-01, not 'yesterday'"),
     "range upside down": (
         ("add", "a.csv", "--voltage-range", "10", "0"),
         "--voltage-range must be two numbers, the lower one first, not 10 0",

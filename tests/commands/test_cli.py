@@ -347,12 +347,12 @@ def test_a_bad_specification_ends_with_one_sentence(old: str, new: str, sentence
 PLAIN_ROWS = "time_s,x_code\n0,1\n0.001,2\n0.002,3\n"
 
 BAD_TRACES: dict[str, tuple[str, str | bytes, str]] = {
-    "empty": ("plain", "", "trace.csv must hold a header line and rows of numbers, not nothing"),
-    "blank lines": ("plain", "\n\n\n", "trace.csv must hold a header line and rows of numbers, not nothing"),
+    "empty": ("plain", "", "trace.csv must hold a header line and rows of numbers, not be empty"),
+    "blank lines": ("plain", "\n\n\n", "trace.csv must hold a header line and rows of numbers, not be empty"),
     "header alone": (
         "plain",
         "x_code\n",
-        "trace.csv must hold rows of numbers below its header, not the header only",
+        "trace.csv must hold rows of numbers below its header, not only the header",
     ),
     "ragged row": ("plain", "time_s,x_code\n0,1\n0.001\n", "trace.csv, line 3: row must have 2 cells, not 1"),
     "long row": ("plain", "x_code\n1\n2,3\n", "trace.csv, line 3: row must have 1 cells, not 2"),
@@ -366,7 +366,7 @@ BAD_TRACES: dict[str, tuple[str, str | bytes, str]] = {
         "x_code,colour\n1,2\n",
         "trace.csv, line 1: column must be one of time_s, channel, truth, reading, x, x_code, not 'colour'",
     ),
-    "column twice": ("plain", "x,x\n1,2\n", "trace.csv, line 1: column x must be there once, not 2 times"),
+    "column twice": ("plain", "x,x\n1,2\n", "trace.csv, line 1: column x must appear once, not 2 times"),
     "missing column": ("plain", "time_s\n0\n", "trace.csv must have the column x_code or x, not only time_s"),
     "missing temperature": (
         "demo",
@@ -388,17 +388,17 @@ BAD_TRACES: dict[str, tuple[str, str | bytes, str]] = {
     "wrong time step": (
         "plain",
         PLAIN_ROWS.replace("0.002", "0.003"),
-        "trace.csv, line 4: time_s must be 0.001 s after the row before, not 0.002 s",
+        "trace.csv, line 4: time_s must be 0.001 s after the previous row, not 0.002 s",
     ),
     "time of another rate": (
         "demo",
         "time_s,voltage_V,temperature_C\n0,1,20\n1,1,20\n",
-        "trace.csv, line 3: time_s must be 0.01 s after the row before, not 1 s",
+        "trace.csv, line 3: time_s must be 0.01 s after the previous row, not 1 s",
     ),
     "the same row twice": (
         "plain",
         "time_s,x_code\n0,1\n0,1\n",
-        "trace.csv, line 3: time_s must be above 0.0, the row before, not 0.0",
+        "trace.csv, line 3: time_s must be above 0.0, the value in the previous row, not 0.0",
     ),
     "reading of 2": ("plain", "x,reading\n0,2\n", "trace.csv, line 2: reading must be 0 or 1, not 2"),
     "not UTF-8": ("plain", b"x\n\xb5\n", "trace.csv, line 2: text must be UTF-8, not contain the byte 0xb5"),
@@ -427,14 +427,14 @@ GOOD_MEASUREMENTS = HEADER + "".join(
 )
 
 BAD_MEASUREMENTS: dict[str, tuple[str | bytes, str]] = {
-    "empty": ("", "data.csv must hold a header line and rows of numbers, not nothing"),
-    "header alone": (HEADER, "data.csv must hold rows of numbers below its header, not the header only"),
+    "empty": ("", "data.csv must hold a header line and rows of numbers, not be empty"),
+    "header alone": (HEADER, "data.csv must hold rows of numbers below its header, not only the header"),
     "ragged row": (HEADER + "1,2\n", "data.csv, line 2: row must have 3 cells, not 2"),
     "word": (HEADER + "1,2,warm\n", "data.csv, line 2: temperature_C must be a finite number, not 'warm'"),
     "NaN": (HEADER + "1,NaN,3\n", "data.csv, line 2: voltage_V must be a finite number, not 'NaN'"),
     "duplicate row": (
         GOOD_MEASUREMENTS + GOOD_MEASUREMENTS.splitlines()[3] + "\n",
-        "data.csv, line 17: row must be a measurement of its own, not a duplicate of line 4",
+        "data.csv, line 17: row must be a new measurement, not a duplicate of line 4",
     ),
     "negative clearance": (
         GOOD_MEASUREMENTS + "-1,1,20\n",
@@ -446,7 +446,7 @@ BAD_MEASUREMENTS: dict[str, tuple[str | bytes, str]] = {
     ),
     "missing column": (
         "clearance_mm,voltage_V\n1,2\n",
-        "data.csv, line 1: column temperature_C must be there, not missing among clearance_mm, voltage_V",
+        "data.csv, line 1: column temperature_C must be present, not missing from clearance_mm, voltage_V",
     ),
     "too few rows": (
         "".join(GOOD_MEASUREMENTS.splitlines(keepends=True)[:4]),

@@ -54,7 +54,10 @@ def test_a_trace_from_a_file(folder: Path) -> None:
 def test_a_note_where_the_temperature_leaves_the_inputs_range(folder: Path) -> None:
     result = run("emulate", "spec.toml", "hot.toml", "-o", "hot.csv")
     assert result.exit_code == 0
-    assert "note: hot.toml: excerpt[0] reaches 200 degC, but the temperature input of the core ends at" in result.stderr
+    assert (
+        "note: hot.toml: excerpt[0] reaches 200 degC, but the range of the core's temperature input ends at"
+        in result.stderr
+    )
     assert (folder / "hot.csv").exists()
 
 

@@ -132,12 +132,12 @@ def test_refusals() -> None:
     Path("plain.toml").write_text(example())
     refused("plain.toml: the specification must have a table [wear] for --spec, not none", "days.csv", "--spec",
             "plain.toml")  # fmt: skip
-    refused("days.csv must have a column of clearances (z_mm), not only days, clearance_mm, remark", "days.csv",
+    refused("days.csv must have a clearance column (z_mm), not only days, clearance_mm, remark", "days.csv",
             *LIMITS, "--column", "z_mm")  # fmt: skip
-    refused("days.csv: the column of clearances must be another than that of the time, days", "days.csv", *LIMITS,
+    refused("days.csv: the clearance column must differ from the time column, not be days too", "days.csv", *LIMITS,
             "--column", "days")  # fmt: skip
     Path("um.csv").write_text("days,clearance_um\n0,1500\n1,1501\n")
-    refused("um.csv: the column of clearances must be in mm, not clearance_um", "um.csv", *LIMITS, "--column",
+    refused("um.csv: the clearance column must be in mm, not clearance_um", "um.csv", *LIMITS, "--column",
             "clearance_um")  # fmt: skip
     refused("window must be at least 1 days, from the last reading to one before it, not 0.5 days", "days.csv", *LIMITS,
             "--window", "0.5")  # fmt: skip
@@ -146,21 +146,21 @@ def test_refusals() -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", " must hold a header line and rows of numbers, not nothing"),
+        ("", " must hold a header line and rows of numbers, not be empty"),
         (
             "when,clearance_mm\n1,2\n",
-            " must have a column of times (time_s, date, days, time_days, time_d, hours, time_h), not only when, "
+            " must have a time column (time_s, date, days, time_days, time_d, hours, time_h), not only when, "
             "clearance_mm",
         ),
         (
             "days;clearance_mm\n1;2\n",
-            ", line 1: cells must be separated by commas, with points in decimal numbers, not by semicolons",
+            ", line 1: cells must be separated by commas, with decimal points, not by semicolons",
         ),
-        ("days,clearance_mm\n1,2\n0.5,2\n", ", line 3: days must not be before that of the row before"),
+        ("days,clearance_mm\n1,2\n0.5,2\n", ", line 3: days must be no earlier than in the previous row, not go back"),
         ("days,clearance_mm\n1,worn\n", ", line 2: clearance_mm must be a finite number, not 'worn'"),
         (
             "date,clearance_mm\n2024-13-01,2\n",
-            ", line 2: date must be a date as 2024-03-01 or 2024-03-01T06:30, not '2024-13-01'",
+            ", line 2: date must be a date such as 2024-03-01 or 2024-03-01T06:30, not '2024-13-01'",
         ),
     ],
 )

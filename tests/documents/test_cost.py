@@ -151,7 +151,7 @@ def test_only_what_has_changed_is_synthesized_again(monkeypatch: pytest.MonkeyPa
     record.write_text(json.dumps({"tools": ["yosys"], "cores": {core.key: entry}}), encoding="utf-8")
     monkeypatch.setattr(cost, "RECORD", record)
     monkeypatch.setattr(cost, "document", lambda _: {})
-    monkeypatch.setattr(cost, "tools", lambda: ["yosys"])
+    monkeypatch.setattr(cost, "version", lambda _: "yosys")
     monkeypatch.setattr(cost, "synthesize", lambda *_: cells)
     monkeypatch.setattr(cost, "verilog", lambda _: "text")
     assert cost.check() == []
@@ -162,7 +162,7 @@ def test_only_what_has_changed_is_synthesized_again(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(cost, "verilog", lambda _: "another text")
     assert cost.check() == grown
     monkeypatch.setattr(cost, "verilog", lambda _: "text")
-    monkeypatch.setattr(cost, "tools", lambda: ["a newer yosys"])
+    monkeypatch.setattr(cost, "version", lambda _: "a newer yosys")
     assert cost.check() == grown
 
 

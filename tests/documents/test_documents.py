@@ -1,7 +1,8 @@
 """The documents: what the README shows is what the commands print, and the maps of the code are true.
 
 Run as a script, it renews what is generated in them: the output in the README, the file table of the
-architecture, the register map, the commands and the schema of the calibration, the vehicle and its parameters.
+architecture, the register map, the commands and the schema of the calibration, the vehicle and its parameters,
+and the page of the Python interface.
 """
 
 import contextlib
@@ -11,8 +12,10 @@ import tempfile
 import textwrap
 from pathlib import Path
 
+import click
 import pytest
 from click.testing import CliRunner
+from tests.documents.python_page import first_example, page
 from tests.house import ROOMS, WITH_SUB_ROOMS, file_table, picture
 
 from sosmith.cli import cli
@@ -27,6 +30,7 @@ ARCHITECTURE = ROOT / "docs" / "architecture.md"
 CALIBRATION = ROOT / "docs" / "calibration.md"
 PRINTING = [CALIBRATION, *(ROOT / "docs" / f"{name}.md" for name in ("spectrum", "wear", "vehicle", "sensors"))]
 """Documents whose shell blocks stand above what they print."""
+PYTHON = ROOT / "docs" / "python.md"
 REGISTERS = ROOT / "docs" / "registers.md"
 VEHICLE = ROOT / "docs" / "vehicle.md"
 DOCUMENTS = [README, ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -64,12 +68,13 @@ def run(line: str, folder: Path) -> str:
 
 
 def worked_example(folder: Path) -> str:
-    """Print what the README shows under its specification."""
+    """Print what the README shows under its specification: the design, up to its sections."""
     lines = shell_lines()
     specification = next(line for line in lines if line.startswith("cat > "))
     run(specification, folder)
     printed = run(next(line for line in lines if line.startswith("./run design ")), folder)
-    return "".join(f"{line.rstrip()}\n" for line in printed.strip().splitlines())
+    lines = [line.rstrip() for line in printed.strip().splitlines()]
+    return "\n".join(lines[: lines.index("Sections") - 1]) + "\n"
 
 
 def with_output(text: str, folder: Path) -> str:
@@ -121,7 +126,9 @@ def test_every_line_works_or_is_understood(folder: Path) -> None:
     for line in lines:
         if line.startswith(NEEDS_SIMULATION):
             name, *arguments = shlex.split(line)[1:]
-            cli.commands[name].make_context(name, arguments)
+            command = cli.get_command(click.Context(cli), name)
+            assert command is not None
+            command.make_context(name, arguments)
         else:
             run(line, folder)
 
@@ -165,6 +172,16 @@ def test_pictures_are_what_the_commands_draw(name: str, folder: Path) -> None:
     assert (folder / name).read_bytes() == (ROOT / "docs" / "images" / name).read_bytes()
 
 
+def test_the_python_page_is_up_to_date() -> None:
+    assert PYTHON.read_text(encoding="utf-8") == page()
+
+
+def test_the_readme_shows_the_first_example_of_the_python_page() -> None:
+    (shown,) = re.findall(r"```python\n(.*?)```", README.read_text(encoding="utf-8"), flags=re.DOTALL)
+    assert [line for line in shown.splitlines() if not line.startswith("print(")] == first_example()[:-1]
+    assert len(shown.splitlines()) < 10
+
+
 def test_the_schema_is_the_one_of_the_store() -> None:
     assert _SCHEMA.findall(CALIBRATION.read_text(encoding="utf-8")) == [schema()]
 
@@ -205,6 +222,7 @@ if __name__ == "__main__":
             text = document.read_text(encoding="utf-8")
             document.write_text(with_output(text, Path(scratch)), encoding="utf-8")
     ARCHITECTURE.write_text(with_house(ARCHITECTURE.read_text(encoding="utf-8")), encoding="utf-8")
+    PYTHON.write_text(page(), encoding="utf-8")
     renew(REGISTERS, _REGISTERS, markdown())
     renew(CALIBRATION, _SCHEMA, schema())
     renew(VEHICLE, _PARAMETERS, parameter_table())

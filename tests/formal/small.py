@@ -42,7 +42,7 @@ def leaky() -> Datapath:
 def resonator(low: int = -12, high: int = 11) -> Datapath:
     """Make ``v(n) = x(n) + x(n-1) + floor(v(n-1) / 2) - floor(v(n-2) / 4)``, limited to two bits at the output.
 
-    It takes all three ranks: what is no loop, what depends on the older state alone, and the rest.
+    It takes all three pipeline stages: what no recursion reaches, what depends on the older state alone, and the rest.
     """
     g = GraphBuilder()
     x = g.input("x", *_X)
@@ -64,7 +64,7 @@ def _limited(graph: Graph) -> Datapath:
 
 
 def reference(m: Module, datapath: Datapath, code: Value, take: Value, clear: Value) -> Value:
-    """Build a datapath of one input all at once, with no ranks, in the domain `proof`.
+    """Build a datapath of one input without a pipeline, in the domain `proof`.
 
     Parameters
     ----------

@@ -36,7 +36,7 @@ class SerialMultiplier(Component):
         )
 
     def elaborate(self, platform: object) -> Module:
-        """Build the multiplication and what stands for the ranks around it."""
+        """Build the multiplication and what stands for the pipeline around it."""
         m = Module()
         with m.If(self.advance):
             m.d.sync += self.multiplies.eq(self.starts)
@@ -51,9 +51,9 @@ class SerialMultiplier(Component):
 class Multiplication(Proof):
     """Every product ends as ``before + a * b``, after no more clocks than a word has bits.
 
-    After `place` clocks, ``total = before + sum(bit i of b * a * 2**i for i < place)``. The proof adds that sum up in
-    `partial`, from the factors as they came. When the unit is done, ``rest = b >> place`` must be -1, 0 or 1, and
-    ``rest * a * 2**place`` must be added: the whole then is ``before + a * b``, since ``b = rest * 2**place`` plus its
+    After `shift` clocks, ``total = before + sum(bit i of b * a * 2**i for i < shift)``. The proof adds that sum up in
+    `partial`, from the factors as they came. When the unit is done, ``rest = b >> shift`` must be -1, 0 or 1, and
+    ``rest * a * 2**shift`` must be added: the whole then is ``before + a * b``, since ``b = rest * 2**shift`` plus its
     lower bits. With `whole`, the last step is proven as well, for sums that begin at zero.
     """
 
@@ -67,19 +67,19 @@ class Multiplication(Proof):
         a, b, rest = (Signal(signed(d.word), name=name) for name in ("a", "b", "rest"))
         moved = Signal(signed(2 * d.word))
         partial, sofar, expected = (Signal(d.total.shape(), name=name) for name in ("partial", "sofar", "expected"))
-        place, ended = Signal(range(2 * d.word)), Signal()
-        m.d.comb += [sofar.eq(Mux(place == 0, d.total, partial)), moved.eq(a << place), rest.eq(b >> place)]
+        shift, ended = Signal(range(2 * d.word)), Signal()
+        m.d.comb += [sofar.eq(Mux(shift == 0, d.total, partial)), moved.eq(a << shift), rest.eq(b >> shift)]
         m.d.proof += [
-            place.eq(place + 1),
+            shift.eq(shift + 1),
             partial.eq(sofar + Mux(rest[0], moved, 0)),
             expected.eq(sofar + Mux(rest == -1, -moved, Mux(rest[0], moved, 0))),
             ended.eq(d.multiplies & d.advance & ~d.clears & ~self.reset),
         ]
         with m.If(self.reset | d.advance):
-            m.d.proof += [a.eq(d.data), b.eq(d.factor), place.eq(0)]
+            m.d.proof += [a.eq(d.data), b.eq(d.factor), shift.eq(0)]
         with m.If(self.started & d.multiplies):
             m.d.comb += [
-                Assert(place < d.word),
+                Assert(shift < d.word),
                 Assert(self.inside["left"] == rest),
                 Assert(self.inside["shifted"] == moved),
                 Assert(d.total == sofar),
@@ -89,16 +89,16 @@ class Multiplication(Proof):
         with m.If(self.started & ended):
             m.d.comb += Assert(d.total == expected)
         if self.whole:
-            self._state_product(m, a, b, place, ended)
+            self._state_product(m, a, b, shift, ended)
 
-    def _state_product(self, m: Module, a: Signal, b: Signal, place: Signal, ended: Signal) -> None:
+    def _state_product(self, m: Module, a: Signal, b: Signal, shift: Signal, ended: Signal) -> None:
         """With `clears` at every product's beginning, state that `total` is ``a`` times the lower bits of ``b``."""
         d = self.design
         from_zero, product = Signal(), Signal(d.total.shape())
         m.d.proof += product.eq(a * b)
         with m.If(self.reset | d.advance):
             m.d.proof += from_zero.eq(self.reset | d.clears)
-        lower = b.as_unsigned() & ((1 << place) - 1)
+        lower = b.as_unsigned() & ((1 << shift) - 1)
         with m.If(self.started & d.multiplies & from_zero):
             m.d.comb += Assert(d.total == a * lower)
         was_from_zero = Signal()

@@ -10,7 +10,7 @@ from tests.formal.prover import Proof, prove
 from tests.formal.small import port, resonator
 from tests.gen.proven_stages import Format, Ranges, proven_cascade
 
-from sosmith.gen.realizations.registry import WIDE
+from sosmith.gen.realizations.section_format import WIDE
 from sosmith.hdl.pipelined_logic import unique_names
 from sosmith.hdl.stage import PipelinedStage, pipeline_stages
 from sosmith.model.dataflow.datapath import Stage
@@ -19,7 +19,7 @@ from sosmith.model.sections.direct_form import DirectForm1, Product
 
 
 class StatedRanges(Proof):
-    """Every node's code is in its range when its rank is about a sample; for a BOUND, that is the code that comes in.
+    """Every node's code is in its range while its pipeline stage holds a sample; of a BOUND, the operand's code is.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ class StatedRanges(Proof):
         for k, index in enumerate(self.graph.inputs):
             node, code = self.graph.nodes[index], getattr(self.design, f"i{k}")
             m.d.comb += Assume((code >= node.low) & (code <= node.high))
-        names, ranks = unique_names(self.graph), pipeline_stages(self.graph)
+        names, stages = unique_names(self.graph), pipeline_stages(self.graph)
         for index, node in enumerate(self.graph.nodes):
             if node.op in {Op.INPUT, Op.CONSTANT, Op.SHIFT}:
                 continue
@@ -44,7 +44,7 @@ class StatedRanges(Proof):
             while self.graph.nodes[source].op is Op.SHIFT:
                 source = self.graph.nodes[source].operands[0]
             code = self.inside[names[source]]
-            valid = self.inside[f"valid{ranks[index]}"] if ranks[index] else self.design.i_valid
+            valid = self.inside[f"valid{stages[index]}"] if stages[index] else self.design.i_valid
             with m.If(self.started & valid):
                 m.d.comb += Assert((code >= node.low) & (code <= node.high))
 

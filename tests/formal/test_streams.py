@@ -155,7 +155,7 @@ def test_the_parallel_core_keeps_the_rules_and_computes_its_recursion(tmp_path: 
 
 
 @pytest.mark.slow
-def test_a_core_of_three_ranks_computes_its_recursion(tmp_path: Path) -> None:
+def test_a_core_of_three_pipeline_stages_computes_its_recursion(tmp_path: Path) -> None:
     assert prove(core_rules(datapath=resonator()), tmp_path, timeout=1200) == "PASS"
 
 

@@ -8,29 +8,28 @@ import numpy as np
 
 from sosmith.gen.proof.cascade_proof import prove_cascade
 from sosmith.gen.proof.linear_model import linear_model
-from sosmith.gen.realizations.registry import WIDE
+from sosmith.gen.realizations.section_format import unknown_range
 from sosmith.model.dataflow.datapath import Datapath, Stage
-from sosmith.model.dataflow.graph import GraphBuilder
+from sosmith.model.dataflow.graph import GraphBuilder, Range
 from sosmith.model.port import Port
 from sosmith.model.sections.horner import HornerStep
 
-Format = tuple[int, int, int]
 Ranges = Mapping[str, tuple[int, int]]
-Build = Callable[[Format, Ranges], Stage]
+Build = Callable[[Range, Ranges], Stage]
 """Makes a stage for the format of its input (fraction bits, smallest and largest code), with the ranges known."""
 
 
 def proven_cascade(builds: Sequence[Build], port: Port) -> list[Stage]:
     """Build stages one after the other, prove their ranges, and build them again with these."""
-    entry: Format = (0, -WIDE, WIDE)
+    entry = unknown_range(0)
     stages = []
     for build in builds:
         stages.append(build(entry, {}))
-        entry = (format_of(stages[-1])[0], -WIDE, WIDE)
+        entry = unknown_range(format_of(stages[-1]).frac)
     models = [linear_model(stage.graph) for stage in stages]
     exact = [(model.transfer, model.denominator) for model in models]
     proof = prove_cascade([(model,) for model in models], exact, Fraction(port.lowest), Fraction(port.highest))
-    entry = (0, port.lowest, port.highest)
+    entry = Range(0, port.lowest, port.highest)
     result = []
     for build, stage, extents in zip(builds, stages, proof.nodes, strict=True):
         ranges = {}
@@ -43,10 +42,9 @@ def proven_cascade(builds: Sequence[Build], port: Port) -> list[Stage]:
     return result
 
 
-def format_of(stage: Stage) -> Format:
+def format_of(stage: Stage) -> Range:
     """Format of a stage's output."""
-    node = stage.graph.nodes[stage.graph.outputs[0]]
-    return node.frac, node.low, node.high
+    return stage.graph.output_ranges[0]
 
 
 def datapath_of(stages: Sequence[Stage], port: Port) -> Datapath:

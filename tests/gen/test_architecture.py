@@ -6,9 +6,10 @@ from dataclasses import replace
 from fractions import Fraction
 
 import pytest
+from tests.formal.small import limiter
 from tests.gen.designs import EXAMPLES, example_design
 
-from sosmith.gen.architecture import Budget, fitting
+from sosmith.gen.architecture import Architecture, Budget, fitting
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.fpga.boards import find_board
 from sosmith.gen.output.core_facts import core_facts
@@ -128,3 +129,11 @@ def test_a_realization_that_cannot_be_folded_is_refused() -> None:
         r"the datapath must not truncate inside to be folded; parallel takes every realization$",
     ):
         fitting("folded", Budget(clock=Fraction(10**8), sample_rate=Fraction(48_000)), datapath)
+
+
+@pytest.mark.parametrize(
+    ("architecture", "expected"), [("parallel", 2141111839), ("folded", 2248281888), ("serial", 3874547459)]
+)
+def test_cores_in_the_field_keep_their_fingerprint(architecture: str, expected: int) -> None:
+    """A core compares this number with that of a set: it must not follow the names in this code."""
+    assert Architecture(architecture, limiter(), reload=True).fingerprint == expected

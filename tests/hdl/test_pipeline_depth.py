@@ -1,4 +1,4 @@
-"""Which rank of a stage does what, and the latency that follows."""
+"""The number of pipeline stages of a datapath stage, and the latency that follows."""
 
 import pytest
 from tests.gen.designs import example_design
@@ -8,7 +8,7 @@ from sosmith.hdl.stage import pipeline_depth
 
 
 @pytest.mark.parametrize(
-    ("realization", "counts"),
+    ("realization", "depths"),
     [
         ("df1_ef2", [2, 3, 3, 1]),  # a first-order section remembers one sample only
         ("df2t", [2, 2, 2, 1]),
@@ -16,12 +16,12 @@ from sosmith.hdl.stage import pipeline_depth
         ("lattice_wdf", [1, 1, 1, 1]),  # no arithmetic before its loops
     ],
 )
-def test_ranks_of_the_audio_low_pass(realization: str, counts: list[int]) -> None:
+def test_the_stages_of_the_audio_low_pass(realization: str, depths: list[int]) -> None:
     datapath = example_design("audio_lowpass.toml", realization=realization).datapath
-    assert [pipeline_depth(stage.graph) for stage in datapath.stages] == counts
-    assert latency_cycles(datapath) == sum(counts) + 1
+    assert [pipeline_depth(stage.graph) for stage in datapath.stages] == depths
+    assert latency_cycles(datapath) == sum(depths) + 1
 
 
-def test_a_polynomial_has_one_rank_a_stage() -> None:
+def test_each_step_of_a_polynomial_takes_one_pipeline_stage() -> None:
     datapath = example_design("flange_wear_bench.toml", core="calibration").datapath
     assert {pipeline_depth(stage.graph) for stage in datapath.stages} == {1}

@@ -1,11 +1,14 @@
 """Stages in Amaranth's own simulator: equal to the graph, sample for sample, whatever the pipeline's pace."""
 
+import doctest
+
 import pytest
 from tests.gen.designs import ALL, example_design
 from tests.gen.word_lengths.test_quantize import stimulus
 from tests.hdl.stage_bench import run
 
 from sosmith.gen.realizations.registry import REALIZATIONS
+from sosmith.hdl import stage as stage_module
 
 
 @pytest.mark.parametrize("realization", list(REALIZATIONS))
@@ -17,3 +20,9 @@ def test_stages_equal_their_graphs(name: str, realization: str) -> None:
         expected = stage.graph.run(samples)
         assert run(stage, samples, index) == expected, stage.name
         samples = expected
+
+
+def test_the_worked_example_is_true() -> None:
+    results = doctest.testmod(stage_module)
+    assert results.attempted > 0
+    assert results.failed == 0

@@ -6,6 +6,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ from sosmith.gen.report.evidence import Evidence
 from sosmith.gen.report.report import summarise
 from sosmith.gen.stimuli import bench_of, traces_for
 from sosmith.model.errors import ShortfallError
-from sosmith.model.scenarios.catalogue import SCENARIOS
+from sosmith.model.scenarios.summaries import fitting
 from sosmith.model.traces.trace import Trace
 from sosmith.sim import simulation
 from sosmith.sim.simulation import simulate
@@ -31,7 +32,7 @@ SAMPLES_ASKED = 100_000
 
 
 def scenarios(made: CoreDesign) -> list[str]:
-    return [name for name, scenario in SCENARIOS.items() if bench_of(made).kind in scenario.kinds]
+    return fitting(bench_of(made).kind)
 
 
 def short(trace: Trace, samples: int) -> Trace:
@@ -39,30 +40,34 @@ def short(trace: Trace, samples: int) -> Trace:
     return replace(trace, codes=trace.codes[:samples], truth=None, reading=None)
 
 
-@pytest.fixture(scope="module")
-def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[tuple[str, str], tuple[Evidence, dict[str, Any]]]:
-    """Evidence and report of every scenario of every example; each example is built once."""
-    found = {}
-    for example in ALL:
-        made = parallel_design(example)
-        folder = tmp_path_factory.mktemp(made.spec.name)
-        for scenario in scenarios(made):
-            seed = 100 + len(found)
-            evidence = simulate(made, traces_for(made, scenario, seed=seed), folder, seed=seed)
-            found[example, scenario] = evidence, summarise(evidence)
-    return found
-
-
 CASES = [(example, scenario) for example in ALL for scenario in scenarios(parallel_design(example))]
+LONG = {(LOCOMOTIVE, scenario) for scenario in ("bench_43_50", "bench_92_96", "temperature_ramp", "wear_ramp")}
+"""More than 30,000 samples each; one of them is the demonstration's."""
+EVERY = [pytest.param(*case, marks=[pytest.mark.slow] if case in LONG else []) for case in CASES]
+
+Run = tuple[Evidence, dict[str, Any]]
 
 
-@pytest.mark.parametrize(("example", "scenario"), CASES)
-def test_hardware_equals_the_integer_model(
-    example: str, scenario: str, runs: dict[tuple[str, str], tuple[Evidence, dict[str, Any]]]
-) -> None:
-    evidence, report = runs[example, scenario]
+@pytest.fixture(scope="module")
+def run_of(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, str], Run]:
+    """Simulate a scenario of an example, once; return evidence and report. Each example is built once."""
+    folders = {example: tmp_path_factory.mktemp(example) for example in ALL}
+
+    @cache
+    def run(example: str, scenario: str) -> Run:
+        made, seed = parallel_design(example), 100 + CASES.index((example, scenario))
+        evidence = simulate(made, traces_for(made, scenario, seed=seed), folders[example], seed=seed)
+        return evidence, summarise(evidence)
+
+    return run
+
+
+@pytest.mark.parametrize(("example", "scenario"), EVERY)
+def test_hardware_equals_the_integer_model(example: str, scenario: str, run_of: Callable[[str, str], Run]) -> None:
+    evidence, report = run_of(example, scenario)
     assert evidence.mismatches == 0
     assert evidence.samples == len(evidence.hardware) >= 4000
+    assert evidence.cycles > 1.5 * evidence.samples  # idle and stall of 0.3 each were in force
     assert report["error"]["max_lsb"] <= 1
     assert report["shortfalls"] == []
     assert report["passed"]
@@ -74,13 +79,11 @@ def test_hardware_equals_the_integer_model(
 
 
 @pytest.mark.parametrize("example", ALL)
-def test_worst_cases_stay_within_the_proof(
-    example: str, runs: dict[tuple[str, str], tuple[Evidence, dict[str, Any]]]
-) -> None:
+def test_worst_cases_stay_within_the_proof(example: str, run_of: Callable[[str, str], Run]) -> None:
     """The inputs that drive the filter, and the way of every rounding error, furthest: hardware and exact graph."""
     made = parallel_design(example)
     for scenario in ("worst_case", "worst_case_errors"):
-        evidence, report = runs[example, scenario]
+        evidence, report = run_of(example, scenario)
         assert report["bit_exact"]
         assert 0.4 * made.quantized.bound < report["error"]["max_lsb"] <= made.quantized.bound
     # The interpreter raises where a node leaves its range, and the hardware computed these very samples.
@@ -107,26 +110,27 @@ def test_worst_cases_in_every_realization(example: str, realization: str, tmp_pa
     assert made.datapath.output.decode(np.array(exact)).tolist() == evidence.hardware[: len(exact)].tolist()
 
 
+MEASURED = [
+    pytest.param(*case, marks=[pytest.mark.slow] if case in LONG else [])
+    for case in CASES
+    if parallel_design(case[0]).core == "instrument" and not case[1].startswith("worst_case")
+]
+
+
+@pytest.mark.parametrize(("example", "scenario"), MEASURED)
 def test_accuracy_is_printed_for_every_run_of_the_instruments(
-    runs: dict[tuple[str, str], tuple[Evidence, dict[str, Any]]],
+    example: str, scenario: str, run_of: Callable[[str, str], Run]
 ) -> None:
-    measured = {
-        case: report["accuracy_percent"]
-        for case, (evidence, report) in runs.items()
-        if evidence.core == "instrument" and not evidence.scenario.startswith("worst_case")
-    }
-    assert len(measured) == 8
-    for accuracy in measured.values():
-        assert 80 < accuracy["unfiltered"] < accuracy["golden"] < 100
+    _, report = run_of(example, scenario)
+    accuracy = report["accuracy_percent"]
+    assert 80 < accuracy["unfiltered"] < accuracy["golden"] < 100
 
 
-def test_enough_samples_under_different_handshakes(
-    runs: dict[tuple[str, str], tuple[Evidence, dict[str, Any]]],
-) -> None:
-    assert sum(evidence.samples for evidence, _ in runs.values()) >= SAMPLES_ASKED
-    assert len({evidence.seed for evidence, _ in runs.values()}) == len(runs)
-    for evidence, _ in runs.values():
-        assert evidence.cycles > 1.5 * evidence.samples  # idle and stall of 0.3 each were in force
+def test_enough_samples_under_different_handshakes(run_of: Callable[[str, str], Run]) -> None:
+    assert len(MEASURED) == 8
+    runs = [run_of(*case)[0] for case in CASES if case not in LONG]
+    assert sum(evidence.samples for evidence in runs) >= SAMPLES_ASKED
+    assert len({evidence.seed for evidence in runs}) == len(runs)
 
 
 @pytest.mark.parametrize("example", ALL)

@@ -1,6 +1,7 @@
 """Reloads at random moments under random back-pressure: every sample is computed with one set, and the right one."""
 
 import json
+import os
 import random
 import sys
 from dataclasses import replace
@@ -13,7 +14,7 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 from amaranth.hdl import Module, Signal
-from cocotb_tools.runner import Icarus
+from cocotb_tools.runner import Icarus, Verilator
 from tests.gen.designs import EXAMPLES
 
 from sosmith.gen.core import CoreDesign, design_core
@@ -28,6 +29,7 @@ from sosmith.hdl.folded import FoldedCore
 from sosmith.hdl.reload import ReloadPort
 from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.reload.swapping import compute_swapping
+from sosmith.sim.simulators import find_simulator
 
 RATIOS = ("0.8", "0.9", "1.1", "1.2")
 """Cutoffs of the sets over that of the core."""
@@ -68,7 +70,9 @@ def writes_of(made: CoreDesign, other: OtherSet, version: int, *, wrong: bool) -
     return [*pairs, (register.address, crc ^ (wrong << version % 32))]
 
 
-def run(folder: Path, made: CoreDesign, source: str, count: int, seed: int) -> tuple[dict[str, Any], list[int]]:
+def run(
+    folder: Path, made: CoreDesign, source: str, count: int, seed: int, simulator: str = "icarus"
+) -> tuple[dict[str, Any], list[int]]:
     """Simulate `count` loads, one in eight with a wrong CRC; return the outcome and which set each load has."""
     pace = random.Random(seed)
     sets = sets_for(made.architecture.name, made.spec.name)
@@ -95,15 +99,18 @@ def run(folder: Path, made: CoreDesign, source: str, count: int, seed: int) -> t
     }
     (folder / "core.sv").write_text(source)
     (folder / "job.json").write_text(json.dumps(job))
-    runner = Icarus()
-    runner.build(
-        sources=[folder / "core.sv"],
-        hdl_toplevel=made.datapath.name,
-        build_dir=folder / "build",
-        timescale=("1ns", "1ps"),
-        always=True,
-    )
-    with patch.object(sys, "path", [str(EXAMPLES.parent), *sys.path]):  # where the simulator's Python looks
+    tool = find_simulator(simulator, folder / "bin")
+    # Where the simulator's Python looks, and where its programs are.
+    with patch.object(sys, "path", [str(EXAMPLES.parent), *sys.path]), patch.dict(os.environ, tool.environment):
+        runner = Icarus() if simulator == "icarus" else Verilator()
+        runner.build(
+            sources=[folder / "core.sv"],
+            hdl_toplevel=made.datapath.name,
+            build_dir=folder / "build",
+            build_args=[] if simulator == "icarus" else ["-Wno-fatal", "-O3"],
+            timescale=("1ns", "1ps"),
+            always=True,
+        )
         runner.test(
             test_module="tests.sim.reload_bench",
             hdl_toplevel=made.datapath.name,
@@ -148,6 +155,9 @@ def verilog(made: CoreDesign) -> str:
     return to_verilog(to_rtlil(made.architecture.component(), made.datapath.name))
 
 
+MAX_IN_ICARUS = 100
+"""Loads that Icarus simulates in seconds; more of them are for Verilator."""
+
 COUNTS = [
     *(pytest.param(name, "audio_lowpass", 1, 60, id=f"{name}-60") for name in ARCHITECTURES),
     *(pytest.param(name, "audio_lowpass", 3, 40, id=f"{name}-3-channels") for name in ARCHITECTURES),
@@ -165,7 +175,8 @@ COUNTS = [
 @pytest.mark.parametrize(("architecture", "example", "channels", "count"), COUNTS)
 def test_reloads_at_any_moment(architecture: str, example: str, channels: int, count: int, tmp_path: Path) -> None:
     made = hardware_in(architecture, example, channels)
-    outcome, chosen = run(tmp_path, made, verilog(made), count, seed=count)
+    simulator = "verilator" if count > MAX_IN_ICARUS else "icarus"
+    outcome, chosen = run(tmp_path, made, verilog(made), count, count, simulator)
     assert outcome["swaps"][-1] == len(outcome["accepted"])
     assert len(set(outcome["swaps"])) > count // 2  # most sets were used by a sample
     assert [word for _, word in outcome["received"]] == expected(made, outcome, chosen)

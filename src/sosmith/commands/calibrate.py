@@ -5,44 +5,18 @@ from __future__ import annotations
 import datetime
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
-from rich.markup import escape
 
-from sosmith.gen.instrument.calibration_plot import calibration_plot
-from sosmith.gen.instrument.calibration_report import (
-    CALLED_OUT,
-    addition_json,
-    calibration_json,
-    measurements_csv,
-    specification_table,
-    version_json,
-)
-from sosmith.gen.picture import FORMATS
-from sosmith.model.calibration.fit import REQUIRED_R, terms_of
-from sosmith.model.calibration.fit_quality import CELLS
-from sosmith.model.calibration.measurement_files import DEFAULT_RANGES, Range, Refusal, parse_date
-from sosmith.model.calibration.measurement_store import Version, open_store
-from sosmith.model.calibration.self_updating import (
-    Calibration,
-    add,
-    calibration_of,
-    find_version,
-    refit,
-    refused_first_file,
-)
+from sosmith.gen.picture import format_of
+from sosmith.model.calibration.acceptance import DEFAULT_RANGES, REQUIRED_R, Range
 from sosmith.model.errors import ShortfallError, SpecificationError
 from sosmith.model.text_files import write_contents, write_files
-from sosmith.terminal import (
-    JSON_OPTION,
-    TableConsole,
-    new_table,
-    note,
-    output_option,
-    print_json,
-    show_progress,
-)
+from sosmith.terminal import JSON_OPTION, note, output_option, print_json, show_progress
+
+if TYPE_CHECKING:
+    from sosmith.model.calibration.measurement_files import Refusal
 
 _SHOWN = 20
 """Count of refused lines that are printed; JSON has all."""
@@ -66,7 +40,11 @@ def calibrate() -> None:
 
 
 def _day(ctx: click.Context, parameter: click.Parameter, text: str | None) -> str:
-    return datetime.date.today().isoformat() if text is None else parse_date(text)
+    if text is None:
+        return datetime.date.today().isoformat()
+    from sosmith.model.calibration.measurement_files import parse_date
+
+    return parse_date(text)
 
 
 def _range(quantity: str, unit: str, usual: Range) -> Callable[[Any], Any]:
@@ -150,6 +128,10 @@ def add_command(
     --keep-good is given. What is kept is on disk before this command ends, together with the version fitted to it.
     Exits with 1 if the measurements are kept but no polynomial reaches the required r.
     """
+    from sosmith.gen.instrument.calibration_report import addition_json
+    from sosmith.model.calibration.measurement_store import open_store
+    from sosmith.model.calibration.self_updating import add, refused_first_file
+
     ranges = (clearance_range, voltage_range, temperature_range)
     with show_progress() as step:
         step(f"adding {file}")
@@ -182,7 +164,9 @@ def add_command(
     if addition.calibration is None:
         raise ShortfallError(addition.shortfall)
     if not as_json:
-        _print_calibration(addition.calibration)
+        from sosmith.commands.tables.calibration import print_calibration
+
+        print_calibration(addition.calibration)
 
 
 @calibrate.command("fit")
@@ -198,6 +182,11 @@ def fit_command(store: Path, sensor: str, date: str, required_r: float, robust: 
     Makes a new version if the polynomial or what was asked for has changed. Exits with 1 if no polynomial reaches the
     required r.
     """
+    from sosmith.commands.tables.calibration import print_calibration
+    from sosmith.gen.instrument.calibration_report import calibration_json
+    from sosmith.model.calibration.measurement_store import open_store
+    from sosmith.model.calibration.self_updating import refit
+
     with show_progress() as step, open_store(store) as opened:
         step(f"fitting {sensor}")
         made = refit(
@@ -211,7 +200,7 @@ def fit_command(store: Path, sensor: str, date: str, required_r: float, robust: 
     if as_json:
         print_json(calibration_json(made))
     else:
-        _print_calibration(made)
+        print_calibration(made)
 
 
 @calibrate.command("history")
@@ -226,6 +215,11 @@ def history_command(store: Path, sensor: str, verify: bool, as_json: bool) -> No
     version before, over the voltages and temperatures that measurements cover.
     With --verify, exits with 1 if a version does not come out the same.
     """
+    from sosmith.commands.tables.calibration import print_history
+    from sosmith.gen.instrument.calibration_report import version_json
+    from sosmith.model.calibration.measurement_store import open_store
+    from sosmith.model.calibration.self_updating import calibration_of, find_version
+
     with show_progress() as step, open_store(store) as opened:
         newest = find_version(opened, sensor)
         versions = opened.versions(sensor)
@@ -238,7 +232,7 @@ def history_command(store: Path, sensor: str, verify: bool, as_json: bool) -> No
     if as_json:
         print_json([version_json(sensor, version) for version in versions])
     else:
-        _print_history(sensor, versions)
+        print_history(sensor, versions)
     if verify:
         note(f"every version comes out the same, bit for bit: {len(versions)} of {len(versions)}")
 
@@ -262,6 +256,10 @@ def export_command(store: Path, sensor: str, number: int | None, file_format: st
     Either way the doubles read back are those of the version. A core with reload = true takes the specification with
     new coefficients at run time.
     """
+    from sosmith.gen.instrument.calibration_report import measurements_csv, specification_table
+    from sosmith.model.calibration.measurement_store import open_store
+    from sosmith.model.calibration.self_updating import find_version
+
     with open_store(store) as opened:
         version = find_version(opened, sensor, number)
         text = (
@@ -284,9 +282,11 @@ def export_command(store: Path, sensor: str, number: int | None, file_format: st
 def plot_command(store: Path, sensor: str, number: int | None, output: Path | None) -> None:
     """Draw coverage, residuals, leverage and history of a sensor's calibration."""
     path = output or Path("calibration.svg")
-    file_format = path.suffix.lower().removeprefix(".")
-    if file_format not in FORMATS:
-        raise SpecificationError(f"{path}: the plot's name must end in .svg or .png, not {path.suffix or 'neither'}")
+    file_format = format_of(path)
+    from sosmith.gen.instrument.calibration_plot import calibration_plot
+    from sosmith.model.calibration.measurement_store import open_store
+    from sosmith.model.calibration.self_updating import calibration_of
+
     with show_progress() as step, open_store(store) as opened:
         step("fitting again")
         made = calibration_of(opened, sensor, number)
@@ -306,68 +306,3 @@ def _note_refusals(file: Path, refusals: tuple[Refusal, ...]) -> None:
         note(f"{file}, line {refusal.line}: {refusal.reason}")
     if len(refusals) > _SHOWN:
         note(f"... and {len(refusals) - _SHOWN:,} more lines; --json lists all")
-
-
-def _mm(value: float | None) -> str:
-    return "-" if value is None else f"{value:.4g} mm"
-
-
-def _print_calibration(made: Calibration) -> None:
-    version, quality = made.version, made.quality
-    console = TableConsole()
-    state = "new" if made.new else "unchanged"
-    overview = new_table(f"Sensor {escape(made.sensor)}, version {version.number} of {version.date}: {state}", ["", ""])
-    robust = ", robust" if version.robust else ""
-    overview.add_row("measurements", f"{version.measurements:,}{robust}")
-    m, n = version.polynomial.orders
-    overview.add_row("orders", f"{m} in voltage, {n} in temperature, to reach r = {version.required_r:g}")
-    overview.add_row("adjusted r", f"{made.fit.adjusted_r:.6f}{_rejected(made)}")
-    overview.add_row("residual, rms", _mm(version.rms))
-    overview.add_row("residual, largest", _mm(float(abs(quality.residual).max())))
-    left_out = _mm(version.cross_validated) if version.cross_validated is not None else "not defined: leverage 1"
-    overview.add_row("cross-validated error, rms", left_out)
-    (v_low, v_high), (t_low, t_high) = made.fit.covered
-    overview.add_row("covered", f"{v_low:g} to {v_high:g} V, {t_low:g} to {t_high:g} °C")
-    overview.add_row("coverage of the range", f"{100 * made.coverage:.1f} % lies between measurements")
-    cells = round(quality.filled_cells * CELLS**2)
-    overview.add_row("cells with measurements", f"{cells} of {CELLS} x {CELLS}")
-    mean = len(terms_of(made.fit.orders)) / version.measurements
-    high = len(quality.high_leverage)
-    overview.add_row("leverage, largest", f"{quality.leverage.max():.4f} (mean {mean:.4f}; {high} above 3 times that)")
-    if version.robust:
-        overview.add_row("weighted down", f"{sum(weight < 1 for weight in made.fit.weights):,}")
-    for number, drift in sorted(made.drift.items(), reverse=True)[:5]:
-        overview.add_row(f"drift from version {number}", _mm(drift))
-    console.print(overview)
-    called = new_table("Largest residuals", ["no.", "from", "mm", "V", "°C", "residual, mm", "leverage"])
-    for index in quality.largest_residuals(CALLED_OUT):
-        one = made.stored[index]
-        values = [f"{value:g}" for value in one.reading.values]
-        off, leverage = f"{quality.residual[index]:+.4f}", f"{quality.leverage[index]:.3f}"
-        called.add_row(str(one.number), escape(f"{one.source}:{one.reading.line}"), *values, off, leverage)
-    console.print(called)
-
-
-def _rejected(made: Calibration) -> str:
-    shown = [f"{trial.orders[0]}, {trial.orders[1]}: {trial.adjusted_r:.6f}" for trial in made.fit.rejected[:3]]
-    more = [f"{len(made.fit.rejected) - 3} more"] if len(made.fit.rejected) > 3 else []
-    return f" (orders {'; '.join(shown + more)})" if shown else ""
-
-
-def _print_history(sensor: str, versions: list[Version]) -> None:
-    table = new_table(
-        f"Sensor {escape(sensor)}, errors in mm",
-        ["no.", "date", "count", "orders", "r", "rms", "CV error", "drift"],
-    )
-    for version in versions:
-        m, n = version.polynomial.orders
-        figures = (version.rms, version.cross_validated, version.drift)
-        table.add_row(
-            str(version.number),
-            version.date,
-            f"{version.measurements:,}",
-            f"{m}, {n}{' robust' if version.robust else ''}",
-            f"{max(version.adjusted_r_squared, 0.0) ** 0.5:.5f}",
-            *("-" if figure is None else f"{figure:.4g}" for figure in figures),
-        )
-    TableConsole().print(table)

@@ -5,12 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import click
-from rich.markup import escape
 
-from sosmith.gen.report.comparison import column_names, comparison_json, comparison_page, load_report
-from sosmith.gen.report.comparison import compare as compare_reports
 from sosmith.model.text_files import write_files
-from sosmith.terminal import JSON_OPTION, TableConsole, new_table, note, output_option, print_json
+from sosmith.terminal import JSON_OPTION, note, output_option, print_json
 
 
 @click.command("compare")
@@ -18,18 +15,22 @@ from sosmith.terminal import JSON_OPTION, TableConsole, new_table, note, output_
 @JSON_OPTION
 @output_option("Write a page with the comparison to this HTML file too.")
 def compare_command(reports: tuple[Path, ...], as_json: bool, output: Path | None) -> None:
-    """Set accuracy reports side by side; each REPORT is a report.json or the folder that holds it."""
-    loaded = [load_report(path) for path in reports]
+    """Set accuracy reports side by side.
+
+    Each REPORT is a report.json or the folder that holds it.
+
+    \b
+        sosmith compare build/clearance build/ramp -o comparison.html
+    """
+    from sosmith.interface.comparison import compare
+
+    comparison = compare(reports)
     if output is not None:
-        write_files(output.parent, {output.name: comparison_page(loaded)})
+        write_files(output.parent, {output.name: comparison.page()})
         note(f"wrote {output}")
     if as_json:
-        print_json(comparison_json(loaded))
-        return
-    table = new_table("Accuracy reports", ["", *map(escape, column_names(loaded))])
-    for row in compare_reports(loaded):
-        cells = [
-            f"[bold green]{escape(cell)}[/]" if k in row.best else escape(cell) for k, cell in enumerate(row.cells)
-        ]
-        table.add_row(escape(row.title), *cells)
-    TableConsole().print(table)
+        print_json(comparison.as_dict())
+    else:
+        from sosmith.commands.tables.comparison import print_comparison
+
+        print_comparison(comparison)

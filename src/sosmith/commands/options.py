@@ -3,30 +3,38 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
-from sosmith.gen.core import CORES, CoreDesign
-from sosmith.gen.fpga.boards import BOARDS, Board, find_board
-from sosmith.gen.realizations.registry import ERROR_FEEDBACK, REALIZATIONS
+from sosmith.gen.fpga.boards import BOARDS, find_board
+from sosmith.gen.specification.choices import CORES, ERROR_FEEDBACK, REALIZATIONS
+from sosmith.model.suggestion import did_you_mean
+
+
+class OneOf(click.Choice[str]):
+    """One of some names; an unknown one is refused with the name that was probably meant."""
+
+    def get_invalid_choice_message(self, value: Any, ctx: click.Context | None) -> str:
+        return f"{super().get_invalid_choice_message(value, ctx)[:-1]}{did_you_mean(str(value), self.choices)}."
+
 
 SPEC = click.argument("spec", type=click.Path(path_type=Path))
-CORE = click.option(
-    "--core", type=click.Choice(CORES), help="The part to make.  [default: all that the specification has]"
-)
+CORE = click.option("--core", type=OneOf(CORES), help="The part to make.  [default: all that the specification has]")
 REALIZATION = click.option(
     "--realization",
-    type=click.Choice(["auto", *REALIZATIONS]),
+    type=OneOf(REALIZATIONS),
     help="Use this one, whatever the specification says.",
 )
 WIDTHS_OF = click.option(
     "--widths-of",
-    type=click.Choice(ERROR_FEEDBACK),
+    type=OneOf(ERROR_FEEDBACK),
     help="Keep the word lengths chosen for this realization, to compare structures at equal width.",
 )
 BOARD = click.option(
     "--board",
     metavar="BOARD",
+    callback=lambda ctx, parameter, name: None if name is None else find_board(name).name,
     help=f"What it is meant for: an automatic choice of the architecture heeds its multipliers. {', '.join(BOARDS)}.",
 )
 SEED = click.option(
@@ -39,11 +47,6 @@ SECONDS = click.option(
 )
 
 
-def default_folder(made: CoreDesign) -> Path:
-    """Return the folder for what is made of a core, if none is named."""
-    return Path("build") / made.spec.name
-
-
-def board_named(name: str | None) -> Board | None:
-    """Return the board of an option, None if it is not given."""
-    return None if name is None else find_board(name)
+def default_folder(name: str) -> Path:
+    """Return the folder for what is made of the specification `name`, if none is given."""
+    return Path("build") / name

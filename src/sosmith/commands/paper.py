@@ -6,11 +6,8 @@ from pathlib import Path
 
 import click
 
-from sosmith.gen.paper.comparison import LABELS
-from sosmith.gen.paper.document import paper_files, paper_json, summary_rows
-from sosmith.gen.paper.figures import read_paper_figures
 from sosmith.model.text_files import write_files
-from sosmith.terminal import JSON_OPTION, TableConsole, new_table, note, output_option, print_json, show_progress
+from sosmith.terminal import JSON_OPTION, note, output_option, print_json, show_progress
 
 
 @click.command("paper")
@@ -21,7 +18,14 @@ def paper(output: Path | None, as_json: bool) -> None:
 
     Prints how many figures of each are reproduced, near, different or not comparable. With -o docs/paper.md it writes
     the whole comparison with its explanations and pictures; --json prints all its figures.
+
+    \b
+        sosmith paper -o paper/paper.md
     """
+    from sosmith.gen.paper.comparison import LABELS
+    from sosmith.gen.paper.document import paper_files, paper_json, summary_rows
+    from sosmith.gen.paper.figures import read_paper_figures
+
     with show_progress() as step:
         figures = read_paper_figures()
         step("computing")
@@ -34,6 +38,8 @@ def paper(output: Path | None, as_json: bool) -> None:
     if as_json:
         print_json(paper_json(figures))
     elif output is None:
+        from sosmith.commands.tables.console import TableConsole, new_table
+
         listing = new_table("The paper's figures, ours beside them", ["", *LABELS])
         for row in rows:
             listing.add_row(*row[:-1])

@@ -3,26 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import click
-from rich.markup import escape
 
-from sosmith.commands.options import (
-    BOARD,
-    CORE,
-    REALIZATION,
-    SPEC,
-    WIDTHS_OF,
-    board_named,
-    default_folder,
-)
-from sosmith.gen.core import CoreDesign, design_core
-from sosmith.gen.reload.register_writes import reload_json
-from sosmith.gen.reload.reload import Swap, check_swap, own_set, set_for
-from sosmith.gen.specification.specification import Specification, load
+from sosmith.commands.options import BOARD, CORE, REALIZATION, SPEC, WIDTHS_OF, default_folder
 from sosmith.model.text_files import to_json, write_files
-from sosmith.terminal import JSON_OPTION, TableConsole, new_table, note, output_option, print_json, show_progress
+from sosmith.terminal import JSON_OPTION, note, output_option, print_json, show_progress
 
 
 @click.command("reload")
@@ -77,45 +63,32 @@ def reload_command(
 
     The file's `writes` are pairs of a byte address and a word for the AXI4-Lite port, in order. Before, compare
     `design` with the register DESIGN. docs/registers.md has the registers.
+
+    \b
+        sosmith reload my.toml recalibrated.toml
     """
-    target = board_named(board)
+    from sosmith.interface.specification import Specification
+
+    asked, wanted = Specification.load(spec), Specification.load(other).checked
+    running = None if active is None else Specification.load(active).checked
     with show_progress() as step:
-        made = design_core(
-            load(spec), core=core, realization=realization, widths_of=widths_of, board=target, progress=step
-        )
+        from sosmith.gen.reload.register_writes import reload_json
+        from sosmith.gen.reload.reload import check_swap, own_set, set_for
+        from sosmith.interface.design import design
+
+        made = design(asked, core=core, realization=realization, widths_of=widths_of, board=board, progress=step).core
         step("set")
-        wanted = load(other)
         new = set_for(made, wanted)
-        before = own_set(made) if active is None else set_for(made, load(active))
+        before = own_set(made) if running is None else set_for(made, running)
         step("swap")
         swap = check_swap(made, None if reset else before, new)
     tree = reload_json(made, swap, version)
-    path = output or default_folder(made) / f"{other.stem}.reload.json"
+    path = output or default_folder(asked.name) / f"{other.stem}.reload.json"
     write_files(path.parent, {path.name: to_json(tree)})
     if as_json:
         print_json(tree)
     else:
-        _print_swap(made, wanted, swap, tree)
+        from sosmith.commands.tables.reload import print_swap
+
+        print_swap(made, wanted, swap, tree)
     note(f"wrote {path}")
-
-
-def _print_swap(made: CoreDesign, wanted: Specification, swap: Swap, tree: dict[str, Any]) -> None:
-    console = TableConsole()
-    output, quantized = made.datapath.output, swap.made.quantized
-    unit = escape(f" {output.unit}".rstrip())
-    bound, allowed = quantized.bound * output.lsb, wanted.max_error
-    table = new_table(f"{made.spec.name}: the set may be loaded", ["", ""])
-    if quantized.filter is not None:
-        table.add_row("filter", quantized.filter.describe)
-    table.add_row("error bound", f"{float(bound):.3g}{unit} of {float(allowed):.3g}{unit} allowed")
-    table.add_row("headroom", f"{float(allowed - bound):.3g}{unit}, {float(100 * (1 - bound / allowed)):.1f} %")
-    if swap.samples:
-        seconds = swap.samples / float(made.spec.sample_rate)
-        table.add_row("transient", f"{swap.samples:,} samples, {seconds:.3g} s, until the bound holds")
-    else:
-        table.add_row("transient", "none, the bound holds from the first sample on")
-    table.add_row("states", f"take at most {100 * float(swap.use):.3g} % of what their words hold")
-    crc = tree["writes"][-1][1]
-    table.add_row("load", f"version {tree['version']}, {tree['words']:,} words, CRC 0x{crc:08X}")
-    table.add_row("for the design", f"0x{tree['design']:08X}")
-    console.print(table)

@@ -5,12 +5,10 @@ from __future__ import annotations
 import math
 import sys
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
-from rich.markup import escape
 
-from sosmith.commands.design_tables import print_design
 from sosmith.commands.options import (
     BOARD,
     CORE,
@@ -19,33 +17,20 @@ from sosmith.commands.options import (
     SEED,
     SPEC,
     WIDTHS_OF,
-    board_named,
+    OneOf,
     default_folder,
 )
-from sosmith.gen.core import CoreDesign, design_core
-from sosmith.gen.fpga.boards import BOARDS
-from sosmith.gen.report.report import write_report
-from sosmith.gen.specification.specification import example, load
-from sosmith.gen.stimuli import bench_of, default_scenario, is_scenario_file, notes_on, traces_for
+from sosmith.gen.fpga.boards import BOARDS, find_board
 from sosmith.model.errors import SpecificationError
-from sosmith.model.scenarios.catalogue import SCENARIOS
-from sosmith.model.scenarios.depot_measurements import measurements_csv, measurements_of
-from sosmith.model.scenarios.file import load_scenario
+from sosmith.model.scenarios.summaries import SUMMARIES, check_scenario, fitting
+from sosmith.model.suggestion import did_you_mean
 from sosmith.model.text_files import write_files
-from sosmith.model.traces.trace_file import traces_csv, write_traces
-from sosmith.sim.simulation import simulate
-from sosmith.sim.simulators import check_name
-from sosmith.terminal import (
-    JSON_OPTION,
-    Step,
-    TableConsole,
-    new_table,
-    note,
-    output_option,
-    print_json,
-    reader_may_leave,
-    show_progress,
-)
+from sosmith.terminal import JSON_OPTION, Step, note, output_option, print_json, reader_may_leave, show_progress
+
+if TYPE_CHECKING:
+    from sosmith.interface.design import Design
+    from sosmith.interface.report import Report
+    from sosmith.interface.specification import Specification
 
 
 class _Share(click.FloatRange):
@@ -75,7 +60,7 @@ class _Share(click.FloatRange):
 )
 @click.option(
     "--simulator",
-    type=click.Choice(["verilator", "icarus", "cxxrtl"]),
+    type=OneOf(["verilator", "icarus", "cxxrtl"]),
     default="verilator",
     show_default=True,
 )
@@ -121,7 +106,7 @@ def simulate_command(
     as_json: bool,
     output: Path | None,
 ) -> None:
-    """Run the generated hardware of SPEC under cocotb and report its accuracy.
+    """Run the generated hardware of SPEC in a simulator and report its accuracy.
 
     The SystemVerilog runs with random idle and back-pressure on both streams. Every sample is compared with the
     integer model for equality, and with the double-precision golden chain for the error. Writes report.json and
@@ -129,20 +114,36 @@ def simulate_command(
 
     With --gates, the same bench runs the cells of an FPGA, their flip-flops at random when it starts, and an automatic
     choice of the architecture is made for that board.
+
+    \b
+        sosmith simulate my.toml
+        sosmith simulate my.toml --trace worst_case --simulator icarus -o build/worst
     """
-    check_name(simulator)  # before anything takes time
-    netlist_for = board_named(gates)
-    target = board_named(board) or netlist_for
+    from sosmith.interface.specification import Specification
+    from sosmith.sim.simulators import check_name
+
+    check_name(simulator)
+    netlist_for = None if gates is None else find_board(gates).name
+    asked = Specification.load(spec)
+    if source is not None and not _is_file(source):
+        check_scenario(source, _kind(asked, core))
     with show_progress() as step:
-        made = design_core(
-            load(spec), core=core, realization=realization, widths_of=widths_of, board=target, progress=step
+        from sosmith.interface.design import design
+
+        made = design(
+            asked,
+            core=core,
+            realization=realization,
+            widths_of=widths_of,
+            board=board or netlist_for,
+            progress=step,
         )
-        summary, folder = _simulate(
+        report = _simulated(
             made,
             step,
             source,
-            output,
-            seconds,
+            folder=output or default_folder(asked.name),
+            seconds=seconds,
             simulator=simulator,
             seed=seed,
             idle=idle,
@@ -150,7 +151,7 @@ def simulate_command(
             gates=netlist_for,
             waves=waves,
         )
-    _finish(summary, folder, as_json=as_json)
+    _finish(report, as_json=as_json)
 
 
 @click.command("emulate")
@@ -180,20 +181,41 @@ def emulate_command(
 
     A scenario is a built-in one by name, or a file that describes days of operation: examples/scenarios/ holds some,
     and docs/sensors.md says what can be in them.
+
+    \b
+        sosmith emulate my.toml
+        sosmith emulate my.toml wear_ramp -o ramp.csv
     """
     if measurements:
         if seconds is not None:
             raise SpecificationError("--seconds must come with a scenario's name, not with --measurements")
         _write_measurements(spec, scenario, seed, output)
         return
+    from sosmith.interface.specification import Specification
+
+    asked = Specification.load(spec)
+    kind = _kind(asked, core)
+    if scenario is None:
+        from sosmith.commands.tables.scenarios import print_scenarios
+
+        print_scenarios(asked.name, {name: SUMMARIES[name].description for name in fitting(kind)})
+        note("a file can take a name's place: examples/scenarios/ holds some, docs/sensors.md says what can be in them")
+        return
+    if scenario not in fitting(kind) and not _is_scenario_file(scenario):
+        known = fitting(kind)
+        raise SpecificationError(
+            f"the scenario must be one of {', '.join(known)}, or a file whose name ends in .toml, not "
+            f"{scenario}{did_you_mean(scenario, known)}"
+        )
     with show_progress() as step:
-        made = design_core(load(spec), core=core, progress=step)
-        if scenario is None:
-            _list_scenarios(made)
-            return
+        from sosmith.gen.stimuli import notes_on, traces_for
+        from sosmith.interface.design import design
+        from sosmith.model.traces.trace_file import traces_csv, write_traces
+
+        made = design(asked, core=core, progress=step)
         step(f"emulating {scenario}")
-        traces = traces_for(made, _known_scenario(made, scenario), seed=seed, seconds=seconds)
-        notes = notes_on(made, scenario)
+        traces = traces_for(made.core, scenario, seed=seed, seconds=seconds)
+        notes = notes_on(made.core, scenario)
         if output is not None:
             write_traces(output, traces)
     if output is None:
@@ -213,77 +235,74 @@ def demo(output: Path | None, seed: int) -> None:
 
     Designs the filter, generates the hardware, runs it in the simulator on an emulated wear run, and writes the
     report.
+
+    \b
+        sosmith demo -o my_demo
     """
+    from sosmith.gen.specification.specification import example
+    from sosmith.interface.specification import Specification
+
     folder = output or Path("build/demo")
     with show_progress() as step:
         step("writing the example specification")
         (spec,) = write_files(folder, {"flange_wear.toml": example()})
-        made = design_core(load(spec), progress=step)
-        summary, folder = _simulate(
-            made, step, None, folder, None, simulator="verilator", seed=seed, idle=0.3, stall=0.3, waves=False
-        )
+        from sosmith.interface.design import design
+
+        made = design(Specification.load(spec), progress=step)
+        report = _simulated(made, step, None, folder=folder, seed=seed)
+    from sosmith.commands.tables.design import print_design
+
     print_design(made, brief=True)
-    _finish(summary, folder, as_json=False)
+    _finish(report, as_json=False)
 
 
-def _simulate(
-    made: CoreDesign,
-    step: Step,
-    source: str | None,
-    output: Path | None,
-    seconds: float | None,
-    **options: Any,
-) -> tuple[dict[str, Any], Path]:
-    folder = output or default_folder(made)
-    chosen = source or default_scenario(made)
-    step(f"trace {chosen}")
-    traces = traces_for(made, chosen, seed=options["seed"], seconds=seconds)
-    evidence = simulate(made, traces, folder, progress=step, **options)
-    for sentence in notes_on(made, chosen):
-        note(f"note: {sentence}")
-    step("writing the report")
-    return write_report(evidence, folder), folder
+def _simulated(made: Design, step: Step, source: str | None, **options: Any) -> Report:
+    report = made.simulate(source, progress=step, **options)
+    if source is not None:
+        from sosmith.gen.stimuli import notes_on
+
+        for sentence in notes_on(made.core, source):
+            note(f"note: {sentence}")
+    return report
 
 
-def _finish(summary: dict[str, Any], folder: Path, *, as_json: bool) -> None:
+def _finish(report: Report, *, as_json: bool) -> None:
     with reader_may_leave():
         if as_json:
-            print_json(summary)
+            print_json(report.summary)
         else:
-            _print_summary(summary)
-    note(f"report: {(folder / 'report.html').resolve().as_uri()}")
-    if not summary["passed"]:
+            from sosmith.commands.tables.report import print_summary
+
+            print_summary(report.summary)
+    note(f"report: {(report.folder / 'report.html').resolve().as_uri()}")
+    if not report.passed:
         sys.exit(1)
 
 
-def _known_scenario(made: CoreDesign, name: str) -> str:
-    if name not in SCENARIOS and not is_scenario_file(name):
-        fitting = ", ".join(_fitting(made))
-        raise SpecificationError(
-            f"the scenario must be one of {fitting}, or a file whose name ends in .toml, not {name}"
-        )
-    return name
+def _kind(spec: Specification, core: str | None) -> str:
+    """Return the kind of core that a scenario has to fit."""
+    return "filter" if spec.checked.calibration is None or core == "filter" else "instrument"
 
 
-def _fitting(made: CoreDesign) -> list[str]:
-    kind = bench_of(made).kind
-    return [name for name, scenario in SCENARIOS.items() if kind in scenario.kinds]
+def _is_scenario_file(source: str) -> bool:
+    return source not in SUMMARIES and source.lower().endswith(".toml")
 
 
-def _list_scenarios(made: CoreDesign) -> None:
-    bench = bench_of(made)
-    table = new_table(f"Scenarios for {made.spec.name}", ["name", "seconds", "what it is"])
-    for name in _fitting(made):
-        table.add_row(name, f"{SCENARIOS[name].default_seconds(bench):.4g}", SCENARIOS[name].description)
-    TableConsole().print(table)
-    note("a file can take a name's place: examples/scenarios/ holds some, docs/sensors.md says what can be in them")
+def _is_file(source: str) -> bool:
+    """Tell whether a trace comes from a file: by its ending, or because the file is there."""
+    return source not in SUMMARIES and (source.lower().endswith((".csv", ".toml")) or Path(source).exists())
 
 
 def _write_measurements(spec: Path, source: str | None, seed: int, output: Path | None) -> None:
     """Write what is measured by hand in a scenario file's depot, as CSV."""
-    if source is None or not is_scenario_file(source):
+    if source is None or not _is_scenario_file(source):
         raise SpecificationError(f"--measurements must come with a scenario file (TOML), not {source or 'without one'}")
-    load(spec)  # so that a slip in it is not found out later
+    from sosmith.interface.specification import Specification
+
+    Specification.load(spec)  # so that a slip in it is not found out later
+    from sosmith.model.scenarios.depot_measurements import measurements_csv, measurements_of
+    from sosmith.model.scenarios.file import load_scenario
+
     rows = measurements_of(load_scenario(Path(source)), seed)
     text = measurements_csv(rows)
     if output is None:
@@ -291,34 +310,3 @@ def _write_measurements(spec: Path, source: str | None, seed: int, output: Path 
         return
     write_files(output.parent, {output.name: text})
     note(f"wrote {output}: {len(rows)} measurements")
-
-
-def _print_summary(summary: dict[str, Any]) -> None:
-    unit = escape(f" {summary['error']['unit']}".rstrip())
-    verdict = "[bold green]passed[/]" if summary["passed"] else "[bold red]fell short[/]"
-    table = new_table(f"{summary['name']}: {verdict}", ["", ""])
-    exact = (
-        "yes, every one"
-        if summary["bit_exact"]
-        else f"no: {summary['mismatches']} differ, the first at {summary['first_mismatch']}"
-    )
-    table.add_row("hardware equals integer model", f"{exact} of {summary['samples']} samples")
-    error = summary["error"]
-    table.add_row(
-        "largest error against golden",
-        f"{error['max_abs']:.4g}{unit} = {error['max_lsb']:.3f} LSB (bound {error['bound']:.4g}{unit})",
-    )
-    if summary["sqnr_db"] is not None:
-        table.add_row("signal to quantization noise", f"{summary['sqnr_db']:.1f} dB")
-    accuracy = summary["accuracy_percent"]
-    if accuracy["hardware"] is not None:
-        measured = ", ".join(f"{chain} {percent:.4f} %" for chain, percent in accuracy.items())
-        table.add_row("accuracy by the paper's measure", measured)
-    for other in summary["alternatives"]:
-        table.add_row(f"  {other['name']} at the same widths", f"largest error {other['max_abs']:.4g}{unit}")
-    for reason in summary["shortfalls"]:
-        table.add_row("[red]short[/]", escape(reason))
-    gates = "" if summary["gates"] is None else f", the netlist for {summary['gates']}"
-    speed = f"{summary['simulator']}{gates}, {summary['cycles']} clocks at {summary['cycles_per_second']:.3g} a second"
-    table.add_row("simulated in", speed)
-    TableConsole().print(table)

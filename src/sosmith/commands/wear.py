@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
-from rich.markup import escape
 
-from sosmith.gen.instrument.wear_plot import wear_plot
-from sosmith.gen.picture import FORMATS
-from sosmith.gen.specification.specification import load
+from sosmith.gen.picture import format_of
 from sosmith.model.errors import SpecificationError
 from sosmith.model.text_files import write_contents
-from sosmith.model.wear.assessment import WearLimits, WearReport, judge
-from sosmith.model.wear.record_file import CLEARANCES, TIMES, WearRecord, moment_text, read_wear_record
-from sosmith.terminal import JSON_OPTION, TableConsole, new_table, note, print_json, show_progress
+from sosmith.model.wear.record_columns import CLEARANCES, TIMES
+from sosmith.terminal import JSON_OPTION, note, print_json, show_progress
+
+if TYPE_CHECKING:
+    from sosmith.model.wear.assessment import WearLimits, WearReport
+    from sosmith.model.wear.record_file import WearRecord
 
 _HELP = f"""Tell from TRACE.csv how far a wheel flange is worn, how fast it wears, and how long it will last.
 
@@ -69,8 +69,10 @@ def wear_command(
     as_json: bool,
 ) -> None:
     """Carry out `sosmith wear`."""
-    if plot is not None and plot.suffix.lower().removeprefix(".") not in FORMATS:
-        raise SpecificationError(f"{plot}: the plot's name must end in .svg or .png, not {plot.suffix or 'neither'}")
+    file_format = "" if plot is None else format_of(plot)
+    from sosmith.model.wear.assessment import WearLimits, judge
+    from sosmith.model.wear.record_file import read_wear_record
+
     if spec is not None:
         if any(value is not None for value in (initial, limit, warning, sensor_range)):
             raise SpecificationError("the limits must be given by --spec or one by one, not both")
@@ -88,18 +90,25 @@ def wear_command(
         report = judge(record.time, record.clearance, limits, block=block, window=window, confidence=confidence)
         drawn = None
         if plot is not None:
+            from sosmith.gen.instrument.wear_plot import wear_plot
+
             step("drawing")
-            drawn = wear_plot(record.time, record.clearance, report, plot.suffix.lower().removeprefix("."))
+            drawn = wear_plot(record.time, record.clearance, report, file_format)
     if as_json:
         print_json(_json(record, report))
     else:
-        _print(record, report, channel)
+        from sosmith.commands.tables.wear import print_wear
+
+        print_wear(record, report, channel)
     if plot is not None and drawn is not None:
         write_contents(plot.parent, {plot.name: drawn})
         note(f"wrote {plot}")
 
 
 def _limits_of(path: Path, channel: int) -> WearLimits:
+    from sosmith.gen.specification.specification import load
+    from sosmith.model.wear.assessment import WearLimits
+
     spec = load(path)
     wear = spec.wear
     if wear is None:
@@ -147,61 +156,3 @@ def _json(record: WearRecord, report: WearReport) -> dict[str, Any]:
             "critical": report.criticals,
         },
     }
-
-
-def _print(record: WearRecord, report: WearReport, channel: int) -> None:
-    rate, limits = report.rate, report.limits
-    table = new_table(f"Wear by {escape(record.path.name)}: {report.state}", ["", ""])
-    of_channel = f" of channel {channel}" if record.channels else ""
-    table.add_row("record", f"{report.samples:,} readings{of_channel} over {report.duration:.4g} days")
-    table.add_row(
-        "clearance",
-        f"{report.clearance:.4g} mm, the median of the last {_length(rate.block)} ({limits.initial:g} mm new)",
-    )
-    table.add_row("wear", f"{report.wear:.4g} mm")
-    table.add_row("remaining", f"{report.remaining:.4g} mm {_end(limits)}")
-    interval = f"{rate.low:.3g} to {rate.high:.3g} at {100 * rate.confidence:g} %"
-    table.add_row("rate", f"{rate.rate:.3g} mm a day ({interval}), {_yearly(rate.rate)} mm a year")
-    table.add_row(
-        "taken from",
-        f"{rate.blocks} blocks that scatter by {rate.scatter:.2g} mm, neighbours correlated by {rate.correlation:.2f}",
-    )
-    if (fall := report.fall) is not None:
-        table.add_row(
-            "fall",
-            f"{fall.size:.3g} mm, {fall.window:.4g} days ago, as when a wheel is turned or a sensor mounted anew: take "
-            f"the rate from there on by --window {fall.window:.6g}",
-        )
-    table.add_row("remaining life", _life(report))
-    table.add_row("state", f"{report.state}: the last reading is {report.last:.4g} mm")
-    for name, first, count in (
-        ("warning", report.first_warning, report.warnings),
-        ("critical", report.first_critical, report.criticals),
-    ):
-        if first is not None:
-            when = moment_text(first) if record.dated else f"day {first:.4g}"
-            table.add_row(f"first {name}", f"{when}; {count} of the {report.last_block} readings of the last block")
-    TableConsole().print(table)
-
-
-def _end(limits: WearLimits) -> str:
-    if limits.critical_clearance < limits.initial + limits.limit:
-        return f"to the end of the sensor's range, {limits.critical_clearance:g} mm, which comes before the limit"
-    return f"to the limit of {limits.limit:g} mm"
-
-
-def _length(block: float) -> str:
-    return "day" if block == 1 else f"{block:.3g} days"
-
-
-def _yearly(rate: float) -> str:
-    return f"{rate * 365.25:.3g}"
-
-
-def _life(report: WearReport) -> str:
-    if report.life is None:
-        least = f"; at least {report.life_low:.4g} days" if report.life_low is not None else ""
-        return f"no end in sight{least}"
-    low = "0" if report.life_low is None else f"{report.life_low:.4g}"
-    high = "no end in sight" if report.life_high is None else f"{report.life_high:.4g}"
-    return f"{report.life:.4g} days ({low} to {high}), if wear goes on so"

@@ -2,6 +2,7 @@
 
 import math
 import re
+from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
@@ -15,11 +16,13 @@ from tests.gen.word_lengths.test_quantize import errors, plain, stimulus
 from sosmith.cli import cli
 from sosmith.gen.core import design_core
 from sosmith.gen.filter.design import Filter, design
-from sosmith.gen.filter.impulse_invariance import AnalogFilter, analog_lowpass, impulse_invariant
+from sosmith.gen.filter.impulse_invariance import Aliasing, aliasing, impulse_invariant
+from sosmith.gen.filter.prototypes import prototype
 from sosmith.gen.output.core_facts import core_facts
 from sosmith.gen.output.manifest import manifest
 from sosmith.gen.realizations.registry import CASCADES
 from sosmith.gen.specification.specification import FilterSpec, load
+from sosmith.model.arithmetic.correct_rounding import evaluate
 
 CASES = [
     ("butterworth", 1, 0.05),
@@ -41,8 +44,32 @@ ALL_POLE = [case for case in CASES if case[0] in {"butterworth", "bessel"} and c
 """Without those of order 1, whose impulse response starts with a step: the sum of its aliases does not converge."""
 
 
-def analog(family: str, order: int, cutoff: float) -> AnalogFilter:
-    return analog_lowpass(family, order, cutoff, 0.5, 50.0)
+@dataclass(frozen=True)
+class Analog:
+    """``gain * prod(s - zeros) / prod(s - poles)``, s in radians per sample; scipy's."""
+
+    zeros: np.ndarray
+    poles: np.ndarray
+    gain: float
+
+
+def analog(family: str, order: int, cutoff: float) -> Analog:
+    edge = 2 * np.pi * cutoff
+    zeros, poles, gain = {
+        "butterworth": lambda: signal.butter(order, edge, analog=True, output="zpk"),
+        "chebyshev1": lambda: signal.cheby1(order, 0.5, edge, analog=True, output="zpk"),
+        "chebyshev2": lambda: signal.cheby2(order, 50, edge, analog=True, output="zpk"),
+        "elliptic": lambda: signal.ellip(order, 0.5, 50, edge, analog=True, output="zpk"),
+        "bessel": lambda: signal.bessel(order, edge, analog=True, output="zpk", norm="mag"),
+    }[family]()
+    return Analog(np.asarray(zeros), np.asarray(poles), float(gain))
+
+
+def sampled(family: str, order: int, cutoff: float) -> tuple[np.ndarray, Aliasing]:
+    """Sections and aliasing; `cutoff` as a part of the sample rate."""
+    losses, ratio = (Fraction(1, 2), Fraction(50)), Fraction(cutoff)
+    rows = evaluate(lambda: impulse_invariant(prototype(family, order, *losses), ratio))
+    return np.array(rows), evaluate(lambda: aliasing(prototype(family, order, *losses), ratio))
 
 
 def designed(family: str, order: int, cutoff: float) -> Filter:
@@ -66,8 +93,8 @@ def designed(family: str, order: int, cutoff: float) -> Filter:
 
 def sampled_response(family: str, order: int, cutoff: float, samples: int) -> np.ndarray:
     """h_a(n T) by a matrix exponential in the time of the prototype, whose cutoff is 1 rad/s."""
-    prototype = analog(family, order, 1 / (2 * math.pi))
-    a, b, c, _ = signal.zpk2ss(prototype.zeros, prototype.poles, prototype.gain)
+    model = analog(family, order, 1 / (2 * math.pi))
+    a, b, c, _ = signal.zpk2ss(model.zeros, model.poles, model.gain)
     step = linalg.expm(a * 2 * math.pi * cutoff)
     x, result = b[:, 0], []
     for _ in range(samples):
@@ -95,7 +122,7 @@ def test_agrees_with_scipy_where_scipy_is_exact() -> None:
         model = analog("butterworth", order, 0.08)
         b, a = signal.zpk2tf(model.zeros, model.poles, model.gain)
         theirs = signal.cont2discrete((b, a), 1.0, method="impulse")
-        sos, _ = impulse_invariant(model, 1.0)
+        sos, _ = sampled("butterworth", order, 0.08)
         w = np.linspace(0, np.pi, 100)
         ours = signal.sosfreqz(sos, worN=w)[1]
         assert np.abs(ours - signal.freqz(theirs[0][0], theirs[1], worN=w)[1]).max() < 1e-12
@@ -111,38 +138,38 @@ def test_the_aliasing_is_that_of_the_poisson_sum(family: str, order: int, cutoff
         s = 2j * np.pi * (frequency - terms)
         return complex(np.sum(model.gain / np.prod(s[:, np.newaxis] - model.poles, axis=1)))
 
-    sos, aliasing = impulse_invariant(model, 1.0)
+    sos, found = sampled(family, order, cutoff)
     # The tail of order 2 falls like 1/k**2: both sides of it together leave 2 / 4000 of the first alias.
     tolerance = 1e-3 * (cutoff**2 if order == 2 else 1e-5)
-    assert aliasing.dc_error == pytest.approx(abs(aliased(0.0)) - 1, abs=tolerance)
+    assert found.dc_error == pytest.approx(abs(aliased(0.0)) - 1, abs=tolerance)
     frequencies = np.linspace(0, 0.5, 200)
     response = signal.sosfreqz(sos, worN=frequencies, fs=1.0)[1]
     expected = np.array([aliased(f) for f in frequencies])
     assert np.abs(response - expected).max() < tolerance + 1e-9
     model_magnitude = np.abs([model.gain / np.prod(2j * np.pi * f - model.poles) for f in frequencies])
     deviation = np.abs(np.abs(expected) - model_magnitude).max()
-    assert deviation <= aliasing.max_deviation + tolerance + 1e-9
-    assert aliasing.max_deviation < 1.1 * deviation + tolerance + 1e-9
+    assert deviation <= found.max_deviation + tolerance + 1e-9
+    assert found.max_deviation < 1.1 * deviation + tolerance + 1e-9
 
 
 def test_first_order_in_closed_form() -> None:
     """h[n] = W exp(-W n), hence a gain of W / (1 - exp(-W)) at zero frequency."""
     w = 2 * math.pi * 0.05
-    sos, aliasing = impulse_invariant(analog("butterworth", 1, 0.05), 1.0)
+    sos, found = sampled("butterworth", 1, 0.05)
     assert sos[0] == pytest.approx([w, 0, 0, 1, -math.exp(-w), 0], rel=1e-14)
-    assert aliasing.dc_error == pytest.approx(w / (1 - math.exp(-w)) - 1, rel=1e-12)
+    assert found.dc_error == pytest.approx(w / (1 - math.exp(-w)) - 1, rel=1e-12)
 
 
 def test_zeros_of_a_narrow_low_pass_are_those_of_eulers_polynomial() -> None:
     """As the cutoff falls, order 4 tends to w (1 + 4 w + w**2): zeros -2 +- sqrt(3), whatever the poles."""
-    sos, _ = impulse_invariant(analog("butterworth", 4, 1e-5), 1.0)
+    sos, _ = sampled("butterworth", 4, 1e-5)
     zeros = sorted(root for row in sos for root in np.roots(np.trim_zeros(row[:3], "f")) if root)
     assert zeros == pytest.approx([-2 - math.sqrt(3), -2 + math.sqrt(3)], rel=1e-4)
 
 
 def test_the_aliasing_falls_with_the_cutoff() -> None:
     deviations = [designed("butterworth", 3, cutoff).aliasing for cutoff in (0.2, 0.1, 0.05)]
-    sizes = [aliasing.max_deviation for aliasing in deviations if aliasing is not None]
+    sizes = [found.max_deviation for found in deviations if found is not None]
     assert sizes == sorted(sizes, reverse=True)
     assert len(sizes) == 3
 
@@ -150,7 +177,7 @@ def test_the_aliasing_falls_with_the_cutoff() -> None:
 def test_a_filter_without_fall_off_is_refused() -> None:
     message = "zeros must be fewer than the 4 poles, not 4"
     with pytest.raises(ValueError, match=f"^{re.escape(message)}$"):
-        impulse_invariant(analog("elliptic", 4, 0.1), 1.0)
+        sampled("elliptic", 4, 0.1)
 
 
 def test_the_design_says_what_it_is() -> None:

@@ -23,7 +23,8 @@ from sosmith.gen.proof.limit_cycles import (
     lyapunov_diagonal,
     proves_decay,
 )
-from sosmith.gen.realizations.registry import CASCADES, REALIZATIONS, Row, SectionFormat
+from sosmith.gen.realizations.registry import CASCADES, REALIZATIONS, Row
+from sosmith.gen.realizations.section_format import SectionFormat, unknown_range
 from sosmith.model.dataflow.graph import Graph, GraphBuilder, value
 
 SECTION: Row = tuple(signal.butter(2, 0.1)[0]) + tuple(signal.butter(2, 0.1)[1])
@@ -40,8 +41,8 @@ def section_0() -> Row:
 
 def graph_of(realization: str, row: Row, bits: int = 24, x_frac: int = 0) -> Graph:
     """Section with every quantizer at whole LSBs."""
-    words = SectionFormat(coefficient_bits=bits, x_frac=x_frac, fracs={"v": 0} if x_frac else {})
-    return REALIZATIONS[realization].build(row, words, "section").graph
+    form = SectionFormat(coefficient_bits=bits, x=unknown_range(x_frac), fracs={"v": 0} if x_frac else {})
+    return REALIZATIONS[realization].build(row, form, "section").graph
 
 
 def run_constant(graph: Graph, code: int, samples: int) -> list[float]:

@@ -26,15 +26,16 @@ from sosmith.gen.output.manifest import manifest
 from sosmith.gen.proof.limit_cycles import limit_cycles, recursions
 from sosmith.gen.proof.linear_model import LinearModel, linear_models
 from sosmith.gen.realizations.lattice import LatticePair, LatticeSigns, Row, lattice_parts
-from sosmith.gen.realizations.registry import REALIZATIONS, SectionFormat
+from sosmith.gen.realizations.registry import REALIZATIONS
+from sosmith.gen.realizations.section_format import SectionFormat
 from sosmith.gen.specification.specification import load
 from sosmith.gen.verifier.certificate_file import Certificate, certificate_text
 from sosmith.gen.verifier.verification import RejectedError, verify
 from sosmith.gen.word_lengths.error_paths import error_paths
 from sosmith.model.dataflow.datapath import Stage
-from sosmith.model.dataflow.graph import Graph, Op
+from sosmith.model.dataflow.graph import Graph, Op, Range
 from sosmith.model.errors import ShortfallError
-from sosmith.model.sections.lattice import Adaptor, Allpass, Format, LatticeStage
+from sosmith.model.sections.lattice import Adaptor, Allpass, LatticeStage
 from sosmith.model.sections.state_space import Coefficient
 
 KINDS = ("lowpass", "highpass", "bandpass", "bandstop")
@@ -45,11 +46,11 @@ def stages_of(ideal: Filter, bits: int = 5) -> list[Stage]:
     """Stages with coefficients of few bits and every quantizer at whole numbers."""
     realization = REALIZATIONS["lattice_wdf"]
     stages: list[Stage] = []
-    beside: tuple[tuple[int, int, int], ...] = ()
+    beside: tuple[Range, ...] = ()
     for k, part in enumerate(realization.parts(ideal.rows)):
-        words = SectionFormat(coefficient_bits=bits, beside=beside)
-        stages.append(realization.build(part, words, f"section{k}"))
-        beside = ((0, words.x_low, words.x_high),)
+        form = SectionFormat(coefficient_bits=bits, beside=beside)
+        stages.append(realization.build(part, form, f"section{k}"))
+        beside = (form.x,)
     return stages
 
 
@@ -196,7 +197,7 @@ def test_gain_is_exactly_one_or_zero(kind: str, order: int, cutoff: float, bits:
     ],
 )
 def test_sections_that_cannot_be(integer: int, states: int, message: str) -> None:
-    words = Format(0, -100, 100)
+    words = Range(0, -100, 100)
     with pytest.raises(ValueError, match=f"^{message}$"):
         Allpass(adaptors=(Adaptor(0, Coefficient(integer, 3)),), states=(words,) * states, inner=words, output=words)
 
@@ -374,9 +375,9 @@ def test_a_range_too_narrow_is_rejected() -> None:
     upper, lower = first.lanes
     assert upper is not None
     frac, low, high = upper.output
-    narrow = replace(first, lanes=(replace(upper, output=Format(frac, low, high - high // 2**12)), lower))
+    narrow = replace(first, lanes=(replace(upper, output=Range(frac, low, high - high // 2**12)), lower))
     wave = narrow.graph.nodes[narrow.graph.outputs[0]]
-    last = replace(join, entries=(Format(frac, wave.low, wave.high), join.entries[1]))
+    last = replace(join, entries=(Range(frac, wave.low, wave.high), join.entries[1]))
     ends = last.graph.nodes[last.graph.outputs[0]]
     output = replace(quantized.datapath.stages[-1], x_low=ends.low, x_high=ends.high)
     lie = replace(quantized, datapath=replace(quantized.datapath, stages=(narrow, last, output)))

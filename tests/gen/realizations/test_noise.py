@@ -12,12 +12,14 @@ from functools import lru_cache
 import numpy as np
 import pytest
 from scipy import signal
-from tests.gen.proven_stages import Format, Ranges, proven_cascade, run
+from tests.gen.proven_stages import Ranges, proven_cascade, run
 
 from sosmith.gen.filter.design import decay_length
 from sosmith.gen.proof.linear_model import LinearModel, Source, linear_model
-from sosmith.gen.realizations.registry import REALIZATIONS, SectionFormat
+from sosmith.gen.realizations.registry import REALIZATIONS
+from sosmith.gen.realizations.section_format import SectionFormat
 from sosmith.model.dataflow.datapath import Stage
+from sosmith.model.dataflow.graph import Range
 from sosmith.model.port import Port
 from sosmith.model.sections.transposed_form import TransposedForm
 
@@ -80,9 +82,9 @@ def section(case: str, cutoff: float) -> Stage:
     realization, _, fine = case.partition(", ")
     fracs = {"v": 0} | dict.fromkeys(("t1", "t2"), FINE if fine else 0)
 
-    def build(x: Format, ranges: Ranges) -> Stage:
-        words = SectionFormat(x_frac=x[0], x_low=x[1], x_high=x[2], coefficient_bits=BITS, fracs=fracs, ranges=ranges)
-        return REALIZATIONS[realization].build(row_of(cutoff), words, "section")
+    def build(x: Range, ranges: Ranges) -> Stage:
+        form = SectionFormat(x=x, coefficient_bits=BITS, fracs=fracs, ranges=ranges)
+        return REALIZATIONS[realization].build(row_of(cutoff), form, "section")
 
     (stage,) = proven_cascade([build], INPUT)
     return stage

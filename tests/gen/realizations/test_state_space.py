@@ -33,10 +33,11 @@ from sosmith.gen.realizations.noise import (
     minimum_gain,
     second_order_modes,
 )
-from sosmith.gen.realizations.registry import REALIZATIONS, SectionFormat
+from sosmith.gen.realizations.registry import REALIZATIONS
+from sosmith.gen.realizations.section_format import SectionFormat
 from sosmith.gen.realizations.state_space import StateDesign, minimum_noise, normal
 from sosmith.model.dataflow.datapath import Datapath, Stage
-from sosmith.model.dataflow.graph import Graph, GraphBuilder
+from sosmith.model.dataflow.graph import Graph, GraphBuilder, Range
 from sosmith.model.errors import ShortfallError
 from sosmith.model.port import Port
 from sosmith.model.sections.state_space import Coefficient, StateSpace
@@ -177,8 +178,7 @@ def coarse(row: Row, realization: str, *, bits: int = 24) -> StateSpace:
     """Section whose states and output are whole numbers, for 20-bit inputs."""
     limits = (-(1 << 30), 1 << 30)
     words = SectionFormat(
-        x_low=-(1 << 19),
-        x_high=(1 << 19) - 1,
+        x=Range(0, -(1 << 19), (1 << 19) - 1),
         coefficient_bits=bits,
         fracs=dict.fromkeys(("x1_sum", "x2_sum", "y_sum"), 0),
         ranges=dict.fromkeys(("x1_next", "x2_next", "y"), limits),

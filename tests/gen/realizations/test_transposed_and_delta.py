@@ -9,16 +9,18 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from scipy import signal
-from tests.gen.proven_stages import Format, Ranges, datapath_of, proven_cascade
+from tests.gen.proven_stages import Ranges, datapath_of, proven_cascade
 from tests.gen.word_lengths.test_quantize import butterworth, errors, plain, stimulus
 from tests.hdl.stage_bench import run as run_hardware
 
 from sosmith.gen.proof.linear_model import linear_model
 from sosmith.gen.realizations.coefficients import Rounding
 from sosmith.gen.realizations.direct_form import direct_form
-from sosmith.gen.realizations.registry import REALIZATIONS, WIDE, SectionFormat
+from sosmith.gen.realizations.registry import REALIZATIONS
+from sosmith.gen.realizations.section_format import WIDE, SectionFormat
 from sosmith.gen.realizations.transposed import transposed_form
 from sosmith.model.dataflow.datapath import Stage
+from sosmith.model.dataflow.graph import Range
 from sosmith.model.errors import ShortfallError
 from sosmith.model.port import Port
 from sosmith.model.sections.direct_form import DirectForm1
@@ -61,10 +63,10 @@ DESIGNS = [
 ]
 
 
-Make = Callable[[Row, Design, Format, Ranges], Stage]
+Make = Callable[[Row, Design, Range, Ranges], Stage]
 
 
-def exact_delta(row: Row, design: Design, x: Format, ranges: Ranges) -> TransposedForm:
+def exact_delta(row: Row, design: Design, x: Range, ranges: Ranges) -> TransposedForm:
     """Make the section in delta form with states that keep all their bits."""
     return transposed_form(
         row,
@@ -78,7 +80,7 @@ def exact_delta(row: Row, design: Design, x: Format, ranges: Ranges) -> Transpos
     )
 
 
-def error_feedback(row: Row, design: Design, x: Format, ranges: Ranges) -> DirectForm1:
+def error_feedback(row: Row, design: Design, x: Range, ranges: Ranges) -> DirectForm1:
     """Make the section as df1_ef2 with the error feedback (-2, 1), or (-1, 0) at first order, also where Q is low."""
     section = direct_form(
         row,

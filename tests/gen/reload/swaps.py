@@ -8,7 +8,7 @@ import numpy as np
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.filter.design import Filter, design
 from sosmith.gen.reload.transient import transient
-from sosmith.gen.word_lengths.quantize import Quantized
+from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.reload.constants import with_ranges
 

@@ -10,7 +10,7 @@ from tests.gen.reload.swaps import during, moved, worst_input
 from sosmith.gen.reload import transient as module
 from sosmith.gen.reload.other_constants import with_constants
 from sosmith.gen.reload.transient import RESIDUE, transient
-from sosmith.gen.word_lengths.quantize import Quantized
+from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.graph import RangeError
 from sosmith.model.errors import ShortfallError

@@ -11,8 +11,9 @@ import pytest
 from sosmith.gen.specification.specification import example
 from sosmith.gen.spectrum.filter_table import filter_table, replace_filter
 from sosmith.gen.spectrum.prediction import Content
-from sosmith.gen.spectrum.proposal import Proposal, Wish, propose
-from sosmith.gen.spectrum.spectra import SpectrumSettings, spectrum
+from sosmith.gen.spectrum.proposal import Proposal, propose
+from sosmith.gen.spectrum.settings import SpectrumSettings, Wish
+from sosmith.gen.spectrum.spectra import spectrum
 from sosmith.model.errors import SpecificationError
 
 TABLE = '[filter]\nfamily = "butterworth"\norder = 2\n'

@@ -13,9 +13,10 @@ import pytest
 from sosmith.gen.filter.design import minimum_order
 from sosmith.gen.filter.response import magnitude_db
 from sosmith.gen.spectrum.prediction import Content, told_apart
-from sosmith.gen.spectrum.proposal import Proposal, Wish, propose
+from sosmith.gen.spectrum.proposal import Proposal, propose
 from sosmith.gen.spectrum.report import ripple
-from sosmith.gen.spectrum.spectra import Array, SpectrumSettings, spectrum
+from sosmith.gen.spectrum.settings import SpectrumSettings, Wish
+from sosmith.gen.spectrum.spectra import Array, spectrum
 from sosmith.gen.spectrum.trial import try_filter
 from sosmith.model.errors import ShortfallError, SpecificationError
 

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from sosmith.gen.spectrum.report import peaks
-from sosmith.gen.spectrum.spectra import WINDOWS, SpectrumSettings, degrees_of_freedom, slow_rms, spectrum
+from sosmith.gen.spectrum.settings import WINDOWS, SpectrumSettings
+from sosmith.gen.spectrum.spectra import degrees_of_freedom, slow_rms, spectrum
 from sosmith.model.errors import SpecificationError
 
 RATE = 50.0

@@ -27,7 +27,8 @@ from sosmith.gen.specification.specification import FilterSpec
 from sosmith.gen.verifier.certificate_file import Certificate, Operation, certificate_text, on_grid, read_certificate
 from sosmith.gen.verifier.l1_response import UndecidedError, inverse, is_stable, response
 from sosmith.gen.verifier.verification import RejectedError, verify
-from sosmith.gen.word_lengths.quantize import Quantized, quantize
+from sosmith.gen.word_lengths.quantize import quantize
+from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.dataflow.graph import Graph, Node, Op
 from sosmith.model.errors import SpecificationError

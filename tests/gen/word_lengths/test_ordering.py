@@ -15,7 +15,8 @@ from tests.gen.word_lengths.test_quantize import plain
 
 from sosmith.gen.filter.design import decay_length
 from sosmith.gen.proof.linear_model import linear_model
-from sosmith.gen.realizations.registry import REALIZATIONS, Row, SectionFormat
+from sosmith.gen.realizations.registry import REALIZATIONS, Row
+from sosmith.gen.realizations.section_format import SectionFormat
 from sosmith.gen.word_lengths.ordering import NoisySection, Norm, arrange, best_order
 
 NORMS: tuple[Norm, ...] = ("l1", "l2", "linf")
@@ -170,7 +171,7 @@ def test_numerators_beyond_their_denominator_stay_where_they_are() -> None:
 
 
 def test_too_many_sections_are_refused() -> None:
-    message = "sections must be few enough for responses of theirs, not 12"
+    message = "sections must be so few that their spectra have at most 268435456 samples, not 12"
     with pytest.raises(ValueError, match=f"^{re.escape(message)}$"):
         arrange(noisy(butterworth(24, 0.01), feedback=0), scale="l1")
 

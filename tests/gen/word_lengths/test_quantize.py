@@ -12,7 +12,9 @@ from tests.gen.designs import ALL, example_design
 from sosmith.gen.filter.design import Filter, design
 from sosmith.gen.realizations.registry import CASCADES, REALIZATIONS
 from sosmith.gen.specification.specification import FilterSpec
-from sosmith.gen.word_lengths.quantize import Quantized, quantize, with_realization
+from sosmith.gen.word_lengths.other_realization import with_realization
+from sosmith.gen.word_lengths.quantize import quantize
+from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.port import Port
 from sosmith.model.reference.golden import calibrated, filtered

@@ -8,7 +8,8 @@ import pytest
 from tests.gen.word_lengths.test_quantize import OUT, SIGNED, butterworth, plain
 
 from sosmith.gen.filter.design import Filter
-from sosmith.gen.realizations.registry import CASCADES, REALIZATIONS, Row, SectionFormat
+from sosmith.gen.realizations.registry import CASCADES, REALIZATIONS, Row
+from sosmith.gen.realizations.section_format import SectionFormat
 from sosmith.gen.word_lengths.quantize import quantize
 from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.errors import ShortfallError

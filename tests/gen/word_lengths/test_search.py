@@ -14,10 +14,12 @@ from tests.gen.word_lengths.test_quantize import OUT, SIGNED, butterworth
 from sosmith.gen.filter.design import Filter
 from sosmith.gen.proof.linear_model import Source, linear_model
 from sosmith.gen.realizations.coefficients import lowest_terms, round_significant
-from sosmith.gen.realizations.registry import CASCADES, REALIZATIONS, Section, SectionFormat
+from sosmith.gen.realizations.registry import CASCADES, REALIZATIONS, Section
+from sosmith.gen.realizations.section_format import SectionFormat
 from sosmith.gen.word_lengths import quantize as quantize_module
 from sosmith.gen.word_lengths.cost import cost_of, cost_of_graphs
-from sosmith.gen.word_lengths.quantize import Plan, Quantized, plan, prove
+from sosmith.gen.word_lengths.quantize import Plan, plan, prove
+from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.gen.word_lengths.search import Choice, Search
 from sosmith.model.sections.direct_form import DirectForm1, Product
 
@@ -97,9 +99,11 @@ def test_what_is_estimated_is_what_is_proven(name: str, realization: str) -> Non
     """Of the words that the search ends with, at the first attempt: error by its parts, and area."""
     trimmed, made = trimmed_and_proven(name, realization)
     search, choice = search_of(trimmed)
-    assert [section.coefficients for section in made.sections] == [words.coefficients for words in choice.words]
+    assert [section.coefficients for section in made.sections] == [form.coefficients for form in choice.formats]
     coefficients = search.coefficient_error(choice)
-    rounding = search.error(choice) - coefficients - float(trimmed.entries[choice.entry].error * trimmed.gain)
+    rounding = (
+        search.error(choice) - coefficients - float(trimmed.input_stages[choice.input_stage].error * trimmed.gain)
+    )
     assert coefficients == pytest.approx(float(made.budget["filter coefficients"]), rel=1e-3)
     # Of few bits dropped, the largest error is less than a unit; the estimate takes a unit.
     assert 0.999 < rounding / float(made.budget["filter rounding"]) < 1.08
@@ -112,13 +116,13 @@ def test_the_start_keeps_each_part_to_its_share(name: str, realization: str) -> 
     planned = example_plan(name, realization)
     search, choice = search_of(planned)
     share = float(planned.share)
-    entry = float(planned.entries[0].error * planned.gain)
+    entry = float(planned.input_stages[0].error * planned.gain)
     coefficients = search.coefficient_error(choice)
-    assert choice.entry == 0
+    assert choice.input_stage == 0
     assert max(entry, coefficients, search.error(choice) - coefficients - entry) <= share * (1 + 1e-9)
     exact = [{name: float(value) for name, value in section.items()} for section in ideal_coefficients(planned)]
     assert any(
-        [words.coefficients for words in choice.words]
+        [form.coefficients for form in choice.formats]
         == [{name: round_significant(value, bits) for name, value in section.items()} for section in exact]
         for bits in range(1, 41)
     )
@@ -147,16 +151,19 @@ def shorter(planned: Plan) -> Iterator[tuple[str, Choice]]:
     """Every choice with one bit less in one quantizer, or in one coefficient whichever its neighbour."""
     _, choice = search_of(planned)
     exact = ideal_coefficients(planned)
-    for k, words in enumerate(choice.words):
-        changed = [(name, words.with_frac(name, frac - 1)) for name, frac in words.fracs.items() if frac]
-        for name, (integer, frac) in words.coefficients.items():
+    for k, form in enumerate(choice.formats):
+        changed = [(name, form.with_frac(name, frac - 1)) for name, frac in form.fracs.items() if frac]
+        for name, (integer, frac) in form.coefficients.items():
             if abs(integer).bit_length() > 2:
                 below = (exact[k][name] * Fraction(2) ** (frac - 1)).__floor__()
-                changed += [(name, words.with_coefficient(name, lowest_terms(i, frac - 1))) for i in (below, below + 1)]
+                changed += [(name, form.with_coefficient(name, lowest_terms(i, frac - 1))) for i in (below, below + 1)]
         for name, other in changed:
-            yield f"{name} of section {k}", replace(choice, words=(*choice.words[:k], other, *choice.words[k + 1 :]))
-    if choice.entry + 1 < len(planned.entries):
-        yield "entry", replace(choice, entry=choice.entry + 1)
+            yield (
+                f"{name} of section {k}",
+                replace(choice, formats=(*choice.formats[:k], other, *choice.formats[k + 1 :])),
+            )
+    if choice.input_stage + 1 < len(planned.input_stages):
+        yield "input stage", replace(choice, input_stage=choice.input_stage + 1)
 
 
 @pytest.mark.parametrize("realization", CASCADES)
@@ -329,12 +336,12 @@ def test_an_estimate_that_is_too_low_is_made_up_for(
 
 
 def too_short(choice: Choice) -> Choice:
-    return replace(choice, words=tuple(replace(w, fracs=dict.fromkeys(w.fracs, 0)) for w in choice.words))
+    return replace(choice, formats=tuple(replace(w, fracs=dict.fromkeys(w.fracs, 0)) for w in choice.formats))
 
 
 def unstable(choice: Choice) -> Choice:
     return replace(
-        choice, words=tuple(replace(w, coefficients=dict.fromkeys(w.coefficients, (8, 0))) for w in choice.words)
+        choice, formats=tuple(replace(w, coefficients=dict.fromkeys(w.coefficients, (8, 0))) for w in choice.formats)
     )
 
 

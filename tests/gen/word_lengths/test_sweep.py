@@ -8,7 +8,6 @@ lattice can be made of is refused in that realization; it gets further designs o
 import re
 from collections.abc import Iterator
 from fractions import Fraction
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +17,8 @@ from sosmith.gen.filter.design import decay_length, design, impulse_response
 from sosmith.gen.realizations.registry import CASCADES, REALIZATIONS
 from sosmith.gen.specification.specification import FilterSpec
 from sosmith.gen.word_lengths.error_paths import error_responses
-from sosmith.gen.word_lengths.quantize import Quantized, quantize
+from sosmith.gen.word_lengths.quantize import quantize
+from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.model.errors import ShortfallError
 from sosmith.model.port import Port
 from sosmith.model.reference.golden import calibrated, filtered
@@ -120,17 +120,20 @@ LATTICES = [
 """Designs for the realization that takes only some of the others."""
 
 ALL = [
-    pytest.param(number, realization, marks=[] if number % 8 == 4 else [pytest.mark.slow])
+    pytest.param(
+        (number, realization), id=f"{number}-{realization}", marks=[] if number % 8 == 4 else [pytest.mark.slow]
+    )
     for number in range(len(DESIGNS))
     for realization in REALIZATIONS
     if realization in CASCADES or is_lattice(DESIGNS[number])
 ] + [
-    pytest.param(number, "lattice_wdf", marks=[] if number % 8 == 4 else [pytest.mark.slow])
+    pytest.param(
+        (number, "lattice_wdf"), id=f"{number}-lattice_wdf", marks=[] if number % 8 == 4 else [pytest.mark.slow]
+    )
     for number in range(len(DESIGNS), len(DESIGNS) + len(LATTICES))
 ]
 
 
-@lru_cache(maxsize=8)
 def quantized_design(number: int, realization: str) -> Quantized:
     wanted = [*DESIGNS, *LATTICES][number]
     ideal = design(
@@ -160,6 +163,13 @@ def quantized_design(number: int, realization: str) -> Quantized:
     )
 
 
+@pytest.fixture(scope="module")
+def numbered(request: pytest.FixtureRequest) -> tuple[int, Quantized]:
+    """Make a design of the sweep and give its number; its tests follow each other, so that none is made twice."""
+    number, realization = request.param
+    return number, quantized_design(number, realization)
+
+
 def stimuli(quantized: Quantized, seed: int) -> Iterator[np.ndarray]:
     (port,) = quantized.datapath.inputs
     rng = np.random.default_rng(seed)
@@ -171,9 +181,9 @@ def stimuli(quantized: Quantized, seed: int) -> Iterator[np.ndarray]:
     yield np.repeat(heights, min(settle, 200_000))
 
 
-@pytest.mark.parametrize(("number", "realization"), ALL)
-def test_no_input_exceeds_the_certificate(number: int, realization: str) -> None:
-    quantized = quantized_design(number, realization)
+@pytest.mark.parametrize("numbered", ALL, indirect=True)
+def test_no_input_exceeds_the_certificate(numbered: tuple[int, Quantized]) -> None:
+    number, quantized = numbered
     datapath = quantized.datapath
     lsb = float(datapath.output.lsb)
     assert quantized.bound * datapath.output.lsb <= datapath.output.lsb
@@ -205,10 +215,10 @@ def test_there_are_enough_lattices() -> None:
     assert sum(map(is_lattice, [*DESIGNS, *LATTICES])) >= 40
 
 
-@pytest.mark.parametrize(("number", "realization"), ALL)
-def test_no_value_leaves_its_proven_range(number: int, realization: str) -> None:
+@pytest.mark.parametrize("numbered", ALL, indirect=True)
+def test_no_value_leaves_its_proven_range(numbered: tuple[int, Quantized]) -> None:
     """The exact interpreter checks every node on the worst case of the whole filter, its end and then noise."""
-    quantized = quantized_design(number, realization)
+    number, quantized = numbered
     (port,) = quantized.datapath.inputs
     response = impulse_response(quantized.quantized_sos)
     strongest = int(np.searchsorted(np.cumsum(np.abs(response)), 0.999 * np.abs(response).sum()))

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sosmith.model.arrays import Values
 from sosmith.model.calibration.fit import Measurements, candidate_orders, fit, read_measurements
 from sosmith.model.calibration.polynomial import EQUATION_5A, Polynomial
 from sosmith.model.errors import SpecificationError
-from sosmith.model.port import Values
 
 HEADER = "clearance_mm,voltage_V,temperature_C\n"
 
@@ -181,11 +181,11 @@ def test_read_measurements(tmp_path: Path) -> None:
         (HEADER + "1,2,20\n-0.5,2,20\n", ", line 3: clearance_mm must be 0 or more, not -0.5"),
         (
             HEADER + "1,2,20\n2,3,20\n\n1.0,2,2e1\n",
-            ", line 5: row must be a measurement of its own, not a duplicate of line 2",
+            ", line 5: row must be a new measurement, not a duplicate of line 2",
         ),
         (
             "clearance_mm,voltage_V\n1,2\n",
-            ", line 1: column temperature_C must be there, not missing among clearance_mm, voltage_V",
+            ", line 1: column temperature_C must be present, not missing from clearance_mm, voltage_V",
         ),
         (
             "clearance,voltage_V,temperature_C\n1,2,3\n",

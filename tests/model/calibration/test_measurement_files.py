@@ -56,8 +56,8 @@ def test_dates_of_their_own(path: Path) -> None:
     file = read(path, [(*HEADER, "date"), (*GOOD, day), (6, 6, 21, "31.12.2023"), (7, 7, 21, None)])
     assert [one.date for one in file.readings] == ["2023-12-31"]
     assert [(one.line, one.reason) for one in file.refusals] == [
-        (3, "date must be a day as in 2024-03-01, not '31.12.2023'"),
-        (4, "date must be a day as in 2024-03-01, not ''"),
+        (3, "date must be a date such as 2024-03-01, not '31.12.2023'"),
+        (4, "date must be a date such as 2024-03-01, not ''"),
     ]
 
 
@@ -79,7 +79,7 @@ BAD = {
         (5, -1, 1000),
         "voltage_V must be 0 to 10 V, not -1; temperature_C must be 0 to 128 C, not 1000",
     ),
-    "duplicate": ((5.0, 5.5, "20.5"), "row must be a measurement of its own, not a duplicate of line 2"),
+    "duplicate": ((5.0, 5.5, "20.5"), "row must be a new measurement, not a duplicate of line 2"),
     "too long": ((5, 5.5, 20, 1), "row must have 3 cells, not 4"),
 }
 
@@ -143,15 +143,15 @@ HEADERS = {
     ),
     "semicolons": (
         ("clearance_mm;voltage_V;temperature_C",),
-        ", line 1: cells must be separated by commas, with points in decimal numbers, not by semicolons",
+        ", line 1: cells must be separated by commas, with decimal points, not by semicolons",
     ),
     "missing": (
         ("clearance_mm", "voltage_V"),
-        ", line 1: column temperature_C must be there, not missing among clearance_mm, voltage_V",
+        ", line 1: column temperature_C must be present, not missing from clearance_mm, voltage_V",
     ),
     "twice": (
         ("clearance_mm", "voltage_V", "voltage_V"),
-        ", line 1: column voltage_V must be there once, not 2 times",
+        ", line 1: column voltage_V must appear once, not 2 times",
     ),
 }
 
@@ -163,7 +163,7 @@ def test_headers_that_say_something_else(header: Sequence[str], message: str, pa
 
 def test_nothing_to_read(path: Path) -> None:
     refused(path, " must be a readable CSV or XLSX file (no such file or directory)")
-    refused(write(path, [HEADER]), " must hold rows of numbers below its header, not the header only")
+    refused(write(path, [HEADER]), " must hold rows of numbers below its header, not only the header")
     refused(write(path, []), ", line 1: header must be clearance_mm,voltage_V,temperature_C, not empty")
 
 
@@ -210,6 +210,6 @@ def test_minus_zero_is_zero_and_hashes_tell_sensors_and_days_apart(tmp_path: Pat
 @pytest.mark.parametrize("text", ["", "2024-3-1", "20240301", "2024-02-30", "today"])
 def test_days_are_written_one_way(text: str) -> None:
     with pytest.raises(
-        SpecificationError, match=f"^{re.escape(f'date must be a day as in 2024-03-01, not {text!r}')}$"
+        SpecificationError, match=f"^{re.escape(f'date must be a date such as 2024-03-01, not {text!r}')}$"
     ):
         parse_date(text)

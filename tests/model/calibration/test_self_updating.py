@@ -87,7 +87,7 @@ def test_bad_rows_keep_the_file_out_unless_the_user_says_so(store: MeasurementSt
 def test_what_is_there_already_is_refused(store: MeasurementStore, tmp_path: Path) -> None:
     path = batch(tmp_path, "a.csv")
     add(store, "left", path, DAY)
-    message = f"{path} must be a file of new measurements, not what was added as {path}"
+    message = f"{path} must hold new measurements, not those already added as {path}"
     with pytest.raises(SpecificationError, match=f"^{re.escape(message)}$"):
         add(store, "left", path, "2024-03-02")
     header, first, *_ = path.read_text().splitlines()
@@ -95,7 +95,7 @@ def test_what_is_there_already_is_refused(store: MeasurementStore, tmp_path: Pat
     other.write_text(f"{header}\n{first}\n1,1.5,30\n")
     addition = add(store, "left", other, "2024-03-02")
     assert not addition.kept
-    reason = f"row must be a measurement of its own, not a duplicate of measurement 1 ({path}, line 2, {DAY})"
+    reason = f"row must be a new measurement, not a duplicate of measurement 1 ({path}, line 2, {DAY})"
     assert [(one.line, one.reason) for one in addition.file.refusals] == [(2, reason)]
 
 
@@ -110,7 +110,7 @@ def test_columns_swapped_within_their_ranges_are_found_by_the_version_before(
     (reason,) = {one.reason for one in addition.file.refusals}
     assert re.fullmatch(
         r"clearance_mm and voltage_V must be in their own columns, not swapped: "
-        r"the file is 0\.[3-9]\d* mm rms off version 1, and swapped 0\.0\d+ mm",
+        r"the rms residual against version 1 is 0\.[3-9]\d* mm, with the columns swapped 0\.0\d+ mm",
         reason,
     )
 
@@ -196,11 +196,11 @@ def test_a_changed_measurement_and_a_changed_version_are_noticed(store: Measurem
     add(store, "left", batch(tmp_path, "a.csv"), DAY)
     tamper(store.path, "UPDATE version SET coefficients = replace(coefficients, '0x1.', '0x1.0')")
     with pytest.raises(
-        ShortfallError, match=r"^version 1 of sensor left must come out the same, not another polynomial$"
+        ShortfallError, match=r"^version 1 of sensor left must be reproducible, not give another polynomial$"
     ):
         calibration_of(store, "left")
     tamper(store.path, "UPDATE measurement SET voltage_V = voltage_V + 0.001 WHERE id = 7")
-    message = f"{store.path}: measurement 7 must be as it was added, not changed (its hash differs)"
+    message = f"{store.path}: measurement 7 must match its stored hash, not differ from it"
     with pytest.raises(SpecificationError, match=f"^{re.escape(message)}$"):
         store.measurements("left")
 
@@ -254,7 +254,7 @@ def opening(path: Path, message: str, kind: type[Exception] = SpecificationError
 
 def test_files_that_are_no_store(tmp_path: Path) -> None:
     path = tmp_path / "c.db"
-    opening(path, " must be a store of measurements; sosmith calibrate add makes one")
+    opening(path, " must be an existing store of measurements; sosmith calibrate add creates one")
     opening(
         tmp_path, ": the store must be readable and writable, not: unable to open database file", ToolError, create=True
     )

@@ -1,7 +1,9 @@
 """A datapath's program computes what its graphs compute, in the words and the accumulator that it states."""
 
+import doctest
 from dataclasses import replace
 from fractions import Fraction
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ from hypothesis import strategies as st
 from tests.formal.small import limiter
 from tests.gen.designs import ALL, example_design
 
+from sosmith.model.dataflow import folding, word_reuse
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.folding import FoldingError, program
 from sosmith.model.dataflow.program import HAZARD, Instruction, Opcode, Program, digits_of
@@ -180,3 +183,10 @@ def test_a_state_keeps_its_digits() -> None:
 def test_the_accumulator_holds_a_word_however_small_the_sums() -> None:
     made = program(limiter(), 15)
     assert made.accumulator_bits == 16
+
+
+@pytest.mark.parametrize("module", [folding, word_reuse])
+def test_the_worked_examples_are_true(module: ModuleType) -> None:
+    results = doctest.testmod(module)
+    assert results.attempted > 0
+    assert results.failed == 0

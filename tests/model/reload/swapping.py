@@ -1,22 +1,22 @@
-"""The exact reference for a reloadable core: datapaths that take over from each other between two samples."""
+"""The exact reference of a reloadable core: datapaths that take over from one another between two samples."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
+from sosmith.model.arrays import Codes
 from sosmith.model.dataflow.datapath import Datapath
-from sosmith.model.port import Codes
 
 
 def compute_swapping(first: Datapath, swaps: Sequence[tuple[int, Datapath]], codes: Codes) -> list[int]:
-    """Compute one channel in exact integers, from reset, with each datapath's state handed on to the next.
+    """Compute one channel in exact integers, from reset; each datapath starts from the states of the one before.
 
     Parameters
     ----------
     first : Datapath
-        What the core begins with.
+        The datapath that the core starts with.
     swaps : sequence of (int, Datapath)
-        The first sample, counted from 0, that each other one computes; ascending. Of several at the same sample, the
+        The other datapaths, and the first sample of each, counted from 0; ascending. Of several at the same sample, the
         last one counts.
     codes : integer array, shape (samples, inputs)
         Input codes.
@@ -29,7 +29,7 @@ def compute_swapping(first: Datapath, swaps: Sequence[tuple[int, Datapath]], cod
     Raises
     ------
     ValueError
-        If a datapath's states are not those of the one before, in name or fraction bits.
+        If the states of a datapath differ from those of the one before in name or fraction bits.
     RangeError
         If a value inside leaves the range that its node states.
     """

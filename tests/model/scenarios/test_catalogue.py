@@ -11,13 +11,15 @@ import numpy as np
 import pytest
 from scipy import signal
 
+from sosmith.model.arrays import Values
 from sosmith.model.calibration.polynomial import EQUATION_5A, Polynomial
 from sosmith.model.errors import SpecificationError
-from sosmith.model.port import Port, Values
+from sosmith.model.port import Port
 from sosmith.model.reference.accuracy import accuracy_percent
 from sosmith.model.scenarios.catalogue import SCENARIOS, emulate
 from sosmith.model.scenarios.instrument_signals import TABLE_1_STEPS, TABLE_2_STEPS
 from sosmith.model.scenarios.run import MAX_SAMPLES, MIN_SAMPLES, Bench
+from sosmith.model.scenarios.summaries import SUMMARIES
 from sosmith.model.sensors.inductive_sensor import VOLTAGE_NOISE
 from sosmith.model.traces.trace import Trace
 
@@ -52,7 +54,7 @@ FILTER = Bench(
     impulse_response=butterworth(5, 1000, 48000),
 )
 BENCHES = {"instrument": INSTRUMENT, "locomotive": LOCOMOTIVE, "calibration": CALIBRATION, "filter": FILTER}
-EVERY = [(name, bench) for name, bench in product(SCENARIOS, BENCHES) if BENCHES[bench].kind in SCENARIOS[name].kinds]
+EVERY = [(name, bench) for name, bench in product(SCENARIOS, BENCHES) if BENCHES[bench].kind in SUMMARIES[name].kinds]
 
 
 def clearance(trace: Trace) -> Values:

@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 from tests.model.scenarios.scenario_texts import FAULT, PLAIN
 
+from sosmith.model.arrays import Values
 from sosmith.model.calibration.polynomial import EQUATION_5A
 from sosmith.model.errors import SpecificationError
-from sosmith.model.port import Port, Values
+from sosmith.model.port import Port
 from sosmith.model.scenarios.file import ScenarioFile, emulate_file, load_scenario, range_notes
 from sosmith.model.scenarios.instrument_signals import TABLE_1_STEPS, TABLE_2_STEPS
 from sosmith.model.scenarios.run import Bench
@@ -210,8 +211,8 @@ def test_motion_from_a_file(tmp_path: Path) -> None:
     expected = np.interp(trace.time, [0, 30, 60], [0, 1, -1])
     np.testing.assert_allclose(shown(trace) - truth, expected, atol=0.07)
     for content, message in (
-        ("0,0\n30,1\n", ": time_s must reach from 0 to the 59.99 s of excerpt[0], not from 0 to 30"),
-        ("0,0\n90,1\n60,1\n", ", line 4: time_s must be above 90 s, the row before, not 60 s"),
+        ("0,0\n30,1\n", ": time_s must extend from 0 to the 59.99 s of excerpt[0], not from 0 to 30"),
+        ("0,0\n90,1\n60,1\n", ", line 4: time_s must be above the 90 s of the previous row, not 60 s"),
     ):
         ride.write_text(f"time_s,clearance_mm\n{content}", encoding="utf-8")
         with pytest.raises(SpecificationError, match=f"^{re.escape(f'{ride}{message}')}$"):
@@ -269,7 +270,7 @@ def test_refusals_while_a_trace_is_made(tmp_path: Path) -> None:
             PLAIN.replace("seconds = 60", "seconds = 0.5"),
             BENCH,
             1,
-            "some excerpt must be longer without a fault than the filter takes to settle, ",
+            "one excerpt or more must last longer without a fault than the filter takes to settle, ",
         ),
         (
             PLAIN.replace("seconds = 60", "seconds = 0.001"),
@@ -288,7 +289,7 @@ def test_refusals_while_a_trace_is_made(tmp_path: Path) -> None:
     long = PLAIN.replace("seconds = 60", "seconds = 60000")
     with pytest.raises(
         SpecificationError,
-        match=r"day.toml: all excerpts must take at most 100000 s, 10000000 samples, not 120000$",
+        match=r"day.toml: all excerpts together must last at most 100000 s, 10000000 samples, not 120000$",
     ):
         made(tmp_path, long + "\n[[excerpt]]\n" + long.partition("[[excerpt]]\n")[2])
 
@@ -296,12 +297,15 @@ def test_refusals_while_a_trace_is_made(tmp_path: Path) -> None:
 def test_a_note_on_what_the_temperature_input_cannot_show(tmp_path: Path) -> None:
     hot = scenario(tmp_path, PLAIN.replace("temperature = 20.0", "temperature = 20.0\ntemperature_to = 200.0"))
     assert range_notes(hot, BENCH.ports) == (
-        f"{tmp_path}/day.toml: excerpt[0] reaches 200 degC, but the temperature input of the core ends at 128 degC: "
-        "there its code stands still, and the clearance is calibrated for the wrong temperature; widen the range in"
-        " [input.temperature]",
+        f"{tmp_path}/day.toml: excerpt[0] reaches 200 degC, but the range of the core's temperature input ends at "
+        "128 degC: its code saturates there, and the clearance is calibrated for the wrong temperature; widen the "
+        "range in [input.temperature]",
     )
     cold = scenario(tmp_path, PLAIN.replace("temperature = 20.0", "temperature = -10.0"))
-    assert "reaches -10 degC, but the temperature input of the core ends at 0 degC" in range_notes(cold, BENCH.ports)[0]
+    assert (
+        "reaches -10 degC, but the range of the core's temperature input ends at 0 degC"
+        in range_notes(cold, BENCH.ports)[0]
+    )
     assert range_notes(hot, BENCH.ports[:1]) == ()
     trace = emulate_file(hot, BENCH, seed=1)
     assert trace.codes[-1, 1] == 65535

@@ -76,19 +76,19 @@ def changed(old: str, new: str, text: str = PLAIN) -> str:
         ),
         (
             changed("temperature = 20.0", "temperature = 20.0\ntime_constant = 5.0"),
-            "excerpt[0].time_constant must be there only beside temperature_to, not 5.0",
+            "excerpt[0].time_constant must be given only together with temperature_to, not 5.0",
         ),
         (
             changed("temperature = 20.0", "temperature = 20.0\nvibration = 0.1"),
-            "excerpt[0].vibration must be missing where operation is depot, not 0.1",
+            "excerpt[0].vibration must be left out where operation is depot, not 0.1",
         ),
         (
             changed('"depot"', '"curve"\nclearances = [1, 2]'),
-            "excerpt[0].clearances must be missing where operation is curve, not [1.0, 2.0]",
+            "excerpt[0].clearances must be left out where operation is curve, not [1.0, 2.0]",
         ),
         (
             changed('"depot"', '"curve"\nmotion = [[1, 2]]\nmotion_from = "vehicle"'),
-            "excerpt[0].motion_from must be missing where motion is given, not 'vehicle'",
+            "excerpt[0].motion_from must be left out where motion is given, not 'vehicle'",
         ),
         (
             changed('"depot"', '"curve"\nmotion = [[1, 2], [0, 1]]'),
@@ -104,29 +104,29 @@ def changed(old: str, new: str, text: str = PLAIN) -> str:
         ),
         (
             changed("rate = 0.1", "rate_per_1000_km = 0.1"),
-            "wear.km_per_day must be given beside rate_per_1000_km, and only there, not missing",
+            "wear.km_per_day must be given if and only if rate_per_1000_km is given, not missing",
         ),
         (
             changed("rate = 0.1", "history = [[1, 1], [1, 2]]"),
-            "wear.history must be a list whose days rise, not [1.0, 1.0]",
+            "wear.history must be a list of pairs with rising days, not [1.0, 1.0]",
         ),
         (
             changed("[wear]\ninitial_clearance = 2.0\nrate = 0.1", ""),
-            "excerpt[0].clearances must be there where there is no [wear], not missing",
+            "excerpt[0].clearances must be given where there is no [wear], not missing",
         ),
         (
             changed("[[excerpt]]", "[[channel]]\ninitial_clearance = 1.0\nrate = 0\n[[excerpt]]"),
-            "channel must be missing where [wear] is given, not a list of 1 values",
+            "channel must be left out where [wear] is given, not a list of 1 values",
         ),
         (
             changed("[sensors", "start = 9999-01-01\n[sensors"),
-            "start must be a date until 9900-01-24, so that the last day is one too, not 9999-01-01",
+            "start must be a date up to 9900-01-24, so that every day has a date, not 9999-01-01",
         ),
         (PLAIN.partition("[[excerpt]]")[0], "excerpt must be at least one table [[excerpt]], not missing"),
         (changed('"a test"', '""'), "description must be a text of 1 to 200 characters, not ''"),
         (
             changed("[sensors", 'start = "2024-03-01"\n[sensors'),
-            "start must be a date as 2024-03-01, that of day 0, not '2024-03-01'",
+            "start must be a date such as 2024-03-01, that of day 0, not '2024-03-01'",
         ),
         (
             PLAIN + FAULT.replace('"stuck"', '"open"'),
@@ -134,15 +134,15 @@ def changed(old: str, new: str, text: str = PLAIN) -> str:
         ),
         (
             PLAIN + FAULT.replace('"stuck"', '"missing"'),
-            'excerpt[0].fault[0].share must be given if kind is "missing", and only then, not missing',
+            'excerpt[0].fault[0].share must be given if and only if kind is "missing", not missing',
         ),
         (
             PLAIN + FAULT + "share = 0.5\n",
-            'excerpt[0].fault[0].share must be given if kind is "missing", and only then, not 0.5',
+            'excerpt[0].fault[0].share must be given if and only if kind is "missing", not 0.5',
         ),
         (
             PLAIN + FAULT.replace('"stuck"', '"missing"\nshare = 0.5\ncode = 3'),
-            "excerpt[0].fault[0].code must be there only where kind is stuck, not 3",
+            'excerpt[0].fault[0].code must be given only if kind is "stuck", not 3',
         ),
         (
             PLAIN + CALIBRATION.replace("scatter = 0.3", "scatter = 0.0"),

@@ -7,7 +7,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from sosmith.model.port import Codes, Port
+from sosmith.model.arrays import Codes
+from sosmith.model.port import Port
 from sosmith.model.random_streams import streams
 from sosmith.model.sensors.digitizer import CodeFault, Digitizer, with_faults
 

@@ -64,21 +64,21 @@ def test_columns_can_be_chosen(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("header", "row", "rows", "message"),
     [
-        ("a_mm", lambda k: "1", 100, ", line 1: column time_s must be there, not missing among a_mm"),
-        ("time_s", str, 100, " must have a column of values beside time_s, not only time_s"),
+        ("a_mm", lambda k: "1", 100, ", line 1: column time_s must be present, not missing from a_mm"),
+        ("time_s", str, 100, " must have a column of values besides time_s, not only time_s"),
         ("time_s,a_mm", lambda k: f"{k},1", 63, " must hold at least 64 rows, not 63"),
         ("time_s,a_mm", lambda k: f"{k},nan", 100, ", line 2: a_mm must be a finite number, not 'nan'"),
         (
             "time_s,a_mm",
             lambda k: f"{k + (k > 70)},1",
             100,
-            ", line 73: time_s must be 1 s after the row before, as most rows are, not 2 s",
+            ", line 73: time_s must be 1 s after the previous row, like most rows, not 2 s",
         ),
         (
             "time_s,a_mm",
             lambda k: f"{k - 2 * (k == 70)},1",
             100,
-            ", line 72: time_s must be above 69 s, the row before, not 68 s",
+            ", line 72: time_s must be above the 69 s of the previous row, not 68 s",
         ),
         (
             "time_s,speed",
@@ -91,7 +91,7 @@ def test_columns_can_be_chosen(tmp_path: Path) -> None:
             "time_s,channel,a_mm",
             lambda k: f"{k},{k % 2 / 2},1",
             100,
-            ", line 3: channel must be an integer from 0 on, not 0.5",
+            ", line 3: channel must be an integer of 0 or more, not 0.5",
         ),
         (
             "time_s,channel,a_mm",
@@ -118,7 +118,7 @@ def test_refusals(tmp_path: Path, header: str, row: Callable[[int], str], rows: 
     ("header", "message"),
     [
         ("time_s,channel,a_mm", " must have rows of channel 4, not only of 0, 3"),
-        ("time_s,b_mm,a_mm", " must have the column channel, not only time_s, b_mm, a_mm, for others than 0"),
+        ("time_s,b_mm,a_mm", " must have the column channel for channels above 0, not only time_s, b_mm, a_mm"),
     ],
 )
 def test_channels_asked_for_must_be_there(tmp_path: Path, header: str, message: str) -> None:

@@ -116,10 +116,10 @@ ALL = "time_s, channel, clearance_mm, reading, voltage_V, temperature_C, voltage
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        ("", " must hold a header line and rows of numbers, not nothing"),
-        ("voltage_V,temperature_C\n", " must hold rows of numbers below its header, not the header only"),
+        ("", " must hold a header line and rows of numbers, not be empty"),
+        ("voltage_V,temperature_C\n", " must hold rows of numbers below its header, not only the header"),
         ("voltage_V,temp\n1,2\n", f", line 1: column must be one of {ALL}, not 'temp'"),
-        ("voltage_V,voltage_V\n1,2\n", ", line 1: column voltage_V must be there once, not 2 times"),
+        ("voltage_V,voltage_V\n1,2\n", ", line 1: column voltage_V must appear once, not 2 times"),
         ("voltage_V\n1\n", " must have the column temperature_code or temperature_C, not only voltage_V"),
         ("voltage_V,temperature_C\n1,20\n2\n", ", line 3: row must have 2 cells, not 1"),
         ("voltage_V,temperature_C\n1,hot\n", ", line 2: temperature_C must be a finite number, not 'hot'"),
@@ -136,11 +136,11 @@ ALL = "time_s, channel, clearance_mm, reading, voltage_V, temperature_C, voltage
         ),
         (
             "time_s,voltage_V,temperature_C\n0,1,20\n0.01,1,20\n0.01,1,20\n",
-            ", line 4: time_s must be above 0.01, the row before, not 0.01",
+            ", line 4: time_s must be above 0.01, the value in the previous row, not 0.01",
         ),
         (
             "time_s,voltage_V,temperature_C\n0,1,20\n0.0102,1,20\n",
-            ", line 3: time_s must be 0.01 s after the row before, not 0.0102 s",
+            ", line 3: time_s must be 0.01 s after the previous row, not 0.0102 s",
         ),
         ("voltage_V,temperature_C,reading\n1,20,2\n", ", line 2: reading must be 0 or 1, not 2"),
     ],
@@ -203,24 +203,28 @@ def test_a_file_without_channels_is_one_trace_whatever_the_core_has(tmp_path: Pa
         (2, "0,0\n-1,0", ", line 3: channel must be an integer from 0 to 1, not -1"),
         (2, "0,0\n0.5,0", ", line 3: channel must be an integer from 0 to 1, not 0.5"),
         (2, "0,0\nleft,0", ", line 3: channel must be a finite number, not 'left'"),
-        (1, "0,0\n1,0", ", line 3: channel must be 0, the core's only one, not 1"),
+        (1, "0,0\n1,0", ", line 3: channel must be 0, the core's only channel, not 1"),
         (3, "0,0\n2,0", " must have rows of channel 1, not only of 0, 2"),
         (
             2,
             "0,0\n1,0\n1,0.01\n0,0.01\n1,0.02",
-            ", line 6: channel 1 must end with its row 2, as channel 0 does, not go on",
+            ", line 6: channel 1 must end after row 2, like channel 0, not continue",
         ),
         (
             3,
             "2,0\n0,0\n0,0.01\n1,0\n1,0.01",
-            ", line 4: channel 0 must end with its row 1, as channel 2 does, not go on",
+            ", line 4: channel 0 must end after row 1, like channel 2, not continue",
         ),
         (
             2,
             "0,0\n1,5\n0,0.01\n1,5.02",
-            ", line 5: time_s must be 0.01 s after the row of this channel before, not 0.02 s",
+            ", line 5: time_s must be 0.01 s after the previous row of this channel, not 0.02 s",
         ),
-        (2, "0,0\n1,0\n1,0.01\n0,0", ", line 5: time_s must be above 0.0, the row of this channel before, not 0.0"),
+        (
+            2,
+            "0,0\n1,0\n1,0.01\n0,0",
+            ", line 5: time_s must be above 0.0, the value in the previous row of this channel, not 0.0",
+        ),
     ],
 )
 def test_refusals_of_channels(tmp_path: Path, channels: int, rows: str, message: str) -> None:

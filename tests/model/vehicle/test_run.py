@@ -331,8 +331,8 @@ def test_columns_have_names_with_units(motion: Motion) -> None:
         ({"seed": -1}, "the seed must be 0 or more, not -1"),
         (
             {"speed": 1.0, "sample_rate": 10_000.0},
-            "the run must have at most 5,000,000 samples inside, not 6,100,000: "
-            "a shorter track, more speed or a lower sample rate",
+            "the run must take at most 5,000,000 internal samples, not 6,100,000: "
+            "shorten the track, raise the speed or lower the sample rate",
         ),
     ],
 )

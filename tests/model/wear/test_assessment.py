@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from sosmith.gen.specification.wear_limits import WearSpec
+from sosmith.model.arrays import Values
 from sosmith.model.errors import SpecificationError
-from sosmith.model.port import Port, Values
+from sosmith.model.port import Port
 from sosmith.model.wear.assessment import WearLimits, WearState, block_medians, judge, last_fall, rate_of
 
 LIMITS = WearLimits(initial=1.5, limit=9, warning=7)
@@ -209,9 +210,9 @@ def test_limits_that_make_no_sense(given: dict[str, Any], message: str) -> None:
     ("time", "given", "message"),
     [
         ([], {}, "the record must have a time for each clearance, not 0 for 0"),
-        ([1.0] * 9, {}, "the record must last longer than one moment for a rate of wear, not 0 days"),
-        ([2.0, 1.0], {}, "the record must be in order of time, not go back"),
-        ([0.0, float("inf")], {}, "the record must hold finite times and clearances, not others"),
+        ([1.0] * 9, {}, "the record must span more than 0 days for a rate of wear, not 0 days"),
+        ([2.0, 1.0], {}, "the record must be in chronological order, not go back in time"),
+        ([0.0, float("inf")], {}, "the record must hold finite times and clearances, not NaN or infinity"),
         ([0.0, 4.0, 9.0], {}, "the record must have readings in at least 8 blocks of 1 days, not in 3"),
         ([0.0, 9.0], {"block": 0.0}, "block must be a time above 0 days, not 0 days"),
         (

@@ -2,25 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 
 from rich.console import Console
 from rich.markup import escape
 
+from sosmith.commands.tables.console import TableConsole, new_table
 from sosmith.gen.architecture import Architecture
-from sosmith.gen.core import CoreDesign
-from sosmith.gen.output.core_facts import LimitCycleFacts, core_facts
+from sosmith.gen.output.core_facts import LimitCycleFacts
 from sosmith.gen.specification.wear_limits import WearSpec
 from sosmith.gen.word_lengths.cost import cost_of
+from sosmith.interface.design import Design
+from sosmith.interface.quantity import Quantity
 from sosmith.model.dataflow.program import Program
 from sosmith.model.port import Port
-from sosmith.terminal import TableConsole, new_table
 
 
-def print_design(made: CoreDesign, *, brief: bool = False) -> None:
+def print_design(design: Design, *, brief: bool = False) -> None:
     """Print what follows from a specification; `brief` leaves out sections, limit cycles and schedule."""
-    console = TableConsole()
+    console, made = TableConsole(), design.core
     quantized, datapath = made.quantized, made.datapath
     unit = escape(f" {datapath.output.unit}") if datapath.output.unit else ""
     lsb = float(datapath.output.lsb)
@@ -50,18 +51,17 @@ def print_design(made: CoreDesign, *, brief: bool = False) -> None:
     if made.spec.channels > 1:
         overview.add_row("channels", f"{made.spec.channels:,}, each at {float(made.spec.sample_rate):,.6g} Hz")
     console.print(overview)
-    print_budget(console, quantized.budget, datapath.output.lsb, datapath.output.unit, made.spec.max_error)
+    print_budget(console, design.budget, datapath.output.lsb, design.specification.max_error)
     if brief:
         return
     sections = new_table("Sections", ["section", "coefficients", "input", "states", "output"])
-    facts = core_facts(made)
-    for section in facts.sections:
+    for section in design.facts.sections:
         coefficients = "\n".join(f"{c.name} = {c.integer} * 2^-{c.frac}" for c in section.coefficients)
         states = "\n".join(f"{name} {form}" for name, form in section.states.items())
         sections.add_row(section.name, coefficients, section.input, states, section.output)
-    if facts.sections:
+    if design.facts.sections:
         console.print(sections)
-        _print_limit_cycles(console, facts.limit_cycles, lsb)
+        _print_limit_cycles(console, design.facts.limit_cycles, lsb)
     _print_schedule(console, made.architecture.program)
 
 
@@ -121,13 +121,11 @@ def _print_limit_cycles(console: Console, cycles: Sequence[LimitCycleFacts], lsb
     console.print(table)
 
 
-def print_budget(console: Console, parts: dict[str, Fraction], lsb: Fraction, unit: str, max_error: Fraction) -> None:
-    """Print the parts of an error bound, in output LSBs, and what is allowed."""
-    budget = new_table(
-        "Error budget, proven for all inputs in range", ["part", escape(unit) or "full scale 1", "output LSB"]
+def print_budget(console: Console, budget: Mapping[str, Quantity], lsb: Fraction, max_error: Quantity) -> None:
+    """Print the parts of an error bound, in the output's unit and in its steps, and what is allowed."""
+    table = new_table(
+        "Error budget, proven for all inputs in range", ["part", escape(max_error.unit) or "full scale 1", "output LSB"]
     )
-    bound = sum(parts.values(), Fraction(0))
-    for part, value in [*parts.items(), ("[bold]sum[/]", bound)]:
-        budget.add_row(part, f"{float(value * lsb):.3g}", f"{float(value):.4f}")
-    budget.add_row("allowed", f"{float(max_error):.3g}", f"{float(max_error / lsb):.4f}")
-    console.print(budget)
+    for part, value in [*budget.items(), ("[bold]sum[/]", sum(budget.values())), ("allowed", max_error)]:
+        table.add_row(part, f"{float(value):.3g}", f"{float(value) / float(lsb):.4f}")
+    console.print(table)

@@ -1,0 +1,63 @@
+"""Number formats of a section: its coefficients, its quantizers, and the ranges of its signals."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+from sosmith.gen.realizations.coefficients import Rounding
+from sosmith.model.dataflow.graph import Range
+
+WIDE = 1 << 256
+"""Limit of a code whose range is not known yet; it never meets hardware."""
+
+
+def unknown_range(frac: int) -> Range:
+    """Return the range of a signal of which only the fraction bits are known."""
+    return Range(frac, -WIDE, WIDE)
+
+
+_UNKNOWN = unknown_range(0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SectionFormat:
+    """All number formats of a section.
+
+    Attributes
+    ----------
+    x : Range
+        Fraction bits and range of the input's code.
+    beside : tuple of Range
+        The same of each further input.
+    coefficient_bits : int
+        Significant bits of each coefficient that is not in `coefficients`; 0 where all are.
+    coefficients : mapping of str to tuple of int
+        Integer and fraction bits of coefficients, by name.
+    fracs : mapping of str to int
+        Fraction bits kept by each quantizer, by the name of the node that it quantizes. Empty, they keep as many as
+        the input has; otherwise those that are missing keep all.
+    ranges : mapping of str to tuple of int
+        Range of the code of every node whose range is stated, by its name; `WIDE` where missing.
+    """
+
+    x: Range = _UNKNOWN
+    beside: tuple[Range, ...] = ()
+    coefficient_bits: int = 0
+    coefficients: Mapping[str, tuple[int, int]] = field(default_factory=dict)
+    fracs: Mapping[str, int] = field(default_factory=dict)
+    ranges: Mapping[str, tuple[int, int]] = field(default_factory=dict)
+
+    @property
+    def rounding(self) -> Rounding:
+        """How coefficients become integers."""
+        longest = max((abs(integer).bit_length() for integer, _ in self.coefficients.values()), default=0)
+        return Rounding(self.coefficient_bits or longest, self.coefficients)
+
+    def with_frac(self, name: str, frac: int) -> SectionFormat:
+        """Return the same with other fraction bits of one quantizer."""
+        return replace(self, fracs={**self.fracs, name: frac})
+
+    def with_coefficient(self, name: str, value: tuple[int, int]) -> SectionFormat:
+        """Return the same with another value of one coefficient."""
+        return replace(self, coefficients={**self.coefficients, name: value})

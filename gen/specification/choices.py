@@ -1,0 +1,16 @@
+"""The names that a specification chooses from: families, kinds, methods, realizations, architectures, cores, inputs."""
+
+FAMILIES = ("butterworth", "chebyshev1", "chebyshev2", "elliptic", "bessel")
+KINDS = ("lowpass", "highpass", "bandpass", "bandstop")
+METHODS = ("bilinear", "impulse_invariant")
+REALIZATIONS = ("auto", "df1", "df1_ef1", "df1_ef2", "df2t", "delta", "state_space", "normal", "lattice_wdf")
+ARCHITECTURES = ("auto", "parallel", "folded", "serial")
+
+CORES = ("instrument", "filter", "calibration")
+"""What can be generated from a specification: all of it, or one part."""
+
+ERROR_FEEDBACK = ("df1", "df1_ef1", "df1_ef2")
+"""Realizations that differ only in the error feedback, and so can be compared at the same word lengths."""
+
+CALIBRATION_INPUTS = ("voltage", "temperature")
+"""Inputs of the calibration polynomial, in the order of its indices."""

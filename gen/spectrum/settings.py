@@ -1,0 +1,111 @@
+"""What spectra and a proposal are asked for: window and segments, the error allowed, the pass edge."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from sosmith.model.errors import SpecificationError
+
+WINDOWS = ("hann", "hamming", "blackman", "blackmanharris", "flattop", "boxcar")
+DETRENDS = ("linear", "constant", "none")
+
+TOLERANCE = 0.1
+"""Error allowed at the output, mm, unless said otherwise; assumed: about 1 % of the 9 mm of wear in the paper's
+section 6."""
+
+COVERAGE = 2.0
+"""Times the rms error that the tolerance has to cover: 95 % of the errors of a normal distribution (JCGM 100:2008,
+section 6.3.3)."""
+
+PASSBAND_LOSS = 0.1
+"""Loss up to the pass edge, dB, where the wanted signal would bear more: the paper's choice in section 4.1."""
+
+PARTS = 4
+"""Parts of the error."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpectrumSettings:
+    """How spectra are estimated.
+
+    Attributes
+    ----------
+    window : str
+        One of `WINDOWS`. Hann's, at an overlap of one half, loses little of the data, and its side lobes fall fast.
+    segment : float or None
+        Length of a segment, s; None takes an eighth of the signal.
+    overlap : float
+        Share of a segment that the next one overlaps, 0 to 0.95.
+    detrend : str
+        One of `DETRENDS`: what is taken away from each segment first. A straight line passes a low-pass filter with
+        unity gain at zero frequency unchanged but for the delay, so it is no part of what a mask has to heed.
+    confidence : float
+        Probability of the confidence interval, between 0 and 1.
+
+    Raises
+    ------
+    SpecificationError
+        If a value is none of these.
+    """
+
+    window: str = "hann"
+    segment: float | None = None
+    overlap: float = 0.5
+    detrend: str = "linear"
+    confidence: float = 0.95
+
+    def __post_init__(self) -> None:
+        if self.window not in WINDOWS:
+            raise SpecificationError(f"window must be one of {', '.join(WINDOWS)}, not {self.window!r}")
+        if self.detrend not in DETRENDS:
+            raise SpecificationError(f"detrend must be one of {', '.join(DETRENDS)}, not {self.detrend!r}")
+        if self.segment is not None and not 0 < self.segment < math.inf:
+            raise SpecificationError(f"segment must be a positive number of seconds, not {self.segment:g}")
+        if not 0 <= self.overlap <= 0.95:
+            raise SpecificationError(f"overlap must be 0 to 0.95 of a segment, not {self.overlap:g}")
+        if not 0 < self.confidence < 1:
+            raise SpecificationError(f"confidence must be between 0 and 1, not {self.confidence:g}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wish:
+    """What is asked of the filter.
+
+    Attributes
+    ----------
+    tolerance : float
+        Error allowed at the output, in the unit of the signals, positive; beside it stand the offset, which no filter
+        removes, and the delay.
+    coverage : float
+        How many times the rms error has to lie within the tolerance, positive.
+    passband : float or None
+        Pass edge, Hz; None takes it from the true signals' spectra.
+    passband_loss : float or None
+        Loss up to the pass edge, dB; None takes it from the wanted signals' amplitude.
+
+    Raises
+    ------
+    SpecificationError
+        If a value is none of these.
+    """
+
+    tolerance: float = TOLERANCE
+    coverage: float = COVERAGE
+    passband: float | None = None
+    passband_loss: float | None = None
+
+    def __post_init__(self) -> None:
+        for name, value, unit in (
+            ("tolerance", self.tolerance, ""),
+            ("coverage", self.coverage, ""),
+            ("passband", self.passband, " of Hz"),
+            ("passband-loss", self.passband_loss, " of dB"),
+        ):
+            if value is not None and not 0 < value < math.inf:
+                raise SpecificationError(f"{name} must be a positive number{unit}, not {value:g}")
+
+    @property
+    def share(self) -> float:
+        """Rms error that each of the four parts may have."""
+        return self.tolerance / (self.coverage * math.sqrt(PARTS))

@@ -1,0 +1,31 @@
+"""A design in another realization at the same word lengths, to compare structures."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from sosmith.gen.word_lengths.cascade import cascade, chosen_formats
+from sosmith.gen.word_lengths.output_stage import output_stage
+from sosmith.gen.word_lengths.quantized import Quantized, filter_budget
+
+
+def with_realization(quantized: Quantized, realization: str) -> Quantized:
+    """Return the design in another of the realizations of `ERROR_FEEDBACK`, with the same word lengths.
+
+    The bound is proven anew and may exceed what the specification allows.
+    """
+    ideal = quantized.filter
+    assert ideal is not None
+    stages = quantized.datapath.stages
+    first = next(index for index, stage in enumerate(stages) if stage in quantized.sections)
+    (x,) = quantized.sections[0].graph.input_ranges
+    sections, proof = cascade(ideal, realization, chosen_formats(quantized.sections), x)
+    (y,) = sections[-1].graph.output_ranges
+    last, error = output_stage(y, quantized.datapath.output)
+    return replace(
+        quantized,
+        datapath=replace(quantized.datapath, stages=(*stages[:first], *sections, last)),
+        realization=realization,
+        budget=quantized.budget | filter_budget(proof) | {"output rounding": error},
+        proof=proof,
+    )

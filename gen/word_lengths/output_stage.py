@@ -1,0 +1,30 @@
+"""Makes the last stage of a datapath, and bounds its error."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+from sosmith.model.dataflow.graph import Range
+from sosmith.model.port import Port
+from sosmith.model.sections.output import OutputStage
+
+
+def output_stage(x: Range, output: Port) -> tuple[OutputStage, Fraction]:
+    """Make the last stage for a result in `x`, and bound its error in output LSBs.
+
+    The error is half an LSB where anything is rounded, and what the offset itself is rounded by.
+    """
+    frac = max(x.frac, 0)
+    exact = -output.zero / output.lsb * 2**frac
+    offset = round(exact)
+    rounding = Fraction(1, 2) if x.frac > 0 else Fraction(0)
+    stage = OutputStage(
+        offset=offset,
+        offset_frac=frac,
+        x_frac=x.frac,
+        x_low=x.low,
+        x_high=x.high,
+        low=output.lowest,
+        high=output.highest,
+    )
+    return stage, rounding + abs(exact - offset) / 2**frac

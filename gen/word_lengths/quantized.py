@@ -1,0 +1,111 @@
+"""A frozen datapath with the proven bound on its error."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from typing import cast
+
+import numpy as np
+import numpy.typing as npt
+
+from sosmith.gen.filter.design import Filter
+from sosmith.gen.proof.cascade_proof import CascadeProof
+from sosmith.gen.proof.linear_model import linear_models
+from sosmith.gen.realizations.effective import effective_sections
+from sosmith.gen.realizations.registry import Section
+from sosmith.gen.word_lengths.input_stage import InputStage
+from sosmith.gen.word_lengths.output_stage import output_stage
+from sosmith.model.calibration.polynomial import Polynomial
+from sosmith.model.dataflow.datapath import Datapath
+from sosmith.model.port import Port
+from sosmith.model.sections.horner import HornerStep
+from sosmith.model.sections.output import OutputStage
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Quantized:
+    """A datapath and the proven bound on its error.
+
+    Attributes
+    ----------
+    datapath : Datapath
+        What is computed, bit for bit.
+    filter : Filter or None
+        The ideal filter; None for a calibration core.
+    polynomial : Polynomial or None
+        The ideal polynomial; None for a filter core.
+    realization : str
+        Name of the sections' realization.
+    budget : dict of str to Fraction
+        Parts of the error bound in output LSBs, each proven.
+    input_error : Fraction
+        Bound on the error of the input stage, at the filter's input, in output LSBs; exact.
+    proof : CascadeProof or None
+        The proof of the sections; None without a filter.
+    """
+
+    datapath: Datapath
+    filter: Filter | None
+    polynomial: Polynomial | None
+    realization: str
+    budget: dict[str, Fraction]
+    input_error: Fraction
+    proof: CascadeProof | None
+
+    @property
+    def bound(self) -> Fraction:
+        """Proven bound on ``|output - exact|`` in output LSBs, the exact value limited to the output's range."""
+        return sum(self.budget.values(), Fraction(0))
+
+    @property
+    def sections(self) -> tuple[Section, ...]:
+        """The filter's sections, in the order of the cascade."""
+        return tuple(cast("Section", s) for s in self.datapath.stages if not isinstance(s, HornerStep | OutputStage))
+
+    @cached_property
+    def quantized_sos(self) -> Array:
+        """The transfer functions that the integer coefficients make, shape (sections, 6)."""
+        return effective_sections([linear_models(section.graph) for section in self.sections])
+
+
+def assembled(
+    *,
+    name: str,
+    inputs: tuple[Port, ...],
+    output: Port,
+    ideal: Filter | None,
+    polynomial: Polynomial | None,
+    realization: str,
+    gain: Fraction,
+    input_stage: InputStage,
+    sections: Sequence[Section],
+    proof: CascadeProof | None,
+) -> Quantized:
+    """Put stages together to a datapath and add up its error budget; `gain` is that of the filter, 1 without one."""
+    budget: dict[str, Fraction] = {}
+    if input_stage.stages:
+        budget["calibration" if polynomial is not None else "input scaling"] = input_stage.error * gain
+    if proof is not None:
+        budget |= filter_budget(proof)
+    stages = (*input_stage.stages, *sections)
+    last, error = output_stage(stages[-1].graph.output_ranges[0] if stages else input_stage.output, output)
+    budget["output rounding"] = error
+    return Quantized(
+        datapath=Datapath(name=name, inputs=inputs, output=output, stages=(*stages, last)),
+        filter=ideal,
+        polynomial=polynomial,
+        realization=realization,
+        budget=budget,
+        input_error=input_stage.error,
+        proof=proof,
+    )
+
+
+def filter_budget(proof: CascadeProof) -> dict[str, Fraction]:
+    """Return the parts of the budget that the sections take."""
+    return {"filter coefficients": proof.coefficients.magnitude, "filter rounding": proof.rounding.magnitude}

@@ -1,0 +1,81 @@
+"""The tables of a run of the vehicle: modes, largest motions, the paper beside ours."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from rich.table import Table
+
+from sosmith.commands.tables.console import TableConsole, new_table
+from sosmith.gen.instrument.vehicle_report import VehicleRun, largest
+from sosmith.gen.paper.comparison import Comparison
+from sosmith.model.vehicle.linear_motion import Mode
+
+SWINGING = 0.999
+"""Damping ratio from which on a mode is not listed by itself: its motion is gone before it comes back."""
+
+
+def print_run(made: VehicleRun, tables: Mapping[int, tuple[Comparison, ...]]) -> None:
+    """Print modes, largest motions and, where the run allows it, the comparison with the paper."""
+    console = TableConsole()
+    for name, modes in (("Lateral", made.lateral_modes), ("Vertical", made.vertical_modes)):
+        console.print(_modes_table(f"{name} modes at {made.speed:g} m/s", modes))
+    console.print(_wheelsets_table(made))
+    console.print(_bodies_table(made))
+    if tables:
+        console.print(_comparison_table(tables))
+
+
+def _modes_table(title: str, modes: tuple[Mode, ...]) -> Table:
+    table = new_table(title, ["Hz", "damping ratio", "growth, 1/s", "most in"])
+    for mode in modes:
+        if mode.damping < SWINGING:
+            table.add_row(f"{mode.frequency:.3f}", f"{mode.damping:.3f}", f"{mode.growth:.3f}", mode.coordinate)
+    still = [mode.growth for mode in modes if mode.damping >= SWINGING]
+    if still:
+        table.add_row("-", "1", f"{min(still):.1f} to {max(still):.1f}", "others, which do not swing")
+    return table
+
+
+def _wheelsets_table(made: VehicleRun) -> Table:
+    """Largest motions of the wheelsets, and how far they are beyond the model."""
+    most, found = largest(made.motion), made.limits
+    table = new_table("Largest motion of the wheelsets", ["", *map(str, range(1, 7))])
+    rows = {
+        "lateral, mm": "wheelset{}_lateral_mm",
+        "vertical, mm": "wheelset{}_vertical_mm",
+        "yaw, mrad": "wheelset{}_yaw_mrad",
+        "yaw in the frame, mrad": "wheelset{}_yaw_to_frame_mrad",
+        "change of clearance, mm": "clearance{}_mm",
+    }
+    for name, column in rows.items():
+        table.add_row(name, *(f"{most[column.format(k)]:.3f}" for k in range(1, 7)))
+    table.add_row("beyond the flange, mm", *(f"{1e3 * way:+.3f}" for way in found.beyond_flange))
+    table.add_row("  of the time, %", *(f"{100 * share:.1f}" for share in found.beyond_flange_share))
+    table.add_row("creep force / friction", *(f"{used:.3f}" for used in found.friction_used))
+    table.add_row("  above 1 of the time, %", *(f"{100 * share:.1f}" for share in found.friction_exceeded_share))
+    return table
+
+
+def _bodies_table(made: VehicleRun) -> Table:
+    """Largest motions of frames and body."""
+    most = largest(made.motion)
+    parts = ("frame1", "frame2", "body")
+    table = new_table("Largest motion of frames and body", ["", "frame 1", "frame 2", "body"])
+    for motion in ("lateral", "vertical", "yaw", "roll", "pitch"):
+        unit = "mm" if motion in ("lateral", "vertical") else "mrad"
+        table.add_row(f"{motion}, {unit}", *(f"{most[f'{part}_{motion}_{unit}']:.3f}" for part in parts))
+    return table
+
+
+def _comparison_table(tables: Mapping[int, tuple[Comparison, ...]]) -> Table:
+    """Figures of the paper and ours, and below them the reasons."""
+    reasons = list(dict.fromkeys(one.explanation for rows in tables.values() for one in rows))
+    table = new_table("Beside the paper's tables 5 to 8", ["table", "", "unit", "paper", "ours", "label", "why"])
+    for number, rows in tables.items():
+        for one in rows:
+            why = str(reasons.index(one.explanation) + 1)
+            table.add_row(str(number), one.quantity, one.unit, one.shown_printed, one.shown, one.label, why)
+    table.caption = "\n".join(f"{number}: {reason}" for number, reason in enumerate(reasons, start=1))
+    table.caption_justify = "left"
+    return table

@@ -1,0 +1,116 @@
+"""The certificate of a design, and its proof."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from os import PathLike, fspath
+from pathlib import Path
+
+from sosmith.gen.verifier.certificate_file import Certificate as Entries
+from sosmith.gen.verifier.certificate_file import certificate_text, read_certificate
+from sosmith.gen.verifier.verification import verify
+from sosmith.interface.quantity import Quantity
+from sosmith.model.text_files import write_files
+
+Progress = Callable[[str, int, int], None]
+"""Called with the name of a step, how much of it is done, and how much there is; 0 and 0 where that is not known."""
+
+
+@dataclass(frozen=True)
+class Proof:
+    """What has been proven of a certificate.
+
+    Attributes
+    ----------
+    bound : Quantity
+        Bound on the difference between hardware and exact result, for all inputs in range.
+    budget : dict of str to Quantity
+        Its parts; they add up to `bound`.
+    nodes : int
+        Number of operations whose range was checked.
+    ranges : int
+        How many of these ranges needed a worst-case peak gain.
+    """
+
+    bound: Quantity
+    budget: dict[str, Quantity]
+    nodes: int
+    ranges: int
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """Every operation of a core, the exact filter that it stands for, and the error bound claimed.
+
+    Examples
+    --------
+    >>> import sosmith
+    >>> sos = [[0.25, 0.5, 0.25, 1.0, -0.5, 0.25]]
+    >>> spec = sosmith.Specification.from_sos(sos, 1000, input_bits=8, realization="df1", architecture="parallel")
+    >>> certificate = sosmith.design(spec).certificate
+    >>> proof = certificate.verify()
+    >>> proof.bound == certificate.bound <= spec.max_error
+    True
+    """
+
+    entries: Entries = field(repr=False)
+    """The certificate's content, as its file holds it."""
+
+    @classmethod
+    def load(cls, path: str | PathLike[str]) -> Certificate:
+        """Read a certificate's file, such as ``<name>.certificate.json``.
+
+        Raises
+        ------
+        SpecificationError
+            If it cannot be read, or is no certificate.
+        """
+        return cls(read_certificate(Path(fspath(path))))
+
+    @property
+    def name(self) -> str:
+        """Name of the core."""
+        return self.entries.name
+
+    @property
+    def bound(self) -> Quantity:
+        """The error bound that is claimed, in the unit of the output."""
+        output = self.entries.output
+        return Quantity(float(self.entries.claims.bound * output.lsb), output.unit)
+
+    def verify(self, progress: Progress = lambda step, done, total: None) -> Proof:
+        """Prove the certificate from its content alone, by another method than the one it was made with.
+
+        Raises
+        ------
+        ShortfallError
+            If anything claimed is not exactly what follows.
+        """
+        verdict = verify(self.entries, progress)
+        lsb, unit = self.entries.output.lsb, self.entries.output.unit
+        return Proof(
+            bound=Quantity(float(verdict.bound * lsb), unit),
+            budget={part: Quantity(float(value * lsb), unit) for part, value in verdict.budget.items()},
+            nodes=verdict.nodes,
+            ranges=verdict.ranges,
+        )
+
+    def text(self) -> str:
+        """Return the content of its file, JSON, the same on every run."""
+        return certificate_text(self.entries)
+
+    def save(self, path: str | PathLike[str]) -> Path:
+        """Write its file, and return the path.
+
+        Raises
+        ------
+        SpecificationError
+            If the file cannot be written.
+        """
+        target = Path(fspath(path))
+        (written,) = write_files(target.parent, {target.name: self.text()})
+        return written
+
+    def __repr__(self) -> str:
+        return f"<sosmith.Certificate {self.name}: error at most {self.bound}>"

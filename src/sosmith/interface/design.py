@@ -1,0 +1,448 @@
+"""From a specification to a proven design, and what can be done with it: compute, generate, prove, simulate."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from os import PathLike, fspath
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from sosmith.gen.core import CoreDesign, design_core
+from sosmith.gen.filter.response import complex_response
+from sosmith.gen.fpga.boards import find_board
+from sosmith.gen.output.certificate import certificate
+from sosmith.gen.output.core_facts import CoreFacts, core_facts
+from sosmith.gen.output.generate import generate
+from sosmith.gen.output.manifest import manifest
+from sosmith.gen.word_lengths.cost import Cost
+from sosmith.interface.certificate import Certificate, Progress, Proof
+from sosmith.interface.inputs import codes_of, encoded, traces_of
+from sosmith.interface.notebook import table_html
+from sosmith.interface.quantity import Quantity
+from sosmith.interface.specification import Specification, specification_of
+from sosmith.model.errors import SpecificationError
+from sosmith.model.reference.golden import calibrated, filtered
+
+if TYPE_CHECKING:
+    from sosmith.interface.report import Report
+
+Floats = npt.NDArray[np.float64]
+Codes = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Coefficient:
+    """A coefficient of the hardware.
+
+    Attributes
+    ----------
+    integer : int
+        What the hardware multiplies by.
+    fraction_bits : int
+        Bits of it behind the binary point: its value is ``integer / 2**fraction_bits``.
+    """
+
+    integer: int
+    fraction_bits: int
+
+    @property
+    def value(self) -> float:
+        """The number that it stands for."""
+        return self.integer / 2.0**self.fraction_bits
+
+
+@dataclass(frozen=True)
+class Section:
+    """A section of the filter, as the hardware has it.
+
+    Attributes
+    ----------
+    name : str
+        Such as "section0".
+    coefficients : dict of str to Coefficient
+        The integers that it multiplies by.
+    b, a : tuple of float
+        Numerator and denominator of its transfer function, ``a[0] == 1``.
+    formats : dict of str to str
+        Q format of "input", "output" and every state.
+    """
+
+    name: str
+    coefficients: dict[str, Coefficient]
+    b: tuple[float, ...]
+    a: tuple[float, ...]
+    formats: dict[str, str]
+
+
+@dataclass(frozen=True)
+class Design:
+    """A core whose word lengths are chosen and whose error is proven; `design` makes it.
+
+    Values are in physical units: inputs by the names and units of `Specification.inputs`, results in the unit of the
+    output. Arrays hold one sample a row, shape (samples,) for one channel and (samples, channels) for several.
+
+    Examples
+    --------
+    >>> import numpy as np, sosmith
+    >>> design = sosmith.design({
+    ...     "name": "smooth",
+    ...     "sample_rate": 1000,
+    ...     "input": {"x": {"bits": 12, "range": [-1.0, 1.0], "signed": True}},
+    ...     "filter": {"family": "butterworth", "kind": "lowpass", "order": 2, "cutoff": 100.0},
+    ...     "output": {"bits": 12, "range": [-1.0, 1.0], "signed": True},
+    ...     "hardware": {"realization": "df1_ef1"},
+    ... })
+    >>> x = np.sin(2 * np.pi * 50 * np.arange(200) / 1000)
+    >>> y, exact = design.run(x=x), design.run_exact(x=x)
+    >>> bool(abs(y - exact).max() <= design.bound)
+    True
+    >>> list(design.budget)
+    ['filter coefficients', 'filter rounding', 'output rounding']
+    >>> abs(design.frequency_response([0.0, 100.0])).round(3).tolist()
+    [1.0, 0.707]
+    >>> design.sos.shape, list(design.sections[0].coefficients)
+    ((1, 6), ['A1', 'A2'])
+    """
+
+    core: CoreDesign = field(repr=False)
+    """The same as the rooms below take it: datapath, proof, architecture."""
+
+    @property
+    def specification(self) -> Specification:
+        """What was asked for."""
+        return Specification(self.core.spec)
+
+    @property
+    def name(self) -> str:
+        """Name of the top module and of the files."""
+        return self.core.datapath.name
+
+    @property
+    def kind(self) -> str:
+        """What was designed: "instrument", "filter" or "calibration"."""
+        return self.core.core
+
+    @property
+    def realization(self) -> str | None:
+        """Structure of the filter's sections; None without a filter."""
+        return self.core.quantized.realization if self.core.quantized.sections else None
+
+    @property
+    def architecture(self) -> str:
+        """How the hardware is organized: "parallel", "folded" or "serial"."""
+        return self.core.architecture.name
+
+    @property
+    def reasons(self) -> dict[str, str]:
+        """Why this realization and this architecture, a sentence each."""
+        return dict(self.core.reasons)
+
+    @property
+    def latency_cycles(self) -> int:
+        """Clocks from an input sample to its result."""
+        return self.core.architecture.latency_cycles
+
+    @property
+    def cycles_per_sample(self) -> int:
+        """Clocks that a sample takes before the next one can enter."""
+        return self.core.architecture.cycles_per_sample
+
+    @cached_property
+    def sos(self) -> Floats:
+        """Ideal second-order sections, shape (sections, 6) as scipy wants them; no rows without a filter."""
+        ideal = self.core.quantized.filter
+        return np.zeros((0, 6)) if ideal is None else ideal.sos
+
+    @cached_property
+    def quantized_sos(self) -> Floats:
+        """The sections that the integer coefficients make, shape (sections, 6); no rows without a filter."""
+        return self.core.quantized.quantized_sos if self.core.quantized.sections else np.zeros((0, 6))
+
+    @property
+    def bound(self) -> Quantity:
+        """Proven bound on ``|hardware - exact|`` for all inputs in range, the exact result limited to the output's."""
+        return self._in_units(self.core.quantized.bound)
+
+    @property
+    def budget(self) -> dict[str, Quantity]:
+        """Parts of `bound`, which add up to it."""
+        return {part: self._in_units(value) for part, value in self.core.quantized.budget.items()}
+
+    @cached_property
+    def sections(self) -> tuple[Section, ...]:
+        """The filter's sections, in the order of the cascade."""
+        return tuple(
+            Section(
+                name=section.name,
+                coefficients={c.name: Coefficient(c.integer, c.frac) for c in section.coefficients},
+                b=section.b,
+                a=section.a,
+                formats={"input": section.input, **section.states, "output": section.output},
+            )
+            for section in self.facts.sections
+        )
+
+    @property
+    def cost(self) -> Cost:
+        """Counts before synthesis, those of the parallel architecture: `multipliers`, `adder_bits`, `luts`, ..."""
+        return self.facts.cost
+
+    @cached_property
+    def manifest(self) -> dict[str, Any]:
+        """What a program around the core has to know: the content of ``<name>.json``."""
+        return manifest(self.facts)
+
+    @cached_property
+    def certificate(self) -> Certificate:
+        """What is claimed of the design, to be proven again."""
+        return Certificate(certificate(self.core.quantized, self.core.spec.max_error))
+
+    def verify(self, progress: Progress = lambda step, done, total: None) -> Proof:
+        """Prove the certificate, as `Certificate.verify` does."""
+        return self.certificate.verify(progress)
+
+    def frequency_response(self, f: npt.ArrayLike, *, ideal: bool = False) -> npt.NDArray[np.complex128]:
+        """Return the complex gain of the filter at the frequencies `f` in Hz, an array of the same shape.
+
+        By default it is the gain with the integer coefficients, with `ideal` the one without any rounding.
+
+        Raises
+        ------
+        SpecificationError
+            If the design has no filter.
+        """
+        if not self.core.quantized.sections:
+            raise SpecificationError("the design must have a filter for a frequency response, not only a calibration")
+        frequencies = np.asarray(f, dtype=np.float64)
+        return complex_response(self.sos if ideal else self.quantized_sos, frequencies, self.specification.sample_rate)
+
+    def run(self, **inputs: npt.ArrayLike) -> Floats:
+        """Compute, bit for bit, what the hardware puts out for `inputs`, from reset on.
+
+        Parameters
+        ----------
+        **inputs : array_like, shape (samples,) or (samples, channels)
+            A physical value of each input for every sample, by the names of the inputs. They are rounded to codes and
+            limited to the range of the input, as by a converter. Shapes are broadcast: a number stands for a constant.
+
+        Returns
+        -------
+        ndarray of float, shape (samples,) or (samples, channels)
+            The result, in the unit of the output.
+
+        Raises
+        ------
+        SpecificationError
+            If an input is missing, unknown or not finite, or the shapes do not fit.
+        """
+        return self.core.datapath.output.decode(self._computed(encoded(self.core, inputs)))
+
+    def run_codes(self, **inputs: npt.ArrayLike) -> Codes:
+        """Compute as `run` does, from integer codes to integer codes, without any conversion.
+
+        Raises
+        ------
+        SpecificationError
+            As `run`, and if a code is no integer or outside the range of its input.
+        """
+        return self._computed(codes_of(self.core, inputs))
+
+    def run_exact(self, **inputs: npt.ArrayLike) -> Floats:
+        """Compute what `run` stands for: the same input codes through the exact chain, in double precision.
+
+        Parameters, result and errors are those of `run`.
+        """
+        codes = encoded(self.core, inputs)
+        quantized, datapath = self.core.quantized, self.core.datapath
+        sos = None if quantized.filter is None else quantized.filter.sos
+        block = codes.reshape(len(codes), -1, codes.shape[-1])
+        columns = [
+            filtered(calibrated(block[:, k], datapath.inputs, quantized.polynomial), sos, datapath.output)
+            for k in range(block.shape[1])
+        ]
+        return np.stack(columns, axis=1).reshape(codes.shape[:-1])
+
+    def generate(self, folder: str | PathLike[str], progress: Progress = lambda step, done, total: None) -> list[Path]:
+        """Write SystemVerilog, RTLIL, manifest, certificate and C model into `folder`; return the files' paths.
+
+        Raises
+        ------
+        SpecificationError
+            If the folder cannot be written.
+        ToolError
+            If Yosys fails.
+        """
+        return generate(self.core, Path(fspath(folder)), lambda step: progress(step, 0, 0))
+
+    def simulate(
+        self,
+        trace: str | PathLike[str] | Mapping[str, npt.ArrayLike] | None = None,
+        *,
+        folder: str | PathLike[str] | None = None,
+        seconds: float | None = None,
+        simulator: str = "verilator",
+        gates: str | None = None,
+        idle: float = 0.3,
+        stall: float = 0.3,
+        waves: bool = False,
+        seed: int = 1,
+        progress: Progress = lambda step, done, total: None,
+    ) -> Report:
+        """Run the generated hardware in a simulator, and compare every sample with the model and the exact chain.
+
+        Parameters
+        ----------
+        trace : str, path or mapping of arrays
+            What drives the inputs: the name of a built-in trace (`sosmith emulate SPEC` lists them), a CSV or scenario
+            file, or arrays as `run` takes them. By default a trace that shows most of the core. Where several channels
+            get the same trace, each begins a sample later than the one before.
+        folder : path
+            Where the files go, ``build/<name>`` by default.
+        seconds : float
+            Length of a built-in trace, in seconds of its own time.
+        simulator : str
+            "verilator" or "icarus".
+        gates : str
+            Name of a board: run the netlist that Yosys makes for its FPGA instead of the SystemVerilog.
+        idle, stall : float
+            Share of clocks without an input sample, and with the output held up, 0 to 0.99.
+        waves : bool
+            Write a waveform (VCD) too.
+        seed : int
+            Seed of noise and handshakes.
+
+        Returns
+        -------
+        Report
+            Verdict, figures and samples; ``report.json`` and ``report.html`` are in `folder`.
+
+        Raises
+        ------
+        SpecificationError
+            If there is no such trace, simulator or board, or the folder cannot be written.
+        ShortfallError
+            If the hardware breaks the stream protocol.
+        ToolError
+            If a tool is missing or fails.
+        """
+        # What simulates takes time to load; a design that only computes does without it.
+        from sosmith.interface.report import Report
+        from sosmith.sim.simulation import simulate
+        from sosmith.sim.simulators import check_name
+
+        check_name(simulator)
+        for name, share in (("idle", idle), ("stall", stall)):
+            if not 0 <= share <= 0.99:
+                raise SpecificationError(f"{name} must be from 0 to 0.99, not {share}")
+        board = None if gates is None else find_board(gates)
+        place = Path("build") / self.core.spec.name if folder is None else Path(fspath(folder))
+        progress("trace", 0, 0)
+        traces = traces_of(self.core, trace, seed=seed, seconds=seconds)
+        evidence = simulate(
+            self.core,
+            traces,
+            place,
+            simulator=simulator,
+            seed=seed,
+            idle=idle,
+            stall=stall,
+            waves=waves,
+            gates=board,
+            progress=progress,
+        )
+        progress("writing the report", 0, 0)
+        return Report.written(self.core, traces, evidence, place)
+
+    @cached_property
+    def facts(self) -> CoreFacts:
+        """All facts about the core that manifest and report tell."""
+        return core_facts(self.core)
+
+    def _in_units(self, steps: Any) -> Quantity:
+        """Turn steps of the output into its unit."""
+        output = self.core.datapath.output
+        return Quantity(float(steps * output.lsb), output.unit)
+
+    def _computed(self, codes: Codes) -> Codes:
+        return self.core.datapath.compute(codes)
+
+    def _repr_html_(self) -> str:
+        filter_ = self.core.quantized.filter
+        spec = self.specification
+        rows = [
+            ("filter", "none" if filter_ is None else filter_.describe),
+            *self.reasons.items(),
+            ("inputs", ", ".join(f"{name} ({unit})" if unit else name for name, unit in spec.inputs.items())),
+            ("error bound", f"{self.bound}, proven for all inputs in range; {spec.max_error} allowed"),
+            *((f"of it {part}", str(value)) for part, value in self.budget.items()),
+            ("latency", f"{self.latency_cycles:,} clocks"),
+            ("clocks a sample", f"{self.cycles_per_sample:,}"),
+        ]
+        return table_html(f"{self.name}: {self.kind}", rows)
+
+    def __repr__(self) -> str:
+        made = ", ".join(filter(None, (self.realization, self.architecture)))
+        return f"<sosmith.Design {self.name}: {made}, error at most {self.bound}>"
+
+
+def design(
+    specification: Specification | str | PathLike[str] | Mapping[str, Any],
+    *,
+    core: str | None = None,
+    realization: str | None = None,
+    widths_of: str | None = None,
+    board: str | None = None,
+    progress: Progress = lambda step, done, total: None,
+) -> Design:
+    """Design a core: choose realization, architecture and word lengths, and prove the error.
+
+    Parameters
+    ----------
+    specification : Specification, path or mapping
+        What is asked for; a path or a mapping goes through `Specification.load`.
+    core : str
+        The part to make, "instrument", "filter" or "calibration"; by default all that the specification has.
+    realization : str
+        Structure of the sections, whatever the specification says.
+    widths_of : str
+        Keep the word lengths chosen for this realization, to compare structures at equal width. The error may then
+        exceed what the specification allows.
+    board : str
+        Name of a board: an automatic choice of the architecture heeds its multipliers.
+    progress : callable
+        Called with the name of each step, and 0 and 0.
+
+    Raises
+    ------
+    SpecificationError
+        If there is no such core, realization or board, or the specification is wrong.
+    ShortfallError
+        If no word lengths keep to the error allowed.
+
+    Examples
+    --------
+    >>> import sosmith
+    >>> sos = [[0.25, 0.5, 0.25, 1.0, -0.5, 0.25]]
+    >>> spec = sosmith.Specification.from_sos(sos, 1000, input_bits=8, architecture="parallel")
+    >>> sosmith.design(spec, realization="df1")
+    <sosmith.Design sos_filter: df1, parallel, error at most 0.00...>
+    >>> sosmith.design(spec, realization="df3")
+    Traceback (most recent call last):
+    ...
+    sosmith.model.errors.SpecificationError: the realization must be auto, df1, ..., not df3 (did you mean df1?)
+    """
+    target = None if board is None else find_board(board)
+    made = design_core(
+        specification_of(specification).checked,
+        core=core,
+        realization=realization,
+        widths_of=widths_of,
+        board=target,
+        progress=lambda step: progress(step, 0, 0),
+    )
+    return Design(made)

@@ -1,0 +1,41 @@
+"""A number with its unit."""
+
+from __future__ import annotations
+
+
+class Quantity(float):
+    """A float that knows its unit; it computes as a float, and the results are plain floats.
+
+    Attributes
+    ----------
+    unit : str
+        Such as "mm", "" for a plain number.
+
+    Examples
+    --------
+    >>> import sosmith
+    >>> bound = sosmith.Quantity(0.00029, "mm")
+    >>> print(bound)
+    0.00029 mm
+    >>> bound < 0.0003, 1000 * bound
+    (True, 0.29)
+    """
+
+    unit: str
+
+    def __new__(cls, value: float, unit: str = "") -> Quantity:
+        """Make the quantity `value` in `unit`."""
+        made = super().__new__(cls, value)
+        made.unit = unit
+        return made
+
+    def __reduce__(self) -> tuple[type[Quantity], tuple[float, str]]:
+        """Let copies and pickles keep the unit."""
+        return type(self), (float(self), self.unit)
+
+    def __repr__(self) -> str:
+        return f"Quantity({float(self)!r}, {self.unit!r})"
+
+    def __str__(self) -> str:
+        """Return the number with four significant digits, and the unit."""
+        return f"{float(self):.4g} {self.unit}".rstrip()

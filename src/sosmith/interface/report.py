@@ -1,0 +1,120 @@
+"""What a co-simulation found: verdict, figures and samples."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from sosmith.gen.core import CoreDesign
+from sosmith.gen.report.evidence import Evidence
+from sosmith.gen.report.report import write_report
+from sosmith.interface.notebook import table_html
+from sosmith.interface.quantity import Quantity
+from sosmith.model.traces.trace import Trace
+
+
+@dataclass(frozen=True, eq=False)
+class Report:
+    """The outcome of `Design.simulate`.
+
+    Arrays hold one sample a row, shape (samples,) for one channel and (samples, channels) for several.
+
+    Attributes
+    ----------
+    summary : dict
+        The content of ``report.json``.
+    folder : Path
+        Where the files are, ``report.html`` among them.
+    time : ndarray of float, shape (samples,)
+        Time of each sample in s.
+    input_codes : dict of str to ndarray of int
+        Codes that drove each input.
+    hardware_codes : ndarray of int
+        Codes that the hardware put out.
+    hardware, exact : ndarray of float
+        The hardware's output and that of the exact chain in double precision, in the unit of the output.
+    unit : str
+        Unit of the output.
+    """
+
+    summary: dict[str, Any] = field(repr=False)
+    folder: Path
+    time: npt.NDArray[np.float64] = field(repr=False)
+    input_codes: dict[str, npt.NDArray[np.int64]] = field(repr=False)
+    hardware_codes: npt.NDArray[np.int64] = field(repr=False)
+    hardware: npt.NDArray[np.float64] = field(repr=False)
+    exact: npt.NDArray[np.float64] = field(repr=False)
+    unit: str
+
+    @classmethod
+    def written(cls, design: CoreDesign, traces: Sequence[Trace], evidence: Evidence, folder: Path) -> Report:
+        """Write ``report.json`` and ``report.html`` into `folder`, and return what they tell."""
+        codes = np.stack([trace.codes for trace in traces], axis=1)
+        channels = codes[:, 0] if len(traces) == 1 else codes
+        return cls(
+            summary=write_report(evidence, folder),
+            folder=folder,
+            time=evidence.time,
+            input_codes={port.name: channels[..., k] for k, port in enumerate(design.datapath.inputs)},
+            hardware_codes=design.datapath.output.encode(evidence.hardware),
+            hardware=evidence.hardware,
+            exact=evidence.golden,
+            unit=evidence.unit,
+        )
+
+    @property
+    def name(self) -> str:
+        """Name of the core."""
+        return str(self.summary["name"])
+
+    @property
+    def passed(self) -> bool:
+        """Whether every sample equals the integer model, and errors and response are what the specification allows."""
+        return bool(self.summary["passed"])
+
+    @property
+    def shortfalls(self) -> tuple[str, ...]:
+        """Why it did not pass, a sentence each."""
+        return tuple(self.summary["shortfalls"])
+
+    @property
+    def bit_exact(self) -> bool:
+        """Whether every sample equals the integer model."""
+        return bool(self.summary["bit_exact"])
+
+    @property
+    def error(self) -> npt.NDArray[np.float64]:
+        """Hardware minus exact, in the unit of the output."""
+        return self.hardware - self.exact
+
+    @property
+    def largest_error(self) -> Quantity:
+        """Largest magnitude of `error`."""
+        return Quantity(self.summary["error"]["max_abs"], self.unit)
+
+    @property
+    def bound(self) -> Quantity:
+        """Proven bound on the error, for all inputs in range."""
+        return Quantity(self.summary["error"]["bound"], self.unit)
+
+    def _repr_html_(self) -> str:
+        error = self.summary["error"]
+        rows = [
+            ("verdict", "passed" if self.passed else "falls short"),
+            *(("", sentence) for sentence in self.shortfalls),
+            ("samples", f"{self.summary['samples']:,} by {self.summary['simulator']}"),
+            ("equal to the integer model", "yes" if self.bit_exact else f"no, {self.summary['mismatches']:,} differ"),
+            ("largest error", f"{self.largest_error} = {error['max_lsb']:.3f} steps of the output"),
+            ("bound", str(self.bound)),
+            ("report", str(self.folder / "report.html")),
+        ]
+        return table_html(self.name, rows)
+
+    def __repr__(self) -> str:
+        verdict = "passed" if self.passed else "falls short"
+        return f"<sosmith.Report {self.name}: {verdict}, largest error {self.largest_error} of {self.bound}>"

@@ -1,0 +1,98 @@
+"""What loads when: the import, help, completion and refusals that need no design do without the large libraries."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from click import Context
+
+import sosmith
+from sosmith.cli import cli
+
+LARGE = ("numpy", "scipy", "matplotlib", "amaranth", "pydantic", "rich", "flint", "openpyxl")
+EXAMPLE = Path(__file__).parents[2] / "examples" / "audio_lowpass.toml"
+
+SCRIPT = """\
+import sys
+try:
+    {statement}
+except SystemExit:
+    pass
+print(*sorted({large!r} & sys.modules.keys()), file=sys.stderr)
+"""
+
+
+def loaded(statement: str, *arguments: str, **environment: str) -> list[str]:
+    """Run a statement in a process of its own; return which large libraries it loaded, the last line of stderr."""
+    script = SCRIPT.format(statement=statement, large=set(LARGE))
+    ended = subprocess.run(
+        [sys.executable, "-c", script, *arguments],
+        capture_output=True,
+        text=True,
+        check=True,
+        env=os.environ | environment,
+    )
+    return ended.stderr.splitlines()[-1].split()
+
+
+def command(*arguments: str, **environment: str) -> list[str]:
+    return loaded("import sosmith; sosmith.main()", *arguments, **environment)
+
+
+def test_the_import_loads_none_of_them() -> None:
+    assert loaded("import sosmith; dir(sosmith); sosmith.SosmithError") == []
+
+
+def test_a_design_loads_them() -> None:
+    assert {"numpy", "scipy"} <= set(loaded("import sosmith; sosmith.design"))
+
+
+NOTHING = {
+    "version": ("--version",),
+    "help": ("--help",),
+    "no command": (),
+    "unknown command": ("simulte",),
+    "missing specification": ("design", "none.toml"),
+    "specification that is no TOML": ("design", __file__),
+    "unknown board": ("design", str(EXAMPLE), "--board", "icebraker"),
+    "unknown board for gates": ("simulate", str(EXAMPLE), "--gates", "icebraker"),
+    "unknown simulator": ("simulate", str(EXAMPLE), "--simulator", "veriltor"),
+    "unknown realization": ("generate", str(EXAMPLE), "--realization", "df3"),
+    "plot of another format": ("vehicle", "--plot", "run.pdf"),
+}
+
+
+@pytest.mark.parametrize("arguments", NOTHING.values(), ids=NOTHING)
+def test_what_loads_none_of_them(arguments: tuple[str, ...]) -> None:
+    assert command(*arguments) == []
+
+
+@pytest.mark.parametrize("name", cli.list_commands(Context(cli)))
+def test_help_of_a_command_loads_none_of_them(name: str) -> None:
+    assert command(name, "--help") == []
+
+
+def test_completion_loads_none_of_them() -> None:
+    words = {"_SOSMITH_COMPLETE": "bash_complete", "COMP_WORDS": "sosmith sim", "COMP_CWORD": "1"}
+    assert loaded("sys.argv[0] = 'sosmith'; import sosmith; sosmith.main()", **words) == []
+
+
+CHECKED = {
+    "list of traces": ("emulate", str(EXAMPLE)),
+    "unknown trace": ("simulate", str(EXAMPLE), "--trace", "nois"),
+    "unknown trace to emulate": ("emulate", str(EXAMPLE), "nois"),
+}
+
+
+@pytest.mark.parametrize("arguments", CHECKED.values(), ids=CHECKED)
+def test_what_needs_the_specification_alone(arguments: tuple[str, ...]) -> None:
+    assert set(command(*arguments)) <= {"pydantic", "rich"}
+
+
+def test_every_public_name_is_there() -> None:
+    assert set(sosmith.__all__) <= set(dir(sosmith))
+    assert all(getattr(sosmith, name) is not None for name in sosmith.__all__)
+    with pytest.raises(AttributeError, match=r"^module 'sosmith' has no attribute 'desing'$"):
+        _ = sosmith.desing  # type: ignore[attr-defined]
