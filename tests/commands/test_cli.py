@@ -319,7 +319,7 @@ UNFIT = {
     ),
     "no report there": (
         ("compare", "none"),
-        "none must be a report.json or a folder with one, not no such file or directory",
+        "none must be a readable report.json or a folder that holds one, not: no such file or directory",
     ),
     "report that is none": (
         ("compare", "plain.toml"),
