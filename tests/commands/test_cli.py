@@ -212,7 +212,7 @@ def test_commands_of_the_contract_that_are_still_to_come(command: str, sosmith: 
 
 USAGE = {
     "no command": ((), "Usage: sosmith [OPTIONS] COMMAND [ARGS]..."),
-    "unknown command": (("simulte",), "Error: No such command 'simulte'."),
+    "unknown command": (("simulte",), "Error: No such command 'simulte' (did you mean simulate?)."),
     "no specification": (("design",), "Error: Missing argument 'SPEC'."),
     "unknown option": (("design", "plain.toml", "--colour"), "Error: No such option '--colour'."),
     "unknown core": (

@@ -220,7 +220,17 @@ def test_a_section_unstable_by_quantization() -> None:
 # The same transfer function as sections.
 
 
-@pytest.mark.parametrize(("kind", "order", "cutoff"), [*ODD, ("lowpass", 9, 0.01), ("bandpass", 7, 0.1)])
+LARGEST = {("bandpass", 5, 0.002), ("bandstop", 5, 0.002)}
+"""A minute each: rationals of the most digits."""
+
+
+@pytest.mark.parametrize(
+    ("kind", "order", "cutoff"),
+    [
+        pytest.param(*wanted, marks=[pytest.mark.slow] if wanted in LARGEST else [])
+        for wanted in [*ODD, ("lowpass", 9, 0.01), ("bandpass", 7, 0.1)]
+    ],
+)
 def test_effective_sections_are_exact_in_the_stop_band(kind: str, order: int, cutoff: float) -> None:
     """Against the branches in rationals, at frequencies whose sine and cosine are rational."""
     quantized = plain(butterworth(order, cutoff, kind), "lattice_wdf")
