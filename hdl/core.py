@@ -11,7 +11,7 @@ With one channel, as in the bench example of a calibration and a filter::
     s_axis_tready <--------------------------- advance <-----------------------------------+
 
 Every datapath stage has one to three pipeline stages, `sosmith.hdl.stage`; all of them move at the clocks at which
-`advance`, a register of the output buffer, is high.
+`advance`, which comes from a register of the output buffer, is high.
 
 Several channels take the stages of `sosmith.hdl.interleaved`, whose states lie in memories, and an input buffer, which
 holds back a sample of a channel whose last one is still in a recursion::

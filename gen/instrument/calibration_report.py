@@ -1,4 +1,4 @@
-"""What is told of a self-updating calibration: its report and history as JSON, and the files exported from it."""
+"""The results of a self-updating calibration: report and history as JSON, and the files exported from it."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def version_json(sensor: str, version: Version) -> dict[str, Any]:
 
 
 def addition_json(addition: Addition) -> dict[str, Any]:
-    """Tell what became of a file, line by line."""
+    """Return which lines of a file were kept and which were refused, and the calibration made from them."""
     made = addition.calibration
     return {
         "file": str(addition.file.path),

@@ -77,7 +77,9 @@ def load_report(path: Path) -> dict[str, Any]:
         content = json.loads(file.read_text(encoding="utf-8"), parse_constant=_refuse_constant)
     except OSError as error:
         reason = (error.strerror or "unreadable").lower()
-        raise SpecificationError(f"{path} must be a report.json or a folder with one, not {reason}") from error
+        raise SpecificationError(
+            f"{path} must be a readable report.json or a folder that holds one, not: {reason}"
+        ) from error
     except (ValueError, RecursionError) as error:  # no JSON, or lists some thousand deep
         raise SpecificationError(f"{file} must be a report.json of sosmith, not text that is no JSON") from error
     problem = _problem(content)

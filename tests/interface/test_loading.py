@@ -9,7 +9,7 @@ import pytest
 from click import Context
 
 import sosmith
-from sosmith.cli import cli
+from sosmith.cli import _COMMANDS, cli
 
 LARGE = ("numpy", "scipy", "matplotlib", "amaranth", "pydantic", "rich", "flint", "openpyxl")
 EXAMPLE = Path(__file__).parents[2] / "examples" / "audio_lowpass.toml"
@@ -37,7 +37,7 @@ def loaded(statement: str, *arguments: str, **environment: str) -> list[str]:
     return ended.stderr.splitlines()[-1].split()
 
 
-def command(*arguments: str, **environment: str) -> list[str]:
+def run(*arguments: str, **environment: str) -> list[str]:
     return loaded("import sosmith; sosmith.main()", *arguments, **environment)
 
 
@@ -66,12 +66,20 @@ NOTHING = {
 
 @pytest.mark.parametrize("arguments", NOTHING.values(), ids=NOTHING)
 def test_what_loads_none_of_them(arguments: tuple[str, ...]) -> None:
-    assert command(*arguments) == []
+    assert run(*arguments) == []
 
 
 @pytest.mark.parametrize("name", cli.list_commands(Context(cli)))
 def test_help_of_a_command_loads_none_of_them(name: str) -> None:
-    assert command(name, "--help") == []
+    assert run(name, "--help") == []
+
+
+def test_the_list_of_commands_tells_what_their_help_does() -> None:
+    with Context(cli) as context:
+        for name, (_, _, summary) in _COMMANDS.items():
+            command = cli.get_command(context, name)
+            assert command is not None
+            assert command.get_short_help_str(limit=200).rstrip(".") == summary.rstrip(".")
 
 
 def test_completion_loads_none_of_them() -> None:
@@ -88,7 +96,7 @@ CHECKED = {
 
 @pytest.mark.parametrize("arguments", CHECKED.values(), ids=CHECKED)
 def test_what_needs_the_specification_alone(arguments: tuple[str, ...]) -> None:
-    assert set(command(*arguments)) <= {"pydantic", "rich"}
+    assert set(run(*arguments)) <= {"pydantic", "rich"}
 
 
 def test_every_public_name_is_there() -> None:

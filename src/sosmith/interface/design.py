@@ -165,7 +165,10 @@ class Design:
 
     @property
     def bound(self) -> Quantity:
-        """Proven bound on ``|hardware - exact|`` for all inputs in range, the exact result limited to the output's."""
+        """Proven bound on ``|hardware - exact|`` for all inputs in range, the exact result limited to the output's.
+
+        That of the certificate is computed more closely, and agrees in all digits that matter.
+        """
         return self._in_units(self.core.quantized.bound)
 
     @property

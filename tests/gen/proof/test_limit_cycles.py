@@ -10,19 +10,18 @@ import pytest
 from click.testing import CliRunner
 from scipy import signal
 from tests.gen.designs import EXAMPLES, example_design
+from tests.gen.proof.cycle_search import cycle_from, search_cycles
 
 from sosmith.cli import cli
 from sosmith.gen.output.core_facts import core_facts
 from sosmith.gen.output.manifest import manifest
 from sosmith.gen.proof.limit_cycles import (
-    cycle_from,
     is_positive_definite,
     limit_cycles,
     loop_matrix,
     loop_states,
     lyapunov_diagonal,
     proves_decay,
-    search_cycles,
 )
 from sosmith.gen.realizations.registry import CASCADES, REALIZATIONS, Row
 from sosmith.gen.realizations.section_format import SectionFormat, unknown_range

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from scipy import signal
 from tests.gen.designs import EXAMPLES
+from tests.gen.proof.cycle_search import search_cycles
 from tests.gen.proven_stages import run
 from tests.gen.verifier.test_certificate import all_edits, proven, wrongly_accepted
 from tests.gen.word_lengths.test_quantize import OUT, SIGNED, butterworth, errors, plain, stimulus
@@ -22,7 +23,7 @@ from sosmith.gen.filter.design import Filter
 from sosmith.gen.output.certificate import certificate
 from sosmith.gen.output.core_facts import core_facts
 from sosmith.gen.output.manifest import manifest
-from sosmith.gen.proof.limit_cycles import limit_cycles, recursions, search_cycles
+from sosmith.gen.proof.limit_cycles import limit_cycles, recursions
 from sosmith.gen.proof.linear_model import LinearModel, linear_models
 from sosmith.gen.realizations.lattice import LatticePair, LatticeSigns, Row, lattice_parts
 from sosmith.gen.realizations.registry import REALIZATIONS
@@ -219,7 +220,17 @@ def test_a_section_unstable_by_quantization() -> None:
 # The same transfer function as sections.
 
 
-@pytest.mark.parametrize(("kind", "order", "cutoff"), [*ODD, ("lowpass", 9, 0.01), ("bandpass", 7, 0.1)])
+LARGEST = {("bandpass", 5, 0.002), ("bandstop", 5, 0.002)}
+"""A minute each: rationals of the most digits."""
+
+
+@pytest.mark.parametrize(
+    ("kind", "order", "cutoff"),
+    [
+        pytest.param(*wanted, marks=[pytest.mark.slow] if wanted in LARGEST else [])
+        for wanted in [*ODD, ("lowpass", 9, 0.01), ("bandpass", 7, 0.1)]
+    ],
+)
 def test_effective_sections_are_exact_in_the_stop_band(kind: str, order: int, cutoff: float) -> None:
     """Against the branches in rationals, at frequencies whose sine and cosine are rational."""
     quantized = plain(butterworth(order, cutoff, kind), "lattice_wdf")

@@ -194,6 +194,6 @@ def test_load_refuses_bytes(tmp_path: Path) -> None:
 
 def test_load_refuses_a_missing_file(tmp_path: Path) -> None:
     for path in (tmp_path, tmp_path / "nowhere"):
-        message = f"{path} must be a report.json or a folder with one, not no such file or directory"
+        message = f"{path} must be a readable report.json or a folder that holds one, not: no such file or directory"
         with pytest.raises(SpecificationError, match=f"^{re.escape(message)}$"):
             load_report(path)

@@ -533,7 +533,7 @@ def test_page_says_the_verdict_first(built: tuple[str, Path, dict[str, Any]]) ->
 
 def test_page_shows_numbers_with_units() -> None:
     content = " ".join(Page(page_of(evidence())).words)
-    for words in ("122\u00a0nm", "0.500 LSB", "200\u00a0nm", "−66,026,473", "s18.14", "5.048", "3.01 dB"):
+    for words in ("122\u00a0nm", "0.500 LSB", "200\u00a0nm", "−66,026,473", "Q7.14", "5.048", "3.01 dB"):
         assert words in content
 
 

@@ -412,7 +412,7 @@ BAD = [
         "unknown kind",
         KIND,
         'kind = "low pass"',
-        "filter.kind must be one of lowpass, highpass, bandpass, bandstop, not 'low pass'",
+        "filter.kind must be one of lowpass, highpass, bandpass, bandstop, not 'low pass' (did you mean lowpass?)",
     ),
     (
         "kind is a list",
@@ -763,7 +763,7 @@ BAD = [
         CLOCK,
         CLOCK + '\nrealization = "df3"',
         "hardware.realization must be one of auto, df1, df1_ef1, df1_ef2, df2t, delta, state_space, normal, "
-        "lattice_wdf, not 'df3'",
+        "lattice_wdf, not 'df3' (did you mean df1?)",
     ),
     (
         "unknown architecture",

@@ -6,12 +6,12 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from tests.gen.designs import example_design
+from tests.model.reload.swapping import compute_swapping
 
 from sosmith.gen.filter.design import design
 from sosmith.gen.reload.other_constants import with_constants
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.graph import RangeError
-from sosmith.model.reload.swapping import compute_swapping
 
 
 def pair(realization: str) -> tuple[Datapath, Datapath]:

@@ -84,7 +84,7 @@ def test_columns_can_be_chosen(tmp_path: Path) -> None:
             "time_s,speed",
             lambda k: f"{k},1",
             100,
-            ": column must end in its unit (_mm, _um, _m, _V, _mV, _C, _degC, _rad, _mrad, _deg) or be chosen by "
+            ": column must end in its unit (_mm, _um, _m, _V, _mV, _C, _degC, _rad, _mrad, _deg) or be selected by "
             "--column, not 'speed'",
         ),
         (

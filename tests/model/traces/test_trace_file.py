@@ -91,7 +91,7 @@ def test_writing_refusals(tmp_path: Path) -> None:
         write_traces(tmp_path / "folder", [instrument_trace()])
     assert [entry.name for entry in tmp_path.iterdir()] == ["folder"]
     clash = Port.from_range("truth", 16, Fraction(0), Fraction(1))
-    message = "input names must differ from the other columns of a trace file, not give 'truth' twice"
+    message = "input names must differ from the other columns of a trace file, not repeat 'truth'"
     with pytest.raises(SpecificationError, match=f"^{re.escape(message)}$"):
         traces_csv([Trace(name="t", ports=(clash,), sample_rate=RATE, codes=np.zeros((1, 1)))])
 

@@ -250,10 +250,6 @@ def test_clearance_is_blind_to_rigid_motion() -> None:
     assert row == pytest.approx(np.zeros((1, 6)), abs=1e-12)
 
 
-def test_left_clearance_is_right_clearance_with_the_other_sign(motion: Motion) -> None:
-    assert (motion.clearance_left_mm == -motion.clearance_mm).all()
-
-
 def test_in_the_curve_wheelsets_yaw_in_their_frames(motion: Motion) -> None:
     """Between axles that stay parallel the track turns: relative yaw is what the link springs allow."""
     k = 1500
