@@ -79,7 +79,7 @@ def horizon(paths: Iterable[Iterable[Coefficients]]) -> Horizon:
 
 @dataclass(frozen=True)
 class Response:
-    """An impulse response with what is not exact about it.
+    """An impulse response with bounds on its inexactness.
 
     Attributes
     ----------
@@ -143,7 +143,7 @@ class Response:
 
     @property
     def uncertainty(self) -> Fraction:
-        """Bound on the sum over all k of what the samples do not say about ``|h_k|``: rounding and tail."""
+        """Bound on the error of the sum of the samples' magnitudes: rounding and tail."""
         return self.rounding * self.horizon.length / (1 << self.horizon.bits) + self.tail
 
     @property
@@ -154,7 +154,7 @@ class Response:
 
 
 def impulse(at: Horizon) -> Response:
-    """Response of nothing: one sample of 1."""
+    """Unit impulse: a single sample of 1."""
     return Response(at, [1 << at.bits] + [0] * (at.length - 1), Fraction(0), Fraction(1))
 
 
@@ -181,10 +181,11 @@ class Extent:
 
 
 def extent(drives: Sequence[Drive]) -> Extent:
-    """Limits of the sum of `drives`, which all start at reset with nothing before.
+    """Limits of the sum of `drives`, all of which are zero before reset.
 
-    They are those of ``sum over drives of sum over k <= n of max(h_k low, h_k high)`` over all n: an interval
-    that is not symmetric about zero is used as it is, and drives that balance at each n do so here.
+    The upper limit is the maximum over all n of ``sum over drives of sum over k <= n of max(h_k low, h_k high)``, and
+    the lower limit likewise. Intervals that are not symmetric about zero are used as they are, and drives may cancel
+    at each n.
     """
     live = [drive for drive in drives if drive.low or drive.high]
     if not live:
@@ -200,7 +201,7 @@ def extent(drives: Sequence[Drive]) -> Extent:
 def _steps(drives: Sequence[Drive]) -> tuple[Fraction, npt.NDArray[np.int64], npt.NDArray[np.int64]]:
     """Largest and smallest contribution of all drives together at each delay, as integers of a common unit.
 
-    The unit is chosen so that their running sums stay within 64 bits; it is far below what matters.
+    The unit is chosen so that their running sums stay within 64 bits; its effect on the result is negligible.
     """
     bits, length = drives[0].response.horizon.bits, len(drives[0].response.samples)
     peak = sum(
@@ -316,7 +317,7 @@ def _power_above(base: Fraction, exponent: int) -> Fraction:
 
 
 def _rounded_up(value: Fraction) -> Fraction:
-    """`value` rounded up to some 64 significant bits, to keep numbers short."""
+    """`value` rounded up to about 64 significant bits, to keep numbers short."""
     scale = Fraction(2) ** (value.denominator.bit_length() - value.numerator.bit_length() + 64)
     return Fraction(math.ceil(value * scale)) / scale
 
