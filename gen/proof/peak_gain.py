@@ -25,14 +25,14 @@ from sosmith.model.errors import ShortfallError
 Coefficients = tuple[Fraction, ...]
 """Of a polynomial in ``w = z**-1``, dyadic, the constant term first."""
 
-_RELATIVE_BITS = 40  # to which a sum is known, roughly
+_RELATIVE_BITS = 40  # approximate relative accuracy of a sum
 _LONGEST = 1 << 20  # samples of a response
-_ROOT_BITS = 80  # to which pole radii are rounded upward
+_ROOT_BITS = 80  # fraction bits that pole radii are rounded up to
 
 
 @dataclass(frozen=True)
 class Horizon:
-    """How long and how fine responses are computed.
+    """Length and resolution at which responses are computed.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ def horizon(paths: Iterable[Iterable[Coefficients]]) -> Horizon:
     largest = max((radius for path in radii for radius in path), default=Fraction(0))
     if largest >= 1:
         raise ShortfallError("every pole must lie inside the unit circle, and one does not")
-    # rho lies nine tenths of the way, in logarithms, to where the slowest pole would be met.
+    # log(rho) is nine tenths of its limit, which the slowest pole sets.
     decay = 4.0 if largest < Fraction(1, 64) else -math.log(largest)
     rho = _rounded_down(Fraction(math.exp(0.9 * decay)))
     log_magnitude = max(-sum(math.log2(1 - radius * rho) for radius in path) for path in radii)
@@ -154,7 +154,7 @@ class Response:
 
 
 def impulse(at: Horizon) -> Response:
-    """Unit impulse: a single sample of 1."""
+    """Response without any filter: a single sample of 1."""
     return Response(at, [1 << at.bits] + [0] * (at.length - 1), Fraction(0), Fraction(1))
 
 

@@ -77,7 +77,7 @@ def _value(stage: StageEntry, index: int, operands: Sequence[_Value], variables:
         return operands[0].times(_constant(Fraction(2) ** node.parameter, variables))
     if node.op is Operation.SCALE:
         return operands[0].times(_constant(node.parameter * Fraction(2) ** -node.parameter_frac, variables))
-    if node.op is Operation.FLOOR:  # as the middle of what it can drop, give or take half of it
+    if node.op is Operation.FLOOR:  # the middle of the dropped range, plus or minus half its width
         half = Fraction(2) ** -node.frac / 2
         return _Value(operands[0].plus(_constant(-half, variables)).exact, operands[0].radius + half)
     require(
