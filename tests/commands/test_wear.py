@@ -71,7 +71,7 @@ def test_the_limits_of_a_specification() -> None:
     assert (first["wear_mm"], second["wear_mm"]) == (pytest.approx(7.9), pytest.approx(6.9))
     assert second["limits_mm"]["critical_clearance"] == 10.5
     end = good("days.csv", "--spec", "my.toml", "--channel", "1").stdout
-    assert "to the end of the sensor's range, 10.5 mm, which comes before the limit" in end
+    assert "to the end of the sensor's range, 10.5 mm, which is reached before the limit" in end
     refused("my.toml: channel must be below 2, the count of channels, not 2", "days.csv", "--spec", "my.toml",
             "--channel", "2")  # fmt: skip
     refused("the limits must be given by --spec or one by one, not both", "days.csv", "--spec", "my.toml", *LIMITS)
@@ -93,8 +93,8 @@ def test_a_turned_wheel_is_told() -> None:
     rows = [f"{day},{5 + 0.1 * day - 3 * (day >= 25):.6g}" for day in range(40)]
     Path("turned.csv").write_text("\n".join(["days,clearance_mm", *rows]) + "\n")
     shown = re.sub(r"\s+", " ", good("turned.csv", *LIMITS).stdout)
-    assert "fall 3 mm, 14.5 days ago, as when a wheel is turned or a sensor mounted anew" in shown
-    assert "take the rate from there on by --window 14.5" in shown
+    assert "fall 3 mm, 14.5 days ago, as after turning a wheel or remounting a sensor" in shown
+    assert "use --window 14.5 to take the rate from there on" in shown
     assert json.loads(good("turned.csv", *LIMITS, "--json").stdout)["fall"]["window_days"] == 14.5
     after = json.loads(good("turned.csv", *LIMITS, "--window", "14.5", "--json").stdout)
     assert after["fall"] is None
