@@ -174,9 +174,9 @@ NEEDED = {
     "compare": ("REPORT REPORT...", "--json", "HTML"),
     "calibrate": ("clearance_mm", "sosmith calibrate add", "export"),
     "spectrum": ("TRACE", "--tolerance", "--passband", "--motion", "--into SPEC", "--json"),
-    "vehicle": ("PARAMETERS.toml", "--speed", "tables 5 to 8", "--json"),
+    "vehicle": ("PARAMETERS is a TOML file", "--speed", "tables 5 to 8", "--json"),
     "wear": ("TRACE.csv", "--initial", "--limit", "--warning", "--spec"),
-    "paper": ("docs/paper.md", "-o, --output", "--json"),
+    "paper": ("paper/paper.md", "-o, --output", "--json"),
     "demo": ("build/demo", "--seed"),
 }
 
@@ -194,7 +194,7 @@ def test_help_of_all_lists_the_commands_in_the_order_of_work(sosmith: Command) -
     outcome = sosmith("--help")
     assert outcome.status == 0
     assert re.findall(r"^  ([a-z]+)  ", outcome.stdout, flags=re.MULTILINE) == list(NEEDED)
-    assert "\n      sosmith design my.toml      see filter" in outcome.stdout
+    assert "\n      sosmith design my.toml      show the filter" in outcome.stdout
 
 
 def test_version(sosmith: Command) -> None:
