@@ -15,8 +15,8 @@ TOLERANCE = 0.1
 section 6."""
 
 COVERAGE = 2.0
-"""Multiple of the rms error that the tolerance has to cover: 95 % of normally distributed errors (JCGM 100:2008, section
-6.3.3)."""
+"""Multiple of the rms error that the tolerance has to cover: 95 % of normally distributed errors (JCGM 100:2008,
+section 6.3.3)."""
 
 PASSBAND_LOSS = 0.1
 """Maximum loss up to the pass edge, dB, even if the wanted signal allows more: the paper's choice in section 4.1."""
