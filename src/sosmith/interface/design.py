@@ -165,7 +165,7 @@ class Design:
 
     @property
     def bound(self) -> Quantity:
-        """Proven bound on ``|hardware - exact|`` for all inputs in range, with the exact result limited as the output is.
+        """Proven bound on ``|hardware - exact|`` for all inputs in range, the exact result limited as well.
 
         The bound in the certificate is computed more precisely; the two agree in all significant digits.
         """
