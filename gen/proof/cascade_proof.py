@@ -1,12 +1,11 @@
 """The proof of a cascade: ranges of all its nodes, and the error of its roundings and its coefficients.
 
-Every stage's exact linear models hand the responses of all sources on to the next: the input, and the error
-of every quantizer so far. At each node whose range a stage states, and at the end, the responses say what is
-possible. If no node overflows at any sample before, none does at this one: so by induction the linear model
-holds throughout.
+The impulse responses of all sources (the input, and the error of every quantizer) are carried from stage to stage
+through exact linear models. At each node with a stated range, and at the output, they bound the value. If no node has
+overflowed at an earlier sample, none overflows at this one; by induction, the linear model always holds.
 
-Stages may have several inputs and outputs. What one source sends along several wires is added where they meet: it
-drives there as one.
+Stages may have several inputs and outputs. Where the paths of one source meet, their responses are added, and the
+source counts once.
 """
 
 from __future__ import annotations
@@ -36,9 +35,9 @@ class CascadeProof:
     output : Extent
         The values that the output can take.
     rounding : Extent
-        Output minus what the same coefficients would give without quantizers.
+        Output minus the output of the same coefficients without quantizers.
     coefficients : Extent
-        What the stages' transfer functions give, minus what the ideal sections give.
+        Output of the stages' transfer functions minus that of the ideal sections.
     gain : Fraction
         Worst-case peak gain of the ideal sections.
     """
@@ -58,7 +57,7 @@ def prove_cascade(
     Raises
     ------
     ShortfallError
-        If a stage is unstable or its response does not end in time.
+        If a stage is unstable or its response does not decay in time.
     """
     at = cascade_horizon(stages, ideal)
     wires: list[Drives] = [{INPUT: Drive(impulse(at), low, high)}]
@@ -81,7 +80,7 @@ def prove_cascade(
 def coefficient_extent(
     stages: Sequence[StageModel], ideal: Sequence[TransferFunction], low: Fraction, high: Fraction
 ) -> Extent:
-    """Limits of what the stages' transfer functions give, minus what the ideal sections give."""
+    """Limits of the output of the stages' transfer functions minus that of the ideal sections."""
     at = cascade_horizon(stages, ideal)
     return extent([Drive(made_response(stages, at).minus(through(ideal, at)), low, high)])
 
@@ -96,7 +95,7 @@ def made_response(stages: Sequence[StageModel], at: Horizon) -> Response:
 
 
 def error_drives(stages: Sequence[StageModel], at: Horizon) -> list[Drive]:
-    """Drives at the output by all that the stages add to the input: errors of the quantizers, and constants."""
+    """Drives at the output by everything except the input: errors of the quantizers, and constants."""
     wires: list[Drives] = [{}]
     for number, stage in enumerate(stages):
         lanes = [Lane(number, model, wires, at) for model in stage]
@@ -106,7 +105,7 @@ def error_drives(stages: Sequence[StageModel], at: Horizon) -> list[Drive]:
 
 
 def rounding_gains(stages: Sequence[StageModel]) -> list[dict[str, Fraction]]:
-    """Error at the output of each stage's quantizers, by name, half from the lowest to the highest possible."""
+    """Error that each stage's quantizers cause at the output, by name: half the width of its range."""
     at = cascade_horizon(stages, [])
     wires = [impulse(at)]  # from each output of a stage to the end
     gains = []
@@ -135,7 +134,7 @@ def ideal_gain(ideal: Sequence[TransferFunction]) -> Fraction:
 
 
 def through(sections: Sequence[TransferFunction], at: Horizon) -> Response:
-    """Impulse response of sections in a row."""
+    """Impulse response of cascaded sections."""
     response = impulse(at)
     for numerator, denominator in sections:
         response = response.all_pole(denominator).taps(numerator)
@@ -144,7 +143,7 @@ def through(sections: Sequence[TransferFunction], at: Horizon) -> Response:
 
 def cascade_horizon(stages: Sequence[StageModel], ideal: Sequence[TransferFunction]) -> Horizon:
     """Choose a horizon for the responses of stages and ideal sections."""
-    paths: list[list[list[Polynomial]]] = [[[]]]  # for each wire the ways to it, for each way its denominators
+    paths: list[list[list[Polynomial]]] = [[[]]]  # the denominators along each path to each wire
     for stage in stages:
         paths = [[[*path, m.denominator] for k in m.entries for path in paths[k]] for m in stage]
     return horizon([*(path for wire in paths for path in wire), [denominator for _, denominator in ideal]])
@@ -159,7 +158,7 @@ INPUT: Key = (-1, 0, "input", 0)
 
 
 class Lane:
-    """One output of a stage, with all that arrives at it."""
+    """One output of a stage, with everything that drives it."""
 
     def __init__(self, number: int, model: LinearModel, wires: Sequence[Drives], at: Horizon) -> None:
         self.model = model
@@ -171,7 +170,7 @@ class Lane:
         self._own = impulse(at).all_pole(model.denominator)
 
     def at(self, node: int) -> Drives:
-        """Drives at a node: what has come from before, then the stage's own sources."""
+        """Drives at a node: those from earlier stages, then the stage's own sources."""
         model = self.model
         drives: dict[Key, Drive] = {}
         for source, arrived in zip(model.sources, self._arrived, strict=False):

@@ -1,19 +1,19 @@
-"""What a section does of its own accord: limit cycles of the rounding, and dead bands.
+"""Limit cycles and dead bands of a section.
 
-Without input, the quantizers of a recursion can keep it from coming to rest, and a small constant input can stay
-without effect. Three things are told of a section's dataflow graph.
+Without input, the quantizers of a recursion can keep it from coming to rest, and a small constant input can have
+no effect. Three properties are derived from a section's dataflow graph.
 
-- The largest output that its quantizers can sustain, from the same exact gains as the proof: all their errors at
-  their worst, for ever. It holds for every cycle; with one rounding quantizer it is half an LSB times L1 of the way
-  from there to the output.
-- The dead band: the same for constant errors, by the gains at zero frequency. A constant output can be this far
-  from what the input asks for. Error feedback has a zero there.
-- Whether there are no cycles at all: with a diagonal D > 0 for which D - A^T D A is positive definite, x^T D x falls
-  with every sample, and no quantizer that only shortens each state (magnitude truncation) can raise it. Where the
-  states overflow, the same D excludes overflow oscillations (Mills, Mullis and Roberts 1978). D and its proof are in
-  rationals.
+- The largest output that its quantizers can sustain: all errors are at their worst at every sample, and weighted by
+  the exact gains of the proof. It bounds every limit cycle. With one rounding quantizer it is half an LSB times the
+  peak gain from there to the output.
+- The dead band: the same for constant errors, with the gains at zero frequency. A constant output can be this far
+  from its exact value. Error feedback has a zero at zero frequency.
+- Whether limit cycles are impossible: with a diagonal D > 0 for which D - A^T D A is positive definite, x^T D x falls
+  with every sample, and no quantizer that only reduces the magnitude of each state (magnitude truncation) can raise
+  it. Where the states overflow, the same D excludes overflow oscillations (Mills, Mullis and Roberts 1978). D and its
+  proof are in rationals.
 
-A section with several outputs is told of output by output.
+In a section with several outputs, each output is analysed by itself.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ _MIN_SHARE = 400  # of the weight of one state in a triangular matrix, as a powe
 def recursions(section: Stage) -> dict[str, Graph]:
     """Recursions of a section by name, each with one input and one output.
 
-    They are the section itself, or where it has several inputs or outputs, what leads to each output that depends on a
-    state.
+    A section with one input and one output is its own recursion. Otherwise there is one for each output that depends
+    on a state: the part of the graph that leads to that output.
     """
     graph = section.graph
     if len(graph.inputs) == len(graph.outputs) == 1:
@@ -49,20 +49,20 @@ def recursions(section: Stage) -> dict[str, Graph]:
 
 @dataclass(frozen=True, kw_only=True)
 class LimitCycles:
-    """What the quantizers of a section can sustain, in the units of its output.
+    """Limit cycles of a section, in the units of its output.
 
     Attributes
     ----------
     largest : Fraction
-        Proven bound of the output's magnitude in every limit cycle without input, and of its distance from the
-        exact response with any input once the start is over.
+        Proven bound on the output's magnitude in every limit cycle without input, and on its distance from the
+        exact response to any input after the start-up transient.
     dead_band : Fraction
         Largest error that a constant output can have.
     lyapunov : tuple of Fraction or None
         Diagonal D of the certificate, one entry per state in the loop; None if there is none.
     none : bool
-        Whether it is proven that the section comes to rest without input: there is a certificate, and no other
-        quantizer in the loop than truncation of magnitudes, of the states or on the only way to one.
+        Whether it is proven that the section comes to rest without input: there is a certificate, and all
+        quantizers in the loop are magnitude truncations, of the states or on the only path to one.
     """
 
     largest: Fraction
@@ -73,7 +73,7 @@ class LimitCycles:
 
 @lru_cache(maxsize=256)
 def limit_cycles(graph: Graph) -> LimitCycles:
-    """Tell what the quantizers of a section can sustain.
+    """Find the limit cycles that the quantizers of a section can sustain.
 
     Raises
     ------
@@ -108,7 +108,7 @@ def _dead_band(model: LinearModel) -> Fraction:
 
 
 def loop_states(graph: Graph) -> tuple[int, ...]:
-    """Which of the graph's delays lie in a loop, as positions among them; the others empty themselves."""
+    """Positions, among the graph's delays, of those in a loop; the others decay to zero by themselves."""
     matrix = state_matrix(graph)
     size = len(matrix)
     reach = [[bool(matrix[i][j]) for j in range(size)] for i in range(size)]
@@ -118,7 +118,7 @@ def loop_states(graph: Graph) -> tuple[int, ...]:
 
 
 def loop_matrix(graph: Graph) -> list[list[Fraction]]:
-    """Rows and columns of `state_matrix` for the states in a loop."""
+    """Rows and columns of `state_matrix` that belong to states in a loop."""
     matrix, states = state_matrix(graph), loop_states(graph)
     return [[matrix[i][j] for j in states] for i in states]
 
@@ -153,9 +153,9 @@ def proves_decay(diagonal: Sequence[Fraction], matrix: Matrix) -> bool:
 def lyapunov_diagonal(matrix: Matrix) -> tuple[Fraction, ...] | None:
     """Find a diagonal D that `proves_decay`; None if there is none, or for more than two states.
 
-    With two states D = diag(|a21|, |a12|) makes the cross terms of ``sqrt(D) A / sqrt(D)`` equal in size, which no
-    other ratio betters: it is the only one to try, unless a cross term is zero. Then D may make the other as small
-    as it takes.
+    With two states, D = diag(|a21|, |a12|) makes the cross terms of ``sqrt(D) A / sqrt(D)`` equal in size. No other
+    ratio is better, so only this one is tried, unless a cross term is zero. In that case, D can make the other as small
+    as necessary.
     """
     if len(matrix) > 2:
         return None
@@ -177,10 +177,10 @@ def _only_truncates_states(graph: Graph) -> bool:
 
 
 def _never_grows(graph: Graph, index: int) -> bool:
-    """Whether a node's quantizers can only make it smaller in magnitude than the states make it without them.
+    """Whether quantization can only reduce a node's magnitude.
 
-    It is a sum of multiples of states, or a multiple of just one value that is truncated in turn, and is truncated
-    itself or not quantized.
+    The node must be a sum of multiples of states, or a multiple of one value that is itself truncated, and must
+    either be truncated or not be quantized.
     """
     index = _unbounded(graph, index)
     if graph.nodes[index].op is Op.TRUNCATE:

@@ -1,9 +1,9 @@
 """Exact transfer functions of a linear stage, read off its dataflow graph.
 
 A quantizer is an error source: ``floor(a) = a - e`` with e in [0, 2**-frac), ``truncate(a) = a - e`` with e in
-(-2**-frac, 2**-frac). A FLOOR or FRACTION of a delayed node sees the delayed error of that node, so that all the
-places where one error enters count as one source, which is what error feedback lives on. Everything is a polynomial
-in ``w = z**-1`` with rational coefficients.
+(-2**-frac, 2**-frac). A FLOOR or FRACTION of a delayed node sees the delayed error of that node. An error that enters
+in several places is therefore one source; error feedback depends on this. All transfer functions are polynomials in
+``w = z**-1`` with rational coefficients.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ Polynomial = tuple[Fraction, ...]
 
 @dataclass(frozen=True)
 class Source:
-    """Something that drives a stage.
+    """An input, a constant or a quantization error that drives a stage.
 
     Attributes
     ----------
@@ -30,9 +30,9 @@ class Source:
     low, high : Fraction
         Range of its value at every sample from reset on; for the input, the range its node states.
     kept : int or None
-        Fraction bits that the quantizer keeps; None for what is no quantizer.
+        Fraction bits that the quantizer keeps; None if the source is not a quantizer.
     numerators : mapping of int to Polynomial
-        From this source to the output node and to every BOUND node, over the stage's denominator.
+        Numerators from this source to the output node and to every BOUND node, over the stage's denominator.
     """
 
     name: str
@@ -44,16 +44,16 @@ class Source:
 
 @dataclass(frozen=True)
 class LinearModel:
-    """What leads to one output of a stage: one denominator, and a numerator for every source and node.
+    """Linear model of one output of a stage: one denominator, and a numerator for every source and node.
 
     Attributes
     ----------
     denominator : Polynomial
-        Constant term 1; of the states that this output depends on.
+        Denominator of the states that this output depends on; the constant term is 1.
     output : int
         Index of the output node.
     entries : tuple of int
-        Which of the stage's inputs it depends on, as positions among them.
+        Positions, among the stage's inputs, of those that it depends on.
     bounds : tuple of int
         Indices of the BOUND nodes that it depends on, whose ranges are to be proven.
     sources : tuple of Source
@@ -73,7 +73,7 @@ class LinearModel:
 
     @property
     def transfer(self) -> Polynomial:
-        """Numerator from the one input to the output."""
+        """Numerator from the only input to the output."""
         (numerator,) = self.transfers
         return numerator
 
@@ -104,18 +104,18 @@ def linear_model(graph: Graph) -> LinearModel:
 
 @lru_cache(maxsize=256)
 def linear_models(graph: Graph) -> tuple[LinearModel, ...]:
-    """Extract the models of all outputs of `graph`, each of what leads to that output alone.
+    """Extract the models of all outputs of `graph`, each from the part of the graph that leads to that output.
 
     Raises
     ------
     ValueError
-        If the graph multiplies two variables or clamps, or states a range of what no output depends on.
+        If the graph multiplies two variables or clamps, or states a range of a node that no output depends on.
     """
     for node in graph.nodes:
         if node.op in {Op.MULTIPLY, Op.CLAMP}:
             raise ValueError(f"graph must be linear, not {node.op.value}")
     bounds = [index for index, node in enumerate(graph.nodes) if node.op is Op.BOUND]
-    # Beside a single output, a state that does not reach it has its range proven too.
+    # With a single output, the ranges of states that do not reach it are proven too.
     beside = bounds if len(graph.outputs) == 1 else []
     models = tuple(_model(*cone(graph, output, beside)) for output in graph.outputs)
     seen = {index for model in models for index in model.bounds}
@@ -127,16 +127,16 @@ def linear_models(graph: Graph) -> tuple[LinearModel, ...]:
 
 
 def cone(graph: Graph, output: int, beside: Sequence[int] = ()) -> tuple[Graph, tuple[int, ...], tuple[int, ...]]:
-    """Cut out what leads to one node of `graph`, and to those `beside` it.
+    """Extract the part of `graph` that leads to one node and to the nodes `beside` it.
 
     Returns
     -------
     graph : Graph
-        With all its inputs among those of the whole, and the one output.
+        The extracted part, with one output.
     indices : tuple of int
-        For each of its nodes the index in the whole.
+        Index in the whole graph of each of its nodes.
     entries : tuple of int
-        For each of its inputs the position among those of the whole.
+        Position, among the inputs of the whole graph, of each of its inputs.
     """
     reached, pending = {output, *beside}, [output, *beside]
     while pending:
@@ -156,7 +156,7 @@ def cone(graph: Graph, output: int, beside: Sequence[int] = ()) -> tuple[Graph, 
 
 
 def _model(graph: Graph, indices: Sequence[int], entries: tuple[int, ...]) -> LinearModel:
-    """Model of `graph`, which has one output; `indices` and `entries` tell its nodes and inputs in the whole."""
+    """Model of `graph`, which has one output; `indices` and `entries` are as `cone` returns them."""
     (output,) = graph.outputs
     bounds = tuple(i for i, node in enumerate(graph.nodes) if node.op is Op.BOUND)
     denominator = _denominator(state_matrix(graph))
@@ -231,7 +231,7 @@ def _impulse_responses(graph: Graph, key: _Key, watched: Sequence[int], length: 
 
 
 def _step(graph: Graph, state: Sequence[Fraction], key: _Key | None, time: int) -> list[Fraction]:
-    """Values of all nodes with the source `key` at 1 at time 0 and 0 at every other, all else at 0."""
+    """Values of all nodes for a unit impulse of the source `key` at time 0, with all other sources at 0."""
     kind, source, kept = key or ("", -1, 0)
     memory = iter(state)
     values: list[Fraction] = []
@@ -261,7 +261,7 @@ def _step(graph: Graph, state: Sequence[Fraction], key: _Key | None, time: int) 
 
 
 def state_matrix(graph: Graph) -> list[list[Fraction]]:
-    """Matrix by which a sample carries the delays of `graph`, in their order, into the next, without quantizers."""
+    """State transition matrix of `graph` without quantizers; the states are its delays, in their order."""
     size = len(graph.delays)
     columns = []
     for j in range(size):

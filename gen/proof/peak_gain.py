@@ -25,14 +25,14 @@ from sosmith.model.errors import ShortfallError
 Coefficients = tuple[Fraction, ...]
 """Of a polynomial in ``w = z**-1``, dyadic, the constant term first."""
 
-_RELATIVE_BITS = 40  # to which a sum is known, roughly
+_RELATIVE_BITS = 40  # approximate relative accuracy of a sum
 _LONGEST = 1 << 20  # samples of a response
-_ROOT_BITS = 80  # to which pole radii are rounded upward
+_ROOT_BITS = 80  # fraction bits that pole radii are rounded up to
 
 
 @dataclass(frozen=True)
 class Horizon:
-    """How long and how fine responses are computed.
+    """Length and resolution at which responses are computed.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ def horizon(paths: Iterable[Iterable[Coefficients]]) -> Horizon:
     largest = max((radius for path in radii for radius in path), default=Fraction(0))
     if largest >= 1:
         raise ShortfallError("every pole must lie inside the unit circle, and one does not")
-    # rho lies nine tenths of the way, in logarithms, to where the slowest pole would be met.
+    # log(rho) is nine tenths of its limit, which the slowest pole sets.
     decay = 4.0 if largest < Fraction(1, 64) else -math.log(largest)
     rho = _rounded_down(Fraction(math.exp(0.9 * decay)))
     log_magnitude = max(-sum(math.log2(1 - radius * rho) for radius in path) for path in radii)
@@ -79,7 +79,7 @@ def horizon(paths: Iterable[Iterable[Coefficients]]) -> Horizon:
 
 @dataclass(frozen=True)
 class Response:
-    """An impulse response with what is not exact about it.
+    """An impulse response with bounds on its inexactness.
 
     Attributes
     ----------
@@ -143,7 +143,7 @@ class Response:
 
     @property
     def uncertainty(self) -> Fraction:
-        """Bound on the sum over all k of what the samples do not say about ``|h_k|``: rounding and tail."""
+        """Bound on the error of the sum of the samples' magnitudes: rounding and tail."""
         return self.rounding * self.horizon.length / (1 << self.horizon.bits) + self.tail
 
     @property
@@ -154,7 +154,7 @@ class Response:
 
 
 def impulse(at: Horizon) -> Response:
-    """Response of nothing: one sample of 1."""
+    """Response without any filter: a single sample of 1."""
     return Response(at, [1 << at.bits] + [0] * (at.length - 1), Fraction(0), Fraction(1))
 
 
@@ -181,10 +181,11 @@ class Extent:
 
 
 def extent(drives: Sequence[Drive]) -> Extent:
-    """Limits of the sum of `drives`, which all start at reset with nothing before.
+    """Limits of the sum of `drives`, all of which are zero before reset.
 
-    They are those of ``sum over drives of sum over k <= n of max(h_k low, h_k high)`` over all n: an interval
-    that is not symmetric about zero is used as it is, and drives that balance at each n do so here.
+    The upper limit is the maximum over all n of ``sum over drives of sum over k <= n of max(h_k low, h_k high)``, and
+    the lower limit likewise. Intervals that are not symmetric about zero are used as they are, and drives may cancel
+    at each n.
     """
     live = [drive for drive in drives if drive.low or drive.high]
     if not live:
@@ -200,7 +201,7 @@ def extent(drives: Sequence[Drive]) -> Extent:
 def _steps(drives: Sequence[Drive]) -> tuple[Fraction, npt.NDArray[np.int64], npt.NDArray[np.int64]]:
     """Largest and smallest contribution of all drives together at each delay, as integers of a common unit.
 
-    The unit is chosen so that their running sums stay within 64 bits; it is far below what matters.
+    The unit is chosen so that their running sums stay within 64 bits; its effect on the result is negligible.
     """
     bits, length = drives[0].response.horizon.bits, len(drives[0].response.samples)
     peak = sum(
@@ -316,7 +317,7 @@ def _power_above(base: Fraction, exponent: int) -> Fraction:
 
 
 def _rounded_up(value: Fraction) -> Fraction:
-    """`value` rounded up to some 64 significant bits, to keep numbers short."""
+    """`value` rounded up to about 64 significant bits, to keep numbers short."""
     scale = Fraction(2) ** (value.denominator.bit_length() - value.numerator.bit_length() + 64)
     return Fraction(math.ceil(value * scale)) / scale
 

@@ -1,1 +1,1 @@
-"""How a section of the ideal filter becomes a stage of integers, one file for each family of structures."""
+"""Realizations of the ideal filter's sections as integer stages, one file for each family of structures."""

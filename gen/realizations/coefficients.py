@@ -16,7 +16,7 @@ class Rounding:
     bits : int
         Significant bits of each coefficient.
     chosen : mapping of str to tuple of int
-        Integer and fraction bits of those coefficients, by name, that take another value than the nearest.
+        Integer and fraction bits, by name, of the coefficients that are not rounded to the nearest value.
     """
 
     bits: int
@@ -38,7 +38,7 @@ def round_significant(value: float, bits: int) -> tuple[int, int]:
 
 
 def lowest_terms(integer: int, frac: int) -> tuple[int, int]:
-    """Drop the trailing zeros of ``integer * 2**-frac``; the fraction bits are never negative."""
+    """Drop the trailing zeros of ``integer * 2**-frac``; the number of fraction bits is never negative."""
     while integer and integer % 2 == 0:
         integer //= 2
         frac -= 1

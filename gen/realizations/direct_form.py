@@ -27,10 +27,10 @@ def products(
 ) -> tuple[tuple[Product, ...], tuple[int, int]]:
     """Products and integer part of a section with rounded coefficients.
 
-    The recursion is written about z = s, with s = 1 or -1. Its coefficients A1 and A2 are small on the side
-    of the poles; on either side A2 is what sets the gain there. A numerator whose gain at z = s is one shares
-    A2, so that this gain is one exactly, whatever the rounding; (1, 2, 1) and (1, -2, 1) numerators then need
-    no product of their own.
+    The recursion is written about z = s, with s = 1 or -1. Its coefficients A1 and A2 are small if s is on the side
+    of the poles; on either side, A2 sets the gain at z = s. A section with unity gain at z = s uses A2 in its numerator
+    too, so that the gain is exactly one however A2 is rounded. Numerators (1, 2, 1) and (1, -2, 1) then need no
+    product of their own.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def products(
     name : str
         Name of the section, for messages.
     side : int or None
-        s; None takes the side where the gain is one, or else that of the poles.
+        s; None selects the side with unity gain, or else that of the poles.
 
     Returns
     -------
@@ -71,7 +71,7 @@ _Term = tuple[str, float, tuple[int, int, int], tuple[int, int], int]
 
 
 def _side(row: Row) -> int:
-    """On which side of the unit circle the section is described: where its gain is one, else where its poles lie."""
+    """Side of the unit circle about which the section is described: with unity gain, or else with the poles."""
     gains = {s: _gain(row, s) for s in (1, -1)}
     unity = [s for s in (1, -1) if abs(gains[s] - 1) < _EQUAL]
     near = pole_side(row)
@@ -79,7 +79,7 @@ def _side(row: Row) -> int:
 
 
 def pole_side(row: Row) -> int:
-    """1 or -1: on which side of the unit circle the poles lie."""
+    """Side of the unit circle where the poles lie: 1 or -1."""
     return -1 if row[4] > 0 else 1
 
 
@@ -167,8 +167,8 @@ def direct_form(
     x : Range
         Fraction bits and range of the input's code.
     fracs : mapping of str to int
-        Fraction bits that are kept of v, as many as x has where missing, and of ``taps_A1`` and the like, all where
-        missing.
+        Fraction bits kept by the quantizers of v and of ``taps_A1`` and the like. If missing, v keeps as many as x
+        has, and the others keep all.
     ranges : mapping of str to tuple of int
         Smallest and largest code of v and of ``taps_A1`` and the like.
     wide : tuple of int
@@ -204,10 +204,10 @@ def direct_form(
 
 @lru_cache(maxsize=1024)
 def best_feedback(denominator: tuple[Fraction, Fraction], integer_part: tuple[int, int], order: int) -> tuple[int, int]:
-    """Multiplier-free error feedback (k1, k2) of an order with the smallest peak gain to the section's output.
+    """Multiplier-free error feedback (k1, k2) of a given order with the smallest peak gain to the section's output.
 
-    Peak gains in double precision, which only choose here; among equals the integer part wins, because one
-    register then holds state and error.
+    Double precision is sufficient for this choice. Among equal gains the integer part is preferred, because one
+    register then holds both state and error.
     """
     if order == 0:
         return 0, 0

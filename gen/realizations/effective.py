@@ -1,8 +1,8 @@
-"""The second-order sections that a datapath's integer coefficients make, whatever its structure.
+"""The second-order sections that a datapath's integer coefficients realize, for any structure.
 
-Sections in a row are told one by one. Where branches meet again, the sum of their transfer functions is taken in
-rationals, and its zeros are found to double precision: so it is exact to rounding even deep in the stop band, where
-the branches nearly cancel.
+Cascaded sections are converted one by one. Where parallel branches meet, their transfer functions are added in rational
+arithmetic, and the zeros of the sum are computed to double precision. The result is therefore accurate even deep in
+the stop band, where the branches nearly cancel.
 """
 
 from __future__ import annotations
@@ -23,16 +23,16 @@ Array = npt.NDArray[np.float64]
 
 
 _Wire = tuple[fmpq_poly, tuple[Polynomial, ...]]
-"""Numerator, and the factors of the denominator, of what a wire carries."""
+"""Numerator, and factors of the denominator, of the transfer function from the input to a wire."""
 
 
 def effective_sections(stages: Sequence[StageModel]) -> Array:
-    """Second-order sections of the same transfer function, one row of b0, b1, b2, 1, a1, a2 for each.
+    """Second-order sections with the same transfer function, one row of b0, b1, b2, 1, a1, a2 for each.
 
     Parameters
     ----------
     stages : sequence of StageModel
-        With one input and one output in all.
+        Stages that together have one input and one output.
 
     Returns
     -------
@@ -48,7 +48,7 @@ def effective_sections(stages: Sequence[StageModel]) -> Array:
     factors, gain = _factors(numerator)
     one = (Fraction(1),)
     pairs = list(zip_longest(factors, denominators, fillvalue=one)) or [(one, one)]
-    share = abs(gain) ** (1 / len(pairs))  # a part of the gain for each
+    share = abs(gain) ** (1 / len(pairs))  # of the gain, for each section
     rows = [[*(share * value for value in _padded(b)), *_padded(a)] for b, a in pairs]
     result = np.array(rows)
     result[0, :3] *= np.sign(gain)
@@ -56,7 +56,7 @@ def effective_sections(stages: Sequence[StageModel]) -> Array:
 
 
 def _through(model: LinearModel, wires: Sequence[_Wire]) -> _Wire:
-    """Add up what arrives at an output of a stage; branches that meet are taken to share no states."""
+    """Add the transfer functions to an output of a stage; branches that meet are assumed to share no states."""
     arrived = [wires[k] for k in model.entries]
     total = fmpq_poly([0])
     for k, transfer in enumerate(model.transfers):
@@ -74,12 +74,12 @@ def _poly(values: Polynomial) -> fmpq_poly:
 
 
 def _factors(polynomial: fmpq_poly) -> tuple[list[tuple[float, ...]], float]:
-    """Factors of a degree of at most 2 in ``w = 1/z``, each 1 or 0 for w = 0, and the constant before them."""
+    """Factors of degree at most 2 in ``w = 1/z``, each with a constant term of 1 or 0, and the constant factor."""
     coefficients = [int(value) for value in polynomial.numer().coeffs()]
     delays = next(k for k, value in enumerate(coefficients) if value)
     pairs: list[tuple[float, ...]] = []
     real: list[float] = []
-    # The library's own types leave out the multiplicities.
+    # The library's type stubs omit the multiplicities.
     roots = cast("list[tuple[acb, int]]", fmpz_poly(coefficients[delays:][::-1]).complex_roots())
     for root, count in roots:
         z = complex(root)

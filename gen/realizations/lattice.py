@@ -1,9 +1,9 @@
-"""Makes lattice wave digital filters: takes a filter apart into two allpass branches, and their coefficients.
+"""Makes lattice wave digital filters: decomposes a filter into two allpass branches and finds their coefficients.
 
-A filter is a lattice where ``H = (s0 A0 + s1 A1) / 2`` with allpass functions A0, A1 that share its poles out between
-them: so it is with Butterworth, Chebyshev and elliptic low-pass and high-pass filters of odd order, and with band-pass
-and band-stop filters that are made from such. Nothing but the poles is needed to build it, so the way to tell is
-to try: of all ways to share the poles out, one gives back H or none does.
+A filter is a lattice if ``H = (s0 A0 + s1 A1) / 2`` with allpass functions A0 and A1, each of which has some of the
+poles. Butterworth, Chebyshev and elliptic low-pass and high-pass filters of odd order are lattices, and so are
+band-pass and band-stop filters derived from them. A lattice is determined by the split of its poles, so all splits
+are tried; either one of them gives H, or the filter is not a lattice.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ Denominator = tuple[Fraction, ...]
 """(1, a1) or (1, a1, a2) of an allpass section."""
 
 Rounding = Callable[[str, float], tuple[int, int]]
-"""Integer and fraction bits of the coefficient of a name and an ideal value."""
+"""Rounds a coefficient, given its name and ideal value, to an integer and its fraction bits."""
 
 _CLOSE = 1e-8
-"""How close a lattice must come to the filter at all frequencies, of a largest gain of one: well above what double
-precision leaves of the designs of tests/gen/word_lengths/test_sweep.py, well below what any other filter comes to. The
-proof takes account of what remains."""
+"""Largest allowed difference between a lattice and the filter at any frequency, relative to the largest gain. It is
+well above the double-precision errors of the designs in tests/gen/word_lengths/test_sweep.py, and well below the
+difference of any filter that is not a lattice. The proof covers the remaining difference."""
 
-_MAX_GROUPS = 16  # of poles; all ways to share these out are tried
-_NOTHING = 1e-13  # a coefficient this small is but the rounding of the design
+_MAX_GROUPS = 16  # of poles; all splits between the two branches are tried
+_NOTHING = 1e-13  # a coefficient this small is a rounding error of the design
 _FREQUENCIES = 24
 
 Spectrum = npt.NDArray[np.complex128]
@@ -43,14 +43,14 @@ Spectrum = npt.NDArray[np.complex128]
 
 @dataclass(frozen=True)
 class LatticePair:
-    """What one stage is made from: the denominators of the sections in its two branches, None for a wire."""
+    """Part for one stage: the denominators of the sections in its two branches, None for a wire."""
 
     lanes: tuple[Denominator | None, Denominator | None]
 
 
 @dataclass(frozen=True)
 class LatticeSigns:
-    """What the last stage is made from: s0 and s1."""
+    """Part for the last stage: s0 and s1."""
 
     signs: tuple[int, int]
 
@@ -59,7 +59,7 @@ Part = LatticePair | LatticeSigns
 
 
 def lattice_parts(rows: Sequence[Row]) -> tuple[Part, ...]:
-    """Take a filter apart into what the stages of its lattice are made from.
+    """Decompose a filter into the parts that the stages of its lattice are made from.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def lattice_parts(rows: Sequence[Row]) -> tuple[Part, ...]:
     Raises
     ------
     ShortfallError
-        If the filter is no lattice.
+        If the filter is not a lattice.
     """
     return _parts(tuple(tuple(row) for row in rows))
 
@@ -94,7 +94,7 @@ def _parts(rows: tuple[tuple[float, ...], ...]) -> tuple[Part, ...]:
 def _groups(rows: Sequence[tuple[float, ...]]) -> list[Denominator]:
     """Denominators of the allpass sections: one for each pair of complex poles and for each real pole.
 
-    They are exact for complex poles. Poles at zero belong to zeros beyond those that the other poles pair with.
+    They are exact for complex poles. Poles at zero are added if there are more zeros than other poles.
     """
     groups: list[Denominator] = []
     zeros = 0
@@ -131,14 +131,14 @@ def _shared_out(
 ) -> tuple[set[int], tuple[int, int]] | None:
     """Which of `groups` belong to the upper branch, and the signs of the branches; None if there is no lattice.
 
-    The phase of an allpass function tells its sections apart most where its poles are: there are the frequencies to
-    try, and between them.
+    The phases of allpass sections differ most near their poles, so the candidates are compared at frequencies there
+    and in between.
     """
     w = np.exp(-1j * _frequencies(groups))
     wanted = np.prod([_value(row[:3], w) / _value(row[3:], w) for row in rows], axis=0)
     sections = [_value(group[::-1], w) / _value(group, w) for group in groups]
     upper = lower = np.ones((1, len(w)), dtype=np.complex128)
-    for section in sections:  # bit k of an index tells whether section k is in the upper branch
+    for section in sections:  # bit k of an index is set if section k is in the upper branch
         upper, lower = np.concatenate([upper, upper * section]), np.concatenate([lower * section, lower])
     best, choice, signs = math.inf, 0, (1, 1)
     for s0, s1 in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
@@ -152,7 +152,7 @@ def _shared_out(
 
 
 def _frequencies(groups: Sequence[Denominator]) -> npt.NDArray[np.float64]:
-    """Angular frequencies at the poles, around them by their distance from the unit circle, and everywhere else."""
+    """Angular frequencies at the poles, around them (spaced by the distance to the unit circle), and on a grid."""
     found = list(np.linspace(0, math.pi, _FREQUENCIES))
     for group in groups:
         angle = _angle(group)
@@ -188,7 +188,7 @@ def lattice_stage(
     entries : sequence of Range
         Fraction bits and range of each input's code; a single one drives both branches.
     fracs : mapping of str to int
-        Fraction bits that are kept of ``upper_x1_sum`` and the like; those of the lane's input where missing.
+        Fraction bits kept by the quantizers of ``upper_x1_sum`` and the like; if missing, those of the branch's input.
     ranges : mapping of str to tuple of int
         Smallest and largest code of ``upper_x1_next`` and the like.
     wide : tuple of int
@@ -209,7 +209,7 @@ def lattice_stage(
 
         ideal = _adaptors(denominator)
         names = ("g",) if len(ideal) == 1 else ("g1", "g2")
-        # An inner coefficient of zero makes two delays in a row: what enters the first is not quantized again.
+        # An inner coefficient of zero makes two delays in series, between which nothing is quantized.
         second, inner = ("x1_sum", "x1_sum") if ideal[1:] == [(0, 0.0)] else ("x2_sum", "inner_sum")
         return Allpass(
             adaptors=tuple(
@@ -232,7 +232,7 @@ def lattice_stage(
 
 
 def _adaptors(denominator: Denominator) -> list[tuple[int, float]]:
-    """For each adaptor what its coefficient is near to, -1, 0 or 1, and the rest."""
+    """For each adaptor, the nearest of -1, 0 and 1 to its coefficient, and the remainder."""
     if len(denominator) == 2:
         return [_split(-denominator[1])]
     _, a1, a2 = denominator

@@ -1,7 +1,7 @@
 """Second-order sections in the coordinates with the least roundoff noise, the same doubles on every machine.
 
-The theory is that of `sosmith.gen.realizations.noise`. Here the Gramians are exact rationals, and what follows from
-them is rounded correctly.
+The theory is in `sosmith.gen.realizations.noise`. Here the Gramians are exact rationals, and the results are correctly
+rounded.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from sosmith.model.arithmetic.correct_rounding import ball, evaluate, nearest_do
 
 Array = npt.NDArray[np.float64]
 
-_FLOOR = 1e-12  # of the largest eigenvalue: what is below is a state that nearly no input or output sees
+_FLOOR = 1e-12  # relative to the largest eigenvalue: below it a state is nearly uncontrollable or unobservable
 _EQUAL = 1e-9  # relative distance at which two eigenvalues count as one
 _NOTHING = 1e-9  # relative size below which an entry of B counts as zero
 
 
 def least_noise(side: int, M: Array, C: Array) -> tuple[Array, Array]:
-    """Turn a section into the coordinates with the least noise.
+    """Transform a section to the coordinates with the least noise.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ def least_noise(side: int, M: Array, C: Array) -> tuple[Array, Array]:
     M : array, shape (2, 2)
         ``A = s (I + M)``, stable.
     C : array, shape (2,)
-        Beside B = (0, 1).
+        For B = (0, 1).
 
     Returns
     -------
@@ -67,7 +67,7 @@ def unit_gains(side: int, M: Array, B: Array) -> Array:
 
 
 def power_of_two_below(value: float) -> float:
-    """Largest power of two that is not above a positive value."""
+    """Largest power of two not above a positive value."""
     return math.ldexp(0.5, math.frexp(value)[1])
 
 
@@ -121,7 +121,7 @@ def _coordinates(K: arb_mat, W: arb_mat) -> arb_mat:
     spread = (half**2 + mixed**2).nonnegative_part().sqrt()
     if sign(spread - mean * _EQUAL) > 0:
         cosine = half / spread
-    else:  # any axes will do, and which these are would be left to the rounding of the coefficients
+    else:  # any axes will do; the computed ones would depend on how the coefficients were rounded
         cosine, mixed = arb(1), arb(0)
     # the major axis of S lies at half the angle of (half, mixed)
     along = ((1 + cosine) / 2).nonnegative_part().sqrt()

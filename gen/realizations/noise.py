@@ -2,8 +2,8 @@
 
 A system ``x(n+1) = A x + B u, y = C x + D u`` has the Gramians ``K = A K A' + B B'`` of its states (their variances
 for white input of variance 1) and ``W = A' W A + C' C`` (the energy at the output of a unit error of each state).
-Words that use their range hold state i with a variance in proportion to ``K_ii``, so ``K_ii W_ii`` is the noise
-that its rounding makes; the sum over the states is the noise gain. No coordinates make it smaller than
+If each state uses its full range, the variance of the rounding error of state i is proportional to ``K_ii``, and its
+noise at the output to ``K_ii W_ii``; the sum over the states is the noise gain. No coordinates make it smaller than
 ``(sum mu)**2 / n`` with the second-order modes mu, the square roots of the eigenvalues of K W
 (Mullis and Roberts 1976; Hwang 1977).
 """
@@ -20,7 +20,7 @@ from scipy import linalg
 
 Array = npt.NDArray[np.float64]
 
-_FLOOR = 1e-12  # of the largest eigenvalue: what is below is a state that nearly no input or output sees
+_FLOOR = 1e-12  # relative to the largest eigenvalue: below it a state is nearly uncontrollable or unobservable
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,12 +52,12 @@ class StateSystem:
 
     @property
     def noise(self) -> Array:
-        """``K_ii W_ii`` of every state, shape (n,): its share of the noise gain."""
+        """``K_ii W_ii`` of every state, shape (n,): its contribution to the noise gain."""
         return np.asarray(np.diag(self.controllability) * np.diag(self.observability), dtype=np.float64)
 
     @property
     def energy(self) -> float:
-        """Sum of the squares of the impulse response: noise at the output for white noise at the input."""
+        """Sum of the squares of the impulse response: noise gain from a white input to the output."""
         return float(self.D**2 + self.C @ self.controllability @ self.C)
 
     def transformed(self, T: Array) -> StateSystem:
@@ -67,7 +67,7 @@ class StateSystem:
 
 
 def companion(row: Sequence[float]) -> StateSystem:
-    """Second-order section in direct form II: the states are its inner signal, one and two samples ago.
+    """Second-order section in direct form II: the states are its internal signal, delayed by one and two samples.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def companion(row: Sequence[float]) -> StateSystem:
 
 
 def cascade(systems: Sequence[StateSystem]) -> StateSystem:
-    """Make one system of several, each fed by the one before; its states are theirs, in order."""
+    """Combine several systems into one, each driven by the previous one; the states are theirs, in order."""
     whole = systems[0]
     for after in systems[1:]:
         n, m = len(whole.B), len(after.B)
@@ -95,21 +95,21 @@ def cascade(systems: Sequence[StateSystem]) -> StateSystem:
 
 
 def second_order_modes(system: StateSystem) -> Array:
-    """Second-order modes, largest first, shape (n,); no coordinates and no frequency transformation change them."""
+    """Second-order modes, largest first, shape (n,); invariant under changes of coordinates and of frequency."""
     squares = np.linalg.eigvals(system.controllability @ system.observability)
     return np.sort(np.sqrt(np.maximum(squares.real, 0.0)))[::-1]
 
 
 def minimum_gain(modes: Array) -> float:
-    """Smallest noise gain that any coordinates reach, all states with words of equal length."""
+    """Smallest noise gain in any coordinates if all states have the same word length."""
     return float(modes.sum() ** 2 / len(modes))
 
 
 def minimum_noise_coordinates(K: Array, W: Array) -> Array:
     """Coordinates T, shape (2, 2), in which two states with these Gramians make the least noise.
 
-    In balanced coordinates K and W are the same diagonal matrix of the modes. Turned from there by an eighth of
-    a turn they are still equal, and so are both entries of their diagonal: the condition for the minimum.
+    In balanced coordinates, K and W are the same diagonal matrix of the modes. After a rotation by 45 degrees they are
+    still equal, and so are both diagonal entries, which is the condition for the minimum.
     """
     lower = np.linalg.cholesky(K)
     squares, U = np.linalg.eigh(lower.T @ W @ lower)
@@ -119,7 +119,7 @@ def minimum_noise_coordinates(K: Array, W: Array) -> Array:
 
 
 def block_optimal(systems: Sequence[StateSystem]) -> list[StateSystem]:
-    """Second-order sections, each in the coordinates that make the least noise within their cascade."""
+    """Second-order sections, each in the coordinates with the least noise within their cascade."""
     whole = cascade(systems)
     blocks = [slice(2 * i, 2 * i + 2) for i in range(len(systems))]
     return [

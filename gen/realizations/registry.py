@@ -1,6 +1,6 @@
-"""The registry of realizations: how a section of the ideal filter becomes a stage of integers.
+"""The registry of realizations: how a section of the ideal filter becomes an integer stage.
 
-A realization is named here once. Word lengths, proof, C model, hardware, report and test matrix take it from here.
+Each realization is registered once, here. Word lengths, proof, C model, hardware, report and test matrix follow.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Section(Stage, Protocol):
 
     @property
     def optional_quantizers(self) -> tuple[str, ...]:
-        """Names of the nodes of which bits may be dropped without need."""
+        """Names of the nodes whose quantizers are optional."""
         ...
 
 
@@ -43,14 +43,14 @@ class Realization:
     name : str
         As in the specification.
     title : str
-        A few words for people.
+        Short description.
     build : callable
-        Makes the stage of a part in given formats, with a given name.
+        Makes the stage for a part, given its formats and name.
     parts : callable
-        Takes the ideal sections apart into what the stages are made from; the rows themselves for a cascade. Raises
-        ShortfallError where the filter cannot be realized so.
+        Turns the ideal sections into one part for each stage: the rows themselves for a cascade. Raises
+        ShortfallError if the filter has no such realization.
     cascade : bool
-        Whether every stage is one of the ideal sections, in whichever order.
+        Whether every stage is one of the ideal sections, in any order.
     """
 
     name: str
@@ -158,4 +158,4 @@ CASCADES = tuple(name for name, realization in REALIZATIONS.items() if realizati
 """Names of the realizations whose stages are the ideal sections."""
 
 BEST_KEPT = "df1_ef2"
-"""Realization whose rounding needs the fewest bits at low cutoffs: where it falls short, its reason tells most."""
+"""Realization that needs the fewest bits at low cutoffs: if it fails too, its reason is the most informative."""

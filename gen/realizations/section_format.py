@@ -9,11 +9,11 @@ from sosmith.gen.realizations.coefficients import Rounding
 from sosmith.model.dataflow.graph import Range
 
 WIDE = 1 << 256
-"""Limit of a code whose range is not known yet; it never meets hardware."""
+"""Placeholder limit of a code whose range is not known yet; never used in hardware."""
 
 
 def unknown_range(frac: int) -> Range:
-    """Return the range of a signal of which only the fraction bits are known."""
+    """Return the range of a signal for which only the fraction bits are known."""
     return Range(frac, -WIDE, WIDE)
 
 
@@ -29,16 +29,16 @@ class SectionFormat:
     x : Range
         Fraction bits and range of the input's code.
     beside : tuple of Range
-        The same of each further input.
+        The same for each further input.
     coefficient_bits : int
-        Significant bits of each coefficient that is not in `coefficients`; 0 where all are.
+        Significant bits of each coefficient that is not in `coefficients`; 0 if all are.
     coefficients : mapping of str to tuple of int
         Integer and fraction bits of coefficients, by name.
     fracs : mapping of str to int
-        Fraction bits kept by each quantizer, by the name of the node that it quantizes. Empty, they keep as many as
-        the input has; otherwise those that are missing keep all.
+        Fraction bits kept by each quantizer, by the name of the node that it quantizes. If the mapping is empty, all
+        quantizers keep as many as the input has; otherwise, missing ones keep all.
     ranges : mapping of str to tuple of int
-        Range of the code of every node whose range is stated, by its name; `WIDE` where missing.
+        Range of the code of every node with a stated range, by its name; `WIDE` if missing.
     """
 
     x: Range = _UNKNOWN
@@ -55,9 +55,9 @@ class SectionFormat:
         return Rounding(self.coefficient_bits or longest, self.coefficients)
 
     def with_frac(self, name: str, frac: int) -> SectionFormat:
-        """Return the same with other fraction bits of one quantizer."""
+        """Return a copy with different fraction bits for one quantizer."""
         return replace(self, fracs={**self.fracs, name: frac})
 
     def with_coefficient(self, name: str, value: tuple[int, int]) -> SectionFormat:
-        """Return the same with another value of one coefficient."""
+        """Return a copy with a different value for one coefficient."""
         return replace(self, coefficients={**self.coefficients, name: value})

@@ -1,11 +1,11 @@
 """Makes state-space sections: minimum-noise coordinates, or normal form for truncated states.
 
-A section is described about z = s, with s = 1 or -1 on the side of its poles, as ``A = s (I + M)``: M is small
-where the poles are near s, and nothing is lost by cancellation on the way to coefficients.
+A section is described about z = s, with s = 1 or -1 on the side of its poles, as ``A = s (I + M)``. M is small
+if the poles are near s, and the coefficients are computed without cancellation.
 
-Every state is scaled so that its input coefficient is a power of two, of a size that for white input
-gives the state a standard deviation of one half to one times the input's. The noise gains ``K_ii W_ii`` do not
-depend on the scaling, and B needs no multiplication.
+Every state is scaled so that its input coefficient is a power of two, chosen so that a white input gives the state a
+standard deviation of one half to one times the input's. The noise gains ``K_ii W_ii`` do not depend on the scaling,
+and B needs no multiplication.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ from sosmith.model.sections.state_space import Coefficient, StateSpace
 Array = npt.NDArray[np.float64]
 Row = Sequence[float]
 
-_ROUNDING = 1e-13  # relative size below which an entry of A is but the rounding of this design
-_EQUAL = 2.0**-36  # relative to the squared distance from s: square of an imaginary part that counts as none
+_ROUNDING = 1e-13  # relative size below which an entry of A is a rounding error of this design
+_EQUAL = 2.0**-36  # relative to the squared distance from s: squared imaginary part below which a pole counts as real
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,12 +57,12 @@ class StateDesign:
 
     @property
     def system(self) -> StateSystem:
-        """The same as A, B, C, D."""
+        """The section as a system with A, B, C, D."""
         return StateSystem(self.side * (np.eye(len(self.B)) + self.M), self.B, self.C, self.D)
 
 
 def minimum_noise(row: Row) -> StateDesign:
-    """Design a section with the least roundoff noise that two states can have.
+    """Design a section with the least roundoff noise possible with two states.
 
     Parameters
     ----------
@@ -75,9 +75,9 @@ def minimum_noise(row: Row) -> StateDesign:
 def normal(row: Row) -> StateDesign:
     """Design a section that comes to rest when its states are truncated towards zero.
 
-    Complex poles ``p`` make the normal form, A = [[re p, -im p], [im p, re p]], which shortens every state
-    vector. Real poles make two first-order systems in a row, which come to rest one after the other; unlike a
-    diagonal A, which nearly equal poles make ill-conditioned, that works for all of them.
+    Complex poles ``p`` give the normal form, A = [[re p, -im p], [im p, re p]], which shortens every state vector.
+    Real poles give two first-order systems in series, which come to rest one after the other. This works for all real
+    poles, whereas a diagonal A is ill-conditioned if they are nearly equal.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def _normal(row: tuple[float, ...]) -> StateDesign:
         w = math.sqrt(imaginary)
         M, B = np.array([[-big1 / 2, -w], [w, -big1 / 2]]), np.array([0.0, 1.0])
         return _completed(row, side, M, B * unit_gains(side, M, B).min())
-    # Roots of d**2 + big1 d + big2, the distances of the poles from s: the far one first, without cancellation.
+    # Roots of d**2 + big1 d + big2, the distances of the poles from s: the larger one first, to avoid cancellation.
     far = -(big1 + 2 * math.sqrt(max(-imaginary, 0.0))) / 2
     near = big2 / far
     M, B = np.array([[near, 0.0], [1.0, far]]), np.array([1.0, 0.0])
@@ -141,7 +141,7 @@ def _about_side(row: Row) -> tuple[int, float, float]:
 
 
 def _completed(row: Row, side: int, M: Array, B: Array) -> StateDesign:
-    """Find C so that the system has the section's numerator: ``C B = h1`` and ``C A B = h2``, exactly solved."""
+    """Find C so that the system has the section's numerator: solves ``C B = h1`` and ``C A B = h2`` exactly."""
     b0, b1, b2, _, a1, a2 = map(Fraction, row)
     first = b1 - b0 * a1
     second = b2 - b0 * a2 - a1 * first
@@ -177,14 +177,14 @@ def state_space(
     design : callable
         `minimum_noise` or `normal`.
     truncating : bool
-        Whether the states are truncated towards zero, not rounded.
+        Whether the states are truncated towards zero instead of being rounded.
     rounding : Rounding
         Rounds the coefficients.
     u : Range
         Fraction bits and range of the input's code.
     fracs : mapping of str to int
-        Fraction bits that are kept of ``x1_sum``, ``x2_sum`` and ``y_sum``. A missing one keeps all where the sum is
-        of integer multiples, else as many as the input has.
+        Fraction bits kept of ``x1_sum``, ``x2_sum`` and ``y_sum``. If missing, a sum of integer multiples keeps all,
+        and any other sum keeps as many as the input has.
     ranges : mapping of str to tuple of int
         Smallest and largest code of ``x1_next``, ``x2_next`` and ``y``.
     wide : tuple of int
@@ -204,7 +204,7 @@ def state_space(
     c = tuple(Coefficient(*rounding(f"c{i}", value)) for i, value in enumerate(made.C, start=1))
     d = Coefficient(*rounding("d", made.D))
     x_fracs = [fracs.get(f"x{i + 1}_sum", u.frac) for i in states]
-    for i in [*states, *states]:  # twice, as a state that only copies may stand before the one that it copies
+    for i in [*states, *states]:  # twice, since a state that only copies another may come before it
         if f"x{i + 1}_sum" not in fracs:
             x_fracs[i] = _exact_frac([*zip(a[i], x_fracs, strict=True), (b[i], u.frac)], u.frac)
     try:
@@ -229,7 +229,7 @@ def state_space(
 
 
 def _exact_frac(terms: Sequence[tuple[Coefficient, int]], otherwise: int) -> int:
-    """Fraction bits of a sum of integer multiples of signals with so many each, or else `otherwise`."""
+    """Fraction bits of the exact sum if all multiples are integers, else `otherwise`."""
     used = [(coefficient, frac) for coefficient, frac in terms if coefficient.integer]
     whole = all(coefficient.frac == 0 for coefficient, _ in used)
     return max((frac for _, frac in used), default=otherwise) if whole else otherwise
@@ -238,7 +238,10 @@ def _exact_frac(terms: Sequence[tuple[Coefficient, int]], otherwise: int) -> int
 def _rounded_matrix(
     made: StateDesign, rounding: Rounding
 ) -> tuple[tuple[tuple[Coefficient, ...], ...], tuple[int, ...]]:
-    """Rows of A with its diagonal split, and the integer part: 0 where a diagonal entry is closer to 0 than to s."""
+    """Rows of A with the integer part of its diagonal split off, and that integer part.
+
+    The integer part is 0 where a diagonal entry is closer to 0 than to s.
+    """
     integers = [round(1 + entry) for entry in np.diag(made.M)]
     rest = made.M + np.diag([1 - integer for integer in integers])
     rest[np.abs(rest) < _ROUNDING * np.abs(rest).max()] = 0

@@ -34,31 +34,32 @@ def transposed_form(
     name : str
         Its name.
     delta : bool
-        In the delta operator about the side of the unit circle where its poles lie, not in the shift operator.
+        Whether to use the delta operator, about the side of the unit circle where the poles lie, instead of the shift
+        operator.
     rounding : Rounding
         Rounds the coefficients.
     x : Range
         Fraction bits and range of the input's code.
     fracs : mapping of str to int
-        Fraction bits that the quantizers of v, t1 and t2 keep. Empty, they keep as many as the input has; else those
-        that are missing keep all, because with none nothing was left there to drop.
+        Fraction bits kept by the quantizers of v, t1 and t2. If the mapping is empty, all keep as many as the input
+        has; otherwise a missing one keeps all, because it had nothing to drop.
     ranges : mapping of str to tuple of int
         Ranges of the codes of v, t1 and t2.
     wide : tuple of int
-        Range where one is missing.
+        Range of a code that `ranges` does not name.
 
     Raises
     ------
     ShortfallError
         If the section passes nothing, or its rounded coefficients are unstable.
     """
-    # In transposed form each coefficient meets x by itself, so that a unity gain on the other side saves nothing.
+    # In transposed form, x is multiplied by each coefficient separately: unity gain on the other side saves nothing.
     side = pole_side(row)
     made, integer_part = products(row, rounding, name, side)
     operator = side if delta else 0
     exponent = _delta_exponent(row, operator)
     state_fracs = (fracs.get("t1"), fracs.get("t2")) if fracs else (x.frac, x.frac)
-    # Without x(n) in it, y(n) is s1, which is quantized already.
+    # If y(n) does not depend on x(n), it is s1, which is already quantized.
     output = "v" if any(product.x[0] for product in made) else "t1"
     try:
         return TransposedForm(
@@ -81,7 +82,7 @@ def transposed_form(
 
 
 def _exact_frac(x_frac: int, fracs: Mapping[str, int], delta_exponent: int) -> int:
-    """Fraction bits of y where it adds only integer multiples of x and of what the states keep."""
+    """Fraction bits of y, which is a sum of integer multiples of x and of the quantized states."""
     if not fracs:
         return x_frac
     return max(x_frac, fracs.get("t1", 0), fracs.get("t2", 0) - delta_exponent)
@@ -90,8 +91,8 @@ def _exact_frac(x_frac: int, fracs: Mapping[str, int], delta_exponent: int) -> i
 def _delta_exponent(row: Row, operator: int) -> int:
     """Exponent of the power of two nearest to the ratio of the states' rms values.
 
-    With A1 and A2 in powers of ``z - g``, ``Delta s2`` is about the derivative of y plus A1 y; for noise in a
-    narrow band about the poles these are independent, of the powers A2 and A1**2 times that of y.
+    With A1 and A2 in powers of ``z - g``, ``Delta s2`` is approximately the derivative of y plus A1 y. For noise in a
+    narrow band about the poles, these two are uncorrelated, with powers of A2 and A1**2 times that of y.
     """
     if operator == 0:
         return 0

@@ -1,8 +1,8 @@
-"""The format of a certificate: what stands in the file, and nothing about how it is proven.
+"""The file format of a certificate.
 
 A certificate is a JSON text. Integers are JSON integers, rationals are strings ``"p/q"``; there are no
-floating-point numbers in it. A figure that is the sum of an infinite series stands as the next multiple of
-``2**-64`` above it (`on_grid`), so that whoever computes it closely enough finds the same number.
+floating-point numbers in it. The sum of an infinite series is stored as the next multiple of ``2**-64`` above it
+(`on_grid`), so that anyone who computes it accurately enough gets the same number.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from sosmith.model.errors import SpecificationError
 
 FORMAT = "sosmith certificate 1"
 _GRID_BITS = 64
-_MAX_BITS = 4096  # of any number; far beyond any design, and short of what would stall the arithmetic
-_MAX_DIGITS = 1300  # of an integer in the file, somewhat beyond the same
+_MAX_BITS = 4096  # of any number: far beyond any design, and few enough to keep the arithmetic fast
+_MAX_DIGITS = 1300  # of an integer in the file: slightly more than _MAX_BITS
 _RATIONAL = re.compile(r"(-?[0-9]{1,1200})(?:/([0-9]{1,1200}))?")
 
 
@@ -80,21 +80,21 @@ class Operation(Enum):
     CONSTANT = "constant"
     ADD = "add"
     SUBTRACT = "subtract"
-    SHIFT = "shift"  # by 2**parameter: the same code, another binary point
-    SCALE = "scale"  # by the constant parameter * 2**-parameter_frac
+    SHIFT = "shift"  # multiplies by 2**parameter: the same code with another binary point
+    SCALE = "scale"  # multiplies by the constant parameter * 2**-parameter_frac
     MULTIPLY = "multiply"
-    FLOOR = "floor"  # down to `frac` fraction bits
-    FRACTION = "fraction"  # what FLOOR to `parameter` fraction bits drops
-    TRUNCATE = "truncate"  # towards zero, to `frac` fraction bits
-    CLAMP = "clamp"  # to low..high
-    BOUND = "bound"  # the value of the operand, which is claimed to stay in low..high
-    DELAY = "delay"  # the operand of the sample before; 0 at reset
+    FLOOR = "floor"  # rounds down to `frac` fraction bits
+    FRACTION = "fraction"  # the bits that FLOOR to `parameter` fraction bits drops
+    TRUNCATE = "truncate"  # rounds towards zero to `frac` fraction bits
+    CLAMP = "clamp"  # limits to low..high
+    BOUND = "bound"  # passes on the operand, which is claimed to stay in low..high
+    DELAY = "delay"  # the operand at the previous sample; 0 at reset
 
 
 class NodeEntry(_Part):
     """A node of a dataflow graph: its value is its code times ``2**-frac``, and the code stays in low..high.
 
-    `operands` are indices of nodes in the same stage; that of a DELAY may come later.
+    `operands` are indices of nodes in the same stage. Only a DELAY may refer to a later node.
     """
 
     op: Operation
@@ -124,10 +124,10 @@ class SectionEntry(_Part):
 
 
 class IdealEntry(_Part):
-    """What the hardware stands for.
+    """The exact calculation that the hardware approximates.
 
-    `polynomial` holds the calibration's coefficients in physical units, row i those of the first input to the
-    power i; None where the value of the one input is taken as it is.
+    `polynomial` holds the calibration's coefficients in physical units: row i is for the first input to the power i.
+    It is None if the only input is used as it is.
     """
 
     polynomial: tuple[Annotated[tuple[Rational, ...], Field(min_length=1)], ...] | None
@@ -135,7 +135,7 @@ class IdealEntry(_Part):
 
 
 class GainEntry(_Part):
-    """Worst-case peak gains of a section of the hardware: of the section, and of its recursion 1/A alone."""
+    """Worst-case peak gains of a section as built: of the whole section, and of its recursion 1/A alone."""
 
     section: Text
     peak_gain: Rational
@@ -143,7 +143,7 @@ class GainEntry(_Part):
 
 
 class ClaimsEntry(_Part):
-    """What is claimed, in output LSBs; the gains are plain numbers, `peak_gain` that of the ideal filter."""
+    """Claims, in output LSBs; gains have no unit, and `peak_gain` is that of the ideal filter."""
 
     budget: dict[Text, Rational]
     bound: Rational
@@ -165,13 +165,13 @@ class Certificate(_Part):
 
 
 def certificate_text(certificate: Certificate) -> str:
-    """JSON text with one node a line, the same on every run."""
+    """JSON text with one node per line, identical on every run."""
     tree = certificate.model_dump(mode="json", exclude_defaults=True)
     return _layout(tree, "") + "\n"
 
 
 def _layout(tree: Any, indent: str) -> str:
-    """Break lines down to the innermost lists and objects, which take one each."""
+    """Break lines so that each of the innermost lists and objects has its own line."""
     inner = indent + " "
     if isinstance(tree, dict) and any(isinstance(value, dict | list) and value for value in tree.values()):
         if "op" not in tree:
@@ -238,7 +238,7 @@ _SENTENCES = {
     "less_than": "it must be less than {lt}",
     "value_error": "it {error}",
 }
-"""What to say of the errors that validation finds, by their type; in braces what it knows about them."""
+"""Messages for validation errors, by error type; the placeholders are keys of the error's context."""
 
 
 def _said(error: ErrorDetails) -> str:
@@ -247,7 +247,7 @@ def _said(error: ErrorDetails) -> str:
 
 
 def _power(value: int) -> str:
-    """Write a limit, which is a power of two where it is large."""
+    """Write a limit; a large one is a power of two and written as such."""
     return str(value) if abs(value) < 10**6 else f"{'-' if value < 0 else ''}2**{value.bit_length() - 1}"
 
 

@@ -1,7 +1,7 @@
 """Checks a certificate's dataflow graphs on their own, and reads transfer functions off them by determinants.
 
-Nothing here shares code with the way the graphs were built (`sosmith.model.dataflow.graph.GraphBuilder`) or with the
-extraction that word lengths were chosen on (`sosmith.gen.proof.linear_model`).
+This shares no code with the module that builds the graphs (`sosmith.model.dataflow.graph`) or with the linear models
+that word lengths are chosen from (`sosmith.gen.proof.linear_model`).
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def require(condition: bool, message: str) -> None:
 
 
 def label(stage: StageEntry, index: int) -> str:
-    """Name a node for people."""
+    """Name of a node, for messages."""
     node = stage.nodes[index]
     return f"node {index} ({f'{node.op.value} {node.name}'.strip()}) of {stage.name}"
 
@@ -48,22 +48,22 @@ _OPERANDS = {
     Operation.SUBTRACT: 2,
     Operation.MULTIPLY: 2,
 }
-"""Numbers of operands; all others take one."""
+"""Numbers of operands; all other operations take one."""
 
 _PARAMETERS = {Operation.CONSTANT: 1, Operation.SHIFT: 1, Operation.FRACTION: 1, Operation.SCALE: 2}
-"""How many of `parameter`, `parameter_frac` an operation uses; the others use none."""
+"""How many of `parameter`, `parameter_frac` an operation uses; all other operations use none."""
 
 
 def check_graph(stage: StageEntry) -> None:
-    """Check that a stage can be computed in the order of its nodes and that its ranges follow from each other.
+    """Check that a stage can be computed in the order of its nodes, and that each range follows from earlier ones.
 
-    The range of an INPUT is checked where stages meet, that of a BOUND, beyond its lying in its operand's, where
-    it is proven.
+    The range of an INPUT is checked where stages meet. For a BOUND, only that it lies within its operand's range is
+    checked here; the rest is checked where it is proven.
 
     Raises
     ------
     RejectedError
-        If a node refers to one that is not computed yet, or has another format or range than its operands give.
+        If a node refers to one that is not computed yet, or its format or range does not follow from its operands.
     """
     for index, node in enumerate(stage.nodes):
         name = label(stage, index)
@@ -112,10 +112,10 @@ def _expected(stage: StageEntry, node: NodeEntry, name: str) -> tuple[int, int, 
 
 
 def _delayed(stage: StageEntry, node: NodeEntry) -> Interval:
-    """Range of a delay: that of its source, and the zero of reset.
+    """Range of a delay: that of its source, extended to contain the zero of reset.
 
-    A wider one would do no harm. It is accepted where the source's own limit is not the one that was proven, but
-    interval arithmetic happened to give a closer one.
+    A wider range does no harm. It is accepted where interval arithmetic gives the source a tighter limit than the
+    one that was proven.
     """
     source = stage.nodes[node.operands[0]]
     low, high = min(source.low, 0), max(source.high, 0)
@@ -178,8 +178,9 @@ def _dropped_bits(node: NodeEntry, of: NodeEntry, count: int) -> tuple[int, int,
 
 
 Source = tuple[Operation, int, int]
-"""What drives a stage: (INPUT, node, 0), (CONSTANT, node, 0), or what a quantizer drops: (FLOOR or TRUNCATE, the
-undelayed node that is quantized, fraction bits kept). All quantizers of one node to the same bits are one source."""
+"""What drives a stage: (INPUT, node, 0), (CONSTANT, node, 0), or a quantization error: (FLOOR or TRUNCATE, the
+undelayed node that is quantized, fraction bits kept). All quantizers of one node that keep the same bits are one
+source."""
 
 _State = int
 _Form = dict["_State | tuple[Source, int]", fmpq]
@@ -200,7 +201,7 @@ class Transfer:
 
     @cached_property
     def sources(self) -> dict[Source, tuple[Fraction, Fraction]]:
-        """Every source with the range of its values, the input first."""
+        """Every source with the range of its values; the inputs come first."""
         nodes = self.stage.nodes
         found: dict[Source, tuple[Fraction, Fraction]] = {}
         for form in self._forms:
@@ -226,11 +227,11 @@ class Transfer:
         return _reversed_characteristic(self._matrix)
 
     def numerator(self, source: Source, node: int) -> fmpq_poly:
-        """From `source` to `node`, over `denominator`.
+        """Numerator from `source` to `node`, over `denominator`.
 
         With the states ``s = w (A s + b u)`` and the node ``c s + d u`` it is ``det(I - w A + w b c) + (d - 1)
-        det(I - w A)``, by the matrix determinant lemma. A source that enters with several delays counts once for
-        each.
+        det(I - w A)``, by the matrix determinant lemma. A source that enters with several delays contributes one such
+        term for each.
         """
         states = self._states
         c = [self._forms[node].get(state, fmpq(0)) for state in states]

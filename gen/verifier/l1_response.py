@@ -6,8 +6,8 @@ norm. Let D be a polynomial in ``w = z**-1`` and h any finite sequence, however 
 
     |1/D - h| <= |h| |E| / (1 - |E|).
 
-E is one exact product of integer polynomials. What was rounded in finding h and where h was cut off is all in it;
-no pole is ever located, and where the bound exists the recursion is stable.
+E is one exact product of integer polynomials. It contains all rounding and truncation of h. No poles need to be
+located, and if the bound exists, the recursion is stable.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ BITS = 176
 _ERROR_BITS = 136  # an inverse is within 2**-136
 _BITS_PER_POLE = 24  # a pole at 1 - 2**-24 would ring beyond the longest response
 _LONGEST = 1 << 21  # samples
-_BLOCK = 256  # samples between two looks at whether a response has died away
+_BLOCK = 256  # samples between checks of whether a response has decayed
 
 
 class UndecidedError(ArithmeticError):
@@ -56,7 +56,7 @@ class Response:
 
 
 def fraction(value: fmpq) -> Fraction:
-    """Return a rational of the other library as one of ours."""
+    """Convert a rational of FLINT to a Fraction."""
     return Fraction(int(value.p), int(value.q))
 
 
@@ -77,7 +77,7 @@ def inverse(denominator: fmpq_poly) -> Inverse:
     Raises
     ------
     UndecidedError
-        If the inverse does not die away within some two million samples, or a coefficient is no binary fraction.
+        If the inverse does not decay within about two million samples, or a coefficient is not a binary fraction.
     """
     shift = _fraction_bits(denominator)
     bits = _ERROR_BITS + 64 + _BITS_PER_POLE * denominator.degree()
@@ -92,7 +92,7 @@ def inverse(denominator: fmpq_poly) -> Inverse:
 
 
 def _divided(numerators: list[int], shift: int, bits: int) -> list[int]:
-    """Divide 1 by a polynomial, until the rest is small enough; nothing relies on how exact this is."""
+    """Divide 1 by a polynomial until the remainder is small enough; the proof does not depend on its accuracy."""
     weights = [-value for value in numerators[1:]]
     size = 1 + (sum(map(abs, weights)) >> shift)
     line = [0] * len(weights)

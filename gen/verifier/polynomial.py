@@ -1,8 +1,7 @@
 """Follows a certificate's polynomial and output stages symbolically.
 
-Every value in these stages, which have no memory, is an exact polynomial in the inputs, give or take an error of
-bounded size. The inputs are variables of at most one in size, so that the absolute values of a polynomial's
-coefficients bound it.
+These stages have no memory: every value is an exact polynomial in the inputs plus a bounded error. The inputs are
+scaled to variables of magnitude at most one, so the sum of the coefficients' absolute values bounds a polynomial.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ _Polynomial = dict[tuple[int, ...], Fraction]
 
 @dataclass(frozen=True)
 class _Value:
-    """An exact polynomial in variables of at most one in size, within `radius` of a node's value."""
+    """An exact polynomial in variables of magnitude at most one, within `radius` of a node's value."""
 
     exact: _Polynomial
     radius: Fraction
@@ -78,7 +77,7 @@ def _value(stage: StageEntry, index: int, operands: Sequence[_Value], variables:
         return operands[0].times(_constant(Fraction(2) ** node.parameter, variables))
     if node.op is Operation.SCALE:
         return operands[0].times(_constant(node.parameter * Fraction(2) ** -node.parameter_frac, variables))
-    if node.op is Operation.FLOOR:  # as the middle of what it can drop, give or take half of it
+    if node.op is Operation.FLOOR:  # the middle of the dropped range, plus or minus half its width
         half = Fraction(2) ** -node.frac / 2
         return _Value(operands[0].plus(_constant(-half, variables)).exact, operands[0].radius + half)
     require(
@@ -94,7 +93,7 @@ def polynomial_error(certificate: Certificate, stages: Sequence[StageEntry]) -> 
     Raises
     ------
     RejectedError
-        If the stages compute no polynomial of variables of at most one in size.
+        If the stages do not compute a polynomial in variables of magnitude at most one.
     """
     entries = [stages[0].nodes[index] for index in inputs_of(stages[0])]
     count = len(entries)
@@ -113,7 +112,7 @@ def polynomial_error(certificate: Certificate, stages: Sequence[StageEntry]) -> 
 
 
 def _ideal_polynomial(certificate: Certificate, entries: Sequence[NodeEntry]) -> _Value:
-    """Return what the polynomial should be, in output LSBs, as one in the same variables."""
+    """Return the ideal polynomial in the same variables, in output LSBs."""
     count = len(entries)
     physical = [
         _affine(port, entry, index, count)
@@ -138,7 +137,9 @@ def _affine(port: PortEntry, entry: NodeEntry, index: int, count: int) -> _Value
 
 
 def output_error(certificate: Certificate, stage: StageEntry) -> Fraction:
-    """Bound the error of the last stage, in output LSBs: it should subtract the output's zero, round and limit.
+    """Bound the error of the last stage, in output LSBs.
+
+    The stage subtracts the output's zero, rounds and limits.
 
     Raises
     ------

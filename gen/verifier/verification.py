@@ -1,15 +1,15 @@
-"""Proves a certificate again, by another method than the one it was made with, from nothing but the certificate.
+"""Proves a certificate again by a different method, using only the certificate itself.
 
-1. Every graph is well formed, and every range in it follows from the ranges before (`sosmith.gen.verifier.graph`).
+1. Every graph must be well formed, and every range must follow from earlier ranges (`sosmith.gen.verifier.graph`).
 2. The polynomial and the output rounding are followed symbolically (`sosmith.gen.verifier.polynomial`).
-3. The sections' transfer functions are found as determinants, and stability by the Schur-Cohn recursion. A section
-   may have several inputs and outputs; the cascade has one of each.
-4. Responses are enclosed by approximate inverses (`sosmith.gen.verifier.l1_response`). Every range that a BOUND
-   states must hold what they allow, and every figure claimed must be what they give, to the last unit of the
-   certificate's grid.
+3. The sections' transfer functions are computed as determinants, and the Schur-Cohn recursion decides stability. A
+   section may have several inputs and outputs; the cascade has one of each.
+4. Impulse responses are enclosed by approximate inverses (`sosmith.gen.verifier.l1_response`). Every range that a
+   BOUND states must contain the proven range, and every claimed figure must equal the proven one, to the last unit of
+   the certificate's grid.
 
-The induction that carries the ranges: integers without limits obey the linear model exactly, with the quantizers'
-errors as further inputs; so its extents hold at every sample, and words of these ranges never overflow.
+The ranges hold by induction. Unbounded integers obey the linear model exactly, with the quantizers' errors as further
+inputs. The limits from the linear model therefore hold at every sample, and signals with these ranges never overflow.
 """
 
 from __future__ import annotations
@@ -28,21 +28,21 @@ from sosmith.gen.verifier.l1_response import BITS, Inverse, Response, UndecidedE
 from sosmith.gen.verifier.polynomial import output_error, polynomial_error
 
 Progress = Callable[[str, int, int], None]
-"""Told the name of what is being done, how much of it is, and how much there is."""
+"""Callback for progress, called with the name of the step, the number of units done, and their total."""
 
 _ROLES = ("polynomial", "section", "output")
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What a certificate proves.
+    """Result of verifying a certificate.
 
     Attributes
     ----------
     budget : dict of str to Fraction
         Parts of the error bound, in output LSBs.
     nodes, ranges : int
-        Number of nodes whose range was checked, and of those whose range needed a peak gain.
+        Number of nodes with a checked range, and of those whose range needed a peak gain.
     """
 
     budget: dict[str, Fraction]
@@ -63,17 +63,17 @@ def verify(certificate: Certificate, progress: Progress = lambda step, done, tot
     certificate : Certificate
         As read from its file.
     progress : callable
-        Told of every step.
+        Called at every step.
 
     Returns
     -------
     Verdict
-        What is proven: just what the certificate claims.
+        The proven figures, which equal the claims.
 
     Raises
     ------
     RejectedError
-        If something claimed does not hold, is not exactly what follows, or could not be decided.
+        If a claim does not hold, differs from the proven figure, or cannot be decided.
     """
     try:
         return _verified(certificate, progress)
@@ -175,7 +175,7 @@ def _check_seams(certificate: Certificate) -> None:
 
 
 def _check_plain_input(certificate: Certificate) -> None:
-    """Without a polynomial, the input's code is taken as a multiple of the output's LSB."""
+    """Check that without a polynomial, the input's code is a multiple of the output's LSB."""
     port, output = certificate.inputs[0], certificate.output
     entry = certificate.stages[0].nodes[inputs_of(certificate.stages[0])[0]]
     require(
@@ -194,7 +194,7 @@ def _check_plain_input(certificate: Certificate) -> None:
 
 @dataclass(frozen=True)
 class _Drive:
-    """A source on its way: where it entered, the numerator that it has gathered on each wire, and its range."""
+    """A source within the cascade: where it entered, its numerator so far on each wire, and its range."""
 
     first: int
     numerators: Sequence[fmpq_poly]
@@ -207,7 +207,7 @@ _Driven = tuple[Response, Fraction, Fraction]
 
 
 class _Cascade:
-    """The proof of a cascade of sections; its attributes are what is claimed, on the grid."""
+    """The proof of a cascade of sections; its attributes are the claimed figures, rounded up to the grid."""
 
     def __init__(self, certificate: Certificate, sections: Sequence[StageEntry], progress: Progress) -> None:
         self._models = [Transfer(section) for section in sections]
@@ -275,7 +275,7 @@ class _Cascade:
         return self._inverses[first, last]
 
     def _at(self, index: int, nodes: Sequence[int], arrived: Sequence[_Drive]) -> list[_Drive]:
-        """All that drives some nodes: what arrives at their section, then the section's own sources."""
+        """Everything that drives the given nodes: drives from earlier sections, then the section's own sources."""
         model = self._models[index]
         ways = [[model.numerator(entry, node) for entry in model.inputs] for node in nodes]
         return [
