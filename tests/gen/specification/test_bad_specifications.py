@@ -730,7 +730,7 @@ BAD = [
         "max_error of a third of an LSB",
         UNIT,
         UNIT + "\nmax_error = 8e-5",
-        "output.max_error must be more than half an LSB of the output (0.0001220703125), which its"
+        "output.max_error must be more than half an LSB of the output (0.0001220703125), which output"
         " rounding alone takes, not 8e-05",
     ),
     ("max_error zero", UNIT, UNIT + "\nmax_error = 0", f"output.max_error must be {MAX_ERROR}, not 0"),
