@@ -71,7 +71,7 @@ def test_the_limits_of_a_specification() -> None:
     assert (first["wear_mm"], second["wear_mm"]) == (pytest.approx(7.9), pytest.approx(6.9))
     assert second["limits_mm"]["critical_clearance"] == 10.5
     end = good("days.csv", "--spec", "my.toml", "--channel", "1").stdout
-    assert "to the end of the sensor's range, 10.5 mm, which is reached before the limit" in end
+    assert "to the end of the sensor's range, 10.5 mm, which comes before the limit" in end
     refused("my.toml: channel must be below 2, the count of channels, not 2", "days.csv", "--spec", "my.toml",
             "--channel", "2")  # fmt: skip
     refused("the limits must be given by --spec or one by one, not both", "days.csv", "--spec", "my.toml", *LIMITS)

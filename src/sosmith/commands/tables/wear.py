@@ -47,7 +47,7 @@ def print_wear(record: WearRecord, report: WearReport, channel: int) -> None:
 
 def _end(limits: WearLimits) -> str:
     if limits.critical_clearance < limits.initial + limits.limit:
-        return f"to the end of the sensor's range, {limits.critical_clearance:g} mm, which is reached before the limit"
+        return f"to the end of the sensor's range, {limits.critical_clearance:g} mm, which comes before the limit"
     return f"to the limit of {limits.limit:g} mm"
 
 
