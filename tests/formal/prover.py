@@ -132,7 +132,8 @@ def prove(proof: Proof, folder: Path, engine: str = PDR, *, timeout: int = 300) 
     (folder / "top.il").write_text(proof.rtlil(), encoding="utf-8")
     (folder / "top.sby").write_text(_SBY.format(engine=engine, timeout=timeout), encoding="utf-8")
     abc = folder / "abc"
-    abc.write_text(_ABC.format(program=shutil.which("berkeley-abc")), encoding="utf-8")
+    program = shutil.which("yosys-abc") or shutil.which("berkeley-abc")
+    abc.write_text(_ABC.format(program=program), encoding="utf-8")
     abc.chmod(0o755)
     tools = [word for option in {**_TOOLS, "--abc": str(abc)}.items() for word in option]
     result = _run(["yowasp-sby", "-f", *tools, "top.sby"], folder)

@@ -8,13 +8,13 @@ import pytest
 from amaranth.hdl import Assert, Assume, Module
 from tests.formal.prover import Proof, prove
 from tests.formal.small import port, resonator
-from tests.gen.proven_stages import Format, Ranges, proven_cascade
+from tests.gen.proven_stages import Ranges, proven_cascade
 
 from sosmith.gen.realizations.section_format import WIDE
 from sosmith.hdl.pipelined_logic import unique_names
 from sosmith.hdl.stage import PipelinedStage, pipeline_stages
 from sosmith.model.dataflow.datapath import Stage
-from sosmith.model.dataflow.graph import Op
+from sosmith.model.dataflow.graph import Op, Range
 from sosmith.model.sections.direct_form import DirectForm1, Product
 
 
@@ -49,7 +49,7 @@ class StatedRanges(Proof):
                 m.d.comb += Assert((code >= node.low) & (code <= node.high))
 
 
-def section(entry: Format, ranges: Ranges, y_frac: int) -> DirectForm1:
+def section(entry: Range, ranges: Ranges, y_frac: int) -> DirectForm1:
     """Make a section with error feedback of second order and poles at 0.71; its state has a guard of 4 bits."""
     frac, low, high = entry
     v_low, v_high = ranges.get("v", (-WIDE, WIDE))

@@ -16,6 +16,7 @@ import pytest
 from amaranth.hdl import Module, Signal
 from cocotb_tools.runner import Icarus, Verilator
 from tests.gen.designs import EXAMPLES
+from tests.model.reload.swapping import compute_swapping
 
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.filter.design import design
@@ -28,7 +29,6 @@ from sosmith.hdl.axi_stream import fields
 from sosmith.hdl.folded import FoldedCore
 from sosmith.hdl.reload import ReloadPort
 from sosmith.model.calibration.polynomial import Polynomial
-from sosmith.model.reload.swapping import compute_swapping
 from sosmith.sim.simulators import find_simulator
 
 RATIOS = ("0.8", "0.9", "1.1", "1.2")

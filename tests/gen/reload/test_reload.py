@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from tests.gen.designs import EXAMPLES, example_design
 from tests.gen.reload.swaps import during, moved, worst_input
+from tests.model.reload.swapping import compute_swapping
 
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.filter.design import design
@@ -26,7 +27,6 @@ from sosmith.model.dataflow.program import Opcode, Program
 from sosmith.model.errors import ShortfallError, SpecificationError
 from sosmith.model.reload.constants import constants, unpacked
 from sosmith.model.reload.registers import CRC, DATA, VERSION
-from sosmith.model.reload.swapping import compute_swapping
 
 EXACT = [name for name in REALIZATIONS if name != "state_space"]  # that one rounds its coefficients together
 

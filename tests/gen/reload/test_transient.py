@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from tests.gen.designs import example_design
 from tests.gen.reload.swaps import during, moved, worst_input
+from tests.model.reload.swapping import compute_swapping
 
 from sosmith.gen.reload import transient as module
 from sosmith.gen.reload.other_constants import with_constants
@@ -14,7 +15,6 @@ from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.graph import RangeError
 from sosmith.model.errors import ShortfallError
-from sosmith.model.reload.swapping import compute_swapping
 
 REALIZATIONS = ("df1", "df1_ef2", "df2t", "delta", "normal", "lattice_wdf")
 RATIOS = ("0.5", "1.2")
