@@ -101,7 +101,7 @@ def test_a_store_that_another_process_makes_meanwhile_is_kept(monkeypatch: pytes
             add(opened, "sensor", Path("a.csv"), "2024-03-01")
         return refused_first_file(*arguments, **options)
 
-    monkeypatch.setattr("sosmith.commands.calibrate.refused_first_file", meanwhile)
+    monkeypatch.setattr("sosmith.model.calibration.self_updating.refused_first_file", meanwhile)
     refused("a.csv must hold new measurements, not those already added as a.csv", "add", "a.csv")
     Path("calibration.db").unlink()
     good("add", "b.csv")

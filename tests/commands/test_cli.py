@@ -194,7 +194,7 @@ def test_help_of_all_lists_the_commands_in_the_order_of_work(sosmith: Command) -
     outcome = sosmith("--help")
     assert outcome.status == 0
     assert re.findall(r"^  ([a-z]+)  ", outcome.stdout, flags=re.MULTILINE) == list(NEEDED)
-    assert "\n      sosmith design my.toml      see filter" in outcome.stdout
+    assert "\n      sosmith design my.toml      show the filter" in outcome.stdout
 
 
 def test_version(sosmith: Command) -> None:
