@@ -1,4 +1,4 @@
-"""How a datapath becomes hardware: every operation at once, or one unit for all of them."""
+"""Hardware architectures of a datapath: all operations in parallel, or one unit shared by all of them."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ from sosmith.model.errors import ShortfallError
 from sosmith.model.reload.constants import with_room
 
 DIGIT_BITS = 15
-"""Of a digit: products of 16 bits, signed, fit one block of an iCE40 UltraPlus as well as one of an ECP5."""
+"""Width of a digit: signed 16-bit products fit one multiplier block of an iCE40 UltraPlus or an ECP5."""
 
 
 SPARE_ACCUMULATOR_BITS = 2
-"""More bits than its own program needs, in hardware that others can be loaded into."""
+"""Additional bits, beyond the needs of its own program, in hardware that can load other programs."""
 
 SPARE_INSTRUCTIONS = 4
-"""A program that others can take the place of has more instructions than it needs: one for so many."""
+"""A replaceable program has spare instructions: one for each group of this many."""
 
 
 @dataclass(frozen=True)
 class Architecture:
-    """A datapath and the kind of hardware that computes it.
+    """A datapath and the architecture of its hardware.
 
     Attributes
     ----------
@@ -40,9 +40,9 @@ class Architecture:
         "parallel": every operation has its own hardware. "folded": one multiplier and one accumulator run a program.
         "serial": the same without a multiplier block.
     datapath : Datapath
-        What is computed.
+        The datapath.
     channels : int
-        For how many channels.
+        Number of channels.
     reload : bool
         Whether constants can be loaded at run time.
     """
@@ -54,7 +54,7 @@ class Architecture:
 
     @cached_property
     def program(self) -> Program | None:
-        """What one unit runs; None in the parallel architecture.
+        """Program of the shared unit; None in the parallel architecture.
 
         Raises
         ------
@@ -76,14 +76,14 @@ class Architecture:
 
     @cached_property
     def built(self) -> Datapath:
-        """The datapath with the widths that the parallel hardware has."""
+        """The datapath with the widths of the parallel hardware."""
         return with_room(self.datapath) if self.reload and self.program is None else self.datapath
 
     @cached_property
     def fingerprint(self) -> int | None:
-        """CRC-32 of everything about the hardware but its constants: sets are loadable where this is equal.
+        """CRC-32 of everything about the hardware except its constants: sets are loadable if this is equal.
 
-        None where none can be loaded.
+        None if the hardware is not reloadable.
         """
         if not self.reload:
             return None
@@ -92,32 +92,32 @@ class Architecture:
         shape = (self.name, self.channels, self.datapath.inputs, self.datapath.output, stages)
         sizes = "None"
         if made is not None:
-            # Cores in the field hold this number: the text keeps the name that the class had when they were made.
+            # Cores in the field contain this number, so the text keeps the former name of the class.
             locations = repr(made.locations).replace("Location(", "Place(")
             sizes = f"({locations}, {made.words}, {made.accumulator_bits}, {len(made.instructions)})"
         return zlib.crc32(f"({shape!r}, {sizes})".encode())
 
     @property
     def latency_cycles(self) -> int:
-        """Clocks from the edge that accepts a sample to the edge that can hand it on; in serial, at most so many."""
+        """Clocks from the edge that accepts a sample to the edge that can output it; an upper limit in serial."""
         if self.program is None:
             return core.latency_cycles(self.built, self.channels)
         return folded.latency_cycles(self.program, serial=self.name == "serial")
 
     @property
     def reset_cycles(self) -> int:
-        """Clocks after a reset until the first sample is taken: memories are cleared."""
+        """Clocks after a reset until the first sample is accepted, while memories are cleared."""
         if self.program is None:
             return self.channels if self.channels > 1 else 0
         return folded.reset_cycles(self.program, self.channels)
 
     @property
     def cycles_per_sample(self) -> int:
-        """Clocks from one sample to the next at the highest rate; in serial, at most so many."""
+        """Clocks between samples at the highest rate; an upper limit in serial."""
         return 1 if self.program is None else self.latency_cycles + 1
 
     def component(self) -> Component:
-        """Make the hardware, whose top module's name is that of the datapath."""
+        """Make the hardware; the top module has the name of the datapath."""
         if self.program is None:
             return core.Core(self.built, self.channels, fingerprint=self.fingerprint)
         return folded.FoldedCore(
@@ -130,7 +130,7 @@ class Architecture:
 
 
 def structure(node: Node) -> tuple[object, ...]:
-    """Everything about a node that a set of constants must not change."""
+    """Everything about a node that a new set of constants must not change."""
     constant = node.op in {Op.SCALE, Op.CONSTANT}
     limits = (node.low, node.high) if node.op is Op.CLAMP else ()
     return node.op.value, node.operands, node.frac, 0 if constant else node.parameter, node.parameter_frac, limits
@@ -138,12 +138,12 @@ def structure(node: Node) -> tuple[object, ...]:
 
 @dataclass(frozen=True, kw_only=True)
 class Budget:
-    """Time that the hardware has.
+    """Time available to the hardware.
 
     Attributes
     ----------
     clock, sample_rate : Fraction
-        Hz; the second of each channel.
+        Clock frequency and sample rate of each channel, in Hz.
     channels : int
         Number of channels.
     reload : bool
@@ -157,7 +157,7 @@ class Budget:
 
     @property
     def cycles(self) -> int:
-        """Clocks for one sample of one channel."""
+        """Clocks available for one sample of one channel."""
         return int(self.clock / (self.sample_rate * self.channels))
 
     def check(self, architecture: Architecture) -> None:
@@ -166,7 +166,7 @@ class Budget:
         Raises
         ------
         ShortfallError
-            If the architecture takes more clocks than there are; tells the rate that it could do.
+            If the architecture takes more clocks than available; gives the highest rate that it can achieve.
         """
         needed = architecture.cycles_per_sample
         if needed <= self.cycles:
@@ -180,7 +180,7 @@ class Budget:
 
 
 def _told_apart(most: Fraction, wanted: Fraction) -> tuple[str, str]:
-    """Texts of two rates with the digits that it takes to tell them apart, `most` rounded down: that much will do."""
+    """Texts of two rates with enough digits to tell them apart; `most` is rounded down, so that it is achievable."""
     for digits in range(6, 17):
         context = decimal.Context(prec=digits, rounding=decimal.ROUND_FLOOR)
         floor = context.divide(decimal.Decimal(most.numerator), decimal.Decimal(most.denominator))
@@ -191,9 +191,9 @@ def _told_apart(most: Fraction, wanted: Fraction) -> tuple[str, str]:
 
 
 def candidates(wanted: str, board: Board | None) -> tuple[str, ...]:
-    """Architectures to be tried for what the specification asks for, the smallest first.
+    """Architectures to try for the one that the specification asks for, the smallest first.
 
-    Without multiplier blocks on the board, shifts and additions are smaller than a multiplier made of LUT4.
+    On boards without multiplier blocks, shifts and additions are smaller than a multiplier made of LUT4.
     """
     if wanted != "auto":
         return (wanted,)
@@ -214,7 +214,7 @@ def fitting(name: str, budget: Budget, datapath: Datapath) -> Architecture:
 
 
 def reason_for(architecture: Architecture, budget: Budget, *, asked: bool, board: Board | None, refused: str) -> str:
-    """Say why an architecture was taken; `refused` is why a smaller one was not, if one was tried."""
+    """Explain the choice of an architecture; `refused` says why a smaller one was rejected, if one was tried."""
     name, needed = architecture.name, architecture.cycles_per_sample
     smallest = "the smallest that keeps up"
     if board is not None:

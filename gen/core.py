@@ -1,4 +1,4 @@
-"""From a specification to a core: filter, calibration, realization and architecture chosen, formats fixed."""
+"""From a specification to a core: chooses filter, calibration, realization and architecture, and fixes the formats."""
 
 from __future__ import annotations
 
@@ -24,29 +24,29 @@ from sosmith.model.port import Port
 from sosmith.model.suggestion import did_you_mean
 
 AUTO = "auto"
-"""Realization that stands for the cheapest proven one."""
+"""Value of the realization that selects the cheapest proven one."""
 
 Progress = Callable[[str], None]
 
 
 @dataclass(frozen=True, kw_only=True)
 class CoreDesign:
-    """A core and how it came about.
+    """A designed core, with the reasons for its choices.
 
     Attributes
     ----------
     spec : Specification
-        What was asked for.
+        The specification.
     core : str
         One of `sosmith.gen.specification.choices.CORES`.
     quantized : Quantized
-        The datapath, with the ideal filter and polynomial it stands for.
+        The datapath, with the ideal filter and polynomial that it implements.
     architecture : Architecture
-        How the datapath becomes hardware.
+        Hardware architecture of the datapath.
     reasons : dict of str to str
-        Why this realization and this architecture, one sentence each.
+        Reasons for this realization and this architecture, one sentence each.
     fit : Fit or None
-        The fit, where the calibration came from measurements.
+        The fit, if the calibration comes from measurements.
     """
 
     spec: Specification
@@ -71,28 +71,28 @@ def design_core(
     board: Board | None = None,
     progress: Progress = lambda step: None,
 ) -> CoreDesign:
-    """Design a core of a specification.
+    """Design a core for a specification.
 
     Parameters
     ----------
     spec : Specification
-        What is asked for.
+        The specification.
     core : str or None
-        One of `sosmith.gen.specification.choices.CORES`; None takes all that the specification has.
+        One of `sosmith.gen.specification.choices.CORES`; None for everything that the specification contains.
     realization : str or None
         Overrides the specification's.
     widths_of : str or None
-        Choose fraction bits and coefficients for this realization, then use `realization` at these widths; the
-        error may then exceed what the specification allows.
+        Choose fraction bits and coefficients for this realization, then use `realization` with these widths; the
+        error may then exceed the limit in the specification.
     board : Board or None
-        What it is meant for: the automatic choice of an architecture heeds its multipliers.
+        Target board; the automatic choice of an architecture considers its multipliers.
     progress : callable
-        Told the name of each step.
+        Called with the name of each step.
 
     Raises
     ------
     SpecificationError
-        If the core does not exist in the specification, or its measurements are unfit.
+        If the specification has no such core, or its measurements are unsuitable.
     ShortfallError
         If no formats meet the specification.
     """
@@ -135,7 +135,7 @@ def design_core(
         return selection.cheapest(accept) if given is None else given
 
     def in_hardware(name: str, datapath: Datapath) -> Architecture:
-        """With the calibrated range, which a program judges and takes time for, and the limits of wear."""
+        """Architecture with the calibrated range, which costs a program instructions, and the limits of wear."""
         codes = () if fitted is None else calibrated_codes(datapath.inputs, fitted)
         wear = () if spec.wear is None else spec.wear.codes(spec.output)
         return fitting(name, budget, replace(datapath, calibrated=codes, wear=wear))
@@ -187,7 +187,7 @@ def _known(wanted: str) -> str:
 
 def _inputs(spec: Specification, core: str) -> tuple[Port, ...]:
     if core == "filter" and spec.calibration is not None:
-        # Alone, the filter takes what the calibration would hand it, in the output's format.
+        # A filter core takes the output of the calibration as its input, in the output's format.
         return (replace(spec.output, name=f"{spec.output.name}_in"),)
     return spec.inputs
 
@@ -198,7 +198,7 @@ def polynomial_of(spec: Specification) -> tuple[Polynomial, Fit | None]:
     Raises
     ------
     SpecificationError
-        If the measurements are unfit.
+        If the measurements are unsuitable.
     """
     assert spec.calibration is not None
     if spec.calibration.data is not None:

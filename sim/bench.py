@@ -1,4 +1,4 @@
-"""What every bench does, whatever runs the core: it takes input beats and gives output beats and clock counts."""
+"""The interface of every bench: it takes input beats and returns output beats and clock counts."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from typing import Protocol
 from sosmith.sim.stream_packing import Beats
 
 Progress = Callable[[int, int], None]
-"""Told the number of beats received and their total."""
+"""Called with the number of beats received and their total."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class BenchRun:
-    """What a bench saw.
+    """Result of running a bench.
 
     Attributes
     ----------
@@ -23,9 +23,9 @@ class BenchRun:
     cycles : int
         Clocks from the end of reset to the last beat received.
     seconds : float
-        Duration of the run, without building.
+        Duration of the run, excluding the build.
     tools : mapping of str to str
-        Versions of what ran the core, by name.
+        Versions of the tools that ran the core, by name.
     """
 
     received: Beats
@@ -39,11 +39,11 @@ class Bench(Protocol):
 
     @property
     def name(self) -> str:
-        """Name of what runs the core, such as a simulator."""
+        """Name of the simulator or board that runs the core."""
         ...
 
     def run(self, sent: Beats, progress: Progress) -> BenchRun:
-        """Reset the core, send it all of `sent`, and receive as many beats.
+        """Reset the core, send it all beats of `sent`, and receive the same number of beats.
 
         Raises
         ------

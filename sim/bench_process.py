@@ -1,7 +1,7 @@
-"""Runs as a process of its own: builds the simulation with cocotb's runner and runs the bench in it.
+"""The bench's own process: builds the simulation with cocotb's runner and runs the bench in it.
 
-``python -m sosmith.sim.bench_process FOLDER`` reads ``FOLDER/job.json``. Everything that simulators, compilers
-and cocotb print goes to this process's output, which the parent keeps in a log file.
+``python -m sosmith.sim.bench_process FOLDER`` reads ``FOLDER/job.json``. All output of simulators, compilers and cocotb
+goes to this process's output, which the parent keeps in a log file.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from cocotb_tools.runner import Icarus, Verilator, VerilatorControlFile
 
 
 class _FastVerilator(Verilator):  # type: ignore[misc]
-    """Cocotb's runner with only the ports public: builds and simulations are several times faster."""
+    """Cocotb's runner with only the ports public, which makes builds and simulations several times faster."""
 
     def _build_command(self) -> list[list[str]]:
         return [[word for word in command if word != "--public-flat-rw"] for command in super()._build_command()]
@@ -39,7 +39,7 @@ def main() -> None:
     try:
         _build_and_test(job, runner, sources, arguments)
     except RuntimeError:
-        # A failed command: what it printed is the log's last word, not our traceback.
+        # A command failed: the log should end with its output, not with our traceback.
         sys.exit(1)
 
 
@@ -48,7 +48,7 @@ def _build_and_test(job: dict[str, Any], runner: Any, sources: list[Any], argume
     build = folder / "build"
     record = build / "built.txt"
     if _changed(job, record, arguments):
-        record.unlink(missing_ok=True)  # an interrupted build must not pass for the one before
+        record.unlink(missing_ok=True)  # an interrupted build must not pass for the previous one
         runner.build(
             sources=sources,
             hdl_toplevel=job["top"],

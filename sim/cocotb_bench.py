@@ -27,7 +27,7 @@ from sosmith.sim.simulators import Simulator, find_simulator
 from sosmith.sim.stream_packing import Beats
 
 _POLL_SECONDS = 0.05
-_LOG_TAIL = 12  # lines of the log that an error shows
+_LOG_TAIL = 12  # lines of the log shown in an error
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,15 +41,15 @@ class CocotbBench:
     interface : InterfaceFacts
         Streams and clocks of the core.
     build_dir : Path
-        Folder for the simulation; an unchanged core is not built again.
+        Folder for the simulation; an unchanged core is not rebuilt.
     simulator : str
         ``"verilator"`` or ``"icarus"``.
     seed : int
-        Seed of the handshakes.
+        Seed of the random handshakes.
     idle, stall : float
-        Share of clocks without input and with the output held up, 0 to below 1.
+        Fractions of clocks without input and with back-pressure on the output, in [0, 1).
     waves : bool
-        Leave a waveform in `build_dir`.
+        Whether to write a waveform to `build_dir`.
     """
 
     source: Path
@@ -67,7 +67,7 @@ class CocotbBench:
         return self.simulator
 
     def run(self, sent: Beats, progress: Progress) -> BenchRun:
-        """Reset the core, send it all of `sent`, and receive as many beats.
+        """Reset the core, send it all beats of `sent`, and receive the same number of beats.
 
         Raises
         ------
@@ -143,7 +143,7 @@ def _received(folder: Path) -> Beats:
 
 @contextlib.contextmanager
 def _plain_path(folder: Path) -> Iterator[Path]:
-    """Give a folder that makefiles can build in: `folder`, or a passing one if its path has a space or the like."""
+    """Yield a folder that makefiles can build in: `folder`, or a temporary one if its path contains spaces or such."""
     if re.fullmatch(r"[\w./+-]+", str(folder)):
         yield folder
         return
@@ -155,11 +155,11 @@ def _plain_path(folder: Path) -> Iterator[Path]:
 
 
 def _run(folder: Path, tool: Simulator, total: int, progress: Progress) -> None:
-    """Run the bench's process to its end, however that comes about; it never outlives this call."""
+    """Run the bench's process until it ends or is interrupted; it never outlives this call."""
     log = folder / "log.txt"
     command = [sys.executable, "-m", "sosmith.sim.bench_process", str(folder)]
     with log.open("w", encoding="utf-8") as output:
-        # A session of its own: the simulator's and compilers' processes can be ended all together.
+        # In a session of its own, so that all processes of simulator and compilers can be terminated together.
         process = subprocess.Popen(
             command,
             stdout=output,

@@ -1,4 +1,4 @@
-"""Runs input codes through a core on any bench and returns its output codes."""
+"""Runs input codes through a core on a bench and returns its output codes."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ from sosmith.sim.stream_packing import pack, random_order, unpack
 
 @dataclass(frozen=True, kw_only=True)
 class CosimulationResult:
-    """What came out of the hardware.
+    """Outputs of the hardware.
 
     Attributes
     ----------
     codes : int64 array, shape (samples, channels, outputs)
         Output codes.
     status : uint8 array, shape (samples, channels)
-        Status of the outputs, 0 where the core gives none.
+        Status of the outputs, 0 if the core has none.
     cycles : int
         Clocks from the end of reset to the last sample received.
     wall_seconds : float
         Duration of build and run.
     cycles_per_second : float
-        Speed of the run, its start-up included.
+        Speed of the run, including start-up.
     simulator : str
         Name of the bench.
     tools : mapping of str to str
-        Versions of what ran the core.
+        Versions of the tools that ran the core, by name.
     """
 
     codes: Codes
@@ -59,20 +59,20 @@ def cosimulate(
     Parameters
     ----------
     bench : Bench
-        What runs the core.
+        Bench that runs the core.
     interface : InterfaceFacts
         Streams of the core.
     codes : int64 array, shape (samples, channels, inputs)
-        Input codes, at least one sample. The samples of several channels come partly in turn, partly in random order.
+        Input codes, at least one sample. Samples of several channels are sent partly in turn, partly in random order.
     seed : int
         Seed of that order.
     progress : callable
-        Told the number of samples received and their total.
+        Called with the number of samples received and their total.
 
     Raises
     ------
     ShortfallError
-        If the core breaks a rule of AXI4-Stream, or hands out a sample as another channel's; says which and where.
+        If the core breaks a rule of AXI4-Stream, or returns a sample for the wrong channel; says which and where.
     ToolError
         If a tool is missing or fails.
     """

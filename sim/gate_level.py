@@ -1,7 +1,7 @@
-"""Makes one Verilog file of a netlist and the models of its cells, for a simulator to take in a core's place.
+"""Combines a netlist and the models of its cells into one Verilog file that can be simulated in place of the core.
 
-Memories start with the content that the bitstream gives them. Flip-flops start at random, which shows that the reset
-reaches all that matters, or as the bitstream says.
+Memories start with the contents from the bitstream. Flip-flops start either with random values, which shows that the
+reset is sufficient, or with those from the bitstream.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ _OF_YOSYS = {"ice40": ("ice40/cells_sim.v",), "ecp5": ("ecp5/common_sim.vh", "ec
 """Models that come with Yosys, by family."""
 
 _OURS = {"ice40": (), "ecp5": (Path(__file__).parent / "ecp5_cells.v",)}
-"""Models to take in their place, and those that Yosys has not."""
+"""Models that replace those of Yosys, or that Yosys lacks."""
 
-# The models of iCE40 flip-flops leave their initial value to a macro, and default values of inputs, which not every
-# simulator knows, to three others. In hardware they start at 0.
+# The models of iCE40 flip-flops take their initial value from a macro, and default values of inputs, which not every
+# simulator supports, from three others. In hardware, the flip-flops start at 0.
 _MACROS = """`define SB_DFF_INIT initial Q = `START(0);
 `define ICE40_DEFAULT_ASSIGNMENT_V(v)
 `define ICE40_DEFAULT_ASSIGNMENT_0
@@ -32,15 +32,15 @@ _PARAMETERS = re.compile(r"^  (\w+) #\((.*?)^  \) ", re.MULTILINE | re.DOTALL)
 
 
 def with_cell_models(netlist: Netlist, *, scrambled: bool) -> Path:
-    """Write ``gates.v`` beside the netlist: the netlist, and a model of each cell that it needs.
+    """Write ``gates.v`` beside the netlist, with the netlist and a model of each cell that it uses.
 
     Parameters
     ----------
     netlist : Netlist
-        What to simulate.
+        The netlist to simulate.
     scrambled : bool
-        Whether flip-flops start at random. A memory whose content must outlast a reset cannot bear that: a register
-        before its write port may then write anything at the first clock edge.
+        Whether flip-flops start with random values. Not usable if a memory has to keep its contents across a reset: a
+        register before its write port could then write anything at the first clock edge.
 
     Returns
     -------
@@ -50,18 +50,18 @@ def with_cell_models(netlist: Netlist, *, scrambled: bool) -> Path:
     Raises
     ------
     ToolError
-        If there is no model of a cell, or not of what a netlist sets of it, or if Yosys is missing.
+        If a cell has no model, the model lacks a parameter that the netlist sets, or Yosys is missing.
     """
     device = netlist.board.device
     files = [*(share_folder() / name for name in _OF_YOSYS[device.family]), *_OURS[device.family]]
     models = {found[1]: found[0] for file in files for found in _MODULE.finditer(file.read_text(encoding="utf-8"))}
     needed = sorted(netlist.cells)
-    for cell in needed:  # it grows by the cells that models are made of
+    for cell in needed:  # grows while it is iterated: models instantiate further cells
         if cell not in models:
             raise ToolError(f"every cell of {device.title} in a netlist must have a model, which {cell} has not")
         needed += sorted(models.keys() & set(re.findall(r"\w+", models[cell])) - set(needed))
     text = netlist.path.read_text(encoding="utf-8")
-    for cell, parameters in _PARAMETERS.findall(text):  # a simulator may pass over one that the model does not know
+    for cell, parameters in _PARAMETERS.findall(text):  # simulators may ignore one that the model lacks
         unknown = set(re.findall(r"\.(\w+)\(", parameters)) - set(re.findall(r"\w+", models[cell]))
         if unknown:
             raise ToolError(f"the model of {cell} must know what a netlist sets of the cell, as {min(unknown)}")

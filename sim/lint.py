@@ -1,4 +1,4 @@
-"""Reads generated SystemVerilog with Verilator's linter and with Icarus, and tells what they object to."""
+"""Checks generated SystemVerilog with Verilator's linter and with Icarus, and returns their warnings."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ WAIVERS = {
     "UNUSEDSIGNAL": "a format drops the bits beyond its proven range or below its rounding, on purpose",
     "WIDTHEXPAND": "operands of a sum differ in width, and the language extends the narrower one by its sign",
 }
-"""Warnings of Verilator's ``-Wall`` that generated cores draw, and why each is as meant."""
+"""Warnings of Verilator's ``-Wall`` that generated cores cause, and why each is harmless."""
 
 
 def lint(sv: Path, top: str, build_dir: Path, *, waived: Collection[str] = tuple(WAIVERS)) -> list[str]:
-    """Read `sv` with Verilator's ``--lint-only -Wall``.
+    """Check `sv` with Verilator's ``--lint-only -Wall``.
 
     Parameters
     ----------
@@ -41,12 +41,12 @@ def lint(sv: Path, top: str, build_dir: Path, *, waived: Collection[str] = tuple
     Raises
     ------
     ShortfallError
-        If Verilator does not take the file; says why.
+        If Verilator rejects the file; gives the reason.
     ToolError
         If Verilator is missing.
     """
     verilator = find_simulator("verilator", build_dir / "bin")
-    # -Wno-fatal: the exit status then tells errors from warnings.
+    # With -Wno-fatal, the exit status is nonzero only for errors.
     options = ["--lint-only", "-Wall", "-Wno-fatal", *(f"-Wno-{name}" for name in sorted(waived))]
     result = subprocess.run(
         ["verilator", *options, "--top-module", top, str(sv.resolve())],
@@ -62,7 +62,7 @@ def lint(sv: Path, top: str, build_dir: Path, *, waived: Collection[str] = tuple
 
 
 def icarus_check(sv: Path, top: str) -> list[str]:
-    """Read and elaborate `sv` with Icarus (``-g2012 -Wall``).
+    """Parse and elaborate `sv` with Icarus (``-g2012 -Wall``).
 
     Returns
     -------
@@ -72,7 +72,7 @@ def icarus_check(sv: Path, top: str) -> list[str]:
     Raises
     ------
     ShortfallError
-        If Icarus does not take the file; says why.
+        If Icarus rejects the file; gives the reason.
     ToolError
         If Icarus is missing.
     """
@@ -90,6 +90,6 @@ def icarus_check(sv: Path, top: str) -> list[str]:
 
 
 def _first_error(text: str, mark: str) -> str:
-    """First line with `mark`, or the first of all."""
+    """First line that contains `mark`, or else the first line."""
     lines = text.splitlines() or ["no message"]
     return next((line for line in lines if mark in line), lines[0]).strip()

@@ -36,7 +36,7 @@ from sosmith.sim.simulators import check_name
 _Kind = TypeVar("_Kind", bound=np.generic)
 
 Progress = Callable[[str, int, int], None]
-"""Called with the name of the step, the amount done and the total; the total is 0 where the amount is not known."""
+"""Called with the name of the step, the amount done and the total; the total is 0 if it is not known."""
 
 
 def simulate(
@@ -52,10 +52,10 @@ def simulate(
     gates: Board | None = None,
     progress: Progress = lambda step, done, total: None,
 ) -> Evidence:
-    """Generate the core into `directory`, run `traces` through it, and set the result beside model and golden chain.
+    """Generate the core into `directory`, run `traces` through it, and compare it with model and golden chain.
 
-    There is one trace for each channel, all of the same length. With `gates`, what runs is the netlist that synthesis
-    makes for that board.
+    There is one trace for each channel, all of the same length. With `gates`, the simulation runs the netlist
+    synthesized for that board.
 
     Raises
     ------
@@ -69,7 +69,7 @@ def simulate(
     started = time.monotonic()
     check_name(simulator)
     with _alone_in(directory):
-        for stale in ("report.json", "report.html"):  # of a run of another core, if this one fails
+        for stale in ("report.json", "report.html"):  # of a run of another core, in case this run fails
             (directory / stale).unlink(missing_ok=True)
         facts = core_facts(design)
         generate(design, directory, lambda step: progress(f"generating {step}", 0, 0), facts=facts)
@@ -103,7 +103,7 @@ def simulate(
 
 @contextmanager
 def _alone_in(directory: Path) -> Iterator[None]:
-    """Hold `directory`, made if missing, against a second run, whose files would mix with those of this one."""
+    """Lock `directory`, made if missing, so that no second run can mix its files with those of this one."""
     write_files(directory, {})
     handle = os.open(directory, os.O_RDONLY)
     try:
@@ -184,7 +184,7 @@ def _evidence(
 
 
 def _stacked(columns: Sequence[npt.NDArray[_Kind] | None]) -> npt.NDArray[_Kind] | None:
-    """Columns of all channels side by side, or None if they are not there."""
+    """Columns of all channels side by side, or None if there are none."""
     present = [column for column in columns if column is not None]
     return np.stack(present, axis=1) if present else None
 
@@ -207,7 +207,7 @@ def _filter_facts(quantized: Quantized) -> FilterFacts | None:
 
 
 def _alternatives(quantized: Quantized, codes: Codes, golden: Values) -> list[Alternative]:
-    """Compute with the integer model what each other realization makes of the same input at the same word lengths."""
+    """Run the integer model of every other realization on the same input, with the same word lengths."""
     if quantized.realization not in ERROR_FEEDBACK or not quantized.sections:
         return []
     rows = []

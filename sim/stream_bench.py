@@ -1,9 +1,9 @@
-"""The cocotb test that runs inside the simulator: feeds a core's streams, checks their rules, keeps the results.
+"""The cocotb test that runs inside the simulator: drives a core's streams, checks the protocol, stores the results.
 
-Configuration and stimulus come from the folder named by SOSMITH_BENCH: ``bench.json`` and ``words.txt``;
-``result.json`` and ``received.txt`` go there. The bench wakes once a clock, at the falling edge: there it reads
-what the rising edge before has left, settled, and sets the inputs that the next rising edge takes. While a core that
-takes many clocks a sample is busy and nothing can happen, it sleeps.
+Configuration and stimulus are read from the folder named by SOSMITH_BENCH (``bench.json`` and ``words.txt``);
+``result.json`` and ``received.txt`` are written there. The bench wakes once per clock, at the falling edge: it reads
+the settled outputs of the previous rising edge, and sets the inputs for the next one. While a core that takes many
+clocks per sample is busy and nothing can happen, the bench sleeps.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from cocotb.utils import get_sim_time
 
 _PERIOD_NS = 20
 _SETTLE_NS = 1  # for the probes, several of which fit into half a period
-_SILENCE = 2000  # clocks without a transfer, both sides willing most of the time, that mean a hang
+_SILENCE = 2000  # clocks without a transfer, with both sides ready most of the time, after which the core has hung
 _PROGRESS_EVERY = 4096  # clocks
-_BUSY = 64  # clocks from input to output beyond which it pays to sleep while a core is busy
-_PROBED_SHARE = 1 / 32  # of all clocks, at which combinational paths between the handshakes are looked for
+_BUSY = 64  # clocks from input to output above which sleeping while a core is busy saves time
+_PROBED_SHARE = 1 / 32  # of all clocks, at which combinational paths between the handshakes are tested for
 
 
 class ProtocolError(Exception):
@@ -33,7 +33,7 @@ class ProtocolError(Exception):
 
 
 class Word(NamedTuple):
-    """A word of a stream: channel, data and, on the way out, status."""
+    """A word of a stream: channel, data and, on the output stream, status."""
 
     tdest: int
     tdata: int
@@ -66,7 +66,7 @@ class _Bench:
         return name == "tdata" or bool(self.config[name])
 
     async def clock(self) -> None:
-        """Let one rising edge pass."""
+        """Wait for one rising edge."""
         await self._falling
         self.clocks += 1
 
@@ -75,7 +75,7 @@ class _Bench:
         self.clocks = self._shown = 0
 
     async def busy(self) -> None:
-        """Let the clocks pass at which the core neither takes nor offers anything."""
+        """Skip the clocks at which the core neither accepts nor offers anything."""
         dut, before = self.dut, get_sim_time("ns")
         limit = Timer(self.patience * _PERIOD_NS, "ns")
         await First(RisingEdge(dut.s_axis_tready), RisingEdge(dut.m_axis_tvalid), limit)
@@ -105,14 +105,14 @@ class _Bench:
             raise ProtocolError("m_axis_tvalid must be low after reset")
 
     def bit(self, handle: Any, name: str) -> bool:
-        """Value of a handshake signal, which must be known."""
+        """Value of a handshake signal, which must not be X or Z."""
         value = handle.value
         if not value.is_resolvable:
             raise ProtocolError(f"{name} must be 0 or 1, not {value}, at clock {self.clocks}")
         return bool(value)
 
     def word(self) -> Word:
-        """Output word, every bit of which must be known."""
+        """Output word, in which no bit may be X or Z."""
         found = {}
         for name, handle in self._outputs:
             value = handle.value
@@ -122,7 +122,7 @@ class _Bench:
         return Word(found.get("tdest", 0), found["tdata"], found.get("tuser", 0))
 
     async def output_appears_without_ready(self) -> None:
-        """Check that a core offers a result that it holds whether or not the sink is ready."""
+        """Check that a core with a result asserts ``tvalid`` whether or not the sink is ready."""
         self.offer(self.words[0])
         for _ in range(self.patience + 64):
             await self.clock()
@@ -131,7 +131,7 @@ class _Bench:
         raise ProtocolError("m_axis_tvalid must not wait for m_axis_tready")
 
     async def probe(self) -> None:
-        """Neither handshake output may follow an input within a clock."""
+        """Check that no handshake output depends combinationally on an input."""
         dut = self.dut
         watched = [dut.s_axis_tready, dut.m_axis_tvalid, *(handle for _, handle in self._outputs)]
         before = [str(handle.value) for handle in watched]
@@ -149,7 +149,7 @@ class _Bench:
         await Timer(_SETTLE_NS, "ns")
 
     async def stream(self, words: list[Word], *, probe: bool) -> None:
-        """Send `words` at a random pace and receive as many, checking every clock."""
+        """Send `words` at a random pace and receive the same number, checking every clock."""
         dut = self.dut
         pace = random.Random(self.config["seed"])
         idle, stall = _Pace(pace, self.config["idle"]), _Pace(pace, self.config["stall"])
@@ -157,7 +157,7 @@ class _Bench:
         sent, offered, silence = 0, False, 0
         was_ready: bool | None = None
         was_offered: bool | None = None
-        held: Word | None = None  # the word that the core offers and we have not taken
+        held: Word | None = None  # the word that the core offers and the bench has not accepted
         while len(self.received) < target:
             if not offered:
                 offered = sent < len(words) and next(idle)
@@ -165,7 +165,7 @@ class _Bench:
                     self.offer(words[sent] if offered else None)
                 was_offered = offered
             ready = next(stall)
-            if ready != was_ready:  # a write costs as much as the rest of a clock
+            if ready != was_ready:  # a write takes as long as the rest of a clock
                 dut.m_axis_tready.value = int(ready)
                 was_ready = ready
             if probe or pace.random() < _PROBED_SHARE:
@@ -201,7 +201,7 @@ class _Bench:
         self.offer(None)
 
     async def nothing_more_comes(self) -> None:
-        """After the last result the core must be silent."""
+        """Check that the core is silent after the last result."""
         self.dut.m_axis_tready.value = 1
         for _ in range(self.config["latency_cycles"] + 64):
             await self.clock()
@@ -209,7 +209,7 @@ class _Bench:
                 raise ProtocolError(f"{len(self.received)} samples must come out, not more")
 
     def report(self, done: int) -> None:
-        """Leave the count of samples for the parent process to show."""
+        """Write the number of samples for the parent process to show."""
         (self.folder / "progress.txt").write_text(str(done), encoding="utf-8")
 
 
@@ -222,7 +222,7 @@ def _change(held: Word, word: Word | None) -> str:
 
 
 class _Pace:
-    """Random go and wait with the given share of waiting, in bursts, at full speed, and one clock at a time."""
+    """Random sequence of go and wait with the given share of waiting: in bursts, at full speed, and single clocks."""
 
     def __init__(self, source: random.Random, waiting: float) -> None:
         self._source, self._waiting = source, waiting
@@ -230,7 +230,7 @@ class _Pace:
 
     def __next__(self) -> bool:
         if self._left == 0:
-            # Phases of no waiting and of heavy waiting keep the wanted share on average.
+            # Phases without waiting and with heavy waiting average to the given share.
             self._left = self._source.randrange(20, 200)
             spread = min(self._waiting, 1 - self._waiting, 0.4)
             self._share = self._waiting + self._source.choice((-spread, 0.0, spread))
@@ -243,7 +243,7 @@ async def _run(bench: _Bench) -> None:
     Clock(bench.dut.aclk, _PERIOD_NS, "ns", impl="gpi").start(start_high=False)
     await bench.reset()
     await bench.output_appears_without_ready()
-    # Reset in mid-run: what went in before must leave no trace.
+    # Reset in mid-run: earlier inputs must have no effect.
     await bench.reset()
     first = bench.words[: min(len(bench.words), 64)]
     await bench.stream(first, probe=True)
@@ -261,7 +261,7 @@ async def _run(bench: _Bench) -> None:
 
 @cocotb.test()
 async def core_under_test(dut: Any) -> None:
-    """Run the whole stimulus; leave the outcome in ``result.json``, written last."""
+    """Run the whole stimulus and write the outcome to ``result.json`` last."""
     folder = Path(os.environ["SOSMITH_BENCH"])
     bench = _Bench(dut, folder)
     started = time.monotonic()

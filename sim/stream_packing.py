@@ -1,4 +1,4 @@
-"""Codes of a core's ports packed into the beats of its streams and back; samples of channels in a random order."""
+"""Packs codes of a core's ports into beats of its streams, unpacks them, and draws a random order of channels."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from sosmith.model.errors import ShortfallError
 Order = npt.NDArray[np.int64]
 """Channel of each sample on a stream, shape (samples * channels,)."""
 
-_BLOCK = 8  # samples of each channel that come in turn, then as many shuffled
+_BLOCK = 8  # samples per channel in each block; blocks in turn alternate with shuffled ones
 
 
 @dataclass(frozen=True, eq=False)
 class Beats:
-    """Transfers on an AXI4-Stream, in order; arrays of the shape (n,).
+    """Transfers on an AXI4-Stream, in order; all arrays have shape (n,).
 
     Attributes
     ----------
@@ -41,7 +41,7 @@ class Beats:
 
 
 def random_order(samples: int, channels: int, seed: int) -> Order:
-    """Draw an order: blocks with the channels in turn alternate with blocks that are shuffled."""
+    """Draw an order in which blocks with the channels in turn alternate with shuffled blocks."""
     rng = np.random.default_rng(seed)
     blocks = []
     for start in range(0, samples, _BLOCK):
@@ -51,7 +51,7 @@ def random_order(samples: int, channels: int, seed: int) -> Order:
 
 
 def pack(codes: Codes, order: Order, stream: StreamFacts) -> Beats:
-    """Pack codes into beats: each field is extended by its sign to whole bytes.
+    """Pack codes into beats: each field is sign-extended to whole bytes.
 
     Parameters
     ----------
@@ -77,8 +77,8 @@ def unpack(beats: Beats, order: Order, stream: StreamFacts) -> tuple[Codes, npt.
     Raises
     ------
     ShortfallError
-        If the number of beats or a beat's channel is not as in `order`, or a field is not extended by its sign to
-        whole bytes.
+        If the number of beats or a beat's channel differs from `order`, or a field is not sign-extended to whole
+        bytes.
     """
     _check_channels(beats, order)
     channels = int(order.max()) + 1

@@ -1,4 +1,4 @@
-"""FPGAs and the boards that carry them, as data: what synthesis, gate-level simulation and placement need to know."""
+"""FPGAs and boards as data for synthesis, gate-level simulation and placement."""
 
 from __future__ import annotations
 
@@ -8,33 +8,33 @@ from sosmith.model.errors import SpecificationError
 from sosmith.model.suggestion import did_you_mean
 
 _LUTS = {"SB_LUT4": 1, "LUT4": 1, "CCU2C": 2, "TRELLIS_DPR16X4": 4}
-"""LUT4 that a cell takes."""
+"""Number of LUT4 that a cell uses."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Device:
-    """An FPGA, whatever its package.
+    """An FPGA, in any package.
 
     Attributes
     ----------
     family : str
         ``"ice40"`` or ``"ecp5"``: the name of the cell library.
     title : str
-        For people.
+        Name for display.
     synthesis : str
         Yosys command that maps a design onto its cells.
     placer : str
-        Option of nextpnr that chooses it.
+        Option of nextpnr that selects it.
     logic_cells : int
-        LUT4, each with a flip-flop beside it.
+        Number of LUT4, each with a flip-flop.
     multiplier : str or None
         Cell type of the multiplier block, None if there is none: SB_MAC16 multiplies 16 x 16 bits, MULT18X18D 18 x 18.
     multipliers : int
-        Number of those.
+        Number of multiplier blocks.
     block_ram : str
         Cell type of the block RAM: SB_RAM40_4K holds 4,096 bits, DP16KD 18,432.
     block_rams : int
-        Number of those.
+        Number of block RAMs.
     """
 
     family: str
@@ -48,7 +48,7 @@ class Device:
     block_rams: int
 
     def excess(self, cells: dict[str, int]) -> list[str]:
-        """Tell of a netlist's cells what is more than there is; none of it means that placement may still fail.
+        """List the cells of which a netlist needs more than the FPGA has; placement may fail even if there are none.
 
         Parameters
         ----------
@@ -58,7 +58,7 @@ class Device:
         Returns
         -------
         list of str
-            Such as ``"13 SB_MAC16 of 8"``.
+            Items such as ``"13 SB_MAC16 of 8"``.
         """
         luts = sum(weight * cells.get(kind, 0) for kind, weight in _LUTS.items())
         needed = [
@@ -71,18 +71,18 @@ class Device:
 
 @dataclass(frozen=True, kw_only=True)
 class Board:
-    """A board to be had.
+    """A commercially available board.
 
     Attributes
     ----------
     name : str
         As on the command line.
     title : str
-        For people.
+        Name for display.
     device : Device
         Its FPGA.
     package, speed : str
-        As nextpnr calls them; iCE40 have no speed grade.
+        Names in nextpnr; iCE40 devices have no speed grade.
     clock : int
         Frequency of the oscillator at a clock pin, in Hz.
     """
@@ -95,7 +95,7 @@ class Board:
     clock: int
 
 
-# Numbers of cells are those that nextpnr 0.11.1 tells for an empty design.
+# Numbers of cells are those that nextpnr 0.11.1 reports for an empty design.
 _UP5K = Device(
     family="ice40",
     title="iCE40 UP5K",
@@ -136,8 +136,8 @@ _ECP5_85_5G = replace(_ECP5_85, title="ECP5 LFE5UM5G-85F", placer="--um5g-85k")
 
 _ULX3S = Board(name="ulx3s_25f", title="ULX3S 25F", device=_ECP5_25, package="CABGA381", speed="6", clock=25_000_000)
 
-# FPGA, package, speed grade and clock as in amaranth-boards 0.0.21; those of the Colorlight i5, 7.0, as its pins are
-# documented in wuxx/Colorlight-FPGA-Projects. On an UPduino 3 the oscillator reaches its pin through a solder jumper.
+# FPGA, package, speed grade and clock are from amaranth-boards 0.0.21; those of the Colorlight i5, 7.0, from its pinout
+# in wuxx/Colorlight-FPGA-Projects. On an UPduino 3, a solder jumper connects the oscillator to its pin.
 _ALL = (
     Board(name="icebreaker", title="iCEBreaker", device=_UP5K, package="sg48", speed="", clock=12_000_000),
     Board(name="upduino", title="UPduino 3", device=_UP5K, package="sg48", speed="", clock=12_000_000),
@@ -175,7 +175,7 @@ def find_board(name: str) -> Board:
     Raises
     ------
     SpecificationError
-        If there is none; lists those that there are.
+        If there is no such board; lists the available ones.
     """
     if name not in BOARDS:
         hint = did_you_mean(name, BOARDS)

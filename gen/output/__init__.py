@@ -1,1 +1,1 @@
-"""Files that leave the house: SystemVerilog, RTLIL, manifest, certificate."""
+"""Generated files: SystemVerilog, RTLIL, manifest, certificate."""

@@ -1,6 +1,6 @@
-"""Makes the certificate of a design: the datapath, what it stands for, and what is proven about it.
+"""Makes the certificate of a design: the datapath, the exact calculation that it approximates, and the proven bounds.
 
-Whoever reads it can prove the bound again and needs nothing else; `sosmith.gen.verifier.verification` does.
+The bound can be proven again from the certificate alone, as `sosmith.gen.verifier.verification` does.
 """
 
 from __future__ import annotations
@@ -43,17 +43,17 @@ from sosmith.model.sections.horner import HornerStep
 from sosmith.model.sections.output import OutputStage
 
 _FINER_BITS = 88
-"""Bits by which a claim is computed more precisely than the search for word lengths needs, so that two methods fall
-into the same step of the grid."""
+"""Additional bits, beyond the needs of the word-length search, to which claims are computed, so that two methods round
+to the same value on the grid."""
 
 
 def certificate(quantized: Quantized, max_error: Fraction) -> Certificate:
-    """Certify a design; `max_error` is what was asked for, in the unit of the output.
+    """Certify a design; `max_error` is the specified limit, in the unit of the output.
 
     Raises
     ------
     ShortfallError
-        If a section is unstable or its response does not end in time.
+        If a section is unstable or its response does not decay in time.
     """
     datapath = quantized.datapath
     sections = ideal_sections(quantized.filter) if quantized.filter is not None else []
@@ -133,7 +133,7 @@ def _closer(stages: Sequence[StageModel], ideal: Sequence[TransferFunction], low
 
 
 def _gains(name: str, stage: StageModel) -> GainEntry:
-    """Gains of a stage: the largest of its outputs', and that of the recursions of all its outputs in a row."""
+    """Gains of a stage: the largest among its outputs, and that of the cascaded recursions of all its outputs."""
     at = _finer(horizon([[model.denominator for model in stage]]))
     largest = Fraction(0)
     recursion = impulse(at)
@@ -150,7 +150,7 @@ def _gain(response: Response) -> Fraction:
 
 
 def _magnitude(drives: Sequence[Drive]) -> Fraction:
-    """Largest size of the sum of `drives`, as `sosmith.gen.proof.peak_gain.extent` has it, without any rounding."""
+    """Largest magnitude of the sum of `drives`, as in `sosmith.gen.proof.peak_gain.extent` but without rounding."""
     scale = math.lcm(*(end.denominator for drive in drives for end in (drive.low, drive.high)))
     length = max((len(drive.response.samples) for drive in drives), default=0)
     tops, bottoms = [0] * length, [0] * length

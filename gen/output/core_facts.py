@@ -31,11 +31,11 @@ class StreamFacts:
     Attributes
     ----------
     fields : tuple of Field
-        Where each quantity lies in ``tdata``, the lowest first.
+        Position of each quantity in ``tdata``, the lowest first.
     dest_width : int
-        Bits of ``tdest``; 0 without one.
+        Bits of ``tdest``; 0 if there is none.
     flags : mapping of str to int
-        Bit of each flag in ``tuser``, by name; empty without ``tuser``.
+        Bit position of each flag in ``tuser``, by name; empty if there is no ``tuser``.
     """
 
     fields: tuple[Field, ...]
@@ -50,7 +50,7 @@ class StreamFacts:
 
 @dataclass(frozen=True, kw_only=True)
 class InterfaceFacts:
-    """What drives a core from outside needs to know.
+    """Facts needed to drive a core: its streams and timing.
 
     Attributes
     ----------
@@ -59,9 +59,9 @@ class InterfaceFacts:
     inputs, outputs : StreamFacts
         ``s_axis`` and ``m_axis``.
     reset_cycles : int
-        Clocks after a reset until the first sample is taken.
+        Clocks after a reset until the first sample is accepted.
     latency_cycles : int
-        Clocks from the edge that accepts a sample to the edge that can hand its result on, at most.
+        Largest number of clocks from the edge that accepts a sample to the edge that can output its result.
     """
 
     name: str
@@ -73,7 +73,7 @@ class InterfaceFacts:
 
 @dataclass(frozen=True, kw_only=True)
 class WearFacts:
-    """Clearances of one channel at which the flags of wear rise, in the output's unit, and their codes."""
+    """Clearances of one channel at which the wear flags are set, in the output's unit, and their codes."""
 
     warning: float
     critical: float
@@ -82,18 +82,18 @@ class WearFacts:
 
 @dataclass(frozen=True, kw_only=True)
 class ReloadFacts:
-    """What a set of constants for this core has to match, and the files that describe its registers.
+    """Facts that a set of constants for this core has to match, and the files that describe its registers.
 
     Attributes
     ----------
     interface : int
         Version of the register interface.
     design : int
-        Fingerprint of everything but the constants.
+        Fingerprint of everything except the constants.
     words, word_bits : int
         Size of a bank of constants.
     registers : tuple of str
-        Names of the files.
+        Names of the files that describe the registers.
     """
 
     interface: int
@@ -126,11 +126,11 @@ class SectionFacts:
     states : mapping of str to str
         Q format of each state, by name.
     b, a : tuple of float, length 3
-        The transfer function that the integers make, in powers of ``z**-1``.
+        Transfer function with the integer coefficients, in powers of ``z**-1``.
     input, output : str
         Q formats.
     error_feedback : tuple of int or None
-        Weights of the dropped bits of the samples before; None where the realization has none.
+        Weights of the dropped bits of earlier samples; None if the realization has no error feedback.
     """
 
     name: str
@@ -156,7 +156,7 @@ class NodeFormat:
     low, high : float
         Smallest and largest value, in `unit`.
     unit : str
-        Unit of the node, ``""`` for a plain number.
+        Unit of the node, ``""`` for a dimensionless number.
     """
 
     stage: str
@@ -169,19 +169,18 @@ class NodeFormat:
 
 @dataclass(frozen=True, kw_only=True)
 class LimitCycleFacts:
-    """What the rounding of one recursion can sustain, at its own output.
+    """Limit cycles and dead band of one recursion, at its own output.
 
     Attributes
     ----------
     section : str
         Name of the recursion, as in `SectionFacts`.
     largest, dead_band : float
-        Bounds, in the unit of the core's output: of a limit cycle without input, and of how far a constant output
-        can stay from its exact value.
+        Bounds, in the unit of the core's output, on a limit cycle without input and on the error of a constant output.
     none : bool
         Whether it is proven that there is no limit cycle.
     lyapunov : tuple of Fraction or None
-        Weights of a diagonal Lyapunov function; None where there is none.
+        Weights of a diagonal Lyapunov function; None if there is none.
     """
 
     section: str
@@ -193,7 +192,7 @@ class LimitCycleFacts:
 
 @dataclass(frozen=True, kw_only=True)
 class CoreFacts:
-    """Everything about a generated core that its manifest and its report tell.
+    """All facts about a generated core for its manifest and its report.
 
     Attributes
     ----------
@@ -206,19 +205,19 @@ class CoreFacts:
     interface : InterfaceFacts
         Streams and clocks.
     cycles_per_sample : int
-        Clocks from one sample to the next at the highest rate, at most.
+        Largest number of clocks between samples at the highest rate.
     wear : tuple of WearFacts or None
-        One for all channels, or one for each; None without limits of wear.
+        One for all channels, or one for each; None without wear limits.
     realization : str or None
         Name of the realization; None without sections.
     architecture : str
         Name of the architecture.
     program : Program or None
-        What the folded and serial architectures run; None in the parallel one.
+        Program of the folded and serial architectures; None in the parallel one.
     reload : ReloadFacts or None
-        None where no constants can be loaded.
+        Facts for reloading; None if the core is not reloadable.
     reasons : mapping of str to str
-        Why this realization and this architecture.
+        Reasons for this realization and this architecture.
     sections : tuple of SectionFacts
         In the order of the cascade.
     formats : tuple of NodeFormat
@@ -232,7 +231,7 @@ class CoreFacts:
     limit_cycles : tuple of LimitCycleFacts
         One for each of `sections`.
     aliasing : Aliasing or None
-        Of an impulse-invariant filter.
+        Aliasing of an impulse-invariant filter; None for all others.
     cost : Cost
         Operators of the parallel architecture.
     """
@@ -292,7 +291,7 @@ def core_facts(design: CoreDesign) -> CoreFacts:
 
 
 def interface_facts(design: CoreDesign) -> InterfaceFacts:
-    """Collect what drives a core from outside needs to know."""
+    """Collect the facts needed to drive a core."""
     datapath, width = design.datapath, dest_width(design.spec.channels)
     flags = {flag.name.lower(): flag.value for flag in Flag}
     return InterfaceFacts(
@@ -315,7 +314,7 @@ def _wear(design: CoreDesign) -> tuple[WearFacts, ...] | None:
 
 
 def _sections(section: Stage) -> Sequence[SectionFacts]:
-    """One for each recursion of a section."""
+    """Facts about each recursion of a section."""
     feedback = tuple(section.feedback) if isinstance(section, DirectForm1) else None
     return [_section(name, graph, feedback) for name, graph in recursions(section).items()]
 

@@ -26,8 +26,8 @@ def generate(
 ) -> list[Path]:
     """Write SystemVerilog, RTLIL, manifest, certificate and C model; return the paths of the files.
 
-    For a core whose constants can be loaded, also its registers, as a C header and in SystemRDL. Two runs on the same
-    specification write the same bytes.
+    A reloadable core also gets its register map as a C header and in SystemRDL. Two runs on the same specification
+    write the same bytes.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def generate(
     directory : Path
         Folder for the files, made if missing.
     progress : callable
-        Told the name of each step.
+        Called with the name of each step.
     facts : CoreFacts or None
         The facts about the core, if they have been collected already.
 

@@ -1,4 +1,4 @@
-"""The manifest: the facts about a generated core as a tree of JSON values, for a program around it."""
+"""The manifest: the facts about a generated core as a tree of JSON values, for other programs."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def manifest(facts: CoreFacts) -> dict[str, Any]:
 
 
 def limit_cycle_entry(found: LimitCycleFacts) -> dict[str, Any]:
-    """Return what is known of a section's limit cycles as JSON values; the weights are texts of rationals."""
+    """Return the facts about a section's limit cycles as JSON values; the weights are rationals as strings."""
     weights = None if found.lyapunov is None else [str(weight) for weight in found.lyapunov]
     return _entry(found) | {"lyapunov": weights}
 

@@ -1,4 +1,4 @@
-"""Emits a core as RTLIL and SystemVerilog, byte for byte the same on every run."""
+"""Emits a core as RTLIL and SystemVerilog, byte-identical on every run."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from amaranth.lib.wiring import Component
 
 from sosmith.model.errors import ToolError
 
-# Without `-nomux` there is no combinational process left, which Icarus would leave unevaluated at time 0.
+# Without `-nomux`, no combinational processes remain, which Icarus would not evaluate at time 0.
 _SCRIPT = """read_rtlil <<end_of_rtlil
 {rtlil}
 end_of_rtlil
@@ -34,7 +34,7 @@ def to_rtlil(core: Component, name: str) -> str:
 
 
 def to_verilog(rtlil_text: str) -> str:
-    """SystemVerilog text of an RTLIL text, by the Yosys that comes with Amaranth.
+    """SystemVerilog text of an RTLIL text, converted by the Yosys that comes with Amaranth.
 
     Raises
     ------

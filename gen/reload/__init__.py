@@ -1,1 +1,1 @@
-"""Other coefficients for hardware that exists: made, proven, and written as register writes."""
+"""New coefficients for existing hardware: designed, proven, and turned into register writes."""

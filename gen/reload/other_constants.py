@@ -1,4 +1,4 @@
-"""A design with the constants of another filter or polynomial, all signals as they are."""
+"""A design with the constants of another filter or polynomial, and unchanged signal formats."""
 
 from __future__ import annotations
 
@@ -25,24 +25,24 @@ _DOUBLE = 53
 def with_constants(
     made: Quantized, ideal: Filter | None, polynomial: Polynomial | None, *, finer: int = 0, room: int = 0
 ) -> Quantized:
-    """Return the design for another filter or another polynomial, with no bit more or less of any signal.
+    """Return the design for another filter or another polynomial, with the same fraction bits of all signals.
 
-    The bound is proven anew and may exceed what the specification allows.
+    The bound is proven again and may exceed the limit in the specification.
 
     Parameters
     ----------
     made : Quantized
         The design.
     ideal : Filter or None
-        The other filter; None for the one it has. Sections take the places of those with the same rank by the
-        distance of their poles from the unit circle.
+        The other filter; None to keep the present one. Sections are matched in order of the distance of their poles
+        from the unit circle.
     polynomial : Polynomial or None
-        The other polynomial; None for the one it has.
+        The other polynomial; None to keep the present one.
     finer : int
-        Fraction bits to which the coefficients of another filter are rounded beyond those of the design.
+        Additional fraction bits, beyond those of the design, to which the coefficients of another filter are rounded.
     room : int
-        Fraction bits, at least `finer`, that all coefficients are written with beyond those of the design: sets that
-        are made with the same room have the same formats, so that states carry over from one to another.
+        Additional fraction bits, at least `finer`, with which all coefficients are stored. Sets with the same room have
+        the same formats, so that states carry over from one to another.
 
     Raises
     ------
@@ -104,7 +104,7 @@ def _input_stage(made: Quantized, polynomial: Polynomial | None) -> InputStage:
 
 
 def _ranked(ideal: Filter, like: Filter, realization: str) -> Filter:
-    """Return the filter with its sections in the order of `like`: each has the same rank by its pole radius."""
+    """Return the filter with its sections in the order of `like`, matched by their pole radii."""
     if not REALIZATIONS[realization].cascade or len(ideal.rows) != len(like.rows):
         return ideal
     ranks = sorted(range(len(like.rows)), key=lambda k: _nearness(like.rows[k]))
@@ -113,12 +113,12 @@ def _ranked(ideal: Filter, like: Filter, realization: str) -> Filter:
 
 
 def _nearness(row: Sequence[float]) -> tuple[bool, float]:
-    """Key that sorts sections of first order first, then by the radius of their poles."""
+    """Sort key: sections of first order first, then by the radius of their poles."""
     return row[5] != 0, row[5]
 
 
 def _lifted(formats: Sequence[SectionFormat], bits: int) -> list[SectionFormat]:
-    """Write all coefficients with `bits` more fraction bits, of the same value."""
+    """Write all coefficients with `bits` more fraction bits and the same values."""
     return [
         replace(f, coefficients={name: (code << bits, frac + bits) for name, (code, frac) in f.coefficients.items()})
         for f in formats
@@ -126,7 +126,7 @@ def _lifted(formats: Sequence[SectionFormat], bits: int) -> list[SectionFormat]:
 
 
 def _with_coefficients_of(ideal: Filter, formats: Sequence[SectionFormat], realization: str) -> list[SectionFormat]:
-    """Return `formats` with the coefficients of another filter, rounded to the fraction bits of these."""
+    """Return `formats` with the coefficients of another filter, rounded to the same fraction bits."""
     nearest = [SectionFormat(coefficient_bits=_DOUBLE)] * len(parts_of(ideal, realization))
     exact = stages_of(ideal, realization, nearest, unknown_range(0))
     names, wanted = ([list(f.coefficients) for f in formats], [list(stage.coefficients) for stage in exact])

@@ -1,4 +1,4 @@
-"""The registers of a reloadable core as texts: Markdown, C header, SystemRDL, all from the one description."""
+"""The register map of a reloadable core as Markdown, C header and SystemRDL, all from one description."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ def c_registers(name: str, *, words: int, design: int) -> str:
     name : str
         Name of the core.
     words : int
-        Words of a bank.
+        Number of words in a bank.
     design : int
-        Fingerprint.
+        Fingerprint of the design.
     """
     constants = {"ID": MAGIC, "INTERFACE": INTERFACE, "WORDS": words, "DESIGN": design}
     return render(
@@ -41,7 +41,7 @@ def c_registers(name: str, *, words: int, design: int) -> str:
 
 
 def systemrdl(name: str, *, words: int, design: int) -> str:
-    """Return the registers in SystemRDL 2.0, which other tools read; parameters as for `c_registers`."""
+    """Return the registers in SystemRDL 2.0, for other tools; parameters as for `c_registers`."""
     layout = INTERFACE << LAYOUT.field("INTERFACE").low | words << LAYOUT.field("WORDS").low
     constants = {ID.name: MAGIC, LAYOUT.name: layout, DESIGN.name: design}
     return render(__package__, "registers.rdl.jinja", name=name, bits=BITS, registers=REGISTERS, constants=constants)

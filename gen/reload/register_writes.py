@@ -1,4 +1,4 @@
-"""What is written to a core's registers to load a set, as a list and as a JSON file."""
+"""The register writes that load a set of constants into a core, as a list and as JSON."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from sosmith.model.reload.registers import CRC, DATA, VERSION, Register
 
 
 def bank_size(architecture: Architecture) -> tuple[int, int]:
-    """Return the number of words in a bank of a core, and the bits of each that are used."""
+    """Return the number of words in a bank of a core, and the number of bits used in each."""
     made = architecture.program
     if made is not None:
         return len(made.instructions), instruction_bits(made)
@@ -24,16 +24,16 @@ def bank_size(architecture: Architecture) -> tuple[int, int]:
 
 
 def register_writes(hardware: CoreDesign, made: OtherSet, version: int) -> list[tuple[Register, int]]:
-    """List what is to be written to which register, in this order, so that a core takes a set over.
+    """List the register writes, in order, that make a core switch to a set.
 
     Parameters
     ----------
     hardware : CoreDesign
-        What the core was made from.
+        Design of the core.
     made : OtherSet
         The set, as `check_swap` returns it.
     version : int
-        What ``VERSION`` is to read once the set is active, 32 bits.
+        Value of ``VERSION`` once the set is active, 32 bits.
     """
     if not 0 <= version < 1 << 32:
         raise ValueError(f"version must be in 0..4294967295, not {version}")
@@ -46,9 +46,9 @@ def register_writes(hardware: CoreDesign, made: OtherSet, version: int) -> list[
 
 
 def reload_json(hardware: CoreDesign, swap: Swap, version: int) -> dict[str, Any]:
-    """Return what a host needs to load a set, and what is proven of it, as a tree of JSON values.
+    """Return what a host needs to load a set, and what is proven about it, as JSON values.
 
-    ``writes`` are pairs of a byte address and a word, in order; errors are in the output's unit.
+    ``writes`` is a list of pairs of a byte address and a word, in order; errors are in the output's unit.
     """
     output = hardware.datapath.output
     words, _ = bank_size(hardware.architecture)

@@ -1,8 +1,8 @@
-"""Coefficients for existing hardware: made in its formats, proven again, and refused where they do not fit.
+"""New coefficients for existing hardware: designed in its formats, proven again, and refused if they do not fit.
 
-Ranges and bound of a set are proven for a core that runs from reset with it. What a swap hands on is a state that
-another set made, so a swap is proven too: that nothing wraps from the first sample on, whatever the input was and will
-be, and after how many samples the bound holds again (`sosmith.gen.reload.transient`).
+Ranges and bound of a set are proven for a core that runs with it from reset. A swap, however, starts from states of
+another set, so it is proven too: that nothing wraps from the first sample on, for all inputs before and after, and
+after how many samples the bound holds again (`sosmith.gen.reload.transient`).
 """
 
 from __future__ import annotations
@@ -31,19 +31,19 @@ ADVICE = (
     "go there in smaller steps, each after the one before has faded, or stop the samples and reset the core before "
     "the first one with the new set"
 )
-"""What helps where a swap is refused."""
+"""Remedy if a swap is refused."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class OtherSet:
-    """Constants for hardware that exists.
+    """New constants for existing hardware.
 
     Attributes
     ----------
     quantized : Quantized
-        The design with them, its bound proven.
+        The design with these constants, its bound proven.
     program : Program or None
-        What the hardware's unit runs with them, in as many instructions as before; None in the parallel architecture.
+        Program with these constants, with as many instructions as before; None in the parallel architecture.
     """
 
     quantized: Quantized
@@ -52,17 +52,17 @@ class OtherSet:
 
 @dataclass(frozen=True, kw_only=True)
 class Swap:
-    """A swap from one set to another that nothing can wrap in.
+    """A swap from one set to another in which nothing can wrap.
 
     Attributes
     ----------
     made : OtherSet
-        The new set. Where there is a program, it is made for all values that the swap can cause.
+        The new set. Its program, if any, allows for all values that the swap can cause.
     samples : int
-        Length of the transient: from then on the error is within the set's bound and
+        Length of the transient: from then on the error is at most the set's bound plus
         `sosmith.gen.reload.transient.RESIDUE` output LSB, and another swap may follow.
     use : Fraction
-        Largest share of what its word in the hardware holds that a state may take, at most 1.
+        Largest share of its hardware range that any state may use, at most 1.
     """
 
     made: OtherSet
@@ -71,12 +71,12 @@ class Swap:
 
 
 def own_set(hardware: CoreDesign) -> OtherSet:
-    """Return the set that a core was generated with, in the formats of all others.
+    """Return the set that a core was generated with, in the formats that all sets share.
 
     Raises
     ------
     ShortfallError
-        If its constants cannot be written in these without a change.
+        If these formats cannot represent its constants exactly.
     """
     quantized = with_constants(hardware.quantized, None, None, room=room_of(hardware))
     if _values(quantized.datapath) != _values(hardware.datapath):
@@ -87,7 +87,7 @@ def own_set(hardware: CoreDesign) -> OtherSet:
 
 
 def _values(datapath: Datapath) -> list[Fraction]:
-    """Values of all that multiplies or is added, in the order of the nodes."""
+    """Values of all constants, in the order of the nodes."""
     return [
         node.parameter * Fraction(2) ** -(node.parameter_frac if node.op is Op.SCALE else node.frac)
         for stage in datapath.stages
@@ -97,12 +97,12 @@ def _values(datapath: Datapath) -> list[Fraction]:
 
 
 def set_for(hardware: CoreDesign, wanted: Specification) -> OtherSet:
-    """Make the set that another specification asks for: its filter, its calibration, its `max_error`.
+    """Make the set for another specification: its filter, its calibration, its `max_error`.
 
     Raises
     ------
     SpecificationError
-        If it differs in what is not loadable, or the hardware is not.
+        If it differs in something that cannot be loaded, or the hardware is not reloadable.
     ShortfallError
         As `other_set`.
     """
@@ -140,28 +140,28 @@ def other_set(
     calibrated: tuple[tuple[int, int], ...] | None = None,
     max_error: Fraction | None = None,
 ) -> OtherSet:
-    """Make constants of another filter or polynomial for a core that exists, and prove their error.
+    """Make constants of another filter or polynomial for an existing core, and prove their error.
 
-    The formats of all signals are the hardware's. Where a program is loaded, coefficients may have more fraction bits
-    than those that they replace: as few as the error allowed needs.
+    The formats of all signals are the hardware's. In a program, coefficients may have more fraction bits than those
+    they replace: as few as the allowed error requires.
 
     Parameters
     ----------
     hardware : CoreDesign
-        What the core was made from.
+        Design of the core.
     ideal, polynomial
         As for `sosmith.gen.reload.other_constants.with_constants`.
     calibrated : tuple of (int, int) or None
         Lowest and highest code of each input that the calibration covers; None for the core's own. The parallel
-        architecture goes on to judge by its own range, so that the other must hold it.
+        architecture keeps checking its own range, so the new range must contain it.
     max_error : Fraction or None
-        Error allowed, in the output's unit; None for what the core was made for.
+        Error allowed, in the output's unit; None for the core's own limit.
 
     Raises
     ------
     ShortfallError
-        If the constants have another structure, do not fit the hardware, or break the bound. Nothing of the kind
-        must be loaded.
+        If the constants have another structure, do not fit the hardware, or exceed the bound. Such constants must not
+        be loaded.
     """
     allowed = hardware.spec.max_error if max_error is None else max_error
     room = room_of(hardware)
@@ -175,16 +175,16 @@ def other_set(
                 quantized = replace(quantized, datapath=replace(quantized.datapath, calibrated=calibrated))
             return OtherSet(quantized=quantized, program=_fitted(hardware, quantized.datapath, "set"))
         except ShortfallError as error:
-            refusal = refusal or error  # the first one is about the hardware's own formats
+            refusal = refusal or error  # the first refusal is for the hardware's own formats
     assert refusal is not None
     raise refusal
 
 
 def room_of(hardware: CoreDesign) -> int:
-    """Fraction bits that coefficients may have more than the hardware's, with all states where they are.
+    """Count the fraction bits that coefficients may have beyond the hardware's, with unchanged state formats.
 
-    A program keeps a state with as many fraction bits as bring its cut between two digits, often more than the
-    datapath has. None in the parallel architecture, where every bit has its own wire.
+    A program aligns the least significant bit of a state with a digit boundary, so states often have more fraction bits
+    than in the datapath. It is 0 in the parallel architecture, where every bit has its own wire.
     """
     made = hardware.architecture.program
     if made is None or not hardware.quantized.sections:
@@ -203,7 +203,7 @@ def room_of(hardware: CoreDesign) -> int:
 
 
 def parallel_bank(hardware: CoreDesign, made: OtherSet) -> list[int]:
-    """Words of a bank of the parallel architecture."""
+    """Contents of a bank in the parallel architecture."""
     loadable = constants(hardware.datapath)
     return packed(values_of(made.quantized.datapath, loadable), loadable)
 
@@ -214,17 +214,17 @@ def check_swap(hardware: CoreDesign, active: OtherSet | None, other: OtherSet) -
     Parameters
     ----------
     hardware : CoreDesign
-        What the core was made from.
+        Design of the core.
     active : OtherSet or None
-        What it runs: from reset on, or since a swap whose transient has ended. None if the core is reset between the
-        swap and the next sample: then there is nothing to prove beyond the set.
+        Set in use: since reset, or since a swap whose transient has ended. None if the core is reset between the
+        swap and the next sample: then only the set itself is proven.
     other : OtherSet
         The new set.
 
     Raises
     ------
     ShortfallError
-        If something inside could leave what the hardware's words hold.
+        If a signal could exceed its range in the hardware.
     """
     if active is None or not other.quantized.sections:
         return Swap(made=other, samples=0, use=_use(hardware, other.quantized.datapath, other.program))
@@ -244,7 +244,7 @@ def check_swap(hardware: CoreDesign, active: OtherSet | None, other: OtherSet) -
 
 
 def _use(hardware: CoreDesign, during: Datapath, made: Program | None) -> Fraction:
-    """Largest share of what its word holds that a state may take, of those that remember more than the input."""
+    """Largest share of its hardware range that a state may use, among states that are not just delayed inputs."""
     shares = []
     locations = {} if made is None else {location.name: location for location in made.locations}
     for stage, roomy in zip(during.stages, with_room(hardware.datapath).stages, strict=True):
@@ -287,7 +287,7 @@ def _ends(ranges: tuple[tuple[int, int], ...]) -> str:
 
 
 def _fitted(hardware: CoreDesign, datapath: Datapath, what: str) -> Program | None:
-    """Check that the hardware can run it; return its program, if there is one. `what` is what does not fit if not."""
+    """Check that the hardware can run `datapath`; return its program, if there is one. `what` names it in messages."""
     before = hardware.architecture.program
     limited = [_is_limited(made) for made in (hardware.datapath, datapath)]
     if limited[1] and not limited[0]:
@@ -313,12 +313,12 @@ def _is_limited(datapath: Datapath) -> bool:
 
 
 def _check_parallel(hardware: Datapath, other: Datapath, what: str) -> None:
-    """Check that `other` is `hardware` with other constants, and that these and all ranges fit.
+    """Check that `other` is `hardware` with other constants, and that the constants and all ranges fit.
 
     Raises
     ------
     ShortfallError
-        If not; tells the first thing that does not fit.
+        If not; names the first mismatch.
     """
     loadable = constants(hardware)
     for old, new in zip(with_room(hardware).stages, other.stages, strict=True):
@@ -339,6 +339,6 @@ def _check_parallel(hardware: Datapath, other: Datapath, what: str) -> None:
 
 
 def _word(node: Node) -> tuple[int, int]:
-    """Codes that the hardware's word for a node holds."""
+    """Smallest and largest code that the hardware's signal for a node can hold."""
     span = 1 << node.width
     return (-span // 2, span // 2 - 1) if node.signed else (0, span - 1)

@@ -1,15 +1,15 @@
-"""What a swap of constants leaves behind: values inside while the filter's memory fades, and how long that takes.
+"""The transient after a swap of constants: the values of internal signals, and how long it lasts.
 
-The states that a new set finds were made by the set before. Let that one run on beside it, over the same input. Where
-the new set's equations are applied to the old run's states and input, they give other next states and outputs than
-the old set did: by amounts that are themselves driven by the input, through the old set alone, and so bounded by exact
-responses. Everything inside the new run is what these equations give plus the answer of the new set, from the swap
-on, to the sum of such differences. With A, B of the old set and A', B' of the new one::
+The new set starts from states of the old one. Suppose the old set kept running in parallel on the same input. Applied
+to the states and input of this old run, the new set's equations give next states and outputs that differ from the old
+ones. These differences are driven by the input through the old set alone, so exact responses bound them. Every signal
+in the new run is the sum of two parts: the result of these equations, and the response of the new set, from the swap
+on, to the differences. With A, B of the old set and A', B' of the new one::
 
     x'(n+1) - x(n+1) = A' (x'(n) - x(n)) + (A' - A) x(n) + (B' - B) u(n),    x'(0) - x(0) = 0
 
-So the bound is small where the sets are close to each other, however slow the filter is. Each quantizer may err
-differently in the two runs: that drives the difference too.
+So the bound is small if the sets are close to each other, however slow the filter is. The errors of each quantizer may
+differ between the two runs, which drives the difference too.
 """
 
 from __future__ import annotations
@@ -28,10 +28,11 @@ from sosmith.model.dataflow.graph import Graph, Node, Op
 from sosmith.model.errors import ShortfallError
 
 RESIDUE = Fraction(1, 256)
-"""What is left of the set before in any state and in the output once it counts as faded, in output LSBs."""
+"""Remaining effect of the previous set on any state and on the output at which the transient counts as over, in output
+LSBs."""
 
 _GRID = 1 << 40
-"""Limits of a source are rounded outward to multiples of its reciprocal."""
+"""Limits of a source are rounded outward to multiples of the reciprocal of this."""
 
 Codes = tuple[int, int]
 """Smallest and largest code."""
@@ -39,14 +40,15 @@ Codes = tuple[int, int]
 
 @dataclass(frozen=True, kw_only=True)
 class Transient:
-    """What is proven about a swap.
+    """Proven facts about a swap.
 
     Attributes
     ----------
     ranges : tuple of dict of str to (int, int)
-        For each section the codes of its inputs and of its BOUND nodes, by name, at any time before or after the swap.
+        For each section, the range of codes of its inputs and BOUND nodes, by name, at any time before or after the
+        swap.
     samples : int
-        After so many samples `RESIDUE` bounds what is left in every state and in the output.
+        Number of samples after which `RESIDUE` bounds the remaining effect on every state and on the output.
     """
 
     ranges: tuple[dict[str, Codes], ...]
@@ -54,9 +56,9 @@ class Transient:
 
 
 def transient(active: Quantized, other: Quantized) -> Transient:
-    """Bound what can happen when `other` takes over from `active`, at any sample and for all inputs in range.
+    """Bound all signals when `other` takes over from `active`, at any sample and for all inputs in range.
 
-    The last swap before may have left `RESIDUE` in every state.
+    An earlier swap may have left an error of up to `RESIDUE` in every state.
 
     Parameters
     ----------
@@ -87,7 +89,7 @@ def transient(active: Quantized, other: Quantized) -> Transient:
 
 
 def _input_values(active: Quantized, other: Quantized) -> tuple[Fraction, Fraction]:
-    """Values that may arrive at the first section."""
+    """Smallest and largest value at the input of the first section."""
     nodes = [made.sections[0].graph.nodes[made.sections[0].graph.inputs[0]] for made in (active, other)]
     units = [Fraction(2) ** -node.frac for node in nodes]
     return (
@@ -97,21 +99,21 @@ def _input_values(active: Quantized, other: Quantized) -> tuple[Fraction, Fracti
 
 
 class _Pair:
-    """A section of both sets.
+    """The same section in both sets.
 
     Attributes
     ----------
     together : Graph
-        The active set's section, and the other's equations on its states and input. Outputs: those of the active
-        set, then the differences in next state and output, without those that are nothing at all.
+        The active set's section, and the other set's equations applied to its states and input. Outputs: those of the
+        active set, then the differences in next state and output, except those that are identically zero.
     place : list of int
-        For each node of the other set's graph the one in `together`.
+        Node in `together` for each node of the other set's graph.
     differences : dict of int to int
-        For the states and, counted on from there, the outputs of the other set: the node in `together` that tells the
-        difference.
+        Node in `together` with the difference, by the index of the state or, counted after the states, of the output of
+        the other set.
     after : Graph
-        The other set's section with a further input for each state and each output, which adds to it. All its
-        states are watched as BOUND nodes. Constants are 0, as they are in the equations already.
+        The other set's section with an additional input added to each state and each output. All its states are BOUND
+        nodes. Constants are 0, since the equations in `together` already include them.
     """
 
     def __init__(self, active: Section, other: Section) -> None:
@@ -145,7 +147,7 @@ class _Pair:
         self.after, self.watched = _with_additions(b)
 
     def bounds(self, lanes: Sequence[Lane]) -> dict[int, Lane]:
-        """Tell for every BOUND node of the other set an output that depends on it."""
+        """For every BOUND node of the other set, return an output that depends on it."""
         return {
             node: next(lane for lane in lanes if self.place[node] in lane.model.bounds)
             for node, it in enumerate(self.other.graph.nodes)
@@ -153,7 +155,7 @@ class _Pair:
         }
 
     def ranges(self, extents: Mapping[int, Extent]) -> dict[str, Codes]:
-        """Codes of inputs and BOUND nodes: those of each set by itself, and what `extents` tell."""
+        """Ranges of codes of inputs and BOUND nodes that cover those of each set by itself and `extents`."""
         result: dict[str, Codes] = {}
         for graph, left in ((self.active.graph, RESIDUE), (self.other.graph, Fraction(0))):
             for node in graph.nodes:
@@ -169,9 +171,9 @@ class _Pair:
         return result
 
     def mismatch(self, state: int) -> Fraction:
-        """Return how far a state, by its number, can be from what the other set alone would have made of it.
+        """Bound the distance of a state, by its index, from its value if the other set had been running alone.
 
-        What a quantizer has dropped counts as none: any such error might have been.
+        It is 0 for a state that holds a quantization error: any such error is possible with either set.
         """
         b = self.other.graph
         node = b.nodes[b.delays[state]]
@@ -182,7 +184,7 @@ class _Pair:
 
 
 def _with_additions(graph: Graph) -> tuple[Graph, tuple[int, ...]]:
-    """Give every state and every output an input that adds to it; return the nodes of the states' next values too."""
+    """Add an input to every state and every output; return also the nodes of the states' next values."""
     nodes = [replace(node, parameter=0, low=0, high=0) if node.op is Op.CONSTANT else node for node in graph.nodes]
     added, sums = [], []
     for k, source in enumerate([*(graph.nodes[i].operands[0] for i in graph.delays), *graph.outputs]):
@@ -201,7 +203,7 @@ def _with_additions(graph: Graph) -> tuple[Graph, tuple[int, ...]]:
 
 
 class _Fading:
-    """Follows the difference between the two runs through the other set's sections, one after the other."""
+    """Propagates the difference between the two runs through the other set's sections, in order."""
 
     def __init__(self, at: Horizon) -> None:
         self.samples = 0
@@ -210,16 +212,16 @@ class _Fading:
         self._mismatches: dict[Key, Fraction] = {}
 
     def section(self, number: int, pair: _Pair, starts: Mapping[int, Extent]) -> dict[int, Extent]:
-        """Return how far BOUND nodes of a section can be from what its equations give on the old run.
+        """Bound the difference of a section's BOUND nodes from the result of its equations on the old run.
 
         Parameters
         ----------
         number : int
-            Of the section.
+            Index of the section.
         pair : _Pair
             The section in both sets.
         starts : mapping of int to Extent
-            Values of the differences, by their nodes in `pair.together`.
+            Limits of the differences, by their nodes in `pair.together`.
         """
         states = len(pair.other.graph.delays)
         additions: list[Drives] = []
@@ -249,7 +251,7 @@ class _Fading:
         return moved
 
     def _watch(self, drives: Drives, delays: int) -> None:
-        """Lengthen `samples` until the states that the swap found no longer matter here, nor in so many delays."""
+        """Increase `samples` until the states at the swap no longer matter here, nor after `delays` more samples."""
         weighted = [(d.response, self._mismatches[key]) for key, d in drives.items() if key in self._mismatches]
         self.samples = max(self.samples, _last_above(weighted, self._at) + delays + 1)
 
@@ -271,7 +273,7 @@ def _last_above(weighted: Sequence[tuple[Response, Fraction]], at: Horizon) -> i
 
 
 def _symmetric(model: LinearModel) -> LinearModel:
-    """Return the model with quantizers whose errors are differences of two errors."""
+    """Return the model with each quantizer's error replaced by the difference of two such errors."""
     count = len(model.entries)
     sources = [*model.sources[:count]]
     for source in model.own:
@@ -281,7 +283,7 @@ def _symmetric(model: LinearModel) -> LinearModel:
 
 
 def _merged(drives: Drives, kept: set[Key], rest: Key, at: Horizon) -> Drives:
-    """Take all sources but those of `kept` together as one, which is as large and knows nothing of before."""
+    """Replace all sources except those in `kept` by one that takes any value within their limits at each sample."""
     found = extent([drive for key, drive in drives.items() if key not in kept])
     return {key: drive for key, drive in drives.items() if key in kept} | {rest: _drive(at, found)}
 
@@ -291,6 +293,6 @@ def _sum(a: Extent, b: Extent) -> Extent:
 
 
 def _drive(at: Horizon, limits: Extent, more: Fraction = Fraction(0)) -> Drive:
-    """Make a source of anything within limits, rounded outward, and so much `more`."""
+    """Make a source with the given limits, widened by `more` and rounded outward."""
     low, high = limits.low - more, limits.high + more
     return Drive(impulse(at), Fraction(math.floor(low * _GRID), _GRID), Fraction(math.ceil(high * _GRID), _GRID))

@@ -1,1 +1,1 @@
-"""From a designed filter to a frozen datapath: word lengths searched by estimates, then proven."""
+"""From a designed filter to a frozen datapath: word lengths are searched with estimates, then proven."""

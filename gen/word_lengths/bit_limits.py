@@ -1,8 +1,8 @@
-"""How many bits of a coefficient or a signal are tried."""
+"""Limits on the bits of coefficients and signals that are tried."""
 
 MIN_BITS = 4
-"""Significant bits of a coefficient that are tried first."""
+"""Significant bits of a coefficient at which the search starts."""
 
 MAX_BITS = 40
-"""Most significant bits of a coefficient that are tried, and most fraction bits of a signal: no useful design needs
-more."""
+"""Largest number of significant bits of a coefficient, and of fraction bits of a signal, that is tried. No useful
+design needs more."""

@@ -32,12 +32,12 @@ def _shortened(values: Sequence[Fraction]) -> tuple[Fraction, ...]:
 
 
 def parts_of(ideal: Filter, realization: str) -> Sequence[Any]:
-    """Return what the realization makes its stages from, one for each."""
+    """Return the parts that the realization makes its stages from, one for each stage."""
     return REALIZATIONS[realization].parts(ideal.rows)
 
 
 def unquantized(ideal: Filter, realization: str, bits: int) -> list[StageModel]:
-    """Models of the stages with coefficients of `bits` significant bits; quantizers keep whole output LSBs."""
+    """Models of the stages with coefficients of `bits` significant bits and quantizers that keep whole output LSBs."""
     formats = [SectionFormat(coefficient_bits=bits)] * len(parts_of(ideal, realization))
     return [linear_models(stage.graph) for stage in stages_of(ideal, realization, formats, unknown_range(0))]
 
@@ -45,7 +45,7 @@ def unquantized(ideal: Filter, realization: str, bits: int) -> list[StageModel]:
 def cascade(
     ideal: Filter, realization: str, formats: Sequence[SectionFormat], x: Range
 ) -> tuple[list[Section], CascadeProof]:
-    """Build the stages for an input in `x`, prove their ranges, and build them again with these."""
+    """Build the stages for an input in `x`, prove their ranges, and build them again with these ranges."""
     stages = stages_of(ideal, realization, formats, unknown_range(x.frac))
     proof = prove_cascade([linear_models(s.graph) for s in stages], ideal_sections(ideal), *x.limits)
     proven = list(formats)
@@ -57,7 +57,7 @@ def cascade(
 
 
 def stages_of(ideal: Filter, realization: str, formats: Sequence[SectionFormat], x: Range) -> list[Section]:
-    """Build the stages one after the other, each for what the one before hands on."""
+    """Build the stages in order, each for the output range of the previous one."""
     build = REALIZATIONS[realization].build
     first, beside = x, list[Range]()
     stages: list[Section] = []
@@ -79,6 +79,6 @@ def chosen_formats(sections: Sequence[Section]) -> list[SectionFormat]:
 
 
 def _codes(extent: Extent, frac: int) -> tuple[int, int]:
-    """Range of codes that holds all values of an extent."""
+    """Range of codes that covers all values of an extent."""
     unit = Fraction(2) ** frac
     return math.floor(extent.low * unit), math.ceil(extent.high * unit)

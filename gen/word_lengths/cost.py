@@ -1,4 +1,4 @@
-"""What a datapath costs, counted on its dataflow graphs: multipliers, adder bits, register bits."""
+"""Cost of a datapath, counted on its dataflow graphs: multipliers, adder bits, register bits."""
 
 from __future__ import annotations
 
@@ -10,13 +10,14 @@ from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.graph import Graph, Node, Op
 
 MULTIPLIER_BITS = 18
-"""Bits of each operand of a hardware multiplier; Yosys adds what one bit more contributes instead of taking a block."""
+"""Bits of each operand of a hardware multiplier; for one extra bit, Yosys uses adders instead of another block."""
 
 _LUTS_PER_ADDER_BIT, _LUTS_PER_SPLIT = 1.04, 30.7
-"""Fitted by benchmarks/cost_model.py to synthesis of the examples for ECP5, to within two fifths."""
+"""Fitted by benchmarks/cost_model.py to synthesis results of the examples on ECP5, within 40 %."""
 
 LUTS_OF_A_BLOCK = 864
-"""What a multiplier block counts in LUT4: an ECP5-25 has 24,192 and 28 (Lattice FPGA-DS-02012, family table)."""
+"""LUT4 that a multiplier block counts as: an ECP5-25 has 24,192 LUT4 and 28 blocks (Lattice FPGA-DS-02012, family
+table)."""
 
 
 class Operand(NamedTuple):
@@ -26,7 +27,7 @@ class Operand(NamedTuple):
     signed: bool
 
     def beside(self, other: Operand) -> int:
-        """Bits that the multiplier sees: it takes both operands signed or neither."""
+        """Bits at the multiplier, which takes either both operands as signed or neither."""
         return self.bits + (other.signed and not self.signed)
 
 
@@ -49,13 +50,13 @@ class Multiplication:
 
     @property
     def extra_bits(self) -> int:
-        """Adder bits for operands that have one bit more than whole blocks; a sign that is always 0 adds nothing."""
+        """Adder bits for operands one bit wider than whole blocks; a sign bit that is always 0 adds nothing."""
         return _extra(self.data, self.factor) * self.factor.bits + _extra(self.factor, self.data) * self.data.bits
 
 
 @dataclass(frozen=True, kw_only=True)
 class Cost:
-    """Counts of a datapath in the parallel architecture, before synthesis.
+    """Operator counts of a datapath in the parallel architecture, before synthesis.
 
     Attributes
     ----------
@@ -78,33 +79,33 @@ class Cost:
 
     @property
     def multiplier_blocks(self) -> int:
-        """Hardware multipliers of 18 x 18 bits, signed, that the multiplications take."""
+        """Number of hardware multipliers (signed, 18 x 18 bits) that the multiplications use."""
         return sum(m.blocks for m in self.multiplications)
 
     @property
     def splits(self) -> int:
-        """Blocks beyond the first of each multiplication: so many partial products have to be added."""
+        """Blocks beyond the first of each multiplication: the number of partial products to be added."""
         return self.multiplier_blocks - len(self.multiplications)
 
     @property
     def extra_bits(self) -> int:
-        """Adder bits for operands that have one bit more than whole blocks."""
+        """Adder bits for operands one bit wider than whole blocks."""
         return sum(m.extra_bits for m in self.multiplications)
 
     @property
     def luts(self) -> int:
-        """Estimate of the LUT4 on an ECP5, a carry cell counting as two."""
+        """Estimated number of LUT4 on an ECP5; a carry cell counts as two."""
         adder_bits = self.adder_bits + self.extra_bits
         return round(_LUTS_PER_ADDER_BIT * adder_bits + _LUTS_PER_SPLIT * self.splits)
 
     @property
     def area(self) -> int:
-        """One number to compare designs by: LUT4, with a multiplier block as much as its share of an ECP5-25."""
+        """Figure of merit for comparing designs: LUT4, with a multiplier block weighted by its share of an ECP5-25."""
         return self.luts + LUTS_OF_A_BLOCK * self.multiplier_blocks
 
     @property
     def multiplier_sizes(self) -> str:
-        """The multiplications for people, such as ``2 of 23 x 18, 1 of 16 x 19``."""
+        """Readable list of the multiplications, such as ``2 of 23 x 18, 1 of 16 x 19``."""
         distinct = sorted(set(self.multipliers), reverse=True)
         return ", ".join(f"{self.multipliers.count(size)} of {size[0]} x {size[1]}" for size in distinct) or "none"
 
@@ -129,7 +130,7 @@ def cost_of_graphs(graphs: Sequence[Graph]) -> Cost:
                 multiplications.append(Multiplication(a, b))
             elif node.op in {Op.ADD, Op.SUBTRACT}:
                 adders += node.width
-            elif node.op is Op.TRUNCATE:  # adds what makes negative values round upward
+            elif node.op is Op.TRUNCATE:  # an adder makes negative values round up
                 adders += nodes[node.operands[0]].width
             elif node.op is Op.DELAY:
                 registers += node.width
@@ -138,7 +139,7 @@ def cost_of_graphs(graphs: Sequence[Graph]) -> Cost:
 
 
 def area_of(graph: Graph) -> int:
-    """Return the part of a graph in the area of a datapath."""
+    """Return the contribution of a graph to the area of a datapath."""
     return cost_of_graphs([graph]).area
 
 

@@ -1,4 +1,4 @@
-"""Formats that give every part of the error budget the same share, by exact figures."""
+"""Formats that give every part of the error budget an equal share, from exact figures."""
 
 from __future__ import annotations
 
@@ -30,23 +30,23 @@ def equally_shared(
     realization : str
         A key of `REALIZATIONS`.
     x : Range
-        What enters the filter.
+        Fraction bits and range of the filter's input.
     share : Fraction
-        Error allowed to each part, in output LSBs.
+        Error allowed for each part, in output LSBs.
 
     Raises
     ------
     ShortfallError
-        If no formats within the limits keep to the error allowed, or the filter cannot be realized so.
+        If no formats within the limits keep to the error allowed, or the filter has no such realization.
     """
-    parts_of(ideal, realization)  # refused here, not for want of bits, if it cannot be realized so
+    parts_of(ideal, realization)  # raises here, with its own reason, if there is no such realization
     bits = _coefficient_bits(ideal, realization, x, share)
     fracs = _fraction_bits(ideal, realization, bits, share)
     while True:
         sections, proof = cascade(ideal, realization, _rounded(ideal, realization, bits, fracs), x)
         if proof.rounding.magnitude <= share:
             return sections, proof
-        # A quantizer's error is not centred.
+        # A quantizer's error is not centred on zero.
         finer = [{name: frac + 1 for name, frac in sources.items()} for sources in fracs]
         fracs = _within_limits(finer, ideal, realization, share)
 
@@ -63,7 +63,7 @@ def _coefficient_bits(ideal: Filter, realization: str, x: Range, share: Fraction
             continue
         if error <= share:
             return bits
-        # An error falls by half with each bit, now and then by more: leap most of the way.
+        # Each bit halves the error, sometimes more: jump most of the way.
         bits += max(1, math.floor(math.log2(error / share)) - 2)
     raise ShortfallError(
         f"the filter's coefficients must keep their error below {float(share):.3g} output LSB with {MAX_BITS} "
@@ -72,7 +72,7 @@ def _coefficient_bits(ideal: Filter, realization: str, x: Range, share: Fraction
 
 
 def _fraction_bits(ideal: Filter, realization: str, bits: int, share: Fraction) -> list[dict[str, int]]:
-    """Fraction bits of every quantizer so that all their errors together stay within `share`."""
+    """Fraction bits of every quantizer such that the sum of all their errors stays within `share`."""
     unit = rounding_gains(unquantized(ideal, realization, bits))
     count = sum(map(len, unit))
     fracs = [
@@ -80,7 +80,7 @@ def _fraction_bits(ideal: Filter, realization: str, bits: int, share: Fraction) 
         for sources in unit
     ]
     _within_limits(fracs, ideal, realization, share)
-    # An equal split wastes up to a bit each; give back what the sum allows, the first section first.
+    # An equal split wastes up to a bit each: remove bits while the sum allows it, starting with the first section.
     for sources, errors in zip(fracs, unit, strict=True):
         for name in sources:
             total = _total(fracs, unit) + errors[name] * Fraction(2) ** -sources[name]
@@ -90,7 +90,7 @@ def _fraction_bits(ideal: Filter, realization: str, bits: int, share: Fraction) 
 
 
 def _within_limits(fracs: _Fracs, ideal: Filter, realization: str, share: Fraction) -> _Fracs:
-    """Return `fracs` unless there are more than may be."""
+    """Return `fracs` unless there are too many fraction bits."""
     if max((frac for sources in fracs for frac in sources.values()), default=0) > MAX_BITS:
         better = [] if realization == BEST_KEPT else [f"set hardware.realization to {BEST_KEPT}"]
         raise ShortfallError(
@@ -112,7 +112,7 @@ def _total(fracs: Sequence[Mapping[str, int]], unit: Sequence[Mapping[str, Fract
 
 
 def _rounded(ideal: Filter, realization: str, bits: int, fracs: Sequence[Mapping[str, int]]) -> list[SectionFormat]:
-    """Return formats of stages whose coefficients all have the same significant bits."""
+    """Return formats of stages whose coefficients all have the same number of significant bits."""
     formats = [SectionFormat(coefficient_bits=bits)] * len(fracs)
     stages = stages_of(ideal, realization, formats, unknown_range(0))
     return [
@@ -121,7 +121,7 @@ def _rounded(ideal: Filter, realization: str, bits: int, fracs: Sequence[Mapping
 
 
 def _remedy(ideal: Filter, *first: str) -> str:
-    """Name what would help where a share of the budget cannot be kept to."""
+    """Suggest remedies if a part of the budget cannot keep to its share."""
     ways = [*first, "raise output.max_error", "raise output.bits"]
     if ideal.decimation > 1:
         assert ideal.cutoff is not None

@@ -1,6 +1,6 @@
 """Impulse responses of a cascade in double precision, from every quantizer to the output.
 
-What test signals are made from: the proof has its own, exact ones in `sosmith.gen.proof.peak_gain`.
+Test signals are made from these. The proof uses its own exact responses (`sosmith.gen.proof.peak_gain`).
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ def error_responses(quantized: Quantized) -> Iterator[Array]:
     Yields
     ------
     ndarray, shape (n,)
-        Until what follows is below 1e-12 of the envelope; for an error and a response in output LSBs. Constants
-        inside the sections count as quantizers.
+        Response of the output to a unit error, both in output LSBs, until the rest is below 1e-12 of the envelope.
+        Constants inside the sections count as quantizers.
     """
     for _, _, _, response in error_paths(quantized):
         yield response
 
 
 def error_paths(quantized: Quantized) -> list[tuple[int, LinearModel, Source, Array]]:
-    """Every source inside the sections: number of its section, its model, the source, and its response as above."""
+    """Every source inside the sections: index of its section, its model, the source, and its response as above."""
     length = decay_length(quantized.quantized_sos)
     impulse = np.zeros(length)
     impulse[0] = 1.0

@@ -1,4 +1,4 @@
-"""What stands before a filter's sections: the calibration polynomial, or the scaling of the input."""
+"""The stage before a filter's sections: the calibration polynomial, or the scaling of the input."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from sosmith.model.port import Port
 from sosmith.model.sections.horner import HornerPolynomial, Variable
 
 _COARSER = 4
-"""Fraction bits that the calibration may have less than with an equal share of the budget."""
+"""How many fraction bits fewer the calibration may have than with an equal share of the budget."""
 
 
 _IDENTITY = Polynomial(((Fraction(0),), (Fraction(1),)))
@@ -24,14 +24,14 @@ _IDENTITY = Polynomial(((Fraction(0),), (Fraction(1),)))
 
 @dataclass(frozen=True, kw_only=True)
 class InputStage:
-    """What stands before the sections.
+    """Input stage: calibration or scaling, before the sections.
 
     Attributes
     ----------
     stages : tuple of Stage
-        Its stages; empty where the sections take the input as it is.
+        Its stages; empty if the sections take the input as it is.
     output : Range
-        Fraction bits and range of what it hands to the sections.
+        Fraction bits and range of its output, which drives the sections.
     error : Fraction
         Bound on its error, in output LSBs; exact.
     """
@@ -47,18 +47,18 @@ class InputStage:
 
 
 def needs_scaling(port: Port, output: Port) -> bool:
-    """Whether the code of a filter's input is anything but a power of two times an output LSB."""
+    """Whether a filter's input has an offset, or an LSB that is not a power of two times the output's."""
     return port.zero != 0 or _exponent_of_two(port.lsb / output.lsb) is None
 
 
 def _exponent_of_two(value: Fraction) -> int | None:
-    """Exponent k where `value` is 2**k, else None."""
+    """Exponent k if `value` is 2**k, else None."""
     exponent = value.numerator.bit_length() - value.denominator.bit_length()
     return exponent if value == Fraction(2) ** exponent else None
 
 
 def normalised(polynomial: Polynomial, inputs: Sequence[Port], output: Port) -> tuple[tuple[Fraction, ...], ...]:
-    """Return exact coefficients in the codes' fractions ``code * 2**-bits``, in output LSBs."""
+    """Return exact coefficients, in output LSBs, for the variables ``code * 2**-bits``."""
     columns = max(map(len, polynomial.coefficients))
     first = _substitution(inputs[0], len(polynomial.coefficients))
     second = _substitution(inputs[1], columns) if len(inputs) > 1 else [[Fraction(1)]]
@@ -93,8 +93,8 @@ def input_stages(
 ) -> tuple[InputStage, ...]:
     """Make the input stage with the fewest fraction bits that keeps to the error `allowed`, and coarser ones.
 
-    The error is in output LSBs. Each one that follows has a fraction bit less than the one before. Without a
-    polynomial, an input stage scales the input to output LSBs; it is empty where the factor is a power of two.
+    The error is in output LSBs. Each stage in the result has one fraction bit fewer than the previous one. Without a
+    polynomial, an input stage scales the input to output LSBs; it is empty if the factor is a power of two.
 
     Raises
     ------

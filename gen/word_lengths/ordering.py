@@ -1,17 +1,17 @@
-"""Which poles go with which zeros, and in which order: the arrangement of a cascade that rounds best.
+"""Pole-zero pairing and ordering of a cascade for the smallest rounding error.
 
-Every section is scaled so that the largest value at its output fits its word, hence its quantizer's error counts
-by the gain from the input up to there, times the gain of the error from there to the output. The first depends
-only on *which* sections lie before, not on their order, and the second only on which lie behind. So with S the set
-of sections placed and s the next one::
+Every section is scaled so that the largest value at its output fits its format. The error of its quantizer is
+therefore weighted by the gain from the input to that point, times the gain of the error from there to the output. The
+first gain depends only on *which* sections come before, not on their order, and the second only on which come after.
+So with S the set of sections already placed and s the next one::
 
     cost(S, s) = (|| prod of H_i over S and s ||_p  *  || noise_s / A_s * prod of H_j over the others ||_q) ** m
     V(S and s) = min over s of V(S) + cost(S, s)
 
-is exact (dynamic programming over subsets, Dehner 2003). With q = 2 and m = 2 the sum is the power of the noise at
-the output against that of one quantizer; with q = 1 and m = 1 it is the error that cannot be exceeded.
+is exact (dynamic programming over subsets, Dehner 2003). With q = 2 and m = 2, the sum is the noise power at the
+output relative to that of one quantizer; with q = 1 and m = 1, it is the worst-case error.
 
-Norms are in double precision: they choose here, what is chosen gets proven afterwards.
+Norms are computed in double precision. They only guide the choice; the result is proven afterwards.
 """
 
 from __future__ import annotations
@@ -29,29 +29,29 @@ from sosmith.gen.filter.design import decay_length
 from sosmith.gen.proof.linear_model import LinearModel
 
 Norm = Literal["l1", "l2", "linf"]
-"""Of an impulse response: sum of magnitudes, root of the sum of squares, largest gain over all frequencies."""
+"""Norm of an impulse response: sum of magnitudes, root of the sum of squares, largest gain over all frequencies."""
 
 Spectrum = npt.NDArray[np.complex128]
 
 _MAX_WORK = 1 << 28
-"""Samples of all spectra together; beyond, an order is not looked for. About three seconds."""
+"""Largest total number of spectrum samples for which the order is optimized; takes about three seconds."""
 
 _WORTH_IT = 2 / 3
-"""An order is changed only where it brings the error below this part of what it was. Word lengths come in whole bits:
-on the designs of tests/gen/word_lengths/test_sweep.py register bits fall by 2 % on average below this ratio, by
-nothing above."""
+"""The order is changed only if this reduces the error below this fraction of its previous value. Word lengths are whole
+bits: on the designs of tests/gen/word_lengths/test_sweep.py, a larger reduction saves 2 % of the register bits on
+average, a smaller one nothing."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class NoisySection:
-    """A section and the ways of its rounding errors, as polynomials in ``w = z**-1``, constant term first.
+    """A section and the paths of its rounding errors, as polynomials in ``w = z**-1``, constant term first.
 
     Attributes
     ----------
     numerator, denominator : tuple of float
-        Of the transfer function; the denominator begins with 1 and has a degree of at most 2.
+        Transfer function; the denominator begins with 1 and has a degree of at most 2.
     noise : tuple of tuple of float
-        For each error its numerator to the section's output, over the same denominator.
+        Numerator from each error to the section's output, over the same denominator.
     """
 
     numerator: tuple[float, ...]
@@ -66,9 +66,9 @@ class Arrangement:
     Attributes
     ----------
     order : tuple of tuple of int
-        For each place the index of the denominator and that of the numerator.
+        Indices of the denominator and the numerator at each position.
     cost : float
-        Sum over all errors, as the module describes.
+        Sum over all errors, as defined above.
     """
 
     order: tuple[tuple[int, int], ...]
@@ -93,20 +93,20 @@ def arrange(
     Parameters
     ----------
     sections : sequence of NoisySection
-        At most some ten, or five with `pairing`.
+        At most about ten, or five with `pairing`.
     scale : Norm
-        What keeps a value in its word: "l1" for all inputs, "linf" for sinusoids, "l2" for white noise.
+        Norm that sets the range of a signal: "l1" for all inputs, "linf" for sinusoids, "l2" for white noise.
     noise : Norm
-        How errors count: "l2" as power, else as amplitude.
+        Norm of the errors: "l2" adds powers, the others add amplitudes.
     pairing : bool
-        Whether numerators may go with other denominators of the same or a higher degree.
+        Whether numerators may be paired with other denominators of the same or a higher degree.
     worst : bool
-        Find the worst one instead, to see what there is to gain.
+        Find the worst arrangement instead, to show how much can be gained.
 
     Raises
     ------
     ValueError
-        If there are too many sections for responses as long as theirs.
+        If there are too many sections for the length of their responses.
     """
     table = _Costs(sections, scale, noise, pairing=pairing)
     sign = -1 if worst else 1
@@ -124,10 +124,10 @@ def arrange(
 
 
 def best_order(models: Sequence[LinearModel]) -> tuple[int, ...]:
-    """Order of a cascade with the smallest error that its roundings can add up to, by the stages' models.
+    """Order of a cascade with the smallest worst-case rounding error, from the stages' models.
 
-    Both norms are "l1", as in the proof: the words must hold every input, and the bound holds for every error. The
-    order stays as it is where another brings less than a third, or where the table would be too large.
+    Both norms are "l1", as in the proof: the formats must hold every input, and the bound must hold for every error.
+    The order is kept if another one gains less than a third, or if the table would be too large.
     """
     present = tuple(range(len(models)))
     sections = [_section(model) for model in models]
@@ -149,11 +149,11 @@ def _section(model: LinearModel) -> NoisySection:
 
 
 _Placed = tuple[int, int]
-"""Bit sets of the denominators and of the numerators already placed."""
+"""Bit masks of the denominators and of the numerators already placed."""
 
 
 def _length(sections: Sequence[NoisySection]) -> int:
-    """Length of the spectra: eight times that of the responses, so that resonances show their peaks to 0.1 %."""
+    """Length of the spectra: eight times that of the responses, which resolves resonance peaks to 0.1 %."""
     rows = [[1.0, 0.0, 0.0, *s.denominator, *[0.0] * (3 - len(s.denominator))] for s in sections]
     return 1 << (8 * decay_length(np.array(rows)) - 1).bit_length()
 
@@ -165,7 +165,7 @@ def _feasible(sections: Sequence[NoisySection], *, pairing: bool) -> bool:
 
 
 class _Costs:
-    """Norms over the sets of sections, each computed once."""
+    """Norms over sets of sections, each computed once."""
 
     def __init__(self, sections: Sequence[NoisySection], scale: Norm, noise: Norm, *, pairing: bool) -> None:
         if not _feasible(sections, pairing=pairing):
@@ -197,7 +197,7 @@ class _Costs:
                     yield pole, zero
 
     def cost(self, after: _Placed, last: int) -> float:
-        """Cost of the section whose denominator is `last`, by what has been placed together with it."""
+        """Cost of the section whose denominator is `last`, given the set of sections placed so far, itself included."""
         gain, power = self._gain_to(after), 2 if self._noise == "l2" else 1
         total = float(sum((gain * error) ** power for error in self._gains_from(after)[last]))
         # Sections that mirror each other cost the same: their order must not be left to the rounding of spectra.

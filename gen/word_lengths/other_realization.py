@@ -1,4 +1,4 @@
-"""A design in another realization at the same word lengths, to compare structures."""
+"""A design in another realization with the same word lengths, to compare structures."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from sosmith.gen.word_lengths.quantized import Quantized, filter_budget
 
 
 def with_realization(quantized: Quantized, realization: str) -> Quantized:
-    """Return the design in another of the realizations of `ERROR_FEEDBACK`, with the same word lengths.
+    """Return the design in another realization from `ERROR_FEEDBACK`, with the same word lengths.
 
-    The bound is proven anew and may exceed what the specification allows.
+    The bound is proven again and may exceed the limit in the specification.
     """
     ideal = quantized.filter
     assert ideal is not None

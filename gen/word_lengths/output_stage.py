@@ -12,7 +12,7 @@ from sosmith.model.sections.output import OutputStage
 def output_stage(x: Range, output: Port) -> tuple[OutputStage, Fraction]:
     """Make the last stage for a result in `x`, and bound its error in output LSBs.
 
-    The error is half an LSB where anything is rounded, and what the offset itself is rounded by.
+    The error is half an LSB if anything is rounded, plus the rounding error of the offset.
     """
     frac = max(x.frac, 0)
     exact = -output.zero / output.lsb * 2**frac

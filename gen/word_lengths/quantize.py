@@ -1,9 +1,9 @@
-"""From a specification to a frozen datapath: formats chosen by estimates, then proven.
+"""From a specification to a frozen datapath: formats are chosen with estimates, then proven.
 
-All amounts inside are in output LSBs. What `max_error` leaves beside the half LSB of the output rounding is
-divided equally between calibration, filter coefficients and filter rounding to begin with; then formats are trimmed to
-the smallest estimated area, on whichever part that costs error (`sosmith.gen.word_lengths.search`). The parts of
-the bound are proven for what came out, and so are the ranges of all nodes.
+All errors inside are in output LSBs. `max_error` minus the half LSB of the output rounding is at first divided equally
+among calibration, filter coefficients and filter rounding. Formats are then trimmed to the smallest estimated area,
+whichever part of the error that increases (`sosmith.gen.word_lengths.search`). For the result, the parts of the bound
+and the ranges of all nodes are proven.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ from sosmith.model.errors import ShortfallError
 from sosmith.model.port import Port
 
 _BITS_TO_ORDER = 24
-"""Significant bits of the coefficients with which orders of the sections are compared."""
+"""Significant bits of the coefficients when orders of the sections are compared."""
 
 _ATTEMPTS = 4
-"""Times that formats are chosen again by estimates before exact figures take over."""
+"""How often formats are chosen again with estimates before exact figures are used."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,19 +44,19 @@ class Plan:
     Attributes
     ----------
     name, inputs, output, max_error, ideal, polynomial, realization
-        As for `plan`, the filter's sections in the order of the cascade.
+        As for `plan`; the filter's sections are in the order of the cascade.
     gain : Fraction
         Worst-case peak gain of the filter, 1 without one.
     share : Fraction
-        Error of each part of the budget but the output rounding, in output LSBs, where all get the same.
+        Error of each part of the budget except the output rounding, in output LSBs, with equal shares.
     input_stages : tuple of InputStage
-        What may stand before the sections, each a little coarser than the one before.
+        Possible input stages, each a little coarser than the previous one.
     search : Search or None
-        The search that formats come from; None without a filter.
+        The search that chooses the formats; None without a filter.
     start : Choice or None
-        Formats that keep to `share`; None where double precision found none.
+        Formats that keep to `share`; None if the estimates found none.
     made : Quantized or None
-        The proven design itself, of a realization that there are no estimates for.
+        The proven design, for a realization without estimates.
     """
 
     name: str
@@ -75,7 +75,7 @@ class Plan:
 
     @property
     def allowed(self) -> Fraction:
-        """Error of everything but the output rounding, in output LSBs."""
+        """Error allowed for everything except the output rounding, in output LSBs."""
         return self.max_error / self.output.lsb - Fraction(1, 2)
 
     @cached_property
@@ -89,7 +89,7 @@ class Plan:
         return self.search.area(self.start) + cost_of_graphs([last.graph]).area
 
     def trimmed(self) -> Plan:
-        """Return the same with formats from which nothing more can be saved."""
+        """Return a copy with formats trimmed until no step saves any more."""
         if self.search is None or self.start is None:
             return self
         return replace(self, start=self.search.trimmed(self.start, float(self.allowed)))
@@ -125,8 +125,8 @@ def plan(
     Raises
     ------
     ShortfallError
-        If the calibration cannot keep to its share of `max_error`, a section cannot be built, or the filter cannot be
-        realized so.
+        If the calibration cannot keep to its share of `max_error`, a section cannot be built, or the filter has no such
+        realization.
     """
     scaled = polynomial is not None or needs_scaling(inputs[0], output)
     parts = scaled + 2 * (ideal is not None)
@@ -184,8 +184,8 @@ def quantize(
 def prove(planned: Plan) -> Quantized:
     """Fix formats and integer coefficients, and prove their error.
 
-    Where the proof finds the planned formats too short, they are chosen again with less allowed; if that does not end
-    well, with the same share for every part of the budget and exact figures instead of estimates.
+    If the proof finds the planned formats too short, they are chosen again with a smaller allowed error. If that fails
+    too, every part of the budget gets an equal share, and exact figures replace the estimates.
 
     Raises
     ------
@@ -216,7 +216,7 @@ def prove(planned: Plan) -> Quantized:
 
 
 def _equally_shared(planned: Plan, ideal: Filter) -> Quantized:
-    """Give every part of the budget the same share, by exact figures."""
+    """Give every part of the budget an equal share, from exact figures."""
     before = planned.input_stages[0]
     return _assembled(planned, before, *equally_shared(ideal, planned.realization, before.output, planned.share))
 
@@ -244,7 +244,7 @@ def gain_of(ideal: Filter) -> Fraction:
     Raises
     ------
     ShortfallError
-        If a pole lies too close to the unit circle; says what would help.
+        If a pole lies too close to the unit circle; the message says what would help.
     """
     try:
         return ideal_gain(ideal_sections(ideal))
@@ -253,7 +253,7 @@ def gain_of(ideal: Filter) -> Fraction:
 
 
 def _remedy_of_poles(ideal: Filter) -> str:
-    """Name what moves a filter's poles away from the unit circle, if that is known."""
+    """Suggest what would move a filter's poles away from the unit circle, if that is known."""
     if ideal.cutoff is None:
         return ""
     if ideal.decimation > 1:
@@ -264,9 +264,9 @@ def _remedy_of_poles(ideal: Filter) -> str:
 
 
 def _ordered(ideal: Filter, realization: str) -> Filter:
-    """Return the filter with its sections in the order that rounds best, if that is worth a change."""
+    """Return the filter with its sections in the order with the smallest rounding error, if the gain is worth it."""
     try:
         models = [model for (model,) in unquantized(ideal, realization, _BITS_TO_ORDER)]
     except ShortfallError:
-        return ideal  # not to be built with so few bits
+        return ideal  # cannot be built with so few bits
     return replace(ideal, rows=tuple(ideal.rows[k] for k in best_order(models)))

@@ -34,7 +34,7 @@ class Quantized:
     Attributes
     ----------
     datapath : Datapath
-        What is computed, bit for bit.
+        The bit-true datapath.
     filter : Filter or None
         The ideal filter; None for a calibration core.
     polynomial : Polynomial or None
@@ -69,7 +69,7 @@ class Quantized:
 
     @cached_property
     def quantized_sos(self) -> Array:
-        """The transfer functions that the integer coefficients make, shape (sections, 6)."""
+        """Second-order sections that the integer coefficients realize, shape (sections, 6)."""
         return effective_sections([linear_models(section.graph) for section in self.sections])
 
 
@@ -86,7 +86,7 @@ def assembled(
     sections: Sequence[Section],
     proof: CascadeProof | None,
 ) -> Quantized:
-    """Put stages together to a datapath and add up its error budget; `gain` is that of the filter, 1 without one."""
+    """Combine stages into a datapath and add up its error budget; `gain` is that of the filter, 1 without one."""
     budget: dict[str, Fraction] = {}
     if input_stage.stages:
         budget["calibration" if polynomial is not None else "input scaling"] = input_stage.error * gain
@@ -107,5 +107,5 @@ def assembled(
 
 
 def filter_budget(proof: CascadeProof) -> dict[str, Fraction]:
-    """Return the parts of the budget that the sections take."""
+    """Return the sections' parts of the budget."""
     return {"filter coefficients": proof.coefficients.magnitude, "filter rounding": proof.rounding.magnitude}

@@ -1,13 +1,13 @@
-"""Trims the formats of a cascade until nothing more can be saved: fraction bits of every quantizer, every coefficient.
+"""Trims the formats of a cascade, by greedy descent: fraction bits of every quantizer, bits of every coefficient.
 
-From a start that keeps to the error allowed, the step that saves the most estimated area for the error it costs is
-taken, again and again, until no step fits any more. A step drops bits of one quantizer, of the calibration or of one
-coefficient, which may become either neighbour of its ideal value; or it begins to drop bits of a product's operand so
-that it fits one hardware multiplier.
+The start keeps to the error allowed. Each step is the one that saves the most estimated area for the error it costs;
+the search ends when no further step fits. A step drops bits of one quantizer, of the calibration or of one
+coefficient, which may become either neighbour of its ideal value; or it starts to quantize a product's operand so that
+it fits one hardware multiplier.
 
-All errors here are linear estimates in double precision: of a quantizer its gain to the output, of a coefficient the
-response of its derivative, so that errors of several coefficients may cancel. They only choose; what is chosen
-gets proven afterwards.
+All errors here are linear estimates in double precision: the gain to the output for a quantizer, the response of the
+derivative for a coefficient, so that errors of several coefficients may cancel. They only guide the choice; the result
+is proven afterwards.
 """
 
 from __future__ import annotations
@@ -37,22 +37,22 @@ from sosmith.model.errors import ShortfallError
 Array = npt.NDArray[np.float64]
 
 _EXACT_BITS = 50
-"""Significant bits of a coefficient that count as exact."""
+"""Significant bits at which a coefficient counts as exact."""
 
 _STEPS = (1, 2, 3)
-"""Bits that one step may drop: several, because a shorter fraction may pay only once it is the shortest."""
+"""Bits that one step may drop: several, because a shorter fraction may save area only once it is the shortest one."""
 
 
 @dataclass(frozen=True)
 class Choice:
-    """Index of the input stage, and the formats of every section, as far as they are free."""
+    """Index of the input stage, and the formats of every section that can be chosen."""
 
     input_stage: int
     formats: tuple[SectionFormat, ...]
 
 
 class _Input(NamedTuple):
-    """What an input stage hands to the sections, its error at the filter's output in LSBs, and its area."""
+    """Output range of an input stage, its error at the filter's output in LSBs, and its area."""
 
     x: Range
     error: float
@@ -61,7 +61,7 @@ class _Input(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class _Base:
-    """Formats that others differ from in a few coefficients, and the deviation and error that theirs make."""
+    """Reference formats, which others differ from in a few coefficients, and their deviation and error."""
 
     formats: tuple[SectionFormat, ...]
     deviation: Array
@@ -69,7 +69,7 @@ class _Base:
 
 
 class Search:
-    """Looks for the formats of a cascade.
+    """Searches for the formats of a cascade.
 
     Parameters
     ----------
@@ -78,14 +78,14 @@ class Search:
     realization : str
         A key of `REALIZATIONS`.
     input_stages : sequence of InputStage
-        What may stand before the sections, each a little coarser than the one before.
+        Possible input stages, each a little coarser than the previous one.
     gain : Fraction
-        Gain of the filter, by which their errors count at its output.
+        Gain of the filter, by which their errors are multiplied.
 
     Raises
     ------
     ShortfallError
-        If a section cannot be built, or its response does not end in time.
+        If a section cannot be built, or its response does not decay in time.
     """
 
     def __init__(
@@ -103,8 +103,8 @@ class Search:
     def start(self, share: float, most: int) -> Choice | None:
         """Find formats whose coefficients and whose quantizers each keep their error within `share` output LSBs.
 
-        Every coefficient has the same significant bits; the quantizers share what is allowed equally. None if a
-        coefficient or a quantizer would need more than `most` bits.
+        Every coefficient has the same number of significant bits; the quantizers share the allowed error equally. None
+        if a coefficient or a quantizer would need more than `most` bits.
         """
         names = [[name for name in e.gains if name not in e.optional] for e in self._estimates]
         count = sum(map(len, names))
@@ -126,19 +126,19 @@ class Search:
             error = self.coefficient_error(choice)
             if error <= share and self._is_stable(choice):
                 return choice
-            # An error falls by half with each bit, now and then by more: leap most of the way.
+            # Each bit halves the error, sometimes more: jump most of the way.
             bits += max(1, _bits_below(error, share) - 3)
         return None
 
     def trimmed(self, start: Choice, allowed: float) -> Choice:
-        """Trim the formats until nothing more can be saved.
+        """Trim the formats until no step saves any more.
 
         Parameters
         ----------
         start : Choice
-            Formats to begin with.
+            Initial formats.
         allowed : float
-            Error of input stage, coefficients and rounding together, in output LSBs.
+            Allowed sum of the errors of input stage, coefficients and rounding, in output LSBs.
         """
         choice, error, area = start, self.error(start), self.area(start)
         while error <= allowed:
@@ -172,7 +172,10 @@ class Search:
             x = y
 
     def _changes(self, k: int, form: SectionFormat, fits: Mapping[str, int]) -> Iterator[SectionFormat]:
-        """Yield formats of section k with fewer bits in one place; an operand that is too long may fit with `fits`."""
+        """Yield formats of section k with fewer bits in one place.
+
+        `fits` holds the fraction bits with which an operand that is too long would fit a multiplier.
+        """
         for name, frac in form.fracs.items():
             for step in _STEPS:
                 if frac >= step:
@@ -187,7 +190,7 @@ class Search:
                         yield form.with_coefficient(name, lowest_terms(neighbour, frac - step))
 
     def error(self, choice: Choice) -> float:
-        """Estimated error of input stage, coefficients and rounding together, in output LSBs."""
+        """Estimated sum of the errors of input stage, coefficients and rounding, in output LSBs."""
         rounding = sum(
             estimate.gains.get(name, 0.0) * 2.0**-frac
             for estimate, form in zip(self._estimates, choice.formats, strict=True)
@@ -205,7 +208,7 @@ class Search:
         return max(map(abs, _limits(self._deviation(choice, base), self._ends)))
 
     def _deviation(self, choice: Choice, base: _Base | None) -> Array:
-        """Deviation of the impulse response by the coefficients, from that of `base` on."""
+        """Deviation of the impulse response due to the coefficients, updated from that of `base`."""
         response = np.zeros(1) if base is None else base.deviation
         for k, (estimate, form) in enumerate(zip(self._estimates, choice.formats, strict=True)):
             before = None if base is None else base.formats[k].coefficients
@@ -222,11 +225,11 @@ class Search:
         return self.area(choice) < math.inf
 
     def area(self, choice: Choice) -> float:
-        """Estimated area of the input stage and the sections, infinite where rounded coefficients are unstable."""
+        """Estimated area of the input stage and the sections, infinite if rounded coefficients are unstable."""
         return self._inputs[choice.input_stage].area + sum(area for area, _ in self._built_sections(choice))
 
     def output(self, choice: Choice) -> Range:
-        """Return what leaves the last section, its range estimated."""
+        """Return the estimated output range of the last section."""
         *_, (_, passed) = self._built_sections(choice)
         return passed
 
@@ -268,22 +271,22 @@ class Search:
 
 @dataclass(frozen=True, eq=False)
 class _Estimate:
-    """What double precision says about a section.
+    """Double-precision estimates for a section.
 
     Attributes
     ----------
     ideal : dict of str to float
         Coefficients by name.
     slopes : dict of str to array
-        Change of the filter's impulse response for a unit of each coefficient.
+        Change of the filter's impulse response for a unit change of each coefficient.
     gains : dict of str to float
-        Largest error at the filter's output of each quantizer to whole numbers, centred.
+        Largest centred error at the filter's output for each quantizer, if it rounds to integers.
     limits : dict of str to tuple of float
-        Smallest and largest value of every node whose range is stated, without quantizers.
+        Smallest and largest value of every node with a stated range, without quantizers.
     spreads : dict of str to dict of str to float
-        Largest error at every such node of each of the section's quantizers to whole numbers, centred.
+        Largest centred error at every such node for each of the section's quantizers, if it rounds to integers.
     optional : tuple of str
-        Those of `gains` that need not be.
+        Names in `gains` of the quantizers that are optional.
     """
 
     ideal: dict[str, float]
@@ -294,7 +297,7 @@ class _Estimate:
     optional: tuple[str, ...]
 
     def limits_of(self, node: str, fracs: Mapping[str, int]) -> tuple[float, float]:
-        """Limits of a node with quantizers: what cannot be negative without them may need a sign bit with them."""
+        """Limits of a node with quantizers: they can make a nonnegative node negative, which adds a sign bit."""
         low, high = self.limits[node]
         spread = sum(self.spreads[node].get(name, 0.0) * 2.0**-frac for name, frac in fracs.items())
         return low - spread, high + spread
@@ -336,7 +339,7 @@ def _estimates(rows: Sequence[Sequence[float]], realization: str, ends: tuple[fl
 
 
 def _gain(quantizer: Source, node: int, poles: Sequence[float], behind: Array) -> float:
-    """Largest error through a node of a quantizer to whole numbers: half a unit centred, or one either way."""
+    """Largest error through a node of a quantizer to integers: half a unit for FLOOR (centred), one for TRUNCATE."""
     unit = 1.0 if quantizer.low < 0 else 0.5
     return unit * float(np.abs(_filtered(quantizer.numerators[node], poles, behind)).sum())
 
@@ -344,18 +347,18 @@ def _gain(quantizer: Source, node: int, poles: Sequence[float], behind: Array) -
 def _exact(
     row: Sequence[float], realization: str, coefficients: Mapping[str, tuple[int, int]] | None = None
 ) -> Section:
-    """Build a section with exact coefficients, but for those given, and all quantizers dropping bits."""
+    """Build a section with exact coefficients, except for those given, in which every quantizer drops bits."""
     build = REALIZATIONS[realization].build
     formats = SectionFormat(coefficient_bits=_EXACT_BITS, coefficients=coefficients or {})
     section = build(row, formats, "section")
     required = [source.name for source in linear_model(section.graph).sources if source.kept is not None]
-    # An operand has bits to drop only where its terms have some.
+    # An operand has bits to drop only if its terms have fraction bits.
     fracs = dict.fromkeys(required, 1) | dict.fromkeys(section.optional_quantizers, 0)
     return build(row, replace(formats, fracs=fracs), "section")
 
 
 def _slope(row: Sequence[float], realization: str, section: Section, name: str, others: Array) -> Array:
-    """Response to the derivative of a section's transfer function by a coefficient, and through all other sections."""
+    """Impulse response of the derivative of a section by a coefficient, filtered by all other sections."""
     integer, frac = section.coefficients[name]
     shift = max(0, 30 - abs(integer).bit_length())
     step = max(1, abs(integer) << shift >> 24)
@@ -398,7 +401,7 @@ def _filtered(numerator: Sequence[Fraction | int], denominator: Sequence[float],
 
 
 def _limits(response: Array, ends: tuple[float, float]) -> tuple[float, float]:
-    """Smallest and largest value that inputs within `ends` from reset on can drive a response to."""
+    """Smallest and largest value of a response to inputs that stay within `ends` from reset on."""
     low, high = response * ends[0], response * ends[1]
     bottom, top = np.minimum(low, high).cumsum().min(), np.maximum(low, high).cumsum().max()
     return min(float(bottom), 0.0), max(float(top), 0.0)

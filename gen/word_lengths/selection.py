@@ -1,4 +1,4 @@
-"""Chooses the realization: plans, trims and proves those that are offered, each at most once."""
+"""Chooses the realization: plans, trims and proves the candidates, each at most once."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from sosmith.model.errors import ShortfallError
 
 Progress = Callable[[str], None]
 Accept = Callable[[Datapath], object]
-"""Raises ShortfallError, saying why, for a datapath that does not suit the hardware."""
+"""Raises ShortfallError, with the reason, if a datapath does not suit the hardware."""
 
 _HOPELESS = 2.5
-"""Ratio to the least area beyond which a plan is not trimmed: in no design seen did trimming save a half."""
+"""Ratio to the smallest area beyond which a plan is not trimmed: trimming saved less than half in every design seen."""
 
 
 class Selection:
-    """Realizations of one design.
+    """Candidate realizations of one design.
 
     Parameters
     ----------
     plan_of : callable
         Plans a realization, given its name; may raise ShortfallError.
     progress : callable
-        Told the name of each step.
+        Called with the name of each step.
     """
 
     def __init__(self, plan_of: Callable[[str], Plan], progress: Progress) -> None:
@@ -54,15 +54,15 @@ class Selection:
         return self._prove(name)
 
     def cheapest(self, accept: Accept) -> tuple[Quantized, str]:
-        """Return the proven realization of the smallest estimated area that `accept` lets pass, and why.
+        """Return the proven realization with the smallest estimated area that `accept` permits, and the reason.
 
-        Plans that are not far larger than the least are trimmed. Proofs are made in the order of the planned areas,
-        until none that is left promises to be smaller.
+        Plans that are not much larger than the smallest are trimmed. They are proven in the order of their planned
+        areas until no remaining plan promises to be smaller.
 
         Raises
         ------
         ShortfallError
-            If none meets the specification; says what stands in the way, where that differs for `BEST_KEPT`.
+            If none meets the specification; gives the reason of `BEST_KEPT`, by name if the reasons differ.
         """
         for name in REALIZATIONS:
             self._plan(name)

@@ -174,9 +174,9 @@ NEEDED = {
     "compare": ("REPORT REPORT...", "--json", "HTML"),
     "calibrate": ("clearance_mm", "sosmith calibrate add", "export"),
     "spectrum": ("TRACE", "--tolerance", "--passband", "--motion", "--into SPEC", "--json"),
-    "vehicle": ("PARAMETERS.toml", "--speed", "tables 5 to 8", "--json"),
+    "vehicle": ("PARAMETERS is a TOML file", "--speed", "tables 5 to 8", "--json"),
     "wear": ("TRACE.csv", "--initial", "--limit", "--warning", "--spec"),
-    "paper": ("docs/paper.md", "-o, --output", "--json"),
+    "paper": ("paper/paper.md", "-o, --output", "--json"),
     "demo": ("build/demo", "--seed"),
 }
 
