@@ -17,7 +17,7 @@ def paper(output: Path | None, as_json: bool) -> None:
     """Recompute the paper's equations and tables, and compare them with the printed figures.
 
     Prints how many figures of each are reproduced, near, different or not comparable. With -o, writes the complete
-    comparison with explanations and pictures, as in docs/paper.md; --json prints all figures.
+    comparison with explanations and pictures; --json prints all figures.
 
     \b
         sosmith paper -o paper/paper.md

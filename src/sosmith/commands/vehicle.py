@@ -60,8 +60,8 @@ def vehicle(
 
     Prints the modes of free motion, the largest motion of each part, and, at the paper's track and speed, a comparison
     with the paper's tables 5 to 8. The model is linear: it has no flange contact and no friction limit on the creep
-    forces. The tables show for each wheelset how far the run exceeds these limits. PARAMETERS.toml holds masses,
-    springs and track; by default the built-in ones are used.
+    forces. The tables show for each wheelset how far the run exceeds these limits. PARAMETERS is a TOML file with
+    masses, springs and track; by default the built-in ones are used.
 
     \b
         sosmith vehicle --speed 25 --plot vehicle.svg
