@@ -110,7 +110,7 @@ def test_slips_are_refused() -> None:
     refused("the seed must be 0 or more, not -1", "--seed", "-1", "--irregularities", "low")
     refused("a.pdf: the plot's name must end in .svg or .png, not .pdf", "--plot", "a.pdf")
     refused("a: the plot's name must end in .svg or .png, not neither", "--plot", "a")
-    refused("none.toml must be a readable TOML file (no such file or directory)", "none.toml")
+    refused("none.toml: the file of parameters must be a readable file, not: no such file or directory", "none.toml")
     Path("broken.toml").write_text(built_in_text().replace('unit = "kg"', 'unit = "t"', 1))
     refused("broken.toml: wheelset.mass must be in the unit 'kg', not 't'", "broken.toml")
     assert run("--irregularities", "medium").exit_code == 2
