@@ -215,8 +215,8 @@ def _zero_groups(numerator: acb_poly, *, delayed: bool) -> list[_Group]:
     """Factors of degree 2, and one of a lower degree if necessary, up to a constant.
 
     Real zeros lie in nearly reciprocal pairs; the outermost are paired, which balances their coefficients. If the
-    analog impulse response starts at zero, the filter has one sample of delay, which is combined with the remaining
-    zero.
+    analog impulse response starts at zero, the filter has one sample of delay, which is combined with the unpaired
+    zero, if any.
     """
     constant = 1 if delayed else 0
     rest = acb_poly([numerator[k] for k in range(constant, numerator.degree() + 1)])

@@ -1,4 +1,4 @@
-"""What spectra and a proposal are asked for: window and segments, the error allowed, the pass edge."""
+"""Settings of spectra and requirements of a proposal: window and segments, allowed error, pass edge."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ WINDOWS = ("hann", "hamming", "blackman", "blackmanharris", "flattop", "boxcar")
 DETRENDS = ("linear", "constant", "none")
 
 TOLERANCE = 0.1
-"""Error allowed at the output, mm, unless said otherwise; assumed: about 1 % of the 9 mm of wear in the paper's
+"""Default for the error allowed at the output, mm. It is an assumption: about 1 % of the 9 mm of wear in the paper's
 section 6."""
 
 COVERAGE = 2.0
-"""Times the rms error that the tolerance has to cover: 95 % of the errors of a normal distribution (JCGM 100:2008,
-section 6.3.3)."""
+"""Multiple of the rms error that the tolerance has to cover: 95 % of a normal distribution (JCGM 100:2008, section
+6.3.3)."""
 
 PASSBAND_LOSS = 0.1
-"""Loss up to the pass edge, dB, where the wanted signal would bear more: the paper's choice in section 4.1."""
+"""Largest loss up to the pass edge, dB, even if the wanted signal tolerates more: from section 4.1 of the paper."""
 
 PARTS = 4
-"""Parts of the error."""
+"""Number of parts that share the error."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,21 +32,21 @@ class SpectrumSettings:
     Attributes
     ----------
     window : str
-        One of `WINDOWS`. Hann's, at an overlap of one half, loses little of the data, and its side lobes fall fast.
+        One of `WINDOWS`. The Hann window at 50 % overlap wastes little of the data, and its side lobes fall fast.
     segment : float or None
-        Length of a segment, s; None takes an eighth of the signal.
+        Length of a segment, s; None for an eighth of the signal.
     overlap : float
-        Share of a segment that the next one overlaps, 0 to 0.95.
+        Fraction of a segment that overlaps the next one, 0 to 0.95.
     detrend : str
-        One of `DETRENDS`: what is taken away from each segment first. A straight line passes a low-pass filter with
-        unity gain at zero frequency unchanged but for the delay, so it is no part of what a mask has to heed.
+        One of `DETRENDS`: trend that is subtracted from each segment first. A low-pass filter with unity gain at zero
+        frequency passes a straight line unchanged except for the delay, so the mask need not take account of it.
     confidence : float
         Probability of the confidence interval, between 0 and 1.
 
     Raises
     ------
     SpecificationError
-        If a value is none of these.
+        If a value is not one of these.
     """
 
     window: str = "hann"
@@ -70,24 +70,24 @@ class SpectrumSettings:
 
 @dataclass(frozen=True, kw_only=True)
 class Wish:
-    """What is asked of the filter.
+    """Requirements on the filter.
 
     Attributes
     ----------
     tolerance : float
-        Error allowed at the output, in the unit of the signals, positive; beside it stand the offset, which no filter
+        Error allowed at the output, in the unit of the signals, positive. It excludes the offset, which no filter
         removes, and the delay.
     coverage : float
-        How many times the rms error has to lie within the tolerance, positive.
+        Multiple of the rms error that has to lie within the tolerance, positive.
     passband : float or None
-        Pass edge, Hz; None takes it from the true signals' spectra.
+        Pass edge, Hz; None to derive it from the true signals' spectra.
     passband_loss : float or None
-        Loss up to the pass edge, dB; None takes it from the wanted signals' amplitude.
+        Loss up to the pass edge, dB; None to derive it from the wanted signals' amplitude.
 
     Raises
     ------
     SpecificationError
-        If a value is none of these.
+        If a value is not one of these.
     """
 
     tolerance: float = TOLERANCE
@@ -107,5 +107,5 @@ class Wish:
 
     @property
     def share(self) -> float:
-        """Rms error that each of the four parts may have."""
+        """Rms error allowed for each of the four parts."""
         return self.tolerance / (self.coverage * math.sqrt(PARTS))

@@ -1,4 +1,4 @@
-"""From trace files to spectra and a proposal: what `sosmith spectrum` shows."""
+"""From trace files to spectra and a proposal, as `sosmith spectrum` shows them."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from sosmith.model.traces.trace_file import TIME_TOLERANCE
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SignalSpectra:
-    """A signal with its name and file, and its spectra: measured, and with a truth also true and disturbance."""
+    """A signal with its name, file and spectra: measured and, if there is a truth, true and disturbance."""
 
     name: str
     file: SignalFile
@@ -36,20 +36,20 @@ class SignalSpectra:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Survey:
-    """Spectra of traces, and the filter that follows from them.
+    """Spectra of traces, and the filter proposed from them.
 
     Attributes
     ----------
     signals : list of SignalSpectra
         Every signal of every trace.
     proposal : Proposal or None
-        The filter, None if `obstacle` or `shortfall` says why there is none.
+        The filter; if None, `obstacle` or `shortfall` says why.
     trials : list of Trial or None
-        The proposal tried on each signal, None where it has no truth or there is no proposal.
+        Result of the proposal on each signal; None for a signal without truth or if there is no proposal.
     obstacle : str or None
         What is missing for a proposal.
     shortfall : ShortfallError or None
-        Why no filter is needed, or none is enough.
+        Why no filter is needed, or why none is sufficient.
     table : str or None
         ``[filter]`` of the proposal, TOML, or the whole specification with it.
     """
@@ -85,7 +85,7 @@ def survey(
     motion: bool = False,
     progress: Callable[[str], None] = lambda step: None,
 ) -> Survey:
-    """Estimate the spectra of traces, and propose the low-pass filter that follows from them.
+    """Estimate the spectra of traces, and propose a low-pass filter from them.
 
     Parameters
     ----------
@@ -94,23 +94,23 @@ def survey(
     settings : SpectrumSettings
         How spectra are estimated.
     wish : Wish
-        What is asked of the filter.
+        Requirements on the filter.
     columns, truth, channels
-        Columns of values to take where a trace has them, the column with the true signal, and channels; all there are
-        if empty.
+        Columns of values to use from the traces that have them, the column with the true signal, and channels; all if
+        empty.
     calibration : Path or None
-        Specification whose calibration computes the clearance; None takes that of `into`, or equation 5a.
+        Specification whose calibration computes the clearance; None for that of `into`, or else equation 5a.
     into, output : Path or None
-        Specification to put the filter into, and where the result is to be written; nothing is written here.
+        Specification to insert the filter into, and file for the result, which is not written here.
     motion : bool
-        Whether nothing is wanted of traces without a truth.
+        Whether traces without a truth are all disturbance.
     progress : callable
         Called with the name of each step.
 
     Raises
     ------
     SpecificationError
-        If a file is unfit, or nothing can be proposed though `into` or `output` asks for it.
+        If a file is unsuitable, or nothing can be proposed although `into` or `output` requires it.
     """
     progress("reading")
     polynomial, origin = _polynomial(calibration or into)
@@ -144,7 +144,7 @@ def survey(
 def _proposed(
     contents: Sequence[Content], wish: Wish, sample_rate: float
 ) -> tuple[Proposal | None, ShortfallError | None]:
-    """Propose a filter, or tell why there is none: the spectra are shown either way."""
+    """Propose a filter, or return the reason why there is none; the spectra are shown in either case."""
     try:
         return propose(contents, wish, sample_rate), None
     except ShortfallError as shortfall:
@@ -152,7 +152,7 @@ def _proposed(
 
 
 def _polynomial(path: Path | None) -> tuple[Polynomial, str]:
-    """Calibration of a specification, equation 5a without one, and what to call it."""
+    """Calibration of a specification, or equation 5a without one, and its name."""
     if path is None:
         return EQUATION_5A, "equation 5a of the paper"
     spec = load(path)
@@ -168,7 +168,7 @@ def _read(
     truth: str | None,
     channels: Sequence[int],
 ) -> list[SignalFile]:
-    """Read each file with those of the columns asked for that it has; each must be in one of the files."""
+    """Read from each file the requested columns that it has; each column must exist in at least one file."""
     headers = [csv_header(path) for path in traces]
     for name in (*columns, *([truth] if truth else [])):
         if not any(name in header for header in headers):
@@ -182,7 +182,7 @@ def _read(
 
 
 def _sample_rate(files: Sequence[SignalFile], into: Path | None) -> float:
-    """Sample rate of the filter, Hz: that of the traces, or of the specification that they have to agree with."""
+    """Sample rate of the filter, Hz: that of the traces, which must agree with that of the specification `into`."""
     first = files[0]
     rate, owner = first.sample_rate, str(first.path)
     if into is not None:
@@ -197,7 +197,7 @@ def _sample_rate(files: Sequence[SignalFile], into: Path | None) -> float:
 
 
 def _check_data(into: Path | None, output: Path | None) -> None:
-    """Refuse a copy that would look for its measurements in another folder."""
+    """Refuse to write a copy that would look for its measurement file in another folder."""
     if into is None or output is None:
         return
     calibration = load(into).calibration
@@ -216,7 +216,7 @@ def _spectra_of(file: SignalFile, one: Signal, settings: SpectrumSettings) -> Si
 
 
 def _obstacle(signals: Sequence[SignalSpectra], edge: float | None, *, motion: bool) -> str | None:
-    """Say why no filter can be proposed, if so."""
+    """Return the reason why no filter can be proposed, if any."""
     units = list(dict.fromkeys(one.signal.unit or "no unit" for one in signals))
     if len(units) > 1:
         return f"the signals must have one unit, not {' and '.join(units)}: choose some by --column"
