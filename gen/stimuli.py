@@ -1,4 +1,4 @@
-"""Input signals of a core: traces from files and scenarios, one for each channel."""
+"""Stimuli of a core: traces from files and scenarios, one per channel."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from sosmith.model.traces.trace_file import read_traces
 
 
 def bench_of(design: CoreDesign) -> Bench:
-    """Return what the scenarios need to know about a core."""
+    """Return the properties of a core that scenarios depend on."""
     quantized = design.quantized
     return Bench(
         ports=design.datapath.inputs,
@@ -31,22 +31,22 @@ def bench_of(design: CoreDesign) -> Bench:
 
 
 def default_scenario(design: CoreDesign) -> str:
-    """Return the scenario to run when none is named."""
+    """Return the default scenario of a core."""
     return "sweep" if design.quantized.polynomial is None else "wear_ramp"
 
 
 def traces_for(design: CoreDesign, source: str, *, seed: int, seconds: float | None = None) -> tuple[Trace, ...]:
     """Make a trace for every channel from a CSV file, a scenario file (TOML) or the name of a scenario.
 
-    Channel k lags channel 0 by k samples and has its own noise, so that no two channels are alike. A CSV file with a
-    column `channel` is used as it is; one without drives all channels.
+    Channel k lags channel 0 by k samples and has its own noise, so that all channels differ. A CSV file with a column
+    `channel` is used as it is; one without it drives all channels.
 
     Parameters
     ----------
     design : CoreDesign
         The core.
     source : str
-        Path of a file, or the name of a scenario.
+        Path of a file, or name of a scenario.
     seed : int
         Seed of the noise of channel 0; channel k has ``seed + k``.
     seconds : float or None
@@ -55,7 +55,7 @@ def traces_for(design: CoreDesign, source: str, *, seed: int, seconds: float | N
     Returns
     -------
     tuple of Trace
-        One for each channel, all of the same length.
+        One per channel, all of the same length.
 
     Raises
     ------
@@ -74,7 +74,7 @@ def traces_for(design: CoreDesign, source: str, *, seed: int, seconds: float | N
             raise SpecificationError(f"--seconds must come with a scenario, not with the file {source}")
         given = read_traces(Path(source), design.datapath.inputs, design.spec.sample_rate, len(channels))
         return given if len(given) == len(channels) else tuple(given[0].delayed(k) for k in channels)
-    bench = bench_of(design)  # an unknown scenario is refused there, with a list of those that fit
+    bench = bench_of(design)  # an unknown scenario is refused below, with a list of the valid ones
     return tuple(emulate(source, bench, seed=seed + k, seconds=seconds).delayed(k) for k in channels)
 
 
@@ -84,7 +84,7 @@ def is_scenario_file(source: str) -> bool:
 
 
 def notes_on(design: CoreDesign, source: str) -> tuple[str, ...]:
-    """Return a sentence for each part of a scenario file that exceeds the range of an input; none for other sources.
+    """Return a sentence for each part of a scenario file that exceeds an input range; none for other sources.
 
     Raises
     ------

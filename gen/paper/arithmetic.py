@@ -36,7 +36,7 @@ def butterworth_polynomial(order: int) -> Coefficients:
 
 @cache
 def butterworth_factors(order: int) -> tuple[Coefficients, ...]:
-    """Real factors of `butterworth_polynomial` by falling powers: ``s^2 + 2 sin(theta) s + 1``, and s + 1 for odd orders.
+    """Real factors of `butterworth_polynomial` by falling powers: ``s^2 + 2 sin(theta) s + 1``, and s + 1 if odd.
 
     Sections with the highest Q come first.
     """

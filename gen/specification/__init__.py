@@ -1,1 +1,1 @@
-"""The specification file: its shape, its values, its rules."""
+"""The specification file: its shape, its values and its rules."""

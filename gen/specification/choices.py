@@ -1,4 +1,4 @@
-"""The names that a specification chooses from: families, kinds, methods, realizations, architectures, cores, inputs."""
+"""Valid names in a specification: families, kinds, methods, realizations, architectures, cores, inputs."""
 
 FAMILIES = ("butterworth", "chebyshev1", "chebyshev2", "elliptic", "bessel")
 KINDS = ("lowpass", "highpass", "bandpass", "bandstop")
@@ -7,10 +7,10 @@ REALIZATIONS = ("auto", "df1", "df1_ef1", "df1_ef2", "df2t", "delta", "state_spa
 ARCHITECTURES = ("auto", "parallel", "folded", "serial")
 
 CORES = ("instrument", "filter", "calibration")
-"""What can be generated from a specification: all of it, or one part."""
+"""What can be generated from a specification: the whole instrument, or one part."""
 
 ERROR_FEEDBACK = ("df1", "df1_ef1", "df1_ef2")
-"""Realizations that differ only in the error feedback, and so can be compared at the same word lengths."""
+"""Realizations that differ only in their error feedback, so that they can be compared at the same word lengths."""
 
 CALIBRATION_INPUTS = ("voltage", "temperature")
 """Inputs of the calibration polynomial, in the order of its indices."""

@@ -1,4 +1,4 @@
-"""What the keys of a specification mean together: everything that cannot be told from one key alone.
+"""Rules that involve several keys of a specification.
 
 Each function checks one subject and raises `UnfitError` with the path of the key at fault.
 """
@@ -14,10 +14,10 @@ from sosmith.gen.specification.schema import MAX_ORDER, Document, FilterTable, I
 from sosmith.gen.specification.values import UnfitError, identifier, key_text, listed, literal, one_of
 
 MARGIN = Fraction(1, 10**6)
-"""Least distance of a band edge from 0 and from half the sample rate, as a part of the sample rate.
+"""Minimum distance of a band edge from 0 and from half the sample rate, as a fraction of the sample rate.
 
 At this ratio a section's 1 + a1 + a2, about ``(2 * pi * MARGIN)**2``, is already below 2**-34, so that
-coefficients would need that many bits before the first that matters.
+coefficients would have that many leading bits without information.
 """
 
 _BY_ORDER = ("order", "cutoff")
@@ -26,11 +26,11 @@ _BY_SECTIONS = ("sos",)
 _FORMS = "given by order and cutoff, by passband_edge, stopband_edge, passband_loss and stopband_loss, or by sos"
 
 _LOSSES = {"chebyshev1": ("passband_loss",), "chebyshev2": ("stopband_loss",), "elliptic": _BY_EDGES[2:]}
-"""Losses that a family needs beside order and cutoff: where it has ripples, it has to be told how large."""
+"""Losses that a family needs in addition to order and cutoff: they set the size of its ripples."""
 
 
 def check(document: Document) -> None:
-    """Check everything that `sosmith.gen.specification.schema.parse` cannot see.
+    """Check the rules that `sosmith.gen.specification.schema.parse` cannot check on single keys.
 
     Raises
     ------
@@ -54,9 +54,9 @@ def _check_inputs(document: Document) -> None:
     names = list(document.input)
     found = ", ".join(literal(name) for name in names) or "none"
     if document.calibration is not None and set(names) != set(CALIBRATION_INPUTS):
-        raise UnfitError("the two tables voltage and temperature beside [calibration]", found, where="input")
+        raise UnfitError("the two tables voltage and temperature with [calibration]", found, where="input")
     if document.calibration is None and len(names) != 1:
-        raise UnfitError("one table where there is no [calibration]", found, where="input")
+        raise UnfitError("a single table if there is no [calibration]", found, where="input")
     for name, table in document.input.items():
         try:
             identifier(name)
@@ -101,7 +101,7 @@ def _check_by_order(table: FilterTable, given: Sequence[str], sample_rate: Fract
     if table.method == "impulse_invariant":
         _check_impulse_invariant(table, family, kind)
     losses = _LOSSES.get(family, ())
-    beside = f"beside order and cutoff for {family}"
+    beside = f"with order and cutoff for {family}"
     _check_given(given, _BY_ORDER)
     for key in _BY_EDGES[2:]:
         if key in losses and key not in given:
@@ -121,7 +121,7 @@ def _check_by_edges(table: FilterTable, given: Sequence[str], sample_rate: Fract
     family, kind = _family_and_kind(table)
     if table.method == "impulse_invariant":
         raise UnfitError(
-            "given by order and cutoff with impulse_invariant, whose aliases no formula for the minimum order knows",
+            "given by order and cutoff with impulse_invariant, as no formula for the minimum order covers its aliasing",
             "by edges",
             where="filter",
         )
@@ -149,14 +149,14 @@ def _check_impulse_invariant(table: FilterTable, family: str, kind: str) -> None
         raise UnfitError("lowpass with impulse_invariant", literal(kind), where="filter.kind", later=True)
     if kind != "lowpass":
         raise UnfitError(
-            "lowpass with impulse_invariant, as all that an analog filter passes above half the sample rate would "
-            "fold back",
+            "lowpass with impulse_invariant, as everything that the analog filter passes above half the sample rate "
+            "would alias",
             literal(kind),
             where="filter.kind",
         )
     if family in ("chebyshev2", "elliptic") and table.order is not None and table.order % 2 == 0:
         raise UnfitError(
-            f"odd for {family} with impulse_invariant, as an even one passes a part of all high frequencies",
+            f"odd for {family} with impulse_invariant, as the gain of an even one does not fall to zero",
             literal(table.order),
             where="filter.order",
         )
@@ -165,13 +165,13 @@ def _check_impulse_invariant(table: FilterTable, family: str, kind: str) -> None
 def _check_sections(table: FilterTable, given: Sequence[str]) -> None:
     for key in given:
         if key != "sos":
-            raise UnfitError("left out beside sos", literal(getattr(table, key)), where=f"filter.{key}")
+            raise UnfitError("left out with sos", literal(getattr(table, key)), where=f"filter.{key}")
     for k, (b0, b1, b2, a0, a1, a2) in enumerate(table.sos or ()):
         where = f"filter.sos[{k}]"
         if a0 != 1:
             raise UnfitError("a section with a0 = 1", literal(a0), where=where)
         if not (b0 or b1 or b2):
-            raise UnfitError("a section with a b that is not zero", "b0 = b1 = b2 = 0", where=where)
+            raise UnfitError("a section with at least one nonzero b", "b0 = b1 = b2 = 0", where=where)
         # The triangle of Jury's criterion: both poles strictly inside the unit circle, exact in rationals.
         if not (abs(a2) < 1 and abs(a1) < 1 + a2):
             raise UnfitError(
@@ -193,7 +193,7 @@ def _check_given(given: Sequence[str], needed: Sequence[str]) -> None:
     for key in needed:
         if key not in given:
             others = [other for other in needed if other in given]
-            raise UnfitError(f"given beside {listed(others)}", "missing", where=f"filter.{key}")
+            raise UnfitError(f"given together with {listed(others)}", "missing", where=f"filter.{key}")
 
 
 def _check_losses(table: FilterTable) -> None:
@@ -209,7 +209,7 @@ def _is_band(kind: str) -> bool:
 
 
 def _check_band(table: FilterTable, key: str, kind: str, sample_rate: Fraction) -> tuple[Fraction, ...]:
-    """Check the frequencies of `key` on their own and return them."""
+    """Check the frequencies of `key` by themselves, and return them."""
     frequencies: tuple[Fraction, ...] = getattr(table, key)
     where = f"filter.{key}"
     found = _frequencies(frequencies)
@@ -223,7 +223,7 @@ def _check_band(table: FilterTable, key: str, kind: str, sample_rate: Fraction) 
     if not all(margin <= frequency <= sample_rate / 2 - margin for frequency in frequencies):
         raise UnfitError(
             f"at least a millionth of the sample_rate ({literal(margin)} Hz) away from 0 and from half the"
-            " sample_rate, as no word length holds a filter beyond",
+            " sample_rate, as no word length suffices for a filter closer to them",
             found,
             where=where,
         )
@@ -237,7 +237,7 @@ def _frequencies(frequencies: Sequence[Fraction]) -> str:
 
 
 def _relation(kind: str, passband: Sequence[Fraction], stopband: Sequence[Fraction]) -> tuple[str, bool]:
-    """Return how the edges of the passband have to lie against those of the stopband, and whether they do."""
+    """Return the required position of the passband edges relative to the stopband edges, and whether it holds."""
     match kind:
         case "lowpass":
             return "below", passband[0] < stopband[0]
@@ -256,7 +256,7 @@ def _check_output(document: Document) -> None:
     half = (high - low) / 2 ** (output.bits + 1)
     if output.max_error is not None and output.max_error <= half:
         raise UnfitError(
-            f"more than half an LSB of the output ({literal(half)}), which its rounding alone takes",
+            f"more than half an LSB of the output ({literal(half)}), which output rounding alone takes",
             literal(output.max_error),
             where="output.max_error",
         )
@@ -287,7 +287,7 @@ def _check_wear(document: Document) -> None:
             )
         if end > last:
             raise UnfitError(
-                f"at most {literal(last - initial)}, so that the output can show it",
+                f"at most {literal(last - initial)}, so that the output can represent it",
                 literal(wear.limit),
                 where="wear.limit",
             )

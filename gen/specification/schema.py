@@ -1,7 +1,7 @@
-"""Shape of a specification: its tables, their keys, and the kind of value each key takes.
+"""Shape of a specification: its tables, their keys, and the type of each value.
 
-What two keys mean together is checked in `sosmith.gen.specification.rules`. To add a key, add it to its
-table; messages about unknown and missing keys follow.
+Rules that involve several keys are in `sosmith.gen.specification.rules`. To add a key, add it to its table;
+the messages about unknown and missing keys follow from that.
 """
 
 from __future__ import annotations
@@ -40,10 +40,10 @@ MAX_ORDER = 20
 """Highest order of the digital filter, ten second-order sections."""
 
 MAX_CHANNELS = 65536
-"""So many channels have numbers of two bytes."""
+"""Maximum number of channels: their numbers fit in two bytes."""
 
 LOSS_LIMITS = (Fraction(1, 10**6), Fraction(200))
-"""In dB: double precision designs ripples down to the first, and a 32-bit code spans less than the second."""
+"""Limits in dB: double precision can design ripples down to the first; the range of 32 bits is below the second."""
 
 Rows = tuple[tuple[Fraction, ...], ...]
 Loss = Annotated[Fraction | None, PlainValidator(between(*LOSS_LIMITS, "dB"))]
@@ -51,7 +51,7 @@ Edges = Annotated[tuple[Fraction, ...] | None, PlainValidator(edges)]
 
 
 def read_max_error(value: object) -> Fraction | None:
-    """Read the largest error; "faithful" gives None."""
+    """Read the maximum error; "faithful" gives None."""
     if value == "faithful":
         return None
     expected = 'a positive number in the unit of the output, or "faithful"'
@@ -62,7 +62,7 @@ def read_max_error(value: object) -> Fraction | None:
 
 
 class Table(BaseModel):
-    """A table of the specification: only its own keys, immutable."""
+    """A table of the specification: immutable, without unknown keys."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -78,14 +78,14 @@ class InputTable(Table):
 
 
 class OutputTable(InputTable):
-    """``[output]``: the integer format of the result and how exact it has to be."""
+    """``[output]``: the integer format and the required accuracy of the result."""
 
     unit: Annotated[str, PlainValidator(text(16))] = ""
     max_error: Annotated[Fraction | None, PlainValidator(read_max_error)] = None
 
 
 class CalibrationTable(Table):
-    """``[calibration]``: the polynomial, or the measurements that it is fitted to."""
+    """``[calibration]``: the polynomial, or measurements to fit it to."""
 
     coefficients: Annotated[
         Rows | None, PlainValidator(list_of(list_of(number, 1, 8), 1, 8, "rows of 1 to 8 numbers"))
@@ -94,7 +94,7 @@ class CalibrationTable(Table):
 
 
 class FilterTable(Table):
-    """``[filter]``: by order and cutoff, by edges and losses, or by its sections."""
+    """``[filter]``: given by order and cutoff, by edges and losses, or by sections."""
 
     family: Annotated[str | None, PlainValidator(choice(FAMILIES))] = None
     kind: Annotated[str | None, PlainValidator(choice(KINDS))] = None
@@ -112,7 +112,7 @@ class FilterTable(Table):
 
 
 class WearTable(Table):
-    """``[wear]``: what the output means for a wheel, for the flags of wear."""
+    """``[wear]``: the wear limits behind the wear flags."""
 
     initial: Annotated[tuple[Fraction, ...], PlainValidator(one_or_more)] = Field(
         description="a number in the unit of the output, or a list of one for each channel"
@@ -165,7 +165,7 @@ def parse(tree: dict[str, Any]) -> Document:
     Raises
     ------
     UnfitError
-        For the first finding in the order of the file; the message tells how many more there are.
+        For the first error in the order of the file; the message says how many more there are.
     """
     try:
         return Document.model_validate(tree)
@@ -183,7 +183,7 @@ def parse(tree: dict[str, Any]) -> Document:
 
 
 def _position(tree: Any, path: tuple[int | str, ...]) -> list[int]:
-    """Return the place of a key in the order of the file, for a missing one the end of its table."""
+    """Return the position of a key in the file; a missing key is at the end of its table."""
     position = []
     for key in path:
         position.append(list(tree).index(key) if key in tree else len(tree))
@@ -204,7 +204,7 @@ def _unfit(finding: ErrorDetails) -> UnfitError:
             f"one of the keys {', '.join(keys)}", f"an unknown one{did_you_mean(path[-1], keys)}", where=where
         )
     found = "missing" if finding["type"] == "missing" else literal(finding["input"])
-    # A table [input.NAME] is no field of a model, hence has no description of its own.
+    # A table [input.NAME] is not a field of a model, so it has no description of its own.
     expected = keys[path[-1]].description if path[-1] in keys else "a table"
     return UnfitError(str(expected), found, where=where)
 

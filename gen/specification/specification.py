@@ -1,6 +1,6 @@
 """The specification: a TOML file in physical units, read exactly and checked before anything is built.
 
-Every number stays exact (`Fraction`) as written. Known values that this version does not support are refused by name.
+Every number stays exact (`Fraction`) as written. Values that are known but not supported yet are refused by name.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ if TYPE_CHECKING:
     from sosmith.gen.specification.schema import Document, FilterTable, InputTable, OutputTable
 
 MAX_BYTES = 1 << 16
-"""Largest specification in bytes; a real one has one or two thousand."""
+"""Maximum size of a specification in bytes; typical ones have one or two thousand."""
 
 SECTIONS = "sections"
-"""Family, kind and method of a filter given by its sections, where the specification does not name them."""
+"""Default family, kind and method of a filter that is given by its sections."""
 
 _UNITS = {"voltage": "V", "temperature": "degC"}
 
@@ -40,7 +40,7 @@ class CalibrationSpec:
         1 to 8 rows of 1 to 8 numbers a[i][j], not all zero; i is the power of the voltage (V), j that of
         the temperature (degC). Rows may differ in length.
     data : Path or None
-        CSV file of measurements to fit the polynomial to, found from the folder of the specification.
+        CSV file of measurements to fit the polynomial to; relative to the folder of the specification.
     """
 
     coefficients: tuple[tuple[Fraction, ...], ...] | None
@@ -49,20 +49,20 @@ class CalibrationSpec:
 
 @dataclass(frozen=True, kw_only=True)
 class FilterSpec:
-    """What filter is wanted: by `order` and `cutoff`, by edges and losses, or by `sos`; the rest is None.
+    """The required filter: by `order` and `cutoff`, by edges and losses, or by `sos`; the other attributes are None.
 
     Attributes
     ----------
     family, kind, method : str
-        For example "butterworth", "lowpass", "bilinear". Beside `sos` they are only a label, "sections" where
-        missing.
+        For example "butterworth", "lowpass", "bilinear". With `sos` they are only a label, "sections" by
+        default.
     order : int or None
-        Order of the prototype, 1 to 20; for bandpass and bandstop 1 to 10, the filter having twice that.
+        Order of the prototype, 1 to 20; for bandpass and bandstop 1 to 10, as the filter has twice that order.
     cutoff, passband_edge, stopband_edge : tuple of Fraction or None
         In Hz, one for lowpass and highpass, two rising ones for bandpass and bandstop, all of them at least a
         millionth of the sample rate away from 0 and from half the sample rate.
     passband_loss, stopband_loss : Fraction or None
-        In dB, 1e-6 to 200, the first below the second. Beside `order` and `cutoff` just those that the family
+        In dB, 1e-6 to 200, the first below the second. With `order` and `cutoff`, only those that the family
         needs.
     sos : tuple of tuples of Fraction or None
         1 to 10 stable rows (b0, b1, b2, a0, a1, a2) with a0 = 1 and the sign convention of scipy.
@@ -109,7 +109,7 @@ class Specification:
     Attributes
     ----------
     path : Path
-        File that it was read from.
+        File that the specification was read from.
     source : dict
         The file as read, in the types of JSON, for the manifest.
     name : str
@@ -119,7 +119,7 @@ class Specification:
     channels : int
         Number of channels.
     inputs : tuple of Port
-        Voltage (V) and temperature (degC), in this order also where the file has another; without
+        Voltage (V) and temperature (degC), always in this order; without
         `calibration` the one input of the filter, in the unit of the output.
     calibration : CalibrationSpec or None
         None for a plain filter.
@@ -130,7 +130,7 @@ class Specification:
     max_error : Fraction
         Largest allowed |hardware - exact|, in the unit of the output, more than half an LSB of the output.
     wear : WearSpec or None
-        What the output means for a wheel.
+        Wear limits, for the wear flags.
     hardware : HardwareSpec
         The hardware.
     """
@@ -155,31 +155,31 @@ def load(path: Path) -> Specification:
     Raises
     ------
     SpecificationError
-        For the first thing that is wrong, in one sentence: the file, the path of the key or the line, what
-        would be right and what was found.
+        For the first error, in one sentence: the file, the path of the key or the line, what was expected
+        and what was found.
     """
     tree = read_toml(path, what="the specification", max_bytes=MAX_BYTES, parse_float=Decimal)
     if not tree:
-        raise SpecificationError(f"{path}: the specification must hold the keys of a specification, not nothing")
+        raise SpecificationError(f"{path}: the specification must have keys, not be empty")
     return from_tree(tree, path)
 
 
 def from_tree(tree: dict[str, Any], path: Path) -> Specification:
-    """Check a specification that has been read already.
+    """Check a specification that has already been read.
 
     Parameters
     ----------
     tree : dict
         As `tomllib` gives it, with every float as `decimal.Decimal`.
     path : Path
-        Its name in messages; `calibration.data` is found from the folder of this path.
+        Its name in messages; `calibration.data` is relative to the folder of this path.
 
     Raises
     ------
     SpecificationError
         As `load`.
     """
-    # pydantic takes a while to load: a file that is missing or no TOML is refused without it.
+    # pydantic is slow to import: a file that is missing or not TOML is refused without it.
     from sosmith.gen.specification.rules import check
     from sosmith.gen.specification.schema import parse
 

@@ -1,4 +1,4 @@
-"""Writes a specification as TOML: plain keys first, then one table after another."""
+"""Writes a specification as TOML: plain keys first, then the tables."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def toml_text(tree: Mapping[str, Any]) -> str:
 
 
 def _tables(tree: Mapping[str, Any], path: tuple[str, ...]) -> list[str]:
-    """Texts of a table and of the tables in it."""
+    """Return the texts of a table and of its nested tables."""
     lines = [f"{key_text(key)} = {_value(value)}\n" for key, value in tree.items() if not isinstance(value, Mapping)]
     header = [f"[{'.'.join(map(key_text, path))}]\n"] if path and lines else []
     texts = ["".join(header + lines)] if lines else []

@@ -1,7 +1,7 @@
-"""Readers of single values in a specification, exact, and the one error they raise.
+"""Exact readers of single values in a specification, and the error they raise.
 
 A reader takes a value as `tomllib` gives it (every TOML float as `decimal.Decimal`) and returns it checked,
-numbers as `Fraction`. What does not fit raises `UnfitError`, from which the sentence for the user is made.
+numbers as `Fraction`. A value that does not fit raises `UnfitError`, from which the message to the user is made.
 """
 
 from __future__ import annotations
@@ -21,22 +21,22 @@ IDENTIFIER = f"a Verilog identifier of at most {MAX_NAME} letters, digits and un
 
 MAX_DIGITS = 50
 MAX_EXPONENT = 30
-"""Numbers are zero or from 1e-30 to below 1e30 in size: `Fraction` would write ``1e999999999`` in full."""
+"""Magnitudes are zero or from 1e-30 to below 1e30: `Fraction` would store ``1e999999999`` in full."""
 
 
 class UnfitError(ValueError):
-    """A value that a specification cannot have.
+    """A value that is not valid in a specification.
 
     Parameters
     ----------
     expected : str
-        What would be right, to be read after "must be".
+        What is expected; follows "must be" in the message.
     found : str
-        What stands there.
+        What was found.
     where : str
         Path of the key, such as ``filter.sos[2]``.
     later : bool
-        Whether the value is a known one that this version does not carry out yet.
+        Whether the value is known, but not supported in this version yet.
     """
 
     def __init__(self, expected: str, found: str, *, where: str = "", later: bool = False) -> None:
@@ -48,12 +48,12 @@ class UnfitError(ValueError):
         super().__init__(f"{prefix}{where} must be {expected}, not {found}")
 
     def inside(self, where: str) -> UnfitError:
-        """Return the same finding with `where` put before its place."""
+        """Return the same error with `where` prepended to its path."""
         return UnfitError(self.expected, self.found, where=where + self.where, later=self.later)
 
 
 def literal(value: object) -> str:
-    """Return `value` on one line of bounded length, as a message shows it."""
+    """Return `value` as messages show it, on one line of bounded length."""
     match value:
         case bool():
             shown = "true" if value else "false"
@@ -81,12 +81,12 @@ def literal(value: object) -> str:
 def number(value: object, expected: str = "a number") -> Fraction:
     """Read a finite number exactly: 0.0036 becomes ``Fraction(36, 10000)``.
 
-    What is no number at all is told to be no `expected`.
+    `expected` describes the value in the message if it is not a number.
 
     Raises
     ------
     UnfitError
-        If `value` is no number, is not finite, has more than `MAX_DIGITS` digits or is out of all proportion.
+        If `value` is not a finite number, has more than `MAX_DIGITS` digits or is too large or small.
     """
     if isinstance(value, bool) or not isinstance(value, int | Decimal):
         raise UnfitError(expected, literal(value))
@@ -160,7 +160,7 @@ def text(longest: int) -> Callable[[object], str]:
 
 
 def file_name(value: object) -> str:
-    """Read the name of a file, not empty."""
+    """Read the name of a file, which is not empty."""
     if not isinstance(value, str) or not value.isprintable() or not value:
         raise UnfitError("the name of a file", literal(value))
     return value
@@ -189,23 +189,23 @@ def listed(names: Sequence[str]) -> str:
 
 
 def key_text(key: str) -> str:
-    """Return `key` as TOML writes it: bare where that is allowed, else quoted."""
+    """Return `key` as TOML writes it: bare if that is allowed, otherwise quoted."""
     return key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else literal(key)
 
 
 def identifier(value: object) -> str:
-    """Read a Verilog identifier that is no keyword."""
+    """Read a Verilog identifier that is not a keyword."""
     if not isinstance(value, str) or not is_identifier(value):
         raise UnfitError(IDENTIFIER, literal(value))
     if value in KEYWORDS:
-        raise UnfitError(f"{IDENTIFIER}, none of the keywords of SystemVerilog", literal(value))
+        raise UnfitError(f"{IDENTIFIER}, and no keyword of SystemVerilog", literal(value))
     return value
 
 
 def list_of(
     read: Callable[[object], Item], shortest: int, longest: int, items: str = "numbers"
 ) -> Callable[[object], tuple[Item, ...]]:
-    """Return the reader of a list of `shortest` to `longest` values, each taken by `read`."""
+    """Return the reader of a list of `shortest` to `longest` values, each read by `read`."""
     count = str(shortest) if shortest == longest else f"{shortest} to {longest}"
 
     def read_list(value: object) -> tuple[Item, ...]:
@@ -224,7 +224,7 @@ def _read_item(read: Callable[[object], Item], values: Sequence[object], k: int)
 
 
 ABOVE_ZERO = "a positive number in the unit of the output"
-"""What `above_zero` reads."""
+"""What `above_zero` expects."""
 
 
 def above_zero(value: object) -> Fraction:
@@ -236,11 +236,11 @@ def above_zero(value: object) -> Fraction:
 
 
 ONE_OR_MORE = "a number in the unit of the output, or a list of one for each channel"
-"""What `one_or_more` reads, after "must be"."""
+"""What `one_or_more` expects; follows "must be" in the message."""
 
 
 def one_or_more(value: object) -> tuple[Fraction, ...]:
-    """Read one number for all channels, or a list of one for each."""
+    """Read one number for all channels, or a list with one for each channel."""
     if isinstance(value, list):
         if not value:
             raise UnfitError(ONE_OR_MORE, literal(value))

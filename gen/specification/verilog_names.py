@@ -1,11 +1,11 @@
-"""Names that Verilog tools accept as an identifier."""
+"""Names that Verilog tools accept as identifiers."""
 
 from __future__ import annotations
 
 import re
 
 MAX_NAME = 64
-"""Longest accepted name in characters, so that names derived from it stay within every tool's limits."""
+"""Maximum length of a name in characters; names derived from it stay within the limits of every tool."""
 
 _WORDS = """
     accept_on alias always always_comb always_ff always_latch and assert assign assume automatic before
@@ -31,7 +31,7 @@ _WORDS = """
 """
 
 KEYWORDS = frozenset(_WORDS.split())
-"""Reserved words of SystemVerilog (IEEE 1800-2017, Annex B), which hold those of Verilog."""
+"""Reserved words of SystemVerilog (IEEE 1800-2017, Annex B), which include those of Verilog."""
 
 _IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 

@@ -1,4 +1,4 @@
-"""Settings of spectra and requirements of a proposal: window and segments, allowed error, pass edge."""
+"""Settings of spectra and of a proposal: window and segments, allowed error, pass edge."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ WINDOWS = ("hann", "hamming", "blackman", "blackmanharris", "flattop", "boxcar")
 DETRENDS = ("linear", "constant", "none")
 
 TOLERANCE = 0.1
-"""Default for the error allowed at the output, mm. It is an assumption: about 1 % of the 9 mm of wear in the paper's
+"""Default of the allowed error at the output, mm; an assumption, about 1 % of the 9 mm of wear in the paper's
 section 6."""
 
 COVERAGE = 2.0
-"""Multiple of the rms error that the tolerance has to cover: 95 % of a normal distribution (JCGM 100:2008, section
-6.3.3)."""
+"""Multiple of the rms error that the tolerance has to cover: 95 % of normally distributed errors (JCGM 100:2008,
+section 6.3.3)."""
 
 PASSBAND_LOSS = 0.1
-"""Largest loss up to the pass edge, dB, even if the wanted signal tolerates more: from section 4.1 of the paper."""
+"""Maximum loss up to the pass edge, dB, even if the wanted signal allows more: the paper's choice in section 4.1."""
 
 PARTS = 4
-"""Number of parts that share the error."""
+"""Number of parts of the error."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,17 +36,17 @@ class SpectrumSettings:
     segment : float or None
         Length of a segment, s; None for an eighth of the signal.
     overlap : float
-        Fraction of a segment that overlaps the next one, 0 to 0.95.
+        Fraction of a segment that the next one overlaps, 0 to 0.95.
     detrend : str
-        One of `DETRENDS`: trend that is subtracted from each segment first. A low-pass filter with unity gain at zero
-        frequency passes a straight line unchanged except for the delay, so the mask need not take account of it.
+        One of `DETRENDS`: the trend removed from each segment first. A low-pass filter with unity gain at zero
+        frequency only delays a straight line, so the line does not matter for the mask.
     confidence : float
         Probability of the confidence interval, between 0 and 1.
 
     Raises
     ------
     SpecificationError
-        If a value is not one of these.
+        If a value is outside these limits.
     """
 
     window: str = "hann"
@@ -75,19 +75,19 @@ class Wish:
     Attributes
     ----------
     tolerance : float
-        Error allowed at the output, in the unit of the signals, positive. It excludes the offset, which no filter
-        removes, and the delay.
+        Allowed error at the output, in the unit of the signals, positive. It does not include the offset, which no
+        filter removes, and the delay.
     coverage : float
-        Multiple of the rms error that has to lie within the tolerance, positive.
+        Multiple of the rms error that has to be within the tolerance, positive.
     passband : float or None
-        Pass edge, Hz; None to derive it from the true signals' spectra.
+        Pass edge, Hz; None derives it from the spectra of the true signals.
     passband_loss : float or None
-        Loss up to the pass edge, dB; None to derive it from the wanted signals' amplitude.
+        Loss up to the pass edge, dB; None derives it from the amplitudes of the wanted signals.
 
     Raises
     ------
     SpecificationError
-        If a value is not one of these.
+        If a value is outside these limits.
     """
 
     tolerance: float = TOLERANCE

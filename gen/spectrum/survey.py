@@ -26,7 +26,7 @@ from sosmith.model.traces.trace_file import TIME_TOLERANCE
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SignalSpectra:
-    """A signal with its name, file and spectra: measured and, if there is a truth, true and disturbance."""
+    """A signal with its name, file and spectra: "measured" and, if its truth is known, "true" and "disturbance"."""
 
     name: str
     file: SignalFile
@@ -43,15 +43,15 @@ class Survey:
     signals : list of SignalSpectra
         Every signal of every trace.
     proposal : Proposal or None
-        The filter; if None, `obstacle` or `shortfall` says why.
+        The proposed filter, None if `obstacle` or `shortfall` says why there is none.
     trials : list of Trial or None
-        Result of the proposal on each signal; None for a signal without truth or if there is no proposal.
+        The proposed filter applied to each signal, None if the signal has no truth or there is no proposal.
     obstacle : str or None
         What is missing for a proposal.
     shortfall : ShortfallError or None
-        Why no filter is needed, or why none is sufficient.
+        Why no filter is needed, or why none is good enough.
     table : str or None
-        ``[filter]`` of the proposal, TOML, or the whole specification with it.
+        The proposal as TOML: the table ``[filter]``, or a whole specification with it.
     """
 
     signals: list[SignalSpectra]
@@ -62,7 +62,7 @@ class Survey:
     table: str | None
 
     def plot(self, file_format: str) -> bytes:
-        """Draw the spectra, with the proposal's mask and response if there is one."""
+        """Plot the spectra, with the mask and the response of the proposal if there is one."""
         curves = [
             Curve(name=f"{one.name}, {key}" if len(one.spectra) > 1 else one.name, unit=one.signal.unit, spectrum=s)
             for one in self.signals
@@ -96,21 +96,21 @@ def survey(
     wish : Wish
         Requirements on the filter.
     columns, truth, channels
-        Columns of values to use from the traces that have them, the column with the true signal, and channels; all if
-        empty.
+        Columns of values to use where a trace has them, the column with the true signal, and the channels to use;
+        all of them if empty.
     calibration : Path or None
         Specification whose calibration computes the clearance; None for that of `into`, or else equation 5a.
     into, output : Path or None
-        Specification to insert the filter into, and file for the result, which is not written here.
+        Specification to put the filter into, and the file that the caller will write the result to.
     motion : bool
-        Whether traces without a truth are all disturbance.
+        Whether traces without a truth are disturbance only.
     progress : callable
         Called with the name of each step.
 
     Raises
     ------
     SpecificationError
-        If a file is unsuitable, or nothing can be proposed although `into` or `output` requires it.
+        If a file cannot be used, or `into` or `output` is given and no filter can be proposed.
     """
     progress("reading")
     polynomial, origin = _polynomial(calibration or into)
@@ -144,7 +144,7 @@ def survey(
 def _proposed(
     contents: Sequence[Content], wish: Wish, sample_rate: float
 ) -> tuple[Proposal | None, ShortfallError | None]:
-    """Propose a filter, or return the reason why there is none; the spectra are shown in either case."""
+    """Propose a filter, or return why there is none: the spectra are shown either way."""
     try:
         return propose(contents, wish, sample_rate), None
     except ShortfallError as shortfall:
@@ -152,7 +152,7 @@ def _proposed(
 
 
 def _polynomial(path: Path | None) -> tuple[Polynomial, str]:
-    """Calibration of a specification, or equation 5a without one, and its name."""
+    """Return the calibration of a specification, equation 5a without one, and its name."""
     if path is None:
         return EQUATION_5A, "equation 5a of the paper"
     spec = load(path)
@@ -168,7 +168,7 @@ def _read(
     truth: str | None,
     channels: Sequence[int],
 ) -> list[SignalFile]:
-    """Read from each file the requested columns that it has; each column must exist in at least one file."""
+    """Read each file with the requested columns that it has; each column must be in at least one file."""
     headers = [csv_header(path) for path in traces]
     for name in (*columns, *([truth] if truth else [])):
         if not any(name in header for header in headers):
@@ -182,7 +182,7 @@ def _read(
 
 
 def _sample_rate(files: Sequence[SignalFile], into: Path | None) -> float:
-    """Sample rate of the filter, Hz: that of the traces, which must agree with that of the specification `into`."""
+    """Return the sample rate of the filter, Hz: that of `into` if given, with which the traces must agree."""
     first = files[0]
     rate, owner = first.sample_rate, str(first.path)
     if into is not None:
@@ -197,7 +197,7 @@ def _sample_rate(files: Sequence[SignalFile], into: Path | None) -> float:
 
 
 def _check_data(into: Path | None, output: Path | None) -> None:
-    """Refuse to write a copy that would look for its measurement file in another folder."""
+    """Refuse a copy in another folder, where its path to the measurements would be wrong."""
     if into is None or output is None:
         return
     calibration = load(into).calibration
@@ -216,10 +216,10 @@ def _spectra_of(file: SignalFile, one: Signal, settings: SpectrumSettings) -> Si
 
 
 def _obstacle(signals: Sequence[SignalSpectra], edge: float | None, *, motion: bool) -> str | None:
-    """Return the reason why no filter can be proposed, if any."""
+    """Return why no filter can be proposed, or None."""
     units = list(dict.fromkeys(one.signal.unit or "no unit" for one in signals))
     if len(units) > 1:
-        return f"the signals must have one unit, not {' and '.join(units)}: choose some by --column"
+        return f"the signals must have one unit, not {' and '.join(units)}: choose among them with --column"
     unknown = [one.name for one in signals if one.signal.truth is None]
     if edge is None and unknown and (not motion or len(unknown) == len(signals)):
         return f"--passband or --time-constant must be given, as {unknown[0]} has no truth to tell what is wanted"
@@ -249,4 +249,4 @@ def _trial(one: SignalSpectra, proposal: Proposal) -> Trial | None:
 
 
 def _text_of(path: Path) -> str:
-    return path.read_bytes().decode("utf-8-sig")  # it has been read and checked before
+    return path.read_bytes().decode("utf-8-sig")  # already read and checked

@@ -201,7 +201,7 @@ class _Costs:
         gain, power = self._gain_to(after), 2 if self._noise == "l2" else 1
         total = float(sum((gain * error) ** power for error in self._gains_from(after)[last]))
         # Sections that mirror each other cost the same: their order must not be left to the rounding of spectra.
-        return float(f"{total:.9g}")
+        return float(f"{total:.12g}")
 
     def _product(self, placed: _Placed) -> Spectrum:
         spectrum = np.ones(self._length // 2 + 1, dtype=np.complex128)

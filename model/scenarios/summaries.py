@@ -1,4 +1,4 @@
-"""The built-in scenarios by name: what each one is, and which kinds of core it fits."""
+"""The built-in scenarios by name: their descriptions, and the kinds of core they are for."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from sosmith.model.suggestion import did_you_mean
 
 
 class Summary(NamedTuple):
-    """A scenario as it is listed to the user.
+    """A scenario as it is shown to the user.
 
     Attributes
     ----------
     description : str
-        One line.
+        One line of text.
     kinds : tuple of str
         Kinds of core it fits: "instrument", "filter".
     """
@@ -41,11 +41,11 @@ SUMMARIES = {
         ("instrument",),
     ),
     "worst_case": Summary(
-        "extreme codes in the sign pattern that drives the filter's output furthest",
+        "extreme codes in the sign pattern that maximizes the filter's output",
         ("instrument", "filter"),
     ),
     "worst_case_errors": Summary(
-        "the same for the way of every rounding error through the filter to the output, one after another",
+        "the same for the path of each rounding error through the filter, one after another",
         ("instrument", "filter"),
     ),
     "step": Summary(
@@ -61,21 +61,21 @@ SUMMARIES = {
         ("filter",),
     ),
 }
-"""Every scenario by name, in the order in which they are listed to the user."""
+"""All scenarios by name, in the order in which they are shown to the user."""
 
 
 def fitting(kind: str) -> list[str]:
-    """Return the names of the scenarios that fit a kind of core."""
+    """Return the names of the scenarios for a kind of core."""
     return [name for name, summary in SUMMARIES.items() if kind in summary.kinds]
 
 
 def check_scenario(name: str, kind: str) -> None:
-    """Refuse a scenario that does not exist for a kind of core.
+    """Check that a scenario exists for a kind of core.
 
     Raises
     ------
     SpecificationError
-        With the names of those that there are.
+        If it does not; the message lists those that exist.
     """
     known = fitting(kind)
     if name not in known:

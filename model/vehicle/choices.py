@@ -1,7 +1,7 @@
-"""The names that a run of the vehicle chooses from: tracks, and levels of irregularity."""
+"""Valid names for a vehicle run: tracks, and levels of track irregularity."""
 
 TRACK_NAMES = ("paper", "tangent")
 """The paper's track with its curve, and a straight one of the same length."""
 
 LEVELS = ("low", "high")
-"""Levels of disturbance of ERRI B176."""
+"""Disturbance levels of ERRI B176."""

@@ -1,7 +1,7 @@
 """From a filter specification and calibration data to fixed-point FPGA hardware.
 
-The public interface is what `__all__` names; docs/python.md shows all of it. Everything loads on first use, so that
-the import itself takes next to no time. The rooms behind it, each importing only from those to its right:
+The public interface is the names in `__all__`; docs/python.md documents them. Everything is imported on first use, so
+that importing the package itself is fast. The rooms behind it, each importing only from those to its right:
 ``cli -> interface -> sim -> gen -> hdl -> model``.
 """
 
@@ -53,7 +53,7 @@ _MODULES = {
     "interface.specification": ("Specification",),
     "model.errors": ("ShortfallError", "SosmithError", "SpecificationError", "ToolError"),
 }
-"""The module that holds each public name; the imports above say the same to type checkers."""
+"""The module of each public name; the imports above tell type checkers the same."""
 
 
 def __getattr__(name: str) -> Any:
@@ -72,7 +72,7 @@ def __dir__() -> list[str]:
 
 
 def main() -> None:
-    """Run the `sosmith` command; an interruption ends it in good order even while its modules load."""
+    """Run the `sosmith` command; an interrupt during the import of its modules also ends it cleanly."""
     try:
         import_module("sosmith.cli").main()
     except KeyboardInterrupt:

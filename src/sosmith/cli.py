@@ -21,7 +21,7 @@ from sosmith.terminal import note, reader_may_leave, silence_stdout
 
 
 class _Command(NamedTuple):
-    """Where a command is, and its line in the list of commands."""
+    """Where a command is defined, and its line in the list of commands."""
 
     module: str
     attribute: str
@@ -29,67 +29,67 @@ class _Command(NamedTuple):
 
 
 _COMMANDS = {
-    "init": _Command(
-        "design", "init", "Write a commented example specification to FILE (flange_wear.toml if none is given)."
-    ),
+    "init": _Command("design", "init", "Write a commented example specification to FILE (default: flange_wear.toml)."),
     "design": _Command(
         "design",
         "design_command",
-        "Show the design of SPEC: order, sections, realization, formats, error budget, cost.",
+        "Show the design of SPEC: order, sections, realization, formats, error budget and cost.",
     ),
     "generate": _Command(
         "design",
         "generate_command",
-        "Write SystemVerilog, RTLIL, manifest, certificate and a bit-true C model of SPEC.",
+        "Write SystemVerilog, RTLIL, a manifest, a certificate and a bit-true C model for SPEC.",
     ),
     "verify": _Command(
-        "verify", "verify", "Prove CERTIFICATE again: the error bound, and that nothing inside can overflow."
+        "verify", "verify", "Prove CERTIFICATE by an independent method: the error bound, and no internal overflow."
     ),
     "reload": _Command(
-        "reload", "reload_command", "Prove a set of constants for a core that runs, and write what loads it."
+        "reload",
+        "reload_command",
+        "Prove that a running core can load new coefficients, and save the register writes.",
     ),
     "simulate": _Command(
-        "simulate", "simulate_command", "Run the generated hardware of SPEC in a simulator and report its accuracy."
+        "simulate", "simulate_command", "Simulate the generated hardware of SPEC and report its accuracy."
     ),
     "emulate": _Command(
         "simulate",
         "emulate_command",
-        "Write an emulated sensor trace for SPEC as CSV; without SCENARIO, list the scenarios that fit.",
+        "Write an emulated sensor trace for SPEC as CSV; without SCENARIO, list the scenarios for SPEC.",
     ),
-    "compare": _Command("compare", "compare_command", "Set accuracy reports side by side."),
+    "compare": _Command("compare", "compare_command", "Compare accuracy reports side by side."),
     "calibrate": _Command(
         "calibrate",
         "calibrate",
-        "Keep measurements of sensors, and a calibration that is fitted anew with every addition.",
+        "Store sensor measurements, and refit the calibration with every addition.",
     ),
     "spectrum": _Command(
         "spectrum",
         "spectrum_command",
-        "Show the spectra of each TRACE.csv, and propose the low-pass filter that follows from them.",
+        "Show the spectra of traces, and propose a low-pass filter based on them.",
     ),
-    "vehicle": _Command("vehicle", "vehicle", "Run a six-axle locomotive over a track."),
+    "vehicle": _Command("vehicle", "vehicle", "Simulate the motion of a six-axle locomotive on a track."),
     "wear": _Command(
         "wear",
         "wear_command",
-        "Tell from TRACE.csv how far a wheel flange is worn, how fast it wears, and how long it will last.",
+        "Estimate the wear, wear rate and remaining life of a wheel flange from TRACE.csv.",
     ),
     "paper": _Command(
-        "paper", "paper", "Compute the paper's equations and tables again, and set ours beside the printed figures."
+        "paper", "paper", "Recompute the paper's equations and tables, and compare them with the printed figures."
     ),
     "demo": _Command(
-        "simulate", "demo", "Walk the whole road on the built-in example: a locomotive's flange wear at 100 Hz."
+        "simulate", "demo", "Run the complete flow on the built-in example: a locomotive's flange wear at 100 Hz."
     ),
 }
-"""The commands in the order of work; the module of each one loads when the command is called."""
+"""The commands in the order they are used; the module of each one is imported when the command is called."""
 
 _LATER = ("build", "explore", "monitor", "board")
-"""Commands that this version does not have yet."""
+"""Commands that are planned but not available yet."""
 
 _INTERRUPTED = 130
 
 
 class _Commands(click.Group):
-    """Lists commands without loading them, and names those that are still to come."""
+    """Lists commands without importing them, and recognizes those that are planned."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(_COMMANDS)
@@ -99,7 +99,7 @@ class _Commands(click.Group):
             place = _COMMANDS[cmd_name]
             command: click.Command = getattr(import_module(f"sosmith.commands.{place.module}"), place.attribute)
             return command
-        if ctx.resilient_parsing:  # while a word is completed
+        if ctx.resilient_parsing:  # during shell completion
             return None
         if cmd_name in _LATER:
             raise click.UsageError(f"{cmd_name} is not yet available: the commands so far are {', '.join(_COMMANDS)}")
@@ -114,18 +114,22 @@ class _Commands(click.Group):
             return super().invoke(ctx)
 
 
-_HELP = """From a filter specification and calibration data to FPGA hardware that is checked bit for bit.
+_HELP = """Turn a filter specification and calibration data into FPGA hardware that is checked bit for bit.
 
-A specification is a TOML file in physical units: sensor inputs, a calibration polynomial, a filter, the output's
-format and the error allowed. Begin with
+A specification is a TOML file in physical units: sensor inputs, a calibration polynomial, a filter, the output
+format and the allowed error. To get started:
 
 \b
     sosmith init my.toml        write a commented example
-    sosmith design my.toml      see filter, formats, error budget and cost
-    sosmith simulate my.toml    run the generated hardware and read the report
+    sosmith design my.toml      show the filter, formats, error budget and cost
+    sosmith simulate my.toml    simulate the generated hardware and write the report
 
-The same from Python: import sosmith. Completion in bash: eval "$(_SOSMITH_COMPLETE=bash_source sosmith)"; zsh_source
-and fish_source do it for these shells.
+In Python, all of this is available through import sosmith. To turn on shell completion:
+
+\b
+    eval "$(_SOSMITH_COMPLETE=bash_source sosmith)"    bash
+    eval "$(_SOSMITH_COMPLETE=zsh_source sosmith)"     zsh
+    _SOSMITH_COMPLETE=fish_source sosmith | source     fish
 """
 
 
@@ -134,14 +138,14 @@ and fish_source do it for these shells.
 )
 @click.version_option(sosmith.__version__, prog_name="sosmith")
 def cli() -> None:
-    """Hold the commands."""
+    """Group all commands."""
 
 
 def main() -> None:
     """Run the command line and end the process with its exit status."""
     try:
         for number in (signal.SIGTERM, signal.SIGHUP):
-            if signal.getsignal(number) is signal.SIG_DFL:  # nohup has hang-ups ignored, and that stays
+            if signal.getsignal(number) is signal.SIG_DFL:  # nohup ignores hang-ups: leave it so
                 signal.signal(number, _stop)
         status = cli.main(prog_name="sosmith", standalone_mode=False)
     except SosmithError as error:
@@ -161,7 +165,7 @@ def main() -> None:
 
 
 def _stop(number: int, frame: FrameType | None) -> None:
-    """End in good order, so that no simulator stays behind."""
+    """Exit in an orderly way, so that no simulator is left running."""
     sys.exit(128 + number)
 
 

@@ -19,13 +19,13 @@ JSON_OPTION = click.option("--json", "as_json", is_flag=True, help="Print JSON i
 
 
 def output_option(text: str) -> Callable[[Any], Any]:
-    """Make the option ``-o`` with this help."""
+    """Return the option ``-o`` with the help `text`."""
     return click.option("-o", "--output", type=click.Path(path_type=Path), help=text)
 
 
 @contextmanager
 def reader_may_leave() -> Iterator[None]:
-    """Take it for no error if the reader of our output, such as ``head``, leaves before its end."""
+    """Do not count it as an error when the reader of our output, such as ``head``, exits early."""
     try:
         yield
         sys.stdout.flush()
@@ -34,12 +34,12 @@ def reader_may_leave() -> Iterator[None]:
 
 
 def silence_stdout() -> None:
-    """Let what is still in the buffer go nowhere: flushing it at exit would fail again."""
+    """Discard the output that is still buffered: flushing it at exit would fail again."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 class Step:
-    """Shows one step after another on stderr; called with a name, and with what is done of how much."""
+    """Progress display on stderr; each call names the current step and can say how much of it is done."""
 
     def __init__(self, progress: Progress) -> None:
         self._progress = progress
@@ -67,8 +67,8 @@ class Step:
 
 @contextmanager
 def show_progress() -> Iterator[Step]:
-    """Show steps on stderr while they are carried out."""
-    # rich loads when something is shown: help and refusals do without it.
+    """Show on stderr the progress of the steps inside the context."""
+    # Imported only when something is shown: help and refusals start faster without rich.
     from rich.console import Console
     from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 

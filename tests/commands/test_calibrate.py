@@ -37,7 +37,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_add_reports_the_fit() -> None:
     printed = good("add", "a.csv", *DAY, "--required-r", "0.999")
-    assert "sosmith: kept 60 measurements of a.csv in calibration.db\n" in printed.stderr
+    assert "sosmith: stored 60 measurements from a.csv in calibration.db\n" in printed.stderr
     shown = re.sub(r" {2,}", "  ", printed.stdout)
     for row in (
         "Sensor sensor, version 1 of 2024-03-01: new",
@@ -68,7 +68,7 @@ def test_add_as_json() -> None:
 def test_bad_rows_are_listed_and_only_kept_out_on_request() -> None:
     with Path("a.csv").open("a") as file:
         file.write("1,2 V,20\n" + "1,2,300\n" * 25)
-    message = "a.csv: every row must be right, or left out with --keep-good, not 26 of 86 refused"
+    message = "a.csv: every row must be valid, or skipped with --keep-good, not 26 of 86 refused"
     lines = [line for line in refused(message, "add", "a.csv", *DAY).stderr.splitlines() if line.startswith("sosmith:")]
     assert lines[:2] == [
         "sosmith: a.csv, line 62: voltage_V must be a finite number, not the text '2 V'",
@@ -78,13 +78,13 @@ def test_bad_rows_are_listed_and_only_kept_out_on_request() -> None:
     listed = json.loads(run("add", "a.csv", *DAY, "--json").stdout)
     assert (listed["kept"], len(listed["refused"]), listed["calibration"]) == (0, 26, None)
     note = good("add", "a.csv", "--keep-good", *DAY).stderr
-    assert "sosmith: kept 60 measurements of a.csv in calibration.db, 26 rows left out\n" in note
+    assert "sosmith: stored 60 measurements from a.csv in calibration.db, 26 rows skipped\n" in note
 
 
 def test_a_refused_first_file_leaves_no_store() -> None:
     Path("bad.csv").write_text(Path("a.csv").read_text() + "1,2 V,20\n")
     Path("header.csv").write_text("mm,voltage_V,temperature_C\n1,2,20\n")
-    refused("bad.csv: every row must be right, or left out with --keep-good, not 1 of 61 refused", "add", "bad.csv")
+    refused("bad.csv: every row must be valid, or skipped with --keep-good, not 1 of 61 refused", "add", "bad.csv")
     for arguments in (("header.csv",), ("none.csv",), ("a.csv", "--sensor", ""), ("a.csv", "--date", "today")):
         assert isinstance(run("add", *arguments).exception, SpecificationError)
     assert not Path("calibration.db").exists()
@@ -101,7 +101,7 @@ def test_a_store_that_another_process_makes_meanwhile_is_kept(monkeypatch: pytes
             add(opened, "sensor", Path("a.csv"), "2024-03-01")
         return refused_first_file(*arguments, **options)
 
-    monkeypatch.setattr("sosmith.commands.calibrate.refused_first_file", meanwhile)
+    monkeypatch.setattr("sosmith.model.calibration.self_updating.refused_first_file", meanwhile)
     refused("a.csv must hold new measurements, not those already added as a.csv", "add", "a.csv")
     Path("calibration.db").unlink()
     good("add", "b.csv")
@@ -117,7 +117,7 @@ def test_a_store_that_another_process_makes_meanwhile_is_kept(monkeypatch: pytes
 def test_one_of_them_is_no_plural() -> None:
     Path("one.csv").write_text("clearance_mm,voltage_V,temperature_C\n1,2,30\n1,x,30\n")
     result = run("add", "one.csv", "--keep-good", *DAY)
-    assert "sosmith: kept 1 measurement of one.csv in calibration.db, 1 row left out\n" in result.stderr
+    assert "sosmith: stored 1 measurement from one.csv in calibration.db, 1 row skipped\n" in result.stderr
 
 
 def test_a_shortfall_keeps_the_measurements_and_says_so() -> None:
@@ -127,7 +127,7 @@ def test_a_shortfall_keeps_the_measurements_and_says_so() -> None:
     result = run("add", "a.csv", *DAY, "--required-r", "0.99999")
     assert isinstance(result.exception, ShortfallError)
     assert str(result.exception).startswith(message)
-    assert "sosmith: kept 60 measurements" in result.stderr
+    assert "sosmith: stored 60 measurements" in result.stderr
     assert json.loads(good("fit", *DAY, "--json").stdout)["measurements"] == 60
 
 
@@ -135,7 +135,7 @@ def test_history_lists_and_verifies() -> None:
     good("add", "a.csv", *DAY)
     good("add", "b.csv", "--date", "2024-03-08", "--robust", "--required-r", "0.999")
     result = good("history", "--verify")
-    assert "sosmith: every version comes out the same, bit for bit: 2 of 2\n" in result.stderr
+    assert "sosmith: every version is reproduced bit for bit: 2 of 2\n" in result.stderr
     assert re.search(r"1 +2024-03-01 +60 +1, 1 +0\.\d{5} ", result.stdout)
     assert re.search(r"2 +2024-03-08 +120 +2, 1 robust +0\.999\d\d ", result.stdout)
     listed = json.loads(good("history", "--json").stdout)

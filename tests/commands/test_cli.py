@@ -174,9 +174,9 @@ NEEDED = {
     "compare": ("REPORT REPORT...", "--json", "HTML"),
     "calibrate": ("clearance_mm", "sosmith calibrate add", "export"),
     "spectrum": ("TRACE", "--tolerance", "--passband", "--motion", "--into SPEC", "--json"),
-    "vehicle": ("PARAMETERS.toml", "--speed", "tables 5 to 8", "--json"),
+    "vehicle": ("PARAMETERS is a TOML file", "--speed", "tables 5 to 8", "--json"),
     "wear": ("TRACE.csv", "--initial", "--limit", "--warning", "--spec"),
-    "paper": ("docs/paper.md", "-o, --output", "--json"),
+    "paper": ("paper/paper.md", "-o, --output", "--json"),
     "demo": ("build/demo", "--seed"),
 }
 
@@ -194,7 +194,7 @@ def test_help_of_all_lists_the_commands_in_the_order_of_work(sosmith: Command) -
     outcome = sosmith("--help")
     assert outcome.status == 0
     assert re.findall(r"^  ([a-z]+)  ", outcome.stdout, flags=re.MULTILINE) == list(NEEDED)
-    assert "\n      sosmith design my.toml      see filter" in outcome.stdout
+    assert "\n      sosmith design my.toml      show the filter" in outcome.stdout
 
 
 def test_version(sosmith: Command) -> None:
@@ -766,7 +766,7 @@ def test_demo_walks_the_whole_road(process: Start, tmp_path: Path) -> None:
     output, errors = running.communicate(timeout=200)
     assert running.returncode == 0
     words = " ".join(output.split())
-    assert "yes, every one of 60000 samples" in words
+    assert "yes, all of 60000 samples" in words
     assert "flange_wear: passed" in words
     assert errors.splitlines()[-1] == f"sosmith: report: {(tmp_path / 'out' / 'report.html').as_uri()}"
     report = json.loads((tmp_path / "out" / "report.json").read_text(encoding="utf-8"))

@@ -71,13 +71,13 @@ def test_measurements_that_the_store_takes(folder: Path) -> None:
     assert "wrote m.csv: 72 measurements" in written.stderr
     added = run("calibrate", "add", "m.csv", "--required-r", "0.9")
     assert added.exit_code == 0, added.output
-    assert "kept 72 measurements" in added.stderr
+    assert "stored 72 measurements" in added.stderr
 
 
 def test_the_list_tells_about_files(folder: Path) -> None:
     listed = run("emulate", "spec.toml")
     assert "bench_43_50" in listed.stdout
-    assert "a file can take a name's place: examples/scenarios/ holds some" in listed.stderr
+    assert "a scenario file can be given instead of a name: see examples/scenarios/" in listed.stderr
 
 
 @pytest.mark.parametrize(

@@ -136,7 +136,7 @@ def test_refusals() -> None:
     unknown = "as motion.csv: lateral_mm has no truth to tell what is wanted"
     given = ("motion.csv", "--column", "lateral_mm", "-o", "f.toml")
     refused(f"--passband or --time-constant must be given, {unknown}", *given)
-    refused("the pass edge must be given by one of --passband and --time-constant, not both", "ramp.csv",
+    refused("the passband edge must be given by one of --passband and --time-constant, not both", "ramp.csv",
             "--passband", "1", "--time-constant", "1")  # fmt: skip
     refused("time-constant must be a positive number of seconds, not 0", "ramp.csv", "--time-constant", "0")
     refused("f.pdf: the plot's name must end in .svg or .png, not .pdf", "ramp.csv", "--plot", "f.pdf")

@@ -35,14 +35,14 @@ def test_it_prints_modes_motions_and_the_paper() -> None:
         "Vertical modes at 20 m/s",
         "Largest motion of the wheelsets",
         "Largest motion of frames and body",
-        "Beside the paper's tables 5 to 8",
+        "Comparison with the paper's tables 5 to 8",
         "5: the scale of the paper's transform is not told",
     ):
         assert row in shown
     assert re.search(r"7  yaw, wheelset 1 to bogie 1  rad  0.012578  0.0\d+  differs  4", shown)
     assert re.search(
-        r"^sosmith: this run leaves what a linear model can tell: wheelset 1 goes [\d.]+ mm beyond its flange and "
-        r"creep of wheelset 1 takes [\d.]+ times the friction there is$",
+        r"^sosmith: this run exceeds the limits of the linear model: wheelset 1 moves [\d.]+ mm past the flange and "
+        r"the creep force of wheelset 1 is [\d.]+ times the available friction$",
         result.stderr,
         flags=re.MULTILINE,
     )
@@ -97,7 +97,7 @@ def test_a_tangent_track_can_be_within_the_limits() -> None:
     Path("calm.toml").write_text(text)
     result = good("calm.toml", "--track", "tangent")
     assert "this run leaves" not in result.stderr
-    assert "Beside the paper" not in result.stdout
+    assert "Comparison with the paper" not in result.stdout
 
 
 def test_the_built_in_parameters_can_be_written_and_changed() -> None:

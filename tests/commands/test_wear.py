@@ -93,8 +93,8 @@ def test_a_turned_wheel_is_told() -> None:
     rows = [f"{day},{5 + 0.1 * day - 3 * (day >= 25):.6g}" for day in range(40)]
     Path("turned.csv").write_text("\n".join(["days,clearance_mm", *rows]) + "\n")
     shown = re.sub(r"\s+", " ", good("turned.csv", *LIMITS).stdout)
-    assert "fall 3 mm, 14.5 days ago, as when a wheel is turned or a sensor mounted anew" in shown
-    assert "take the rate from there on by --window 14.5" in shown
+    assert "fall 3 mm, 14.5 days ago, as after turning a wheel or remounting a sensor" in shown
+    assert "use --window 14.5 to take the rate from there on" in shown
     assert json.loads(good("turned.csv", *LIMITS, "--json").stdout)["fall"]["window_days"] == 14.5
     after = json.loads(good("turned.csv", *LIMITS, "--window", "14.5", "--json").stdout)
     assert after["fall"] is None

@@ -1,1 +1,1 @@
-"""The commands of `sosmith`, one file for what belongs together; `sosmith.cli` gathers them."""
+"""The commands of `sosmith`, one file for each group of related commands; `sosmith.cli` lists them."""

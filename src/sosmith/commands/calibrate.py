@@ -1,4 +1,4 @@
-"""The commands under `sosmith calibrate`: take measurements in, refit, look back, export."""
+"""The commands under `sosmith calibrate`: add measurements, refit, show the history, export."""
 
 from __future__ import annotations
 
@@ -19,24 +19,24 @@ if TYPE_CHECKING:
     from sosmith.model.calibration.measurement_files import Refusal
 
 _SHOWN = 20
-"""Count of refused lines that are printed; JSON has all."""
+"""Number of refused lines that are printed; JSON has all of them."""
 
-_HELP = """Keep measurements of sensors, and a calibration that is fitted anew with every addition.
+_HELP = """Store sensor measurements, and refit the calibration with every addition.
 
-Measurements are rows of a CSV or XLSX file with the columns clearance_mm, voltage_V, temperature_C and, if wanted,
-date. They go into a store, a single SQLite file, and stay there. Each addition fits the smallest polynomial of
-voltage and temperature whose adjusted r reaches the value required, and keeps it as a new version. Begin with
+Measurements are rows of a CSV or XLSX file with the columns clearance_mm, voltage_V, temperature_C and, optionally,
+date. They are kept in a store, a single SQLite file. Each addition fits the smallest polynomial of voltage and
+temperature whose adjusted r reaches the required value, and stores it as a new version. To get started:
 
 \b
-    sosmith calibrate add bench.csv --sensor left      take measurements in, see the fit
-    sosmith calibrate history --sensor left            all versions and how far they drifted
-    sosmith calibrate export --sensor left             [calibration] for a specification
+    sosmith calibrate add bench.csv --sensor left      add measurements, show the fit
+    sosmith calibrate history --sensor left            list all versions and their drift
+    sosmith calibrate export --sensor left             print [calibration] for a specification
 """
 
 
 @click.group("calibrate", help=_HELP)
 def calibrate() -> None:
-    """Hold the commands."""
+    """Group the calibration commands."""
 
 
 def _day(ctx: click.Context, parameter: click.Parameter, text: str | None) -> str:
@@ -54,8 +54,8 @@ def _range(quantity: str, unit: str, usual: Range) -> Callable[[Any], Any]:
         type=float,
         metavar="LOW HIGH",
         callback=_check_range,
-        help=f"{quantity.capitalize()} in {unit} that can be right, from now on.  "
-        f"[default: as before; {usual[0]:g} {usual[1]:g} for a new sensor]",
+        help=f"Valid range of the {quantity} in {unit}, kept for later additions.  "
+        f"[default: unchanged; {usual[0]:g} {usual[1]:g} for a new sensor]",
     )
 
 
@@ -78,11 +78,11 @@ _STORE = click.option(
     type=click.Path(path_type=Path),
     default=Path("calibration.db"),
     show_default=True,
-    help="The file with the measurements.",
+    help="SQLite file that holds the measurements.",
 )
 _SENSOR = click.option("--sensor", default="sensor", show_default=True, help="Name of the sensor.")
 _DATE = click.option(
-    "--date", callback=_day, metavar="YYYY-MM-DD", help="Day of the measurements or fit.  [default: today]"
+    "--date", callback=_day, metavar="YYYY-MM-DD", help="Date of the measurements or of the fit.  [default: today]"
 )
 _REQUIRED_R = click.option(
     "--required-r",
@@ -90,10 +90,10 @@ _REQUIRED_R = click.option(
     callback=_check_required_r,
     default=REQUIRED_R,
     show_default=True,
-    help="Adjusted r to reach; orders rise until it is.",
+    help="Required adjusted r; orders are raised until it is reached.",
 )
-_ROBUST = click.option("--robust", is_flag=True, help="Weight outliers down (Huber).")
-_VERSION = click.option("--version", "number", type=int, help="Number of the version.  [default: the newest]")
+_ROBUST = click.option("--robust", is_flag=True, help="Give outliers less weight (Huber).")
+_VERSION = click.option("--version", "number", type=int, help="Version number.  [default: the newest]")
 
 
 @calibrate.command("add")
@@ -101,7 +101,7 @@ _VERSION = click.option("--version", "number", type=int, help="Number of the ver
 @_STORE
 @_SENSOR
 @_DATE
-@click.option("--keep-good", is_flag=True, help="Keep the good rows of a file that has bad ones.")
+@click.option("--keep-good", is_flag=True, help="Keep the valid rows of a file that also has invalid ones.")
 @_range("clearance", "mm", DEFAULT_RANGES[0])
 @_range("voltage", "V", DEFAULT_RANGES[1])
 @_range("temperature", "degC", DEFAULT_RANGES[2])
@@ -121,12 +121,16 @@ def add_command(
     robust: bool,
     as_json: bool,
 ) -> None:
-    """Take the measurements of FILE.csv or FILE.xlsx in, and fit anew.
+    """Add the measurements in FILE (CSV or XLSX), and refit.
 
-    A row that cannot be right is refused with its line and the reason: text in place of a number, a value out of range,
-    a measurement that is there already. Then nothing of the file is kept, and the exit status is 2, unless
-    --keep-good is given. What is kept is on disk before this command ends, together with the version fitted to it.
-    Exits with 1 if the measurements are kept but no polynomial reaches the required r.
+    An invalid row is refused with its line number and the reason: text in place of a number, a value out of range, or a
+    measurement that is already in the store. Unless --keep-good is given, one invalid row refuses the whole file, and
+    the exit status is 2. The measurements and the version fitted to them are on disk when this command ends. Exits
+    with 1 if the measurements are stored but no polynomial reaches the required r.
+
+    \b
+        sosmith calibrate add bench.csv --sensor left
+        sosmith calibrate add april.xlsx --sensor left --date 2026-04-20 --keep-good
     """
     from sosmith.gen.instrument.calibration_report import addition_json
     from sosmith.model.calibration.measurement_store import open_store
@@ -157,10 +161,10 @@ def add_command(
     _note_refusals(file, refusals)
     if not addition.kept:
         rows = len(refusals) + good
-        way = ", or left out with --keep-good" if good else ""
-        raise SpecificationError(f"{file}: every row must be right{way}, not {len(refusals):,} of {rows:,} refused")
-    left_out = f", {_counted(len(refusals), 'row')} left out" if refusals else ""
-    note(f"kept {_counted(good, 'measurement')} of {file} in {store}{left_out}")
+        way = ", or skipped with --keep-good" if good else ""
+        raise SpecificationError(f"{file}: every row must be valid{way}, not {len(refusals):,} of {rows:,} refused")
+    left_out = f", {_counted(len(refusals), 'row')} skipped" if refusals else ""
+    note(f"stored {_counted(good, 'measurement')} from {file} in {store}{left_out}")
     if addition.calibration is None:
         raise ShortfallError(addition.shortfall)
     if not as_json:
@@ -177,10 +181,13 @@ def add_command(
 @_ROBUST
 @JSON_OPTION
 def fit_command(store: Path, sensor: str, date: str, required_r: float, robust: bool, as_json: bool) -> None:
-    """Fit to all measurements of a sensor again, such as with --robust or another --required-r.
+    """Refit to all measurements of a sensor.
 
-    Makes a new version if the polynomial or what was asked for has changed. Exits with 1 if no polynomial reaches the
-    required r.
+    Use it to change --robust or --required-r without new measurements. Creates a new version if the polynomial or the
+    options have changed. Exits with 1 if no polynomial reaches the required r.
+
+    \b
+        sosmith calibrate fit --sensor left --robust --required-r 0.99
     """
     from sosmith.commands.tables.calibration import print_calibration
     from sosmith.gen.instrument.calibration_report import calibration_json
@@ -206,14 +213,17 @@ def fit_command(store: Path, sensor: str, date: str, required_r: float, robust: 
 @calibrate.command("history")
 @_STORE
 @_SENSOR
-@click.option("--verify", is_flag=True, help="Fit every version again from its measurements, and compare bit by bit.")
+@click.option("--verify", is_flag=True, help="Refit every version from its measurements, and compare bit by bit.")
 @JSON_OPTION
 def history_command(store: Path, sensor: str, verify: bool, as_json: bool) -> None:
     """List the versions of a sensor's calibration.
 
-    Shown are orders, adjusted r, rms residual, cross-validated (CV) error and drift: the largest difference to the
-    version before, over the voltages and temperatures that measurements cover.
-    With --verify, exits with 1 if a version does not come out the same.
+    Shows the orders, adjusted r, rms residual, cross-validated (CV) error and drift. The drift is the largest
+    difference from the previous version, over the measured voltages and temperatures.
+    With --verify, exits with 1 if a version cannot be reproduced.
+
+    \b
+        sosmith calibrate history --sensor left --verify
     """
     from sosmith.commands.tables.calibration import print_history
     from sosmith.gen.instrument.calibration_report import version_json
@@ -234,7 +244,7 @@ def history_command(store: Path, sensor: str, verify: bool, as_json: bool) -> No
     else:
         print_history(sensor, versions)
     if verify:
-        note(f"every version comes out the same, bit for bit: {len(versions)} of {len(versions)}")
+        note(f"every version is reproduced bit for bit: {len(versions)} of {len(versions)}")
 
 
 @calibrate.command("export")
@@ -247,14 +257,19 @@ def history_command(store: Path, sensor: str, verify: bool, as_json: bool) -> No
     type=click.Choice(["toml", "csv"]),
     default="toml",
     show_default=True,
-    help="The table [calibration] of a specification, or the measurements for its key calibration.data.",
+    help="toml: the table [calibration] of a specification; csv: the measurements, for its key calibration.data.",
 )
 @output_option("File to write.  [default: stdout]")
 def export_command(store: Path, sensor: str, number: int | None, file_format: str, output: Path | None) -> None:
-    """Write a version's coefficients as the table [calibration] of a specification, or its measurements as CSV.
+    """Write the coefficients or the measurements of a version.
 
-    Either way the doubles read back are those of the version. A core with reload = true takes the specification with
-    new coefficients at run time.
+    The format toml is the table [calibration] of a specification, csv the measurements that it was fitted to. Either
+    file reads back to exactly the same doubles. A core with reload = true can load the new coefficients at run
+    time; see `sosmith reload`.
+
+    \b
+        sosmith calibrate export --sensor left -o left.toml
+        sosmith calibrate export --sensor left --version 1 --format csv -o left.csv
     """
     from sosmith.gen.instrument.calibration_report import measurements_csv, specification_table
     from sosmith.model.calibration.measurement_store import open_store
@@ -280,7 +295,11 @@ def export_command(store: Path, sensor: str, number: int | None, file_format: st
 @_VERSION
 @output_option("SVG or PNG file to write.  [default: calibration.svg]")
 def plot_command(store: Path, sensor: str, number: int | None, output: Path | None) -> None:
-    """Draw coverage, residuals, leverage and history of a sensor's calibration."""
+    """Plot coverage, residuals, leverage and history.
+
+    \b
+        sosmith calibrate plot --sensor left -o left.svg
+    """
     path = output or Path("calibration.svg")
     file_format = format_of(path)
     from sosmith.gen.instrument.calibration_plot import calibration_plot

@@ -13,11 +13,11 @@ from sosmith.terminal import JSON_OPTION, note, output_option, print_json
 @click.command("compare")
 @click.argument("reports", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="REPORT REPORT...")
 @JSON_OPTION
-@output_option("Write a page with the comparison to this HTML file too.")
+@output_option("HTML file to write the comparison to as well.")
 def compare_command(reports: tuple[Path, ...], as_json: bool, output: Path | None) -> None:
-    """Set accuracy reports side by side.
+    """Compare accuracy reports side by side.
 
-    Each REPORT is a report.json or the folder that holds it.
+    Each REPORT is a report.json file or the folder that contains it.
 
     \b
         sosmith compare build/clearance build/ramp -o comparison.html

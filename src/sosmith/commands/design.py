@@ -16,7 +16,7 @@ from sosmith.terminal import JSON_OPTION, note, output_option, print_json, show_
 @click.argument("file", type=click.Path(path_type=Path), default=Path("flange_wear.toml"))
 @click.option("--force", is_flag=True, help="Overwrite an existing file.")
 def init(file: Path, force: bool) -> None:
-    """Write a commented example specification to FILE (flange_wear.toml if none is given).
+    """Write a commented example specification to FILE (default: flange_wear.toml).
 
     \b
         sosmith init my.toml
@@ -39,7 +39,7 @@ def init(file: Path, force: bool) -> None:
 def design_command(
     spec: Path, core: str | None, realization: str | None, widths_of: str | None, board: str | None, as_json: bool
 ) -> None:
-    """Show the design of SPEC: order, sections, realization, formats, error budget, cost.
+    """Show the design of SPEC: order, sections, realization, formats, error budget and cost.
 
     \b
         sosmith design my.toml
@@ -75,9 +75,9 @@ def generate_command(
     board: str | None,
     output: Path | None,
 ) -> None:
-    """Write SystemVerilog, RTLIL, manifest, certificate and a bit-true C model of SPEC.
+    """Write SystemVerilog, RTLIL, a manifest, a certificate and a bit-true C model for SPEC.
 
-    The paths of the files go to stdout, one a line. Two runs write the same bytes.
+    Prints the paths of the files to stdout, one per line. Two runs write identical files.
 
     \b
         sosmith generate my.toml -o my_core

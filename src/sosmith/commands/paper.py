@@ -1,4 +1,4 @@
-"""The command `sosmith paper`: the paper's equations and tables computed again, beside the printed figures."""
+"""The command `sosmith paper`: the paper's equations and tables recomputed and compared with the printed figures."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from sosmith.terminal import JSON_OPTION, note, output_option, print_json, show_
 
 
 @click.command("paper")
-@output_option("Markdown file to write, with its pictures in images/ beside it.")
+@output_option("Markdown file to write; its pictures go into images/ next to it.")
 @JSON_OPTION
 def paper(output: Path | None, as_json: bool) -> None:
-    """Compute the paper's equations and tables again, and set ours beside the printed figures.
+    """Recompute the paper's equations and tables, and compare them with the printed figures.
 
-    Prints how many figures of each are reproduced, near, different or not comparable. With -o docs/paper.md it writes
-    the whole comparison with its explanations and pictures; --json prints all its figures.
+    Prints how many figures of each are reproduced, near, different or not comparable. With -o, writes the complete
+    comparison with explanations and pictures; --json prints all figures.
 
     \b
         sosmith paper -o paper/paper.md
@@ -40,7 +40,7 @@ def paper(output: Path | None, as_json: bool) -> None:
     elif output is None:
         from sosmith.commands.tables.console import TableConsole, new_table
 
-        listing = new_table("The paper's figures, ours beside them", ["", *LABELS])
+        listing = new_table("The paper's figures compared with ours", ["", *LABELS])
         for row in rows:
             listing.add_row(*row[:-1])
         TableConsole().print(listing)

@@ -1,4 +1,4 @@
-"""The command `reload`: prove a set of constants for a core that runs."""
+"""The command `reload`: prove new coefficients for a running core."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ from sosmith.terminal import JSON_OPTION, note, output_option, print_json, show_
 @click.option(
     "--active",
     type=click.Path(path_type=Path),
-    help="Specification of the set that the core runs when it is loaded.  [default: SPEC]",
+    help="Specification of the coefficients that are active before the swap.  [default: SPEC]",
 )
 @click.option(
     "--reset",
     is_flag=True,
-    help="The core will be reset between the swap and its next sample: no transient then, and more sets fit.",
+    help="Assume a reset between the swap and the next sample: there is no transient, and more sets fit.",
 )
 @click.option(
     "--version",
     type=click.IntRange(0, (1 << 32) - 1),
     default=1,
     show_default=True,
-    help="What the register VERSION is to read once the set is active.",
+    help="Value of the register VERSION once the new set is active.",
 )
 @JSON_OPTION
 @output_option("JSON file for the register writes.  [default: build/<name>/<stem of OTHER>.reload.json]")
@@ -50,19 +50,19 @@ def reload_command(
     as_json: bool,
     output: Path | None,
 ) -> None:
-    """Prove a set of constants for a core that runs, and write what loads it.
+    """Prove that a running core can load new coefficients, and save the register writes.
 
-    SPEC is what the core was generated from, with `reload = true` under [hardware], and with the same options. OTHER is
-    a specification with another [calibration], [filter] or max_error, all else as in SPEC; its [hardware] does not
-    count.
+    SPEC is the specification that the core was generated from, with `reload = true` under [hardware]; give the same
+    options as then. OTHER is a specification with another [calibration], [filter] or max_error and otherwise as SPEC;
+    its [hardware] is ignored.
 
-    The hardware keeps its word lengths, so not every set fits. This proves that the new set keeps its error within
-    OTHER's max_error, and that nothing inside can wrap while the filter still remembers the set before. The table says
-    after how many samples the bound holds again; no other swap may follow before. Exits with 1 and the reason if the
-    set is refused: then do not load it.
+    The word lengths of the hardware are fixed, so not every set of coefficients fits. The proof shows that with the new
+    set the error stays within OTHER's max_error, and that nothing can overflow while the filter's states still come
+    from the previous set. The table says after how many samples the bound holds again; do not swap again before that.
+    Exits with 1 and the reason if the set is refused; do not load it then.
 
-    The file's `writes` are pairs of a byte address and a word for the AXI4-Lite port, in order. Before, compare
-    `design` with the register DESIGN. docs/registers.md has the registers.
+    `writes` in the JSON file are pairs of a byte address and a data word for the AXI4-Lite port, in order. Check first
+    that the register DESIGN equals `design`. docs/registers.md describes the registers.
 
     \b
         sosmith reload my.toml recalibrated.toml

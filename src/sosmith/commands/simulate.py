@@ -1,4 +1,4 @@
-"""Commands that run the hardware in a simulator, and make what drives it: `simulate`, `emulate`, `demo`."""
+"""Commands that simulate the hardware, and generate its stimuli: `simulate`, `emulate`, `demo`."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 
 class _Share(click.FloatRange):
-    """Share of clocks; unlike its parent it refuses NaN."""
+    """Fraction of clocks; unlike its parent, refuses NaN."""
 
     def __init__(self) -> None:
         super().__init__(0, 0.99)
@@ -56,35 +56,36 @@ class _Share(click.FloatRange):
     "--trace",
     "source",
     metavar="FILE.csv|FILE.toml|SCENARIO",
-    help="What drives the inputs.  [default: wear_ramp, or sweep without a calibration]",
+    help="Stimulus of the inputs.  [default: wear_ramp, or sweep without a calibration]",
 )
 @click.option(
     "--simulator",
     type=OneOf(["verilator", "icarus", "cxxrtl"]),
     default="verilator",
     show_default=True,
+    help="Simulator to use.",
 )
 @click.option(
     "--idle",
     type=_Share(),
     default=0.3,
     show_default=True,
-    help="Share of clocks without an input sample.",
+    help="Fraction of clocks without an input sample.",
 )
 @click.option(
     "--stall",
     type=_Share(),
     default=0.3,
     show_default=True,
-    help="Share of clocks with the output held up.",
+    help="Fraction of clocks in which the output is stalled.",
 )
 @click.option(
     "--gates",
     metavar="BOARD",
-    help="Run the netlist that Yosys makes of it for the FPGA of a board instead: "
-    f"{', '.join(BOARDS)}. Takes seconds to synthesize, and runs slower.",
+    help="Simulate the netlist that Yosys synthesizes for the FPGA of this board instead: "
+    f"{', '.join(BOARDS)}. Synthesis takes seconds, and the simulation is slower.",
 )
-@click.option("--waves", is_flag=True, help="Write a waveform (VCD) too.")
+@click.option("--waves", is_flag=True, help="Also write a waveform (VCD).")
 @SECONDS
 @SEED
 @JSON_OPTION
@@ -106,14 +107,14 @@ def simulate_command(
     as_json: bool,
     output: Path | None,
 ) -> None:
-    """Run the generated hardware of SPEC in a simulator and report its accuracy.
+    """Simulate the generated hardware of SPEC and report its accuracy.
 
-    The SystemVerilog runs with random idle and back-pressure on both streams. Every sample is compared with the
-    integer model for equality, and with the double-precision golden chain for the error. Writes report.json and
-    report.html; exits with 1 if the result falls short. `sosmith emulate SPEC` lists the scenarios.
+    The test bench inserts random idle clocks at the input and random back-pressure at the output. Every sample must
+    equal that of the integer model; the error is measured against a double-precision golden model. Writes report.json
+    and report.html; exits with 1 if the result falls short. `sosmith emulate SPEC` lists the scenarios.
 
-    With --gates, the same bench runs the cells of an FPGA, their flip-flops at random when it starts, and an automatic
-    choice of the architecture is made for that board.
+    With --gates, the same test bench simulates the netlist of FPGA cells, with random initial values in the flip-flops,
+    and an automatic choice of the architecture is made for that board.
 
     \b
         sosmith simulate my.toml
@@ -162,7 +163,7 @@ def simulate_command(
 @click.option(
     "--measurements",
     is_flag=True,
-    help="Write the depot's measurements of FILE.toml instead, for `sosmith calibrate add`.",
+    help="Write the depot measurements of FILE.toml instead, for `sosmith calibrate add`.",
 )
 @SEED
 @output_option("CSV file to write.  [default: stdout]")
@@ -175,12 +176,12 @@ def emulate_command(
     seed: int,
     output: Path | None,
 ) -> None:
-    """Write an emulated sensor trace for SPEC as CSV; without SCENARIO, list the scenarios that fit.
+    """Write an emulated sensor trace for SPEC as CSV; without SCENARIO, list the scenarios for SPEC.
 
-    A core with several channels gets the rows of all of them, by the column channel.
+    With several channels, the column channel says which channel a row belongs to.
 
-    A scenario is a built-in one by name, or a file that describes days of operation: examples/scenarios/ holds some,
-    and docs/sensors.md says what can be in them.
+    A scenario is the name of a built-in one, or a file that describes days of operation: see examples/scenarios/ and
+    docs/sensors.md.
 
     \b
         sosmith emulate my.toml
@@ -199,7 +200,7 @@ def emulate_command(
         from sosmith.commands.tables.scenarios import print_scenarios
 
         print_scenarios(asked.name, {name: SUMMARIES[name].description for name in fitting(kind)})
-        note("a file can take a name's place: examples/scenarios/ holds some, docs/sensors.md says what can be in them")
+        note("a scenario file can be given instead of a name: see examples/scenarios/ and docs/sensors.md")
         return
     if scenario not in fitting(kind) and not _is_scenario_file(scenario):
         known = fitting(kind)
@@ -231,10 +232,9 @@ def emulate_command(
 @output_option("Folder for the files.  [default: build/demo]")
 @SEED
 def demo(output: Path | None, seed: int) -> None:
-    """Walk the whole road on the built-in example: a locomotive's flange wear at 100 Hz.
+    """Run the complete flow on the built-in example: a locomotive's flange wear at 100 Hz.
 
-    Designs the filter, generates the hardware, runs it in the simulator on an emulated wear run, and writes the
-    report.
+    Designs the filter, generates the hardware, simulates it with an emulated wear run as input, and writes the report.
 
     \b
         sosmith demo -o my_demo
@@ -289,17 +289,17 @@ def _is_scenario_file(source: str) -> bool:
 
 
 def _is_file(source: str) -> bool:
-    """Tell whether a trace comes from a file: by its ending, or because the file is there."""
+    """Tell whether a trace comes from a file: by its suffix, or because the file exists."""
     return source not in SUMMARIES and (source.lower().endswith((".csv", ".toml")) or Path(source).exists())
 
 
 def _write_measurements(spec: Path, source: str | None, seed: int, output: Path | None) -> None:
-    """Write what is measured by hand in a scenario file's depot, as CSV."""
+    """Write the measurements taken by hand in a scenario's depot, as CSV."""
     if source is None or not _is_scenario_file(source):
         raise SpecificationError(f"--measurements must come with a scenario file (TOML), not {source or 'without one'}")
     from sosmith.interface.specification import Specification
 
-    Specification.load(spec)  # so that a slip in it is not found out later
+    Specification.load(spec)  # so that a mistake in it is found now
     from sosmith.model.scenarios.depot_measurements import measurements_csv, measurements_of
     from sosmith.model.scenarios.file import load_scenario
 

@@ -1,4 +1,4 @@
-"""`sosmith spectrum`: spectra of traces, and the filter that follows from them."""
+"""`sosmith spectrum`: spectra of traces, and a filter proposed from them."""
 
 from __future__ import annotations
 
@@ -23,36 +23,34 @@ from sosmith.model.errors import SpecificationError
 from sosmith.model.text_files import write_contents
 from sosmith.terminal import JSON_OPTION, note, output_option, print_json, show_progress
 
-_HELP = """Show the spectra of each TRACE.csv, and propose the low-pass filter that follows from them.
+_HELP = """Show the spectra of traces, and propose a low-pass filter based on them.
 
-A TRACE is what `sosmith emulate` writes, whose clearance the calibration computes, or a CSV file with the column
-time_s and columns of values in even steps. The error allowed (--tolerance) is shared among what the filter takes from
-the true signal and what it leaves of the disturbance; edges, losses, order and delay follow. A measured trace without
-its truth needs --passband or --time-constant: what lies below is wanted, what lies above disturbs. With --motion,
-traces without a truth are motion of the vehicle, and nothing of them is wanted. Several traces, or channels of a trace:
-the filter does for each of them. Begin with
+A TRACE is a file that `sosmith emulate` has written, from which the calibration computes the clearance, or a CSV file
+with a column time_s in even steps and columns of values. The allowed error (--tolerance) is divided between the
+distortion of the true signal and the disturbance that passes the filter; edges, losses, order and delay follow from it.
+A measured trace without a true signal needs --passband or --time-constant: everything below that edge is wanted signal,
+everything above is disturbance. With --motion, all of a trace without a true signal is disturbance by vehicle motion.
+With several traces or channels, the filter meets the tolerance for each of them. To get started:
 
 \b
     sosmith emulate my.toml wear_ramp -o ramp.csv
-    sosmith spectrum ramp.csv                                  spectra, proposal, [filter] on stdout
-    sosmith spectrum ramp.csv --into my.toml -o filtered.toml  my.toml with the new [filter], and a plot
+    sosmith spectrum ramp.csv                                  print spectra, proposal and [filter]
+    sosmith spectrum ramp.csv --into my.toml -o filtered.toml  write my.toml with the new [filter], and a plot
 
-Exits with 1 if no filter is needed for the tolerance, or none is enough.
+Exits with 1 if the tolerance needs no filter, or no filter meets it.
 """
 
 
 @click.command("spectrum", help=_HELP)
 @click.argument("traces", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="TRACE...")
-@click.option(
-    "--column", "columns", multiple=True, help="Take this column of values, where a trace has it; may be given again."
-)
+@click.option("--column", "columns", multiple=True, help="Use this column of values, where a trace has it; repeatable.")
 @click.option("--truth", help="Column with the true signal.  [default: clearance_mm of an emulated trace, truth]")
 @click.option(
     "--channel",
     "channels",
     multiple=True,
     type=click.IntRange(min=0),
-    help="Take this channel of traces that hold several; may be given again.  [default: all]",
+    help="Use this channel of multichannel traces; repeatable.  [default: all]",
 )
 @click.option(
     "--calibration",
@@ -60,28 +58,42 @@ Exits with 1 if no filter is needed for the tolerance, or none is enough.
     metavar="SPEC",
     help="Specification whose calibration computes the clearance.  [default: that of --into, or equation 5a]",
 )
-@click.option("--motion", is_flag=True, help="Nothing is wanted of traces without a truth.")
+@click.option("--motion", is_flag=True, help="Treat traces without a true signal as disturbance by vehicle motion.")
 @click.option(
-    "--tolerance", type=float, default=TOLERANCE, show_default=True, help="Error allowed at the output, in mm."
+    "--tolerance", type=float, default=TOLERANCE, show_default=True, help="Allowed error at the output, in mm."
 )
 @click.option(
-    "--coverage", type=float, default=COVERAGE, show_default=True, help="Times the rms error that is to be allowed."
+    "--coverage",
+    type=float,
+    default=COVERAGE,
+    show_default=True,
+    help="Multiple of the rms error that the tolerance covers.",
 )
-@click.option("--passband", type=float, help="Pass edge in Hz.  [default: from the true signals]")
-@click.option("--time-constant", type=float, help="The same as 1 / (2 pi T), T in s.")
+@click.option("--passband", type=float, help="Passband edge in Hz.  [default: from the true signals]")
+@click.option("--time-constant", type=float, help="Passband edge given as a time constant T in s: 1 / (2 pi T).")
 @click.option(
-    "--passband-loss", type=float, help=f"In dB.  [default: from the wanted signal, at most {PASSBAND_LOSS:g}]"
+    "--passband-loss",
+    type=float,
+    help=f"Passband loss in dB.  [default: from the signal, at most {PASSBAND_LOSS:g}]",
 )
-@click.option("--window", type=OneOf(WINDOWS), default="hann", show_default=True)
+@click.option("--window", type=OneOf(WINDOWS), default="hann", show_default=True, help="Window function.")
 @click.option("--segment", type=float, help="Length of a segment in s.  [default: an eighth of the trace]")
-@click.option("--overlap", type=float, default=0.5, show_default=True, help="Of a segment with the next.")
-@click.option("--detrend", type=OneOf(DETRENDS), default="linear", show_default=True, help="In each segment.")
-@click.option("--confidence", type=float, default=0.95, show_default=True, help="Of the interval of the spectra.")
+@click.option("--overlap", type=float, default=0.5, show_default=True, help="Overlap of adjacent segments, 0 to 0.95.")
+@click.option(
+    "--detrend", type=OneOf(DETRENDS), default="linear", show_default=True, help="Trend to remove from segments."
+)
+@click.option(
+    "--confidence",
+    type=float,
+    default=0.95,
+    show_default=True,
+    help="Confidence level of the spectra.",
+)
 @click.option(
     "--into", type=click.Path(path_type=Path), metavar="SPEC", help="Write a copy of SPEC with [filter] replaced."
 )
 @click.option(
-    "--plot", type=click.Path(path_type=Path), help="SVG or PNG file for the plot.  [default: beside -o, as .svg]"
+    "--plot", type=click.Path(path_type=Path), help="SVG or PNG file for the plot.  [default: name of -o with .svg]"
 )
 @JSON_OPTION
 @output_option("TOML file for [filter], or for the copy of SPEC.  [default: stdout]")
@@ -168,10 +180,10 @@ def _pass_edge(passband: float | None, time_constant: float | None) -> float | N
     if time_constant is None:
         return passband
     if passband is not None:
-        raise SpecificationError("the pass edge must be given by one of --passband and --time-constant, not both")
+        raise SpecificationError("the passband edge must be given by one of --passband and --time-constant, not both")
     if not 0 < time_constant < math.inf:
         raise SpecificationError(f"time-constant must be a positive number of seconds, not {time_constant:g}")
-    return float(f"{1 / (2 * math.pi * time_constant):.5g}")  # as many digits as the proposal's other numbers
+    return float(f"{1 / (2 * math.pi * time_constant):.5g}")  # as many digits as the other numbers of the proposal
 
 
 def _write(path: Path, content: bytes) -> None:

@@ -1,4 +1,4 @@
-"""The command `sosmith vehicle`: motion of a six-axle locomotive over a track, and what a sensor sees of it."""
+"""The command `sosmith vehicle`: motion of a six-axle locomotive on a track, and the clearance that a sensor sees."""
 
 from __future__ import annotations
 
@@ -19,30 +19,30 @@ if TYPE_CHECKING:
 
 @click.command("vehicle")
 @click.argument("parameters", type=click.Path(path_type=Path), required=False)
-@click.option("--speed", type=float, default=20.0, show_default=True, help="In m/s.")
-@click.option("--sample-rate", type=float, default=100.0, show_default=True, help="Of the motion, in Hz.")
+@click.option("--speed", type=float, default=20.0, show_default=True, help="Speed in m/s.")
+@click.option("--sample-rate", type=float, default=100.0, show_default=True, help="Sample rate of the motion in Hz.")
 @click.option(
     "--track",
     type=OneOf(TRACK_NAMES),
     default="paper",
     show_default=True,
-    help="The paper's track with its curve, or a straight one of the same length.",
+    help="paper: the paper's track with its curve; tangent: a straight track of the same length.",
 )
 @click.option(
     "--irregularities",
     type=OneOf(["none", *LEVELS]),
     default="none",
     show_default=True,
-    help="Random ones of ERRI B176, on top of the track's single one.",
+    help="Level of random irregularities (ERRI B176), added to the track's single one.",
 )
-@click.option("--seed", type=int, default=1, show_default=True, help="Of the random irregularities.")
-@click.option("--plot", type=click.Path(path_type=Path), help="Draw motions and spectra into this SVG or PNG file.")
+@click.option("--seed", type=int, default=1, show_default=True, help="Seed of the random irregularities.")
+@click.option("--plot", type=click.Path(path_type=Path), help="SVG or PNG file for a plot of motions and spectra.")
 @click.option(
     "--write-parameters",
     type=click.Path(path_type=Path),
-    help="Write the built-in PARAMETERS, with the source of each, into this TOML file, and do nothing else.",
+    help="Only write the built-in parameters, with the source of each, to this TOML file.",
 )
-@output_option("CSV file for the motion: time_s, wheelset1_lateral_mm, ..., clearance1_mm, ...")
+@output_option("CSV file for the motion, with the columns time_s, wheelset1_lateral_mm, ..., clearance1_mm, ...")
 @JSON_OPTION
 def vehicle(
     parameters: Path | None,
@@ -56,12 +56,17 @@ def vehicle(
     output: Path | None,
     as_json: bool,
 ) -> None:
-    """Run a six-axle locomotive over a track.
+    """Simulate the motion of a six-axle locomotive on a track.
 
-    Prints the modes of free motion, the largest motion of each part, and, for the paper's track and speed, both beside
-    the paper's tables 5 to 8. The model is linear: it has no flange contact, and its creep knows no friction limit.
-    How far a run goes beyond that is told for each wheelset. PARAMETERS.toml holds masses, springs and track; without
-    it, those built in.
+    Prints the modes of free motion, the largest motion of each part, and, at the paper's track and speed, a comparison
+    with the paper's tables 5 to 8. The model is linear: it has no flange contact and no friction limit on the creep
+    forces. The tables show for each wheelset how far the run exceeds these limits. PARAMETERS is a TOML file with
+    masses, springs and track; by default the built-in ones are used.
+
+    \b
+        sosmith vehicle --speed 25 --plot vehicle.svg
+        sosmith vehicle --write-parameters my_vehicle.toml
+        sosmith vehicle my_vehicle.toml --track tangent --irregularities low -o motion.csv
     """
     file_format = "" if plot is None else format_of(plot)
     from sosmith.model.vehicle.parameters import built_in, built_in_text, load
@@ -104,14 +109,14 @@ def vehicle(
 
 
 def _warning(made: VehicleRun) -> str:
-    """One sentence on the wheelsets that are worst off."""
+    """Describe in one sentence the wheelsets that exceed the model most."""
     found = made.limits
     worst, slips = int(found.beyond_flange.argmax()), int(found.friction_used.argmax())
     parts = []
     if found.beyond_flange[worst] > 0:
-        parts.append(f"wheelset {worst + 1} goes {1e3 * found.beyond_flange[worst]:.1f} mm beyond its flange")
+        parts.append(f"wheelset {worst + 1} moves {1e3 * found.beyond_flange[worst]:.1f} mm past the flange")
     if found.friction_used[slips] > 1:
         parts.append(
-            f"creep of wheelset {slips + 1} takes {found.friction_used[slips]:.2f} times the friction there is"
+            f"the creep force of wheelset {slips + 1} is {found.friction_used[slips]:.2f} times the available friction"
         )
-    return f"this run leaves what a linear model can tell: {' and '.join(parts)}"
+    return f"this run exceeds the limits of the linear model: {' and '.join(parts)}"

@@ -1,4 +1,4 @@
-"""The command `verify`: prove a certificate again."""
+"""The command `verify`: prove a certificate by an independent method."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from sosmith.terminal import JSON_OPTION, print_json, show_progress
 @click.argument("certificate", type=click.Path(path_type=Path))
 @JSON_OPTION
 def verify(certificate: Path, as_json: bool) -> None:
-    """Prove CERTIFICATE again: the error bound, and that nothing inside can overflow.
+    """Prove CERTIFICATE by an independent method: the error bound, and no internal overflow.
 
-    Reads nothing but that file, which `sosmith generate` writes as <name>.certificate.json, and works by another
-    method than the one it was made with. Exits with 1 and the reason if anything claimed is not exactly what follows.
+    CERTIFICATE is the <name>.certificate.json that `sosmith generate` writes; no other file is read. The method is
+    different from the one that made the certificate. Exits with 1 and the reason if any claim does not follow exactly.
 
     \b
         sosmith verify my_core/my.certificate.json

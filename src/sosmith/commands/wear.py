@@ -18,12 +18,12 @@ if TYPE_CHECKING:
     from sosmith.model.wear.assessment import WearLimits, WearReport
     from sosmith.model.wear.record_file import WearRecord
 
-_HELP = f"""Tell from TRACE.csv how far a wheel flange is worn, how fast it wears, and how long it will last.
+_HELP = f"""Estimate the wear, wear rate and remaining life of a wheel flange from TRACE.csv.
 
-TRACE.csv holds a time ({", ".join(("time_s", *TIMES))}) and a clearance in mm ({", ".join(CLEARANCES)}, or --column).
-Wear is the clearance minus the initial one. The rate is the median slope between the medians of blocks of a day, with
-an interval that heeds how they correlate. The state is that of the last reading, by the comparisons that the hardware's
-flags of wear make.
+TRACE.csv has a time column ({", ".join(("time_s", *TIMES))}) and a clearance column in mm ({", ".join(CLEARANCES)}, or
+--column). Wear is the clearance minus the initial one. The rate is the median slope between the medians of one-day
+blocks, with a confidence interval that accounts for their correlation. The state is that of the last reading, by the
+same comparisons as the wear flags of the hardware.
 
 \b
     sosmith wear days.csv --initial 1.5 --limit 9 --warning 7
@@ -34,11 +34,14 @@ flags of wear make.
 @click.command("wear", help=_HELP)
 @click.argument("trace", type=click.Path(path_type=Path), metavar="TRACE.csv")
 @click.option("--initial", type=float, help="Clearance without wear, in mm.")
-@click.option("--limit", type=float, help="Wear from which on it is critical, in mm.")
-@click.option("--warning", type=float, help="Wear from which on there is a warning, in mm.  [default: no warning]")
-@click.option("--sensor-range", type=float, help="Clearance up to which the sensor can be trusted, in mm.")
+@click.option("--limit", type=float, help="Wear at which the state is critical, in mm.")
+@click.option("--warning", type=float, help="Wear at which the state is a warning, in mm.  [default: no warning]")
+@click.option("--sensor-range", type=float, help="Largest clearance that the sensor measures reliably, in mm.")
 @click.option(
-    "--spec", type=click.Path(path_type=Path), metavar="SPEC", help="Take all four from [wear] of this specification."
+    "--spec",
+    type=click.Path(path_type=Path),
+    metavar="SPEC",
+    help="Take these four from [wear] of this specification.",
 )
 @click.option(
     "--channel",
@@ -47,10 +50,10 @@ flags of wear make.
     show_default=True,
     help="Channel of SPEC, and of TRACE.csv if it has the column channel.",
 )
-@click.option("--column", help="Column of the clearance.")
-@click.option("--block", type=float, help="Days whose readings count as one.  [default: 1, less in a short record]")
-@click.option("--window", type=float, help="Take the rate from so many days at the end.  [default: all]")
-@click.option("--confidence", type=float, default=0.95, show_default=True, help="Of the intervals.")
+@click.option("--column", help="Name of the clearance column.")
+@click.option("--block", type=float, help="Length of a block in days.  [default: 1, less for a short record]")
+@click.option("--window", type=float, help="Estimate the rate from this many days at the end.  [default: all]")
+@click.option("--confidence", type=float, default=0.95, show_default=True, help="Confidence level of the intervals.")
 @click.option("--plot", type=click.Path(path_type=Path), help="SVG or PNG file for a plot.")
 @JSON_OPTION
 def wear_command(
@@ -126,7 +129,7 @@ def _limits_of(path: Path, channel: int) -> WearLimits:
 
 
 def _json(record: WearRecord, report: WearReport) -> dict[str, Any]:
-    """Everything, with the unit in each name."""
+    """Return all results, with the unit in each key."""
     rate = report.rate
     return {
         "file": str(record.path),

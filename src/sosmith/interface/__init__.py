@@ -1,6 +1,6 @@
-"""The public Python interface, one file a subject; `sosmith` itself hands out its names.
+"""The public Python interface, one file per subject; its names are imported from `sosmith`.
 
-A filter of scipy becomes proven and simulated hardware:
+From a scipy filter to proven and simulated hardware:
 
 Examples
 --------

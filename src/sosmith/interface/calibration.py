@@ -20,7 +20,7 @@ from sosmith.model.errors import SpecificationError
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """The smallest polynomial of voltage and temperature that fits measured clearances well enough.
+    """The smallest polynomial of voltage and temperature that fits measured clearances to the required accuracy.
 
     Examples
     --------
@@ -36,9 +36,9 @@ class Calibration:
     """
 
     fitted: Fit = field(repr=False)
-    """Coefficients as exact fractions, and the trials before."""
+    """Exact coefficients as fractions, and the orders rejected before."""
     measurements: Measurements = field(repr=False)
-    """What it is fitted to."""
+    """The measurements that it is fitted to."""
 
     @classmethod
     def fit(
@@ -50,21 +50,21 @@ class Calibration:
         required_r: float = REQUIRED_R,
         robust: bool = False,
     ) -> Calibration:
-        """Fit measurements: orders rise until the adjusted coefficient of correlation is high enough.
+        """Fit measurements: the orders are raised until the adjusted correlation coefficient is high enough.
 
         Parameters
         ----------
-        voltage, temperature, clearance : array_like of one shape
-            In V, degC and mm; a clearance is not negative.
+        voltage, temperature, clearance : array_like, all of the same shape
+            In V, degC and mm; clearances must not be negative.
         required_r : float
-            Adjusted r to reach, from 0 to below 1.
+            Required adjusted r, from 0 to below 1.
         robust : bool
-            Weight outliers down (Huber).
+            Give outliers less weight (Huber).
 
         Raises
         ------
         SpecificationError
-            If the measurements do not determine a polynomial, or none is good enough.
+            If the measurements do not determine a polynomial, or no polynomial is good enough.
         """
         if not 0 <= required_r < 1:
             raise SpecificationError(f"required_r must be 0 or more and less than 1, not {required_r:g}")
@@ -109,12 +109,12 @@ class Calibration:
 
     @property
     def adjusted_r(self) -> float:
-        """Adjusted coefficient of correlation."""
+        """Adjusted correlation coefficient."""
         return self.fitted.adjusted_r
 
     @property
     def residual(self) -> npt.NDArray[np.float64]:
-        """Measured minus computed clearance in mm, one element for each measurement."""
+        """Measured minus computed clearance in mm, one element per measurement."""
         return residuals(self.measurements, self.fitted.polynomial)
 
     @property
@@ -124,7 +124,7 @@ class Calibration:
 
     @property
     def covered(self) -> dict[str, tuple[float, float]]:
-        """Least and largest "voltage" in V and "temperature" in degC that was measured at."""
+        """Smallest and largest measured "voltage" in V and "temperature" in degC."""
         return dict(zip(("voltage", "temperature"), self.fitted.covered, strict=True))
 
     def __call__(self, voltage: npt.ArrayLike, temperature: npt.ArrayLike) -> npt.NDArray[np.float64]:

@@ -1,4 +1,4 @@
-"""The certificate of a design, and its proof."""
+"""The certificate of a design, and the result of its proof."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ from sosmith.interface.quantity import Quantity
 from sosmith.model.text_files import write_files
 
 Progress = Callable[[str, int, int], None]
-"""Called with the name of a step, how much of it is done, and how much there is; 0 and 0 where that is not known."""
+"""Called with the name of a step, the amount done and the total; both are 0 if they are not known."""
 
 
 @dataclass(frozen=True)
 class Proof:
-    """What has been proven of a certificate.
+    """Result of proving a certificate.
 
     Attributes
     ----------
     bound : Quantity
         Bound on the difference between hardware and exact result, for all inputs in range.
     budget : dict of str to Quantity
-        Its parts; they add up to `bound`.
+        Parts of the bound, which add up to it.
     nodes : int
         Number of operations whose range was checked.
     ranges : int
-        How many of these ranges needed a worst-case peak gain.
+        Number of these ranges that needed a worst-case peak gain.
     """
 
     bound: Quantity
@@ -41,7 +41,7 @@ class Proof:
 
 @dataclass(frozen=True)
 class Certificate:
-    """Every operation of a core, the exact filter that it stands for, and the error bound claimed.
+    """Every operation of a core, the exact filter that it approximates, and the claimed error bound.
 
     Examples
     --------
@@ -55,16 +55,16 @@ class Certificate:
     """
 
     entries: Entries = field(repr=False)
-    """The certificate's content, as its file holds it."""
+    """The content of the certificate, as in its file."""
 
     @classmethod
     def load(cls, path: str | PathLike[str]) -> Certificate:
-        """Read a certificate's file, such as ``<name>.certificate.json``.
+        """Read a certificate file, such as ``<name>.certificate.json``.
 
         Raises
         ------
         SpecificationError
-            If it cannot be read, or is no certificate.
+            If the file cannot be read, or is not a certificate.
         """
         return cls(read_certificate(Path(fspath(path))))
 
@@ -75,17 +75,17 @@ class Certificate:
 
     @property
     def bound(self) -> Quantity:
-        """The error bound that is claimed, in the unit of the output."""
+        """The claimed error bound, in the unit of the output."""
         output = self.entries.output
         return Quantity(float(self.entries.claims.bound * output.lsb), output.unit)
 
     def verify(self, progress: Progress = lambda step, done, total: None) -> Proof:
-        """Prove the certificate from its content alone, by another method than the one it was made with.
+        """Prove the certificate from its content alone, by a different method than the one that made it.
 
         Raises
         ------
         ShortfallError
-            If anything claimed is not exactly what follows.
+            If any claim does not follow exactly.
         """
         verdict = verify(self.entries, progress)
         lsb, unit = self.entries.output.lsb, self.entries.output.unit
@@ -97,11 +97,11 @@ class Certificate:
         )
 
     def text(self) -> str:
-        """Return the content of its file, JSON, the same on every run."""
+        """Return the content of its file as JSON, identical on every run."""
         return certificate_text(self.entries)
 
     def save(self, path: str | PathLike[str]) -> Path:
-        """Write its file, and return the path.
+        """Write its file and return the path.
 
         Raises
         ------

@@ -17,27 +17,27 @@ from sosmith.model.errors import SpecificationError
 
 @dataclass(frozen=True)
 class Comparison:
-    """Accuracy reports side by side; `compare` makes it."""
+    """Accuracy reports side by side, as returned by `compare`."""
 
     reports: tuple[Mapping[str, Any], ...] = field(repr=False)
-    """The reports, each the content of its ``report.json``."""
+    """The content of each ``report.json``."""
 
     @property
     def names(self) -> list[str]:
-        """Name of each report, told apart where several have the same."""
+        """Name of each report, made unique if several are the same."""
         return column_names(self.reports)
 
     @property
     def rows(self) -> list[Row]:
-        """The properties compared: `key`, `title`, `values`, `cells` for people, and which reports are `best`."""
+        """The compared properties: `key`, `title`, `values`, `cells` as text, and the indices of the `best` reports."""
         return compare_reports(self.reports)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return ``{"names": [...], "rows": [{"key", "title", "values", "best"}]}``, the types those of JSON."""
+        """Return ``{"names": [...], "rows": [{"key", "title", "values", "best"}]}``, in JSON types."""
         return comparison_json(self.reports)
 
     def page(self) -> str:
-        """Return one HTML page that stands alone."""
+        """Return the comparison as a self-contained HTML page."""
         return comparison_page(self.reports)
 
     def _repr_html_(self) -> str:
@@ -49,17 +49,17 @@ class Comparison:
 
 
 def compare(reports: Sequence[Report | Mapping[str, Any] | str | PathLike[str]]) -> Comparison:
-    """Set accuracy reports side by side.
+    """Compare accuracy reports side by side.
 
     Parameters
     ----------
     reports : sequence of Report, path or mapping
-        At least one: what `Design.simulate` returned, a ``report.json`` or the folder that holds it, or its content.
+        At least one: the result of `Design.simulate`, a ``report.json``, its folder, or its content.
 
     Raises
     ------
     SpecificationError
-        If there is none, or a file is no report.
+        If there are no reports, or a file is not a report.
 
     Examples
     --------

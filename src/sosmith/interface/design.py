@@ -1,4 +1,4 @@
-"""From a specification to a proven design, and what can be done with it: compute, generate, prove, simulate."""
+"""From a specification to a proven design, and its uses: compute, generate, prove, simulate."""
 
 from __future__ import annotations
 
@@ -42,9 +42,9 @@ class Coefficient:
     Attributes
     ----------
     integer : int
-        What the hardware multiplies by.
+        Integer that the hardware multiplies by.
     fraction_bits : int
-        Bits of it behind the binary point: its value is ``integer / 2**fraction_bits``.
+        Number of bits after the binary point: the value is ``integer / 2**fraction_bits``.
     """
 
     integer: int
@@ -52,22 +52,22 @@ class Coefficient:
 
     @property
     def value(self) -> float:
-        """The number that it stands for."""
+        """The real value of the coefficient."""
         return self.integer / 2.0**self.fraction_bits
 
 
 @dataclass(frozen=True)
 class Section:
-    """A section of the filter, as the hardware has it.
+    """A section of the filter, as implemented in hardware.
 
     Attributes
     ----------
     name : str
-        Such as "section0".
+        Name, such as "section0".
     coefficients : dict of str to Coefficient
-        The integers that it multiplies by.
+        The integer coefficients of its multiplications.
     b, a : tuple of float
-        Numerator and denominator of its transfer function, ``a[0] == 1``.
+        Numerator and denominator of its transfer function, with ``a[0] == 1``.
     formats : dict of str to str
         Q format of "input", "output" and every state.
     """
@@ -81,10 +81,10 @@ class Section:
 
 @dataclass(frozen=True)
 class Design:
-    """A core whose word lengths are chosen and whose error is proven; `design` makes it.
+    """A core with chosen word lengths and a proven error bound, as returned by `design`.
 
-    Values are in physical units: inputs by the names and units of `Specification.inputs`, results in the unit of the
-    output. Arrays hold one sample a row, shape (samples,) for one channel and (samples, channels) for several.
+    Values are in physical units: inputs have the names and units of `Specification.inputs`, results the unit of the
+    output. Arrays hold one sample per row, shape (samples,) for one channel and (samples, channels) for several.
 
     Examples
     --------
@@ -110,11 +110,11 @@ class Design:
     """
 
     core: CoreDesign = field(repr=False)
-    """The same as the rooms below take it: datapath, proof, architecture."""
+    """The design in the form of the inner packages: datapath, proof, architecture."""
 
     @property
     def specification(self) -> Specification:
-        """What was asked for."""
+        """The specification that was designed."""
         return Specification(self.core.spec)
 
     @property
@@ -129,7 +129,7 @@ class Design:
 
     @property
     def realization(self) -> str | None:
-        """Structure of the filter's sections; None without a filter."""
+        """Structure of the filter sections; None without a filter."""
         return self.core.quantized.realization if self.core.quantized.sections else None
 
     @property
@@ -139,41 +139,41 @@ class Design:
 
     @property
     def reasons(self) -> dict[str, str]:
-        """Why this realization and this architecture, a sentence each."""
+        """Why this realization and this architecture were chosen, one sentence each."""
         return dict(self.core.reasons)
 
     @property
     def latency_cycles(self) -> int:
-        """Clocks from an input sample to its result."""
+        """Clock cycles from an input sample to its result."""
         return self.core.architecture.latency_cycles
 
     @property
     def cycles_per_sample(self) -> int:
-        """Clocks that a sample takes before the next one can enter."""
+        """Clock cycles from one input sample to the next."""
         return self.core.architecture.cycles_per_sample
 
     @cached_property
     def sos(self) -> Floats:
-        """Ideal second-order sections, shape (sections, 6) as scipy wants them; no rows without a filter."""
+        """Ideal second-order sections, shape (sections, 6) as in scipy; no rows without a filter."""
         ideal = self.core.quantized.filter
         return np.zeros((0, 6)) if ideal is None else ideal.sos
 
     @cached_property
     def quantized_sos(self) -> Floats:
-        """The sections that the integer coefficients make, shape (sections, 6); no rows without a filter."""
+        """Second-order sections with the integer coefficients, shape (sections, 6); no rows without a filter."""
         return self.core.quantized.quantized_sos if self.core.quantized.sections else np.zeros((0, 6))
 
     @property
     def bound(self) -> Quantity:
-        """Proven bound on ``|hardware - exact|`` for all inputs in range, the exact result limited to the output's.
+        """Proven bound on ``|hardware - exact|`` for all inputs in range, the exact result limited as well.
 
-        That of the certificate is computed more closely, and agrees in all digits that matter.
+        The bound in the certificate is computed more precisely; the two agree in all significant digits.
         """
         return self._in_units(self.core.quantized.bound)
 
     @property
     def budget(self) -> dict[str, Quantity]:
-        """Parts of `bound`, which add up to it."""
+        """Parts of `bound`; they add up to it."""
         return {part: self._in_units(value) for part, value in self.core.quantized.budget.items()}
 
     @cached_property
@@ -192,17 +192,17 @@ class Design:
 
     @property
     def cost(self) -> Cost:
-        """Counts before synthesis, those of the parallel architecture: `multipliers`, `adder_bits`, `luts`, ..."""
+        """Estimates before synthesis, for the parallel architecture: `multipliers`, `adder_bits`, `luts`, ..."""
         return self.facts.cost
 
     @cached_property
     def manifest(self) -> dict[str, Any]:
-        """What a program around the core has to know: the content of ``<name>.json``."""
+        """What software needs to know about the core: the content of ``<name>.json``."""
         return manifest(self.facts)
 
     @cached_property
     def certificate(self) -> Certificate:
-        """What is claimed of the design, to be proven again."""
+        """The claims about the design, for an independent proof."""
         return Certificate(certificate(self.core.quantized, self.core.spec.max_error))
 
     def verify(self, progress: Progress = lambda step, done, total: None) -> Proof:
@@ -212,7 +212,7 @@ class Design:
     def frequency_response(self, f: npt.ArrayLike, *, ideal: bool = False) -> npt.NDArray[np.complex128]:
         """Return the complex gain of the filter at the frequencies `f` in Hz, an array of the same shape.
 
-        By default it is the gain with the integer coefficients, with `ideal` the one without any rounding.
+        The default is the gain with the integer coefficients; with `ideal`, it is the gain without any rounding.
 
         Raises
         ------
@@ -225,13 +225,13 @@ class Design:
         return complex_response(self.sos if ideal else self.quantized_sos, frequencies, self.specification.sample_rate)
 
     def run(self, **inputs: npt.ArrayLike) -> Floats:
-        """Compute, bit for bit, what the hardware puts out for `inputs`, from reset on.
+        """Compute the output of the hardware for `inputs` bit for bit, starting from reset.
 
         Parameters
         ----------
         **inputs : array_like, shape (samples,) or (samples, channels)
-            A physical value of each input for every sample, by the names of the inputs. They are rounded to codes and
-            limited to the range of the input, as by a converter. Shapes are broadcast: a number stands for a constant.
+            Physical values of each input, by its name. As in a converter, they are rounded to codes and limited to the
+            range of the input. Shapes are broadcast: a number is a constant input.
 
         Returns
         -------
@@ -246,17 +246,17 @@ class Design:
         return self.core.datapath.output.decode(self._computed(encoded(self.core, inputs)))
 
     def run_codes(self, **inputs: npt.ArrayLike) -> Codes:
-        """Compute as `run` does, from integer codes to integer codes, without any conversion.
+        """Compute as `run` does, but from integer codes to integer codes.
 
         Raises
         ------
         SpecificationError
-            As `run`, and if a code is no integer or outside the range of its input.
+            As `run`, or if a code is not an integer or is outside the range of its input.
         """
         return self._computed(codes_of(self.core, inputs))
 
     def run_exact(self, **inputs: npt.ArrayLike) -> Floats:
-        """Compute what `run` stands for: the same input codes through the exact chain, in double precision.
+        """Compute the exact result that `run` approximates: from the same input codes, in double precision.
 
         Parameters, result and errors are those of `run`.
         """
@@ -271,7 +271,7 @@ class Design:
         return np.stack(columns, axis=1).reshape(codes.shape[:-1])
 
     def generate(self, folder: str | PathLike[str], progress: Progress = lambda step, done, total: None) -> list[Path]:
-        """Write SystemVerilog, RTLIL, manifest, certificate and C model into `folder`; return the files' paths.
+        """Write SystemVerilog, RTLIL, manifest, certificate and C model into `folder`; return their paths.
 
         Raises
         ------
@@ -296,44 +296,44 @@ class Design:
         seed: int = 1,
         progress: Progress = lambda step, done, total: None,
     ) -> Report:
-        """Run the generated hardware in a simulator, and compare every sample with the model and the exact chain.
+        """Simulate the generated hardware, and compare every sample with the integer model and the exact result.
 
         Parameters
         ----------
         trace : str, path or mapping of arrays
-            What drives the inputs: the name of a built-in trace (`sosmith emulate SPEC` lists them), a CSV or scenario
-            file, or arrays as `run` takes them. By default a trace that shows most of the core. Where several channels
-            get the same trace, each begins a sample later than the one before.
+            Stimulus of the inputs: the name of a built-in trace (`sosmith emulate SPEC` lists them), a CSV or scenario
+            file, or arrays as `run` takes them. By default a trace that exercises most of the core. If several channels
+            get the same trace, each lags the previous one by a sample.
         folder : path
-            Where the files go, ``build/<name>`` by default.
+            Folder for the files, ``build/<name>`` by default.
         seconds : float
-            Length of a built-in trace, in seconds of its own time.
+            Length of a built-in trace, in seconds of simulated time.
         simulator : str
             "verilator" or "icarus".
         gates : str
-            Name of a board: run the netlist that Yosys makes for its FPGA instead of the SystemVerilog.
+            Name of a board: simulate the netlist that Yosys synthesizes for its FPGA instead of the SystemVerilog.
         idle, stall : float
-            Share of clocks without an input sample, and with the output held up, 0 to 0.99.
+            Fractions of clocks without an input sample and with the output stalled, 0 to 0.99.
         waves : bool
-            Write a waveform (VCD) too.
+            Whether to write a waveform (VCD) as well.
         seed : int
-            Seed of noise and handshakes.
+            Random seed for noise and handshakes.
 
         Returns
         -------
         Report
-            Verdict, figures and samples; ``report.json`` and ``report.html`` are in `folder`.
+            Verdict, results and samples; ``report.json`` and ``report.html`` are in `folder`.
 
         Raises
         ------
         SpecificationError
-            If there is no such trace, simulator or board, or the folder cannot be written.
+            If the trace, simulator or board does not exist, or the folder cannot be written.
         ShortfallError
             If the hardware breaks the stream protocol.
         ToolError
             If a tool is missing or fails.
         """
-        # What simulates takes time to load; a design that only computes does without it.
+        # The simulation modules are slow to import; a design that only computes does not need them.
         from sosmith.interface.report import Report
         from sosmith.sim.simulation import simulate
         from sosmith.sim.simulators import check_name
@@ -363,11 +363,11 @@ class Design:
 
     @cached_property
     def facts(self) -> CoreFacts:
-        """All facts about the core that manifest and report tell."""
+        """All facts about the core in manifest and report."""
         return core_facts(self.core)
 
     def _in_units(self, steps: Any) -> Quantity:
-        """Turn steps of the output into its unit."""
+        """Convert LSBs of the output to its unit."""
         output = self.core.datapath.output
         return Quantity(float(steps * output.lsb), output.unit)
 
@@ -407,25 +407,25 @@ def design(
     Parameters
     ----------
     specification : Specification, path or mapping
-        What is asked for; a path or a mapping goes through `Specification.load`.
+        The specification; a path or a mapping is passed to `Specification.load`.
     core : str
-        The part to make, "instrument", "filter" or "calibration"; by default all that the specification has.
+        The part to design, "instrument", "filter" or "calibration"; by default everything in the specification.
     realization : str
-        Structure of the sections, whatever the specification says.
+        Structure of the sections; overrides the specification.
     widths_of : str
-        Keep the word lengths chosen for this realization, to compare structures at equal width. The error may then
-        exceed what the specification allows.
+        Use the word lengths chosen for this realization, to compare structures at equal widths. The error can then
+        exceed `max_error`.
     board : str
-        Name of a board: an automatic choice of the architecture heeds its multipliers.
+        Name of the target board; an automatic choice of the architecture considers its multipliers.
     progress : callable
-        Called with the name of each step, and 0 and 0.
+        Called with the name of each step, 0 and 0.
 
     Raises
     ------
     SpecificationError
-        If there is no such core, realization or board, or the specification is wrong.
+        If the core, realization or board does not exist, or the specification is invalid.
     ShortfallError
-        If no word lengths keep to the error allowed.
+        If no word lengths meet the allowed error.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Inputs of a design by name: checked, brought to one shape, turned into codes and traces."""
+"""Inputs of a design by name: checked, broadcast to one shape, and converted to codes and traces."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def encoded(design: CoreDesign, inputs: Mapping[str, npt.ArrayLike]) -> Codes:
     Raises
     ------
     SpecificationError
-        If an input is missing, unknown, no number or not finite, or the shapes do not fit.
+        If an input is missing, unknown, not a number or not finite, or the shapes do not match.
     """
     columns = []
     for port, values in zip(design.datapath.inputs, _in_one_shape(design, inputs), strict=True):
@@ -34,12 +34,12 @@ def encoded(design: CoreDesign, inputs: Mapping[str, npt.ArrayLike]) -> Codes:
 
 
 def codes_of(design: CoreDesign, inputs: Mapping[str, npt.ArrayLike]) -> Codes:
-    """Return integer codes as they are, in the shape of `encoded`.
+    """Return integer codes unchanged, in the shape of `encoded`.
 
     Raises
     ------
     SpecificationError
-        As `encoded`, and if a code is no integer or outside the range of its input.
+        As `encoded`, or if a code is not an integer or is outside the range of its input.
     """
     columns = []
     for port, values in zip(design.datapath.inputs, _in_one_shape(design, inputs), strict=True):
@@ -59,7 +59,7 @@ def traces_of(
     seed: int,
     seconds: float | None,
 ) -> tuple[Trace, ...]:
-    """Make a trace for each channel from arrays, a file or a built-in trace's name.
+    """Make a trace for each channel from arrays, a file or the name of a built-in trace.
 
     Raises
     ------
@@ -80,7 +80,7 @@ def traces_of(
 
 
 def _in_one_shape(design: CoreDesign, inputs: Mapping[str, npt.ArrayLike]) -> list[npt.NDArray[np.generic]]:
-    """Arrays of all inputs in the order of the ports, broadcast to (samples,) or (samples, channels)."""
+    """Return arrays of all inputs in the order of the ports, broadcast to (samples,) or (samples, channels)."""
     names = [port.name for port in design.datapath.inputs]
     for name in inputs:
         if name not in names:

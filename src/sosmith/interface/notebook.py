@@ -1,4 +1,4 @@
-"""Small tables in HTML, as notebooks show an object: every text escaped, no script, no style sheet."""
+"""Small HTML tables that represent objects in notebooks: text is escaped; no scripts or style sheets."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from html import escape
 
 
 def table_html(title: str, rows: Iterable[Sequence[str]], header: Sequence[str] = ()) -> str:
-    """Return a table: `title` above it, the first cell of every row as its heading."""
+    """Return a table with the caption `title`; the first cell of each row is its heading."""
     head = "".join(f'<th scope="col">{escape(cell)}</th>' for cell in header)
     body = "".join(
         f'<tr><th scope="row">{escape(first)}</th>{"".join(f"<td>{escape(cell)}</td>" for cell in rest)}</tr>'

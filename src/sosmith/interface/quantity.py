@@ -4,12 +4,12 @@ from __future__ import annotations
 
 
 class Quantity(float):
-    """A float that knows its unit; it computes as a float, and the results are plain floats.
+    """A float with a unit; arithmetic on it gives plain floats.
 
     Attributes
     ----------
     unit : str
-        Such as "mm", "" for a plain number.
+        Unit such as "mm", or "" for a plain number.
 
     Examples
     --------
@@ -30,7 +30,7 @@ class Quantity(float):
         return made
 
     def __reduce__(self) -> tuple[type[Quantity], tuple[float, str]]:
-        """Let copies and pickles keep the unit."""
+        """Keep the unit in copies and pickles."""
         return type(self), (float(self), self.unit)
 
     def __repr__(self) -> str:

@@ -1,4 +1,4 @@
-"""What a co-simulation found: verdict, figures and samples."""
+"""Results of a co-simulation: verdict, figures and samples."""
 
 from __future__ import annotations
 
@@ -20,24 +20,24 @@ from sosmith.model.traces.trace import Trace
 
 @dataclass(frozen=True, eq=False)
 class Report:
-    """The outcome of `Design.simulate`.
+    """The results of `Design.simulate`.
 
-    Arrays hold one sample a row, shape (samples,) for one channel and (samples, channels) for several.
+    Arrays hold one sample per row, shape (samples,) for one channel and (samples, channels) for several.
 
     Attributes
     ----------
     summary : dict
         The content of ``report.json``.
     folder : Path
-        Where the files are, ``report.html`` among them.
+        Folder of the files, including ``report.html``.
     time : ndarray of float, shape (samples,)
         Time of each sample in s.
     input_codes : dict of str to ndarray of int
-        Codes that drove each input.
+        Codes applied to each input.
     hardware_codes : ndarray of int
-        Codes that the hardware put out.
+        Codes at the output of the hardware.
     hardware, exact : ndarray of float
-        The hardware's output and that of the exact chain in double precision, in the unit of the output.
+        Output of the hardware and exact result in double precision, in the unit of the output.
     unit : str
         Unit of the output.
     """
@@ -53,7 +53,7 @@ class Report:
 
     @classmethod
     def written(cls, design: CoreDesign, traces: Sequence[Trace], evidence: Evidence, folder: Path) -> Report:
-        """Write ``report.json`` and ``report.html`` into `folder`, and return what they tell."""
+        """Write ``report.json`` and ``report.html`` into `folder`, and return their content."""
         codes = np.stack([trace.codes for trace in traces], axis=1)
         channels = codes[:, 0] if len(traces) == 1 else codes
         return cls(
@@ -74,12 +74,12 @@ class Report:
 
     @property
     def passed(self) -> bool:
-        """Whether every sample equals the integer model, and errors and response are what the specification allows."""
+        """Whether every sample equals the integer model, and errors and response meet the specification."""
         return bool(self.summary["passed"])
 
     @property
     def shortfalls(self) -> tuple[str, ...]:
-        """Why it did not pass, a sentence each."""
+        """Reasons for not passing, one sentence each."""
         return tuple(self.summary["shortfalls"])
 
     @property
@@ -89,7 +89,7 @@ class Report:
 
     @property
     def error(self) -> npt.NDArray[np.float64]:
-        """Hardware minus exact, in the unit of the output."""
+        """Hardware minus exact result, in the unit of the output."""
         return self.hardware - self.exact
 
     @property

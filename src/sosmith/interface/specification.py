@@ -1,4 +1,4 @@
-"""What is asked for: a specification from a TOML file, from a dict, or around second-order sections."""
+"""Specifications from a TOML file, from a dict, or from second-order sections."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
 _UNNAMED = Path("specification")
-"""What messages call a specification that comes from no file."""
+"""Name in messages for a specification that does not come from a file."""
 
 
 @dataclass(frozen=True)
 class Specification:
     """A checked specification; make one with `load`, `from_sos` or `example`.
 
-    It is checked as a whole when it is made, and never changes. The keys are those of the TOML file: `sosmith init`
+    It is checked completely when it is made, and is immutable. The keys are those of the TOML file: `sosmith init`
     writes one with a comment on every key.
 
     Examples
@@ -51,7 +51,7 @@ class Specification:
     """
 
     checked: Checked = field(repr=False)
-    """The same with every number as an exact `fractions.Fraction`, as the rooms below take it."""
+    """The same specification with every number as an exact `fractions.Fraction`."""
 
     @classmethod
     def load(cls, source: str | PathLike[str] | Mapping[str, Any]) -> Specification:
@@ -60,13 +60,13 @@ class Specification:
         Parameters
         ----------
         source : path or mapping
-            Path of the file; or its content, where a float counts as the shortest decimal number that reads back as
-            the same float, and arrays of numpy count as lists.
+            Path of the file, or its content. A float is taken as the shortest decimal number that reads back as the
+            same float, and a numpy array as a list.
 
         Raises
         ------
         SpecificationError
-            For the first thing that is wrong, with the path of its key, what would be right and what was found.
+            For the first error, with the path of its key, what was expected and what was found.
         """
         if isinstance(source, Mapping):
             return cls(from_tree(_exact(source), _UNNAMED))
@@ -90,12 +90,12 @@ class Specification:
         architecture: str = "auto",
         clock: float = 12e6,
     ) -> Specification:
-        """Ask for hardware that computes given second-order sections, such as those of scipy.
+        """Specify hardware for given second-order sections, such as those from scipy.
 
         Parameters
         ----------
         sos : array_like, shape (sections, 6)
-            1 to 10 stable rows ``[b0, b1, b2, 1, a1, a2]``, as ``scipy.signal.butter(..., output="sos")`` gives them.
+            1 to 10 stable rows ``[b0, b1, b2, 1, a1, a2]``, as returned by ``scipy.signal.butter(..., output="sos")``.
         sample_rate : float
             Samples per second of each channel, in Hz.
         name : str
@@ -103,25 +103,25 @@ class Specification:
         channels : int
             Number of channels that share the hardware, 1 to 65536.
         input_bits, output_bits : int
-            Bits of a code, 2 to 32; the output has as many as the input unless it is told otherwise.
+            Bits per code, 2 to 32; by default the output has as many as the input.
         input_range, output_range : tuple of float
-            Physical values ``(low, high)`` that the codes divide into equal steps; the output takes the range of the
-            input unless it is told otherwise. A range with ``low == -high`` has signed codes, any other unsigned ones.
-            A result outside of the range is limited to it.
+            Physical range ``(low, high)``, divided into equal steps by the codes; by default the output has the range
+            of the input. A range with ``low == -high`` has signed codes, any other unsigned codes. Results outside the
+            range are limited to it.
         unit : str
-            Unit of input and output, at most 16 characters.
+            Unit of the input and the output, at most 16 characters.
         max_error : float or "faithful"
-            Largest allowed difference to the exact result, for all inputs in range, in `unit`; more than half a step
-            of the output. "faithful" stands for one step.
+            Largest allowed difference from the exact result, for all inputs in range, in `unit`; more than half an LSB
+            of the output. "faithful" means one LSB.
         realization, architecture : str
-            As the keys of ``[hardware]``; "auto" takes what is smallest.
+            As the keys in ``[hardware]``; "auto" chooses the smallest.
         clock : float
-            Clock of the hardware in Hz, at least `sample_rate`.
+            Clock frequency of the hardware in Hz, at least `sample_rate`.
 
         Raises
         ------
         SpecificationError
-            If a value is none of these.
+            If a value is invalid.
 
         Examples
         --------
@@ -169,15 +169,15 @@ class Specification:
 
     @classmethod
     def example(cls) -> Specification:
-        """Return the built-in example, the flange wear of a locomotive: what `sosmith init` writes."""
+        """Return the built-in example, the flange wear of a locomotive, as written by `sosmith init`."""
         import tomllib
 
         return cls(from_tree(tomllib.loads(example(), parse_float=Decimal), _UNNAMED))
 
     def replaced(self, **keys: Any) -> Specification:
-        """Return the specification with other values for some of its top-level keys; None leaves a key out.
+        """Return a copy with other values for some of the top-level keys; None removes a key.
 
-        A table takes the place of the whole table that was there.
+        A table replaces the whole previous table.
 
         Examples
         --------
@@ -206,7 +206,7 @@ class Specification:
 
     @property
     def inputs(self) -> dict[str, str]:
-        """Unit of each input, by its name, in the order of the hardware's fields."""
+        """Unit of each input by its name, in the order of the fields in the hardware."""
         return {port.name: port.unit for port in self.checked.inputs}
 
     @property
@@ -215,11 +215,11 @@ class Specification:
         return Quantity(float(self.checked.max_error), self.checked.output.unit)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the keys as they were given, in the types of JSON; `load` takes them again."""
+        """Return the keys as given, in JSON types; `load` accepts them."""
         return _plain(self.checked.source)
 
     def toml(self) -> str:
-        """Return the specification as the text of a TOML file; `load` reads the same from it."""
+        """Return the specification as the text of a TOML file; `load` reads back the same specification."""
         return toml_text(self.checked.source)
 
     def __repr__(self) -> str:
@@ -228,7 +228,7 @@ class Specification:
 
 
 def specification_of(source: Specification | str | PathLike[str] | Mapping[str, Any]) -> Specification:
-    """Return `source` itself if it is a specification, else what `Specification.load` makes of it."""
+    """Return `source` itself if it is a specification, otherwise load it with `Specification.load`."""
     return source if isinstance(source, Specification) else Specification.load(source)
 
 
@@ -240,17 +240,17 @@ def _format(bits: int, ends: Sequence[float]) -> dict[str, Any]:
 
 
 def _plain(tree: dict[str, Any]) -> dict[str, Any]:
-    """Copy nested tables, so that whoever changes them changes nothing here."""
+    """Copy nested tables, so that changes by the caller have no effect here."""
     return {key: _plain(value) if isinstance(value, dict) else value for key, value in tree.items()}
 
 
 def _exact(value: Any) -> Any:
-    """Return nested values as `tomllib` gives them, with every float as the `Decimal` that it is written as."""
+    """Return nested values as `tomllib` gives them, with every float as the `Decimal` that prints the same."""
     if isinstance(value, Mapping):
         return {str(key): _exact(item) for key, item in value.items()}
     if isinstance(value, str | bool | Decimal):
         return value
-    if hasattr(value, "tolist"):  # an array or a number of numpy
+    if hasattr(value, "tolist"):  # a numpy array or number
         return _exact(value.tolist())
     if isinstance(value, Integral):
         return int(value)

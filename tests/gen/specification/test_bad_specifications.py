@@ -71,7 +71,7 @@ FAMILIES = "one of butterworth, chebyshev1, chebyshev2, elliptic, bessel"
 FORMS = "given by order and cutoff, by passband_edge, stopband_edge, passband_loss and stopband_loss, or by sos"
 MARGIN = (
     "at least a millionth of the sample_rate (0.0001 Hz) away from 0 and from half the sample_rate,"
-    " as no word length holds a filter beyond"
+    " as no word length suffices for a filter closer to them"
 )
 NYQUIST = "above 0 and below half the sample_rate (50 Hz)"
 STABLE = "a stable section, |a2| < 1 and |a1| < 1 + a2"
@@ -146,7 +146,7 @@ BAD = [
         "",
         "filter.kind must be one of lowpass, highpass, bandpass, bandstop, not missing",
     ),
-    ("missing cutoff", CUT + "\n", "", "filter.cutoff must be given beside order, not missing"),
+    ("missing cutoff", CUT + "\n", "", "filter.cutoff must be given together with order, not missing"),
     ("name is a number", NAME, "name = 5", f"name must be {IDENTIFIER}, not 5"),
     ("name starts with a digit", NAME, 'name = "9lives"', f"name must be {IDENTIFIER}, not '9lives'"),
     ("name with a dollar", NAME, 'name = "a$b"', f"name must be {IDENTIFIER}, not 'a$b'"),
@@ -155,7 +155,7 @@ BAD = [
         "name is a keyword",
         NAME,
         'name = "module"',
-        f"name must be {IDENTIFIER}, none of the keywords of SystemVerilog, not 'module'",
+        f"name must be {IDENTIFIER}, and no keyword of SystemVerilog, not 'module'",
     ),
     (
         "name is too long",
@@ -308,31 +308,31 @@ BAD = [
         "calibration of one input",
         TEMP,
         "",
-        "input must be the two tables voltage and temperature beside [calibration], not 'voltage'",
+        "input must be the two tables voltage and temperature with [calibration], not 'voltage'",
     ),
     (
         "calibration of another input",
         "[input.temperature]",
         "[input.temp]",
-        "input must be the two tables voltage and temperature beside [calibration], not 'voltage', 'temp'",
+        "input must be the two tables voltage and temperature with [calibration], not 'voltage', 'temp'",
     ),
     (
         "two inputs without calibration",
         CAL,
         "",
-        "input must be one table where there is no [calibration], not 'voltage', 'temperature'",
+        "input must be a single table if there is no [calibration], not 'voltage', 'temperature'",
     ),
     (
         "no input",
         "[input.voltage]\n" + VOLT + "\n" + TEMP + CAL,
         "[input]\n",
-        "input must be one table where there is no [calibration], not none",
+        "input must be a single table if there is no [calibration], not none",
     ),
     (
         "input name is a keyword",
         "[input.voltage]\n" + VOLT + "\n" + TEMP + CAL,
         "[input.wire]\n" + VOLT + "\n",
-        f"input.wire must be named by {IDENTIFIER}, none of the keywords of SystemVerilog, not 'wire'",
+        f"input.wire must be named by {IDENTIFIER}, and no keyword of SystemVerilog, not 'wire'",
     ),
     (
         "input name is no identifier",
@@ -424,8 +424,8 @@ BAD = [
         "impulse invariance of a high-pass",
         KIND,
         'kind = "highpass"\nmethod = "impulse_invariant"',
-        "filter.kind must be lowpass with impulse_invariant, as all that an analog filter passes above half the"
-        " sample rate would fold back, not 'highpass'",
+        "filter.kind must be lowpass with impulse_invariant, as everything that the analog filter passes above half"
+        " the sample rate would alias, not 'highpass'",
     ),
     (
         "impulse invariance of a band-pass",
@@ -437,16 +437,16 @@ BAD = [
         "impulse invariance by edges",
         f"{FAM}\n{KO}",
         f'{FAM}\n{KIND}\nmethod = "impulse_invariant"\n' + EDGES.format(10.0, 45.0, 0.02, 60.0),
-        "filter must be given by order and cutoff with impulse_invariant, whose aliases no formula for the minimum"
-        " order knows, not by edges",
+        "filter must be given by order and cutoff with impulse_invariant, as no formula for the minimum order"
+        " covers its aliasing, not by edges",
     ),
     (
         "impulse invariance of an even elliptic filter",
         f"{FAM}\n{KO}",
         f'family = "elliptic"\n{KIND}\nmethod = "impulse_invariant"\npassband_loss = 0.5\nstopband_loss = 60\n'
         "order = 4\ncutoff = 10.0",
-        "filter.order must be odd for elliptic with impulse_invariant, as an even one passes a part of all high"
-        " frequencies, not 4",
+        "filter.order must be odd for elliptic with impulse_invariant, as the gain of an even one does not fall"
+        " to zero, not 4",
     ),
     (
         "unknown method",
@@ -513,25 +513,25 @@ BAD = [
         "ripple of a Butterworth",
         ORD,
         ORD + "\npassband_loss = 0.1",
-        "filter.passband_loss must be left out beside order and cutoff for butterworth, not 0.1",
+        "filter.passband_loss must be left out with order and cutoff for butterworth, not 0.1",
     ),
     (
         "no ripple of a Chebyshev",
         FAM,
         'family = "chebyshev1"',
-        "filter.passband_loss must be given in dB beside order and cutoff for chebyshev1, not missing",
+        "filter.passband_loss must be given in dB with order and cutoff for chebyshev1, not missing",
     ),
     (
         "no stopband loss of an inverse Chebyshev",
         FAM,
         'family = "chebyshev2"',
-        "filter.stopband_loss must be given in dB beside order and cutoff for chebyshev2, not missing",
+        "filter.stopband_loss must be given in dB with order and cutoff for chebyshev2, not missing",
     ),
     (
         "no stopband loss of an elliptic",
         FAM,
         'family = "elliptic"\npassband_loss = 0.1',
-        "filter.stopband_loss must be given in dB beside order and cutoff for elliptic, not missing",
+        "filter.stopband_loss must be given in dB with order and cutoff for elliptic, not missing",
     ),
     (
         "losses of an elliptic the wrong way round",
@@ -556,13 +556,13 @@ BAD = [
         "no stopband edge",
         OC,
         "passband_edge = 1.0\npassband_loss = 0.1\nstopband_loss = 60.0",
-        "filter.stopband_edge must be given beside passband_edge, passband_loss and stopband_loss, not missing",
+        "filter.stopband_edge must be given together with passband_edge, passband_loss and stopband_loss, not missing",
     ),
     (
         "no passband loss",
         OC,
         "passband_edge = 1.0\nstopband_edge = 2.0\nstopband_loss = 60.0",
-        "filter.passband_loss must be given beside passband_edge, stopband_edge and stopband_loss, not missing",
+        "filter.passband_loss must be given together with passband_edge, stopband_edge and stopband_loss, not missing",
     ),
     (
         "loss zero",
@@ -670,7 +670,7 @@ BAD = [
         "sections beside a loss",
         OC,
         "passband_loss = 1\nsos = [[1, 2, 1, 1, 0, 0]]",
-        "filter.passband_loss must be left out beside sos, not 1",
+        "filter.passband_loss must be left out with sos, not 1",
     ),
     (
         "no section",
@@ -706,7 +706,7 @@ BAD = [
         "section of zeros",
         OC,
         "sos = [[0, 0.0, 0, 1, 0.5, 0]]",
-        "filter.sos[0] must be a section with a b that is not zero, not b0 = b1 = b2 = 0",
+        "filter.sos[0] must be a section with at least one nonzero b, not b0 = b1 = b2 = 0",
     ),
     (
         "section with a pole at 1",
@@ -730,7 +730,7 @@ BAD = [
         "max_error of a third of an LSB",
         UNIT,
         UNIT + "\nmax_error = 8e-5",
-        "output.max_error must be more than half an LSB of the output (0.0001220703125), which its"
+        "output.max_error must be more than half an LSB of the output (0.0001220703125), which output"
         " rounding alone takes, not 8e-05",
     ),
     ("max_error zero", UNIT, UNIT + "\nmax_error = 0", f"output.max_error must be {MAX_ERROR}, not 0"),
@@ -842,7 +842,7 @@ BAD = [
         "limit beyond the output",
         UNIT,
         UNIT + "\n[wear]\ninitial = 8\nwarning = 7\nlimit = 9",
-        "wear.limit must be at most 7.999755859375, so that the output can show it, not 9",
+        "wear.limit must be at most 7.999755859375, so that the output can represent it, not 9",
     ),
     (
         "sensor blind before the warning",
@@ -869,12 +869,12 @@ BAD = [
         "line 18, column 10 must be valid TOML, not a syntax error: cannot overwrite a value",
     ),
     ("list without end", BASE, "a = [1, 2", "line 1 must be valid TOML, not a syntax error: unclosed array"),
-    ("empty", BASE, "", "the specification must hold the keys of a specification, not nothing"),
+    ("empty", BASE, "", "the specification must have keys, not be empty"),
     (
         "comments alone",
         BASE,
         "# nothing\n\n",
-        "the specification must hold the keys of a specification, not nothing",
+        "the specification must have keys, not be empty",
     ),
     ("whole number of 5000 digits", ORD, "order = " + "9" * 5000, f"{REASON}"),
     ("lists a thousand deep", ORD, "order = " + "[" * 5000, f"{REASON}"),

@@ -159,17 +159,8 @@ def test_verification_has_nothing_in_common_with_the_proof() -> None:
         "print(*sorted(name.removeprefix('sosmith.') for name in sys.modules if name.startswith('sosmith.')))"
     )
     loaded = subprocess.run([sys.executable, "-c", program], check=True, capture_output=True, text=True).stdout.split()
-    assert loaded == [
-        "gen",
-        "gen.certificate_file",
-        "gen.l1_response",
-        "gen.verification",
-        "gen.verified_graph",
-        "gen.verified_polynomial",
-        "model",
-        "model.errors",
-        "model.graph",
-    ]
+    assert [name for name in loaded if not name.startswith("gen.verifier")] == ["gen", "model", "model.errors"]
+    assert "gen.verifier.verification" in loaded
 
 
 # Any number that matters.

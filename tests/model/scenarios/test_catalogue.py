@@ -264,7 +264,7 @@ def test_seconds_give_the_length() -> None:
             INSTRUMENT,
             {},
             "scenario for an instrument must be one of bench_43_50, bench_92_96, temperature_ramp, "
-            "wear_ramp, worst_case, worst_case_errors, not 'bench'",
+            "wear_ramp, worst_case, worst_case_errors, not 'bench' (did you mean bench_92_96?)",
         ),
         (
             "wear_ramp",

@@ -1,1 +1,1 @@
-"""The tables that commands print, one file a subject; a command loads its own when it has something to print."""
+"""The tables that commands print, one file per subject; a command imports its own when it prints."""

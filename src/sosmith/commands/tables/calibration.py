@@ -17,7 +17,7 @@ def _mm(value: float | None) -> str:
 
 
 def print_calibration(made: Calibration) -> None:
-    """Print the figures of a version, and the measurements that it fits worst."""
+    """Print the figures of a version, and the measurements with the largest residuals."""
     version, quality = made.version, made.quality
     console = TableConsole()
     state = "new" if made.new else "unchanged"
@@ -38,9 +38,11 @@ def print_calibration(made: Calibration) -> None:
     overview.add_row("cells with measurements", f"{cells} of {CELLS} x {CELLS}")
     mean = len(terms_of(made.fit.orders)) / version.measurements
     high = len(quality.high_leverage)
-    overview.add_row("leverage, largest", f"{quality.leverage.max():.4f} (mean {mean:.4f}; {high} above 3 times that)")
+    overview.add_row(
+        "leverage, largest", f"{quality.leverage.max():.4f} (mean {mean:.4f}; {high} above three times the mean)"
+    )
     if version.robust:
-        overview.add_row("weighted down", f"{sum(weight < 1 for weight in made.fit.weights):,}")
+        overview.add_row("given less weight", f"{sum(weight < 1 for weight in made.fit.weights):,}")
     for number, drift in sorted(made.drift.items(), reverse=True)[:5]:
         overview.add_row(f"drift from version {number}", _mm(drift))
     console.print(overview)

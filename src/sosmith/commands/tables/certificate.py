@@ -1,4 +1,4 @@
-"""The table of a certificate that has been proven."""
+"""The table of a proven certificate."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from sosmith.interface.quantity import Quantity
 
 
 def print_proof(certificate: Certificate, proof: Proof) -> None:
-    """Print the proven budget, and how many ranges were checked."""
+    """Print the proven error budget, and the number of ranges checked."""
     console = TableConsole()
     ranges = f"{proof.nodes} nodes within their ranges, {proof.ranges} by peak gains: nothing inside overflows"
     print_budget(

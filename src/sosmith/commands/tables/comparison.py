@@ -9,7 +9,7 @@ from sosmith.interface.comparison import Comparison
 
 
 def print_comparison(comparison: Comparison) -> None:
-    """Print a row for each property, the best reports of a row in green."""
+    """Print one row per property, with the best values in green."""
     table = new_table("Accuracy reports", ["", *map(escape, comparison.names)])
     for row in comparison.rows:
         cells = [

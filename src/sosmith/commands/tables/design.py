@@ -20,7 +20,7 @@ from sosmith.model.port import Port
 
 
 def print_design(design: Design, *, brief: bool = False) -> None:
-    """Print what follows from a specification; `brief` leaves out sections, limit cycles and schedule."""
+    """Print a design; `brief` leaves out sections, limit cycles and schedule."""
     console, made = TableConsole(), design.core
     quantized, datapath = made.quantized, made.datapath
     unit = escape(f" {datapath.output.unit}") if datapath.output.unit else ""
@@ -66,7 +66,7 @@ def print_design(design: Design, *, brief: bool = False) -> None:
 
 
 def _wear_text(wear: WearSpec, output: Port) -> str:
-    """Say from which clearances on the flags of wear rise: one for all channels, or from the least to the largest."""
+    """Return the clearances at which the wear flags are set: one value, or the range over the channels."""
     unit = f" {output.unit}".rstrip()
 
     def span(values: Sequence[Fraction]) -> str:
@@ -78,7 +78,7 @@ def _wear_text(wear: WearSpec, output: Port) -> str:
 
 
 def _hardware_rows(architecture: Architecture) -> list[tuple[str, str]]:
-    """Say what the hardware has, before synthesis."""
+    """Return the resources of the hardware, before synthesis."""
     program, cost = architecture.program, cost_of(architecture.datapath)
     latency = ("latency", f"{architecture.latency_cycles:,} clocks")
     if program is None:
@@ -122,7 +122,7 @@ def _print_limit_cycles(console: Console, cycles: Sequence[LimitCycleFacts], lsb
 
 
 def print_budget(console: Console, budget: Mapping[str, Quantity], lsb: Fraction, max_error: Quantity) -> None:
-    """Print the parts of an error bound, in the output's unit and in its steps, and what is allowed."""
+    """Print the parts of an error bound and the allowed error, in the output's unit and in LSB."""
     table = new_table(
         "Error budget, proven for all inputs in range", ["part", escape(max_error.unit) or "full scale 1", "output LSB"]
     )

@@ -1,4 +1,4 @@
-"""The table of a set of constants that may be loaded."""
+"""The table of a set of coefficients that may be loaded."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from sosmith.gen.specification.specification import Specification
 
 
 def print_swap(made: CoreDesign, wanted: Specification, swap: Swap, tree: dict[str, Any]) -> None:
-    """Print the bound with the new set, and how long the swap takes; `tree` is what the file holds."""
+    """Print the error bound of the new set and the transient of the swap; `tree` is the content of the file."""
     console = TableConsole()
     output, quantized = made.datapath.output, swap.made.quantized
     unit = escape(f" {output.unit}".rstrip())
@@ -25,10 +25,10 @@ def print_swap(made: CoreDesign, wanted: Specification, swap: Swap, tree: dict[s
     table.add_row("headroom", f"{float(allowed - bound):.3g}{unit}, {float(100 * (1 - bound / allowed)):.1f} %")
     if swap.samples:
         seconds = swap.samples / float(made.spec.sample_rate)
-        table.add_row("transient", f"{swap.samples:,} samples, {seconds:.3g} s, until the bound holds")
+        table.add_row("transient", f"{swap.samples:,} samples, {seconds:.3g} s, until the bound holds again")
     else:
-        table.add_row("transient", "none, the bound holds from the first sample on")
-    table.add_row("states", f"take at most {100 * float(swap.use):.3g} % of what their words hold")
+        table.add_row("transient", "none, the bound holds from the first sample")
+    table.add_row("states", f"use at most {100 * float(swap.use):.3g} % of their range")
     crc = tree["writes"][-1][1]
     table.add_row("load", f"version {tree['version']}, {tree['words']:,} words, CRC 0x{crc:08X}")
     table.add_row("for the design", f"0x{tree['design']:08X}")

@@ -1,4 +1,4 @@
-"""The table of a co-simulation's outcome."""
+"""The table of a co-simulation's results."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def print_summary(summary: dict[str, Any]) -> None:
     verdict = "[bold green]passed[/]" if summary["passed"] else "[bold red]fell short[/]"
     table = new_table(f"{summary['name']}: {verdict}", ["", ""])
     exact = (
-        "yes, every one"
+        "yes, all"
         if summary["bit_exact"]
         else f"no: {summary['mismatches']} differ, the first at {summary['first_mismatch']}"
     )
@@ -36,6 +36,8 @@ def print_summary(summary: dict[str, Any]) -> None:
     for reason in summary["shortfalls"]:
         table.add_row("[red]short[/]", escape(reason))
     gates = "" if summary["gates"] is None else f", the netlist for {summary['gates']}"
-    speed = f"{summary['simulator']}{gates}, {summary['cycles']} clocks at {summary['cycles_per_second']:.3g} a second"
+    speed = (
+        f"{summary['simulator']}{gates}, {summary['cycles']} clocks at {summary['cycles_per_second']:.3g} per second"
+    )
     table.add_row("simulated in", speed)
     TableConsole().print(table)

@@ -1,4 +1,4 @@
-"""The tables of spectra, and of the filter proposed."""
+"""The tables of spectra, and of the proposed filter."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from sosmith.gen.spectrum.survey import SignalSpectra
 from sosmith.gen.spectrum.trial import Trial
 
 _NOTHING = 1e-9
-"""Below this, in any unit, a figure is what rounding left of zero."""
+"""Figures below this, in any unit, are rounding errors of zero."""
 
 
 def print_signals(signals: Sequence[SignalSpectra]) -> None:
-    """Print rms and largest amplitudes of every signal."""
+    """Print the rms and the largest amplitudes of each signal."""
     first = signals[0].spectra["measured"]
     table = new_table(
         f"Spectra of {first.averages} segments of {1 / first.step:.4g} s; the density of noise lies within "
@@ -36,7 +36,7 @@ def print_signals(signals: Sequence[SignalSpectra]) -> None:
 
 
 def print_proposal(proposal: Proposal, signals: Sequence[SignalSpectra], trials: Sequence[Trial | None]) -> None:
-    """Print the numbers of the filter with their reasons, and the error that is left."""
+    """Print the parameters of the filter with their reasons, and the remaining error."""
     console = TableConsole()
     made, wish, unit = proposal.filter, proposal.wish, signals[0].signal.unit
     table = new_table(
@@ -45,8 +45,10 @@ def print_proposal(proposal: Proposal, signals: Sequence[SignalSpectra], trials:
     for choice in proposal.choices:
         table.add_row(choice.key.replace("_", " "), f"{choice.value:.5g} {choice.unit}", escape(choice.reason))
     assert made.cutoff is not None
-    table.add_row("order", str(made.order), f"the least for these, with its cutoff at {made.cutoff[0]:.5g} Hz (-3 dB)")
-    table.add_row("group delay", f"{proposal.delay:.4g} s", "at zero frequency: by so much the output is late")
+    table.add_row(
+        "order", str(made.order), f"the minimum for these, with the cutoff at {made.cutoff[0]:.5g} Hz (-3 dB)"
+    )
+    table.add_row("group delay", f"{proposal.delay:.4g} s", "at zero frequency: the delay of the output")
     console.print(table)
     checks = new_table(
         f"Error at the output, rms in {unit or 'the unit of the signal'}",

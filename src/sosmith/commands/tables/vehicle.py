@@ -1,4 +1,4 @@
-"""The tables of a run of the vehicle: modes, largest motions, the paper beside ours."""
+"""The tables of a run of the vehicle: modes, largest motions, comparison with the paper."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from sosmith.gen.paper.comparison import Comparison
 from sosmith.model.vehicle.linear_motion import Mode
 
 SWINGING = 0.999
-"""Damping ratio from which on a mode is not listed by itself: its motion is gone before it comes back."""
+"""Damping ratio from which on a mode is not listed separately: it hardly oscillates."""
 
 
 def print_run(made: VehicleRun, tables: Mapping[int, tuple[Comparison, ...]]) -> None:
@@ -33,12 +33,12 @@ def _modes_table(title: str, modes: tuple[Mode, ...]) -> Table:
             table.add_row(f"{mode.frequency:.3f}", f"{mode.damping:.3f}", f"{mode.growth:.3f}", mode.coordinate)
     still = [mode.growth for mode in modes if mode.damping >= SWINGING]
     if still:
-        table.add_row("-", "1", f"{min(still):.1f} to {max(still):.1f}", "others, which do not swing")
+        table.add_row("-", "1", f"{min(still):.1f} to {max(still):.1f}", "other modes, without oscillation")
     return table
 
 
 def _wheelsets_table(made: VehicleRun) -> Table:
-    """Largest motions of the wheelsets, and how far they are beyond the model."""
+    """Largest motions of the wheelsets, and how far they exceed the limits of the model."""
     most, found = largest(made.motion), made.limits
     table = new_table("Largest motion of the wheelsets", ["", *map(str, range(1, 7))])
     rows = {
@@ -58,7 +58,7 @@ def _wheelsets_table(made: VehicleRun) -> Table:
 
 
 def _bodies_table(made: VehicleRun) -> Table:
-    """Largest motions of frames and body."""
+    """Largest motions of the frames and the body."""
     most = largest(made.motion)
     parts = ("frame1", "frame2", "body")
     table = new_table("Largest motion of frames and body", ["", "frame 1", "frame 2", "body"])
@@ -69,9 +69,11 @@ def _bodies_table(made: VehicleRun) -> Table:
 
 
 def _comparison_table(tables: Mapping[int, tuple[Comparison, ...]]) -> Table:
-    """Figures of the paper and ours, and below them the reasons."""
+    """Figures of the paper and ours, with the reasons below."""
     reasons = list(dict.fromkeys(one.explanation for rows in tables.values() for one in rows))
-    table = new_table("Beside the paper's tables 5 to 8", ["table", "", "unit", "paper", "ours", "label", "why"])
+    table = new_table(
+        "Comparison with the paper's tables 5 to 8", ["table", "", "unit", "paper", "ours", "label", "why"]
+    )
     for number, rows in tables.items():
         for one in rows:
             why = str(reasons.index(one.explanation) + 1)

@@ -25,13 +25,13 @@ def print_wear(record: WearRecord, report: WearReport, channel: int) -> None:
     table.add_row("rate", f"{rate.rate:.3g} mm a day ({interval}), {_yearly(rate.rate)} mm a year")
     table.add_row(
         "taken from",
-        f"{rate.blocks} blocks that scatter by {rate.scatter:.2g} mm, neighbours correlated by {rate.correlation:.2f}",
+        f"{rate.blocks} blocks, scatter {rate.scatter:.2g} mm, neighbours correlated by {rate.correlation:.2f}",
     )
     if (fall := report.fall) is not None:
         table.add_row(
             "fall",
-            f"{fall.size:.3g} mm, {fall.window:.4g} days ago, as when a wheel is turned or a sensor mounted anew: take "
-            f"the rate from there on by --window {fall.window:.6g}",
+            f"{fall.size:.3g} mm, {fall.window:.4g} days ago, as after turning a wheel or remounting a sensor: use "
+            f"--window {fall.window:.6g} to take the rate from there on",
         )
     table.add_row("remaining life", _life(report))
     table.add_row("state", f"{report.state}: the last reading is {report.last:.4g} mm")
@@ -65,4 +65,4 @@ def _life(report: WearReport) -> str:
         return f"no end in sight{least}"
     low = "0" if report.life_low is None else f"{report.life_low:.4g}"
     high = "no end in sight" if report.life_high is None else f"{report.life_high:.4g}"
-    return f"{report.life:.4g} days ({low} to {high}), if wear goes on so"
+    return f"{report.life:.4g} days ({low} to {high}), if wear continues at this rate"
