@@ -1,1 +1,1 @@
-"""Filter design, from the specification to second-order sections, correctly rounded, and their frequency response."""
+"""Filter design, from the specification to correctly rounded second-order sections, and their frequency response."""

@@ -29,11 +29,11 @@ from sosmith.model.errors import ShortfallError, SpecificationError
 
 Array = npt.NDArray[np.float64]
 
-_MAX_RESPONSE = 1 << 24  # samples; poles closer to the unit circle than this resolves are refused
-_DECAY = 1e-12  # where an impulse response counts as over, of its envelope
-_COMFORTABLE = 20  # samples per period of the band edge: word lengths hardly fall with fewer
-_UNITY = 1e-14  # relative distance at which the gain of given sections counts as one: their rounding, not intent
-_GRID = 2048  # frequencies up to half the sample rate at which given sections are looked at
+_MAX_RESPONSE = 1 << 24  # samples; poles so close to the unit circle that responses are longer are refused
+_DECAY = 1e-12  # relative to its envelope, where an impulse response counts as decayed
+_COMFORTABLE = 20  # samples per period of the band edge; fewer hardly reduce the word lengths
+_UNITY = 1e-14  # relative distance within which the gain of given sections counts as one: rounding, not intent
+_GRID = 2048  # frequencies up to half the sample rate at which given sections are evaluated
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,19 +45,19 @@ class Filter:
     sample_rate : float
         Hz.
     family, kind : str
-        As in the specification; ``"sections"`` where the sections were given.
+        As in the specification; ``"sections"`` if the sections were given.
     order : int
         Number of poles.
     cutoff : tuple of float or None
-        Hz, as the family defines it; None where the sections were given.
+        Hz, as the family defines it; None if the sections were given.
     passband_edge, stopband_edge : tuple of float or None
-        Hz, where the specification states them.
+        Hz; None if the specification does not state them.
     passband_loss, stopband_loss : float or None
         dB, likewise.
     rows : tuple of tuple of float
         (b0, b1, b2, 1, a1, a2) per section, in the order of the cascade.
     aliasing : Aliasing or None
-        How far an impulse-invariant filter is from its analog model; None for every other.
+        Deviation of an impulse-invariant filter from its analog model; None for all others.
     """
 
     sample_rate: float
@@ -74,12 +74,12 @@ class Filter:
 
     @property
     def sos(self) -> Array:
-        """Sections as scipy wants them, shape (sections, 6)."""
+        """Sections in scipy's form, shape (sections, 6)."""
         return np.array(self.rows, dtype=np.float64)
 
     @cached_property
     def impulse_response(self) -> Array:
-        """Impulse response, long enough that what follows is below 1e-12 of its envelope."""
+        """Impulse response, until it has decayed below 1e-12 of its envelope."""
         return impulse_response(self.sos)
 
     @property
@@ -90,9 +90,9 @@ class Filter:
 
     @property
     def decimation(self) -> int:
-        """Largest power of two to divide the sample rate by that leaves the upper band edge below a twentieth of it.
+        """Largest power-of-two decimation that leaves the upper band edge below a twentieth of the sample rate.
 
-        1 if there is none, and where the filter passes all high frequencies or its cutoff is not known.
+        1 if there is none, if the filter passes high frequencies, or if its cutoff is not known.
         """
         if self.cutoff is None or self.kind not in {"lowpass", "bandpass"}:
             return 1
@@ -100,7 +100,7 @@ class Filter:
 
     @property
     def describe(self) -> str:
-        """One line for people: family, kind, order, cutoff, sample rate, and the method if it is not the usual one."""
+        """One-line description: family, kind, order, cutoff, sample rate, and the method if it is not the default."""
         if self.cutoff is None:
             return f"{len(self.rows)} given sections at {self.sample_rate:g} Hz"
         edges = " to ".join(f"{edge:.6g}" for edge in self.cutoff)
@@ -137,7 +137,7 @@ def decay_length(sos: Array) -> int:
 
 def _radius(a1: float, a2: float) -> float:
     """Magnitude of the larger pole of a section."""
-    square = Fraction(a1) ** 2 - 4 * Fraction(a2)  # exact: nearly equal poles differ by the root of it
+    square = Fraction(a1) ** 2 - 4 * Fraction(a2)  # exact: nearly equal poles differ by its square root
     return math.sqrt(a2) if square < 0 else (abs(a1) + math.sqrt(square)) / 2
 
 
@@ -150,7 +150,7 @@ def prewarp(frequency: float, sample_rate: float) -> float:
 
 
 def unwarp(angular: float, sample_rate: float) -> float:
-    """Frequency in Hz to which the bilinear transformation maps `angular` in rad/s; undoes `prewarp`."""
+    """Frequency in Hz to which the bilinear transformation maps `angular` in rad/s; the inverse of `prewarp`."""
     return sample_rate / math.pi * math.atan(angular / (2 * sample_rate))
 
 
@@ -173,7 +173,7 @@ def minimum_order(
     order : int
         Number of poles.
     cutoff : float
-        Hz, at -3 dB; the pass-band edge is met exactly, the stop-band edge with what is left over.
+        Hz, at -3 dB; the pass-band edge is met exactly, the stop-band edge with margin.
     """
     fs = Fraction(sample_rate)
 
@@ -197,7 +197,7 @@ def design(spec: FilterSpec, sample_rate: Fraction | float) -> Filter:
     ----------
     spec : FilterSpec
     sample_rate : Fraction or float
-        Hz; taken exactly.
+        Hz; used exactly.
 
     Raises
     ------
@@ -255,7 +255,7 @@ def _order_and_edges(spec: FilterSpec, fs: Fraction) -> tuple[int, tuple[arb, ..
     """Order of the prototype, and pre-warped edges as the family defines them."""
     if spec.order is not None and spec.cutoff is not None:
         return spec.order, tuple(warped(edge, fs) for edge in spec.cutoff)
-    # The specification has checked that these come together.
+    # The specification has checked that these are given together.
     assert spec.passband_edge is not None
     assert spec.stopband_edge is not None
     assert spec.passband_loss is not None
@@ -295,9 +295,9 @@ def _poles(rows: Sequence[Row]) -> int:
 
 
 def _normalized(rows: Sequence[Row]) -> tuple[str, tuple[Row, ...]]:
-    """Kind of given sections, and the sections with unity gain where the filter passes.
+    """Kind of given sections, and the sections scaled to unity gain in the pass band.
 
-    The kind follows from where the gain is largest. What is left of the gain goes to the first section.
+    The kind follows from the frequency of the largest gain. The first section takes the remaining gain.
     """
     # cos and sin of the grid from 0 to just below half the sample rate
     grid = [acb(arb.cos_pi_fmpq(fmpq(k, _GRID)), arb.sin_pi_fmpq(fmpq(k, _GRID))) for k in range(_GRID)]
@@ -311,7 +311,7 @@ def _normalized(rows: Sequence[Row]) -> tuple[str, tuple[Row, ...]]:
     made, total = [], arb(1)
     for row in rows:
         response = _response([row], z)
-        # with its sign where the response is real, so that a section may turn the sign without loss of its unity gain
+        # If the response is real, its sign is kept, so that a section that inverts the signal also has unity gain.
         gain = abs(response) if kind == "bandpass" else response.real
         if sign(gain) == 0:
             made.append([arb(b) for b in row[:3]])

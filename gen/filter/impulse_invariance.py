@@ -4,10 +4,10 @@ With the analog filter in partial fractions (simple poles, more poles than zeros
 
     H_a(s) = sum of R_i / (s - p_i)   ->   H(z) = T * sum of R_i / (1 - exp(p_i T) z^-1)
 
-What the analog filter passes above half the sample rate folds back: `Aliasing` says how much.
+The response of the analog filter above half the sample rate is aliased; `Aliasing` says by how much.
 
-The zeros of H(z) are nearly those of Euler's polynomials, and at low cutoffs the sum is by many orders of magnitude
-smaller than its terms: hence ball arithmetic, with as many bits as that takes.
+The zeros of H(z) are close to those of Euler's polynomials, and at low cutoffs the sum is smaller than its terms by
+many orders of magnitude. It is therefore computed in ball arithmetic with sufficient precision.
 
 References
 ----------
@@ -30,23 +30,23 @@ _GRID = 512
 """Points of each of the two grids on which responses are compared, one even and one logarithmic."""
 
 _DECADES = 2
-"""How far the logarithmic grid reaches below the slowest pole."""
+"""Decades that the logarithmic grid extends below the slowest pole."""
 
 _UNITY = 1e-9
-"""Relative distance at which the gain at zero frequency counts as one: such an alias is no reason for hardware that
-tells them apart."""
+"""Relative distance within which the gain at zero frequency counts as one: so little aliasing does not justify extra
+hardware."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Aliasing:
-    """How far an impulse-invariant filter is from its analog model, up to half the sample rate.
+    """Deviation of an impulse-invariant filter from its analog model, up to half the sample rate.
 
     Attributes
     ----------
     max_deviation : float
-        Largest difference of the two magnitudes, as a part of the analog filter's largest.
+        Largest difference of the two magnitudes, relative to the largest magnitude of the analog filter.
     dc_error : float
-        Gain at zero frequency minus the analog filter's, as a part of the latter.
+        Gain at zero frequency minus that of the analog filter, relative to the latter.
     """
 
     max_deviation: float
@@ -61,18 +61,18 @@ def impulse_invariant(prototype: Prototype, ratio: Fraction) -> tuple[Row, ...]:
     prototype : Prototype
         More poles than zeros; poles simple, in the left half-plane, at most one of them real.
     ratio : Fraction
-        Cutoff as a part of the sample rate, not pre-warped.
+        Cutoff divided by the sample rate, not pre-warped.
 
     Returns
     -------
     tuple of tuple of float
-        (b0, b1, b2, 1, a1, a2); poles closest to the unit circle last, as scipy has them. Each section has unity gain
-        at zero frequency, except that the first takes what is left of the gain.
+        (b0, b1, b2, 1, a1, a2); poles closest to the unit circle come last, as in scipy. Each section has unity gain
+        at zero frequency, except the first, which takes the remaining gain.
 
     Raises
     ------
     ValueError
-        If there are not more poles than zeros.
+        If the poles do not outnumber the zeros.
     UndecidedError
         If the precision is too low.
     """
@@ -83,13 +83,13 @@ def impulse_invariant(prototype: Prototype, ratio: Fraction) -> tuple[Row, ...]:
 
 
 def aliasing(prototype: Prototype, ratio: Fraction) -> Aliasing:
-    """Say how far the filter of `impulse_invariant` is from its analog model; parameters and errors as there."""
+    """Compare the filter of `impulse_invariant` with its analog model; parameters and errors as there."""
     sampled = _Sampled.of(prototype, ratio)
     model = sampled.model
     level = prototype.dc_gain
     dc_error = nearest_double(sampled(acb(1)).real / level - 1)
     slowest = _smallest([abs(pole) for pole in model.poles])
-    start = _smallest([slowest / arb.pi(), arb(1)]) / 10**_DECADES  # as a part of half the sample rate
+    start = _smallest([slowest / arb.pi(), arb(1)]) / 10**_DECADES  # relative to half the sample rate
     even = [arb(k) / (_GRID - 1) for k in range(_GRID)]
     worst, largest = arb(0), arb(0)
     for place in (*even, *(start ** (1 - place) for place in even)):
@@ -117,7 +117,7 @@ class _Analog:
 
     @classmethod
     def of(cls, prototype: Prototype, scale: arb) -> _Analog:
-        """Move the edge to `scale`."""
+        """Scale a prototype so that its edge is at `scale`."""
         zeros = tuple(zero * scale for zero in prototype.zeros)
         real = [acb(pole * scale) for pole in prototype.real_poles]
         upper = [pole * scale for pole in prototype.pole_pairs]
@@ -178,7 +178,7 @@ def _sections(numerator: acb_poly, prototype: Prototype, scale: arb) -> list[Sec
 
 
 def _numerator(model: _Analog, denominators: Sequence[acb_poly]) -> acb_poly:
-    """Numerator of one degree less than there are poles."""
+    """Numerator, whose degree is the number of poles minus one."""
     total = acb_poly([])
     for i, pole in enumerate(model.poles):
         residue = acb(model.gain)
@@ -200,7 +200,7 @@ def _product(polynomials: Sequence[acb_poly]) -> acb_poly:
 
 @dataclass(frozen=True)
 class _Group:
-    """A factor of the numerator in w, and its zeros in the plane of z."""
+    """A factor of the numerator in w, and its zeros in the z-plane."""
 
     factor: acb_poly
     zeros: tuple[acb, ...]
@@ -212,11 +212,11 @@ def _section(group: _Group, denominator: acb_poly) -> Section:
 
 
 def _zero_groups(numerator: acb_poly, *, delayed: bool) -> list[_Group]:
-    """Factors of degree 2, and one of a lower degree if need be, up to a constant.
+    """Factors of degree 2, and one of a lower degree if necessary, up to a constant.
 
-    Real zeros lie in nearly reciprocal pairs; the outermost go together, which balances their coefficients. Where
-    the analog impulse response starts at zero, so that the filter has one sample of delay, this goes with what is
-    left over.
+    Real zeros lie in nearly reciprocal pairs; the outermost are paired, which balances their coefficients. If the
+    analog impulse response starts at zero, the filter has one sample of delay, which is combined with the unpaired
+    zero, if any.
     """
     constant = 1 if delayed else 0
     rest = acb_poly([numerator[k] for k in range(constant, numerator.degree() + 1)])
@@ -237,9 +237,9 @@ def _size_and_side(zero: acb) -> tuple[float, float]:
 
 
 def _roots(polynomial: acb_poly) -> list[acb]:
-    """Roots of a polynomial with real coefficients, real ones as such.
+    """Roots of a polynomial with real coefficients; real roots have an imaginary part of exactly zero.
 
-    The balls are disjoint, so one that meets the real axis holds its own conjugate: it encloses a real root.
+    The balls are disjoint, so one that intersects the real axis contains the conjugate of its root: the root is real.
     """
     try:
         roots: list[acb] = polynomial.roots(tol=2.0 ** -min(ctx.prec // 2, 1000), maxprec=2 * ctx.prec)

@@ -1,7 +1,7 @@
-"""Minimum order and edges of a filter from the edges of its pass and stop band and the losses there.
+"""Minimum order and edges of a filter from its pass-band and stop-band edges and losses.
 
-The paper's equations 10 to 13 for a Butterworth low-pass; for every other family and kind, what `scipy.signal.buttord`
-and its kin compute, in ball arithmetic.
+For a Butterworth low-pass, these are the paper's equations 10 to 13; for all other families and kinds, the results of
+`scipy.signal.buttord` and similar functions. All are computed in ball arithmetic.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ def least_order(
     stopband: Sequence[arb],
     losses: tuple[Fraction, Fraction],
 ) -> tuple[int, tuple[arb, ...]]:
-    """Find the smallest order that meets the losses, and the edges with which it does.
+    """Find the smallest order that meets the losses, and the edges that do so.
 
     Parameters
     ----------
@@ -33,15 +33,15 @@ def least_order(
     passband, stopband : sequence of arb
         Pre-warped edges, rising.
     losses : tuple of Fraction
-        Largest in the pass band and smallest in the stop band, dB, positive, the first below the second.
+        Largest loss in the pass band and smallest in the stop band, dB, positive, the first below the second.
 
     Returns
     -------
     order : int
         Of the prototype.
     edges : tuple of arb
-        Pre-warped edges as the family defines them; the pass band's edges are met exactly, those of a band-stop's side
-        with the looser demand more than met.
+        Pre-warped edges as the family defines them. Pass-band edges are met exactly, except that of a band-stop on the
+        side with the looser requirement, which is met with margin.
 
     Raises
     ------
@@ -73,23 +73,23 @@ def _ratio_of_periods(k: arb) -> arb:
 
 
 def _selectivity(kind: str, passband: Sequence[arb], stopband: Sequence[arb]) -> arb:
-    """Frequency of the prototype, of an edge at 1, that the closest stop edge corresponds to; above 1."""
+    """Frequency, in a prototype with its edge at 1, that corresponds to the closest stop edge; above 1."""
     if kind == "lowpass":
         return stopband[0] / passband[0]
     if kind == "highpass":
         return passband[0] / stopband[0]
     low, high = passband
-    if kind == "bandstop":  # narrowed, so that both stop edges are equally far
+    if kind == "bandstop":  # narrowed so that both stop edges are equally distant
         return (high - low) / (stopband[1] - stopband[0])
     first, second = (abs(stop**2 - low * high) / (stop * (high - low)) for stop in stopband)
     return first.min(second)
 
 
 def _narrowed(passband: Sequence[arb], stopband: Sequence[arb]) -> tuple[arb, arb]:
-    """Move one edge of a band-stop's pass band inwards until both stop edges are equally far.
+    """Move one pass-band edge of a band-stop inwards until both stop edges are equally distant.
 
-    The selectivity falls with either edge on one side of that point and rises on the other, so this is the optimum that
-    scipy searches for; it lies inside, as ``stopband[0] < stopband[1]``.
+    This is the optimum that scipy searches for: on either side of this point, the selectivity is worse. It lies between
+    the edges because ``stopband[0] < stopband[1]``.
     """
     low, high = passband
     product = stopband[0] * stopband[1]
@@ -97,7 +97,7 @@ def _narrowed(passband: Sequence[arb], stopband: Sequence[arb]) -> tuple[arb, ar
 
 
 def _rescaled(kind: str, edges: Sequence[arb], factor: arb) -> tuple[arb, ...]:
-    """Edges that correspond to the frequency `factor` of a prototype whose edge is at 1 for `edges`."""
+    """Edges that correspond to the frequency `factor` of a prototype whose edge at 1 corresponds to `edges`."""
     if kind == "lowpass":
         return (edges[0] * factor,)
     if kind == "highpass":

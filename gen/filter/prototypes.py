@@ -30,7 +30,7 @@ class Prototype:
     real_poles : tuple of arb
         Negative; at most one.
     pole_pairs : tuple of acb
-        Of each conjugate pair the pole with the positive imaginary part.
+        The pole with the positive imaginary part of each conjugate pair.
     dc_gain : arb
         Gain at zero frequency.
     """
@@ -47,7 +47,7 @@ class Prototype:
 
     @property
     def zeros_at_infinity(self) -> int:
-        """By how many the poles exceed the zeros."""
+        """Number of poles minus number of finite zeros."""
         return self.order - 2 * len(self.zeros)
 
 
@@ -57,12 +57,12 @@ def prototype(family: str, order: int, passband_loss: Fraction | None, stopband_
     Parameters
     ----------
     family : str
-        butterworth, chebyshev1, chebyshev2, elliptic or bessel. The edge is that of the pass band, at the loss given,
-        for chebyshev1 and elliptic; that of the stop band for chebyshev2; at half the power for the others.
+        butterworth, chebyshev1, chebyshev2, elliptic or bessel. The edge is that of the pass band, at the given loss,
+        for chebyshev1 and elliptic; that of the stop band for chebyshev2; at half power for the others.
     order : int
         Number of poles, at least 1.
     passband_loss, stopband_loss : Fraction or None
-        dB, where the family has ripples there.
+        dB; given if the family has ripples there.
     """
     passband, stopband = (None if loss is None else ripple(loss) for loss in (passband_loss, stopband_loss))
     match family, passband, stopband:
@@ -81,7 +81,7 @@ def prototype(family: str, order: int, passband_loss: Fraction | None, stopband_
 
 
 def ripple(loss: Fraction) -> arb:
-    """Ripple factor epsilon of a loss in dB: the power gain there is ``1 / (1 + epsilon**2)``."""
+    """Ripple factor epsilon for a loss in dB: the power gain is ``1 / (1 + epsilon**2)``."""
     return excess(loss).sqrt()
 
 
@@ -91,7 +91,7 @@ def excess(loss: Fraction) -> arb:
 
 
 def _angles(order: int) -> list[fmpq]:
-    """Angles of the Butterworth poles above the negative real axis, in turns of pi, outermost first."""
+    """Angles of the Butterworth poles from the negative real axis, in units of pi, largest first."""
     return [fmpq(k, 2 * order) for k in range(order - 1, 0, -2)]
 
 
@@ -121,7 +121,7 @@ def _chebyshev2(order: int, epsilon: arb) -> Prototype:
 
 
 def _on_ellipse(order: int, epsilon: arb) -> tuple[tuple[arb, ...], tuple[acb, ...]]:
-    """Poles of a Chebyshev filter: Butterworth's, moved onto an ellipse."""
+    """Poles of a Chebyshev filter: the Butterworth poles moved onto an ellipse."""
     mu = (1 / epsilon).asinh() / order
     short, long = mu.sinh(), mu.cosh()
     pairs = (acb(-short * arb.cos_pi_fmpq(angle), long * arb.sin_pi_fmpq(angle)) for angle in _angles(order))
@@ -129,7 +129,7 @@ def _on_ellipse(order: int, epsilon: arb) -> tuple[tuple[arb, ...], tuple[acb, .
 
 
 def _elliptic(order: int, passband: arb, stopband: arb) -> Prototype:
-    """Elliptic filter, its Jacobian functions as quotients of theta functions.
+    """Elliptic filter; Jacobian elliptic functions are computed as quotients of theta functions.
 
     With the modulus ``k1 = epsilon_p / epsilon_s`` of the ripples, the degree equation gives the frequencies' nome by
     ``tau = i K1' / (N K1)``. For ``u = j / N`` the zeros lie at ``1 / (k sn(u K))`` and the poles at
@@ -159,7 +159,7 @@ def _elliptic(order: int, passband: arb, stopband: arb) -> Prototype:
 
 
 def _bessel(order: int) -> Prototype:
-    """Bessel filter: the reverse Bessel polynomial, scaled to half the power at 1 rad/s."""
+    """Bessel filter: the reverse Bessel polynomial, scaled to half power at 1 rad/s."""
     coefficients = [
         math.factorial(2 * order - k) // (2 ** (order - k) * math.factorial(k) * math.factorial(order - k))
         for k in range(order + 1)
@@ -179,5 +179,5 @@ def _bessel(order: int) -> Prototype:
 
 
 def _roots(polynomial: fmpz_poly) -> list[acb]:
-    # The library's own types leave out the multiplicities; both polynomials have simple roots.
+    # The library's type stubs omit the multiplicities; both polynomials have simple roots.
     return [root for root, _ in cast("list[tuple[acb, int]]", polynomial.complex_roots())]

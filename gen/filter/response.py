@@ -1,8 +1,8 @@
 """Frequency response of second-order sections: magnitude, group delay, passband and stopband measures.
 
-Everything is computed section by section from the section's own polynomials and then added, in dB and in
-samples. Nothing is differenced or unwrapped, so poles very close to z = 1 (cut-off far below the sampling
-frequency) lose no accuracy.
+All results are computed section by section from the section's polynomials and then added, in dB and in samples. No
+phase is differentiated or unwrapped, so poles very close to z = 1 (cut-off far below the sampling frequency) cause no
+loss of accuracy.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ Complex = npt.NDArray[np.complex128]
 Band = tuple[float, float]
 
 FLOOR_DB = -400.0
-"""Magnitudes below this, such as at a zero on the unit circle, are given as this."""
+"""Lower limit of magnitudes; anything lower, such as at a zero on the unit circle, is shown as this."""
 
 MASK_TOLERANCE_DB = 1e-3
-"""By how much a response may miss its mask. A minimum-order design meets one edge of the mask with equality,
-so rounding the coefficients puts it a hair to either side of it."""
+"""How far a response may miss its mask. A minimum-order design meets one edge of the mask exactly, so rounded
+coefficients may miss it slightly."""
 
 HALF_POWER_DB = 10 * math.log10(2)
 
 
 @dataclass(frozen=True, kw_only=True)
 class FilterFacts:
-    """A filter as it was asked for and as its integer coefficients realize it.
+    """A filter as specified and as realized by its integer coefficients.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class FilterFacts:
     kind : str
         ``"lowpass"``, ``"highpass"``, ``"bandpass"`` or ``"bandstop"``.
     passband_edge, stopband_edge : tuple of float or None
-        Edges of the specification's mask in Hz: one for low-pass and high-pass, else two, rising.
+        Edges of the specification's mask in Hz: one for low-pass and high-pass, else two in rising order.
     passband_loss, stopband_loss : float or None
         Largest loss in the passband and smallest in the stopband, in dB, both positive.
     cutoff : tuple of float or None
@@ -79,7 +79,7 @@ class FilterFacts:
 
 @dataclass(frozen=True, kw_only=True)
 class ResponseMeasures:
-    """How the quantized response compares with the ideal one and with the mask.
+    """Comparison of the quantized response with the ideal one and with the mask.
 
     Attributes
     ----------
@@ -93,7 +93,7 @@ class ResponseMeasures:
     passband_gain_db : float
         Largest gain of the quantized response in the passband, in dB above the passband's level.
     largest_pole_radius : float
-        Of the quantized filter; below 1 exactly if it is stable.
+        Largest pole radius of the quantized filter; below 1 if and only if it is stable.
     """
 
     max_deviation_db_passband: float
@@ -106,7 +106,7 @@ class ResponseMeasures:
 def _polynomial(coefficients: Array, omega: Array) -> tuple[Array, Array]:
     """Real and imaginary part of ``c0 + c1 z^-1 + c2 z^-2`` on the unit circle.
 
-    Not in complex numbers, whose products differ among machines in numpy.
+    Complex numbers are avoided, because numpy's complex products differ among machines.
     """
     c0, c1, c2 = (float(c) for c in coefficients)
     cos, sin = np.cos(omega), np.sin(omega)
@@ -168,7 +168,7 @@ def group_delay(sos: Array, frequency: Array, sample_rate: float) -> Array:
 
     Examples
     --------
-    Two equal averages of neighbours delay by one sample.
+    The average of three neighbours, weighted 1 : 2 : 1, delays by one sample.
 
     >>> group_delay(np.array([[0.25, 0.5, 0.25, 1.0, 0.0, 0.0]]), np.array([0.0, 10.0]), 100.0).tolist()
     [0.01, 0.01]
@@ -191,7 +191,7 @@ def _quadratic_roots(coefficients: Sequence[float]) -> list[complex]:
     if len(coefficients) < 3:
         return [complex(-c1 / coefficients[0]) for c1 in coefficients[1:]]
     c0, c1, c2 = coefficients
-    # exact: roots close to each other are told apart by it
+    # exact, because nearly equal roots are separated by it
     square = float(Fraction(c1) ** 2 - 4 * Fraction(c0) * Fraction(c2))
     if square < 0:
         real, imag = -c1 / (2 * c0), math.sqrt(-square) / abs(2 * c0)
@@ -221,7 +221,7 @@ def frequency_grid(facts: FilterFacts, points: int = 1200) -> Array:
 
 
 def _lowest_pole_frequency(facts: FilterFacts) -> float:
-    """Distance of the nearest pole from z = 1, as a frequency in Hz: where the response starts to bend."""
+    """Distance of the nearest pole from z = 1, as a frequency in Hz: where the response starts to fall."""
     found = poles(facts.ideal_sos) - 1
     distances = np.hypot(found.real, found.imag)
     distance = float(np.min(distances)) if len(distances) else 1.0
@@ -237,15 +237,15 @@ def _outside(edges: tuple[float, ...], kind: str, nyquist: float, *, stop: bool)
 
 
 def passbands(facts: FilterFacts) -> list[Band]:
-    """Passbands in Hz: by the passband edges if given, else by the cut-off, else empty."""
+    """Passbands in Hz: from the passband edges if given, else from the cut-off, else empty."""
     edges = facts.passband_edge or facts.cutoff
     return _outside(edges, facts.kind, facts.sample_rate / 2, stop=False) if edges else []
 
 
 def stopbands(facts: FilterFacts) -> list[Band]:
-    """Stopbands in Hz: by the stopband edges if given, else an octave beyond the cut-off.
+    """Stopbands in Hz: from the stopband edges if given, else from an octave beyond the cut-off.
 
-    Where no octave fits: half-way to the Nyquist frequency; in a band-stop, the middle half of the band.
+    If an octave does not fit, they start half-way to the Nyquist frequency, or are the middle half of a band-stop.
     """
     nyquist = facts.sample_rate / 2
     if facts.stopband_edge:

@@ -1,9 +1,9 @@
-"""Second-order sections of a digital filter: poles paired with zeros, ordered, scaled and rounded to doubles.
+"""Second-order sections of a digital filter: pairs poles with zeros, orders, scales and rounds them to doubles.
 
-The denominators and the places of the zeros are the correctly rounded ones. Gains are set with the rounded denominator:
-what a section passes at its reference frequency is then right to a rounding, however close the poles are to the unit
-circle, where a rounding of a1 or a2 alone would move the gain by much more. All choices compare correctly rounded
-numbers, so that equal distances are equal everywhere.
+The denominators and the positions of the zeros are correctly rounded. Gains are set with the rounded denominator: the
+gain of a section at its reference frequency is then accurate to one rounding, even if the poles are so close to the
+unit circle that rounding a1 or a2 alone would change the gain by much more. All choices compare correctly rounded
+numbers, so that equal distances are equal on every machine.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ Quadratic = tuple[arb, arb, arb]
 
 @dataclass(frozen=True)
 class _Root:
-    """A real zero or pole, or one of a conjugate pair; where it is one on the unit circle, `cosine` gives the pair."""
+    """A real zero or pole, or one of a conjugate pair; for a pair on the unit circle, `cosine` is its real part."""
 
     place: acb
     real: bool
@@ -33,13 +33,13 @@ class _Root:
 
     @property
     def key(self) -> tuple[float, float]:
-        """What pairs are sorted by before anything is chosen, as `scipy.signal.zpk2sos` does."""
+        """Sort key for pairs before pairing, as in `scipy.signal.zpk2sos`."""
         return nearest_double(self.place.real), 0.0 if self.real else nearest_double(self.place.imag)
 
 
 @dataclass(frozen=True)
 class Section:
-    """A section before it is rounded: polynomials in 1/z with a leading 1, or 1/z where there is a delay."""
+    """A section before rounding: polynomials in 1/z with a leading 1, or with a leading 1/z if there is a delay."""
 
     numerator: Quadratic
     denominator: Quadratic
@@ -48,8 +48,8 @@ class Section:
 def sections(filter_: DigitalFilter) -> list[Section]:
     """Pair poles with zeros; poles closest to the unit circle come last.
 
-    Where all zeros lie in one place, every section gets as many zeros as poles. Otherwise pairing and order are those
-    of `scipy.signal.zpk2sos`: the pole closest to the unit circle takes the zeros nearest to it, and so on.
+    If all zeros coincide, every section gets as many zeros as poles. Otherwise pairing and order are those of
+    `scipy.signal.zpk2sos`: the pole closest to the unit circle is paired with the zeros nearest to it, and so on.
 
     Raises
     ------
@@ -58,7 +58,7 @@ def sections(filter_: DigitalFilter) -> list[Section]:
     """
     if not filter_.zero_cosines and len(set(filter_.real_zeros)) == 1:
         return _with_equal_zeros(filter_, filter_.real_zeros[0])
-    origin = (0,) if len(filter_.real_poles) % 2 else ()  # an odd order is filled up there
+    origin = (0,) if len(filter_.real_poles) % 2 else ()  # an odd order gets a pole and a zero at the origin
     poles = _sorted([_Root(pole, real=False) for pole in filter_.pole_pairs])
     poles += _sorted([_Root(acb(pole), real=True) for pole in (*filter_.real_poles, *origin)])
     zeros = _sorted([_on_circle(cosine) for cosine in filter_.zero_cosines])
@@ -70,7 +70,7 @@ def sections(filter_: DigitalFilter) -> list[Section]:
 
 
 def rounded(made: Sequence[Section], passing: acb, level: arb) -> tuple[Row, ...]:
-    """Round sections, each scaled to unity gain at one frequency but for the first, which takes the level.
+    """Round sections, each scaled to unity gain at one frequency, except the first, which takes the total gain.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def rounded(made: Sequence[Section], passing: acb, level: arb) -> tuple[Row, ...
     passing : acb
         Point on the unit circle where the gain is set.
     level : arb
-        Gain of all sections together there, positive.
+        Total gain of all sections there, positive.
 
     Raises
     ------
@@ -118,7 +118,7 @@ def _with_equal_zeros(filter_: DigitalFilter, zero: int) -> list[Section]:
 
 
 def _next(poles: list[_Root], zeros: list[_Root]) -> Section:
-    """Take the worst pole left, what goes with it, and its zeros; as `scipy.signal.zpk2sos` chooses them."""
+    """Take the remaining pole closest to the unit circle, its partner, and their zeros, as `scipy.signal.zpk2sos`."""
     pole = _taken(poles, min(poles, key=_margin))
     others = [other for other in poles if other.real]
     if pole.real and not others:
@@ -132,12 +132,12 @@ def _next(poles: list[_Root], zeros: list[_Root]) -> Section:
 
 
 def _margin(pole: _Root) -> float:
-    """``1 - |pole|**2``: how far it is from the unit circle."""
+    """``1 - |pole|**2``, a measure of its distance from the unit circle."""
     return nearest_double(1 - _square(pole.place))
 
 
 def _nearest(zeros: list[_Root], pole: _Root, *, real: bool | None = None) -> _Root:
-    """Take the zero nearest to a pole, of the real or of the complex ones if so asked."""
+    """Take the zero nearest to a pole, only among real or only among complex ones if `real` is given."""
     allowed = [zero for zero in zeros if real is None or zero.real == real]
     return _taken(zeros, min(allowed, key=lambda zero: nearest_double(_square(zero.place - pole.place))))
 

@@ -17,19 +17,19 @@ from sosmith.model.arithmetic.correct_rounding import sign
 
 @dataclass(frozen=True, kw_only=True)
 class DigitalFilter:
-    """Zeros and poles in the plane of z, as many of each, and the level where the filter passes.
+    """Equal numbers of zeros and poles in the z-plane, and the gain in the pass band.
 
     Attributes
     ----------
     zero_cosines : tuple of arb
-        Each stands for a pair of zeros on the unit circle, at ``cosine +- i sqrt(1 - cosine**2)``.
+        Each represents a pair of zeros on the unit circle, at ``cosine +- i sqrt(1 - cosine**2)``.
     real_zeros : tuple of int
         Zeros at 1 and -1.
     real_poles : tuple of arb
     pole_pairs : tuple of acb
-        Of each conjugate pair the pole with the positive imaginary part.
+        The pole with the positive imaginary part of each conjugate pair.
     passing : acb
-        Point on the unit circle where the prototype's zero frequency lies.
+        Point on the unit circle that corresponds to the prototype's zero frequency.
     level : arb
         Gain there, positive.
     """
@@ -50,12 +50,12 @@ def warped(frequency: Fraction, sample_rate: Fraction) -> arb:
 
 
 def unwarped(edge: arb, sample_rate: Fraction) -> arb:
-    """Frequency, in the sample rate's unit, that `warped` takes to `edge`."""
+    """Frequency, in the sample rate's unit, that `warped` maps to `edge`."""
     return edge.atan() / arb.pi() * arb(fmpq(sample_rate.numerator, sample_rate.denominator))
 
 
 def bilinear(prototype: Prototype, kind: str, edges: Sequence[arb]) -> DigitalFilter:
-    """Move a prototype's edge to pre-warped edges, and the analog filter to the plane of z.
+    """Transform a prototype to pre-warped edges, and the resulting analog filter to the z-plane.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def bilinear(prototype: Prototype, kind: str, edges: Sequence[arb]) -> DigitalFi
     Raises
     ------
     UndecidedError
-        If the precision does not tell whether two poles are real.
+        If the precision is too low to decide whether two poles are real.
     """
     real, pairs, zeros, infinite = (
         prototype.real_poles,
@@ -131,13 +131,13 @@ def _band(real: Sequence[arb], pairs: Sequence[acb], centre: arb) -> tuple[tuple
 
 
 def _band_zeros(zero: arb, centre: arb) -> tuple[arb, arb]:
-    """Frequencies of both pairs of zeros that come from the pair at half the width times a frequency."""
+    """Frequencies of the two pairs of zeros that a prototype's pair of zeros is mapped to."""
     above = zero + (zero**2 + centre).sqrt()
     return above, centre / above
 
 
 def _cosine(square: arb) -> arb:
-    """Cosine of the angle to which the bilinear transformation takes the root of `square`."""
+    """Cosine of the angle to which the bilinear transformation maps the square root of `square`."""
     return (1 - square) / (1 + square)
 
 

@@ -11,7 +11,7 @@ from amaranth.lib.wiring import Component
 
 from sosmith.model.errors import ToolError
 
-# Without `-nomux`, no combinational processes remain, which Icarus would not evaluate at time 0.
+# `proc` without `-nomux` leaves no combinational processes, which Icarus would not evaluate at time 0.
 _SCRIPT = """read_rtlil <<end_of_rtlil
 {rtlil}
 end_of_rtlil

@@ -1,1 +1,1 @@
-"""The paper's figures, and ours beside them."""
+"""Comparison of the paper's figures with ours."""

@@ -25,7 +25,7 @@ def filtered_part(figures: PaperFigures) -> Part:
 
 
 def stated_part(figures: PaperFigures) -> Part:
-    """Set the accuracies of the abstract beside all that the tables give."""
+    """Compare the accuracies stated in the abstract with those that follow from the tables."""
     unfiltered, filtered = (figures.number("abstract", name) for name in ("accuracy", "filtered_accuracy"))
     every = {name: (float(relative_reading(figures, name)), float(absolute_reading(figures, name))) for name in TABLES}
     head = ["accuracy in %", "printed error is relative", "printed error is in mm"]
@@ -54,7 +54,7 @@ def stated_part(figures: PaperFigures) -> Part:
 
 
 def relative_reading(figures: PaperFigures, name: str) -> Fraction:
-    """Accuracy in per cent if the printed errors are relative already."""
+    """Accuracy in per cent if the printed errors are already relative."""
     return 100 - 100 * _mean(figures.numbers(name, "error"))
 
 
@@ -162,7 +162,7 @@ def _remarks(figures: PaperFigures, name: str) -> tuple[str, ...]:
 
 
 def _what_the_filter_leaves(figures: PaperFigures) -> str:
-    """Compare the errors of table 4 with those of table 1, altogether and where they are largest."""
+    """Compare the errors of table 4 with those of table 1, overall and where they are largest."""
     before, after = (figures.numbers(name, "error") for name in ("table_1", "table_4"))
     largest = sorted(range(len(before)), key=lambda k: -before[k])[:3]
     left = float(sum(after[k] for k in largest) / sum(before[k] for k in largest))

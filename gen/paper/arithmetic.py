@@ -1,7 +1,7 @@
 """Butterworth low-passes in exact arithmetic: polynomials, bilinear transformation, poles, rounding to digits.
 
-At a cutoff of 1/386 of the sample rate a 7th-order denominator loses 16 digits when it is evaluated near z = 1, so
-double precision says little about it. Here coefficients are fractions: where they are irrational, to 100 digits.
+At a cutoff of 1/386 of the sample rate, evaluating a 7th-order denominator near z = 1 loses 16 digits, so double
+precision is useless. Here coefficients are fractions; irrational ones are computed to 100 digits.
 """
 
 from __future__ import annotations
@@ -36,9 +36,9 @@ def butterworth_polynomial(order: int) -> Coefficients:
 
 @cache
 def butterworth_factors(order: int) -> tuple[Coefficients, ...]:
-    """Real factors of `butterworth_polynomial` by falling powers: ``s^2 + 2 sin(theta) s + 1``, and s + 1 if it is odd.
+    """Real factors of `butterworth_polynomial` by falling powers: ``s^2 + 2 sin(theta) s + 1``, and s + 1 if odd.
 
-    Sections of the highest quality come first.
+    Sections with the highest Q come first.
     """
     factors: list[Coefficients] = []
     with ctx.workprec(_BITS):
@@ -65,7 +65,7 @@ def scaled(polynomial: Coefficients, cutoff: Fraction) -> Coefficients:
 
 
 def cutoffs_of(polynomial: Coefficients, printed: Sequence[Decimal]) -> list[float]:
-    """Cutoff in rad/s with which each coefficient of ``polynomial(s / cutoff)`` but the last, 1, is the printed one."""
+    """Cutoffs in rad/s for which each coefficient of ``polynomial(s / cutoff)``, except the last, is as printed."""
     degree = len(printed) - 1
     return [math.pow(polynomial[k] / Fraction(printed[k]), 1 / (degree - k)) for k in range(degree)]
 
@@ -103,7 +103,7 @@ def dc_gain(numerator: Sequence[Fraction], denominator: Sequence[Fraction]) -> F
 
 
 def poles(denominator: Sequence[Fraction]) -> list[complex]:
-    """Poles in z, farthest from the origin first, of a denominator by rising powers of 1/z; to proven accuracy."""
+    """Poles in z of a denominator by rising powers of 1/z, to proven accuracy; the farthest from the origin first."""
     common = math.lcm(*(value.denominator for value in denominator))
     integers = [int(value * common) for value in reversed(denominator)]
     with ctx.workprec(_BITS):
@@ -113,19 +113,19 @@ def poles(denominator: Sequence[Fraction]) -> list[complex]:
 
 
 def pole_radii(denominator: Sequence[Fraction]) -> list[float]:
-    """Magnitudes of `poles`, largest first; all below 1 exactly if the filter is stable."""
+    """Magnitudes of `poles`, largest first; all below 1 if and only if the filter is stable."""
     return [abs(pole) for pole in poles(denominator)]
 
 
 def rounded(values: Sequence[Fraction], digits: int) -> Coefficients:
-    """Round each of `values` to so many significant digits, halves to even."""
+    """Round each of `values` to `digits` significant digits, ties to even."""
     context = Context(prec=digits)
     return tuple(Fraction(context.create_decimal(decimal_of(value))) for value in values)
 
 
 @cache
 def digits_for_stability(denominator: Coefficients, most: int = 40) -> int:
-    """Fewest significant digits from which on, up to `most`, the denominator stays stable when rounded to them."""
+    """Smallest number of significant digits from which on, up to `most`, the rounded denominator is stable."""
     fewest = most
     while fewest > 1 and pole_radii(rounded(denominator, fewest - 1))[0] < 1:
         fewest -= 1
@@ -143,7 +143,7 @@ def ripple(loss: float) -> float:
 
 
 def order_needed(passband: float, stopband: float, passband_loss: float, stopband_loss: float) -> float:
-    """Order by equation 12, before it is rounded up; edges in rad/s, losses in dB."""
+    """Order by equation 12, before rounding up; edges in rad/s, losses in dB."""
     return math.log(ripple(stopband_loss) / ripple(passband_loss)) / math.log(stopband / passband)
 
 

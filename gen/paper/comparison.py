@@ -1,4 +1,4 @@
-"""A figure of ours beside the printed one, and the rule that labels the two."""
+"""Compares a figure of ours with the printed one, and labels the result."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ REPRODUCED, NEAR, DIFFERS, NOT_COMPARABLE, NOT_PRINTED = (
     "not printed",
 )
 LABELS = (REPRODUCED, NEAR, DIFFERS, NOT_COMPARABLE)
-"""Labels of printed figures. What the paper does not print, and we add, is labelled `NOT_PRINTED`."""
+"""Labels of printed figures. Figures that we add to those of the paper are labelled `NOT_PRINTED`."""
 
 NEAR_PART = Decimal("0.02")
-"""Largest difference of a figure that is near, as a part of the printed one."""
+"""Largest relative difference of a figure that is near."""
 
 LAST_DIGIT_PART = Decimal("0.01")
-"""A last digit may be off by one where it is worth no more than this part of the figure: 5 is not nearly 4."""
+"""The last digit may be off by one if one unit of it is at most this fraction of the figure: 5 does not reproduce 4."""
 
 UNEXPLAINED = "not explained"
 
@@ -35,20 +35,20 @@ class Comparison:
     Attributes
     ----------
     quantity : str
-        What it is, Markdown.
+        Description, Markdown.
     unit : str
-        Empty for a number without one.
+        Unit; empty for a dimensionless number.
     printed : Decimal or None
-        With the digits printed; None where the paper gives none.
+        Figure with the printed digits; None if the paper gives none.
     ours : Decimal or None
-        Computed; None where there is nothing to compute.
+        Computed figure; None if there is nothing to compute.
     note : str
-        Where it comes from, and why it differs or cannot be compared. Markdown.
+        Origin, and why it differs or cannot be compared. Markdown.
     comparable : bool
-        False where the two are not the same thing, or only one of them exists; `note` says why.
+        False if the two are different quantities, or only one of them exists; `note` says why.
     base : Decimal or None
-        What the tolerances are parts of; the printed figure unless given. For accuracies it is what is missing to
-        100 %: 98 % are not near to 97 %.
+        Reference for the tolerances; the printed figure unless given. For accuracies it is the difference from 100 %:
+        98 % is not near 97 %.
     """
 
     quantity: str
@@ -82,13 +82,16 @@ class Comparison:
 
     @property
     def explanation(self) -> str:
-        """The note; says so if there is none where one is due."""
+        """The note, or a remark if a required note is missing."""
         due = self.label in {DIFFERS, NOT_COMPARABLE}
         return UNEXPLAINED if due and not self.note else self.note
 
     @property
     def shown(self) -> str:
-        """Our figure with a digit more than printed and at least four, unless it ends before; else six."""
+        """Our figure with one digit more than printed, but at least four; with six if none is printed.
+
+        Figures that end earlier are shorter.
+        """
         if self.ours is None:
             return "-"
         if self.printed is None:
@@ -119,7 +122,7 @@ class Part:
     where : str
         Place in the paper.
     finding : str
-        One sentence for the summary: what came out. Markdown.
+        Result in one sentence for the summary. Markdown.
     comparisons : tuple of Comparison
         Figure by figure.
     before, after : tuple of str
@@ -134,7 +137,7 @@ class Part:
     after: tuple[str, ...] = ()
 
     def count(self, label: str) -> int:
-        """Count the comparisons that have this label."""
+        """Count the comparisons with this label."""
         return sum(one.label == label for one in self.comparisons)
 
 
@@ -169,25 +172,25 @@ def compare(
 
 
 def compare_accuracy(quantity: str, printed: Decimal | None, ours: float | Fraction, *, note: str = "") -> Comparison:
-    """Compare accuracies in per cent; tolerances are parts of what is missing to 100 %."""
+    """Compare accuracies in per cent; tolerances are relative to the difference from 100 %."""
     base = None if printed is None else 100 - printed
     return compare(quantity, printed, ours, "%", note=note, base=base)
 
 
 def last_digit(value: Decimal) -> Decimal:
-    """Worth of the last digit of `value`, such as 0.01 of 1.23."""
+    """Return the unit of the last digit of `value`, such as 0.01 for 1.23."""
     exponent = value.as_tuple().exponent
     assert isinstance(exponent, int)  # a figure is finite
     return Decimal(1).scaleb(exponent)
 
 
 def plain(value: float | Fraction | Decimal, digits: int = 4) -> str:
-    """Write a number with so many significant digits, with a power of ten where there would be many zeros."""
+    """Write a number with `digits` significant digits, with a power of ten if there would be many zeros."""
     return f"{decimal_of(value):.{digits}g}" if value else "0"
 
 
 def _text(value: Decimal, like: Decimal) -> str:
-    """Digits of `value`, with a power of ten where `like` would be printed with one."""
+    """Digits of `value`, with a power of ten if `like` is printed with one."""
     small = like != 0 and like.adjusted() < -5
     return f"{value:e}" if small else f"{value:f}"
 

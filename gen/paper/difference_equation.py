@@ -1,4 +1,4 @@
-"""The 7th-order filter as the paper would run it: table 10, equations 23 and 24, stability, and sections instead."""
+"""The paper's 7th-order filter as a difference equation: table 10, equations 23 and 24, stability; and as sections."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from sosmith.gen.paper.seventh_order import (
     table_9_filter,
 )
 
-_SETTLED = 0.01  # of a step: how near the output must stay
+_SETTLED = 0.01  # of a step: settling tolerance
 
 
 def difference_equation_parts(figures: PaperFigures) -> list[Part]:
@@ -43,7 +43,7 @@ def printed_filter(figures: PaperFigures) -> tuple[Coefficients, Coefficients]:
 
 
 def section_filters(figures: PaperFigures) -> list[tuple[Coefficients, Coefficients]]:
-    """Sections of the filter by table 9's cutoff, exactly, highest quality first; each has a gain of 1 at 0 Hz."""
+    """Exact sections of the filter with table 9's cutoff, highest Q first; each has a gain of 1 at 0 Hz."""
     cutoff = stated_cutoff(figures)
     return [bilinear(scaled(factor, cutoff), period(figures)) for factor in butterworth_factors(ORDER)]
 
@@ -112,12 +112,12 @@ def _stability(figures: PaperFigures, radii: list[float], digits: int) -> list[C
 
 
 def _different(radii: list[float]) -> list[float]:
-    """Each radius once, though conjugate poles have the same."""
+    """Radii without duplicates: conjugate poles have the same one."""
     return sorted({round(radius, 9) for radius in radii}, reverse=True)
 
 
 def _digit_table(filter_: tuple[Coefficients, Coefficients]) -> str:
-    """Write largest pole radius and gain of the denominator rounded to more and more digits."""
+    """Tabulate the largest pole radius and the gain for denominators rounded to increasing numbers of digits."""
     rows = []
     for digits in (4, 8, 12, 14, 15, 16, 17, 20):
         denominator = rounded(filter_[1], digits)
@@ -195,7 +195,7 @@ def _equation_24(figures: PaperFigures) -> Part:
 
 
 def step_response(figures: PaperFigures) -> tuple[np.ndarray, np.ndarray]:
-    """Time in s and output of the filter by table 9's cutoff for a step of height 1."""
+    """Time in s and output of the filter with table 9's cutoff for a step of height 1."""
     rows = []
     for numerator, denominator in section_filters(figures):
         padded = [[*map(float, values), 0.0][:3] for values in (numerator, denominator)]

@@ -1,4 +1,4 @@
-"""The document that sets our figures beside the paper's, as Markdown with pictures and as JSON."""
+"""The document that compares our figures with the paper's, as Markdown with pictures and as JSON."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def paper_json(figures: PaperFigures) -> list[dict[str, Any]]:
 
 
 def summary_rows(figures: PaperFigures) -> list[list[str]]:
-    """For each equation and table: title, how many figures have each of `LABELS`, finding."""
+    """For each equation and table: title, number of figures with each of `LABELS`, finding."""
     return [row for parts in paper_parts(figures).values() for row in map(_summary_row, parts)]
 
 
@@ -140,7 +140,7 @@ def _comparison_table(comparisons: tuple[Comparison, ...]) -> str:
 
 
 def _without_repeated_notes(rows: list[list[str]]) -> list[list[str]]:
-    """Write a note that several rows have in turn only once, and a mark below it."""
+    """Write a note shared by consecutive rows only once, with ditto marks below it."""
     result, before = [], ""
     for row in rows:
         note = row[-1]

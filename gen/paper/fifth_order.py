@@ -61,19 +61,19 @@ def normalised_part(figures: PaperFigures, equation: str, order: int) -> Part:
 
 
 def mean_cutoff(figures: PaperFigures) -> float:
-    """Mean of the pre-warped edges that the text prints, in rad/s: the cutoff that equation 16 has."""
+    """Mean of the pre-warped edges printed in the text, in rad/s: the cutoff in equation 16."""
     edges = [float(figures.number("equation_10", f"prewarped_{band}_edge")) for band in ("passband", "stopband")]
     return 2 * math.pi * sum(edges) / 2
 
 
 def table_3_filter(figures: PaperFigures) -> tuple[Coefficients, Coefficients]:
-    """Digital filter by the cutoff of table 3 and the sample rate of the text."""
+    """Digital filter with the cutoff of table 3 and the sample rate of the text."""
     cutoff = Fraction(figures.number("table_3", "prewarped_cutoff"))
     return bilinear(scaled(butterworth_polynomial(ORDER), cutoff), 1 / Fraction(_rate(figures)))
 
 
 def equation_16_filter(figures: PaperFigures) -> tuple[Coefficients, Coefficients]:
-    """Digital filter by equation 16 as printed and the sampling period printed with equation 17."""
+    """Digital filter from equation 16 as printed, with the sampling period printed with equation 17."""
     return bilinear(exact(figures, "equation_16", "denominator"), Fraction(figures.number("equation_17", "period")))
 
 
@@ -275,7 +275,7 @@ def _equation_16(figures: PaperFigures) -> Part:
 
 
 def _losses(figures: PaperFigures) -> str:
-    """Loss at the edges of the filters that the paper may mean."""
+    """Loss at the edges for each filter that the paper may mean."""
     rate = float(_rate(figures))
     passband, stopband = _edges(figures)
     printed = exact(figures, "equation_18", "numerator"), exact(figures, "equation_18", "denominator")

@@ -1,4 +1,4 @@
-"""Figures printed in the paper, each with all its digits and its place."""
+"""Figures printed in the paper, with all their digits and their places."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ _PATH = Path(__file__).with_name("paper.toml")
 
 
 class PaperFigures:
-    """The printed figures by table and name, as ``data/paper.toml`` has them.
+    """The printed figures by table and name, as in ``data/paper.toml``.
 
-    A figure is a `Decimal` with the digits that were printed, so that its last one is known.
+    A figure is a `Decimal` with exactly the printed digits, so that its precision is known.
 
     Parameters
     ----------

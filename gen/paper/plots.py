@@ -1,4 +1,4 @@
-"""Pictures of the document beside the paper, as SVG; the same figures give the same bytes."""
+"""Pictures of the comparison with the paper, as SVG; the same figures give the same bytes."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ Digital = tuple[Coefficients, Coefficients]
 
 
 def plots(figures: PaperFigures) -> dict[str, str]:
-    """Texts of the pictures by name of file."""
+    """SVG text of each picture, by file name."""
     return {
         "paper_errors.svg": _draw(lambda figure: _errors(figure, figures)),
         "paper_fifth_order.svg": _draw(lambda figure: _fifth_order(figure, figures)),
@@ -112,7 +112,7 @@ def _seventh_order(figure: Figure, figures: PaperFigures) -> None:
 
 
 def _poles(figure: Figure, figures: PaperFigures) -> None:
-    """Draw the poles of table 10 as printed, and exactly; the latter close up as well."""
+    """Draw the poles of table 10 as printed, and the exact ones, these also enlarged."""
     whole, close = figure.subplots(1, 2)
     circle = np.exp(1j * np.linspace(0, 2 * np.pi, 721))
     printed = np.array(poles(printed_filter(figures)[1]))
@@ -141,7 +141,7 @@ def _responses(axes: Axes, responses: list[tuple[str, Digital, float]], lowest: 
 def _mask(
     axes: Axes, edges: list[float], losses: list[float], lowest: float, highest: float, limits: tuple[float, float]
 ) -> None:
-    """Shade where the response must not be: below the pass band's loss, above the stop band's."""
+    """Shade the regions outside the mask: below the pass band's loss, above the stop band's."""
     axes.set_ylim(*limits)
     shade: dict[str, Any] = {"color": _GREY, "alpha": 0.25, "lw": 0}
     axes.fill_between([lowest, edges[0]], limits[0], max(-losses[0], limits[0]), **shade)

@@ -1,4 +1,4 @@
-"""The paper's regressions, equations 1 to 6: how good they are, and what they say about sensor and temperature."""
+"""The paper's regressions, equations 1 to 6: their quality, and what they imply for sensor and temperature."""
 
 from __future__ import annotations
 
@@ -31,17 +31,17 @@ def polynomial_of(figures: PaperFigures, equation: str) -> Polynomial:
 
 
 def voltage_for(polynomial: Polynomial, clearance: float, temperature: float) -> float | None:
-    """Voltage in V at which `polynomial`, of order 2 at most in V, gives `clearance` in mm; None below 0 V."""
+    """Voltage in V at which `polynomial`, at most quadratic in V, gives `clearance` in mm; None if below 0 V."""
     rows = [sum(float(a) * temperature**j for j, a in enumerate(row)) for row in polynomial.coefficients]
     c, b, a = (*rows, 0.0)[:3]
-    if clearance < c:  # the clearance rises with the voltage, so this would take less than 0 V
+    if clearance < c:  # the clearance rises with the voltage, so the voltage would be negative
         return None
     c -= clearance
     return -c / b if a == 0 else (math.sqrt(b * b - 4 * a * c) - b) / (2 * a)
 
 
 def scatter(figures: PaperFigures, determination: float) -> float:
-    """Return the standard deviation in mm behind an adjusted r^2, for clearances spread like those of table 1."""
+    """Return the standard deviation in mm implied by an adjusted r^2, for the clearances of table 1."""
     clearances = [float(value) for value in figures.numbers("table_1", "clearance")]
     mean = sum(clearances) / len(clearances)
     spread = math.sqrt(sum((value - mean) ** 2 for value in clearances) / len(clearances))
@@ -136,7 +136,7 @@ def _values(polynomial: Polynomial) -> str:
 
 
 def _shape(figures: PaperFigures, equation: str, polynomial: Polynomial) -> list[str]:
-    """Say where the clearance rises and falls, and which clearances there are without a voltage."""
+    """Describe where the clearance rises and falls, and which clearances no voltage gives."""
     if polynomial.orders[0] < 2:
         return ["A plane: it rises with voltage and temperature everywhere."]
     name = f"equation_{equation}"
@@ -156,7 +156,7 @@ def _shape(figures: PaperFigures, equation: str, polynomial: Polynomial) -> list
 
 
 def _unreachable(figures: PaperFigures, polynomial: Polynomial) -> str:
-    """Table 1's first row lies below what equation 4 can give."""
+    """Explain that the first row of table 1 is below the range of equation 4."""
     warm = float(figures.numbers("table_1", "temperature")[1])
     first = float(figures.numbers("table_1", "clearance")[0])
     least = float(polynomial(0.0, warm))
@@ -170,7 +170,7 @@ def _unreachable(figures: PaperFigures, polynomial: Polynomial) -> str:
 
 
 def _reachable(figures: PaperFigures, polynomial: Polynomial) -> str:
-    """Table 2's first row is one that equation 5a can give."""
+    """Explain that the first row of table 2 is within the range of equation 5a."""
     cool, warm = (float(value) for value in figures.numbers("table_2", "temperature"))
     least = float(polynomial(0.0, cool))
     return (

@@ -26,10 +26,10 @@ ORDER = 7
 _SLOW = (0.1, 0.25)  # Hz, slow changes of the clearance
 
 HUNTING = 1.2
-"""Hz: least damped mode of Cooperrider's bogie at 20 m/s, near the kinematic frequency by Klingel's formula."""
+"""Hz: least damped mode of Cooperrider's bogie at 20 m/s, close to the kinematic frequency from Klingel's formula."""
 
 _CONICITY, _ROLLING_RADIUS, _HALF_GAUGE = 0.05, 0.4572, 0.716
-"""Of Cooperrider's bogie; radius and half of the distance between the contact points in m."""
+"""Wheel data of Cooperrider's bogie; radius and half the distance between the contact points in m."""
 
 
 def seventh_order_parts(figures: PaperFigures) -> list[Part]:
@@ -48,48 +48,48 @@ def stated_cutoff(figures: PaperFigures) -> Fraction:
 
 
 def proper_cutoff(figures: PaperFigures) -> float:
-    """Cutoff in rad/s of the filter that table 9's text asks for: its pass-band edge pre-warped by equation 10."""
+    """Cutoff in rad/s of the filter described in the text on table 9: its pass-band edge pre-warped by equation 10."""
     edge = prewarped(float(figures.number("table_9", "passband_edge")), float(period(figures)))
     return cutoff_for(edge, float(figures.number("table_9", "passband_loss")), ORDER)
 
 
 def table_9_filter(figures: PaperFigures) -> tuple[Coefficients, Coefficients]:
-    """Digital filter by the cutoff of table 9, exactly."""
+    """Exact digital filter with the cutoff of table 9."""
     return bilinear(scaled(butterworth_polynomial(ORDER), stated_cutoff(figures)), period(figures))
 
 
 def equation_22_filter(figures: PaperFigures) -> tuple[Coefficients, Coefficients]:
-    """Digital filter by equation 22 as printed, exactly."""
+    """Exact digital filter from equation 22 as printed."""
     return bilinear(exact(figures, "equation_22", "denominator"), period(figures))
 
 
 def proper_filter(figures: PaperFigures) -> tuple[Coefficients, Coefficients]:
-    """Digital filter by the cutoff of `proper_cutoff`, exactly."""
+    """Exact digital filter with the cutoff of `proper_cutoff`."""
     return bilinear(scaled(butterworth_polynomial(ORDER), Fraction(proper_cutoff(figures))), period(figures))
 
 
 def irregularity_frequency(figures: PaperFigures) -> float:
-    """Frequency in Hz at which the vehicle meets the track's irregularity."""
+    """Frequency in Hz at which the track's irregularity excites the vehicle."""
     return float(figures.number("track", "speed") / figures.number("track", "irregularity_length"))
 
 
 def klingel_frequency(speed: float) -> float:
-    """Frequency in Hz of the kinematic motion of a wheelset at a speed in m/s, by Klingel's formula."""
+    """Frequency in Hz of the kinematic motion of a wheelset at a speed in m/s, from Klingel's formula."""
     return speed / (2 * math.pi) * math.sqrt(_CONICITY / (_ROLLING_RADIUS * _HALF_GAUGE))
 
 
 def delay(cutoff: float) -> float:
-    """Group delay at 0 Hz in s of a 7th-order Butterworth low-pass, digital or analog, of a cutoff in rad/s."""
+    """Group delay at 0 Hz in s of a 7th-order Butterworth low-pass, digital or analog, with a cutoff in rad/s."""
     return float(butterworth_polynomial(ORDER)[-2]) / cutoff
 
 
 def digital_frequency(cutoff: float, sampling: float) -> float:
-    """Frequency in Hz to which the bilinear transformation takes an analog angular frequency in rad/s."""
+    """Frequency in Hz to which the bilinear transformation maps an analog angular frequency in rad/s."""
     return math.atan(cutoff * sampling / 2) / (math.pi * sampling)
 
 
 def degrees_taken(edge: float, sampling: float) -> float:
-    """Equation 10 in rad/s for an edge in Hz, with the tangent taken of as many degrees as the angle has radians."""
+    """Equation 10 in rad/s for an edge in Hz, if the angle in radians is mistaken for degrees in the tangent."""
     return 2 / sampling * math.tan(math.radians(math.pi * edge * sampling))
 
 
@@ -151,7 +151,7 @@ def _one(
 
 
 def _order(figures: PaperFigures) -> int:
-    """Order by equation 12 and the figures of table 9."""
+    """Order from equation 12 and the figures of table 9."""
     names = ("prewarped_a", "prewarped_p", "passband_loss", "stopband_loss")
     edge, other, loss, stop = (float(figures.number("table_9", name)) for name in names)
     return math.ceil(order_needed(edge, other, loss, stop))
@@ -195,7 +195,7 @@ def _order_and_cutoff(figures: PaperFigures) -> list[Comparison]:
 
 
 def _what_the_cutoff_does(figures: PaperFigures) -> list[str]:
-    """Losses and delay of the filter by the printed cutoff and of the properly pre-warped one."""
+    """Losses and delay of the filter with the printed cutoff and with the properly pre-warped one."""
     sampling, edge = float(period(figures)), float(figures.number("table_9", "passband_edge"))
     cutoffs = (float(stated_cutoff(figures)), proper_cutoff(figures))
     head = ["", *(f"$\\Omega_c$ = {cutoff:.4g} rad/s" for cutoff in cutoffs)]

@@ -1,4 +1,4 @@
-"""The paper's vehicle: equation 20, and tables 5 to 8 beside a run of ours."""
+"""The paper's vehicle: equation 20, and tables 5 to 8 compared with a run of ours."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def vehicle_parts(figures: PaperFigures) -> list[Part]:
 
 @cache
 def run_of_ours() -> VehicleRun:
-    """Run over the paper's track at its speed, with its single irregularity only."""
+    """Simulate a run over the paper's track at its speed, with only its single irregularity."""
     return vehicle_run(
         built_in(), track="paper", speed=PAPER_SPEED, sample_rate=SAMPLE_RATE, irregularities="none", seed=1
     )

@@ -1,4 +1,4 @@
-"""The vehicle's motion beside tables 5 to 8 of the paper, figure by figure."""
+"""Compares the vehicle's motion with tables 5 to 8 of the paper, figure by figure."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ PAPER_SPEED = 20.0
 """Speed in m/s of section 5.1."""
 
 MIN_SAMPLE_RATE = 100.0
-"""In Hz: the paper's tables need motion up to `STOP_FREQUENCY`."""
+"""In Hz; the paper's tables require motion up to `STOP_FREQUENCY`."""
 
 STOP_FREQUENCY = 50.0
 """In Hz; section 5.3 reads the ripple delta there and prints -20 log10(delta)."""
 
 MIN_RIPPLE = 1e-9
-"""Ripples below count as this one, 180 dB: less is the rounding of doubles."""
+"""Lower limit of ripples, 180 dB; anything smaller is double-precision rounding."""
 
 WHEELSETS = 6
-"""The vehicle's; table 8 has those first, then the bogies."""
+"""Number of wheelsets of the vehicle; table 8 lists them first, then the bogies."""
 
 _CONE = "a cone lifts one wheel as much as it lowers the other; real profiles, and the flange, do not"
 _CANT = "ours is half the cant, as the inner rail keeps its height; how the paper's track is canted is not told"
@@ -64,8 +64,8 @@ def comparison_json(tables: Mapping[int, tuple[Comparison, ...]]) -> list[dict[s
 def comparison(motion: Motion, figures: PaperFigures) -> dict[int, tuple[Comparison, ...]]:
     """Compare a motion with the paper's tables 5 to 8; the conditions are those of `run_comparison`.
 
-    Returns the comparisons by table number, row by row. Which of them compare the same quantity was decided before
-    any result was known.
+    Returns the comparisons by table number, row by row. Which of them are comparable was decided before any result was
+    known.
     """
     tables = {5: _vertical, 6: _lateral, 7: _yaw, 8: _attenuations}
     return {number: tuple(table(motion, figures)) for number, table in tables.items()}

@@ -1,4 +1,4 @@
-"""The table [filter] of a specification from a proposal, alone or put into a specification that is there."""
+"""The [filter] table for a proposal, by itself or inserted into an existing specification."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ _NEXT = re.compile(r"[ \t]*\[")
 
 
 def filter_table(proposal: Proposal, provenance: Sequence[str]) -> str:
-    """Text of the table, TOML, with where its numbers come from as comments.
+    """Text of the table in TOML, with comments on the origin of its numbers.
 
     Parameters
     ----------
     proposal : Proposal
         The proposal.
     provenance : sequence of str
-        Lines that say what it was made from.
+        Lines that describe its origin.
     """
     made = proposal.filter
     lines = ["[filter]"]
@@ -37,14 +37,14 @@ def filter_table(proposal: Proposal, provenance: Sequence[str]) -> str:
 
 
 def _one_line(text: str) -> str:
-    """Keep a comment a comment, whatever a file may be called."""
+    """Replace unprintable characters, so that no file name can end a comment."""
     return "".join(char if char.isprintable() else "?" for char in text)
 
 
 def replace_filter(specification: str, table: str, name: str) -> str:
-    """Put `table` in the place of the table [filter] of a specification; everything else stays as it is.
+    """Replace the [filter] table of a specification by `table`; everything else is unchanged.
 
-    The end of the old table is where what is left reads as before: each line that could begin the next table is tried.
+    To find the end of the old table, each line that could begin the next one is tried until the rest parses as before.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def replace_filter(specification: str, table: str, name: str) -> str:
     Raises
     ------
     SpecificationError
-        If there is no line ``[filter]``, or the table cannot be told from the rest.
+        If there is no line ``[filter]``, or the end of the table cannot be found.
     """
     old, new = _read(specification), _read(table)
     assert old is not None
@@ -75,12 +75,12 @@ def replace_filter(specification: str, table: str, name: str) -> str:
 
 
 def _before_comments(lines: Sequence[str], start: int, stop: int) -> int:
-    """Step back from `stop` over the blank lines before it, and over comments that stand right above it."""
+    """Step back from `stop` over the comments directly above it and the blank lines before them."""
     end = stop
     while stop < len(lines) and end > start + 1 and lines[end - 1].lstrip().startswith("#"):
         end -= 1
     if end > start + 1 and lines[end - 1].strip():
-        end = stop  # no blank line between: the comments belong to what is above them
+        end = stop  # without a blank line between, the comments belong to the lines above
     while end > start + 1 and not lines[end - 1].strip():
         end -= 1
     return end

@@ -1,4 +1,4 @@
-"""Spectra with the mask and the response of the filter proposed from them, as an SVG or PNG file."""
+"""Plots spectra with the mask and the response of the proposed filter, as an SVG or PNG file."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ _COLOURS = ("#2563a8", "#b4432f", "#2f8f4e", "#8a5fb0", "#c08a1e", "#4a9aa8")
 _RED, _GREY = "#b4432f", "#8a8a8a"
 _PLAIN = FuncFormatter(lambda value, _: f"{value:g}")
 _DECADES = 8.0
-"""Decades of density below the highest that are drawn: rounding errors lie lower."""
+"""Decades of density that are drawn below the highest; rounding errors are lower."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Curve:
-    """A spectrum with what to call it.
+    """A spectrum with its name and unit.
 
     Attributes
     ----------
     name : str
         For the legend.
     unit : str
-        Unit of the signal; curves of one unit share a panel.
+        Unit of the signal; curves with the same unit share a panel.
     spectrum : Spectrum
         The spectrum.
     """
@@ -43,7 +43,7 @@ class Curve:
 
 
 def spectrum_plot(curves: Sequence[Curve], proposal: Proposal | None, file_format: str) -> bytes:
-    """Draw the spectra, a panel for each unit, and below them mask and response of the proposal if there is one.
+    """Draw the spectra in one panel for each unit, and below them mask and response of the proposal, if there is one.
 
     Parameters
     ----------

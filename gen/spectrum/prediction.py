@@ -1,4 +1,4 @@
-"""What signals hold, wanted and not, and what a filter makes of it by its response and their spectra."""
+"""Predicts the error at a filter's output from its response and the spectra of wanted signal and disturbance."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from sosmith.gen.spectrum.spectra import Array, Spectrum
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Content:
-    """What one signal holds: what is wanted of it, and what disturbs.
+    """Spectra of the wanted part and the disturbance of one signal.
 
     Attributes
     ----------
     name : str
         File and signal.
     wanted : Spectrum or None
-        Of what is to pass; None for motion, of which nothing is wanted.
+        Spectrum of the part to pass; None for motion, which is all disturbance.
     disturbance : Spectrum
-        Of what is not.
+        Spectrum of the part to suppress.
     has_truth : bool
-        Whether the two were told apart by a true signal, not by frequency.
+        Whether a true signal separated the two, rather than frequency.
     slow : float
-        Rms of the disturbance that is slower than the spectra resolve; it counts as let through.
+        Rms of the disturbance below the resolution of the spectra, which counts as passed.
     """
 
     name: str
@@ -40,18 +40,18 @@ class Content:
 
 @dataclass(frozen=True, kw_only=True)
 class Prediction:
-    """Error at the filter's output by its response and the spectra of one signal, in the signal's unit.
+    """Error at the filter's output, from its response and the spectra of one signal, in the signal's unit.
 
     Attributes
     ----------
     name : str
         File and signal.
     wanted : float
-        Rms of what the filter does to the wanted signal, its delay at zero frequency set aside.
+        Rms change of the wanted signal by the filter, apart from the delay at zero frequency.
     disturbance : float
-        Rms of what is left of the disturbance.
+        Rms of the remaining disturbance.
     slow : float
-        Rms of the disturbance that is slower than the spectra resolve, taken as left.
+        Rms of the disturbance below the resolution of the spectra, assumed to pass unchanged.
     unfiltered : float
         Rms of the disturbance before the filter.
     """
@@ -64,12 +64,12 @@ class Prediction:
 
     @property
     def rms(self) -> float:
-        """Of all three, taken as uncorrelated."""
+        """Rms of all three errors, assumed to be uncorrelated."""
         return math.hypot(self.wanted, self.disturbance, self.slow)
 
 
 def told_apart(name: str, measured: Spectrum, passband: float) -> Content:
-    """Content of a measured signal without truth: all up to `passband` in Hz is wanted, all above disturbs."""
+    """Content of a measured signal without truth: wanted up to `passband` in Hz, disturbance above."""
     below = measured.frequency <= passband
     wanted = replace(measured, density=np.where(below, measured.density, 0.0))
     disturbance = replace(measured, density=np.where(below, 0.0, measured.density))
@@ -77,7 +77,7 @@ def told_apart(name: str, measured: Spectrum, passband: float) -> Content:
 
 
 def band_rms(spectrum: Spectrum, first: int, last: int | None = None) -> float:
-    """Root mean square of the frequencies of index `first` up to, not with, `last`; never with zero frequency."""
+    """Rms over the frequencies with indices from `first` up to but excluding `last`; zero frequency is left out."""
     return float(np.sqrt(np.sum(spectrum.density[max(first, 1) : last]) * spectrum.step))
 
 
@@ -88,7 +88,7 @@ def response(made: Filter, frequency: Array) -> npt.NDArray[np.complex128]:
 
 
 def predict(content: Content, made: Filter, delay: float) -> Prediction:
-    """Integrate what the response makes of the spectra; the wanted signal is held against itself, delayed."""
+    """Integrate the filtered spectra; the wanted signal at the output is compared with itself delayed by `delay`."""
 
     def rms(spectrum: Spectrum | None, delayed: bool) -> float:
         if spectrum is None:

@@ -1,8 +1,8 @@
 """A filter specification from spectra: pass and stop edge, losses, and the smallest Butterworth low-pass for them.
 
-The error allowed at the output is shared among four parts: what is lost of the wanted signal above the pass edge and
-below it, what is left of the disturbance below the stop edge and above it. By Parseval's theorem mean squares of
-separate frequencies add up, so each part may be half of the whole. `docs/spectrum.md` has the formulas.
+The allowed error at the output is shared among four parts: the loss of wanted signal above and below the pass edge, and
+the remaining disturbance below and above the stop edge. By Parseval's theorem, mean squares at different frequencies
+add up, so each part may have half of the allowed rms error. `docs/spectrum.md` has the formulas.
 """
 
 from __future__ import annotations
@@ -26,23 +26,23 @@ from sosmith.gen.spectrum.spectra import Array, Spectrum
 from sosmith.model.errors import ShortfallError, SpecificationError
 
 MIN_STOPBAND_LOSS = 3.02
-"""Loss from the stop edge on, dB, where the disturbance would need less: the cutoff then lies below the stop edge."""
+"""Smallest loss from the stop edge on, dB, even if the disturbance needs less: keeps the cutoff below the stop edge."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Choice:
-    """One number of the proposal and where it comes from.
+    """One number of the proposal and its origin.
 
     Attributes
     ----------
     key : str
         Key in ``[filter]``.
     value : float
-        In `unit`.
+        Value in `unit`.
     unit : str
         Hz or dB.
     reason : str
-        Formula with numbers, or who has set it.
+        Formula with numbers, or who set it.
     """
 
     key: str
@@ -58,13 +58,13 @@ class Proposal:
     Attributes
     ----------
     wish : Wish
-        What was asked.
+        The requirements.
     choices : tuple of Choice
         passband_edge, stopband_edge (Hz), passband_loss, stopband_loss (dB).
     filter : Filter
-        The Butterworth low-pass of minimum order that `sosmith design` makes of them.
+        The Butterworth low-pass of minimum order that `sosmith design` makes from them.
     needed : float
-        Pass edge that the true signals need, or that was asked for, Hz; at most the one chosen.
+        Pass edge that the true signals need, or that was requested, Hz; at most the chosen one.
     delay : float
         Group delay at zero frequency, s.
     predictions : tuple of Prediction
@@ -86,25 +86,25 @@ class Proposal:
 def propose(contents: Sequence[Content], wish: Wish, sample_rate: float) -> Proposal:
     """Propose the smallest Butterworth low-pass that keeps the error of every content within the tolerance.
 
-    Without a pass edge in `wish`, the edge is as high as the order allows, at least where the true signal needs it, and
-    the order is the least whose response, phase and all, keeps the predicted error within the tolerance. With a pass
-    edge, what the true signal has above it is given up, and the tolerance holds for the disturbance.
+    Without a pass edge in `wish`, the order is the lowest whose response, including phase, keeps the predicted error
+    within the tolerance. The edge is then as high as this order allows, and at least as high as the true signal needs.
+    With a pass edge, the true signal above it may be lost, and the tolerance applies to the disturbance.
 
     Parameters
     ----------
     contents : sequence of Content
-        At least one; the filter has to do for each of them alone.
+        At least one; the filter must be sufficient for each of them.
     wish : Wish
-        In the unit of the contents.
+        Requirements, in the unit of the contents.
     sample_rate : float
         Hz.
 
     Raises
     ------
     SpecificationError
-        If no pass edge is given and none follows, or it is beyond half the sample rate.
+        If no pass edge is given and none can be derived, or it is beyond half the sample rate.
     ShortfallError
-        If no filter is needed, or none is enough.
+        If no filter is needed, or none is sufficient.
     """
     passband = _pass_edge(contents, wish, sample_rate)
     slowest = max(contents, key=lambda one: one.slow)
@@ -131,7 +131,7 @@ def _harmless(contents: Sequence[Content], wish: Wish) -> bool:
 
 
 def _best(contents: Sequence[Content], wish: Wish, sample_rate: float, passband: Choice) -> Proposal | None:
-    """Make the proposal of least order; None if there is none up to `MAX_ORDER`."""
+    """Make the proposal of lowest order; None if there is none up to `MAX_ORDER`."""
     stopband = _stop_edge(contents, wish)
     losses = _pass_loss(contents, wish), _stop_loss(contents, wish, stopband.value)
     if losses[0].value >= losses[1].value:
@@ -165,7 +165,7 @@ def _best(contents: Sequence[Content], wish: Wish, sample_rate: float, passband:
 
 
 def _highest_pass_edge(order: int, stop_edge: float, pass_loss: float, stop_loss: float, sample_rate: float) -> float:
-    """Pass edge in Hz with which `order` is just enough: equation 12 of the paper solved for it."""
+    """Pass edge in Hz for which `order` is just sufficient: equation 12 of the paper solved for it."""
     ratio = (10 ** (0.1 * pass_loss) - 1) / (10 ** (0.1 * stop_loss) - 1)
     return _down(unwarp(prewarp(stop_edge, sample_rate) * ratio ** (1 / (2 * order)), sample_rate))
 
@@ -193,9 +193,9 @@ def _made(
 
 
 def _pass_edge(contents: Sequence[Content], wish: Wish, sample_rate: float) -> Choice:
-    """Choose the least frequency above which no true signal has more than its share."""
+    """Choose the lowest frequency above which no true signal exceeds its share of the error."""
     if wish.passband is not None:
-        # The stop edge lies above it, and below the margin from half the sample rate.
+        # The stop edge must fit between it and half the sample rate minus a margin.
         if not MARGIN * sample_rate <= wish.passband < sample_rate / 2:
             raise SpecificationError(
                 f"passband must be above 0 and below half the sample rate, {sample_rate / 2:g} Hz, "
@@ -217,17 +217,17 @@ def _pass_edge(contents: Sequence[Content], wish: Wish, sample_rate: float) -> C
 
 
 def _above(spectrum: Spectrum) -> Array:
-    """Root mean square above each frequency, falling to 0 at the last."""
+    """Rms above each frequency, falling to 0 at the last."""
     return np.sqrt(np.append(np.cumsum(spectrum.density[:0:-1])[::-1], 0.0) * spectrum.step)
 
 
 def _up_to(spectrum: Spectrum) -> Array:
-    """Root mean square up to and with each frequency, from 0 at the first."""
+    """Rms up to and including each frequency, rising from 0 at the first."""
     return np.sqrt(np.append(0.0, np.cumsum(spectrum.density[1:])) * spectrum.step)
 
 
 def _stop_edge(contents: Sequence[Content], wish: Wish) -> Choice:
-    """Choose the greatest frequency up to which no disturbance has more than its share; 0 if there is none."""
+    """Choose the highest frequency up to which no disturbance exceeds its share of the error; 0 if there is none."""
     edge, kept, name = min(
         (one.disturbance.frequency[index], band_rms(one.disturbance, 0, index + 1), one.name)
         for one in contents
@@ -239,7 +239,7 @@ def _stop_edge(contents: Sequence[Content], wish: Wish) -> Choice:
 
 
 def _pass_loss(contents: Sequence[Content], wish: Wish) -> Choice:
-    """Choose the loss that costs the wanted signal its share if all of it had that loss."""
+    """Choose the loss that, applied to the whole wanted signal, would use up its share of the error."""
     if wish.passband_loss is not None:
         return Choice(key="passband_loss", value=wish.passband_loss, unit="dB", reason="as asked")
     known = [(band_rms(one.wanted, 0), one.name) for one in contents if one.wanted is not None]
@@ -253,7 +253,7 @@ def _pass_loss(contents: Sequence[Content], wish: Wish) -> Choice:
 
 
 def _stop_loss(contents: Sequence[Content], wish: Wish, edge: float) -> Choice:
-    """Choose the loss that leaves of the worst disturbance above the stop edge its share."""
+    """Choose the loss that reduces the worst disturbance above the stop edge to its share of the error."""
     above, name = max(
         (band_rms(one.disturbance, int(np.searchsorted(one.disturbance.frequency, edge, "right"))), one.name)
         for one in contents
@@ -269,27 +269,27 @@ def _stop_loss(contents: Sequence[Content], wish: Wish, edge: float) -> Choice:
 
 
 def _of(name: str, contents: Sequence[Content]) -> str:
-    """Name the content that decides, where there are several."""
+    """Name the content that decides, if there are several."""
     return f" ({name})" if len(contents) > 1 else ""
 
 
 def _brief(rms: float, wish: Wish) -> str:
-    """Three digits; what is left of nothing after rounding is nothing."""
+    """Write with three digits; rounding residues count as zero."""
     return f"{rms:.3g}" if rms > 1e-9 * wish.tolerance else "0"
 
 
 def _up(value: float, digits: int = 5) -> float:
-    """Round up to so many digits."""
+    """Round up to `digits` significant digits."""
     return float(Context(prec=digits, rounding=ROUND_CEILING).create_decimal_from_float(value))
 
 
 def _down(value: float) -> float:
-    """Round down to five digits."""
+    """Round down to five significant digits."""
     return float(Context(prec=5, rounding=ROUND_FLOOR).create_decimal_from_float(value))
 
 
 def _too_tight(contents: Sequence[Content], wish: Wish, sample_rate: float) -> ShortfallError:
-    """Say which tolerance would do, to three digits."""
+    """Say which tolerance would be feasible, to three digits."""
 
     def feasible(tolerance: float) -> bool:
         asked = replace(wish, tolerance=tolerance)
@@ -298,7 +298,7 @@ def _too_tight(contents: Sequence[Content], wish: Wish, sample_rate: float) -> S
         return _best(contents, asked, sample_rate, _pass_edge(contents, asked, sample_rate)) is not None
 
     low, high = wish.tolerance, 2 * wish.tolerance
-    while not feasible(high):  # it is in the end: without a filter, where the disturbance is within the tolerance
+    while not feasible(high):  # ends: some tolerance exceeds the unfiltered disturbance, and no filter is needed
         low, high = high, 2 * high
     while high > 1.01 * low:
         middle = math.sqrt(low * high)

@@ -1,4 +1,4 @@
-"""What `sosmith spectrum` found, as JSON and as the comments beside a [filter] table."""
+"""Results of `sosmith spectrum` as JSON and as comments in a [filter] table."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from sosmith.gen.spectrum.trial import Trial
 from sosmith.model.traces.signal_file import SignalFile
 
 PEAKS = 3
-"""Largest amplitudes that are called out."""
+"""Number of largest amplitudes that are listed."""
 
 
 def peaks(found: Spectrum, count: int = PEAKS) -> list[tuple[float, float]]:
     """Frequency (Hz) and amplitude of the largest local maxima of the amplitude spectrum, the largest first."""
-    height = found.amplitude / found.sides  # of one side, so that a line at half the sample rate is a maximum there
+    height = found.amplitude / found.sides  # one-sided, so that a line at half the sample rate is a local maximum
     after = np.append(height[2:], -np.inf)
     local = np.flatnonzero((height[1:] > height[:-1]) & (height[1:] >= after)) + 1
     largest = sorted(local, key=lambda k: (-found.amplitude[k], k))[:count]
@@ -30,19 +30,19 @@ def peaks(found: Spectrum, count: int = PEAKS) -> list[tuple[float, float]]:
 
 
 def ripple(found: Spectrum, edge: float) -> tuple[float, float]:
-    """Largest amplitude delta from `edge` in Hz on, and ``-20 log10(delta)`` in dB: how the paper reads table 8.
+    """Largest amplitude delta from `edge` in Hz on, and ``-20 log10(delta)`` in dB, as in table 8 of the paper.
 
-    It grows as the disturbance shrinks, and depends on the unit: with delta in mm it is the attenuation to 1 mm that
-    the spectrum has already, not the one that a filter has to have. Infinite where there is nothing.
+    The dB value grows as the disturbance shrinks, and depends on the unit: with delta in mm it is the level of the
+    unfiltered signal below 1 mm, not an attenuation that a filter must have. It is infinite if delta is 0.
     """
     delta = float(np.max(found.amplitude[found.frequency >= edge], initial=0.0))
     return delta, -20 * math.log10(delta) if delta > 0 else math.inf
 
 
 def options_text(wish: Wish, settings: SpectrumSettings, *, motion: bool) -> str:
-    """Name the options that the proposal depends on, in one line."""
+    """List the options that the proposal depends on, in one line."""
     given = asdict(wish) | asdict(settings) | {"motion": motion}
-    del given["confidence"]  # moves no number of the proposal
+    del given["confidence"]  # does not affect the proposal
     shown = [f"{key} {value:g}" if isinstance(value, float) else f"{key} {value}" for key, value in given.items()]
     return "options: " + ", ".join(text for text in shown if not text.endswith((" None", " False")))
 
@@ -50,7 +50,7 @@ def options_text(wish: Wish, settings: SpectrumSettings, *, motion: bool) -> str
 def provenance(
     files: Sequence[SignalFile], wish: Wish, settings: SpectrumSettings, *, motion: bool, calibration: str
 ) -> list[str]:
-    """Lines that say what a proposal was made from."""
+    """Lines that describe the origin of a proposal."""
     lines = [
         f"{file.path.name} (sha256 {file.sha256}), {file.sample_rate:g} Hz: {', '.join(s.name for s in file.signals)}"
         for file in files
@@ -75,7 +75,7 @@ def spectrum_json(found: Spectrum) -> dict[str, Any]:
 def signal_json(
     name: str, file: SignalFile, unit: str, spectra: Mapping[str, Spectrum], trial: Trial | None
 ) -> dict[str, Any]:
-    """Return one signal: where it comes from, its spectra by what they are of, and the trial."""
+    """Return one signal: its origin, its spectra by name, and the trial."""
     return {
         "name": name,
         "file": str(file.path),

@@ -32,9 +32,9 @@ class SpectrumSettings:
     Attributes
     ----------
     window : str
-        One of `WINDOWS`. Hann's, at an overlap of one half, loses little of the data, and its side lobes fall fast.
+        One of `WINDOWS`. The Hann window at 50 % overlap wastes little of the data, and its side lobes fall fast.
     segment : float or None
-        Length of a segment, s; None takes an eighth of the signal.
+        Length of a segment, s; None for an eighth of the signal.
     overlap : float
         Fraction of a segment that the next one overlaps, 0 to 0.95.
     detrend : str

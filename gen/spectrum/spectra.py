@@ -1,4 +1,4 @@
-"""Windowed spectra by Welch's method: density, amplitude, and how far chance may have them off."""
+"""Windowed spectra by Welch's method: density, amplitude, and confidence interval."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from sosmith.model.errors import SpecificationError
 Array = npt.NDArray[np.float64]
 
 SEGMENTS = 8
-"""Segments that a signal is cut into, before overlap, unless their length is given: 15 averages at half overlap."""
+"""Default number of segments, without overlap, that a signal is divided into: 15 averages at 50 % overlap."""
 
 MIN_SEGMENT = 16
-"""Samples that a segment must have."""
+"""Smallest number of samples in a segment."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -29,19 +29,19 @@ class Spectrum:
     frequency : ndarray
         Hz, even steps from 0 to half the sample rate.
     density : ndarray
-        One-sided power spectral density, U**2/Hz; 0 at zero frequency if a mean or a line was taken away. The sum
-        over a band times `step` is the mean square there.
+        One-sided power spectral density, U**2/Hz; 0 at zero frequency if a mean or a line was subtracted. The sum
+        over a band times `step` is the mean square in the band.
     sides : ndarray of int
-        2 where a wave has a half at the negative frequency as well, 1 at zero and at half the sample rate.
+        2 where the density includes a negative frequency, 1 at zero and at half the sample rate.
     amplitude : ndarray
-        Amplitude of a sine wave of that frequency, U; at half the sample rate that of samples of alternating sign, and
-        at zero frequency the mean.
+        Amplitude of a sine wave at that frequency, U; at half the sample rate, that of samples of alternating sign;
+        at zero frequency, the mean.
     averages : int
-        Count of segments.
+        Number of segments.
     degrees_of_freedom : float
-        Of the chi-square distribution that the density of noise follows, 2 for each independent segment.
+        Degrees of freedom of the chi-square distribution of a noise density, 2 for each independent segment.
     lower, upper : float
-        The true density lies within these multiples of the estimate, at the confidence of the settings, for noise.
+        Confidence limits of a noise density, as multiples of the estimate, at the confidence of the settings.
     """
 
     frequency: Array
@@ -55,12 +55,12 @@ class Spectrum:
 
     @property
     def step(self) -> float:
-        """Distance of two frequencies, Hz: the inverse of a segment's length."""
+        """Spacing of the frequencies, Hz: the inverse of a segment's length."""
         return float(self.frequency[1])
 
     @property
     def rms(self) -> float:
-        """Root mean square over all frequencies but zero, U."""
+        """Root mean square over all frequencies except zero, U."""
         return float(np.sqrt(np.sum(self.density[1:]) * self.step))
 
 
@@ -70,7 +70,7 @@ def segment_length(count: int, sample_rate: float, settings: SpectrumSettings) -
     Raises
     ------
     SpecificationError
-        If they are too few, or more than the signal has.
+        If there are too few, or more than in the signal.
     """
     if settings.segment is None:
         return max(count // SEGMENTS, MIN_SEGMENT)
@@ -119,9 +119,9 @@ def spectrum(values: Array, sample_rate: float, settings: SpectrumSettings) -> S
 
 
 def slow_rms(values: Array, length: int) -> float:
-    """Root mean square of the straight lines through segments of `length` samples of `values`, about the mean of all.
+    """Rms, about the total mean, of the lines fitted to segments of `length` samples of `values`, shape (n,).
 
-    It is what `values`, shape (n,), hold slower than spectra of such segments resolve: detrending takes it from them.
+    This is the slow part of `values` that spectra of such segments cannot resolve and that detrending removes.
     """
     count = len(values) // length
     cut = (values - np.mean(values))[: count * length].reshape(count, length)

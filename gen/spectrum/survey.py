@@ -1,4 +1,4 @@
-"""From trace files to spectra and a proposal: what `sosmith spectrum` shows."""
+"""From trace files to spectra and a proposal, as `sosmith spectrum` shows them."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ def survey(
         Columns of values to use where a trace has them, the column with the true signal, and the channels to use;
         all of them if empty.
     calibration : Path or None
-        Specification whose calibration computes the clearance; None takes that of `into`, or equation 5a.
+        Specification whose calibration computes the clearance; None for that of `into`, or else equation 5a.
     into, output : Path or None
         Specification to put the filter into, and the file that the caller will write the result to.
     motion : bool

@@ -1,4 +1,4 @@
-"""A proposed filter tried on a trace with its truth: the error before and after, counted sample by sample."""
+"""Runs a proposed filter on a trace with truth: the error before and after, sample by sample."""
 
 from __future__ import annotations
 
@@ -12,24 +12,25 @@ from sosmith.gen.spectrum.proposal import Proposal
 from sosmith.gen.spectrum.spectra import Array
 
 SETTLING = 10.0
-"""Group delays left out at the start, in which the filter forgets what it began with."""
+"""Length of the start-up transient that is left out, in group delays."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Trial:
-    """Errors against the truth, in the signal's unit, each with its mean taken away: no filter removes an offset.
+    """Errors relative to the truth, in the signal's unit, without their means: no filter removes an offset.
 
     Attributes
     ----------
     samples : int
-        Count of samples compared.
+        Number of samples compared.
     at_readings : bool
-        Whether those are the trace's readings, compared at the same time; else the truth is delayed as the filter is.
+        Whether only the trace's readings are compared, at the same time; otherwise the truth is delayed like the
+        filter's output.
     before, after : float
         Rms error without and with the filter.
     offset_before, offset_after : float
-        Mean error without and with the filter: where readings are compared at the same time, the lag behind a steady
-        change is in the second.
+        Mean error without and with the filter. If readings are compared at the same time, the second includes the lag
+        behind a steady change.
     """
 
     samples: int
@@ -43,7 +44,7 @@ class Trial:
 def try_filter(values: Array, truth: Array, reading: npt.NDArray[np.bool_] | None, proposal: Proposal) -> Trial | None:
     """Filter `values`, shape (n,), and compare with `truth`; None if the trace is too short to settle.
 
-    The filter, in double precision, starts as if the first value had been there for ever.
+    The filter runs in double precision and starts in the steady state for the first value.
     """
     made = proposal.filter
     filtered, _ = signal.sosfilt(made.sos, values, zi=signal.sosfilt_zi(made.sos) * values[0])
