@@ -83,7 +83,10 @@ def test_the_list_tells_about_files(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("emulate", "spec.toml", "none.toml"), "none.toml: the file must be a readable file, not: no such file or directory"),
+        (
+            ("emulate", "spec.toml", "none.toml"),
+            "none.toml: the file must be a readable file, not: no such file or directory",
+        ),
         (
             ("emulate", "spec.toml", "day.toml", "--seconds", "5"),
             "--seconds must come with a scenario's name, not with the file day.toml",
