@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
-import sosmith
 from sosmith.gen.output.core_facts import CoreFacts, LimitCycleFacts, SectionFacts, StreamFacts
+from sosmith.gen.version import __version__
 from sosmith.model.dataflow.program import Program
 from sosmith.model.dataflow.status import STATUS_BITS
 
@@ -17,7 +17,7 @@ def manifest(facts: CoreFacts) -> dict[str, Any]:
     return {
         "name": facts.name,
         "core": facts.core,
-        "sosmith_version": sosmith.__version__,
+        "sosmith_version": __version__,
         "spec": facts.spec,
         "channels": facts.channels,
         "streams": {"s_axis": _stream(interface.inputs), "m_axis": _stream(interface.outputs)},

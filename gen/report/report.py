@@ -7,12 +7,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from sosmith import __version__
 from sosmith.gen.filter.response import MASK_TOLERANCE_DB, FilterFacts, ResponseMeasures, measure_response
 from sosmith.gen.output.manifest import limit_cycle_entry
 from sosmith.gen.quantity import plain_number, quantity
 from sosmith.gen.report.evidence import Evidence
 from sosmith.gen.report.page import render_page
+from sosmith.gen.version import __version__
 from sosmith.model.reference.accuracy import accuracy_percent, error_statistics, sqnr_db
 from sosmith.model.text_files import to_json, write_files
 

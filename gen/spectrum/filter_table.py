@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from decimal import Decimal
 from typing import Any
 
-from sosmith import __version__
 from sosmith.gen.spectrum.proposal import Proposal
+from sosmith.gen.version import __version__
 from sosmith.model.errors import SpecificationError
 
 _HEADER = re.compile(r"[ \t]*\[[ \t]*(?:filter|\"filter\"|'filter')[ \t]*\][ \t]*(?:#.*)?")

@@ -11,6 +11,8 @@ import sys
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from sosmith.gen.version import __version__
+
 if TYPE_CHECKING:
     from sosmith.interface.calibration import Calibration
     from sosmith.interface.certificate import Certificate, Proof
@@ -20,8 +22,6 @@ if TYPE_CHECKING:
     from sosmith.interface.report import Report
     from sosmith.interface.specification import Specification
     from sosmith.model.errors import ShortfallError, SosmithError, SpecificationError, ToolError
-
-__version__ = "0.1.0"
 
 __all__ = [
     "Calibration",
