@@ -35,7 +35,7 @@ def test_a_pipe_is_written_into(tmp_path: Path) -> None:
     reader = threading.Thread(target=lambda: read.append(pipe.read_bytes()), daemon=True)
     reader.start()
     write_contents(tmp_path, {"pipe": b"through"})
-    reader.join(timeout=5)
+    reader.join(timeout=60)
     assert pipe.is_fifo()
     assert read == [b"through"]
 

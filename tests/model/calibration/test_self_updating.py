@@ -176,7 +176,7 @@ def test_a_process_that_takes_the_processor_for_an_older_one_finds_the_same_bits
         "OPENBLAS_CORETYPE": "Prescott",
         "NPY_DISABLE_CPU_FEATURES": "AVX2 FMA3",
     }
-    subprocess.run([sys.executable, "-c", script, store.path], env=environment, check=True, timeout=60)
+    subprocess.run([sys.executable, "-c", script, store.path], env=environment, check=True, timeout=600)
 
 
 def tamper(path: Path, statement: str) -> None:
@@ -362,7 +362,7 @@ def test_killed_at_any_statement_of_an_addition(tmp_path: Path) -> None:
         with open_store(path, create=True) as opened:
             add(opened, "left", tmp_path / "0.csv", DAY, required_r=0.9)
         killed = adding(path, tmp_path, 1, 2, AT_STATEMENT, str(statement))
-        said, _ = killed.communicate(timeout=60)
+        said, _ = killed.communicate(timeout=600)
         committed = said.splitlines().count("1")
         journals += Path(f"{path}-journal").exists()
         found = whole_batches(path, size)
@@ -415,6 +415,6 @@ def test_without_a_transaction_a_kill_would_tear_an_addition(tmp_path: Path) -> 
         "import contextlib\nfrom sosmith.model.calibration.measurement_store import MeasurementStore\n"
         "MeasurementStore.transaction = lambda self: contextlib.nullcontext()\n"
     )
-    adding(path, tmp_path, 1, 2, AT_STATEMENT + broken, "24").communicate(timeout=60)
+    adding(path, tmp_path, 1, 2, AT_STATEMENT + broken, "24").communicate(timeout=600)
     with pytest.raises(AssertionError):
         whole_batches(path, size)
