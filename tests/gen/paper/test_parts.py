@@ -30,6 +30,7 @@ from sosmith.gen.paper.figures import PaperFigures, read_paper_figures
 from sosmith.gen.paper.regression import polynomial_of, scatter, voltage_for
 from sosmith.gen.paper.seventh_order import proper_cutoff
 from sosmith.gen.paper.vehicle import run_of_ours
+from sosmith.gen.paper.vehicle_comparison import run_comparison
 from sosmith.gen.specification.specification import example, load
 from sosmith.model.calibration.polynomial import EQUATION_5A
 from sosmith.model.reference.accuracy import accuracy_percent
@@ -271,7 +272,7 @@ def test_the_vehicle_has_a_figure_for_each_printed_one(parts: dict[str, Part]) -
 
 def test_the_command_and_the_document_label_the_vehicle_alike(parts: dict[str, Part]) -> None:
     """One rule and one place: `sosmith vehicle` shows the rows of the document."""
-    rows = run_of_ours().comparison
+    rows = run_comparison(run_of_ours(), FIGURES)
     for number, comparisons in rows.items():
         assert parts[f"Table {number}"].comparisons[-len(comparisons) :] == comparisons
     assert {one.label for one in (*rows[5], *rows[7])} == {DIFFERS}
