@@ -223,8 +223,8 @@ WRONG: dict[str, tuple[str, Callable[[str], str]]] = {
 def spoil_emitted_file(spoil: Callable[[str], str], monkeypatch: pytest.MonkeyPatch) -> None:
     """Spoil the SystemVerilog between its emission and the simulator; design and integer model stay as they are."""
 
-    def spoiled(made: CoreDesign, directory: Path, progress: Callable[[str], None]) -> list[Path]:
-        paths = generate(made, directory, progress)
+    def spoiled(*arguments: Any, **options: Any) -> list[Path]:
+        paths = generate(*arguments, **options)
         text = paths[0].read_text(encoding="utf-8")
         paths[0].write_text(spoil(text), encoding="utf-8")
         return paths
