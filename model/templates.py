@@ -37,7 +37,7 @@ def render(package: str, template: str, **values: Any) -> str:
 
 @cache
 def _environment(package: str) -> Environment:
-    from jinja2 import Environment, FunctionLoader, StrictUndefined  # noqa: PLC0415 - see the module's docstring
+    from jinja2 import Environment, FunctionLoader, StrictUndefined
 
     folder = files(package)
     return Environment(
