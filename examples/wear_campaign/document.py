@@ -202,7 +202,7 @@ def _ride(found: dict[str, Any], settings: dict[str, Any]) -> str:
     valid = found["validity"]
     kept = "keeps the model within its limits" if valid["tangent_kept"] else "exceeds its limits as well"
     paper, spectra = found["filters"][0], found["filters"][-1]
-    attenuated, ratio = paper["attenuation"]["the paper's pass edge"], spectra["delay"] / paper["delay"]
+    attenuated, ratio = paper["attenuation"]["the paper's passband edge"], spectra["delay"] / paper["delay"]
     offsets = {row["scenario"]: row["mean_after"] for row in found["runs"] if row["filter"] == "from spectra"}
     told = " and ".join(f"{value:+.3f} mm on the {name.removeprefix('ride_')}" for name, value in offsets.items())
     lines = [
@@ -230,7 +230,7 @@ def _ride(found: dict[str, Any], settings: dict[str, Any]) -> str:
             runs,
         ),
         "![Clearance over both rides, measured and after each filter](images/campaign_ride.svg)",
-        "A filter at the paper's stated pass edge lets the motion of the vehicle through: hunting and the "
+        "A filter at the paper's stated passband edge lets the motion of the vehicle through: hunting and the "
         "irregularity lie "
         f"far below 10 Hz. The paper's own coefficients remove it, with {attenuated:.0f} dB at that edge, at the "
         f"cost of delay. The filter from spectra has {100 * ratio:.0f} % of that delay. "
@@ -244,7 +244,7 @@ def _ride(found: dict[str, Any], settings: dict[str, Any]) -> str:
     return "\n\n".join(lines)
 
 
-_FREQUENCIES = {"hunting": "hunting 1.2 Hz", "irregularity": "irregularity 2 Hz", "the paper's pass edge": "10 Hz"}
+_FREQUENCIES = {"hunting": "hunting 1.2 Hz", "irregularity": "irregularity 2 Hz", "the paper's passband edge": "10 Hz"}
 
 
 def _attenuation(value: float) -> str:

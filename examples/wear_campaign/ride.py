@@ -40,7 +40,7 @@ PAPER_FILTER = hardware.filter_by_order(7, 0.2587802)
 SETTLED = 0.01
 """Remaining fraction of a step at which the filter counts as settled."""
 
-NOTABLE = {"hunting": 1.2, "irregularity": 2.0, "the paper's pass edge": 10.0}
+NOTABLE = {"hunting": 1.2, "irregularity": 2.0, "the paper's passband edge": 10.0}
 """Frequencies in Hz for which the attenuation is shown: bogie mode, and the paper's 10 m irregularity at 20 m/s."""
 
 

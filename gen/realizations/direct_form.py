@@ -183,19 +183,15 @@ def direct_form(
     fitted = tuple(
         replace(p, kept=fracs.get(p.operand), range=ranges.get(p.operand, wide)) if p.is_sum else p for p in made
     )
-    v_range = ranges.get("v", wide)
     try:
         section = DirectForm1(
             name=name,
             products=fitted,
             integer_part=integer_part,
             feedback=(0, 0),
-            x_frac=x.frac,
-            x_low=x.low,
-            x_high=x.high,
+            x=x,
             y_frac=fracs.get("v", x.frac),
-            v_low=v_range[0],
-            v_high=v_range[1],
+            v_range=ranges.get("v", wide),
         )
     except ValueError as error:
         raise ShortfallError(f"{name} must be stable with coefficients of {rounding.bits} bits: {error}") from None

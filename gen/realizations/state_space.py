@@ -207,6 +207,7 @@ def state_space(
     for i in [*states, *states]:  # twice, since a state that only copies another may come before it
         if f"x{i + 1}_sum" not in fracs:
             x_fracs[i] = _exact_frac([*zip(a[i], x_fracs, strict=True), (b[i], u.frac)], u.frac)
+    y_frac = fracs.get("y_sum", _exact_frac([*zip(c, x_fracs, strict=True), (d, u.frac)], u.frac))
     try:
         return StateSpace(
             name=name,
@@ -216,13 +217,9 @@ def state_space(
             c=c,
             d=d,
             truncating=truncating,
-            u_frac=u.frac,
-            u_low=u.low,
-            u_high=u.high,
-            x_fracs=tuple(x_fracs),
-            x_ranges=tuple(ranges.get(f"x{i + 1}_next", wide) for i in states),
-            y_frac=fracs.get("y_sum", _exact_frac([*zip(c, x_fracs, strict=True), (d, u.frac)], u.frac)),
-            y_range=ranges.get("y", wide),
+            u=u,
+            x=tuple(Range(frac, *ranges.get(f"x{i}_next", wide)) for i, frac in enumerate(x_fracs, start=1)),
+            y=Range(y_frac, *ranges.get("y", wide)),
         )
     except ValueError as error:
         raise ShortfallError(f"{name} must be stable with coefficients of {rounding.bits} bits: {error}") from None

@@ -1,8 +1,8 @@
 """A filter specification from spectra: pass and stop edge, losses, and the smallest Butterworth low-pass for them.
 
-The allowed error at the output is shared among four parts: the loss of wanted signal above and below the pass edge, and
-the remaining disturbance below and above the stop edge. By Parseval's theorem, mean squares at different frequencies
-add up, so each part may have half of the allowed rms error. `docs/spectrum.md` has the formulas.
+The allowed error at the output is shared among four parts: the loss of wanted signal above and below the passband edge,
+and the remaining disturbance below and above the stop edge. By Parseval's theorem, mean squares at different
+frequencies add up, so each part may have half of the allowed rms error. `docs/spectrum.md` has the formulas.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ class Proposal:
     filter : Filter
         The Butterworth low-pass of minimum order that `sosmith design` makes from them.
     needed : float
-        Pass edge that the true signals need, or that was requested, Hz; at most the chosen one.
+        Passband edge that the true signals need, or that was requested, Hz; at most the chosen one.
     delay : float
         Group delay at zero frequency, s.
     predictions : tuple of Prediction
@@ -86,9 +86,10 @@ class Proposal:
 def propose(contents: Sequence[Content], wish: Wish, sample_rate: float) -> Proposal:
     """Propose the smallest Butterworth low-pass that keeps the error of every content within the tolerance.
 
-    Without a pass edge in `wish`, the order is the lowest whose response, including phase, keeps the predicted error
-    within the tolerance. The edge is then as high as this order allows, and at least as high as the true signal needs.
-    With a pass edge, the true signal above it may be lost, and the tolerance applies to the disturbance.
+    Without a passband edge in `wish`, the order is the lowest whose response, including phase, keeps the predicted
+    error within the tolerance. The edge is then as high as this order allows, and at least as high as the
+    true signal needs.
+    With a passband edge, the true signal above it may be lost, and the tolerance applies to the disturbance.
 
     Parameters
     ----------
@@ -102,7 +103,7 @@ def propose(contents: Sequence[Content], wish: Wish, sample_rate: float) -> Prop
     Raises
     ------
     SpecificationError
-        If no pass edge is given and none can be derived, or it is beyond half the sample rate.
+        If no passband edge is given and none can be derived, or it is beyond half the sample rate.
     ShortfallError
         If no filter is needed, or none is sufficient.
     """
@@ -165,7 +166,7 @@ def _best(contents: Sequence[Content], wish: Wish, sample_rate: float, passband:
 
 
 def _highest_pass_edge(order: int, stop_edge: float, pass_loss: float, stop_loss: float, sample_rate: float) -> float:
-    """Pass edge in Hz for which `order` is just sufficient: equation 12 of the paper solved for it."""
+    """Passband edge in Hz for which `order` is just sufficient: equation 12 of the paper solved for it."""
     ratio = (10 ** (0.1 * pass_loss) - 1) / (10 ** (0.1 * stop_loss) - 1)
     return _down(unwarp(prewarp(stop_edge, sample_rate) * ratio ** (1 / (2 * order)), sample_rate))
 
@@ -205,7 +206,7 @@ def _pass_edge(contents: Sequence[Content], wish: Wish, sample_rate: float) -> C
     known = [(one.name, one.wanted) for one in contents if one.has_truth and one.wanted is not None]
     if not known:
         raise SpecificationError(
-            "the pass edge must be given, by --passband in Hz or --time-constant in s, where no trace has its truth"
+            "the passband edge must be given, by --passband in Hz or --time-constant in s, if no trace has its truth"
         )
     edge, lost, name = max(
         (found.frequency[index], band_rms(found, index + 1), name)

@@ -1,4 +1,4 @@
-"""Settings of spectra and of a proposal: window and segments, allowed error, pass edge."""
+"""Settings of spectra and of a proposal: window and segments, allowed error, passband edge."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ COVERAGE = 2.0
 section 6.3.3)."""
 
 PASSBAND_LOSS = 0.1
-"""Maximum loss up to the pass edge, dB, even if the wanted signal allows more: the paper's choice in section 4.1."""
+"""Maximum loss up to the passband edge, dB, even if the wanted signal allows more: section 4.1 of the paper."""
 
 PARTS = 4
 """Number of parts of the error."""
@@ -80,9 +80,9 @@ class Wish:
     coverage : float
         Multiple of the rms error that has to be within the tolerance, positive.
     passband : float or None
-        Pass edge, Hz; None derives it from the spectra of the true signals.
+        Passband edge, Hz; None derives it from the spectra of the true signals.
     passband_loss : float or None
-        Loss up to the pass edge, dB; None derives it from the amplitudes of the wanted signals.
+        Loss up to the passband edge, dB; None derives it from the amplitudes of the wanted signals.
 
     Raises
     ------

@@ -21,9 +21,7 @@ def output_stage(x: Range, output: Port) -> tuple[OutputStage, Fraction]:
     stage = OutputStage(
         offset=offset,
         offset_frac=frac,
-        x_frac=x.frac,
-        x_low=x.low,
-        x_high=x.high,
+        x=x,
         low=output.lowest,
         high=output.highest,
     )

@@ -190,23 +190,3 @@ def packed(values: Sequence[int], loadable: Sequence[Constant]) -> list[int]:
             raise ValueError(f"{constant.name} must fit {constant.bits} bits, not {value}")
         words += [value >> _WORD_BITS * k & (1 << _WORD_BITS) - 1 for k in range(constant.words)]
     return words
-
-
-def unpacked(words: Sequence[int], loadable: Sequence[Constant]) -> list[int]:
-    """Return the constants in the words of a bank as the hardware sees them, without the bits beyond their widths.
-
-    Raises
-    ------
-    ValueError
-        If the number of words is not that of the bank.
-    """
-    count = sum(constant.words for constant in loadable)
-    if len(words) != count:
-        raise ValueError(f"a bank must have {count} words, not {len(words)}")
-    values, start = [], 0
-    for constant in loadable:
-        whole = sum(word << _WORD_BITS * k for k, word in enumerate(words[start : start + constant.words]))
-        code = whole & ((1 << constant.bits) - 1)
-        values.append(code - (code >> (constant.bits - 1) << constant.bits))
-        start += constant.words
-    return values

@@ -35,7 +35,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 
-from sosmith.model.dataflow.graph import Graph, GraphBuilder, Wire
+from sosmith.model.dataflow.graph import Graph, GraphBuilder, Range, Wire
 
 
 @dataclass(frozen=True)
@@ -107,24 +107,21 @@ class DirectForm1:
         (m1, m2), the multiplier-free part of (a1, a2).
     feedback : tuple of int
         (k1, k2), the error feedback.
-    x_frac, x_low, x_high : int
-        Fraction bits and range of the input's code.
+    x : Range
+        Range of the input.
     y_frac : int
         Fraction bits of the output.
-    v_low, v_high : int
-        Range of the code of v, from peak gains; v has `total_frac` fraction bits.
+    v_range : tuple of int
+        Smallest and largest code of v, from peak gains; v has `total_frac` fraction bits.
     """
 
     name: str
     products: tuple[Product, ...]
     integer_part: tuple[int, int]
     feedback: tuple[int, int]
-    x_frac: int
-    x_low: int
-    x_high: int
+    x: Range
     y_frac: int
-    v_low: int
-    v_high: int
+    v_range: tuple[int, int]
 
     def __post_init__(self) -> None:
         if not self.products:
@@ -161,10 +158,10 @@ class DirectForm1:
     def graph(self) -> Graph:
         """The section as a dataflow graph with the input ``x`` and the output ``y``."""
         g = GraphBuilder()
-        x = g.input("x", self.x_frac, self.x_low, self.x_high)
+        x = g.input("x", *self.x)
         taps_x = _delay_line(g, x, "x", reach=max(_reach(p.x) for p in self.products))
         frac = self.total_frac
-        v1 = g.delay("v1", frac, self.v_low, self.v_high)
+        v1 = g.delay("v1", frac, *self.v_range)
         past = [v1, g.previous(v1, "v2")] if self._order > 1 else [v1]
         taps_y = [g.floor(v, self.y_frac, f"y{i}") for i, v in enumerate(past, start=1)]
         # Products that need y(n-1) are ready last and are added last.
@@ -184,7 +181,7 @@ class DirectForm1:
             else:
                 terms += [(-m, y), (-k, g.fraction(v, self.y_frac))]
         terms += [term for is_newest, term in products if is_newest]
-        v = g.bound(g.floor(g.combine(terms), frac), self.v_low, self.v_high, "v")
+        v = g.bound(g.floor(g.combine(terms), frac), *self.v_range, "v")
         g.connect(v1, v)
         return g.build([g.floor(v, self.y_frac, "y")])
 
@@ -208,7 +205,7 @@ class DirectForm1:
         """Fraction bits that hold the exact total of all products."""
         fracs = [self.y_frac]
         for p in self.products:
-            inputs = ([self.x_frac] if any(p.x) else []) + ([self.y_frac] if any(p.y) else [])
+            inputs = ([self.x.frac] if any(p.x) else []) + ([self.y_frac] if any(p.y) else [])
             exact = max(inputs) + p.shift
             fracs.append((exact if p.kept is None else min(exact, p.kept)) + p.frac)
         return max(fracs)

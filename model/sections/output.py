@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from sosmith.model.dataflow.graph import Graph, GraphBuilder
+from sosmith.model.dataflow.graph import Graph, GraphBuilder, Range
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -16,17 +16,15 @@ class OutputStage:
     ----------
     offset, offset_frac : int
         What is added before rounding: minus the lower end of the range, in units of ``2**-offset_frac`` output LSBs.
-    x_frac, x_low, x_high : int
-        Fraction bits and range of the input's code, in output LSBs.
+    x : Range
+        Range of the input, in output LSBs.
     low, high : int
         Range of the output code; the only saturation in a datapath.
     """
 
     offset: int
     offset_frac: int
-    x_frac: int
-    x_low: int
-    x_high: int
+    x: Range
     low: int
     high: int
     name: str = "output_stage"
@@ -35,7 +33,7 @@ class OutputStage:
     def graph(self) -> Graph:
         """The stage as a dataflow graph with the input ``x`` and the output ``code``."""
         g = GraphBuilder()
-        x = g.input("x", self.x_frac, self.x_low, self.x_high)
+        x = g.input("x", *self.x)
         if self.offset:
             x = g.add(x, g.constant(self.offset, self.offset_frac, "offset"))
         rounded = g.round(x, 0, "rounded")

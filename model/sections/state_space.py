@@ -22,7 +22,7 @@ from fractions import Fraction
 from functools import cached_property
 from typing import NamedTuple
 
-from sosmith.model.dataflow.graph import Graph, GraphBuilder, Wire
+from sosmith.model.dataflow.graph import Graph, GraphBuilder, Range, Wire
 
 
 class Coefficient(NamedTuple):
@@ -55,16 +55,12 @@ class StateSpace:
         From input to output.
     truncating : bool
         Whether the states are truncated towards zero; else they are rounded to nearest, ties upward.
-    u_frac, u_low, u_high : int
-        Fraction bits and range of the input's code.
-    x_fracs : tuple of int
-        Fraction bits of the states.
-    x_ranges : tuple of tuple of int
-        Smallest and largest code of each state, from peak gains.
-    y_frac : int
-        Fraction bits of the output.
-    y_range : tuple of int
-        Smallest and largest code of the output, from peak gains.
+    u : Range
+        Range of the input.
+    x : tuple of Range
+        Range of each state, from peak gains.
+    y : Range
+        Range of the output, from peak gains.
     """
 
     name: str
@@ -74,19 +70,15 @@ class StateSpace:
     c: tuple[Coefficient, ...]
     d: Coefficient
     truncating: bool
-    u_frac: int
-    u_low: int
-    u_high: int
-    x_fracs: tuple[int, ...]
-    x_ranges: tuple[tuple[int, int], ...]
-    y_frac: int
-    y_range: tuple[int, int]
+    u: Range
+    x: tuple[Range, ...]
+    y: Range
 
     def __post_init__(self) -> None:
         order = len(self.a)
         if order not in {1, 2}:
             raise ValueError(f"states must be one or two, not {order}")
-        lengths = [*map(len, self.a), *map(len, (self.integer_part, self.b, self.c, self.x_fracs, self.x_ranges))]
+        lengths = [*map(len, self.a), *map(len, (self.integer_part, self.b, self.c, self.x))]
         if set(lengths) != {order}:
             raise ValueError(f"everything about {order} states must come {order} times, not {lengths}")
         if not self.is_stable:
@@ -136,21 +128,18 @@ class StateSpace:
         ``x2_next`` and ``y``.
         """
         g = GraphBuilder()
-        u = g.input("u", self.u_frac, self.u_low, self.u_high)
-        states = [
-            g.delay(f"x{i}", frac, low, high)
-            for i, (frac, (low, high)) in enumerate(zip(self.x_fracs, self.x_ranges, strict=True), start=1)
-        ]
+        u = g.input("u", *self.u)
+        states = [g.delay(f"x{i}", *x) for i, x in enumerate(self.x, start=1)]
         for i, state in enumerate(states):
             name = f"x{i + 1}"
             terms = [(f"a{i + 1}{j}", entry, x) for j, (entry, x) in enumerate(zip(self.a[i], states, strict=True), 1)]
             total = [(self.integer_part[i], state), *_products(g, [*terms, (f"b{i + 1}", self.b[i], u)])]
-            frac, (low, high) = self.x_fracs[i], self.x_ranges[i]
+            frac, low, high = self.x[i]
             quantize = _truncated if self.truncating else _rounded
             g.connect(state, g.bound(quantize(g, total, frac, f"{name}_sum"), low, high, f"{name}_next"))
         terms = [(f"c{j}", entry, x) for j, (entry, x) in enumerate(zip(self.c, states, strict=True), 1)]
-        output = _rounded(g, _products(g, [*terms, ("d", self.d, u)]), self.y_frac, "y_sum")
-        return g.build([g.bound(output, *self.y_range, "y")])
+        output = _rounded(g, _products(g, [*terms, ("d", self.d, u)]), self.y.frac, "y_sum")
+        return g.build([g.bound(output, self.y.low, self.y.high, "y")])
 
 
 _Term = tuple[int, Wire]

@@ -26,7 +26,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from sosmith.model.dataflow.graph import Graph, GraphBuilder, Wire
+from sosmith.model.dataflow.graph import Graph, GraphBuilder, Range, Wire
 from sosmith.model.sections.direct_form import DirectForm1, Product
 
 Limits = tuple[int, int]
@@ -51,8 +51,8 @@ class TransposedForm:
         The g above: 0, 1 or -1.
     delta_exponent : int
         Base-2 logarithm of Delta.
-    x_frac, x_low, x_high : int
-        Fraction bits and range of the input's code.
+    x : Range
+        Range of the input.
     y_frac : int
         Fraction bits of the output.
     state_fracs : tuple of int or None
@@ -66,9 +66,7 @@ class TransposedForm:
     integer_part: tuple[int, int]
     operator: int
     delta_exponent: int
-    x_frac: int
-    x_low: int
-    x_high: int
+    x: Range
     y_frac: int
     state_fracs: tuple[int | None, int | None]
     v_range: Limits
@@ -104,21 +102,18 @@ class TransposedForm:
             products=self.products,
             integer_part=self.integer_part,
             feedback=(-2 * g, g * g) if self.order == 2 else (-g, 0),
-            x_frac=self.x_frac,
-            x_low=self.x_low,
-            x_high=self.x_high,
+            x=self.x,
             y_frac=self.y_frac,
-            v_low=0,
-            v_high=0,
+            v_range=(0, 0),
         )
         finer = section.total_frac - max([*self._fracs_added(0), self._state_fracs[0][1]])
-        return replace(section, v_low=self.v_range[0] << finer, v_high=self.v_range[1] << finer)
+        return replace(section, v_range=(self.v_range[0] << finer, self.v_range[1] << finer))
 
     @cached_property
     def graph(self) -> Graph:
         """The section as a dataflow graph with the input ``x`` and the output ``y``."""
         g = GraphBuilder()
-        x = g.input("x", self.x_frac, self.x_low, self.x_high)
+        x = g.input("x", *self.x)
         states = [
             g.delay(f"s{k}", kept, limits[0] >> (exact - kept), limits[1] >> (exact - kept))
             for k, limits, (exact, kept) in zip((1, 2), self._state_ranges, self._state_fracs, strict=False)
@@ -194,7 +189,7 @@ class TransposedForm:
     def _fracs_added(self, k: int) -> list[int]:
         """Return the fraction bits of all products of x and y in v (k = 0), t1 or t2."""
         fracs = [self.y_frac - _trailing_zeros(self._integers[k])] if self._integers[k] else []
-        for operand, frac in (("x", self.x_frac), ("y", self.y_frac)):
+        for operand, frac in (("x", self.x.frac), ("y", self.y_frac)):
             for p in self.products:
                 if weight := self._weights(p, operand)[k]:
                     fracs.append(frac + p.frac + p.shift - _trailing_zeros(weight))

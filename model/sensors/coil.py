@@ -27,17 +27,6 @@ REFERENCE_TEMPERATURE = 20.0
 COPPER = 0.00393
 """Temperature coefficient of the resistance of annealed copper at 20 degC, 1/K (IEC 60028)."""
 
-FIT_CLEARANCES = (1.5, 10.0)
-"""Clearances in mm over which the fitted parameters were fitted.
-
-They start at 1.5 mm, the smallest initial clearance that the paper allows. Below 1.09 mm at 20 degC, equation 5a gives
-no positive voltage.
-"""
-
-FIT_TEMPERATURES = (60.0, 98.0)
-"""Temperatures in degC, beside `REFERENCE_TEMPERATURE`, to which the drift was fitted; 98 degC is the end of
-equation 5a."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class Coil:

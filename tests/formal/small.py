@@ -57,9 +57,7 @@ def resonator(low: int = -12, high: int = 11) -> Datapath:
 def _limited(graph: Graph) -> Datapath:
     node = graph.nodes[graph.outputs[0]]
     y = port("y", 2)
-    last = OutputStage(
-        offset=0, offset_frac=0, x_frac=node.frac, x_low=node.low, x_high=node.high, low=y.lowest, high=y.highest
-    )
+    last = OutputStage(offset=0, offset_frac=0, x=node.range, low=y.lowest, high=y.highest)
     return Datapath(name="small", inputs=(port("x", 2),), output=y, stages=(HornerStep("section", graph), last))
 
 

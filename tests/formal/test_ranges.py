@@ -51,19 +51,14 @@ class StatedRanges(Proof):
 
 def section(entry: Range, ranges: Ranges, y_frac: int) -> DirectForm1:
     """Make a section with error feedback of second order and poles at 0.71; its state has a guard of 4 bits."""
-    frac, low, high = entry
-    v_low, v_high = ranges.get("v", (-WIDE, WIDE))
     return DirectForm1(
         name="section",
         products=(Product("A1", 5, 2, (0, 0, 0), (-1, 1)), Product("A2", 3, 2, (1, 2, 1), (0, -4), 2)),
         integer_part=(-2, 1),
         feedback=(-2, 1),
-        x_frac=frac,
-        x_low=low,
-        x_high=high,
+        x=entry,
         y_frac=y_frac,
-        v_low=v_low,
-        v_high=v_high,
+        v_range=ranges.get("v", (-WIDE, WIDE)),
     )
 
 
@@ -92,5 +87,5 @@ def test_a_range_that_is_one_too_narrow_is_found_out(tmp_path: Path) -> None:
 
 def test_a_section_that_overflows_is_found_out(tmp_path: Path) -> None:
     stage = proven_section(bits=2, y_frac=0)
-    narrow = replace(stage, v_low=stage.v_low // 2, v_high=stage.v_high // 2)
+    narrow = replace(stage, v_range=(stage.v_range[0] // 2, stage.v_range[1] // 2))
     assert prove(StatedRanges(narrow), tmp_path) == "FAIL"

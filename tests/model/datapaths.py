@@ -8,6 +8,7 @@ import numpy as np
 from scipy import signal
 
 from sosmith.model.dataflow.datapath import Datapath, Stage
+from sosmith.model.dataflow.graph import Range
 from sosmith.model.port import Port
 from sosmith.model.sections.direct_form import DirectForm1, Product
 from sosmith.model.sections.output import OutputStage
@@ -19,7 +20,7 @@ OUTPUT = Port.from_range("y", 16, Fraction(-1), Fraction(1), signed=True)
 def sections_of(sos: np.ndarray, *, guard: int = 5, bits: int = 22, feedback: int = 2) -> list[DirectForm1]:
     """Low-pass sections with unity gain at zero frequency, with ranges far wider than they need."""
     result: list[DirectForm1] = []
-    x_frac, low, high = 0, INPUT.lowest, INPUT.highest
+    x = Range(0, INPUT.lowest, INPUT.highest)
     for index, (*_, a1, a2) in enumerate(sos):
         first = a2 == 0
         big1, big2 = (1 + a1, 0.0) if first else (2 + a1, 1 + a1 + a2)
@@ -36,16 +37,13 @@ def sections_of(sos: np.ndarray, *, guard: int = 5, bits: int = 22, feedback: in
             products=products,
             integer_part=(-1, 0) if first else (-2, 1),
             feedback=kinds[feedback],
-            x_frac=x_frac,
-            x_low=low,
-            x_high=high,
+            x=x,
             y_frac=guard,
-            v_low=0,
-            v_high=0,
+            v_range=(0, 0),
         )
         limit = 1 << (18 + made.total_frac)
-        result.append(replace(made, v_low=-limit, v_high=limit - 1))
-        x_frac, low, high = guard, -(1 << (18 + guard)), (1 << (18 + guard)) - 1
+        result.append(replace(made, v_range=(-limit, limit - 1)))
+        x = Range(guard, -(1 << (18 + guard)), (1 << (18 + guard)) - 1)
     return result
 
 
@@ -62,9 +60,7 @@ def cascade(sos: np.ndarray, **options: int) -> Datapath:
         OutputStage(
             offset=0,
             offset_frac=0,
-            x_frac=last.frac,
-            x_low=last.low,
-            x_high=last.high,
+            x=last.range,
             low=OUTPUT.lowest,
             high=OUTPUT.highest,
         ),

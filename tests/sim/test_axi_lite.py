@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 from cocotb_tools.check_results import get_results
 from cocotb_tools.runner import Icarus
+from tests.sim.lint import icarus_check, lint
 
 from sosmith.gen.output.verilog import to_rtlil, to_verilog
 from sosmith.hdl.reload import ReloadPort
-from sosmith.sim.lint import icarus_check, lint
 
 ROOT = Path(__file__).parents[2]
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests.gen.designs import EXAMPLES
+from tests.sim.lint import icarus_check, lint
 
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.output.core_facts import core_facts
@@ -20,7 +21,6 @@ from sosmith.gen.stimuli import traces_for
 from sosmith.model.dataflow.status import Flag
 from sosmith.model.errors import ShortfallError
 from sosmith.model.port import Port
-from sosmith.sim.lint import icarus_check, lint
 from sosmith.sim.simulation import simulate
 
 

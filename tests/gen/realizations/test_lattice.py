@@ -389,7 +389,7 @@ def test_a_range_too_narrow_is_rejected() -> None:
     wave = narrow.graph.nodes[narrow.graph.outputs[0]]
     last = replace(join, entries=(Range(frac, wave.low, wave.high), join.entries[1]))
     ends = last.graph.nodes[last.graph.outputs[0]]
-    output = replace(quantized.datapath.stages[-1], x_low=ends.low, x_high=ends.high)
+    output = replace(quantized.datapath.stages[-1], x=ends.range)
     lie = replace(quantized, datapath=replace(quantized.datapath, stages=(narrow, last, output)))
     tree = json.loads(certificate_text(certificate(lie, OUT.lsb)))
     pattern = r"^node \d+ \(bound upper_y\) of section0 must hold .*, not .*$"

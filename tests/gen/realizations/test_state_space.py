@@ -346,7 +346,7 @@ ONE = Coefficient(1, 1)
     ("changes", "message"),
     [
         ({"a": ()}, "states must be one or two, not 0"),
-        ({"b": (ONE, ONE)}, "everything about 1 states must come 1 times, not [1, 1, 2, 1, 1, 1]"),
+        ({"b": (ONE, ONE)}, "everything about 1 states must come 1 times, not [1, 1, 2, 1, 1]"),
         ({"integer_part": (-2,)}, "poles must lie inside the unit circle, not at a1 = 1.5, a2 = 0.0"),
     ],
 )
@@ -359,13 +359,9 @@ def test_sections_that_cannot_be(changes: dict[str, object], message: str) -> No
         c=(ONE,),
         d=ONE,
         truncating=False,
-        u_frac=0,
-        u_low=-8,
-        u_high=7,
-        x_fracs=(0,),
-        x_ranges=((-8, 7),),
-        y_frac=0,
-        y_range=(-8, 7),
+        u=Range(0, -8, 7),
+        x=(Range(0, -8, 7),),
+        y=Range(0, -8, 7),
     )
     assert section.graph.run([[7], [0], [0]]) == [[4], [2], [1]]
     with pytest.raises(ValueError, match=f"^{re.escape(message)}$"):

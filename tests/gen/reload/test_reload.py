@@ -11,6 +11,7 @@ import pytest
 from tests.gen.designs import EXAMPLES, example_design
 from tests.gen.reload.swaps import during, moved, worst_input
 from tests.model.reload.swapping import compute_swapping
+from tests.model.reload.unpacking import unpacked
 
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.filter.design import design
@@ -25,7 +26,7 @@ from sosmith.hdl.instruction import encoded
 from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.dataflow.program import Opcode, Program
 from sosmith.model.errors import ShortfallError, SpecificationError
-from sosmith.model.reload.constants import constants, unpacked
+from sosmith.model.reload.constants import constants
 from sosmith.model.reload.registers import CRC, DATA, VERSION
 
 EXACT = [name for name in REALIZATIONS if name != "state_space"]  # that one rounds its coefficients together

@@ -126,7 +126,7 @@ def test_the_response_meets_the_mask_and_no_lower_order_would() -> None:
     assert gain[1] <= -value["stopband_loss"] + 1e-9
     assert minimum_order(*(value[c.key] for c in made.choices), BENCH_RATE)[0] == made.filter.order
     assert made.needed <= value["passband_edge"]
-    # five digits less a hair: the pass edge is as high as the order allows
+    # five digits less a hair: the passband edge is as high as the order allows
     assert minimum_order(value["passband_edge"] * 1.0002, *list(value.values())[1:], BENCH_RATE)[0] > made.filter.order
 
 
@@ -162,7 +162,7 @@ def test_without_truth_the_pass_edge_tells_what_is_wanted() -> None:
     wish = Wish(tolerance=0.1, passband=0.1)
     made = propose([told_apart("trace", measured, 0.1)], wish, rate)
     assert made["stopband_loss"] == pytest.approx(20 * math.log10(0.2 / 0.025), abs=0.1)
-    # as motion alone, the slow part disturbs too, and lies below any pass edge of 0.1 Hz
+    # as motion alone, the slow part disturbs too, and lies below any passband edge of 0.1 Hz
     motion = Content(name="trace", wanted=None, disturbance=measured, has_truth=False)
     with pytest.raises(ShortfallError, match=r"^tolerance must be at least about 1\.2\d for a Butterworth"):
         propose([motion], wish, rate)
@@ -235,8 +235,8 @@ def test_what_is_slower_than_the_spectra_is_part_of_the_error() -> None:
         propose([replace(one, slow=0.003)], wish, BENCH_RATE)
 
 
-def test_motion_alone_needs_a_pass_edge() -> None:
+def test_motion_alone_needs_a_passband_edge() -> None:
     motion = spectrum(waves(20, 800, np.array([2.0]), 0.2, 2), 20, SETTINGS)
-    message = "the pass edge must be given, by --passband in Hz or --time-constant in s, where no trace has its truth"
+    message = "the passband edge must be given, by --passband in Hz or --time-constant in s, if no trace has its truth"
     with pytest.raises(SpecificationError, match=f"^{re.escape(message)}$"):
         propose([Content(name="m", wanted=None, disturbance=motion, has_truth=False)], Wish(), 20)

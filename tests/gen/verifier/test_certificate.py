@@ -315,16 +315,16 @@ def test_a_range_too_narrow_for_what_is_possible() -> None:
     """Everything that follows from the narrower range is consistent; only the peak gain says otherwise."""
     quantized = plain(butterworth(2, 0.05))
     (section,) = quantized.sections
-    narrow = replace(section, v_high=section.v_high - section.v_high // 2**12)
+    low, high = section.v_range
+    less = high - high // 2**12
+    narrow = replace(section, v_range=(low, less))
     stages = list(quantized.datapath.stages)
     stages[0] = narrow
     node = narrow.graph.nodes[narrow.graph.outputs[0]]
-    stages[1] = replace(stages[1], x_low=node.low, x_high=node.high)
+    stages[1] = replace(stages[1], x=node.range)
     lie = replace(quantized, datapath=replace(quantized.datapath, stages=tuple(stages)))
     number = next(index for index, node in enumerate(narrow.graph.nodes) if node.name == "v")
-    message = (
-        rf"node {number} \(bound v\) of section0 must hold -[0-9.]+\.\.[0-9.]+, not {narrow.v_low}\.\.{narrow.v_high}"
-    )
+    message = rf"node {number} \(bound v\) of section0 must hold -[0-9.]+\.\.[0-9.]+, not {low}\.\.{less}"
     rejected(json.loads(certificate_text(certificate(lie, OUT.lsb))), message)
 
 

@@ -21,6 +21,7 @@ from sosmith.gen.word_lengths.cost import cost_of, cost_of_graphs
 from sosmith.gen.word_lengths.quantize import Plan, plan, prove
 from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.gen.word_lengths.search import Choice, Search
+from sosmith.model.dataflow.graph import Range
 from sosmith.model.sections.direct_form import DirectForm1, Product
 
 FAST = "audio_lowpass.toml", "flange_wear_bench.toml"
@@ -267,12 +268,9 @@ def test_what_a_tap_sum_drops_comes_through_its_coefficient_and_a_difference(
         products=fitted,
         integer_part=(-2, 1),
         feedback=feedback,
-        x_frac=6,
-        x_low=-(2**20),
-        x_high=2**20,
+        x=Range(6, -(2**20), 2**20),
         y_frac=5,
-        v_low=-(2**50),
-        v_high=2**50,
+        v_range=(-(2**50), 2**50),
     )
     (cut,) = [p for p in fitted if p.name == label]
     source, output = source_of(section, cut.operand)

@@ -10,7 +10,7 @@ from tests.model.datapaths import INPUT, OUTPUT, butterworth, cascade
 
 from sosmith.model.dataflow.c_model import c_header, c_source
 from sosmith.model.dataflow.datapath import Datapath
-from sosmith.model.dataflow.graph import GraphBuilder
+from sosmith.model.dataflow.graph import GraphBuilder, Range
 from sosmith.model.port import Port
 from sosmith.model.sections.horner import HornerPolynomial, HornerStep, Variable
 
@@ -79,6 +79,6 @@ def test_refusals() -> None:
     with pytest.raises(ValueError, match=r"^the last stage's output must fit the output port, not Node\(.*\)$"):
         replace(datapath, output=Port.from_range("y", 12, Fraction(-1), Fraction(1), signed=True))
     with pytest.raises(ValueError, match=r"^input x of output_stage must hold Node\(.*\), not Node\(.*\)$"):
-        replace(datapath, stages=(datapath.stages[0], replace(datapath.stages[-1], x_frac=3)))
+        replace(datapath, stages=(datapath.stages[0], replace(datapath.stages[-1], x=Range(3, 0, 1))))
     assert datapath.inputs == (INPUT,)
     assert datapath.output == OUTPUT

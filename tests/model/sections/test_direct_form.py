@@ -9,6 +9,7 @@ import pytest
 from scipy import signal
 from tests.model.datapaths import butterworth, sections_of
 
+from sosmith.model.dataflow.graph import Range
 from sosmith.model.sections.direct_form import DirectForm1, Product
 
 F7 = butterworth(7, 0.002588)
@@ -34,10 +35,10 @@ def test_section_computes_its_difference_equation(feedback: int) -> None:
         b, (a1, a2), (k1, k2) = section.numerator, section.denominator, section.feedback
         rng = np.random.default_rng(7)
         x = rng.integers(-20000, 20000, 400).tolist()
-        if section.x_frac:
-            x = [code << section.x_frac for code in x]
+        if section.x.frac:
+            x = [code << section.x.frac for code in x]
         y = [code for (code,) in section.graph.run([[code] for code in x])]
-        scale_x, scale_y = Fraction(1, 1 << section.x_frac), Fraction(1, 1 << section.y_frac)
+        scale_x, scale_y = Fraction(1, 1 << section.x.frac), Fraction(1, 1 << section.y_frac)
         xs = [0, 0, *[code * scale_x for code in x]]
         ys, errors = [Fraction(0)] * 2, [Fraction(0)] * 2
         centre = scale_y / 2 * (1 + k1 + k2)
@@ -88,10 +89,7 @@ def test_refusals() -> None:
             products=(),
             integer_part=(0, 0),
             feedback=(0, 0),
-            x_frac=0,
-            x_low=0,
-            x_high=1,
+            x=Range(0, 0, 1),
             y_frac=0,
-            v_low=0,
-            v_high=1,
+            v_range=(0, 1),
         )

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from tests.model.datapaths import butterworth, sections_of
 
+from sosmith.model.dataflow.graph import Range
 from sosmith.model.sections.direct_form import Product
 from sosmith.model.sections.transposed_form import TransposedForm
 
@@ -33,9 +34,7 @@ def section(products: tuple[Product, ...], operator: int, **options: object) -> 
         integer_part=(-2, 1) if second else (-1, 0),
         operator=operator,
         delta_exponent=-3,
-        x_frac=1,
-        x_low=-(1 << 15),
-        x_high=(1 << 15) - 1,
+        x=Range(1, -(1 << 15), (1 << 15) - 1),
         y_frac=4,
         state_fracs=(6, 5),
         v_range=WIDE,
@@ -58,7 +57,7 @@ def difference_equation(form: TransposedForm, codes: list[int]) -> list[Fraction
     s1 = s2 = Fraction(0)
     result = []
     for code in codes:
-        x = Fraction(code, 1 << form.x_frac)
+        x = Fraction(code, 1 << form.x.frac)
         y = quantized(numerator[0] * x + s1, form.y_frac, centred=g != 1)
         t1 = g * s1 + numerator[1] * x - denominator[0] * y + delta * s2
         t2 = g * s2 + (numerator[2] * x - denominator[1] * y) / delta
@@ -98,9 +97,7 @@ def test_exact_states_make_the_direct_form_bit_for_bit(operator: int) -> None:
             integer_part=direct.integer_part,
             operator=operator,
             delta_exponent=-7,
-            x_frac=0,
-            x_low=-32768,
-            x_high=32767,
+            x=Range(0, -32768, 32767),
             y_frac=3,
             state_fracs=(None, None),
             v_range=WIDE,
