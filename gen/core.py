@@ -47,6 +47,8 @@ class CoreDesign:
         Reasons for this realization and this architecture, one sentence each.
     fit : Fit or None
         The fit, if the calibration comes from measurements.
+    options : dict of str to str
+        What was asked for beside the specification: parameters of `design_core` by name, a board by its name.
     """
 
     spec: Specification
@@ -55,6 +57,7 @@ class CoreDesign:
     architecture: Architecture
     reasons: dict[str, str]
     fit: Fit | None
+    options: dict[str, str]
 
     @property
     def datapath(self) -> Datapath:
@@ -96,6 +99,12 @@ def design_core(
     ShortfallError
         If no formats meet the specification.
     """
+    asked = {
+        "core": core,
+        "realization": realization,
+        "widths_of": widths_of,
+        "board": None if board is None else board.name,
+    }
     kind = _chosen_core(spec, core)
     wanted = _known(realization or spec.hardware.realization)
     if kind != "filter":
@@ -161,6 +170,7 @@ def design_core(
         architecture=architecture,
         reasons={"realization": reason, "architecture": why},
         fit=fitted,
+        options={key: value for key, value in asked.items() if value is not None},
     )
 
 

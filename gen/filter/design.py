@@ -1,7 +1,8 @@
-"""Filter design: from the specification to second-order sections whose doubles are the same on every machine.
+"""Filter design: from the specification to second-order sections that are the same on every machine.
 
 Minimum order, cutoff, poles, zeros and gains are derived from the specification's numbers in ball arithmetic and
-rounded once; see `sosmith.gen.filter.sections` for what is rounded. Sign convention of the sections: scipy's,
+rounded once: to rationals with hundreds of bits, against which everything is proven, and to doubles, from which
+hardware is made. See `sosmith.gen.filter.sections` for what is rounded. Sign convention of the sections: scipy's,
 ``a0 = 1``.
 """
 
@@ -18,10 +19,19 @@ import numpy.typing as npt
 from flint import acb, arb, fmpq
 from scipy import signal
 
-from sosmith.gen.filter.impulse_invariance import Aliasing, aliasing, impulse_invariant
+from sosmith.gen.filter.impulse_invariance import Aliasing, aliasing, impulse_invariant, simple_level
 from sosmith.gen.filter.minimum_order import least_order
 from sosmith.gen.filter.prototypes import Prototype, prototype
-from sosmith.gen.filter.sections import Row, rounded, sections
+from sosmith.gen.filter.sections import (
+    Exact,
+    Row,
+    Section,
+    exact_bits,
+    exact_sections,
+    given_sections,
+    rounded,
+    sections,
+)
 from sosmith.gen.filter.transformations import bilinear, unwarped, warped
 from sosmith.gen.specification.specification import FilterSpec
 from sosmith.model.arithmetic.correct_rounding import evaluate, nearest_double, sign
@@ -33,6 +43,7 @@ _MAX_RESPONSE = 1 << 24  # samples; poles so close to the unit circle that respo
 _DECAY = 1e-12  # relative to its envelope, where an impulse response counts as decayed
 _COMFORTABLE = 20  # samples per period of the band edge; fewer hardly reduce the word lengths
 _UNITY = 1e-14  # relative distance within which the gain of given sections counts as one: rounding, not intent
+_LARGEST_RADIUS = 1 - 2.0**-52  # of a pole that a double can tell from 1
 _GRID = 2048  # frequencies up to half the sample rate at which given sections are evaluated
 
 
@@ -56,6 +67,9 @@ class Filter:
         dB, likewise.
     rows : tuple of tuple of float
         (b0, b1, b2, 1, a1, a2) per section, in the order of the cascade.
+    exact : tuple of tuple
+        Numerator and denominator of the same sections as dyadic rationals, in any order, whose product is the specified
+        filter far more accurately than that of `rows`: proofs compare with it.
     aliasing : Aliasing or None
         Deviation of an impulse-invariant filter from its analog model; None for all others.
     """
@@ -69,7 +83,8 @@ class Filter:
     stopband_edge: tuple[float, ...] | None
     passband_loss: float | None
     stopband_loss: float | None
-    rows: tuple[tuple[float, ...], ...]
+    rows: tuple[Row, ...]
+    exact: tuple[Exact, ...]
     aliasing: Aliasing | None = None
 
     @property
@@ -207,18 +222,20 @@ def design(spec: FilterSpec, sample_rate: Fraction | float) -> Filter:
     fs = Fraction(sample_rate)
     if spec.sos is not None:
         given = tuple(tuple(float(value) for value in row) for row in spec.sos)
-        return _filter(spec, fs, "sections", *evaluate(lambda: _normalized(given)), order=_poles(given))
+        kind, rows = evaluate(lambda: _normalized(given))
+        exact = given_sections(spec.sos, _exact_bits(given))
+        return _filter(spec, fs, "sections", kind, rows, exact, order=_poles(given))
     order, cutoff = evaluate(lambda: _order_and_cutoff(spec, fs))
     alias = None
     if spec.method == "impulse_invariant":
         assert spec.cutoff is not None  # the specification has checked it
         ratio = spec.cutoff[0] / fs
-        rows = evaluate(lambda: impulse_invariant(_prototype(spec, order), ratio))
+        rows, exact = evaluate(lambda: _sampled(spec, order, ratio))
         alias = evaluate(lambda: aliasing(_prototype(spec, order), ratio))
     else:
-        rows = evaluate(lambda: _bilinear(spec, fs))
+        rows, exact = evaluate(lambda: _bilinear(spec, fs))
     doubled = 2 if spec.kind in {"bandpass", "bandstop"} else 1
-    return _filter(spec, fs, spec.family, spec.kind, rows, order=doubled * order, cutoff=cutoff, aliasing=alias)
+    return _filter(spec, fs, spec.family, spec.kind, rows, exact, order=doubled * order, cutoff=cutoff, aliasing=alias)
 
 
 def _filter(
@@ -227,6 +244,7 @@ def _filter(
     family: str,
     kind: str,
     rows: tuple[Row, ...],
+    exact: tuple[Exact, ...],
     *,
     order: int,
     cutoff: tuple[float, ...] | None = None,
@@ -243,6 +261,7 @@ def _filter(
         passband_loss=None if spec.passband_loss is None else float(spec.passband_loss),
         stopband_loss=None if spec.stopband_loss is None else float(spec.stopband_loss),
         rows=rows,
+        exact=exact,
         aliasing=aliasing,
     )
 
@@ -283,10 +302,29 @@ def _prototype(spec: FilterSpec, order: int) -> Prototype:
     return prototype(spec.family, order, spec.passband_loss, spec.stopband_loss)
 
 
-def _bilinear(spec: FilterSpec, fs: Fraction) -> tuple[Row, ...]:
+def _bilinear(spec: FilterSpec, fs: Fraction) -> _Both:
     order, edges = _order_and_edges(spec, fs)
     digital = bilinear(_prototype(spec, order), spec.kind, edges)
-    return rounded(sections(digital), digital.passing, digital.level)
+    return _both(sections(digital), digital.passing, digital.level, digital.level)
+
+
+def _sampled(spec: FilterSpec, order: int, ratio: Fraction) -> _Both:
+    made, level = impulse_invariant(_prototype(spec, order), ratio)
+    return _both(made, acb(1), level, simple_level(level))
+
+
+_Both = tuple[tuple[Row, ...], tuple[Exact, ...]]
+"""Rounded to doubles, and exact."""
+
+
+def _both(made: Sequence[Section], passing: acb, level: arb, simple: arb) -> _Both:
+    rows = rounded(made, passing, simple)
+    return rows, exact_sections(made, passing, level, _exact_bits(rows))
+
+
+def _exact_bits(rows: Sequence[Row]) -> int:
+    """Choose the fraction bits of exact coefficients by the poles of their doubles."""
+    return exact_bits([min(_radius(row[4], row[5]), _LARGEST_RADIUS) for row in rows for _ in range(_poles([row]))])
 
 
 def _poles(rows: Sequence[Row]) -> int:

@@ -23,7 +23,7 @@ from fractions import Fraction
 from flint import acb, acb_poly, arb, ctx
 
 from sosmith.gen.filter.prototypes import Prototype
-from sosmith.gen.filter.sections import Row, Section, rounded
+from sosmith.gen.filter.sections import Section
 from sosmith.model.arithmetic.correct_rounding import UndecidedError, ball, nearest_double
 
 _GRID = 512
@@ -53,8 +53,8 @@ class Aliasing:
     dc_error: float
 
 
-def impulse_invariant(prototype: Prototype, ratio: Fraction) -> tuple[Row, ...]:
-    """Sections of the filter that samples the impulse response of an analog low-pass.
+def impulse_invariant(prototype: Prototype, ratio: Fraction) -> tuple[list[Section], arb]:
+    """Sections of the filter that samples the impulse response of an analog low-pass, and its gain at zero frequency.
 
     Parameters
     ----------
@@ -65,9 +65,10 @@ def impulse_invariant(prototype: Prototype, ratio: Fraction) -> tuple[Row, ...]:
 
     Returns
     -------
-    tuple of tuple of float
-        (b0, b1, b2, 1, a1, a2); poles closest to the unit circle come last, as in scipy. Each section has unity gain
-        at zero frequency, except the first, which takes the remaining gain.
+    list of Section
+        Poles closest to the unit circle come last, as in scipy; numerators are not scaled.
+    arb
+        The gain at zero frequency; `simple_level` is it for hardware.
 
     Raises
     ------
@@ -77,9 +78,12 @@ def impulse_invariant(prototype: Prototype, ratio: Fraction) -> tuple[Row, ...]:
         If the precision is too low.
     """
     sampled = _Sampled.of(prototype, ratio)
-    level = sampled(acb(1)).real
-    made = _sections(sampled.numerator, prototype, sampled.model.scale)
-    return rounded(made, acb(1), arb(1) if abs(nearest_double(level - 1)) < _UNITY else level)
+    return _sections(sampled.numerator, prototype, sampled.model.scale), sampled(acb(1)).real
+
+
+def simple_level(level: arb) -> arb:
+    """Gain at zero frequency for the doubles that hardware is made from: one if it is as good as one."""
+    return arb(1) if abs(nearest_double(level - 1)) < _UNITY else level
 
 
 def aliasing(prototype: Prototype, ratio: Fraction) -> Aliasing:

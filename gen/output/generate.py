@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from sosmith.gen.core import CoreDesign
-from sosmith.gen.output.certificate import certificate
+from sosmith.gen.output.certificate import about, certificate
 from sosmith.gen.output.core_facts import CoreFacts, core_facts
 from sosmith.gen.output.manifest import manifest
 from sosmith.gen.output.verilog import to_rtlil, to_verilog
@@ -47,25 +47,28 @@ def generate(
     SpecificationError
         If the folder cannot be written.
     """
+    return write_files(directory, generated(design, progress, facts=facts))
+
+
+def generated(
+    design: CoreDesign, progress: Callable[[str], None] = lambda step: None, *, facts: CoreFacts | None = None
+) -> dict[str, str]:
+    """Return the texts that `generate` writes, by the names of the files; parameters and errors as there."""
     name, datapath = design.spec.name, design.datapath
     progress("RTLIL")
     rtlil_text = to_rtlil(design.architecture.component(), datapath.name)
     progress("SystemVerilog")
-    verilog_text = to_verilog(rtlil_text)
+    texts = {
+        f"{name}.sv": to_verilog(rtlil_text),
+        f"{name}.il": rtlil_text,
+        f"{name}.json": to_json(manifest(facts or core_facts(design))),
+        f"{name}.c": c_source(datapath),
+        f"{name}.h": c_header(datapath),
+        **_register_files(design),
+    }
     progress("certificate")
-    proven = certificate(design.quantized, design.spec.max_error)
-    return write_files(
-        directory,
-        {
-            f"{name}.sv": verilog_text,
-            f"{name}.il": rtlil_text,
-            f"{name}.json": to_json(manifest(facts or core_facts(design))),
-            f"{name}.certificate.json": certificate_text(proven),
-            f"{name}.c": c_source(datapath),
-            f"{name}.h": c_header(datapath),
-        }
-        | _register_files(design),
-    )
+    proven = certificate(design.quantized, design.spec.max_error, about(design, texts))
+    return {**texts, f"{name}.certificate.json": certificate_text(proven)}
 
 
 def _register_files(design: CoreDesign) -> dict[str, str]:

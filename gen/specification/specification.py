@@ -5,18 +5,19 @@ Every number stays exact (`Fraction`) as written. Values that are known but not 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sosmith.gen.specification.choices import CALIBRATION_INPUTS
+from sosmith.gen.specification.toml_text import toml_text
 from sosmith.gen.specification.values import UnfitError
 from sosmith.gen.specification.wear_limits import WearSpec
 from sosmith.model.errors import SpecificationError
 from sosmith.model.port import Port
-from sosmith.model.tables.toml_file import read_toml
+from sosmith.model.tables.toml_file import parse_toml, read_text
 
 if TYPE_CHECKING:
     from sosmith.gen.specification.schema import Document, FilterTable, InputTable, OutputTable
@@ -112,6 +113,8 @@ class Specification:
         File that the specification was read from.
     source : dict
         The file as read, in the types of JSON, for the manifest.
+    text : str
+        The file's text, TOML; of a specification that does not come from a file, a text with the same values.
     name : str
         Name of the top module and of the files: a Verilog identifier.
     sample_rate : Fraction
@@ -137,6 +140,7 @@ class Specification:
 
     path: Path
     source: dict[str, Any]
+    text: str
     name: str
     sample_rate: Fraction
     channels: int
@@ -158,10 +162,15 @@ def load(path: Path) -> Specification:
         For the first error, in one sentence: the file, the path of the key or the line, what was expected
         and what was found.
     """
-    tree = read_toml(path, what="the specification", max_bytes=MAX_BYTES, parse_float=Decimal)
+    return from_text(read_text(path, what="the specification", max_bytes=MAX_BYTES), path)
+
+
+def from_text(text: str, path: Path) -> Specification:
+    """Check the specification with the TOML `text`; path and errors as for `from_tree`."""
+    tree = parse_toml(text, str(path), what="the specification", parse_float=Decimal)
     if not tree:
         raise SpecificationError(f"{path}: the specification must have keys, not be empty")
-    return from_tree(tree, path)
+    return replace(from_tree(tree, path), text=text)
 
 
 def from_tree(tree: dict[str, Any], path: Path) -> Specification:
@@ -201,9 +210,11 @@ def _specification(path: Path, tree: dict[str, Any], document: Document) -> Spec
     calibrated = document.calibration is not None
     output_port = _port("clearance" if calibrated else "y", output, output.unit)
     hardware, wear = document.hardware, document.wear
+    source = {key: _to_json(value) for key, value in tree.items()}
     return Specification(
         path=path,
-        source={key: _to_json(value) for key, value in tree.items()},
+        source=source,
+        text=toml_text(source),
         name=document.name,
         sample_rate=document.sample_rate,
         channels=document.channels,

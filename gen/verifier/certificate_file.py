@@ -7,6 +7,7 @@ floating-point numbers in it. The sum of an infinite series is stored as the nex
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
 import re
@@ -20,7 +21,7 @@ from pydantic_core import ErrorDetails
 
 from sosmith.model.errors import SpecificationError
 
-FORMAT = "sosmith certificate 1"
+FORMAT = "sosmith certificate 2"
 _GRID_BITS = 64
 _MAX_BITS = 4096  # of any number: far beyond any design, and few enough to keep the arithmetic fast
 _MAX_DIGITS = 1300  # of an integer in the file: slightly more than _MAX_BITS
@@ -46,6 +47,18 @@ Integer = Annotated[int, Field(strict=True, ge=-(2**_MAX_BITS), le=2**_MAX_BITS)
 Exponent = Annotated[int, Field(strict=True, ge=-_MAX_BITS, le=_MAX_BITS)]
 Index = Annotated[int, Field(strict=True, ge=0, lt=10_000)]
 Text = Annotated[str, Field(strict=True, max_length=1000)]
+
+
+LongText = Annotated[str, Field(strict=True, max_length=1 << 16)]
+
+
+def _sha256(value: object) -> object:
+    if isinstance(value, str) and re.fullmatch("[0-9a-f]{64}", value) is None:
+        raise ValueError("must be a SHA-256 of 64 hexadecimal digits")
+    return value
+
+
+Sha256 = Annotated[str, BeforeValidator(_sha256), Field(strict=True)]
 
 
 class _Part(BaseModel):
@@ -151,17 +164,52 @@ class ClaimsEntry(_Part):
     sections: tuple[GainEntry, ...]
 
 
-class Certificate(_Part):
-    """A whole certificate; `max_error` is in the unit of the output."""
+class FileEntry(_Part):
+    """A file by its name, without a folder, and the SHA-256 of its bytes."""
 
-    format: Literal["sosmith certificate 1"]
     name: Text
+    sha256: Sha256
+
+
+class AboutEntry(_Part):
+    """What the certificate is about.
+
+    `specification` is the whole text of the specification, TOML, `sha256` that of its UTF-8 bytes, and `options` holds
+    what was asked for beside it: core, realization, widths_of, board. `measurements` is the file that the calibration
+    was fitted to. `files` are the files that were written with the certificate, and `versions` those of the tools that
+    made them. `certificate` is the SHA-256 of the certificate's own text with 64 zeros in this place.
+    """
+
+    specification: LongText
+    sha256: Sha256
+    options: dict[Text, Text]
+    measurements: FileEntry | None = None
+    files: Annotated[tuple[FileEntry, ...], Field(max_length=100)]
+    versions: dict[Text, Text]
+    certificate: Sha256
+
+
+class Certificate(_Part):
+    """A whole certificate; `max_error` is in the unit of the output, and `about` is None without files."""
+
+    format: Literal["sosmith certificate 2"]
+    name: Text
+    about: AboutEntry | None = None
     inputs: Annotated[tuple[PortEntry, ...], Field(min_length=1, max_length=2)]
     output: PortEntry
     max_error: Rational
     ideal: IdealEntry
     stages: Annotated[tuple[StageEntry, ...], Field(min_length=1, max_length=256)]
     claims: ClaimsEntry
+
+
+def sealed(certificate: Certificate) -> Certificate:
+    """Return a certificate with the SHA-256 of its own text."""
+    if certificate.about is None:
+        return certificate
+    blank = certificate.model_copy(update={"about": certificate.about.model_copy(update={"certificate": "0" * 64})})
+    digest = hashlib.sha256(certificate_text(blank).encode()).hexdigest()
+    return certificate.model_copy(update={"about": certificate.about.model_copy(update={"certificate": digest})})
 
 
 def certificate_text(certificate: Certificate) -> str:

@@ -43,11 +43,15 @@ class Verdict:
         Parts of the error bound, in output LSBs.
     nodes, ranges : int
         Number of nodes with a checked range, and of those whose range needed a peak gain.
+    margin : Fraction
+        Worst-case peak gain by which the certificate's ideal filter may differ from another one while every claim holds
+        against that one too; 0 without sections.
     """
 
     budget: dict[str, Fraction]
     nodes: int
     ranges: int
+    margin: Fraction
 
     @property
     def bound(self) -> Fraction:
@@ -100,20 +104,20 @@ def _verified(certificate: Certificate, progress: Progress) -> Verdict:
         bool(sections) == bool(certificate.ideal.sections),
         f"the hardware's sections must stand for ideal ones, not {len(sections)} for {len(certificate.ideal.sections)}",
     )
-    ranges = 0
+    ranges, margin = 0, Fraction(0)
     if sections:
         cascade = _Cascade(certificate, sections, progress)
         for part in budget:
             budget[part] *= cascade.peak_gain
         budget["filter coefficients"], budget["filter rounding"] = cascade.coefficients, cascade.rounding
-        ranges = cascade.ranges
+        ranges, margin = cascade.ranges, cascade.margin
         _compare("peak_gain of the filter", certificate.claims.peak_gain, cascade.peak_gain)
     else:
         _compare("peak_gain of the filter", certificate.claims.peak_gain, None)
         require(not certificate.claims.sections, "the gains of sections must not be given where there are none")
     budget["output rounding"] = output_error(certificate, last[0])
     _compare_budget(certificate, budget)
-    return Verdict(budget, sum(len(stage.nodes) for stage in stages), ranges)
+    return Verdict(budget, sum(len(stage.nodes) for stage in stages), ranges, margin)
 
 
 def _compare(what: str, claimed: Fraction | None, proven: Fraction | None) -> None:
@@ -233,8 +237,12 @@ class _Cascade:
         progress("sections", len(self._models), len(self._models))
         made, *errors = (self._driven(drive, len(self._models) - 1) for drive in drives)
         self.rounding = on_grid(_magnitude(errors))
-        difference = _difference(made[0], exact)
-        self.coefficients = on_grid(_magnitude([(difference, *entry)]))
+        deviation = _magnitude([(_difference(made[0], exact), *entry)])
+        self.coefficients = on_grid(deviation)
+        # Both figures are rounded up: what that adds is room for another ideal filter.
+        self.margin = min(
+            self.peak_gain - exact.gain, (self.coefficients - deviation) / max(1, *(abs(end) for end in entry))
+        )
 
     def _compare_gains(self, certificate: Certificate) -> None:
         claims = certificate.claims.sections

@@ -9,26 +9,12 @@ from fractions import Fraction
 from typing import Any
 
 from sosmith.gen.filter.design import Filter
-from sosmith.gen.proof.cascade_proof import CascadeProof, StageModel, TransferFunction, prove_cascade
+from sosmith.gen.proof.cascade_proof import CascadeProof, StageModel, prove_cascade
 from sosmith.gen.proof.linear_model import linear_models
 from sosmith.gen.proof.peak_gain import Extent
 from sosmith.gen.realizations.registry import REALIZATIONS, Section
 from sosmith.gen.realizations.section_format import SectionFormat, unknown_range
 from sosmith.model.dataflow.graph import Range
-
-
-def ideal_sections(ideal: Filter) -> list[TransferFunction]:
-    """Return the ideal sections as exact rationals of their double-precision coefficients."""
-    sections = []
-    for row in ideal.rows:
-        numerator, denominator = ([Fraction(value) for value in part] for part in (row[:3], row[3:]))
-        sections.append((_shortened(numerator), _shortened(denominator)))
-    return sections
-
-
-def _shortened(values: Sequence[Fraction]) -> tuple[Fraction, ...]:
-    end = max((k for k, value in enumerate(values) if value), default=0)
-    return tuple(values[: end + 1])
 
 
 def parts_of(ideal: Filter, realization: str) -> Sequence[Any]:
@@ -47,7 +33,7 @@ def cascade(
 ) -> tuple[list[Section], CascadeProof]:
     """Build the stages for an input in `x`, prove their ranges, and build them again with these ranges."""
     stages = stages_of(ideal, realization, formats, unknown_range(x.frac))
-    proof = prove_cascade([linear_models(s.graph) for s in stages], ideal_sections(ideal), *x.limits)
+    proof = prove_cascade([linear_models(s.graph) for s in stages], ideal.exact, *x.limits)
     proven = list(formats)
     for k, (stage, extents) in enumerate(zip(stages, proof.nodes, strict=True)):
         nodes = stage.graph.nodes

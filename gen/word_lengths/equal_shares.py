@@ -11,7 +11,7 @@ from sosmith.gen.proof.cascade_proof import CascadeProof, coefficient_extent, ro
 from sosmith.gen.realizations.registry import BEST_KEPT, Section
 from sosmith.gen.realizations.section_format import SectionFormat, unknown_range
 from sosmith.gen.word_lengths.bit_limits import MAX_BITS, MIN_BITS
-from sosmith.gen.word_lengths.cascade import cascade, ideal_sections, parts_of, stages_of, unquantized
+from sosmith.gen.word_lengths.cascade import cascade, parts_of, stages_of, unquantized
 from sosmith.model.dataflow.graph import Range
 from sosmith.model.errors import ShortfallError
 
@@ -53,11 +53,10 @@ def equally_shared(
 
 def _coefficient_bits(ideal: Filter, realization: str, x: Range, share: Fraction) -> int:
     """Fewest significant bits whose proven effect stays within `share`."""
-    sections = ideal_sections(ideal)
     bits = MIN_BITS
     while bits <= MAX_BITS:
         try:
-            error = coefficient_extent(unquantized(ideal, realization, bits), sections, *x.limits).magnitude
+            error = coefficient_extent(unquantized(ideal, realization, bits), ideal.exact, *x.limits).magnitude
         except ShortfallError:
             bits += 1  # unstable with so few bits
             continue

@@ -18,7 +18,7 @@ from sosmith.gen.filter.design import Filter
 from sosmith.gen.proof.cascade_proof import CascadeProof, ideal_gain
 from sosmith.gen.realizations.registry import REALIZATIONS, Section
 from sosmith.gen.word_lengths.bit_limits import MAX_BITS
-from sosmith.gen.word_lengths.cascade import cascade, ideal_sections, unquantized
+from sosmith.gen.word_lengths.cascade import cascade, unquantized
 from sosmith.gen.word_lengths.cost import cost_of, cost_of_graphs
 from sosmith.gen.word_lengths.equal_shares import equally_shared
 from sosmith.gen.word_lengths.input_stage import InputStage, input_stages, needs_scaling
@@ -247,7 +247,7 @@ def gain_of(ideal: Filter) -> Fraction:
         If a pole lies too close to the unit circle; the message says what would help.
     """
     try:
-        return ideal_gain(ideal_sections(ideal))
+        return ideal_gain(ideal.exact)
     except ShortfallError as error:
         raise ShortfallError(f"{error}{_remedy_of_poles(ideal)}") from None
 

@@ -72,6 +72,26 @@ def nearest_double(value: arb) -> float:
     raise UndecidedError
 
 
+def nearest_multiple(value: arb, frac: int) -> Fraction:
+    """Round to the nearest multiple of ``2**-frac``.
+
+    A ball that keeps a tie open at the last precision counts as its midpoint.
+
+    Raises
+    ------
+    UndecidedError
+        If the ball does not lie between two neighbouring ties.
+    """
+    if not value.is_finite():
+        raise UndecidedError
+    low, high = (round(_fraction(end) * 2**frac) for end in (value.lower(), value.upper()))
+    if low == high:
+        return Fraction(low, 2**frac)
+    if ctx.prec >= _MAX_PRECISION:
+        return Fraction(round(_fraction(value.mid()) * 2**frac), 2**frac)
+    raise UndecidedError
+
+
 def sign(value: arb) -> int:
     """Sign of the enclosed value, -1, 0 or 1; a ball around zero at the last precision counts as zero.
 

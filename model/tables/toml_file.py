@@ -16,19 +16,35 @@ def read_toml(path: Path, *, what: str, max_bytes: int, parse_float: Callable[[s
 
     Parameters
     ----------
-    path : Path
-        The file, UTF-8 with or without a byte order mark.
-    what : str
-        What the file is, such as "the specification", for messages.
-    max_bytes : int
-        Size from which on a file is refused.
+    path, what, max_bytes
+        As for `read_text`.
     parse_float : callable
         Makes a number of the text of a TOML float.
 
     Raises
     ------
     SpecificationError
-        If the file cannot be read, is longer than `max_bytes`, or is no TOML.
+        As `read_text`, or if the file is no TOML.
+    """
+    return parse_toml(read_text(path, what=what, max_bytes=max_bytes), str(path), what=what, parse_float=parse_float)
+
+
+def read_text(path: Path, *, what: str, max_bytes: int) -> str:
+    """Read a file of text as it is.
+
+    Parameters
+    ----------
+    path : Path
+        The file, UTF-8 with or without a byte order mark.
+    what : str
+        What the file is, such as "the specification", for messages.
+    max_bytes : int
+        Largest size of the file.
+
+    Raises
+    ------
+    SpecificationError
+        If the file cannot be read, is longer than `max_bytes`, or is no UTF-8.
     """
     try:
         with path.open("rb") as file:
@@ -41,13 +57,12 @@ def read_toml(path: Path, *, what: str, max_bytes: int, parse_float: Callable[[s
     if len(content) > max_bytes:
         raise SpecificationError(f"{path}: {what} must be at most {max_bytes} bytes, not longer")
     try:
-        text = content.decode("utf-8-sig")
+        return content.decode("utf-8")
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
         raise SpecificationError(
             f"{path}: line {line} must be UTF-8 text, not the byte 0x{content[error.start]:02x}"
         ) from None
-    return parse_toml(text, str(path), what=what, parse_float=parse_float)
 
 
 def parse_toml(text: str, name: str, *, what: str, parse_float: Callable[[str], Any] = float) -> dict[str, Any]:
@@ -59,7 +74,7 @@ def parse_toml(text: str, name: str, *, what: str, parse_float: Callable[[str], 
         If the text is no TOML.
     """
     try:
-        return tomllib.loads(text, parse_float=parse_float)
+        return tomllib.loads(text.removeprefix("\ufeff"), parse_float=parse_float)
     except tomllib.TOMLDecodeError as error:
         raise SpecificationError(f"{name}: {_syntax_error(str(error), text)}") from None
     except (ValueError, ArithmeticError, RecursionError):

@@ -11,15 +11,30 @@ from sosmith.terminal import JSON_OPTION, print_json, show_progress
 
 @click.command()
 @click.argument("certificate", type=click.Path(path_type=Path))
+@click.option(
+    "--spec",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Hold the certificate against this specification, whose filter is derived again from its words.",
+)
+@click.option(
+    "--files",
+    type=click.Path(path_type=Path),
+    metavar="DIR",
+    help="Hold the generated files in this folder against the certificate, byte for byte.",
+)
+@click.option("--rebuild", is_flag=True, help="Generate all files again and compare them with the certificate.")
 @JSON_OPTION
-def verify(certificate: Path, as_json: bool) -> None:
+def verify(certificate: Path, spec: Path | None, files: Path | None, rebuild: bool, as_json: bool) -> None:
     """Prove CERTIFICATE by an independent method: the error bound, and no internal overflow.
 
-    CERTIFICATE is the <name>.certificate.json that `sosmith generate` writes; no other file is read. The method is
-    different from the one that made the certificate. Exits with 1 and the reason if any claim does not follow exactly.
+    CERTIFICATE is the <name>.certificate.json that `sosmith generate` writes. Without options no other file is read.
+    The method is different from the one that made the certificate. Exits with 1 and the reason if any claim does not
+    follow exactly, or anything that it is held against disagrees.
 
     \b
         sosmith verify my_core/my.certificate.json
+        sosmith verify my_core/my.certificate.json --spec my.toml --files my_core --rebuild
     """
     from sosmith.interface.certificate import Certificate
     from sosmith.model.errors import ShortfallError
@@ -27,7 +42,7 @@ def verify(certificate: Path, as_json: bool) -> None:
     read = Certificate.load(certificate)
     with show_progress() as step:
         try:
-            proof = read.verify(step)
+            proof = read.verify(step, spec=spec, files=files, rebuild=rebuild)
         except ShortfallError as error:
             raise ShortfallError(f"{certificate}: {error}") from None
     if as_json:
@@ -41,6 +56,15 @@ def verify(certificate: Path, as_json: bool) -> None:
                 "max_error": float(read.entries.max_error),
                 "nodes": proof.nodes,
                 "ranges_from_peak_gains": proof.ranges,
+                "specification": None
+                if proof.agreement is None
+                else {
+                    "core": proof.agreement.core,
+                    "filter_distance": None if proof.agreement.distance is None else float(proof.agreement.distance),
+                    "calibration_from_measurements": proof.agreement.fitted,
+                },
+                "files_compared": proof.files,
+                "files_rebuilt": proof.rebuilt,
             }
         )
     else:

@@ -9,7 +9,10 @@ from pathlib import Path
 
 from sosmith.gen.verifier.certificate_file import Certificate as Entries
 from sosmith.gen.verifier.certificate_file import certificate_text, read_certificate
+from sosmith.gen.verifier.generated_files import about_of, check_files, check_measurements, check_seal, check_text, check_texts
 from sosmith.gen.verifier.verification import verify
+from sosmith.gen.specification.specification import from_text, load
+from sosmith.gen.verifier.stated_specification import Agreement, check_specification
 from sosmith.interface.quantity import Quantity
 from sosmith.model.text_files import write_files
 
@@ -37,6 +40,12 @@ class Proof:
     budget: dict[str, Quantity]
     nodes: int
     ranges: int
+    agreement: Agreement | None = None
+    """What of the specification was compared; None if it was not."""
+    files: int = 0
+    """Number of files whose content was compared."""
+    rebuilt: int = 0
+    """Number of files that were generated again."""
 
 
 @dataclass(frozen=True)
@@ -57,6 +66,9 @@ class Certificate:
     entries: Entries = field(repr=False)
     """The content of the certificate, as in its file."""
 
+    path: Path | None = field(default=None, repr=False)
+    """Its file, if it was read from one."""
+
     @classmethod
     def load(cls, path: str | PathLike[str]) -> Certificate:
         """Read a certificate file, such as ``<name>.certificate.json``.
@@ -66,7 +78,8 @@ class Certificate:
         SpecificationError
             If the file cannot be read, or is not a certificate.
         """
-        return cls(read_certificate(Path(fspath(path))))
+        source = Path(fspath(path))
+        return cls(read_certificate(source), source)
 
     @property
     def name(self) -> str:
@@ -79,21 +92,67 @@ class Certificate:
         output = self.entries.output
         return Quantity(float(self.entries.claims.bound * output.lsb), output.unit)
 
-    def verify(self, progress: Progress = lambda step, done, total: None) -> Proof:
-        """Prove the certificate from its content alone, by a different method than the one that made it.
+    def verify(
+        self,
+        progress: Progress = lambda step, done, total: None,
+        *,
+        spec: str | PathLike[str] | None = None,
+        files: str | PathLike[str] | None = None,
+        rebuild: bool = False,
+    ) -> Proof:
+        """Prove the certificate by a different method than the one that made it, and hold it against its subject.
+
+        Parameters
+        ----------
+        progress : callable
+        spec : path
+            Specification file to hold the certificate against: ports, allowed error and calibration must be the same,
+            the ideal filter is derived again from its words, and its text must be the one in the certificate.
+        files : path
+            Folder with the generated files: their SHA-256 must be those in the certificate, and no byte of the
+            certificate's own file may have been changed.
+        rebuild : bool
+            Whether to generate all files again, from `spec` or the specification's text in the certificate, and compare
+            them byte for byte.
 
         Raises
         ------
         ShortfallError
-            If any claim does not follow exactly.
+            If any claim does not follow exactly, or anything disagrees.
+        SpecificationError
+            If a file cannot be read, or the specification is invalid.
         """
         verdict = verify(self.entries, progress)
+        agreement, compared, again = None, 0, 0
+        checked = None if spec is None else load(Path(fspath(spec)))
+        if checked is not None:
+            progress("specification", 0, 0)
+            agreement = check_specification(self.entries, checked.text, verdict.margin)
+            about = about_of(self.entries)
+            check_text(about, checked.text)
+            data = checked.calibration.data if checked.calibration is not None else None
+            if about.measurements is not None and data is not None:
+                check_measurements(about, data)
+        if files is not None:
+            progress("files", 0, 0)
+            content = self.text().encode() if self.path is None else self.path.read_bytes()
+            compared = check_files(check_seal(self.entries, content), Path(fspath(files)))
+        if rebuild:
+            from sosmith.gen.output.rebuild import rebuilt
+
+            about = about_of(self.entries)
+            if checked is None:
+                checked = from_text(about.specification, Path("specification"))
+            again = check_texts(about, rebuilt(about, checked, lambda step: progress(step, 0, 0)))
         lsb, unit = self.entries.output.lsb, self.entries.output.unit
         return Proof(
             bound=Quantity(float(verdict.bound * lsb), unit),
             budget={part: Quantity(float(value * lsb), unit) for part, value in verdict.budget.items()},
             nodes=verdict.nodes,
             ranges=verdict.ranges,
+            agreement=agreement,
+            files=compared,
+            rebuilt=again,
         )
 
     def text(self) -> str:

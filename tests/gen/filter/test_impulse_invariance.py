@@ -16,13 +16,11 @@ from tests.gen.word_lengths.test_quantize import errors, plain, stimulus
 from sosmith.cli import cli
 from sosmith.gen.core import design_core
 from sosmith.gen.filter.design import Filter, design
-from sosmith.gen.filter.impulse_invariance import Aliasing, aliasing, impulse_invariant
-from sosmith.gen.filter.prototypes import prototype
+from sosmith.gen.filter.impulse_invariance import Aliasing
 from sosmith.gen.output.core_facts import core_facts
 from sosmith.gen.output.manifest import manifest
 from sosmith.gen.realizations.registry import CASCADES
 from sosmith.gen.specification.specification import FilterSpec, load
-from sosmith.model.arithmetic.correct_rounding import evaluate
 
 CASES = [
     ("butterworth", 1, 0.05),
@@ -67,9 +65,9 @@ def analog(family: str, order: int, cutoff: float) -> Analog:
 
 def sampled(family: str, order: int, cutoff: float) -> tuple[np.ndarray, Aliasing]:
     """Sections and aliasing; `cutoff` as a part of the sample rate."""
-    losses, ratio = (Fraction(1, 2), Fraction(50)), Fraction(cutoff)
-    rows = evaluate(lambda: impulse_invariant(prototype(family, order, *losses), ratio))
-    return np.array(rows), evaluate(lambda: aliasing(prototype(family, order, *losses), ratio))
+    made = designed(family, order, cutoff)
+    assert made.aliasing is not None
+    return made.sos, made.aliasing
 
 
 def designed(family: str, order: int, cutoff: float) -> Filter:

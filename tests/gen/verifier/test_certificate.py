@@ -566,7 +566,7 @@ def test_what_is_no_certificate(text: str, message: str, tmp_path: Path) -> None
 @pytest.mark.parametrize(
     ("place", "new", "message"),
     [
-        (("format",), "sosmith certificate 2", "it must be 'sosmith certificate 1'"),
+        (("format",), "sosmith certificate 1", "it must be 'sosmith certificate 2'"),
         (("max_error",), 1, 'it must be a rational number as a text "p/q"'),
         (("max_error",), "1/0", 'it must be a rational number as a text "p/q"'),
         (("inputs", 0, "bits"), 33, "it must be at most 32"),

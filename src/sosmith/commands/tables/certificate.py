@@ -7,6 +7,7 @@ from rich.markup import escape
 from sosmith.commands.tables.console import TableConsole
 from sosmith.commands.tables.design import print_budget
 from sosmith.gen.verifier.certificate_file import Certificate
+from sosmith.gen.verifier.stated_specification import Agreement
 from sosmith.interface.certificate import Proof
 from sosmith.interface.quantity import Quantity
 
@@ -19,3 +20,18 @@ def print_proof(certificate: Certificate, proof: Proof) -> None:
         console, proof.budget, certificate.output.lsb, Quantity(float(certificate.max_error), proof.bound.unit)
     )
     console.print(f"[bold green]proven[/]: {escape(certificate.name)}, {ranges}")
+    if proof.agreement is not None:
+        console.print(f"[bold green]as specified[/]: {_agreement(proof.agreement)}")
+    if proof.files:
+        console.print(f"[bold green]unchanged[/]: {proof.files} files and the certificate itself, by their SHA-256")
+    if proof.rebuilt:
+        console.print(f"[bold green]rebuilt[/]: {proof.rebuilt} files, the same byte for byte")
+
+
+def _agreement(agreement: Agreement) -> str:
+    parts = ["ports and allowed error"]
+    if agreement.core != "filter":
+        parts.append("measurements by their SHA-256" if agreement.fitted else "calibration")
+    if agreement.distance is not None:
+        parts.append(f"filter within a peak gain of {float(agreement.distance):.1e} of its words")
+    return f"{', '.join(parts[:-1])} and {parts[-1]}" if len(parts) > 1 else parts[0]

@@ -1,0 +1,156 @@
+"""Holds a certificate against the words of its specification, read by code of its own.
+
+The specification's numbers are taken as they are written, as decimal fractions. Ports, allowed error and calibration
+must equal the certificate's entries exactly. The filter is derived again from its words
+(`sosmith.gen.verifier.ideal_filter`); the certificate's rational sections must be so close to it that every claim holds
+against it as well.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+from fractions import Fraction
+from itertools import zip_longest
+from typing import Any
+
+from sosmith.gen.verifier.certificate_file import Certificate, PortEntry
+from sosmith.gen.verifier.filter_distance import distance
+from sosmith.gen.verifier.graph import RejectedError, require
+from sosmith.gen.verifier.ideal_filter import stated_filter
+from sosmith.gen.verifier.l1_response import UndecidedError
+
+_CALIBRATED = {"voltage": "V", "temperature": "degC"}
+"""Inputs of a calibration, in the order of the ports, and their units."""
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """What of a specification a certificate was held against.
+
+    Attributes
+    ----------
+    core : str
+        "instrument", "filter" or "calibration": the part of the specification that the certificate is about.
+    distance : Fraction or None
+        Bound on the worst-case peak gain of the difference between the specified filter and the certificate's rational
+        one, without unit; None without a filter.
+    fitted : bool
+        Whether the calibration is fitted to measurements: its coefficients are then not in the specification.
+    """
+
+    core: str
+    distance: Fraction | None
+    fitted: bool
+
+
+def check_specification(certificate: Certificate, text: str, margin: Fraction) -> Agreement:
+    """Hold a proven certificate against the TOML `text` of a specification.
+
+    Parameters
+    ----------
+    certificate : Certificate
+    text : str
+        The specification, which has been found to be valid.
+    margin : Fraction
+        Peak gain by which the ideal filter may differ, from `sosmith.gen.verifier.verification.Verdict`.
+
+    Raises
+    ------
+    RejectedError
+        For the first disagreement.
+    """
+    try:
+        tree = tomllib.loads(text.removeprefix("\ufeff"), parse_float=Decimal)
+    except (ValueError, ArithmeticError, RecursionError):
+        raise RejectedError("the specification must be TOML") from None
+    try:
+        return _checked(certificate, tree, margin)
+    except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
+        raise RejectedError(f"the specification must be valid and complete, not: {error!r}") from None
+
+
+def _checked(certificate: Certificate, tree: Mapping[str, Any], margin: Fraction) -> Agreement:
+    polynomial, sections = certificate.ideal.polynomial, certificate.ideal.sections
+    core = "filter" if polynomial is None else "instrument" if sections else "calibration"
+    calibration = tree.get("calibration")
+    _equal("the name", certificate.name, tree["name"])
+    unit = tree["output"].get("unit", "")
+    output = _port("y" if calibration is None else "clearance", tree["output"], unit)
+    inputs = [
+        _port(name, tree["input"][name], unit if calibration is None else _CALIBRATED[name])
+        for name in (tree["input"] if calibration is None else _CALIBRATED)
+    ]
+    if core == "filter" and calibration is not None:  # the filter alone takes what the calibration would give it
+        inputs = [output.model_copy(update={"name": f"{output.name}_in"})]
+    _equal("the number of inputs", len(certificate.inputs), len(inputs))
+    for found, stated in zip((*certificate.inputs, certificate.output), (*inputs, output), strict=True):
+        for key in PortEntry.model_fields:
+            _equal(f"{key} of {stated.name}", getattr(found, key), getattr(stated, key))
+    allowed = tree["output"].get("max_error", "faithful")
+    _equal("max_error", certificate.max_error, output.lsb if allowed == "faithful" else _number(allowed))
+    if polynomial is not None:
+        require(calibration is not None, "the calibration must be left out as specified")
+        if "coefficients" in calibration:
+            _check_polynomial(polynomial, calibration["coefficients"])
+    if not sections:
+        require(core == "calibration", "the filter must not be left out")
+        return Agreement(core, None, "data" in calibration)
+    return Agreement(core, _filter_distance(certificate, tree, margin), core == "instrument" and "data" in calibration)
+
+
+def _filter_distance(certificate: Certificate, tree: Mapping[str, Any], margin: Fraction) -> Fraction:
+    try:
+        apart = distance(stated_filter(_numbers(tree["filter"]), _number(tree["sample_rate"])), certificate.ideal.sections)
+    except UndecidedError as error:
+        raise RejectedError(f"the filter could not be compared with the specified one: {error}") from None
+    require(
+        apart <= margin,
+        f"the filter must be the specified one within a peak gain of {float(margin):.3g}, "
+        f"not differ from it by up to {float(apart):.3g}",
+    )
+    return apart
+
+
+def _check_polynomial(found: Sequence[Sequence[Fraction]], stated: Sequence[Sequence[Any]]) -> None:
+    for i, (row, words) in enumerate(zip_longest(found, stated, fillvalue=())):
+        for j, (value, word) in enumerate(zip_longest(row, words, fillvalue=0)):
+            _equal(f"coefficient [{i}][{j}] of the calibration", value, _number(word))
+
+
+def _port(name: str, table: Mapping[str, Any], unit: str) -> PortEntry:
+    bits, signed = table["bits"], table.get("signed", False)
+    low, high = map(_number, table["range"])
+    return PortEntry(
+        name=name,
+        bits=bits,
+        signed=signed,
+        lsb=(high - low) / 2**bits,
+        zero=Fraction(0) if signed else low,
+        unit=unit,
+    )
+
+
+def _number(word: Any) -> Fraction:
+    if isinstance(word, bool) or not isinstance(word, int | Decimal):
+        raise TypeError(f"{word!r} must be a number")
+    return Fraction(word)
+
+
+def _numbers(value: Any) -> Any:
+    """Return a table with every number as a Fraction."""
+    match value:
+        case dict():
+            return {key: _numbers(item) for key, item in value.items()}
+        case list():
+            return [_numbers(item) for item in value]
+        case bool() | str():
+            return value
+        case _:
+            return _number(value)
+
+
+def _equal(what: str, found: object, stated: object) -> None:
+    require(found == stated, f"{what} must be {stated} as specified, not {found}")
