@@ -75,7 +75,7 @@ def check_specification(certificate: Certificate, text: str, margin: Fraction) -
 def _checked(certificate: Certificate, tree: Mapping[str, Any], margin: Fraction) -> Agreement:
     polynomial, sections = certificate.ideal.polynomial, certificate.ideal.sections
     core = "filter" if polynomial is None else "instrument" if sections else "calibration"
-    calibration = tree.get("calibration")
+    calibration: Mapping[str, Any] | None = tree.get("calibration")
     _equal("the name", certificate.name, tree["name"])
     unit = tree["output"].get("unit", "")
     output = _port("y" if calibration is None else "clearance", tree["output"], unit)
@@ -91,19 +91,20 @@ def _checked(certificate: Certificate, tree: Mapping[str, Any], margin: Fraction
             _equal(f"{key} of {stated.name}", getattr(found, key), getattr(stated, key))
     allowed = tree["output"].get("max_error", "faithful")
     _equal("max_error", certificate.max_error, output.lsb if allowed == "faithful" else _number(allowed))
+    fitted = False
     if polynomial is not None:
-        require(calibration is not None, "the calibration must be left out as specified")
-        if "coefficients" in calibration:
+        if calibration is None:
+            raise RejectedError("the calibration must be left out as specified")
+        fitted = "data" in calibration
+        if not fitted:
             _check_polynomial(polynomial, calibration["coefficients"])
-    if not sections:
-        require(core == "calibration", "the filter must not be left out")
-        return Agreement(core, None, "data" in calibration)
-    return Agreement(core, _filter_distance(certificate, tree, margin), core == "instrument" and "data" in calibration)
+    require(bool(sections) or core == "calibration", "the filter must not be left out")
+    return Agreement(core, _filter_distance(certificate, tree, margin) if sections else None, fitted)
 
 
 def _filter_distance(certificate: Certificate, tree: Mapping[str, Any], margin: Fraction) -> Fraction:
     try:
-        apart = distance(stated_filter(_numbers(tree["filter"]), _number(tree["sample_rate"])), certificate.ideal.sections)
+        apart = distance(stated_filter(tree["filter"], _number(tree["sample_rate"])), certificate.ideal.sections)
     except UndecidedError as error:
         raise RejectedError(f"the filter could not be compared with the specified one: {error}") from None
     require(
@@ -137,19 +138,6 @@ def _number(word: Any) -> Fraction:
     if isinstance(word, bool) or not isinstance(word, int | Decimal):
         raise TypeError(f"{word!r} must be a number")
     return Fraction(word)
-
-
-def _numbers(value: Any) -> Any:
-    """Return a table with every number as a Fraction."""
-    match value:
-        case dict():
-            return {key: _numbers(item) for key, item in value.items()}
-        case list():
-            return [_numbers(item) for item in value]
-        case bool() | str():
-            return value
-        case _:
-            return _number(value)
 
 
 def _equal(what: str, found: object, stated: object) -> None:

@@ -241,7 +241,8 @@ class _Cascade:
         self.coefficients = on_grid(deviation)
         # Both figures are rounded up: what that adds is room for another ideal filter.
         self.margin = min(
-            self.peak_gain - exact.gain, (self.coefficients - deviation) / max(1, *(abs(end) for end in entry))
+            self.peak_gain - exact.gain,
+            (self.coefficients - deviation) / max(Fraction(1), *(abs(end) for end in entry)),
         )
 
     def _compare_gains(self, certificate: Certificate) -> None:

@@ -162,7 +162,7 @@ NEEDED = {
     "init": ("[FILE]", "flange_wear.toml", "--force"),
     "design": ("SPEC", "--core", "--realization", "--widths-of", "--json"),
     "generate": ("SPEC", "SystemVerilog", "-o, --output", "build/<name>"),
-    "verify": ("CERTIFICATE", "sosmith generate", "--json"),
+    "verify": ("CERTIFICATE", "sosmith generate", "--spec FILE", "--files DIR", "--rebuild", "--json"),
     "reload": ("SPEC OTHER", "max_error", "--active", "--reset", "--version", "docs/registers.md", "reload.json"),
     "simulate": (
         "SPEC",

@@ -1,11 +1,15 @@
 """Specifications in memory for the tests."""
 
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from fractions import Fraction
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 from sosmith.gen.core import CoreDesign, design_core
+from sosmith.gen.filter.design import Filter
+from sosmith.gen.filter.sections import given_sections
 from sosmith.gen.specification.specification import load
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -23,3 +27,9 @@ def parallel_design(name: str, **options: Any) -> CoreDesign:
     """Design the same in the parallel architecture, which simulates the most samples a second."""
     spec = load(EXAMPLES / name)
     return design_core(replace(spec, hardware=replace(spec.hardware, architecture="parallel")), **options)
+
+
+def with_rows(filter_: Filter, rows: Iterable[Sequence[float]]) -> Filter:
+    """Return a filter with other sections, which are exact as they are."""
+    made = tuple(tuple(map(float, row)) for row in rows)
+    return replace(filter_, rows=made, exact=given_sections([list(map(Fraction, row)) for row in made], 1100))

@@ -7,12 +7,19 @@ from dataclasses import dataclass, field
 from os import PathLike, fspath
 from pathlib import Path
 
+from sosmith.gen.specification.specification import from_text, load
 from sosmith.gen.verifier.certificate_file import Certificate as Entries
 from sosmith.gen.verifier.certificate_file import certificate_text, read_certificate
-from sosmith.gen.verifier.generated_files import about_of, check_files, check_measurements, check_seal, check_text, check_texts
-from sosmith.gen.verifier.verification import verify
-from sosmith.gen.specification.specification import from_text, load
+from sosmith.gen.verifier.generated_files import (
+    about_of,
+    check_files,
+    check_measurements,
+    check_seal,
+    check_text,
+    check_texts,
+)
 from sosmith.gen.verifier.stated_specification import Agreement, check_specification
+from sosmith.gen.verifier.verification import verify
 from sosmith.interface.quantity import Quantity
 from sosmith.model.text_files import write_files
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy import signal
-from tests.gen.designs import EXAMPLES
+from tests.gen.designs import EXAMPLES, with_rows
 from tests.gen.proof.cycle_search import search_cycles
 from tests.gen.proven_stages import run
 from tests.gen.verifier.test_certificate import all_edits, proven, wrongly_accepted
@@ -101,7 +101,7 @@ def test_poles_alternate_by_angle(order: int, kind: str) -> None:
 
 
 def given(*rows: Row) -> Filter:
-    return replace(butterworth(1, 0.1), rows=tuple(tuple(map(float, row)) for row in rows))
+    return with_rows(butterworth(1, 0.1), rows)
 
 
 NOTCH = (0.9, -1.2, 0.9, 1.0, -1.2, 0.8)

@@ -23,6 +23,7 @@ from benchmarks.published import butterworth as whole_butterworth
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy import signal
+from tests.gen.designs import with_rows
 from tests.gen.word_lengths.test_quantize import butterworth, errors, plain, stimulus
 from tests.hdl.stage_bench import run
 
@@ -319,7 +320,7 @@ def test_designs_stay_within_their_bound(realization: str, kind: str, order: int
 @pytest.mark.parametrize("realization", ["state_space", "normal"])
 @pytest.mark.parametrize("name", ["low-pass", "two real poles", "two real poles on both sides", "delays only"])
 def test_hardware_equals_its_graph(name: str, realization: str) -> None:
-    quantized = plain(replace(butterworth(2, 0.1), rows=(ROWS[name],)), realization)
+    quantized = plain(with_rows(butterworth(2, 0.1), [ROWS[name]]), realization)
     samples: list[list[int]] = stimulus(quantized.datapath.inputs, 3, 200).tolist()
     stage: Stage = quantized.sections[0]
     assert run(stage, samples, 3) == stage.graph.run(samples)

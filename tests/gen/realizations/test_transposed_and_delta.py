@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from scipy import signal
+from tests.gen.designs import with_rows
 from tests.gen.proven_stages import Ranges, datapath_of, proven_cascade
 from tests.gen.word_lengths.test_quantize import butterworth, errors, plain, stimulus
 from tests.hdl.stage_bench import run as run_hardware
@@ -201,7 +202,7 @@ def test_delta_gives_both_states_the_same_scale(kind: str, cutoff: float, operat
 @pytest.mark.parametrize("row", [(0.0, 0.02, 0.01, 1.0, -1.8, 0.83), (0.0, 0.05, 0.0, 1.0, -0.95, 0.0)])
 def test_output_without_the_newest_input(row: Row, realization: str) -> None:
     """With b0 = 0 the output is a state, quantized only once."""
-    quantized = plain(replace(butterworth(2, 0.1), rows=(row,)), realization)
+    quantized = plain(with_rows(butterworth(2, 0.1), [row]), realization)
     (section,) = quantized.sections
     names = [source.name for source in linear_model(section.graph).sources]
     assert "v" not in names
@@ -223,7 +224,7 @@ def test_output_without_the_newest_input(row: Row, realization: str) -> None:
 def test_coefficients_that_are_small_integers(row: Row, realization: str) -> None:
     """A sum that has no bits to drop while every other quantizer drops all may have some when they do not."""
     fractional = butterworth(2, 0.05).rows[0]
-    quantized = plain(replace(butterworth(2, 0.1), rows=(fractional, row)), realization)
+    quantized = plain(with_rows(butterworth(2, 0.1), [fractional, row]), realization)
     codes = stimulus((INPUT,), 6)
     assert np.abs(errors(quantized, codes)).max() <= quantized.bound <= 1
     quantized.datapath.compute_exact(codes[6000:9000])

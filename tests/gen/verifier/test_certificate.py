@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from flint import fmpq, fmpq_poly
 from pydantic import ValidationError
-from tests.gen.designs import ALL, example_design
+from tests.gen.designs import ALL, example_design, with_rows
 from tests.gen.word_lengths.test_quantize import OUT, SIGNED, butterworth, plain
 
 from sosmith.cli import main
@@ -133,7 +133,7 @@ def test_an_input_to_be_scaled_before_sections_in_another_order() -> None:
 def test_the_same_section_twice() -> None:
     """Poles that fall together are no special case."""
     ideal = butterworth(2, 0.1)
-    proven(plain(replace(ideal, rows=ideal.rows * 3)))
+    proven(plain(with_rows(ideal, ideal.rows * 3)))
 
 
 def test_a_polynomial_of_higher_order() -> None:

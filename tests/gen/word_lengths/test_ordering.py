@@ -3,13 +3,13 @@
 import math
 import re
 from collections.abc import Iterable
-from dataclasses import replace
 from functools import cache
 from itertools import permutations
 
 import numpy as np
 import pytest
 from scipy import signal
+from tests.gen.designs import with_rows
 from tests.gen.word_lengths.test_quantize import butterworth as butterworth_filter
 from tests.gen.word_lengths.test_quantize import plain
 
@@ -197,7 +197,7 @@ def test_a_bad_order_is_changed_and_a_good_one_kept() -> None:
 
 def test_the_word_lengths_are_chosen_in_the_better_order() -> None:
     rows = sorted(map(tuple, signal.cheby1(8, 0.5, 0.05, fs=1.0, output="sos").tolist()), key=lambda row: -row[5])
-    ideal = replace(butterworth_filter(2, 0.1), rows=tuple(rows))
+    ideal = with_rows(butterworth_filter(2, 0.1), rows)
     made = plain(ideal, "df1")
     assert made.filter is not None
     order = best_order(models_of(rows))

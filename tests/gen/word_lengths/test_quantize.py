@@ -7,7 +7,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from scipy import signal
-from tests.gen.designs import ALL, example_design
+from tests.gen.designs import ALL, example_design, with_rows
 
 from sosmith.gen.filter.design import Filter, design
 from sosmith.gen.realizations.registry import CASCADES, REALIZATIONS
@@ -174,7 +174,7 @@ def test_feedback_without_new_widths() -> None:
 
 def test_given_sections_of_an_elliptic_filter() -> None:
     sos = signal.ellip(6, 0.2, 60, 0.01, fs=1.0, output="sos")
-    ideal = replace(butterworth(2, 0.1), rows=tuple(tuple(map(float, row)) for row in sos))
+    ideal = with_rows(butterworth(2, 0.1), sos)
     quantized = plain(ideal)
     assert np.abs(errors(quantized, stimulus((SIGNED,), 5))).max() <= quantized.bound <= 1
 
@@ -191,7 +191,7 @@ INTEGER_ROWS = {
 def test_a_section_of_whole_numbers_rounds_nothing(name: str, realization: str) -> None:
     """What it passes on has the fraction bits of the section before it; a quantizer of its own would have none."""
     first, last = butterworth(2, 0.05).rows[0], butterworth(2, 0.1).rows[0]
-    quantized = plain(replace(butterworth(2, 0.1), rows=(first, INTEGER_ROWS[name], last)), realization)
+    quantized = plain(with_rows(butterworth(2, 0.1), [first, INTEGER_ROWS[name], last]), realization)
     codes = stimulus((SIGNED,), 6)
     assert np.abs(errors(quantized, codes)).max() <= quantized.bound <= 1
     assert quantized.datapath.compute(codes[6500:8500]).tolist() == quantized.datapath.compute_exact(codes[6500:8500])
@@ -199,7 +199,7 @@ def test_a_section_of_whole_numbers_rounds_nothing(name: str, realization: str) 
 
 def test_a_state_that_copies_another_keeps_all_its_bits() -> None:
     """In normal form a real pole and two zeros make a second state that is the first one, a sample ago."""
-    ideal = replace(butterworth(2, 0.1), rows=((0.25, 0.1, 0.25, 1.0, -0.4, 0.0), butterworth(2, 0.1).rows[0]))
+    ideal = with_rows(butterworth(2, 0.1), [(0.25, 0.1, 0.25, 1.0, -0.4, 0.0), butterworth(2, 0.1).rows[0]])
     quantized = plain(ideal, "normal")
     assert np.abs(errors(quantized, stimulus((SIGNED,), 7))).max() <= quantized.bound <= 1
 

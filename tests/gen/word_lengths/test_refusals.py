@@ -5,6 +5,7 @@ from dataclasses import replace
 from fractions import Fraction
 
 import pytest
+from tests.gen.designs import with_rows
 from tests.gen.word_lengths.test_quantize import OUT, SIGNED, butterworth, plain
 
 from sosmith.gen.filter.design import Filter
@@ -107,7 +108,7 @@ AWAY = ", move the cutoff further from 0 and from half the sample rate"
     ],
 )
 def test_a_response_too_long_for_another_reason(ideal: Filter, remedy: str) -> None:
-    slow = replace(ideal, rows=((1.0, 0.0, 0.0, 1.0, 0.0, 1 - 2.0**-22),))
+    slow = with_rows(ideal, [(1.0, 0.0, 0.0, 1.0, 0.0, 1 - 2.0**-22)])
     with pytest.raises(ShortfallError, match=f"^{LONG}{remedy}$"):
         plain(slow)
 

@@ -1,0 +1,79 @@
+"""The command `verify` with what a certificate can be held against."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+from tests.commands.invocation import Invocation
+from tests.gen.designs import EXAMPLES, example_design
+
+from sosmith.gen.output.generate import generate
+from sosmith.model.errors import ShortfallError
+
+NAME = "audio_lowpass"
+SPEC = EXAMPLES / f"{NAME}.toml"
+
+command = Invocation("verify", columns=200)
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("verified")
+    generate(example_design(f"{NAME}.toml"), folder)
+    return folder
+
+
+@pytest.fixture
+def folder(written: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(written, tmp_path / "copy"))
+
+
+def test_against_everything(folder: Path) -> None:
+    path = str(folder / f"{NAME}.certificate.json")
+    table = command.good(path, "--spec", str(SPEC), "--files", str(folder), "--rebuild").stdout
+    assert "proven: audio_lowpass, " in table
+    assert "as specified: ports and allowed error and filter within a peak gain of " in table
+    assert "unchanged: 5 files and the certificate itself, by their SHA-256\n" in table
+    assert table.endswith("rebuilt: 5 files, the same byte for byte\n")
+    found = json.loads(command.good(path, "--json", "--spec", str(SPEC), "--files", str(folder)).stdout)
+    assert found["specification"]["core"] == "filter"
+    assert found["specification"]["calibration_from_measurements"] is False
+    assert 0 < found["specification"]["filter_distance"] < 1e-50
+    assert (found["files_compared"], found["files_rebuilt"]) == (5, 0)
+
+
+def test_without_anything_else_as_before(folder: Path) -> None:
+    found = json.loads(command.good(str(folder / f"{NAME}.certificate.json"), "--json").stdout)
+    assert (found["specification"], found["files_compared"], found["files_rebuilt"]) == (None, 0, 0)
+
+
+def test_disagreement_is_a_sentence(folder: Path, tmp_path: Path) -> None:
+    path = folder / f"{NAME}.certificate.json"
+    other = tmp_path / "other.toml"
+    other.write_text(SPEC.read_text(encoding="utf-8") + "# a remark\n", encoding="utf-8")
+    result = command.run(str(path), "--spec", str(other))
+    assert isinstance(result.exception, ShortfallError)
+    assert str(result.exception).startswith(f"{path}: the specification must have the SHA-256 ")
+    assert str(result.exception).endswith(": it says the same in other words")
+    (folder / f"{NAME}.h").write_text("", encoding="utf-8")
+    result = command.run(str(path), "--files", str(folder))
+    assert isinstance(result.exception, ShortfallError)
+    assert str(result.exception).startswith(f"{path}: {folder / f'{NAME}.h'} must have the SHA-256 ")
+
+
+def test_a_certificate_without_a_subject_cannot_be_held_against_one(folder: Path) -> None:
+    path = folder / f"{NAME}.certificate.json"
+    tree = json.loads(path.read_text(encoding="utf-8"))
+    del tree["about"]
+    path.write_text(json.dumps(tree), encoding="utf-8")
+    command.good(str(path))
+    for option in (["--spec", str(SPEC)], ["--files", str(folder)], ["--rebuild"]):
+        command.refused(
+            f"{path}: the certificate must say which specification and files it is about, and does not",
+            str(path),
+            *option,
+            kind=ShortfallError,
+        )
