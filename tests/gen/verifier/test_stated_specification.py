@@ -46,7 +46,7 @@ architecture = "parallel"
 
 @cache
 def certified(name: str, core: str | None = None) -> tuple[Certificate, Fraction]:
-    """A certificate of an example, and the margin that its proof leaves."""
+    """Certify an example; return the certificate and the margin that its proof leaves."""
     design = example_design(name, realization="df1_ef2" if core != "calibration" else None, core=core)
     made = certificate(design.quantized, design.spec.max_error)
     return made, verify(made).margin
