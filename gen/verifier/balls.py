@@ -1,0 +1,28 @@
+"""Balls around rational numbers, and rational limits of balls."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+from flint import arb, ctx, fmpq
+
+
+def ball(value: Fraction | int) -> arb:
+    """Enclose a rational number; exact where its denominator is a power of two.
+
+    >>> ball(Fraction(1, 3)) * 3 == 1, ball(Fraction(1, 4)) == 0.25
+    (False, True)
+    """
+    exact = Fraction(value)
+    return arb(fmpq(exact.numerator, exact.denominator))
+
+
+def upper_limit(value: arb) -> Fraction:
+    """Return a short fraction just above the upper end of a finite ball.
+
+    >>> Fraction(7, 2) <= upper_limit(arb(3, 0.5)) < Fraction(351, 100)
+    True
+    """
+    with ctx.workprec(64):
+        mantissa, exponent = value.upper().man_exp()
+    return Fraction(int(mantissa)) * Fraction(2) ** int(exponent)
