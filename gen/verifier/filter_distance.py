@@ -28,7 +28,7 @@ from sosmith.gen.verifier.ideal_filter import StatedFilter, TransferFunction
 from sosmith.gen.verifier.l1_response import UndecidedError
 
 _FIRST_PRECISION = 256
-_MAX_PRECISION = 1 << 14  # bits
+_MAX_PRECISION = 1 << 13  # bits
 _ACCURACY = 16  # bits of a distance that have to be right
 _EQUAL = Fraction(1, 1 << 1024)  # a distance below this needs no right bit
 
