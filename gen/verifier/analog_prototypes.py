@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import pairwise
+from typing import Any
 
 from flint import acb, arb, fmpq, fmpz_poly
 
@@ -133,7 +134,7 @@ def _chebyshev_poles(order: int, ripple: arb) -> list[acb]:
 
 
 def _rippled_gain(order: int, ripple_squared: arb) -> arb:
-    """Gain at zero frequency of a pass band with ripples: at their top for an odd order, at their bottom for an even one."""
+    """Gain at zero frequency of a pass band with ripples: their top for an odd order, their bottom for an even one."""
     return arb(1) if order % 2 else (1 + ripple_squared).rsqrt()
 
 
@@ -175,7 +176,13 @@ def _bessel(order: int, _pass: Fraction | None, _stop: Fraction | None) -> Analo
     for n in range(2, order + 1):
         below, polynomial = polynomial, (2 * n - 1) * polynomial + fmpz_poly([0, 0, 1]) * below
     edge = _half_power(polynomial)
-    return AnalogPrototype([], [pole / edge for pole, _ in polynomial.complex_roots()], arb(1))
+    return AnalogPrototype([], [pole / edge for pole in _roots(polynomial)], arb(1))
+
+
+def _roots(polynomial: fmpz_poly) -> list[acb]:
+    """Roots of a polynomial without multiple ones; those that are real have no imaginary part."""
+    found: Any = polynomial.complex_roots()  # pairs of root and multiplicity, which FLINT's types do not say
+    return [root for root, _ in found]
 
 
 def _half_power(polynomial: fmpz_poly) -> arb:
@@ -191,9 +198,7 @@ def _half_power(polynomial: fmpz_poly) -> arb:
     coefficients = [int(value) for value in (power - 2 * c[0] ** 2).coeffs()]
     assert sum(a * b < 0 for a, b in pairwise(coefficients)) == 1
     assert all(coefficients)
-    (root,) = (
-        root.real for root, _ in fmpz_poly(coefficients).complex_roots() if root.imag.is_zero() and root.real > 0
-    )
+    (root,) = (root.real for root in _roots(fmpz_poly(coefficients)) if root.imag.is_zero() and root.real > 0)
     return root.sqrt()
 
 

@@ -171,12 +171,14 @@ def _losses(table: Mapping[str, object], keys: Sequence[str]) -> dict[str, Fract
 def _frequencies(table: Mapping[str, object], key: str, kind: str, sample_rate: Fraction) -> tuple[Fraction, ...]:
     value = _stated(table, key)
     values = tuple(value) if isinstance(value, list | tuple) else (value,)
-    count = 2 if _is_band(kind) else 1
-    _require(len(values) == count, key, f"{count} of the frequencies for {kind}", len(values))
-    ratios = tuple(_number(f, key) / sample_rate for f in values)
-    _require(list(ratios) == sorted(set(ratios)), key, "rising", value)
-    _require(ratios[0] > 0 and ratios[-1] < Fraction(1, 2), key, "above 0 and below half the sample_rate", value)
-    return ratios
+    count, expected = (2, "two frequencies [low, high]") if _is_band(kind) else (1, "one frequency")
+    _require(len(values) == count, key, f"{expected} for {kind}", len(values))
+    frequencies = [_number(value, key) for value in values]
+    shown = ", ".join(f"{float(frequency):g}" for frequency in frequencies)
+    _require(frequencies == sorted(set(frequencies)), key, "rising", shown)
+    for frequency in frequencies:
+        _require(0 < frequency < sample_rate / 2, key, "above 0 and below half the sample_rate", f"{shown} Hz")
+    return tuple(frequency / sample_rate for frequency in frequencies)
 
 
 def _check_sides(kind: str, passband: tuple[Fraction, ...], stopband: tuple[Fraction, ...]) -> None:

@@ -8,9 +8,10 @@ pole or zero of the digital filter needs to be computed. Analog frequencies are 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import reduce
 from math import prod
 from typing import NamedTuple
 
@@ -68,7 +69,7 @@ class StatedFilter:
         if table.kind == "bandstop":
             passband = _moved_inwards(passband, stopband)
         band = _band(passband)
-        transition = _smallest(abs(_on_prototype(table.kind, band, edge)) for edge in stopband)
+        transition = reduce(arb.min, (abs(_on_prototype(table.kind, band, edge)) for edge in stopband))
         order = smallest_order(family, transition, *losses, table.max_order)
         if order is None:
             raise SpecificationError(
@@ -129,13 +130,6 @@ def _on_prototype(kind: str, band: _Band, edge: arb) -> arb:
     """Frequency of the prototype that becomes `edge`, with a sign."""
     ratio = edge / band.width if band.product is None else (edge**2 - band.product) / (edge * band.width)
     return ratio if kind in {"lowpass", "bandpass"} else 1 / ratio
-
-
-def _smallest(values: Iterable[arb]) -> arb:
-    first, *others = values
-    for value in others:
-        first = first.min(value)
-    return first
 
 
 def _moved_inwards(passband: Sequence[arb], stopband: Sequence[arb]) -> list[arb]:
