@@ -344,6 +344,19 @@ def test_a_rising_passband_falls_short() -> None:
     ]
 
 
+def test_the_mask_is_held_against_the_quantized_filter() -> None:
+    """An ideal filter that meets its mask excuses nothing, and one that misses it condemns nothing."""
+    good, poor = masked(7).ideal_sos, masked(2).ideal_sos
+    loss, attenuation = (
+        10 * math.log10(1 + (math.tan(math.pi * edge) / math.tan(math.pi * 0.1417)) ** 4) for edge in (0.1, 0.45)
+    )
+    assert shortfalls(evidence(filter=masked(7, ideal_sos=good, quantized_sos=poor))) == [
+        f"The passband loss is {loss:.4f} dB, more than the 0.02 dB allowed.",
+        f"The stopband attenuation is {attenuation:.3f} dB, less than the 60 dB asked for.",
+    ]
+    assert shortfalls(evidence(filter=masked(7, ideal_sos=poor, quantized_sos=good))) == []
+
+
 def test_a_mask_met_with_equality_passes() -> None:
     """A Chebyshev filter touches its mask; rounding its coefficients to 20 bits tips it by a hair."""
     sos = signal.cheby1(5, 0.5, 10, fs=100, output="sos")
@@ -757,6 +770,9 @@ def test_several_channels_are_measured_together_and_the_worst_is_shown() -> None
     summary = summarise(several)
     assert summary["error"]["max_abs"] == np.abs(several.error).max() > summarise(one)["error"]["max_abs"]
     assert summary["error"]["rms"] == pytest.approx(np.sqrt(np.mean(several.error**2)))
+    # the run's cycles over the samples of all channels, 3 times 3,000
+    assert summary["cycles_per_sample"] == pytest.approx(9007 / 9000, rel=1e-15)
+    assert summarise(one)["cycles_per_sample"] == pytest.approx(9007 / 3000, rel=1e-15)
     page = render_page(several, summary)
     assert "All pictures show channel 1, the one of 3 with the largest error" in page
     assert "All pictures show" not in render_page(one, summarise(one))
