@@ -1,11 +1,10 @@
-"""The schedule of a recursion that several channels take turns in, and the latency that follows."""
+"""The schedule of a recursion that several channels take turns in."""
 
 from itertools import pairwise
 
 import pytest
 from tests.gen.designs import example_design
 
-from sosmith.hdl.core import latency_cycles
 from sosmith.hdl.interleaved import schedule
 from sosmith.model.dataflow.graph import Graph, Op
 
@@ -40,8 +39,3 @@ def test_more_channels_make_a_deeper_pipeline() -> None:
     depths = [schedule(section, channels).depth for channels in (2, 3, 8)]
     assert all(few <= more for few, more in pairwise(depths))
     assert depths[0] < depths[-1]
-
-
-def test_the_latency_counts_all_pipeline_stages_and_both_buffers() -> None:
-    datapath = example_design("flange_wear_bench.toml", realization="df1_ef2").datapath
-    assert latency_cycles(datapath, 8) == sum(schedule(stage.graph, 8).depth for stage in datapath.stages) + 2

@@ -147,6 +147,29 @@ def test_only_truncated_magnitudes_are_proven_to_rest(kind: str, none: bool) -> 
     assert found.amplitude <= told.largest
 
 
+def test_a_truncated_value_beside_a_state_is_not_proven_to_rest() -> None:
+    """A state less its truncated half, ``s - trunc(s / 2)``, stays at one for ever."""
+    g = GraphBuilder()
+    wide = 1 << 60
+    u, s = g.input("u", 0, -wide, wide), g.delay("s", 0, -wide, wide)
+    total = g.add(g.subtract(s, g.truncate(g.scale(s, 1, 1), 0)), u)
+    g.connect(s, g.bound(total, -wide, wide, "s_next"))
+    graph = g.build([s])
+    told = limit_cycles(graph)
+    assert told.lyapunov == (1,)
+    assert search_cycles(graph, 3, fraction_bits=0).amplitude == 1
+    assert not told.none
+
+
+def test_constant_errors_add_up_at_their_worst_ends() -> None:
+    """Bits are dropped from ``u / 2`` and from ``u / 4``: the output is off by -1/2 to 3/4."""
+    g = GraphBuilder()
+    u = g.input("u", 0, -8, 7)
+    told = limit_cycles(g.build([g.subtract(g.floor(g.shift(u, -1), 0), g.floor(g.shift(u, -2), 0))]))
+    assert told.dead_band == Fraction(3, 4)
+    assert Fraction(3, 4) <= told.largest < Fraction(3, 4) + Fraction(1, 2**20)
+
+
 def test_search_between_whole_lsbs() -> None:
     """Error feedback reads the bits below the LSB too: starts at every quarter, from -2 to 2."""
     graph = graph_of("df1_ef2", SECTION, 3)

@@ -11,7 +11,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import signal
 
-from sosmith.gen.proof.peak_gain import Coefficients, Drive, Extent, extent, horizon, impulse, peak_gain, pole_radii
+from sosmith.gen.proof.peak_gain import (
+    Coefficients,
+    Drive,
+    Extent,
+    Horizon,
+    extent,
+    horizon,
+    impulse,
+    peak_gain,
+    pole_radii,
+)
 from sosmith.gen.verifier.l1_response import inverse, is_stable, response
 from sosmith.model.errors import ShortfallError
 
@@ -130,6 +140,52 @@ def test_slack_is_tiny_but_there(pole: float) -> None:
     exact = 1 / (1 - abs(Fraction(pole)))
     found = peak_gain([(ONE, dyadic(1, -pole))])
     assert 0 < found - exact < exact / 2**32
+
+
+@pytest.mark.parametrize("length", [1, 5, 60])
+@pytest.mark.parametrize(
+    ("poles", "numerator", "rho"),
+    [
+        ((), (0, 0, 2), 4.0),
+        ((0.9,), (1,), 1.02),
+        ((0.9,), (1, -0.5), 1.1),
+        ((0.9, 0.9), (1,), 1.111),  # nearly 1 / 0.9, where the estimate is closest
+        ((-0.9, 0.5), (0, 0, 2), 1.05),
+    ],
+)
+def test_what_a_horizon_cuts_off_is_counted(
+    poles: tuple[float, ...], numerator: tuple[float, ...], rho: float, length: int
+) -> None:
+    """A short horizon leaves much out; the one that `horizon` chooses leaves out so little that nothing is seen."""
+    exact = np.zeros(3000)
+    exact[: len(numerator)] = numerator
+    made = impulse(Horizon(length, 80, Fraction(rho)))
+    for pole in poles:
+        exact = signal.lfilter([1], [1, -pole], exact)
+        made = made.all_pole(dyadic(1, -pole))
+    made = made.taps(dyadic(*numerator))
+    claimed = float(made.magnitude) * rho ** -np.arange(3000)
+    assert (np.abs(exact) <= claimed * (1 + 1e-9)).all()
+    assert float(made.tail) == pytest.approx(claimed[length:].sum(), rel=1e-9)
+    assert made.uncertainty >= made.tail
+    found = extent([Drive(made, Fraction(-1), Fraction(1))])
+    assert min(-found.low, found.high) >= np.abs(exact).sum() * (1 - 1e-9)
+
+
+@pytest.mark.parametrize("bits", [4, 8, 20])
+def test_samples_are_as_exact_as_they_say(bits: int) -> None:
+    """With few fraction bits, rounding after recursions and taps adds up to several units."""
+    made = impulse(Horizon(80, bits, Fraction(1.02)))
+    exact = [Fraction(1)] + [Fraction(0)] * 79
+    taps = dyadic(3, 2.5, 2)
+    for denominator in (dyadic(1, -0.9), dyadic(1, -1.5, 0.625)):
+        made = made.all_pole(denominator).taps(taps)
+        for k in range(80):
+            exact[k] -= sum(a * exact[k - i] for i, a in enumerate(denominator) if 0 < i <= k)
+        exact = [sum((n * exact[k - i] for i, n in enumerate(taps) if i <= k), Fraction(0)) for k in range(80)]
+        off = max(abs(sample - value * 2**bits) for sample, value in zip(made.samples, exact, strict=True))
+        assert off <= made.rounding
+    assert off > 2
 
 
 @st.composite

@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 from tests.gen.designs import example_design
-from tests.gen.reload.swaps import during, moved, worst_input
+from tests.gen.reload.swaps import during, left_behind, moved, worst_input
 from tests.model.reload.swapping import compute_swapping
 
 from sosmith.gen.reload import transient as module
@@ -79,6 +79,16 @@ def test_a_transient_ends_when_it_is_said_to() -> None:
     difference = np.abs(after - always)[swap:]
     assert difference[length:].max() <= most
     assert difference[: length // 8].max() > 100 * most
+
+
+@pytest.mark.parametrize("realization", ["df1_ef2", "df2t", "delta", "normal"])
+def test_a_transient_lasts_as_long_as_the_states_are_remembered(realization: str) -> None:
+    """Until the old states have faded, and then for as many samples as a section has states; but hardly longer."""
+    active, other = sets(realization, "1.2")
+    found = transient(active, other).samples
+    faded = 1 + int(np.flatnonzero(left_behind(active, other, found + 100) > float(RESIDUE))[-1])
+    states = len(other.sections[-1].graph.delays)
+    assert faded + states <= found <= faded + states + 1
 
 
 def test_other_states_are_refused() -> None:

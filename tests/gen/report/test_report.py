@@ -27,7 +27,7 @@ from sosmith.gen.output.core_facts import CoefficientFacts, LimitCycleFacts, Nod
 from sosmith.gen.report import plots
 from sosmith.gen.report.evidence import Alternative, Evidence
 from sosmith.gen.report.page import render_page
-from sosmith.gen.report.report import summarise, write_report
+from sosmith.gen.report.report import mask_shortfalls, summarise, write_report
 
 Array = npt.NDArray[np.float64]
 
@@ -248,8 +248,19 @@ def test_error_is_hardware_minus_golden() -> None:
     error = summarise(run)["error"]
     assert error["max_abs"] == pytest.approx(np.abs(run.hardware - run.golden).max(), rel=1e-15)
     assert error["rms"] == pytest.approx(np.sqrt(np.mean((run.hardware - run.golden) ** 2)), rel=1e-12)
+    assert error["mean"] == pytest.approx(np.mean(run.hardware - run.golden), rel=1e-12)
     assert error["max_lsb"] == pytest.approx(error["max_abs"] / LSB)
     assert error["unit"] == "mm"
+
+
+def test_figures_of_the_run() -> None:
+    run = evidence()
+    summary = summarise(run)
+    assert (summary["cycles"], summary["latency_cycles"], summary["range"]) == (9007, 23, [0.0, 16.0])
+    noise = np.round(run.golden / LSB) * LSB - run.golden
+    louder = replace(run, hardware=run.golden + 10000 * noise)  # so much that hardware and golden differ in power
+    ratio = np.sum(run.golden**2) / np.sum((10000 * noise) ** 2)
+    assert summarise(louder)["sqnr_db"] == pytest.approx(10 * math.log10(ratio), abs=1e-9)
 
 
 def test_accuracy_counts_only_the_readings() -> None:
@@ -317,6 +328,16 @@ def test_an_error_over_the_allowance_falls_short() -> None:
     ]
 
 
+def test_an_error_equal_to_its_limits_passes() -> None:
+    run = evidence(proven=True)
+    largest = float(np.abs(run.error).max())
+    equal = replace(run, bound=largest, max_error=largest)
+    assert shortfalls(equal) == []
+    assert summarise(equal)["notes"] == []
+    less = math.nextafter(largest, 0)
+    assert len(shortfalls(replace(run, bound=less, max_error=less))) == 2
+
+
 def test_a_mask_that_is_met_passes() -> None:
     assert shortfalls(evidence(filter=masked(7))) == []
 
@@ -336,12 +357,36 @@ def test_a_stopband_attenuation_falls_short() -> None:
     assert shortfalls(run) == [f"The stopband attenuation is {attenuation:.3f} dB, less than the 60 dB asked for."]
 
 
+def test_a_stopband_may_miss_its_mask_by_the_tolerance() -> None:
+    attenuation = summarise(evidence(filter=masked(7)))["frequency_response"]["stopband_attenuation_db"]
+    assert shortfalls(evidence(filter=masked(7, stopband_loss=attenuation + 0.0009))) == []
+    assert len(shortfalls(evidence(filter=masked(7, stopband_loss=attenuation + 0.0011)))) == 1
+
+
+def test_losses_without_edges_are_no_mask() -> None:
+    """They shape an elliptic filter of given order and cutoff; where they hold is not said."""
+    assert shortfalls(evidence(filter=facts(passband_loss=0.01, stopband_loss=500.0))) == []
+
+
 def test_a_rising_passband_falls_short() -> None:
     louder = masked(7).ideal_sos.copy()
     louder[0, :3] *= 10 ** (0.05 / 20)
     assert shortfalls(evidence(filter=masked(7, quantized_sos=louder))) == [
         "The passband rises 0.0500 dB above the level of the ideal filter."
     ]
+
+
+def test_the_mask_is_held_against_the_quantized_filter() -> None:
+    """An ideal filter that meets its mask excuses nothing, and one that misses it condemns nothing."""
+    good, poor = masked(7).ideal_sos, masked(2).ideal_sos
+    loss, attenuation = (
+        10 * math.log10(1 + (math.tan(math.pi * edge) / math.tan(math.pi * 0.1417)) ** 4) for edge in (0.1, 0.45)
+    )
+    assert shortfalls(evidence(filter=masked(7, ideal_sos=good, quantized_sos=poor))) == [
+        f"The passband loss is {loss:.4f} dB, more than the 0.02 dB allowed.",
+        f"The stopband attenuation is {attenuation:.3f} dB, less than the 60 dB asked for.",
+    ]
+    assert shortfalls(evidence(filter=masked(7, ideal_sos=poor, quantized_sos=good))) == []
 
 
 def test_a_mask_met_with_equality_passes() -> None:
@@ -361,6 +406,14 @@ def test_an_unstable_filter_falls_short() -> None:
     assert shortfalls(evidence(filter=facts(quantized_sos=unstable))) == [
         "The filter with its integer coefficients is unstable: a pole lies at radius 1.00005."
     ]
+
+
+def test_a_pole_on_the_unit_circle_falls_short() -> None:
+    measures = replace(response.measure_response(facts()), largest_pole_radius=1.0)
+    assert mask_shortfalls(facts(), measures) == [
+        "The filter with its integer coefficients is unstable: a pole lies at radius 1.00000."
+    ]
+    assert mask_shortfalls(facts(), replace(measures, largest_pole_radius=math.nextafter(1, 0))) == []
 
 
 def test_notes_say_what_is_not_proven() -> None:
@@ -443,10 +496,27 @@ def test_stopband_attenuation_an_octave_beyond_the_cutoff() -> None:
 
 
 def test_deviation_in_the_passband() -> None:
-    louder = F7.copy()
-    louder[0, :3] *= 10 ** (0.25 / 20)
-    measures = response.measure_response(facts(quantized_sos=louder))
-    assert measures.max_deviation_db_passband == pytest.approx(0.25, abs=1e-9)
+    for change in (0.25, -0.25):
+        other = F7.copy()
+        other[0, :3] *= 10 ** (change / 20)
+        measures = response.measure_response(facts(quantized_sos=other))
+        assert measures.max_deviation_db_passband == pytest.approx(0.25, abs=1e-9)
+
+
+def test_a_deviation_beyond_the_passband_does_not_count() -> None:
+    measures = response.measure_response(
+        masked(7, passband_edge=(1.0,), quantized_sos=signal.butter(2, 14.17, fs=100, output="sos"))
+    )
+    assert 0 < measures.max_deviation_db_passband < 1e-4
+
+
+def test_the_level_is_that_of_the_passband() -> None:
+    """A resonance far above it at 25 Hz does not lift the level."""
+    sos = np.array([[1.0, 0.0, 0.0, 1.0, 0.0, 0.81]])
+    filter_facts = facts(ideal_sos=sos, quantized_sos=sos, cutoff=None, passband_edge=(1.0,))
+    (at_the_edge,) = response.magnitude_db(sos, np.array([1.0]), 100.0)
+    assert response.passband_level_db(filter_facts) == pytest.approx(at_the_edge, abs=1e-12)
+    assert at_the_edge < -5
 
 
 @pytest.mark.parametrize(
@@ -751,12 +821,18 @@ def test_several_channels_are_measured_together_and_the_worst_is_shown() -> None
     hardware[100, 1] += 2 * one.lsb
     several = replace(one, hardware=hardware, channels=3, samples=hardware.size, **arrays)
     assert several.worst_channel == 1
+    low = hardware.copy()
+    low[200, 2] -= 3 * one.lsb  # an error below zero is an error too
+    assert replace(several, hardware=low).worst_channel == 2
     shown = several.of_channel(1)
     assert shown.shown_channel == 1
     assert shown.hardware.tolist() == hardware[:, 1].tolist()
     summary = summarise(several)
     assert summary["error"]["max_abs"] == np.abs(several.error).max() > summarise(one)["error"]["max_abs"]
     assert summary["error"]["rms"] == pytest.approx(np.sqrt(np.mean(several.error**2)))
+    # the run's cycles over the samples of all channels, 3 times 3,000
+    assert summary["cycles_per_sample"] == pytest.approx(9007 / 9000, rel=1e-15)
+    assert summarise(one)["cycles_per_sample"] == pytest.approx(9007 / 3000, rel=1e-15)
     page = render_page(several, summary)
     assert "All pictures show channel 1, the one of 3 with the largest error" in page
     assert "All pictures show" not in render_page(one, summarise(one))

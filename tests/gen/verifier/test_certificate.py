@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from flint import fmpq, fmpq_poly
+from flint import fmpq, fmpq_poly, fmpz_poly
 from pydantic import ValidationError
 from tests.gen.designs import ALL, example_design, with_rows
 from tests.gen.word_lengths.test_quantize import OUT, SIGNED, butterworth, plain
@@ -25,7 +25,7 @@ from sosmith.gen.output.certificate import certificate
 from sosmith.gen.realizations.registry import CASCADES, REALIZATIONS
 from sosmith.gen.specification.specification import FilterSpec
 from sosmith.gen.verifier.certificate_file import Certificate, Operation, certificate_text, on_grid, read_certificate
-from sosmith.gen.verifier.l1_response import UndecidedError, inverse, is_stable, response
+from sosmith.gen.verifier.l1_response import Inverse, UndecidedError, inverse, is_stable, response
 from sosmith.gen.verifier.verification import RejectedError, verify
 from sosmith.gen.word_lengths.quantize import quantize
 from sosmith.gen.word_lengths.quantized import Quantized
@@ -311,20 +311,24 @@ def without_calibration() -> Any:
     return json.loads(certificate_text(certificate(quantized, OUT.lsb)))
 
 
-def test_a_range_too_narrow_for_what_is_possible() -> None:
+@pytest.mark.parametrize("end", ["low", "high"])
+def test_a_range_too_narrow_for_what_is_possible(end: str) -> None:
     """Everything that follows from the narrower range is consistent; only the peak gain says otherwise."""
     quantized = plain(butterworth(2, 0.05))
     (section,) = quantized.sections
     low, high = section.v_range
-    less = high - high // 2**12
-    narrow = replace(section, v_range=(low, less))
+    if end == "low":
+        low -= low // 2**12
+    else:
+        high -= high // 2**12
+    narrow = replace(section, v_range=(low, high))
     stages = list(quantized.datapath.stages)
     stages[0] = narrow
     node = narrow.graph.nodes[narrow.graph.outputs[0]]
     stages[1] = replace(stages[1], x=node.range)
     lie = replace(quantized, datapath=replace(quantized.datapath, stages=tuple(stages)))
     number = next(index for index, node in enumerate(narrow.graph.nodes) if node.name == "v")
-    message = rf"node {number} \(bound v\) of section0 must hold -[0-9.]+\.\.[0-9.]+, not {low}\.\.{less}"
+    message = rf"node {number} \(bound v\) of section0 must hold -[0-9.]+\.\.[0-9.]+, not {low}\.\.{high}"
     rejected(json.loads(certificate_text(certificate(lie, OUT.lsb))), message)
 
 
@@ -451,6 +455,9 @@ def lie(edit: Callable[[Any], Any]) -> Any:
             id="lsb",
         ),
         pytest.param(
+            lie(lambda t: t["output"].update(lsb="0")), r"lsb of clearance must be positive, not 0", id="no lsb"
+        ),
+        pytest.param(
             lie(lambda t: change(t, "code", -1, high=65534)),
             r"the output must be limited to 0\.\.65535, not 0\.\.65534",
             id="output limited too early",
@@ -464,6 +471,13 @@ def lie(edit: Callable[[Any], Any]) -> Any:
 )
 def test_a_lie_is_rejected_with_its_reason(tree: Any, message: str) -> None:
     rejected(tree, message)
+
+
+def test_an_error_equal_to_what_is_allowed_is_within_it() -> None:
+    tree = tree_of()
+    error = Fraction(tree["claims"]["bound"]) * Fraction(tree["output"]["lsb"])
+    assert not is_rejected(tree | {"max_error": str(error)})
+    assert is_rejected(tree | {"max_error": str(error - Fraction(1, 2**90))})
 
 
 def test_a_recursion_beyond_the_unit_circle() -> None:
@@ -519,6 +533,14 @@ def test_an_inverse_is_within_its_error(denominator: list[Any]) -> None:
         total += abs(value - Fraction(sample, 2**176))
     assert total <= made.error < Fraction(1, 2**120)
     assert total > 0 or len(denominator) == 1
+
+
+def test_the_error_of_an_inverse_goes_through_the_numerator() -> None:
+    """It grows by the sum of the absolute coefficients; what a real inverse is off by is too small to be seen."""
+    coarse = Inverse(fmpz_poly([1 << 200]), 200, Fraction(1, 2**20))
+    found = response(fmpq_poly([3, -2]), coarse)
+    assert 5 * coarse.error <= found.error < 6 * coarse.error
+    assert found.gain >= 5 + 5 * coarse.error
 
 
 def test_a_pole_on_the_circle_has_no_inverse() -> None:

@@ -13,7 +13,7 @@ from sosmith.model.tables.csv_table import read_csv_table
 
 def test_reads_numbers_in_any_column_order(tmp_path: Path) -> None:
     path = tmp_path / "t.csv"
-    path.write_bytes("\ufeffb, a\r\n1, -2.5e-1\r\n\r\n.5,3.\r\n".encode())
+    path.write_bytes("\ufeffb, a\r\n1, -2.5e-1\r\n\r\n.5,3.\r\n \t\r\n".encode())
     table = read_csv_table(path, ["a", "b", "c"], required=["a"])
     assert table.column("a").tolist() == [-0.25, 3.0]
     assert table.column("b").tolist() == [1.0, 0.5]
@@ -41,6 +41,9 @@ def test_reads_numbers_in_any_column_order(tmp_path: Path) -> None:
         (b"a,b\n1,2\n1\n", ", line 3: row must have 2 cells, not 1"),
         (b"a,b\n1,two\n", ", line 2: b must be a finite number, not 'two'"),
         (b"a,b\n1,\n", ", line 2: b must be a finite number, not ''"),
+        (b"a,b\n1,2\n,\n", ", line 3: a must be a finite number, not ''"),
+        (b"a,b\n ,\n1,2\n", ", line 2: a must be a finite number, not ''"),
+        (b",\na,b\n1,2\n", ", line 1: column must be one of a, b, c, not ''"),
         (b"a,b\n1,nan\n", ", line 2: b must be a finite number, not 'nan'"),
         (b"a,b\n1,2\n-inf,2\n", ", line 3: a must be a finite number, not '-inf'"),
         (b"a,b\n1,1e999\n", ", line 2: b must be a finite number, not '1e999'"),

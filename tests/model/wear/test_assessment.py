@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from sosmith.gen.specification.wear_limits import WearSpec
 from sosmith.model.arrays import Values
@@ -108,6 +109,20 @@ def test_the_interval_holds_the_rate_as_often_as_it_says(correlation: float, blo
     assert held / 300 >= least
 
 
+@pytest.mark.parametrize(("memory", "side"), [(0.0, 1), (0.0, -1), (0.6, 1), (0.6, -1)])
+def test_each_end_of_the_interval_is_widened_by_itself(memory: float, side: int) -> None:
+    """Sen's interval of skewed deviations is not symmetric, and does not become so by being widened."""
+    time = np.arange(60.0)
+    clearance = 0.06 * time + side * 0.05 * np.exp(noise(60, memory, 5))
+    _, _, low, high = stats.theilslopes(clearance, time, alpha=0.9)
+    found = rate_of(time, clearance, 1.0, 0.9)
+    wider = np.sqrt((1 + found.correlation) / (1 - found.correlation)) if found.correlation > 0 else 1.0
+    assert (wider > 1.3) == (memory > 0)
+    assert found.rate - found.low == pytest.approx(wider * (found.rate - low), rel=1e-9)
+    assert found.high - found.rate == pytest.approx(wider * (high - found.rate), rel=1e-9)
+    assert abs((high - found.rate) / (found.rate - low) - 1) > 0.05
+
+
 def test_noise_with_memory_within_the_day_does_not_narrow_the_interval() -> None:
     time = np.arange(0, 40, 0.01)
     held = 0
@@ -141,6 +156,13 @@ def test_a_window_takes_the_recent_rate() -> None:
     clearance = 2 + 0.01 * time + 0.1 * np.maximum(time - 40, 0)
     assert judge(time, clearance, LIMITS, window=15).rate.rate == pytest.approx(0.11)
     assert judge(time, clearance, LIMITS).rate.rate < 0.08
+
+
+def test_a_reading_at_the_start_of_the_window_belongs_to_it() -> None:
+    """It lies 15 days before the last reading, and so is a sixteenth block by itself."""
+    time = np.arange(0, 60, 0.25)
+    for window, blocks in ((15.25, 16), (15.0, 16), (14.99, 15)):
+        assert judge(time, 2 + 0.01 * time, LIMITS, window=window).rate.blocks == blocks
 
 
 @pytest.mark.parametrize("scatter", [0.0, 0.05])

@@ -1,0 +1,58 @@
+"""The latency that each architecture states, measured on its hardware."""
+
+from collections.abc import Callable
+
+import pytest
+from tests.formal.small import limiter, resonator
+from tests.gen.designs import example_design
+from tests.hdl.stream_bench import run
+from tests.hdl.test_status import A, B, adder
+
+from sosmith.hdl import core, folded
+from sosmith.hdl.core import Core
+from sosmith.hdl.folded import FoldedCore
+from sosmith.model.dataflow.datapath import Datapath
+from sosmith.model.dataflow.folding import program
+
+
+def worn() -> Datapath:
+    """Make a datapath with limits of wear of each channel, which are read from a memory."""
+    return adder((A, B), ((3, 4), (5, 6), (7, 8)))
+
+
+def taken(made: Core | FoldedCore) -> set[int]:
+    """Clocks from the edge that finds a sample to the edge that hands its result on, of some samples."""
+    ports = made.datapath.inputs
+    codes = [[port.lowest for port in ports], [0] * len(ports), [port.highest for port in ports]]
+    return {result.clocks for result in run(made, [(k % made.channels, sample) for k, sample in enumerate(codes)])}
+
+
+@pytest.mark.parametrize(
+    ("make", "channels"),
+    [(limiter, 1), (limiter, 3), (resonator, 1), (resonator, 2), (resonator, 8), (resonator, 17), (worn, 3)],
+)
+def test_parallel(make: Callable[[], Datapath], channels: int) -> None:
+    datapath = make()
+    assert taken(Core(datapath, channels)) == {core.latency_cycles(datapath, channels)}
+
+
+@pytest.mark.parametrize("realization", ["df1_ef2", "df2t", "lattice_wdf"])
+def test_parallel_filters(realization: str) -> None:
+    datapath = example_design("audio_lowpass.toml", realization=realization).datapath
+    assert taken(Core(datapath)) == {core.latency_cycles(datapath)}
+
+
+@pytest.mark.parametrize(("make", "channels"), [(limiter, 1), (resonator, 1), (resonator, 3), (worn, 3)])
+def test_folded(make: Callable[[], Datapath], channels: int) -> None:
+    made = program(make(), 3)
+    assert taken(FoldedCore(make(), made, serial=False, channels=channels)) == {
+        folded.latency_cycles(made, serial=False)
+    }
+
+
+@pytest.mark.parametrize("make", [limiter, resonator, worn])
+def test_serial_takes_no_longer_than_it_states(make: Callable[[], Datapath]) -> None:
+    """Small factors take fewer clocks than the bound allows for, but not many."""
+    made = program(make(), 3)
+    stated = folded.latency_cycles(made, serial=True)
+    assert 0.8 * stated <= max(taken(FoldedCore(make(), made, serial=True, channels=3))) <= stated
