@@ -34,9 +34,7 @@ def adder(calibrated: tuple[Ends, Ends], wear: tuple[Ends, ...], *, signed: bool
     graph = g.build([g.add(g.input("a", 0, *A), g.input("b", 0, *B))])
     (total,) = graph.output_ranges
     y = port("y", 5, signed=signed)
-    last = OutputStage(
-        offset=0, offset_frac=0, x_frac=0, x_low=total.low, x_high=total.high, low=y.lowest, high=y.highest
-    )
+    last = OutputStage(offset=0, offset_frac=0, x=total, low=y.lowest, high=y.highest)
     inputs = (port("a", 5, signed=False), port("b", 4, signed=True))
     stages = (HornerStep("sum", graph), last)
     return Datapath(name="adder", inputs=inputs, output=y, stages=stages, calibrated=calibrated, wear=wear)

@@ -70,6 +70,7 @@ def test_example_is_the_contracts_and_is_read_exactly(tmp_path: Path) -> None:
     assert spec == Specification(
         path=tmp_path / "spec.toml",
         source=CONTRACT,
+        text=specification.example(),
         name="flange_wear",
         sample_rate=Fraction(100),
         channels=1,

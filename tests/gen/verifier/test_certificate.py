@@ -178,19 +178,25 @@ def numbers(tree: Any, place: PLACE = ()) -> Iterator[PLACE]:
         yield place
 
 
-def edits(value: Any) -> list[Any]:
-    """Return a number one unit up and down in each of its integers."""
+def edits(value: Any, bits: int | None = None) -> list[Any]:
+    """Return a number one unit up and down in each of its integers, or the last of `bits` significant bits."""
     if isinstance(value, bool):
         return [not value]
     if isinstance(value, int):
         return [value - 1, value + 1]
     p, q = Fraction(value).as_integer_ratio()
-    changed = [(p - 1, q), (p + 1, q), (p, q - 1), (p, q + 1)]
+    up, down = (1 if bits is None else max(1, abs(integer) >> bits) for integer in (p, q))
+    changed = [(p - up, q), (p + up, q), (p, q - down), (p, q + down)]
     return [f"{a}/{b}" for a, b in changed if b > 0 and a * q != p * b]
 
 
 def all_edits(tree: Any) -> list[tuple[PLACE, Any]]:
-    return [(place, new) for place in numbers(tree) for new in edits(at(tree, place))]
+    """Edit every number. Ideal sections have many more bits than any claim about them depends on."""
+    return [
+        (place, new)
+        for place in numbers(tree)
+        for new in edits(at(tree, place), 52 if place[:2] == ("ideal", "sections") else None)
+    ]
 
 
 def at(tree: Any, place: PLACE) -> Any:
