@@ -15,7 +15,7 @@ import numpy.typing as npt
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.filter.response import complex_response
 from sosmith.gen.fpga.boards import find_board
-from sosmith.gen.output.certificate import certificate
+from sosmith.gen.output.certificate import about, certificate
 from sosmith.gen.output.core_facts import CoreFacts, core_facts
 from sosmith.gen.output.generate import generate
 from sosmith.gen.output.manifest import manifest
@@ -202,8 +202,8 @@ class Design:
 
     @cached_property
     def certificate(self) -> Certificate:
-        """The claims about the design, for an independent proof."""
-        return Certificate(certificate(self.core.quantized, self.core.spec.max_error))
+        """The claims about the design, for an independent proof; the one that `generate` writes names its files too."""
+        return Certificate(certificate(self.core.quantized, self.core.spec.max_error, about(self.core, {})))
 
     def verify(self, progress: Progress = lambda step, done, total: None) -> Proof:
         """Prove the certificate, as `Certificate.verify` does."""
