@@ -215,8 +215,9 @@ class MeasurementStore:
     def insert(self, sensor: str, file: MeasurementFile) -> None:
         """Insert the valid rows of a file, none of which may be in the store already."""
         (sensor_id,) = self._sql.execute("SELECT id FROM sensor WHERE name = ?", (sensor,)).fetchone()
+        name = str(file.path).encode(errors="backslashreplace").decode()  # a file's name may be no UTF-8
         source = self._sql.execute(
-            "INSERT INTO source VALUES (NULL, ?, ?, ?)", (sensor_id, str(file.path), file.sha256)
+            "INSERT INTO source VALUES (NULL, ?, ?, ?)", (sensor_id, name, file.sha256)
         ).lastrowid
         self._sql.executemany(
             "INSERT INTO measurement VALUES (NULL, ?, ?, ?, ?, ?, ?, ?, ?)",
