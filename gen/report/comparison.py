@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from reprlib import repr as shortened
 from typing import Any
 
 from sosmith.gen.quantity import decibels, plain_number, quantity
@@ -104,7 +105,10 @@ def _problem(content: Any) -> str:
             value = value[key]
         # bool is a kind of int in Python, not in JSON
         if not isinstance(value, types) or (isinstance(value, bool) and bool not in types):
-            return f"with {value!r} as {'.'.join(keys)}"
+            return f"with {shortened(value)} as {'.'.join(keys)}"
+        # half of a surrogate pair cannot be printed, and a line break would break the table
+        if isinstance(value, str) and not value.isprintable():
+            return f"with {shortened(value)} as {'.'.join(keys)}"
         # no float holds such a number, and 1e999 is read as infinity
         if isinstance(value, _NUMBER) and not abs(value) <= sys.float_info.max:
             return f"with a number out of range as {'.'.join(keys)}"

@@ -276,6 +276,7 @@ _SENTENCES = {
     "int_type": "it must be an integer",
     "bool_type": "it must be true or false",
     "string_type": "it must be a text",
+    "string_unicode": "it must be a text of Unicode characters, without half of a surrogate pair",
     "string_too_long": "it must have at most {max_length} characters",
     "too_short": "it must have no fewer entries than {min_length}",
     "too_long": "it must have no more entries than {max_length}",
@@ -291,7 +292,8 @@ _SENTENCES = {
 
 def _said(error: ErrorDetails) -> str:
     known = {key: _power(value) if isinstance(value, int) else value for key, value in error.get("ctx", {}).items()}
-    return _SENTENCES[error["type"]].format(**known)
+    sentence = _SENTENCES.get(error["type"])
+    return f"it is not what is expected ({error['msg']})" if sentence is None else sentence.format(**known)
 
 
 def _power(value: int) -> str:

@@ -250,7 +250,8 @@ class _Cascade:
         names = [model.stage.name for model in self._models]
         require(
             [claim.section for claim in claims] == names,
-            f"gains must be given of {', '.join(names)}, not {', '.join(claim.section for claim in claims)}",
+            f"gains must be given of {', '.join(names) or 'nothing'}, "
+            f"not {', '.join(claim.section for claim in claims) or 'nothing'}",
         )
         for index, (claim, model) in enumerate(zip(claims, self._models, strict=True)):
             over = self._inverse(index, index)

@@ -10,21 +10,22 @@ import datetime
 import hashlib
 import io
 import sys
-import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import openpyxl
-
 from sosmith.model.calibration.acceptance import DEFAULT_RANGES, Range
 from sosmith.model.calibration.fit import COLUMNS
 from sosmith.model.errors import SpecificationError
-from sosmith.model.tables.csv_table import NUMBER, check_separator
+from sosmith.model.tables.csv_table import NUMBER, check_separator, shortened
+from sosmith.model.tables.workbook import MAX_ROWS, Uncalculated, workbook_rows
 
 DATE_COLUMN = "date"
 """Optional column with the date of each measurement, such as 2024-03-01."""
+
+MAX_BYTES = 16 << 20
+"""Most bytes of a file: several times what `MAX_ROWS` rows take."""
 
 _SLIPS: dict[str, tuple[tuple[str, Callable[[float], float]], ...]] = {
     "clearance_mm": (("micrometres", lambda x: x / 1000), ("metres", lambda x: x * 1000)),
@@ -93,7 +94,7 @@ def read_measurement_file(
 ) -> MeasurementFile:
     """Read the columns clearance_mm, voltage_V, temperature_C and, if present, date, from a CSV or XLSX file.
 
-    Of a workbook, the first sheet is read, with the stored values of formulas.
+    Of a workbook, the first visible worksheet is read, with the stored values of formulas.
 
     Parameters
     ----------
@@ -107,17 +108,21 @@ def read_measurement_file(
     Raises
     ------
     SpecificationError
-        If the file cannot be read, is of another kind, or its header lacks one of the three columns. Errors in
-        single rows go to `MeasurementFile.refusals` instead.
+        If the file cannot be read, is of another kind, or its header lacks one of the three columns; if it has more
+        than `MAX_BYTES` bytes or a row beyond `MAX_ROWS`. Errors in single rows go to `MeasurementFile.refusals`
+        instead.
     """
     try:
-        content = path.read_bytes()
-    except OSError as error:
-        reason = (error.strerror or str(error)).lower()
+        with path.open("rb") as file:
+            content = file.read(MAX_BYTES + 1)
+    except (OSError, ValueError) as error:  # ValueError: a path with a NUL
+        reason = (getattr(error, "strerror", None) or str(error)).lower()
         raise SpecificationError(f"{path} must be a readable CSV or XLSX file ({reason})") from None
-    readers = {".csv": _csv_rows, ".xlsx": _xlsx_rows}
+    readers = {".csv": _csv_rows, ".xlsx": workbook_rows}
     if path.suffix.lower() not in readers:
         raise SpecificationError(f"{path}: the file's name must end in .csv or .xlsx, not {path.suffix or 'neither'}")
+    if len(content) > MAX_BYTES:
+        raise SpecificationError(f"{path} must have at most {MAX_BYTES >> 20} MiB, not more")
     rows = ((line, cells) for line, cells in readers[path.suffix.lower()](path, content) if not _blank(cells))
     line, header = next(rows, (1, ()))
     names = tuple(cell.strip() if isinstance(cell, str) else cell for cell in _trimmed(header, 0))
@@ -144,7 +149,7 @@ def parse_date(text: str) -> str:
             return text
     except ValueError:
         pass
-    raise SpecificationError(f"date must be a date such as 2024-03-01, not {text!r}")
+    raise SpecificationError(f"date must be a date such as 2024-03-01, not {shortened(text)}")
 
 
 def _blank(cells: Sequence[Any]) -> bool:
@@ -170,21 +175,13 @@ def _csv_rows(path: Path, content: bytes) -> Iterator[tuple[int, Sequence[Any]]]
     reader = csv.reader(io.StringIO(text, newline=""), strict=True)
     try:
         for cells in reader:
+            if reader.line_num > MAX_ROWS:
+                raise SpecificationError(f"{path} must end within {MAX_ROWS:,} rows, not go on in row {MAX_ROWS + 1:,}")
             yield reader.line_num, [float(cell) if NUMBER.fullmatch(cell.strip()) else cell for cell in cells]
     except csv.Error as error:
         raise SpecificationError(
             f"{path}, line {reader.line_num}: row must be valid CSV, not broken ({error})"
         ) from None
-
-
-def _xlsx_rows(path: Path, content: bytes) -> Iterator[tuple[int, Sequence[Any]]]:
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # warnings about styles and extensions, which are not read
-            book = openpyxl.load_workbook(io.BytesIO(content), read_only=True, data_only=True)
-            yield from enumerate(book.worksheets[0].iter_rows(values_only=True), start=1)
-    except Exception as error:  # damaged files raise errors of zipfile, of XML, or any other
-        raise SpecificationError(f"{path} must be an XLSX workbook, not damaged ({error})") from None
 
 
 def _check_header(where: str, names: Sequence[Any]) -> None:
@@ -196,7 +193,8 @@ def _check_header(where: str, names: Sequence[Any]) -> None:
     for name in names:
         if name not in known:
             raise SpecificationError(
-                f"{where}: column must be one of {', '.join(known)}, with the unit in its name, not {name or ''!r}"
+                f"{where}: column must be one of {', '.join(known)}, with the unit in its name, "
+                f"not {shortened(str(name or ''))}"
             )
         if names.count(name) > 1:
             raise SpecificationError(f"{where}: column {name} must appear once, not {names.count(name)} times")
@@ -252,12 +250,14 @@ def _number(name: str, cell: Any) -> float:
 
 
 def _shown(cell: Any) -> str:
-    return f"the text {cell.strip()!r}" if isinstance(cell, str) else str(cell)
+    return f"the text {shortened(cell.strip())}" if isinstance(cell, str) else str(cell)
 
 
 def _date(cell: Any) -> str:
     if isinstance(cell, datetime.datetime):
         return cell.date().isoformat()
+    if isinstance(cell, Uncalculated):
+        raise SpecificationError(f"{DATE_COLUMN} must be a date such as 2024-03-01, not {cell}")
     return parse_date("" if cell is None else str(cell).strip())
 
 

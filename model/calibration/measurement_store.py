@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import sqlite3
 from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -21,6 +23,7 @@ from sosmith.model.calibration.fit import Measurements
 from sosmith.model.calibration.measurement_files import MeasurementFile, Reading
 from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.errors import SpecificationError, ToolError
+from sosmith.model.tables.csv_table import shortened
 
 APPLICATION_ID = 0x534F534D
 """SQLite application ID that marks a file as a measurement store."""
@@ -83,6 +86,26 @@ _COMPLAINTS = {
     "database is locked": "must be free within a minute, not locked by another program",
     "file is not a database": "must be a store of measurements, not another kind of file",
 }
+
+
+_UNREACHABLE = {
+    sqlite3.SQLITE_PERM,
+    sqlite3.SQLITE_BUSY,
+    sqlite3.SQLITE_LOCKED,
+    sqlite3.SQLITE_NOMEM,
+    sqlite3.SQLITE_READONLY,
+    sqlite3.SQLITE_INTERRUPT,
+    sqlite3.SQLITE_IOERR,
+    sqlite3.SQLITE_FULL,
+    sqlite3.SQLITE_CANTOPEN,
+    sqlite3.SQLITE_PROTOCOL,
+}
+"""Primary codes of errors that are not about what the file holds."""
+
+_OPTIONAL = (float, type(None))
+_MEASUREMENT = (int, str, int, str, float, float, float, str)
+_VERSION = (int, str, int, int, str, float, int, str, float, float, _OPTIONAL, _OPTIONAL)
+"""Types of the values of a row; SQLite checks them only when it writes."""
 
 
 @dataclass(frozen=True)
@@ -156,15 +179,17 @@ class MeasurementStore:
 
     def sensors(self) -> list[str]:
         """Return the names of all sensors, sorted."""
-        return [name for (name,) in self._sql.execute("SELECT name FROM sensor ORDER BY name")]
+        return [name for (name,) in self._rows((str,), "SELECT name FROM sensor ORDER BY name")]
 
     def ranges(self, sensor: str) -> tuple[Range, Range, Range] | None:
         """Return the ranges of clearance in mm, voltage in V and temperature in degC; None for an unknown sensor."""
-        row = self._sql.execute(
+        rows = self._rows(
+            (float,) * 6,
             "SELECT clearance_low_mm, clearance_high_mm, voltage_low_V, voltage_high_V, temperature_low_C, "
             "temperature_high_C FROM sensor WHERE name = ?",
-            (sensor,),
-        ).fetchone()
+            sensor,
+        )
+        row = next(iter(rows), None)
         return None if row is None else ((row[0], row[1]), (row[2], row[3]), (row[4], row[5]))
 
     def set_ranges(self, sensor: str, ranges: tuple[Range, Range, Range]) -> None:
@@ -179,17 +204,20 @@ class MeasurementStore:
 
     def source_of(self, sensor: str, sha256: str) -> str | None:
         """Return the name under which a file with this hash was added, or None."""
-        row = self._sql.execute(
+        rows = self._rows(
+            (str,),
             "SELECT name FROM source WHERE sensor = (SELECT id FROM sensor WHERE name = ?) AND sha256 = ?",
-            (sensor, sha256),
-        ).fetchone()
-        return None if row is None else str(row[0])
+            sensor,
+            sha256,
+        )
+        return next((name for (name,) in rows), None)
 
     def insert(self, sensor: str, file: MeasurementFile) -> None:
         """Insert the valid rows of a file, none of which may be in the store already."""
         (sensor_id,) = self._sql.execute("SELECT id FROM sensor WHERE name = ?", (sensor,)).fetchone()
+        name = str(file.path).encode(errors="backslashreplace").decode()  # a file's name may be no UTF-8
         source = self._sql.execute(
-            "INSERT INTO source VALUES (NULL, ?, ?, ?)", (sensor_id, str(file.path), file.sha256)
+            "INSERT INTO source VALUES (NULL, ?, ?, ?)", (sensor_id, name, file.sha256)
         ).lastrowid
         self._sql.executemany(
             "INSERT INTO measurement VALUES (NULL, ?, ?, ?, ?, ?, ?, ?, ?)",
@@ -205,15 +233,17 @@ class MeasurementStore:
         Raises
         ------
         SpecificationError
-            If a measurement differs from its stored hash.
+            If a measurement differs from its stored hash, or the store is damaged.
         """
         found = []
-        for number, source, line, date, *values, sha256 in self._sql.execute(
+        for number, source, line, date, *values, sha256 in self._rows(
+            _MEASUREMENT,
             "SELECT measurement.id, source.name, line, date, clearance_mm, voltage_V, temperature_C, "
             "measurement.sha256 FROM measurement JOIN sensor ON sensor.id = measurement.sensor "
             "JOIN source ON source.id = measurement.source "
             "WHERE sensor.name = ? AND measurement.id <= coalesce(?, measurement.id) ORDER BY measurement.id",
-            (sensor, last),
+            sensor,
+            last,
         ):
             reading = Reading(line, date, (values[0], values[1], values[2]))
             if reading.sha256(sensor) != sha256:
@@ -224,16 +254,34 @@ class MeasurementStore:
         return found
 
     def versions(self, sensor: str) -> list[Version]:
-        """Return the versions of a sensor's calibration, oldest first."""
-        rows = self._sql.execute(
+        """Return the versions of a sensor's calibration, oldest first.
+
+        Raises
+        ------
+        SpecificationError
+            If the store is damaged.
+        """
+        rows = self._rows(
+            _VERSION,
             "SELECT number, date, measurements, last_measurement, data_sha256, required_r, robust, coefficients, "
             "adjusted_r_squared, rms_mm, cross_validated_mm, drift_mm FROM version "
             "WHERE sensor = (SELECT id FROM sensor WHERE name = ?) ORDER BY number",
-            (sensor,),
+            sensor,
         )
         return [
             Version(
-                number, date, count, last, data, required_r, bool(robust), _polynomial(text), r, rms, left_out, drift
+                number,
+                date,
+                count,
+                last,
+                data,
+                required_r,
+                bool(robust),
+                self._polynomial(text),
+                r,
+                rms,
+                left_out,
+                drift,
             )
             for number, date, count, last, data, required_r, robust, text, r, rms, left_out, drift in rows
         ]
@@ -270,7 +318,28 @@ class MeasurementStore:
         """
         complaints = [text for (text,) in self._sql.execute("PRAGMA integrity_check")]
         if complaints != ["ok"]:
-            raise SpecificationError(f"{self.path} must be an undamaged store, not: {complaints[0]}")
+            first = " ".join(complaints[0].splitlines()[:2])
+            raise SpecificationError(f"{self.path} must be an undamaged store, not: {first}")
+
+    def _rows(self, types: Sequence[Any], query: str, *values: str | int | None) -> list[tuple[Any, ...]]:
+        """Return the rows that a query finds, each with finite values of these types."""
+        rows: list[tuple[Any, ...]] = self._sql.execute(query, values).fetchall()
+        for row in rows:
+            for value, kind in zip(row, types, strict=True):
+                if not isinstance(value, kind) or (isinstance(value, float) and not math.isfinite(value)):
+                    raise self._damaged(value)
+        return rows
+
+    def _polynomial(self, coefficients: str) -> Polynomial:
+        try:
+            return Polynomial.from_numbers([[float.fromhex(a) for a in row] for row in json.loads(coefficients)])
+        except (ValueError, TypeError, ArithmeticError, RecursionError):
+            raise self._damaged(coefficients) from None
+
+    def _damaged(self, value: Any) -> SpecificationError:
+        return SpecificationError(
+            f"{self.path} must be an undamaged store, not one with the value {shortened(str(value))}"
+        )
 
 
 @contextmanager
@@ -294,10 +363,11 @@ def open_store(path: Path, *, create: bool = False) -> Iterator[MeasurementStore
             store = MeasurementStore(path, connection)
             _prepare(store, connection)
             yield store
-    except sqlite3.OperationalError as error:
-        complaint = _COMPLAINTS.get(str(error), f"must be readable and writable, not: {error}")
-        raise ToolError(f"{path}: the store {complaint}") from None
-    except sqlite3.DatabaseError as error:
+    except (sqlite3.Error, UnicodeDecodeError) as error:  # the latter if a damaged name is in SQLite's own message
+        # The low byte is the primary code. Errors that Python raises by itself have none and are about the content.
+        if getattr(error, "sqlite_errorcode", sqlite3.SQLITE_ERROR) & 0xFF in _UNREACHABLE:
+            complaint = _COMPLAINTS.get(str(error), f"must be readable and writable, not: {error}")
+            raise ToolError(f"{path}: the store {complaint}") from None
         complaint = _COMPLAINTS.get(str(error), f"must be undamaged, not: {error}")
         raise SpecificationError(f"{path}: the file {complaint}") from None
 
@@ -323,10 +393,6 @@ def _pragmas(connection: sqlite3.Connection) -> tuple[int, int]:
     (application,) = connection.execute("PRAGMA application_id").fetchone()
     (version,) = connection.execute("PRAGMA user_version").fetchone()
     return application, version
-
-
-def _polynomial(coefficients: str) -> Polynomial:
-    return Polynomial.from_numbers([[float.fromhex(a) for a in row] for row in json.loads(coefficients)])
 
 
 def as_measurements(stored: Sequence[StoredMeasurement], source: str) -> Measurements:

@@ -195,11 +195,12 @@ def _number(where: str, column: str, cell: str, readers: Mapping[str, Reader]) -
         except ValueError as error:
             raise SpecificationError(f"{where}: {column} must be {error}, not {text!r}") from None
     if not NUMBER.fullmatch(text) or math.isinf(float(text)):
-        raise SpecificationError(f"{where}: {column} must be a finite number, not {_short(text)}")
+        raise SpecificationError(f"{where}: {column} must be a finite number, not {shortened(text)}")
     if abs(float(text)) > LARGEST:
-        raise SpecificationError(f"{where}: {column} must be from -{LARGEST:g} to {LARGEST:g}, not {_short(text)}")
+        raise SpecificationError(f"{where}: {column} must be from -{LARGEST:g} to {LARGEST:g}, not {shortened(text)}")
     return float(text)
 
 
-def _short(text: str) -> str:
+def shortened(text: str) -> str:
+    """Quote `text` for a message; of more than `MAX_SHOWN` characters, only the beginning."""
     return repr(text) if len(text) <= MAX_SHOWN else f"{text[: MAX_SHOWN - 4]!r} ..."

@@ -9,6 +9,7 @@ from __future__ import annotations
 import signal
 import sys
 from importlib import import_module
+from io import TextIOWrapper
 from types import FrameType
 from typing import Any, NamedTuple
 
@@ -143,6 +144,8 @@ def cli() -> None:
 
 def main() -> None:
     """Run the command line and end the process with its exit status."""
+    if isinstance(sys.stdout, TextIOWrapper):  # a file's name may be no text, and a terminal may lack our signs
+        sys.stdout.reconfigure(errors="backslashreplace")
     try:
         for number in (signal.SIGTERM, signal.SIGHUP):
             if signal.getsignal(number) is signal.SIG_DFL:  # nohup ignores hang-ups: leave it so

@@ -86,8 +86,9 @@ def show_progress() -> Iterator[Step]:
 
 
 def note(text: str) -> None:
-    """Print a message on stderr."""
-    click.echo(f"sosmith: {text}", err=True)
+    """Print a message on stderr, with escapes for what a terminal would not show: the text may come from a file."""
+    shown = "".join(c if c.isprintable() or c in "\n\t" else ascii(c)[1:-1] for c in text)
+    click.echo(f"sosmith: {shown}", err=True)
 
 
 def print_json(tree: Any) -> None:

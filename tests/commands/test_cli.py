@@ -510,6 +510,16 @@ def test_design_as_tables_and_as_json(sosmith: Command) -> None:
     assert json.loads(as_json.stdout)["error_unit"] == "mm"
 
 
+def test_a_message_escapes_what_a_terminal_would_obey(sosmith: Command) -> None:
+    Path("a.csv").write_text("\x1b[31m,b\n1,2\n", encoding="utf-8")
+    outcome = sosmith("wear", "a.csv", "--initial", "1", "--limit", "9")
+    assert outcome.status == 2
+    assert outcome.messages == [
+        "sosmith: error: a.csv must have a time column (time_s, date, days, time_days, time_d, hours, time_h), "
+        "not only \\x1b[31m, b"
+    ]
+
+
 def test_a_design_that_cannot_meet_its_specification_falls_short(sosmith: Command) -> None:
     Path("plain.toml").write_text(FILTER.replace('"faithful"', "0.00024414062500000001"), encoding="utf-8")
     outcome = sosmith("design", "plain.toml")

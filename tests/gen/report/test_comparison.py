@@ -174,6 +174,9 @@ _OUT_OF_RANGE = "JSON with a number out of range as error.max_abs"
         (json.dumps(report(**{"error.max_abs": "small"})), "JSON with 'small' as error.max_abs"),
         (json.dumps(report(samples=True)), "JSON with True as samples"),
         (json.dumps(report(passed=1)), "JSON with 1 as passed"),
+        (json.dumps(report(name="\ud800")), "JSON with '\\ud800' as name"),
+        (json.dumps(report(simulator="one\ntwo")), "JSON with 'one\\ntwo' as simulator"),
+        (json.dumps(report(samples="x" * 1000)), "JSON with 'xxxxxxxxxxxx...xxxxxxxxxxxxx' as samples"),
     ],
 )
 def test_load_refuses_what_is_no_report(tmp_path: Path, content: str, reason: str) -> None:

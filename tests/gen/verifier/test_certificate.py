@@ -24,6 +24,7 @@ from sosmith.gen.filter.design import design
 from sosmith.gen.output.certificate import certificate
 from sosmith.gen.realizations.registry import CASCADES, REALIZATIONS
 from sosmith.gen.specification.specification import FilterSpec
+from sosmith.gen.verifier import certificate_file
 from sosmith.gen.verifier.certificate_file import Certificate, Operation, certificate_text, on_grid, read_certificate
 from sosmith.gen.verifier.l1_response import Inverse, UndecidedError, inverse, is_stable, response
 from sosmith.gen.verifier.verification import RejectedError, verify
@@ -384,6 +385,11 @@ def lie(edit: Callable[[Any], Any]) -> Any:
             id="gains missing",
         ),
         pytest.param(
+            lie(lambda t: t["claims"]["sections"].clear()),
+            "gains must be given of section0, section1, section2, not nothing",
+            id="no gains",
+        ),
+        pytest.param(
             lie(lambda t: t["stages"].insert(3, t["stages"].pop(4))),
             r"input x of section1 must take the range -?\d+\.\.\d+ and the format of what feeds it, not -?\d+\.\.\d+",
             id="sections swapped",
@@ -605,6 +611,7 @@ def test_what_is_no_certificate(text: str, message: str, tmp_path: Path) -> None
         (("stages",), {}, "it must be a list"),
         (("stages", 0, "name"), "x" * 1001, "it must have at most 1000 characters"),
         (("stages", 0, "name"), 1, "it must be a text"),
+        (("name",), "\ud800", "it must be a text of Unicode characters, without half of a surrogate pair"),
         (("stages", 0, "outputs", 0), 10000, "it must be less than 10000"),
         (
             ("stages", 0, "nodes", 0, "op"),
@@ -626,6 +633,16 @@ def test_a_certificate_of_the_wrong_form(place: PLACE, new: Any, message: str, t
     path.write_text(json.dumps(edited(tree_of(), place, new)), encoding="utf-8")
     where = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in place)[1:]
     expected = f"{path}: the file must be a certificate, not one where {where} is wrong: {message}"
+    with pytest.raises(SpecificationError, match=f"^{re.escape(expected)}$"):
+        read_certificate(path)
+
+
+def test_a_kind_of_mistake_without_a_sentence_of_ours(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delitem(certificate_file._SENTENCES, "missing")
+    path = tmp_path / "c.json"
+    path.write_text("{}", encoding="utf-8")
+    what = "where format is wrong: it is not what is expected (Field required)"
+    expected = f"{path}: the file must be a certificate, not one {what}"
     with pytest.raises(SpecificationError, match=f"^{re.escape(expected)}$"):
         read_certificate(path)
 

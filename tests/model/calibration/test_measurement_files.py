@@ -12,8 +12,14 @@ from typing import Any
 import openpyxl
 import pytest
 
-from sosmith.model.calibration.measurement_files import MeasurementFile, parse_date, read_measurement_file
+from sosmith.model.calibration.measurement_files import (
+    MAX_BYTES,
+    MeasurementFile,
+    parse_date,
+    read_measurement_file,
+)
 from sosmith.model.errors import SpecificationError
+from sosmith.model.tables.workbook import MAX_ROWS
 
 HEADER = ("clearance_mm", "voltage_V", "temperature_C")
 DAY = "2024-03-01"
@@ -100,7 +106,7 @@ def test_a_bad_row_is_refused_and_the_others_are_not(row: Sequence[Any], reason:
         (True, "True"),
         (datetime.datetime(2024, 3, 1), "2024-03-01 00:00:00"),
         ("#DIV/0!", "the text '#DIV/0!'"),
-        ("=5+A1", "empty"),  # a formula whose value was never stored
+        ("=5+A1", "a formula without a stored value (open the workbook in a spreadsheet program and save it)"),
     ],
 )
 def test_cells_of_a_workbook_that_are_no_numbers(cell: Any, shown: str, tmp_path: Path) -> None:
@@ -108,14 +114,56 @@ def test_cells_of_a_workbook_that_are_no_numbers(cell: Any, shown: str, tmp_path
     assert [one.reason for one in file.refusals] == [f"voltage_V must be a finite number, not {shown}"]
 
 
-def test_a_workbook_with_a_number_that_no_double_holds(tmp_path: Path) -> None:
-    path = write(tmp_path / "m.xlsx", [HEADER, GOOD, (1, 12345, 20)])
+def replace_in_parts(path: Path, old: bytes, new: bytes) -> None:
+    """Replace bytes wherever they stand in the parts of a workbook."""
     with zipfile.ZipFile(path) as archive:
         parts = {name: archive.read(name) for name in archive.namelist()}
-    digits = "9" * 400
+    assert any(old in content for content in parts.values())
     with zipfile.ZipFile(path, "w") as archive:
         for name, content in parts.items():
-            archive.writestr(name, content.replace(b"<v>12345</v>", f"<v>{digits}</v>".encode()))
+            archive.writestr(name, content.replace(old, new))
+
+
+def test_rows_beyond_the_range_that_a_sheet_states(tmp_path: Path) -> None:
+    good = [(k / 4, k / 5, 20 + k) for k in range(40)]
+    path = write(tmp_path / "m.xlsx", [HEADER, *good, ("five", 5.5, 20)])
+    replace_in_parts(path, b'ref="A1:C42"', b'ref="A1:C21"')
+    file = read_measurement_file(path, DAY)
+    assert [one.values for one in file.readings] == good
+    assert [(one.line, one.reason) for one in file.refusals] == [
+        (42, "clearance_mm must be a finite number, not the text 'five'")
+    ]
+
+
+def test_a_formula_for_a_date_without_a_stored_value(tmp_path: Path) -> None:
+    file = read(tmp_path / "m.xlsx", [(*HEADER, "date"), (*GOOD, "=TODAY()")])
+    assert [one.reason for one in file.refusals] == [
+        "date must be a date such as 2024-03-01, not a formula without a stored value "
+        "(open the workbook in a spreadsheet program and save it)"
+    ]
+
+
+def test_formulas_without_values_are_no_blank_row(tmp_path: Path) -> None:
+    file = read(tmp_path / "m.xlsx", [HEADER, GOOD, ("=A2", "=B2", "=C2")])
+    assert [one.line for one in file.refusals] == [3]
+
+
+def test_cells_below_the_first_of_merged_ones_are_empty(tmp_path: Path) -> None:
+    path = write(tmp_path / "m.xlsx", [HEADER, GOOD, (1, 1.5, 20.5), (2, 2.5, 30)])
+    book = openpyxl.load_workbook(path)
+    book.active.merge_cells("C2:C3")
+    book.save(path)
+    file = read_measurement_file(path, DAY)
+    assert [one.line for one in file.readings] == [2, 4]
+    assert [(one.line, one.reason) for one in file.refusals] == [
+        (3, "temperature_C must be a finite number, not empty")
+    ]
+
+
+def test_a_workbook_with_a_number_that_no_double_holds(tmp_path: Path) -> None:
+    path = write(tmp_path / "m.xlsx", [HEADER, GOOD, (1, 12345, 20)])
+    digits = "9" * 400
+    replace_in_parts(path, b"<v>12345</v>", f"<v>{digits}</v>".encode())
     file = read_measurement_file(path, DAY)
     assert [one.reason for one in file.refusals] == [f"voltage_V must be a finite number, not {digits}"]
 
@@ -193,6 +241,27 @@ def test_damaged_workbooks(tmp_path: Path) -> None:
         archive.writestr("word/document.xml", "<a/>")
     with pytest.raises(SpecificationError, match=r" must be an XLSX workbook, not damaged \("):
         read_measurement_file(path, DAY)
+
+
+def test_files_of_more_than_anyone_measures(tmp_path: Path) -> None:
+    path = tmp_path / "m.csv"
+    header = ",".join(HEADER) + "\n"
+    rows = "".join(f"5,5.5,{k}\n" for k in range(1, MAX_ROWS))
+    path.write_text(header + rows)
+    file = read_measurement_file(path, DAY)
+    assert len(file.readings) + len(file.refusals) == MAX_ROWS - 1
+    path.write_text(header + rows + "5,5.5,20\n")
+    refused(path, " must end within 50,000 rows, not go on in row 50,001")
+    with path.open("wb") as file_of_zeros:
+        file_of_zeros.truncate(MAX_BYTES + 1)
+    refused(path, " must have at most 16 MiB, not more")
+
+
+def test_a_long_text_is_quoted_in_part(tmp_path: Path) -> None:
+    file = read(tmp_path / "m.csv", [HEADER, ("x" * 1000, 5.5, 20)])
+    assert [one.reason for one in file.refusals] == [
+        f"clearance_mm must be a finite number, not the text '{'x' * 56}' ..."
+    ]
 
 
 def test_minus_zero_is_zero_and_hashes_tell_sensors_and_days_apart(tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -289,6 +290,72 @@ def test_a_damaged_store_is_noticed(store: MeasurementStore, tmp_path: Path) -> 
     pattern = r"^.*damaged\.db: the file must be undamaged, not: .*$"
     with pytest.raises(SpecificationError, match=pattern), open_store(damaged) as opened:
         opened.measurements("left")
+
+
+def shown(value: str) -> str:
+    return f" must be an undamaged store, not one with the value {value}"
+
+
+VALUES = {
+    "half a row": ("version", "coefficients", "'[[]]'", shown("'[[]]'")),
+    "no JSON": ("version", "coefficients", "'x'", shown("'x'")),
+    "no list": ("version", "coefficients", "'[1]'", shown("'[1]'")),
+    "an infinity": ("version", "coefficients", "'[[\"inf\"]]'", shown("""'[["inf"]]'""")),
+    "beyond any double": ("version", "coefficients", "'[[\"0x1p+9999\"]]'", shown("""'[["0x1p+9999"]]'""")),
+    "an endless range": ("sensor", "voltage_high_V", "9e999", shown("'inf'")),
+    "no UTF-8": (
+        "sensor",
+        "name",
+        "CAST(x'ff' AS TEXT)",
+        ": the file must be undamaged, not: Could not decode to UTF-8 column 'name' with text '\ufffd'",
+    ),
+}
+
+
+@pytest.mark.parametrize(("table", "column", "value", "message"), VALUES.values(), ids=VALUES)
+def test_values_that_no_store_holds(
+    table: str, column: str, value: str, message: str, store: MeasurementStore, tmp_path: Path
+) -> None:
+    add(store, "left", batch(tmp_path, "a.csv"), DAY)
+    changed(store.path, f"UPDATE {table} SET {column} = {value}")
+    with pytest.raises(SpecificationError, match=f"^{re.escape(str(store.path) + message)}$"):
+        read_whole(store.path)
+
+
+def read_whole(path: Path) -> None:
+    with open_store(path) as opened:
+        for sensor in opened.sensors():
+            opened.ranges(sensor)
+            opened.versions(sensor)
+            opened.measurements(sensor)
+
+
+def test_a_store_without_a_column(store: MeasurementStore, tmp_path: Path) -> None:
+    add(store, "left", batch(tmp_path, "a.csv"), DAY)
+    changed(store.path, "ALTER TABLE version RENAME COLUMN rms_mm TO other")
+    message = f"{store.path}: the file must be undamaged, not: no such column: rms_mm"
+    with pytest.raises(SpecificationError, match=f"^{re.escape(message)}$"):
+        read_whole(store.path)
+
+
+def test_the_first_complaint_about_a_damaged_store_is_one_line(store: MeasurementStore, tmp_path: Path) -> None:
+    add(store, "left", batch(tmp_path, "a.csv", 400), DAY)
+    damaged = tmp_path / "damaged.db"
+    content = bytearray(store.path.read_bytes())
+    content[-4096 + 10] = 0x7F  # in the last page: where its second cell stands
+    damaged.write_bytes(content)
+    pattern = r"^[^\n]*damaged\.db must be an undamaged store, not: [^\n]+\Z"
+    with open_store(damaged) as opened, pytest.raises(SpecificationError, match=pattern):
+        opened.check()
+
+
+def changed(path: Path, statement: str) -> None:
+    """Change a store by force, without its triggers."""
+    with closing(sqlite3.connect(path)) as connection:
+        for (name,) in connection.execute("SELECT name FROM sqlite_schema WHERE type = 'trigger'").fetchall():
+            connection.execute(f"DROP TRIGGER {name}")
+        connection.execute(statement)
+        connection.commit()
 
 
 def test_a_writer_that_waits_in_vain_says_so(
