@@ -126,7 +126,7 @@ def test_numbers_are_exact() -> None:
         ({"sos": [[1, 0, 0, 1, 0, 0]], "order": 2}, "filter.order must be left out with sos, not 2"),
         *(
             ({"sos": value}, "filter.sos must be a list of rows [b0, b1, b2, 1, a1, a2], not another value")
-            for value in (1, [], [1], [[1, 2]])
+            for value in (1, [], [1], [[1, 2]], [[1, 0, 0, 1, 0, 0], 1])
         ),
     ],
 )
