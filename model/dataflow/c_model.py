@@ -37,6 +37,7 @@ def c_header(datapath: Datapath) -> str:
         states=max(state_count(datapath), 1),
         parameters=_parameters(datapath),
         wear=datapath.wear,
+        channels=len(datapath.wear) if _takes_channel(datapath) else 0,
     )
 
 
@@ -52,14 +53,18 @@ def c_source(datapath: Datapath) -> str:
         If a value inside is wider than 128 bits.
     """
     count = len(datapath.inputs)
+    names = [f"{port.name}_code" for port in datapath.inputs]
+    codes = [f"in[(n * channels + c) * {count} + {i}]" for i in range(count)]
     judged = ((0, Flag.WEAR_WARNING), (1, Flag.WEAR_CRITICAL))
     return render(
         __package__,
         "c_model.c.jinja",
         name=datapath.name,
-        inputs=[f"{port.name}_code" for port in datapath.inputs],
+        inputs=names,
         parameters=_parameters(datapath),
-        codes=[f"in[(n * channels + c) * {count} + {i}]" for i in range(count)],
+        arguments=["channel", *names] if _takes_channel(datapath) else names,
+        codes=codes,
+        block_arguments=["c", *codes] if _takes_channel(datapath) else codes,
         wires=_wires(datapath),
         stages=_stages(datapath),
         status=_status(datapath),
@@ -70,8 +75,15 @@ def c_source(datapath: Datapath) -> str:
     )
 
 
+def _takes_channel(datapath: Datapath) -> bool:
+    """Whether a sample's status depends on its channel."""
+    return len(datapath.wear) > 1
+
+
 def _parameters(datapath: Datapath) -> str:
-    return "".join(f", int64_t {port.name}_code" for port in datapath.inputs)
+    """Return the parameters of a step between state and status."""
+    codes = [f"int64_t {port.name}_code" for port in datapath.inputs]
+    return ", ".join(["size_t channel", *codes] if _takes_channel(datapath) else codes)
 
 
 def state_count(datapath: Datapath) -> int:
@@ -181,6 +193,9 @@ def _status(datapath: Datapath) -> str:
         before = f"w.{_wire(len(datapath.stages) - 1, node.operands[0])}"
         conditions[Flag.OUTPUT_SATURATED] += [f"{before} < {_literal(node.low)}", f"{before} > {_literal(node.high)}"]
     terms = [f"({' || '.join(found)}) << {flag.value}" for flag, found in conditions.items() if found]
+    if datapath.wear:
+        channel = "channel" if _takes_channel(datapath) else "0"
+        terms.append(f"{datapath.name}_wear_flags({channel}, (int64_t)w.{_result(datapath)})")
     return f"(uint8_t)({' | '.join(terms)})"
 
 

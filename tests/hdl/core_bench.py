@@ -1,0 +1,102 @@
+"""Runs a whole core in Amaranth's own simulator, with random handshakes."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+from amaranth.hdl import ClockDomain, ClockSignal, Module
+from amaranth.sim import Simulator
+
+from sosmith.gen.architecture import Architecture
+from sosmith.hdl.axi_stream import fields
+
+_PATIENCE = 20_000
+"""Clocks without a transfer after which the core counts as hung."""
+
+
+class Result(NamedTuple):
+    """An output beat: the channel, the code and the status."""
+
+    channel: int
+    code: int
+    status: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pace:
+    """Shares of the clocks in which source and sink do not do their part.
+
+    Attributes
+    ----------
+    idle : float
+        Share in which the source has nothing to offer.
+    stall : float
+        Share in which the sink is not ready.
+    withdraw : float
+        Share in which the source breaks the rule of AXI4-Stream: it takes back an offer that was not accepted. The
+        clock after, it may offer the same sample again.
+    """
+
+    idle: float = 0.3
+    stall: float = 0.3
+    withdraw: float = 0.0
+
+
+def run_core(architecture: Architecture, samples: Sequence[tuple[int, Sequence[int]]], pace: Pace) -> list[Result]:
+    """Feed a core; return its output beats in their order.
+
+    Parameters
+    ----------
+    architecture : Architecture
+        The core.
+    samples : sequence of (int, sequence of int)
+        Channel and input codes of each sample, in the order in which they are offered.
+    pace : Pace
+        Of the handshakes.
+    """
+    dut: Any = architecture.component()
+    ports, output = fields(architecture.datapath.inputs), architecture.datapath.output
+    chance = random.Random(1)
+    results: list[Result] = []
+
+    async def bench(ctx: Any) -> None:
+        ctx.set(dut.aresetn, 0)
+        await ctx.tick("bench").repeat(2)
+        ctx.set(dut.aresetn, 1)
+        taken, waited, offers = 0, 0, False
+        while len(results) < len(samples):
+            offers = taken < len(samples) and chance.random() >= (pace.withdraw if offers else pace.idle)
+            channel, codes = samples[taken] if offers else (chance.getrandbits(1), [0] * len(ports))
+            word = sum(
+                (code & ((1 << field.padded) - 1)) << field.offset for field, code in zip(ports, codes, strict=True)
+            )
+            ctx.set(dut.s_axis_tvalid, offers)
+            ctx.set(dut.s_axis_tdata, word)
+            if architecture.channels > 1:
+                ctx.set(dut.s_axis_tdest, channel)
+            ctx.set(dut.m_axis_tready, chance.random() >= pace.stall)
+            moved = False
+            if offers and ctx.get(dut.s_axis_tready):
+                taken, offers, moved = taken + 1, False, True
+            if ctx.get(dut.m_axis_tvalid) and ctx.get(dut.m_axis_tready):
+                code = ctx.get(dut.m_axis_tdata) & ((1 << output.bits) - 1)
+                code -= (output.signed and code >> (output.bits - 1)) << output.bits
+                channel = ctx.get(dut.m_axis_tdest) if architecture.channels > 1 else 0
+                results.append(Result(channel, code, ctx.get(dut.m_axis_tuser)))
+                moved = True
+            waited = 0 if moved else waited + 1
+            assert waited < _PATIENCE, f"the core hangs after {len(results)} results"
+            await ctx.tick("bench")
+
+    m = Module()
+    m.domains.bench = ClockDomain(reset_less=True)
+    m.submodules.core = dut
+    m.d.comb += dut.aclk.eq(ClockSignal("bench"))
+    simulator = Simulator(m)
+    simulator.add_clock(1e-6, domain="bench")
+    simulator.add_testbench(bench)
+    simulator.run()
+    return results
