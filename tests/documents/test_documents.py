@@ -1,8 +1,8 @@
 """The documents: what the README shows is what the commands print, and the maps of the code are true.
 
 Run as a script, it renews what is generated in them: the output in the README, the file table of the
-architecture, the register map, the commands and the schema of the calibration, the vehicle and its parameters,
-and the page of the Python interface.
+architecture, the register map, the fields of the streams, the commands and the schema of the calibration, the vehicle
+and its parameters, and the page of the Python interface.
 """
 
 import contextlib
@@ -16,10 +16,13 @@ import click
 import pytest
 from click.testing import CliRunner
 from tests.documents.python_page import first_example, page
+from tests.gen.designs import example_design
 from tests.house import ROOMS, WITH_SUB_ROOMS, file_table, picture
 
 from sosmith.cli import cli
 from sosmith.gen.instrument.vehicle_report import parameters_json
+from sosmith.gen.output.core_facts import core_facts
+from sosmith.gen.output.manifest import manifest
 from sosmith.gen.reload.register_map import markdown
 from sosmith.model.calibration.measurement_store import SCHEMA
 from sosmith.model.vehicle.parameters import built_in
@@ -31,6 +34,7 @@ CALIBRATION = ROOT / "docs" / "calibration.md"
 PRINTING = [CALIBRATION, *(ROOT / "docs" / f"{name}.md" for name in ("spectrum", "wear", "vehicle", "sensors"))]
 """Documents whose shell blocks stand above what they print."""
 PYTHON = ROOT / "docs" / "python.md"
+HARDWARE = ROOT / "docs" / "hardware.md"
 REGISTERS = ROOT / "docs" / "registers.md"
 VEHICLE = ROOT / "docs" / "vehicle.md"
 DOCUMENTS = [README, ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -39,6 +43,7 @@ BY_CI = {"./run demo", "./run test"}
 NEEDS_SIMULATION = ("./run simulate ", "./run compare ")
 """Beginnings of the lines that only the longer test carries out."""
 
+_FIELDS = re.compile(r"(?<=<!-- fields -->\n).*?(?=<!-- end of fields -->)", re.DOTALL)
 _OUTPUT = re.compile(r"(?<=```text\n).*?(?=```)", re.DOTALL)
 _PARAMETERS = re.compile(r"(?<=<!-- parameters -->\n).*?(?=<!-- end of parameters -->)", re.DOTALL)
 _REGISTERS = re.compile(r"(?<=<!-- registers -->\n).*?(?=<!-- end of registers -->)", re.DOTALL)
@@ -151,6 +156,29 @@ def test_the_register_map_is_up_to_date() -> None:
     assert _REGISTERS.findall(REGISTERS.read_text(encoding="utf-8")) == [markdown()]
 
 
+def field_table() -> str:
+    """Return the names of the streams' fields in cores of two examples, as their manifests have them, in Markdown."""
+    rows = []
+    for example, core in (
+        ("flange_wear_bench", "instrument"),
+        ("flange_wear_bench", "calibration"),
+        ("flange_wear_bench", "filter"),
+        ("audio_lowpass", "filter"),
+    ):
+        streams = manifest(core_facts(example_design(f"{example}.toml", core=core)))["streams"]
+        inputs, outputs = (
+            ", ".join(f"`{field['name']}`" for field in streams[name]["fields"]) for name in ("s_axis", "m_axis")
+        )
+        rows.append(f"| {example} | {core} | {inputs} | {outputs} |\n")
+    return "| example | core | fields of `s_axis_tdata` | field of `m_axis_tdata` |\n|---|---|---|---|\n" + "".join(
+        rows
+    )
+
+
+def test_the_names_of_the_fields_are_those_of_the_manifest() -> None:
+    assert _FIELDS.findall(HARDWARE.read_text(encoding="utf-8")) == [field_table()]
+
+
 @pytest.mark.parametrize("document", PRINTING, ids=lambda path: path.name)
 def test_commands_print_what_is_shown(document: Path, folder: Path) -> None:
     shown = document.read_text(encoding="utf-8")
@@ -225,6 +253,7 @@ if __name__ == "__main__":
             document.write_text(with_output(text, Path(scratch)), encoding="utf-8")
     ARCHITECTURE.write_text(with_house(ARCHITECTURE.read_text(encoding="utf-8")), encoding="utf-8")
     PYTHON.write_text(page(), encoding="utf-8")
+    renew(HARDWARE, _FIELDS, field_table())
     renew(REGISTERS, _REGISTERS, markdown())
     renew(CALIBRATION, _SCHEMA, schema())
     renew(VEHICLE, _PARAMETERS, parameter_table())
