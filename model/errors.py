@@ -24,6 +24,6 @@ class SpecificationError(SosmithError):
 
 
 class ToolError(SosmithError):
-    """An external tool (simulator, compiler) is missing or failed."""
+    """Something outside is missing or failed: a simulator, a compiler, the disk."""
 
     exit_status = 3

@@ -2,12 +2,27 @@
 
 from __future__ import annotations
 
+import errno
 import json
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from sosmith.model.errors import SpecificationError
+from sosmith.model.errors import SosmithError, SpecificationError, ToolError
+
+_UNUSABLE = {
+    errno.EACCES,
+    errno.EEXIST,
+    errno.EISDIR,
+    errno.ELOOP,
+    errno.ENAMETOOLONG,
+    errno.ENOENT,
+    errno.ENOTDIR,
+    errno.EPERM,
+    errno.EROFS,
+}
+"""Errors that tell of the place that the user has named: another one helps. All others tell of the disk."""
 
 
 def write_files(directory: Path, texts: Mapping[str, str]) -> list[Path]:
@@ -24,6 +39,8 @@ def write_files(directory: Path, texts: Mapping[str, str]) -> list[Path]:
     ------
     SpecificationError
         If the directory cannot be created or written, or a folder has the name of a file. Nothing is written then.
+    ToolError
+        If the disk is full, or fails.
     """
     return write_contents(directory, {name: text.encode() for name, text in texts.items()})
 
@@ -34,7 +51,9 @@ def write_contents(directory: Path, contents: Mapping[str, bytes]) -> list[Path]
     Only regular files are replaced: links are followed, devices and pipes are written to.
     """
     paths = [directory / name for name in contents]
+    missing: list[Path] = []
     try:
+        missing += [folder for folder in (directory, *directory.parents) if not folder.exists()]
         directory.mkdir(parents=True, exist_ok=True)
         for path in paths:
             if path.is_dir():
@@ -56,10 +75,19 @@ def write_contents(directory: Path, contents: Mapping[str, bytes]) -> list[Path]
             elif path.name not in own:
                 path.write_bytes(contents[path.name])
     except OSError as error:
-        raise SpecificationError(
-            f"{directory}: the output folder must be a folder that can be written, not: {error.strerror}"
-        ) from None
+        for folder in missing:
+            with suppress(OSError):  # it was not made, or has been filled
+                folder.rmdir()
+        raise _failure(directory, error) from None
     return paths
+
+
+def _failure(directory: Path, error: OSError) -> SosmithError:
+    if error.errno in _UNUSABLE:
+        return SpecificationError(
+            f"{directory}: the output folder must be a folder that can be written, not: {error.strerror}"
+        )
+    return ToolError(f"{directory}: the disk must take the output files, not: {error.strerror}")
 
 
 def to_json(tree: Any) -> str:

@@ -43,7 +43,7 @@ def generate(
     Raises
     ------
     ToolError
-        If Yosys fails.
+        If Yosys fails, or the disk is full.
     SpecificationError
         If the folder cannot be written.
     """

@@ -11,7 +11,7 @@ import json
 import math
 import sqlite3
 from collections.abc import Iterator, Sequence
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -346,6 +346,8 @@ class MeasurementStore:
 def open_store(path: Path, *, create: bool = False) -> Iterator[MeasurementStore]:
     """Open a store; with `create`, make it if it does not exist.
 
+    A store that is made and then left by an error without a measurement in it is removed again.
+
     Raises
     ------
     SpecificationError
@@ -355,14 +357,20 @@ def open_store(path: Path, *, create: bool = False) -> Iterator[MeasurementStore
     """
     if not create and not path.is_file():
         raise SpecificationError(f"{path} must be an existing store of measurements; sosmith calibrate add creates one")
+    is_new = create and not path.exists()
     try:
         with closing(sqlite3.connect(path, timeout=PATIENCE, isolation_level=None)) as connection:
-            # EXTRA: a committed transaction survives a power failure.
-            connection.execute("PRAGMA synchronous = EXTRA")
-            connection.execute("PRAGMA foreign_keys = ON")
-            store = MeasurementStore(path, connection)
-            _prepare(store, connection)
-            yield store
+            try:
+                # EXTRA: a committed transaction survives a power failure.
+                connection.execute("PRAGMA synchronous = EXTRA")
+                connection.execute("PRAGMA foreign_keys = ON")
+                store = MeasurementStore(path, connection)
+                _prepare(store, connection)
+                yield store
+            except BaseException:
+                if is_new:
+                    _remove_if_empty(path, connection)
+                raise
     except (sqlite3.Error, UnicodeDecodeError) as error:  # the latter if a damaged name is in SQLite's own message
         # The low byte is the primary code. Errors that Python raises by itself have none and are about the content.
         if getattr(error, "sqlite_errorcode", sqlite3.SQLITE_ERROR) & 0xFF in _UNREACHABLE:
@@ -387,6 +395,19 @@ def _prepare(store: MeasurementStore, connection: sqlite3.Connection) -> None:
         raise SpecificationError(f"{store.path} must be a store of measurements, not another SQLite database")
     if version != SCHEMA_VERSION:
         raise SpecificationError(f"{store.path}: the store's schema must be version {SCHEMA_VERSION}, not {version}")
+
+
+def _remove_if_empty(path: Path, connection: sqlite3.Connection) -> None:
+    """Remove a store without sensors, unless another program works on it.
+
+    A program that waits for it meanwhile cannot write into the removed file: SQLite refuses to.
+    """
+    with suppress(sqlite3.Error, OSError):
+        connection.execute("PRAGMA busy_timeout = 0")
+        connection.execute("BEGIN EXCLUSIVE")
+        tables = {name for (name,) in connection.execute("SELECT name FROM sqlite_schema WHERE type = 'table'")}
+        if not tables or ("sensor" in tables and not MeasurementStore(path, connection).sensors()):
+            path.resolve().unlink()
 
 
 def _pragmas(connection: sqlite3.Connection) -> tuple[int, int]:

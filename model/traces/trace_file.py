@@ -103,6 +103,8 @@ def write_traces(path: Path, traces: Sequence[Trace]) -> None:
     ------
     SpecificationError
         As for `traces_csv`; if the file cannot be written.
+    ToolError
+        If the disk is full.
     """
     write_files(path.parent, {path.name: traces_csv(traces)})
 

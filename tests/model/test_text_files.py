@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import re
 import threading
@@ -9,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from sosmith.model.errors import SpecificationError
+from sosmith.model.errors import SpecificationError, ToolError
 from sosmith.model.text_files import write_contents, write_files
 
 
@@ -53,3 +54,23 @@ def test_a_folder_is_refused_before_anything_is_written(tmp_path: Path) -> None:
     with pytest.raises(SpecificationError, match=f"^{re.escape(message)}$"):
         write_files(tmp_path, {"a": "text", "b": "text"})
     assert not (tmp_path / "a").exists()
+
+
+def test_a_full_disk_leaves_no_folder_and_is_the_fault_of_a_tool(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(_path: Path, _data: bytes) -> int:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    folder = tmp_path / "new" / "too"
+    message = f"{folder}: the disk must take the output files, not: No space left on device"
+    with pytest.raises(ToolError, match=f"^{re.escape(message)}$"):
+        write_files(folder, {"a": "text"})
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_device_that_is_full_is_the_fault_of_a_tool() -> None:
+    message = "/dev: the disk must take the output files, not: No space left on device"
+    with pytest.raises(ToolError, match=f"^{message}$"):
+        write_contents(Path("/dev"), {"full": b"text"})

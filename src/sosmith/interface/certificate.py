@@ -173,6 +173,8 @@ class Certificate:
         ------
         SpecificationError
             If the file cannot be written.
+        ToolError
+            If the disk is full.
         """
         target = Path(fspath(path))
         (written,) = write_files(target.parent, {target.name: self.text()})

@@ -278,7 +278,7 @@ class Design:
         SpecificationError
             If the folder cannot be written.
         ToolError
-            If Yosys fails.
+            If Yosys fails, or the disk is full.
         """
         return generate(self.core, Path(fspath(folder)), lambda step: progress(step, 0, 0))
 
@@ -331,7 +331,7 @@ class Design:
         ShortfallError
             If the hardware breaks the stream protocol.
         ToolError
-            If a tool is missing or fails.
+            If a tool is missing or fails, or the disk is full.
         """
         # The simulation modules are slow to import; a design that only computes does not need them.
         from sosmith.interface.report import Report

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sosmith.model.errors import SpecificationError
+from sosmith.model.errors import SpecificationError, ToolError
 from sosmith.model.port import Port
 from sosmith.model.traces.trace import Trace
 from sosmith.model.traces.trace_file import read_traces, traces_csv, write_traces
@@ -77,8 +77,8 @@ def test_an_old_file_survives_a_failure(tmp_path: Path, monkeypatch: pytest.Monk
     path = tmp_path / "a.csv"
     path.write_text("old")
     monkeypatch.setattr(Path, "replace", fail)
-    message = f"{tmp_path}: the output folder must be a folder that can be written, not: No space left on device"
-    with pytest.raises(SpecificationError, match=f"^{re.escape(message)}$"):
+    message = f"{tmp_path}: the disk must take the output files, not: No space left on device"
+    with pytest.raises(ToolError, match=f"^{re.escape(message)}$"):
         write_traces(path, [instrument_trace()])
     assert path.read_text() == "old"
     assert list(tmp_path.iterdir()) == [path]
