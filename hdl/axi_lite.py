@@ -12,6 +12,10 @@
 
     idle --AW--> taking --W--> checking --> shifting, 32 + 1 clocks --> answering --B--> idle
       +---------AR--------------^   +---------- refused ----------------^       --R-->
+
+An access at an address that is no multiple of 4 is one of the word around it, as AXI4-Lite allows. A read then has each
+byte on its own lane, as a manager that reads single bytes expects. Of a write, only the strobes tell which bytes it is
+for: a whole word is taken, anything less is refused.
 """
 
 from __future__ import annotations
@@ -61,8 +65,8 @@ class SerialSlave(wiring.Component):
     """AXI4-Lite slave with one data register, which passes data on bit by bit.
 
     Reads and writes that wait take turns. The address and the data of a write may come in either order. A write of less
-    than all bytes is refused; protection bits and the lowest two address bits are ignored. A refused access is answered
-    with SLVERR, and a refused read with arbitrary data.
+    than all bytes is refused; protection bits and the lowest two address bits are ignored, of reads and of writes. A
+    refused access is answered with SLVERR, and a refused read with arbitrary data.
 
     No combinational path leads from an input of the bus to an output. Latency: a read is answered 35 or 36 clocks after
     its request, a write 36 or 37; a refused access after 2 to 4. Throughput: one access at a time.

@@ -198,6 +198,25 @@ async def a_refused_read_breaks_nothing(bench: Bench) -> None:
     assert bench.active == words
 
 
+async def the_lowest_address_bits_are_ignored(bench: Bench) -> None:
+    write, read = bench.bus.write, bench.bus.read
+    for low in range(4):
+        version, words = 11 + low, bench.words()
+        assert await write(VERSION.address + low, version) == OKAY
+        for place, word in enumerate(words):
+            assert await write(DATA.address + (low + place) % 4, word) == OKAY
+        assert await write(CRC.address + low, crc_of(version, words)) == OKAY
+        await bench.bus.idle(2)
+        assert bench.active == words
+        assert await read(VERSION.address + low) == (version, OKAY)
+        assert await read(ID.address + low) == (MAGIC, OKAY)
+        assert (await read(DATA.address + low))[1] == SLVERR
+        assert (await read(4 * len(REGISTERS) + low))[1] == SLVERR
+    for low in range(1, 4):  # the strobes of a manager that writes the bytes from there on
+        assert await write(VERSION.address + low, 7, 15 << low & 15) == SLVERR
+        assert not (await bench.status())["LOADING"]
+
+
 async def a_pending_set_waits_for_a_gap_and_keeps_new_loads_away(bench: Bench) -> None:
     bench.gaps = 0.0
     words = bench.words()
@@ -270,6 +289,7 @@ SCENARIOS: tuple[Scenario, ...] = (
     a_load_broken_off_never_becomes_active,
     a_load_may_begin_anew,
     a_refused_read_breaks_nothing,
+    the_lowest_address_bits_are_ignored,
     a_pending_set_waits_for_a_gap_and_keeps_new_loads_away,
     no_load_begins_while_a_sample_uses_the_other_bank,
     a_swap_does_not_show_half_way_through_a_read,
@@ -363,6 +383,24 @@ MUTANTS: dict[str, tuple[Scenario, str, str, str]] = {
         "axi_lite",
         "partial.eq(~self.s_axil_wstrb.all())",
         "partial.eq(0)",
+    ),
+    "an unaligned write is refused": (
+        the_lowest_address_bits_are_ignored,
+        "axi_lite",
+        "partial.eq(~self.s_axil_wstrb.all())",
+        "partial.eq(~self.s_axil_wstrb.all() | self.s_axil_awaddr[:2].any())",
+    ),
+    "an unaligned part of a word is written": (
+        the_lowest_address_bits_are_ignored,
+        "axi_lite",
+        "partial.eq(~self.s_axil_wstrb.all())",
+        "partial.eq(~self.s_axil_wstrb.all() & ~self.s_axil_awaddr[:2].any())",
+    ),
+    "an unaligned read is of another word": (
+        the_lowest_address_bits_are_ignored,
+        "axi_lite",
+        "index.eq(self.s_axil_araddr[2:])",
+        "index.eq(self.s_axil_araddr[2:] + self.s_axil_araddr[:2].any())",
     ),
     "an answer does not wait": (
         a_refused_read_breaks_nothing,
