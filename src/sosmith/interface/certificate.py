@@ -18,7 +18,7 @@ from sosmith.gen.verifier.generated_files import (
     check_text,
     check_texts,
 )
-from sosmith.gen.verifier.stated_specification import Agreement, check_specification
+from sosmith.gen.verifier.specified.stated_specification import Agreement, check_specification
 from sosmith.gen.verifier.verification import verify
 from sosmith.interface.quantity import Quantity
 from sosmith.model.text_files import write_files

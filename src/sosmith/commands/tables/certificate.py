@@ -7,7 +7,7 @@ from rich.markup import escape
 from sosmith.commands.tables.console import TableConsole
 from sosmith.commands.tables.design import print_budget
 from sosmith.gen.verifier.certificate_file import Certificate
-from sosmith.gen.verifier.stated_specification import Agreement
+from sosmith.gen.verifier.specified.stated_specification import Agreement
 from sosmith.interface.certificate import Proof
 from sosmith.interface.quantity import Quantity
 

@@ -17,11 +17,11 @@ from typing import NamedTuple
 
 from flint import acb, acb_poly, arb, arb_poly, ctx
 
-from sosmith.gen.verifier.analog_prototypes import AnalogPrototype, analog_prototype
-from sosmith.gen.verifier.balls import ball
-from sosmith.gen.verifier.filter_table import FilterTable, read_filter_table
 from sosmith.gen.verifier.l1_response import UndecidedError
-from sosmith.gen.verifier.smallest_order import edge_from_passband, smallest_order
+from sosmith.gen.verifier.specified.analog_prototypes import AnalogPrototype, analog_prototype
+from sosmith.gen.verifier.specified.balls import ball
+from sosmith.gen.verifier.specified.filter_table import FilterTable, read_filter_table
+from sosmith.gen.verifier.specified.smallest_order import edge_from_passband, smallest_order
 from sosmith.model.errors import SpecificationError
 
 

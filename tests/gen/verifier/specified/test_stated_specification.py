@@ -14,7 +14,7 @@ from sosmith.gen.core import design_core
 from sosmith.gen.output.certificate import certificate
 from sosmith.gen.specification.specification import from_text
 from sosmith.gen.verifier.certificate_file import Certificate
-from sosmith.gen.verifier.stated_specification import Agreement, check_specification
+from sosmith.gen.verifier.specified.stated_specification import Agreement, check_specification
 from sosmith.gen.verifier.verification import RejectedError, verify
 
 BENCH, AUDIO = "flange_wear_bench.toml", "audio_lowpass.toml"

@@ -16,9 +16,9 @@ from scipy import signal
 from sosmith.gen.filter.design import design
 from sosmith.gen.specification.specification import FilterSpec
 from sosmith.gen.verifier.certificate_file import SectionEntry
-from sosmith.gen.verifier.filter_distance import distance
-from sosmith.gen.verifier.ideal_filter import StatedFilter, stated_filter
 from sosmith.gen.verifier.l1_response import UndecidedError
+from sosmith.gen.verifier.specified.filter_distance import distance
+from sosmith.gen.verifier.specified.ideal_filter import StatedFilter, stated_filter
 
 FAMILIES = ("butterworth", "chebyshev1", "chebyshev2", "elliptic", "bessel")
 KINDS = ("lowpass", "highpass", "bandpass", "bandstop")

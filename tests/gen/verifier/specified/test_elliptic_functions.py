@@ -6,8 +6,8 @@ import pytest
 from flint import arb, ctx
 from scipy import special
 
-from sosmith.gen.verifier.elliptic_functions import Modulus, inverse_sn, sn
 from sosmith.gen.verifier.l1_response import UndecidedError
+from sosmith.gen.verifier.specified.elliptic_functions import Modulus, inverse_sn, sn
 
 FRACTIONS = [0.0625 * k for k in range(17)]
 

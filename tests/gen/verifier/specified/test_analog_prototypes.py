@@ -7,7 +7,12 @@ import pytest
 from flint import acb, arb, ctx
 from scipy import signal
 
-from sosmith.gen.verifier.analog_prototypes import AnalogPrototype, analog_prototype, ripple_squared, selectivity
+from sosmith.gen.verifier.specified.analog_prototypes import (
+    AnalogPrototype,
+    analog_prototype,
+    ripple_squared,
+    selectivity,
+)
 
 PASS, STOP = Fraction(1, 2), Fraction(40)
 SCIPYS = {

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from sosmith.gen.verifier.filter_table import FilterTable, read_filter_table
+from sosmith.gen.verifier.specified.filter_table import FilterTable, read_filter_table
 from sosmith.model.errors import SpecificationError
 
 BY_ORDER = {"family": "butterworth", "kind": "lowpass", "order": 2, "cutoff": Decimal("0.1")}

@@ -22,10 +22,10 @@ from math import prod
 
 from flint import arb, arb_poly, ctx
 
-from sosmith.gen.verifier.balls import ball, upper_limit
 from sosmith.gen.verifier.certificate_file import SectionEntry
-from sosmith.gen.verifier.ideal_filter import StatedFilter, TransferFunction
 from sosmith.gen.verifier.l1_response import UndecidedError
+from sosmith.gen.verifier.specified.balls import ball, upper_limit
+from sosmith.gen.verifier.specified.ideal_filter import StatedFilter, TransferFunction
 
 _FIRST_PRECISION = 256
 _MAX_PRECISION = 1 << 13  # bits
@@ -56,7 +56,7 @@ def distance(stated: StatedFilter, sections: Sequence[SectionEntry]) -> Fraction
 
     Examples
     --------
-    >>> from sosmith.gen.verifier.ideal_filter import stated_filter
+    >>> from sosmith.gen.verifier.specified.ideal_filter import stated_filter
     >>> stated = stated_filter({"sos": [[1, 0, 0, 1, 0, 0]]}, Fraction(100))
     >>> section = SectionEntry(numerator=(Fraction(3, 4),), denominator=(Fraction(1),))
     >>> Fraction(1, 4) <= distance(stated, [section]) < Fraction(1, 2)

@@ -10,7 +10,7 @@ import pytest
 from flint import acb, acb_poly, arb, ctx
 from scipy import linalg, signal
 
-from sosmith.gen.verifier.ideal_filter import TransferFunction, stated_filter
+from sosmith.gen.verifier.specified.ideal_filter import TransferFunction, stated_filter
 from sosmith.model.errors import SpecificationError
 
 BITS = 512

@@ -6,8 +6,8 @@ from fractions import Fraction
 
 from flint import arb
 
-from sosmith.gen.verifier.analog_prototypes import discrimination, ripple_squared, selectivity
 from sosmith.gen.verifier.l1_response import UndecidedError
+from sosmith.gen.verifier.specified.analog_prototypes import discrimination, ripple_squared, selectivity
 
 
 def smallest_order(

@@ -1,9 +1,9 @@
 """Holds a certificate against the words of its specification, read by code of its own.
 
 The specification's numbers are taken as they are written, as decimal fractions. Ports, allowed error and calibration
-must equal the certificate's entries exactly. The filter is derived again from its words
-(`sosmith.gen.verifier.ideal_filter`); the certificate's rational sections must be so close to it that every claim holds
-against it as well.
+must equal the certificate's entries exactly. The filter is derived again from its words, by
+`sosmith.gen.verifier.specified.ideal_filter`; the certificate's rational sections must be so close to it that every
+claim holds against it as well.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from itertools import zip_longest
 from typing import Any
 
 from sosmith.gen.verifier.certificate_file import Certificate, PortEntry
-from sosmith.gen.verifier.filter_distance import distance
 from sosmith.gen.verifier.graph import RejectedError, require
-from sosmith.gen.verifier.ideal_filter import stated_filter
 from sosmith.gen.verifier.l1_response import UndecidedError
+from sosmith.gen.verifier.specified.filter_distance import distance
+from sosmith.gen.verifier.specified.ideal_filter import stated_filter
 
 _CALIBRATED = {"voltage": "V", "temperature": "degC"}
 """Inputs of a calibration, in the order of the ports, and their units."""

@@ -15,8 +15,8 @@ from typing import Any
 
 from flint import acb, arb, fmpq, fmpz_poly
 
-from sosmith.gen.verifier.balls import ball
-from sosmith.gen.verifier.elliptic_functions import Modulus, inverse_sn, sn
+from sosmith.gen.verifier.specified.balls import ball
+from sosmith.gen.verifier.specified.elliptic_functions import Modulus, inverse_sn, sn
 
 
 @dataclass(frozen=True)

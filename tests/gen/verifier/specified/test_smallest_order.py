@@ -8,9 +8,9 @@ import pytest
 from flint import acb, arb, ctx
 from scipy import signal
 
-from sosmith.gen.verifier.analog_prototypes import AnalogPrototype, analog_prototype, discrimination
 from sosmith.gen.verifier.l1_response import UndecidedError
-from sosmith.gen.verifier.smallest_order import edge_from_passband, smallest_order
+from sosmith.gen.verifier.specified.analog_prototypes import AnalogPrototype, analog_prototype, discrimination
+from sosmith.gen.verifier.specified.smallest_order import edge_from_passband, smallest_order
 
 ESTIMATES = {
     "butterworth": signal.buttord,
