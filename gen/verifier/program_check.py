@@ -24,20 +24,24 @@ outside_calibration are not part of this proof.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
 from sosmith.gen.verifier.certificate_file import Certificate
-from sosmith.gen.verifier.graph import require
+from sosmith.gen.verifier.graph import RejectedError, require
 from sosmith.gen.verifier.graph_forms import Graph, joined
 from sosmith.gen.verifier.logic import Bit
 from sosmith.gen.verifier.normal_form import ONE, Form, Forms, constant, plus, scaled, times, valuation
 from sosmith.gen.verifier.program_fault import Contribution, Group, Word, fault
+from sosmith.gen.verifier.program_run import one_bit_away, samples
 from sosmith.gen.verifier.program_states import find_states
 from sosmith.gen.verifier.program_text import NUMBER_BITS, Instruction, ProgramText, read_program
 
 HAZARD = 4
 """Least number of instructions from one that stores a word to one that reads it: so deep is the pipeline."""
+
+_SAMPLES = 48
+"""Samples for which a program is run on numbers, to find where it is wrong."""
 
 _READS = frozenset({"multiply", "operand", "product", "give"})
 
@@ -89,9 +93,10 @@ def check_program(
     program = read_program(text)
     graph = joined(certificate)
     run = _Run(program, graph, certificate)
-    for number, instruction in enumerate(program.instructions):
-        run.step(number, instruction)
-    run.finish()
+    try:
+        run.all()
+    except RejectedError as error:
+        raise _located(run, certificate) or error from None
     ends = [(port.lowest, port.highest) for port in certificate.inputs]
     judged = tuple((max(low, a), min(high, b)) for (low, high), (a, b) in zip(ends, run.judged, strict=True))
     for port, found, wanted in zip(certificate.inputs, judged, calibrated or judged, strict=True):
@@ -100,6 +105,55 @@ def check_program(
             f"the program must judge {port.name} by the codes {wanted[0]}..{wanted[1]}, not {found[0]}..{found[1]}",
         )
     return ProgramVerdict(len(program.instructions), run.values, len(run.states), judged)
+
+
+def _check_order(program: ProgramText) -> None:
+    """Check what does not depend on values: TAKE comes first, digits lie next to each other, words are read in time."""
+    digits, taken = len(program.digits), 0
+    stored: dict[int, int] = {}
+    before: int | None = None
+    for number, (opcode, address, value) in enumerate(program.instructions):
+        named = program.named(number)
+        if taken < digits and opcode != "nothing":
+            wanted = opcode == "take" and value % (1 << NUMBER_BITS) == taken
+            require(wanted, f"{named} must take digit {taken} of the sample, which must be taken first")
+            taken += 1
+        else:
+            require(opcode != "take", f"{named} must not take a digit of a sample that has been accepted")
+        if opcode in {"store", "finish"} and before is not None:
+            after = program.instructions[before].address + 1
+            require(address == after, f"{named} must store at address {after}, next to {program.named(before)}")
+        if opcode in {"store", "finish", "judge"}:
+            before = number if opcode == "store" else None
+        if opcode in _READS and address in stored:
+            apart = number - stored[address]
+            require(
+                apart >= HAZARD,
+                f"{named} must read its word {HAZARD} or more instructions after it is stored, not {apart}",
+            )
+        if opcode in {"take", "store", "finish"}:
+            stored[address] = number
+
+
+def _located(wrong: _Run, certificate: Certificate) -> RejectedError | None:
+    """Return the rejection for a program that would be right but for one bit; None if there is no such bit."""
+    program, graph = wrong.program, wrong.graph
+    states = dict.fromkeys(graph.delays, 0)
+    results = [graph.step(row, states) for row in samples(certificate, _SAMPLES)]
+    sentences = []
+    for number, code in one_bit_away(program, certificate, results, wrong.suspects()):
+        right = replace(program, codes=(*program.codes[:number], code, *program.codes[number + 1 :]))
+        try:
+            run = _Run(right, graph, certificate)
+            run.all()
+        except RejectedError:
+            continue
+        node = graph.nodes[run.purpose.get(number, graph.output)]
+        sentences.append(
+            f"instruction {number} must be {right.instructions[number]} for {node.label}, "
+            f"not {program.instructions[number]}"
+        )
+    return RejectedError(", or ".join(sentences)) if sentences else None
 
 
 @dataclass
@@ -117,7 +171,7 @@ class _Run:
     """One sample of a program, on forms."""
 
     def __init__(self, program: ProgramText, graph: Graph, certificate: Certificate) -> None:
-        self._program, self._graph, self._certificate = program, graph, certificate
+        self.program, self.graph, self._certificate = program, graph, certificate
         self._bits = program.digit_bits
         self._forms = Forms()
         self._of = graph.values(self._forms)
@@ -141,14 +195,33 @@ class _Run:
         self._operand: tuple[Word, int | None] = (Word(self._forms.variable("operand", -base, base - 1), -base, base - 1, None), None)
         self._given: dict[int, tuple[Word, int]] = {}
         self._history: list[tuple[Word, int]] = []
-        self._taken = -1
         self.values = 0
+        self.purpose: dict[int, int] = {}
+        self._groups: dict[int, list[int]] = {}
+        self._suspects: list[int] = []
         self.judged = [(port.lowest, port.highest) for port in certificate.inputs]
+
+    def all(self) -> None:
+        """Run the program, and check the result and the states.
+
+        Raises
+        ------
+        RejectedError
+            If it does not compute the graph.
+        """
+        _check_order(self.program)
+        for number, instruction in enumerate(self.program.instructions):
+            self._step(number, instruction)
+        self._finish_sample()
+
+    def suspects(self) -> list[int]:
+        """Return the instructions that work on the value at which the run has stopped."""
+        return self._suspects or [*self._group.instructions, *self._group.ends[-1:]]
 
     # Values and their digits.
 
     def _frac(self, node: int) -> int:
-        return self._graph.nodes[node].entry.frac
+        return self.graph.nodes[node].entry.frac
 
     def _state(self, node: int, state: int, shift: int) -> Form:
         """Value of a node as the words of a state hold it."""
@@ -170,16 +243,8 @@ class _Run:
 
     # Instructions.
 
-    def step(self, number: int, instruction: Instruction) -> None:
-        """Run an instruction."""
+    def _step(self, number: int, instruction: Instruction) -> None:
         opcode, address, value = instruction
-        if opcode in _READS:
-            writer = self._words[address].writer
-            require(
-                writer is None or number - writer >= HAZARD,
-                f"{self._named(number)} must read its word {HAZARD} or more instructions after it is stored, not "
-                f"{number - (writer or 0)}",
-            )
         if opcode == "take":
             self._take(number, address, value)
         elif opcode == "multiply":
@@ -200,28 +265,17 @@ class _Run:
         if opcode not in {"finish", "judge"}:
             self._group.instructions.append(number)
 
-    def _named(self, number: int) -> str:
-        return f"instruction {number} ({self._program.instructions[number]})"
-
     def _take(self, number: int, address: int, value: int) -> None:
-        last = len(self._program.digits) - 1
-        digit = min(value % (1 << NUMBER_BITS), last)
-        require(
-            self._taken < 0,
-            f"{self._named(number)} must take its digit before instruction {self._taken} accepts the sample",
-        )
-        if value % (1 << NUMBER_BITS) == last:
-            self._taken = number
-        form = self._taken_form(number, self._program.digits[digit])
+        form = self._taken(number, self.program.digits[value % (1 << NUMBER_BITS)])
         low, high = self._forms.extent(form)
         base = 1 << self._bits
         self._store(number, address, Word(form, max(int(low), -base), min(int(high), base - 1), number))
 
-    def _taken_form(self, number: int, bits: Sequence[Bit]) -> Form:
+    def _taken(self, number: int, bits: Sequence[Bit]) -> Form:
         """Return a digit of an input as a form: zeros, then bits of its code in order, then zeros or its sign."""
         offset = 0
         zeros = next((k for k, bit in enumerate(bits) if bit != 0), len(bits))
-        for port, node in zip(self._certificate.inputs, self._graph.inputs, strict=True):
+        for port, node in zip(self._certificate.inputs, self.graph.inputs, strict=True):
             code = scaled(self._of[node], self._frac(node))
             own = [("s_axis_tdata", offset + k) for k in range(port.bits)]
             offset += -(-port.bits // 8) * 8
@@ -238,7 +292,7 @@ class _Run:
             if not any(rest) and count < len(bits) - zeros:
                 return scaled(plus(self._forms.floor(scaled(code, -first)),
                     self._forms.floor(scaled(code, -first - count)), -(1 << count)), zeros)
-        require(zeros == len(bits), f"{self._named(number)} must take a digit of an input, not bits of several")
+        require(zeros == len(bits), f"{self.program.named(number)} must take a digit of an input, not bits of several")
         return {}
 
     def _store(self, number: int, address: int, word: Word) -> None:
@@ -251,15 +305,15 @@ class _Run:
         acc.total = plus(acc.total, product, 1 << acc.shift)
         corners = [a * b for a in (word.low, word.high) for b in ends]
         acc.low, acc.high = acc.low + min(corners), acc.high + max(corners)
-        operand = self._operand[1] if self._program.instructions[number].opcode == "product" else None
+        operand = self._operand[1] if self.program.instructions[number].opcode == "product" else None
         self._group.contributions.append(Contribution(number, product, factor, len(self._group.ends), operand))
 
     def _fits(self, number: int) -> None:
-        limit = 1 << (self._program.accumulator_bits - 1)
+        limit = 1 << (self.program.accumulator_bits - 1)
         acc = self._acc
         require(
             -limit <= acc.low and acc.high < limit,
-            f"{self._named(number)} must find a sum that fits the {self._program.accumulator_bits} bits of the "
+            f"{self.program.named(number)} must find a sum that fits the {self.program.accumulator_bits} bits of the "
             f"accumulator, not one in {acc.low}..{acc.high}",
         )
 
@@ -283,15 +337,7 @@ class _Run:
             acc.total, acc.shift = self._forms.floor(scaled(acc.total, -acc.shift)), 0
 
     def _store_next(self, number: int, address: int, word: Word) -> None:
-        acc = self._acc
-        if acc.stored:
-            before = acc.stored[-1]
-            wanted = self._program.instructions[before].address + 1
-            require(
-                address == wanted,
-                f"{self._named(number)} must store at address {wanted}, next to {self._named(before)}",
-            )
-        acc.stored.append(number)
+        self._acc.stored.append(number)
         self._store(number, address, word)
 
     def _finish(self, number: int, address: int) -> None:
@@ -302,14 +348,16 @@ class _Run:
         found = self._node(acc.total, top)
         self._group.ends.append(number)
         if found is None:
-            require(False, fault(self._program, self._graph, self._of, self._group, self._words, self._history))
+            require(False, fault(self.program, self.graph, self._of, self._group, self._words, self._history))
             return
         node, frac = found
         value = scaled(self._of[node], frac)
         form = self._forms.floor(scaled(value, -acc.shift))
-        limits = self._graph.nodes[node].limits
+        limits = self.graph.nodes[node].limits
         self._store_next(number, address, self._word(form, limits, frac, acc.shift // self._bits, number))
         self.values += 1
+        self._groups[number] = [*self._group.instructions, number]
+        self.purpose |= dict.fromkeys(self._groups[number], node)
         self._acc, self._group = _Accumulator(), Group()
 
     def _node(self, total: Form, top: int) -> tuple[int, int] | None:
@@ -324,7 +372,7 @@ class _Run:
                 continue
             frac = least - min(map(valuation, value.values()))
             unit = Fraction(2) ** frac
-            low, high = self._graph.nodes[node].limits
+            low, high = self.graph.nodes[node].limits
             if not (-(1 << top) <= low * unit and high * unit < 1 << top):
                 continue
             if all((total.get(m, 0) - value.get(m, 0) * unit) % modulus == 0 for m in total.keys() | value.keys()):
@@ -336,7 +384,7 @@ class _Run:
         self._fits(number)
         total = self._acc.total
         free = total.get(ONE, 0)
-        for index, node in enumerate(self._graph.inputs):
+        for index, node in enumerate(self.graph.inputs):
             code = scaled(self._of[node], self._frac(node))
             (monomial,) = code
             factor = total.get(monomial, 0)
@@ -350,51 +398,45 @@ class _Run:
                 self.judged[index] = low, min(high, limit.__floor__())
             self._acc, self._group = _Accumulator(), Group()
             return
-        require(False, f"{self._named(number)} must compare an input with a limit, not another value")
+        require(False, f"{self.program.named(number)} must compare an input with a limit, not another value")
 
     def _give(self, number: int, address: int, value: int) -> None:
         digit = value % (1 << NUMBER_BITS)
-        if digit < self._program.results:
+        if digit < self.program.results:
             self._given[digit] = self._words[address], number
 
     # The end of the sample.
 
-    def finish(self) -> None:
-        """Check the result and the states once all instructions have run.
-
-        Raises
-        ------
-        RejectedError
-            If one of them is not that of the graph.
-        """
-        last = len(self._program.instructions) - 1
+    def _finish_sample(self) -> None:
+        """Check the result and the states once all instructions have run."""
+        last = len(self.program.instructions) - 1
         require(not self._group.contributions and not self._group.ends,
-            f"{self._named(last)} must be the end of a program that leaves 0 in the accumulator")
-        require(self._taken >= 0, f"the program must take digit {len(self._program.digits) - 1} of the sample")
+            f"{self.program.named(last)} must be the end of a program that leaves 0 in the accumulator")
         self._check_result()
         for state in self.states:
-            entry = self._graph.nodes[state.node].entry
+            entry = self.graph.nodes[state.node].entry
             digits = self._digits(self._state(entry.operands[0], state.node, state.shift), state.digits)
             for k, digit in enumerate(digits):
                 self._check_word(state.address + k, digit,
-                    f"digit {k} of what {self._graph.nodes[state.node].label} takes over")
-        self._check_word(self._program.words - 1, constant(1), "1")
+                    f"digit {k} of what {self.graph.nodes[state.node].label} takes over")
+        self._check_word(self.program.words - 1, constant(1), "1")
 
     def _check_word(self, address: int, wanted: Form, what: str) -> None:
         word = self._words[address]
         if word.form == wanted:
             return
         stored = [writer.writer for writer, at in self._history if at == address and writer.writer is not None]
-        who = self._named(stored[-1]) if stored else "the program"
+        who = self.program.named(stored[-1]) if stored else "the program"
+        self._suspects = next((group for group in self._groups.values() if stored and stored[-1] in group), [])
         require(False, f"{who} must leave {what} in word {address}, not another value")
 
     def _check_result(self) -> None:
-        wanted = self._of[self._graph.output]
-        count = self._program.results
-        label = self._graph.nodes[self._graph.output].label
+        wanted = self._of[self.graph.output]
+        count = self.program.results
+        label = self.graph.nodes[self.graph.output].label
         for k in range(count):
             require(k in self._given, f"the program must give digit {k} of its result, {label}")
         for k, digit in enumerate(self._digits(wanted, count)):
             word, number = self._given[k]
-            require(word.form == digit, f"{self._named(number)} must give digit {k} of {label}, not another value")
+            require(word.form == digit, f"{self.program.named(number)} must give digit {k} of {label}, not another value")
 

@@ -88,9 +88,6 @@ class _Search:
         self._node, self._wanted = self._closest(values)
         self._label = graph.nodes[self._node].label if self._node >= 0 else "any node"
 
-    def _named(self, number: int) -> str:
-        return f"instruction {number} ({self._program.instructions[number]})"
-
     def _sum(self, columns: int) -> Form:
         total: Form = {}
         for part in self._group.contributions:
@@ -118,14 +115,14 @@ class _Search:
     def sentence(self) -> str:
         ends = self._group.ends
         if self._node < 0:
-            return f"{self._named(ends[-1])} must complete the value of a node, not one that has nothing in common with any"
+            return f"{self._program.named(ends[-1])} must complete the value of a node, not one that has nothing in common with any"
         for column, end in enumerate(ends):
             rest = plus(self._wanted, self._sum(column + 1), -1)
             top = self._bits * (column + 1) + (end == ends[-1])
             if any(c % (1 << top) for c in rest.values()):
                 missing = scaled(rest, -self._bits * column)
                 return self._blame(column, {m: c for m, c in missing.items() if c % (1 << self._bits)})
-        return f"{self._named(ends[-1])} must complete {self._label} in a range that it has, not outside of it"
+        return f"{self._program.named(ends[-1])} must complete {self._label} in a range that it has, not outside of it"
 
     def _blame(self, column: int, missing: Form) -> str:
         """Return the sentence for a column that lacks `missing`, a form modulo ``2**digit_bits``."""
@@ -140,7 +137,7 @@ class _Search:
                 text = self._instead(number, plus(missing, part.product), part)
             if text:
                 return text
-        return f"{self._named(end)} must end digit {column} of {self._label}, not of another value"
+        return f"{self._program.named(end)} must end digit {column} of {self._label}, not of another value"
 
     def _instead(self, number: int, wanted: Form, part: Contribution | None) -> str:
         """Return the sentence if an instruction could add `wanted` with one other field."""
@@ -179,11 +176,11 @@ class _Search:
         if place.address == self._program.instructions[number].address:
             later = self._places[place.address].writer
             if later is not None:
-                return f"{self._named(later)} must not store where {self._named(number)} reads for {self._label}"
+                return f"{self._program.named(later)} must not store where {self._program.named(number)} reads for {self._label}"
         if place.writer is None:
             return self._must_be(number, wanted)
         return (
-            f"{self._named(number)} must read what {self._named(place.writer)} stores for {self._label}, "
+            f"{self._program.named(number)} must read what {self._program.named(place.writer)} stores for {self._label}, "
             "not another word"
         )
 

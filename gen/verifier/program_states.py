@@ -16,8 +16,8 @@ from fractions import Fraction
 
 from sosmith.gen.verifier.certificate_file import Certificate
 from sosmith.gen.verifier.graph_forms import Graph
-from sosmith.gen.verifier.logic import Bit
-from sosmith.gen.verifier.program_text import NUMBER_BITS, ProgramText
+from sosmith.gen.verifier.program_run import Machine, samples
+from sosmith.gen.verifier.program_text import ProgramText
 
 _SAMPLES = 48
 _READS = frozenset({"multiply", "operand", "product", "give"})
@@ -49,14 +49,15 @@ def find_states(program: ProgramText, graph: Graph, certificate: Certificate) ->
     held: dict[tuple[int, int], list[int]] = {block: [] for block in blocks}
     states = dict.fromkeys(graph.delays, 0)
     series: dict[int, list[int]] = {node: [] for node in graph.delays}
-    words = [int(address == program.words - 1) for address in range(program.words)]
-    for codes in _samples(certificate):
+    machine = Machine(program, certificate)
+    for codes in samples(certificate, _SAMPLES):
+        words: list[int] = machine.words[:, 0].tolist()
         for (address, count), past in held.items():
             past.append(sum(words[address + k] << (program.digit_bits * k) for k in range(count)))
         for node, past in series.items():
             past.append(states[node])
         graph.step(codes, states)
-        _run(program, words, _tdata(certificate, codes))
+        machine.step(codes)
     return _matched(held, series)
 
 
@@ -78,63 +79,6 @@ def _blocks(program: ProgramText) -> list[tuple[int, int]]:
         if opcode in {"finish", "judge"}:
             count = 0
     return sorted({values[address] for address in kept if address in values})
-
-
-def _samples(certificate: Certificate) -> list[list[int]]:
-    """Return codes of the inputs: both ends, then some that look random and are the same on every run."""
-    seed = 1
-    rows = [[port.highest for port in certificate.inputs]]
-    for _ in range(_SAMPLES - 1):
-        row = []
-        for port in certificate.inputs:
-            seed = (seed * 6364136223846793005 + 1442695040888963407) % 2**64
-            row.append(port.lowest + (seed >> 32) % (port.highest - port.lowest + 1))
-        rows.append(row)
-    return rows
-
-
-def _tdata(certificate: Certificate, codes: Sequence[int]) -> int:
-    """Pack codes as the input stream does: each in whole bytes, the first one lowest."""
-    packed = offset = 0
-    for port, code in zip(certificate.inputs, codes, strict=True):
-        width = -(-port.bits // 8) * 8
-        packed |= (code & ((1 << width) - 1)) << offset
-        offset += width
-    return packed
-
-
-def _run(program: ProgramText, words: list[int], tdata: int) -> None:
-    """Run a program for one sample."""
-    bits, base = program.digit_bits, 1 << program.digit_bits
-    acc = operand = 0
-    for opcode, address, constant in program.instructions:
-        if opcode == "take":
-            number = constant % (1 << NUMBER_BITS)
-            digit = program.digits[min(number, len(program.digits) - 1)]
-            words[address] = _signed(sum(_bit(bit, tdata) << k for k, bit in enumerate(digit)), bits)
-        elif opcode == "multiply":
-            acc += words[address] * constant
-        elif opcode == "operand":
-            operand = words[address]
-        elif opcode == "product":
-            acc += words[address] * operand
-        elif opcode == "store":
-            words[address], acc = acc % base, acc >> bits
-        elif opcode == "drop":
-            acc >>= bits
-        elif opcode == "finish":
-            words[address], acc = _signed(acc, bits), 0
-        elif opcode == "judge":
-            acc = 0
-
-
-def _bit(bit: Bit, tdata: int) -> int:
-    return tdata >> bit[1] & 1 if isinstance(bit, tuple) else bit or 0
-
-
-def _signed(value: int, bits: int) -> int:
-    """Keep the low ``bits + 1`` bits, signed."""
-    return (value + (1 << bits)) % (2 << bits) - (1 << bits)
 
 
 def _matched(held: dict[tuple[int, int], list[int]], series: dict[int, list[int]]) -> list[State]:

@@ -19,6 +19,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import takewhile
 from typing import NamedTuple
 
@@ -50,8 +51,10 @@ class ProgramText:
 
     Attributes
     ----------
-    instructions : tuple of Instruction
-        In the order of their addresses.
+    codes : tuple of int
+        The instructions, in the order of their addresses.
+    code_bits : int
+        Bits of an instruction.
     digit_bits : int
         Bits of a digit, one less than those of a word.
     words, channels : int
@@ -64,13 +67,34 @@ class ProgramText:
         What TAKE stores for each digit number: the bits of the word, the lowest first. Higher numbers are as the last.
     """
 
-    instructions: tuple[Instruction, ...]
+    codes: tuple[int, ...]
+    code_bits: int
     digit_bits: int
     words: int
     channels: int
     accumulator_bits: int
     results: int
     digits: tuple[list[Bit], ...]
+
+    @cached_property
+    def instructions(self) -> tuple[Instruction, ...]:
+        """The decoded instructions."""
+        return tuple(map(self.decoded, self.codes))
+
+    def decoded(self, code: int) -> Instruction:
+        """Decode an instruction; an opcode that does not exist does nothing."""
+        opcode = code % (1 << _OPCODE_BITS)
+        address = code >> _OPCODE_BITS & (self.words - 1)
+        value = code >> (self.code_bits - self.digit_bits - 1)
+        return Instruction(
+            OPCODES[opcode] if opcode < len(OPCODES) else OPCODES[0],
+            address,
+            value - (value >> self.digit_bits << (self.digit_bits + 1)),
+        )
+
+    def named(self, number: int) -> str:
+        """Name of an instruction, for messages."""
+        return f"instruction {number} ({self.instructions[number]})"
 
 
 def read_program(text: str) -> ProgramText:
@@ -101,22 +125,12 @@ def read_program(text: str) -> ProgramText:
         held = sum(content[address] << low for low, content, _ in slices)
         first = int(address % words == words - 1)
         require(held == first, f"word {address} must hold {first} before the first sample, not {held}")
-    instructions = []
     for number, code in enumerate(codes):
-        opcode = code & ((1 << _OPCODE_BITS) - 1)
-        require(
-            opcode < len(OPCODES), f"instruction {number} must have an opcode below {len(OPCODES)}, not {opcode}"
-        )
-        value = code >> (_OPCODE_BITS + address_bits)
-        instructions.append(
-            Instruction(
-                OPCODES[opcode],
-                code >> _OPCODE_BITS & (words - 1),
-                value - (value >> (word_bits - 1) << word_bits),
-            )
-        )
+        opcode = code % (1 << _OPCODE_BITS)
+        require(opcode < len(OPCODES), f"instruction {number} must have an opcode below {len(OPCODES)}, not {opcode}")
     return ProgramText(
-        instructions=tuple(instructions),
+        codes=tuple(codes),
+        code_bits=code_bits,
         digit_bits=word_bits - 1,
         words=words,
         channels=depth // words,
