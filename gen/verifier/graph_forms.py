@@ -6,10 +6,9 @@ The stages are joined, the inputs of each being the outputs of the one before. A
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from math import floor
 
 from sosmith.gen.verifier.certificate_file import Certificate, NodeEntry, Operation
 from sosmith.gen.verifier.graph import label, require
@@ -72,19 +71,19 @@ class Graph:
 
     def step(self, codes: Sequence[int], states: dict[int, int]) -> int:
         """Compute a sample from input codes, and the codes of the states; return the output and update the states."""
-        values: list[Fraction] = []
+        found: list[int] = []
         supply = iter(codes)
         for index, node in enumerate(self.nodes):
-            entry = node.entry
-            if entry.op in {Operation.INPUT, Operation.DELAY}:
-                code = next(supply) if entry.op is Operation.INPUT else states[index]
-                values.append(code * Fraction(2) ** -entry.frac)
+            if node.entry.op is Operation.INPUT:
+                found.append(next(supply))
+            elif node.entry.op is Operation.DELAY:
+                found.append(states[index])
             else:
-                values.append(_number(entry, [values[i] for i in entry.operands]))
+                operands = [(found[i], self.nodes[i].entry.frac) for i in node.entry.operands]
+                found.append(_code(node.entry, operands))
         for index in self.delays:
-            entry = self.nodes[index].entry
-            states[index] = int(values[entry.operands[0]] * 2**entry.frac)
-        return int(values[self.output])
+            states[index] = found[self.nodes[index].entry.operands[0]]
+        return found[self.output]
 
 
 def joined(certificate: Certificate) -> Graph:
@@ -149,19 +148,20 @@ def _value(entry: NodeEntry, operands: Sequence[Form], forms: Forms) -> Form:
     return of  # BOUND
 
 
-def _number(entry: NodeEntry, operands: Sequence[Fraction]) -> Fraction:
-    def cut(value: Fraction, kept: int) -> Fraction:
-        return floor(value * Fraction(2) ** kept) * Fraction(2) ** -kept
-
-    rules: dict[Operation, Callable[..., Fraction]] = {
-        Operation.CONSTANT: lambda: entry.parameter * Fraction(2) ** -entry.frac,
-        Operation.ADD: lambda a, b: a + b,
-        Operation.SUBTRACT: lambda a, b: a - b,
-        Operation.MULTIPLY: lambda a, b: a * b,
-        Operation.SHIFT: lambda a: a * Fraction(2) ** entry.parameter,
-        Operation.SCALE: lambda a: a * entry.parameter * Fraction(2) ** -entry.parameter_frac,
-        Operation.FLOOR: lambda a: cut(a, entry.frac),
-        Operation.FRACTION: lambda a: a - cut(a, entry.parameter),
-        Operation.BOUND: lambda a: a,
-    }
-    return rules[entry.op](*operands)
+def _code(entry: NodeEntry, operands: Sequence[tuple[int, int]]) -> int:
+    """Code of a node from the codes and fraction bits of its operands."""
+    if entry.op is Operation.CONSTANT:
+        return entry.parameter
+    if entry.op in {Operation.ADD, Operation.SUBTRACT}:
+        a, b = (code << (entry.frac - frac) for code, frac in operands)
+        return a + b if entry.op is Operation.ADD else a - b
+    (code, frac), *others = operands
+    if entry.op is Operation.MULTIPLY:
+        return code * others[0][0]
+    if entry.op is Operation.SCALE:
+        return code * entry.parameter
+    if entry.op is Operation.FLOOR:
+        return code >> (frac - entry.frac)
+    if entry.op is Operation.FRACTION:
+        return code & ((1 << (frac - entry.parameter)) - 1)
+    return code  # SHIFT, BOUND

@@ -86,7 +86,9 @@ class _Tokens:
 
     def expect(self, token: str) -> None:
         found = self.next()
-        require(found == token, f"logic must have {token!r} after what stands before it in {self._text!r}, not {found!r}")
+        require(
+            found == token, f"logic must have {token!r} after what stands before it in {self._text!r}, not {found!r}"
+        )
 
 
 def _slice(tokens: _Tokens, widths: Mapping[str, int]) -> tuple[str, int, int]:

@@ -40,7 +40,7 @@ from sosmith.gen.verifier.program_text import NUMBER_BITS, Instruction, ProgramT
 HAZARD = 4
 """Least number of instructions from one that stores a word to one that reads it: so deep is the pipeline."""
 
-_SAMPLES = 48
+_SAMPLES = 32
 """Samples for which a program is run on numbers, to find where it is wrong."""
 
 _READS = frozenset({"multiply", "operand", "product", "give"})
@@ -192,7 +192,10 @@ class _Run:
                 )
         self._acc = _Accumulator()
         self._group = Group()
-        self._operand: tuple[Word, int | None] = (Word(self._forms.variable("operand", -base, base - 1), -base, base - 1, None), None)
+        self._operand: tuple[Word, int | None] = (
+            Word(self._forms.variable("operand", -base, base - 1), -base, base - 1, None),
+            None,
+        )
         self._given: dict[int, tuple[Word, int]] = {}
         self._history: list[tuple[Word, int]] = []
         self.values = 0
@@ -290,8 +293,14 @@ class _Run:
             if ends_in_sign and all(bit == own[-1] for bit in rest):
                 return scaled(self._forms.floor(scaled(code, -first)), zeros)
             if not any(rest) and count < len(bits) - zeros:
-                return scaled(plus(self._forms.floor(scaled(code, -first)),
-                    self._forms.floor(scaled(code, -first - count)), -(1 << count)), zeros)
+                return scaled(
+                    plus(
+                        self._forms.floor(scaled(code, -first)),
+                        self._forms.floor(scaled(code, -first - count)),
+                        -(1 << count),
+                    ),
+                    zeros,
+                )
         require(zeros == len(bits), f"{self.program.named(number)} must take a digit of an input, not bits of several")
         return {}
 
@@ -410,15 +419,18 @@ class _Run:
     def _finish_sample(self) -> None:
         """Check the result and the states once all instructions have run."""
         last = len(self.program.instructions) - 1
-        require(not self._group.contributions and not self._group.ends,
-            f"{self.program.named(last)} must be the end of a program that leaves 0 in the accumulator")
+        require(
+            not self._group.contributions and not self._group.ends,
+            f"{self.program.named(last)} must be the end of a program that leaves 0 in the accumulator",
+        )
         self._check_result()
         for state in self.states:
             entry = self.graph.nodes[state.node].entry
             digits = self._digits(self._state(entry.operands[0], state.node, state.shift), state.digits)
             for k, digit in enumerate(digits):
-                self._check_word(state.address + k, digit,
-                    f"digit {k} of what {self.graph.nodes[state.node].label} takes over")
+                self._check_word(
+                    state.address + k, digit, f"digit {k} of what {self.graph.nodes[state.node].label} takes over"
+                )
         self._check_word(self.program.words - 1, constant(1), "1")
 
     def _check_word(self, address: int, wanted: Form, what: str) -> None:
@@ -438,5 +450,6 @@ class _Run:
             require(k in self._given, f"the program must give digit {k} of its result, {label}")
         for k, digit in enumerate(self._digits(wanted, count)):
             word, number = self._given[k]
-            require(word.form == digit, f"{self.program.named(number)} must give digit {k} of {label}, not another value")
-
+            require(
+                word.form == digit, f"{self.program.named(number)} must give digit {k} of {label}, not another value"
+            )

@@ -198,4 +198,3 @@ class _Search:
                     return None
                 return min((found, found - base), key=lambda value: ((value ^ present) % (2 * base)).bit_count())
         return None
-

@@ -136,7 +136,9 @@ def one_bit_away(
     itself = Machine(program, certificate)
     right = all(int(itself.step(row)[0]) == result for row, result in zip(rows, results, strict=True))
     numbers = suspects if right else range(len(program.codes))
-    machine = Machine(program, certificate, [(n, program.codes[n] ^ 1 << k) for n in numbers for k in range(program.code_bits)])
+    machine = Machine(
+        program, certificate, [(n, program.codes[n] ^ 1 << k) for n in numbers for k in range(program.code_bits)]
+    )
     if not numbers:
         return
     for row, result in zip(rows, results, strict=True):

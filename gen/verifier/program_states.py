@@ -19,7 +19,7 @@ from sosmith.gen.verifier.graph_forms import Graph
 from sosmith.gen.verifier.program_run import Machine, samples
 from sosmith.gen.verifier.program_text import ProgramText
 
-_SAMPLES = 48
+_SAMPLES = 32
 _READS = frozenset({"multiply", "operand", "product", "give"})
 
 
