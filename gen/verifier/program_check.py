@@ -1,7 +1,7 @@
 """Proves that the program of a folded or serial core computes the graph of its certificate, for all inputs and states.
 
-The program is read from the core's SystemVerilog (`sosmith.gen.verifier.program_text`) and run once, with normal forms in
-place of numbers (`sosmith.gen.verifier.normal_form`)::
+The program is read from the core's SystemVerilog (`sosmith.gen.verifier.program_text`) and run once, with normal forms
+in place of numbers (`sosmith.gen.verifier.normal_form`)::
 
     certificate --> graph --> form of each node ---------------------+
                       |                                              v
@@ -10,10 +10,10 @@ place of numbers (`sosmith.gen.verifier.normal_form`)::
     core.sv ----> program ------------------------------------+
 
 1. At the start of a sample, the words of a state hold the digits of its DELAY node, and the last word holds 1.
-2. Each value that the program stores must be that of a node: the same form, up to multiples of what the top digit drops.
-   The certificate's range of that node then says that it fits its digits.
-3. At the end, the result must be the output of the graph before it is limited, and the words of each state must hold the
-   digits of what its DELAY node takes over.
+2. Each value that the program stores must be that of a node: the same form, up to multiples of what the top digit
+   drops. The certificate's range of that node then says that it fits its digits.
+3. At the end, the result must be the output of the graph before it is limited, and the words of each state must hold
+   the digits of what its DELAY node takes over.
 
 By induction over the samples, the states are then those of the graph at every sample. The accumulator adds modulo its
 width; the proof shows that it fits whenever its upper bits are used. The ranges are those of the certificate, which
@@ -26,13 +26,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from itertools import pairwise
+from typing import NamedTuple
 
 from sosmith.gen.verifier.certificate_file import Certificate
 from sosmith.gen.verifier.graph import RejectedError, require
 from sosmith.gen.verifier.graph_forms import Graph, joined
 from sosmith.gen.verifier.logic import Bit
 from sosmith.gen.verifier.normal_form import ONE, Form, Forms, constant, plus, scaled, times, valuation
-from sosmith.gen.verifier.program_fault import Contribution, Group, Word, fault
+from sosmith.gen.verifier.program_fault import Contribution, Group, fault
 from sosmith.gen.verifier.program_run import one_bit_away, samples
 from sosmith.gen.verifier.program_states import find_states
 from sosmith.gen.verifier.program_text import NUMBER_BITS, Instruction, ProgramText, read_program
@@ -156,6 +158,14 @@ def _located(wrong: _Run, certificate: Certificate) -> RejectedError | None:
     return RejectedError(", or ".join(sentences)) if sentences else None
 
 
+class _Word(NamedTuple):
+    """What a memory word or the operand register holds: a form in low..high."""
+
+    form: Form
+    low: int
+    high: int
+
+
 @dataclass
 class _Accumulator:
     """``floor(total / 2**shift)``, in low..high; `columns` are the digits split off since it was 0."""
@@ -177,10 +187,10 @@ class _Run:
         self._of = graph.values(self._forms)
         base = 1 << self._bits
         self._words = [
-            Word(self._forms.variable(("word", address), -base, base - 1), -base, base - 1, None)
+            _Word(self._forms.variable(("word", address), -base, base - 1), -base, base - 1)
             for address in range(program.words)
         ]
-        self._words[-1] = Word(constant(1), 1, 1, None)
+        self._words[-1] = _Word(constant(1), 1, 1)
         self.states = find_states(program, graph, certificate)
         for state in self.states:
             low, high = graph.nodes[state.node].limits
@@ -188,16 +198,13 @@ class _Run:
             for k, digit in enumerate(digits):
                 top = k == state.digits - 1
                 self._words[state.address + k] = self._word(
-                    digit, (low, high) if top else None, self._frac(state.node) + state.shift, k, None
+                    digit, (low, high) if top else None, self._frac(state.node) + state.shift, k
                 )
         self._acc = _Accumulator()
         self._group = Group()
-        self._operand: tuple[Word, int | None] = (
-            Word(self._forms.variable("operand", -base, base - 1), -base, base - 1, None),
-            None,
-        )
-        self._given: dict[int, tuple[Word, int]] = {}
-        self._history: list[tuple[Word, int]] = []
+        self._operand = _Word(self._forms.variable("operand", -base, base - 1), -base, base - 1)
+        self._given: dict[int, tuple[_Word, int]] = {}
+        self._writers: dict[int, int] = {}
         self.values = 0
         self.purpose: dict[int, int] = {}
         self._groups: dict[int, list[int]] = {}
@@ -232,17 +239,15 @@ class _Run:
 
     def _digits(self, value: Form, count: int) -> list[Form]:
         floors = [self._forms.floor(scaled(value, -self._bits * k)) for k in range(count)]
-        low = [plus(a, b, -(1 << self._bits)) for a, b in zip(floors, floors[1:], strict=False)]
+        low = [plus(a, b, -(1 << self._bits)) for a, b in pairwise(floors)]
         return [*low, floors[-1]]
 
-    def _word(
-        self, form: Form, limits: tuple[Fraction, Fraction] | None, frac: int, position: int, writer: int | None
-    ) -> Word:
+    def _word(self, form: Form, limits: tuple[Fraction, Fraction] | None, frac: int, position: int) -> _Word:
         """Return a word with a digit: one of the lower ones, or the top one of a value in `limits`."""
         if limits is None:
-            return Word(form, 0, (1 << self._bits) - 1, writer)
+            return _Word(form, 0, (1 << self._bits) - 1)
         unit = Fraction(2) ** (frac - self._bits * position)
-        return Word(form, (limits[0] * unit).__floor__(), (limits[1] * unit).__floor__(), writer)
+        return _Word(form, (limits[0] * unit).__floor__(), (limits[1] * unit).__floor__())
 
     # Instructions.
 
@@ -251,12 +256,12 @@ class _Run:
         if opcode == "take":
             self._take(number, address, value)
         elif opcode == "multiply":
-            self._add(number, self._words[address], constant(value), (value, value))
+            self._add(self._words[address], constant(value), (value, value))
         elif opcode == "operand":
-            self._operand = self._words[address], number
+            self._operand = self._words[address]
         elif opcode == "product":
-            other = self._operand[0]
-            self._add(number, self._words[address], other.form, (other.low, other.high))
+            other = self._operand
+            self._add(self._words[address], other.form, (other.low, other.high))
         elif opcode in {"store", "drop"}:
             self._column(number, instruction)
         elif opcode == "finish":
@@ -272,7 +277,7 @@ class _Run:
         form = self._taken(number, self.program.digits[value % (1 << NUMBER_BITS)])
         low, high = self._forms.extent(form)
         base = 1 << self._bits
-        self._store(number, address, Word(form, max(int(low), -base), min(int(high), base - 1), number))
+        self._store(number, address, _Word(form, max(int(low), -base), min(int(high), base - 1)))
 
     def _taken(self, number: int, bits: Sequence[Bit]) -> Form:
         """Return a digit of an input as a form: zeros, then bits of its code in order, then zeros or its sign."""
@@ -304,18 +309,17 @@ class _Run:
         require(zeros == len(bits), f"{self.program.named(number)} must take a digit of an input, not bits of several")
         return {}
 
-    def _store(self, number: int, address: int, word: Word) -> None:
+    def _store(self, number: int, address: int, word: _Word) -> None:
         self._words[address] = word
-        self._history.append((word, address))
+        self._writers[address] = number
 
-    def _add(self, number: int, word: Word, factor: Form, ends: tuple[int, int]) -> None:
+    def _add(self, word: _Word, factor: Form, ends: tuple[int, int]) -> None:
         acc = self._acc
         product = times(word.form, factor)
         acc.total = plus(acc.total, product, 1 << acc.shift)
         corners = [a * b for a in (word.low, word.high) for b in ends]
         acc.low, acc.high = acc.low + min(corners), acc.high + max(corners)
-        operand = self._operand[1] if self.program.instructions[number].opcode == "product" else None
-        self._group.contributions.append(Contribution(number, product, factor, len(self._group.ends), operand))
+        self._group.contributions.append(Contribution(product, len(self._group.ends)))
 
     def _fits(self, number: int) -> None:
         limit = 1 << (self.program.accumulator_bits - 1)
@@ -334,7 +338,7 @@ class _Run:
             self._begin()
             low, high = (self._forms.floor(scaled(acc.total, -acc.shift - k)) for k in (0, self._bits))
             form = plus(low, high, -(1 << self._bits))
-            self._store_next(number, instruction.address, self._word(form, None, 0, 0, number))
+            self._store_next(number, instruction.address, self._word(form, None, 0, 0))
         acc.shift += self._bits
         acc.low, acc.high = acc.low >> self._bits, acc.high >> self._bits
         self._group.ends.append(number)
@@ -345,7 +349,7 @@ class _Run:
         if not acc.stored:
             acc.total, acc.shift = self._forms.floor(scaled(acc.total, -acc.shift)), 0
 
-    def _store_next(self, number: int, address: int, word: Word) -> None:
+    def _store_next(self, number: int, address: int, word: _Word) -> None:
         self._acc.stored.append(number)
         self._store(number, address, word)
 
@@ -357,13 +361,13 @@ class _Run:
         found = self._node(acc.total, top)
         self._group.ends.append(number)
         if found is None:
-            require(False, fault(self.program, self.graph, self._of, self._group, self._words, self._history))
+            require(False, fault(self.program, self.graph, self._of, self._group))
             return
         node, frac = found
         value = scaled(self._of[node], frac)
         form = self._forms.floor(scaled(value, -acc.shift))
         limits = self.graph.nodes[node].limits
-        self._store_next(number, address, self._word(form, limits, frac, acc.shift // self._bits, number))
+        self._store_next(number, address, self._word(form, limits, frac, acc.shift // self._bits))
         self.values += 1
         self._groups[number] = [*self._group.instructions, number]
         self.purpose |= dict.fromkeys(self._groups[number], node)
@@ -437,9 +441,9 @@ class _Run:
         word = self._words[address]
         if word.form == wanted:
             return
-        stored = [writer.writer for writer, at in self._history if at == address and writer.writer is not None]
-        who = self.program.named(stored[-1]) if stored else "the program"
-        self._suspects = next((group for group in self._groups.values() if stored and stored[-1] in group), [])
+        writer = self._writers.get(address)
+        who = "the program" if writer is None else self.program.named(writer)
+        self._suspects = next((group for group in self._groups.values() if writer in group), [])
         require(False, f"{who} must leave {what} in word {address}, not another value")
 
     def _check_result(self) -> None:

@@ -1,4 +1,4 @@
-"""Runs a program on numbers, as the hardware does, with many variants at once: to guess what it means, never to prove it.
+"""Runs a program on numbers, as the hardware does, many variants at once: to guess what it means, not to prove it.
 
 Variants lie side by side in arrays of 64 bits. One that overflows them is wrong in any case.
 """

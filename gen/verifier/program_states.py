@@ -2,8 +2,8 @@
 
 A value is written digit by digit: STORE .. STORE FINISH, at addresses that follow each other. The words that are read
 before they are written are states, and the instructions that write a state last say which words belong together. Which
-state it is, and with how many additional fraction bits, is then read off the numbers of a run: the words hold a multiple
-of the state by a power of two at every sample.
+state it is, and with how many additional fraction bits, is then read off the numbers of a run: at every sample, the
+words hold the state times the same power of two.
 
 This is a guess, which the checker proves: see `sosmith.gen.verifier.program_check`.
 """

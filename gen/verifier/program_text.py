@@ -1,8 +1,8 @@
-"""Reads the program of a folded or serial core from its SystemVerilog.
+r"""Reads the program of a folded or serial core from its SystemVerilog.
 
 ::
 
-    reg [n-1:0] \\program [count-1:0];  instruction    n-1          a+4   a+3        4   3      0
+    reg [n-1:0] \program [count-1:0];  instruction    n-1          a+4   a+3        4   3      0
     reg [..] words0 [depth-1:0];       word, cut into +-----------------+--------------+--------+
     reg [..] words8 [depth-1:0];       slices         |    constant     |   address    | opcode |
     reg [..] total;                    accumulator    +-----------------+--------------+--------+
