@@ -133,7 +133,8 @@ def _value(entry: NodeEntry, operands: Sequence[Form], forms: Forms) -> Form:
     if entry.op is Operation.CONSTANT:
         return constant(entry.parameter * Fraction(2) ** -entry.frac)
     if entry.op in {Operation.ADD, Operation.SUBTRACT}:
-        return plus(*operands, 1 if entry.op is Operation.ADD else -1)
+        a, b = operands
+        return plus(a, b, 1 if entry.op is Operation.ADD else -1)
     if entry.op is Operation.MULTIPLY:
         return times(*operands)
     (of,) = operands

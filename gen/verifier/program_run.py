@@ -81,7 +81,7 @@ class Machine:
                 self.words[:, which], state[:, which] = words, own
         bits = program.digit_bits
         *low, top = state[2:]
-        total = top << (bits * len(low))
+        total: _Integers = top << (bits * len(low))
         for k, digit in enumerate(low):
             total = total + ((digit & ((1 << bits) - 1)) << (bits * k))
         return total

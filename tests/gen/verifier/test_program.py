@@ -117,7 +117,7 @@ def test_the_calibration_alone() -> None:
 
 def test_another_certificate_is_rejected() -> None:
     with pytest.raises(RejectedError, match=r"^instruction \d+ \(\w+, address \d+, constant -?\d+\) must .*$"):
-        check_program(small(PLAIN).text, small(PLAIN, realization="df1").certificate)
+        check_program(small(PLAIN).text, small(PLAIN, realization="df2t").certificate)
 
 
 def changed(core: Made, number: int, code: int) -> str:
