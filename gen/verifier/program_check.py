@@ -101,10 +101,12 @@ def check_program(
         raise _located(run, certificate) or error from None
     ends = [(port.lowest, port.highest) for port in certificate.inputs]
     judged = tuple((max(low, a), min(high, b)) for (low, high), (a, b) in zip(ends, run.judged, strict=True))
-    for port, found, wanted in zip(certificate.inputs, judged, calibrated or judged, strict=True):
+    for index, (port, found, wanted) in enumerate(zip(certificate.inputs, judged, calibrated or judged, strict=True)):
+        last = run.judges.get(index)
+        who = "the program" if last is None else program.named(last)
         require(
             found == tuple(wanted),
-            f"the program must judge {port.name} by the codes {wanted[0]}..{wanted[1]}, not {found[0]}..{found[1]}",
+            f"{who} must judge {port.name} by the codes {wanted[0]}..{wanted[1]}, not {found[0]}..{found[1]}",
         )
     return ProgramVerdict(len(program.instructions), run.values, len(run.states), judged)
 
@@ -206,6 +208,7 @@ class _Run:
         self._given: dict[int, tuple[_Word, int]] = {}
         self._writers: dict[int, int] = {}
         self.values = 0
+        self.judges: dict[int, int] = {}
         self.purpose: dict[int, int] = {}
         self._groups: dict[int, list[int]] = {}
         self._suspects: list[int] = []
@@ -405,6 +408,7 @@ class _Run:
                 continue
             low, high = self.judged[index]
             limit = Fraction(-free) / factor
+            self.judges[index] = number
             if factor > 0:
                 self.judged[index] = max(low, -((-limit).__floor__())), high
             else:

@@ -189,6 +189,9 @@ def test_the_limits_of_the_calibration_are_read() -> None:
     inside = replace(design.datapath, calibrated=((5, 4000), (0, 900)))
     core = made(replace(design, quantized=replace(design.quantized, datapath=inside)), "folded")
     assert core.check().judged == ((5, 4000), (0, 900))
+    sentence = r"^instruction \d+ \(judge, .*\) must judge voltage by the codes 6\.\.4000, not 5\.\.4000$"
+    with pytest.raises(RejectedError, match=sentence):
+        check_program(core.text, core.certificate, calibrated=[(6, 4000), (0, 900)])
 
 
 def test_cores_without_a_fixed_program_are_refused() -> None:
