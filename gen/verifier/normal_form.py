@@ -1,0 +1,115 @@
+"""Normal forms of what a filter computes from integers: equal forms are equal for all values of what they are made of.
+
+::
+
+    form       sum of rational multiples of monomials         5 x - 16 floor(x / 16 + 1/2) + 3 x y
+    monomial   product of atoms; the empty one is 1
+    atom       an integer: a variable, or floor(form)
+
+Sums, products and multiples stay forms. A floor has a form of its own once everything whole is taken out of it:
+
+    floor(5/2 x + 3/2 y - 1) = 2 x + y - 1 + floor(1/2 x + 1/2 y)
+
+so that what is left within a floor has coefficients in [0, 1). A floor that is constant over the ranges of its atoms is
+that constant. Everything holds over the integers, of any size.
+
+>>> forms = Forms()
+>>> x = forms.variable("x", 0, 255)
+>>> low = plus(x, forms.floor(times(x, {(): Fraction(1, 16)})), -16)  # the low four bits
+>>> high = forms.floor(times(x, {(): Fraction(1, 16)}))
+>>> plus(low, high, 16) == x
+True
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping
+from fractions import Fraction
+
+Monomial = tuple[int, ...]
+"""Numbers of its atoms, in rising order."""
+
+Form = Mapping[Monomial, int | Fraction]
+"""Coefficients by monomial; none of them is 0."""
+
+ONE: Monomial = ()
+"""The monomial of a constant."""
+
+
+def constant(value: int | Fraction) -> Form:
+    """Return a number as a form."""
+    return {ONE: value} if value else {}
+
+
+def plus(a: Form, b: Form, factor: int | Fraction = 1) -> Form:
+    """Return ``a + factor b``."""
+    total = dict(a)
+    for monomial, coefficient in b.items():
+        total[monomial] = total.get(monomial, 0) + factor * coefficient
+    return {monomial: coefficient for monomial, coefficient in total.items() if coefficient}
+
+
+def times(a: Form, b: Form) -> Form:
+    """Return the product."""
+    total: dict[Monomial, int | Fraction] = {}
+    for p, x in a.items():
+        for q, y in b.items():
+            monomial = tuple(sorted((*p, *q)))
+            total[monomial] = total.get(monomial, 0) + x * y
+    return {monomial: coefficient for monomial, coefficient in total.items() if coefficient}
+
+
+def scaled(form: Form, exponent: int) -> Form:
+    """Return ``form * 2**exponent``."""
+    factor = Fraction(2) ** exponent
+    return {monomial: coefficient * factor for monomial, coefficient in form.items()}
+
+
+def valuation(value: int | Fraction) -> int:
+    """Exponent of the largest power of two that divides a dyadic number other than 0."""
+    exact = Fraction(value)
+    return (exact.numerator & -exact.numerator).bit_length() - exact.denominator.bit_length()
+
+
+class Forms:
+    """The atoms of all forms that are to be compared: the same atom has the same number."""
+
+    def __init__(self) -> None:
+        self._numbers: dict[Hashable, int] = {}
+        self._ranges: list[tuple[int, int]] = []
+
+    def variable(self, name: Hashable, low: int, high: int) -> Form:
+        """Return the integer variable `name`, which lies in low..high."""
+        return self._atom(("variable", name), low, high)
+
+    def floor(self, form: Form) -> Form:
+        """Return the largest integer that is not above `form`."""
+        whole: dict[Monomial, int | Fraction] = {}
+        rest: dict[Monomial, int | Fraction] = {}
+        for monomial, coefficient in form.items():
+            below = coefficient.__floor__()
+            if below:
+                whole[monomial] = below
+            if coefficient != below:
+                rest[monomial] = coefficient - below
+        low, high = (end.__floor__() for end in self.extent(rest))
+        if low == high:
+            return plus(whole, constant(low))
+        return plus(whole, self._atom(("floor", frozenset(rest.items())), low, high))
+
+    def extent(self, form: Form) -> tuple[int | Fraction, int | Fraction]:
+        """Return limits of a form: those of its monomials, added up."""
+        low: int | Fraction = 0
+        high: int | Fraction = 0
+        for monomial, coefficient in form.items():
+            ends = [coefficient]
+            for atom in monomial:
+                ends = [end * limit for end in ends for limit in self._ranges[atom]]
+            low, high = low + min(ends), high + max(ends)
+        return low, high
+
+    def _atom(self, key: Hashable, low: int, high: int) -> Form:
+        if key not in self._numbers:
+            self._numbers[key] = len(self._ranges)
+            self._ranges.append((low, high))
+        return {(self._numbers[key],): 1}

@@ -1,0 +1,314 @@
+"""The program of folded and serial cores: proven against the certificate's graph, rejected when a bit is wrong."""
+
+import json
+import random
+import re
+import tomllib
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
+from decimal import Decimal
+from functools import cache
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from tests.gen.designs import ALL, EXAMPLES
+
+from sosmith.gen.architecture import Architecture
+from sosmith.gen.core import CoreDesign, design_core
+from sosmith.gen.output.certificate import certificate
+from sosmith.gen.output.verilog import to_rtlil, to_verilog
+from sosmith.gen.specification.specification import Specification, from_tree, load
+from sosmith.gen.verifier.certificate_file import Certificate, certificate_text
+from sosmith.gen.verifier.graph import RejectedError
+from sosmith.gen.verifier.program_check import ProgramVerdict, check_program
+from sosmith.hdl.instruction import address_bits, encoded, instruction_bits
+from sosmith.model.dataflow.program import Instruction, Opcode, Program
+
+FOLDABLE = ("df1", "df1_ef1", "df1_ef2", "df2t", "delta", "state_space")
+LOCOMOTIVE = "flange_wear_locomotive.toml"
+
+INSTRUMENT = """
+name = "smooth"
+sample_rate = 100.0
+input.voltage = { bits = 12, range = [0.0, 10.0] }
+input.temperature = { bits = 10, range = [0.0, 128.0] }
+calibration.coefficients = [[1.16, -0.0036], [0.3672, 0.0006618], [0.05812]]
+filter = { family = "butterworth", kind = "lowpass", order = 3, cutoff = 10.0 }
+output = { bits = 12, range = [0.0, 16.0], unit = "mm", max_error = 0.01 }
+"""
+PLAIN = """
+name = "plain"
+sample_rate = 100.0
+input.x = { bits = 8, signed = true, range = [-1.0, 1.0] }
+filter = { family = "butterworth", kind = "lowpass", order = 2, cutoff = 20.0 }
+output = { bits = 8, signed = true, range = [-1.0, 1.0], unit = "", max_error = "faithful" }
+"""
+
+
+class Made(NamedTuple):
+    """A core with its text and its certificate."""
+
+    design: CoreDesign
+    program: Program
+    text: str
+    certificate: Certificate
+
+    def check(self, text: str | None = None) -> ProgramVerdict:
+        return check_program(text or self.text, self.certificate, calibrated=self.design.datapath.calibrated)
+
+
+def specified(text: str) -> Specification:
+    return from_tree(tomllib.loads(text, parse_float=Decimal), Path("small.toml"))
+
+
+def made(design: CoreDesign, architecture: str, channels: int = 1) -> Made:
+    core = Architecture(architecture, design.datapath, channels)
+    assert core.program is not None
+    text = to_verilog(to_rtlil(core.component(), design.datapath.name))
+    read = json.loads(certificate_text(certificate(design.quantized, design.spec.max_error)))
+    return Made(design, core.program, text, Certificate.model_validate(read))
+
+
+@cache
+def small(spec: str, architecture: str = "folded", realization: str = "df1_ef1", channels: int = 1) -> Made:
+    return made(design_core(specified(spec), realization=realization), architecture, channels)
+
+
+# What the generator writes is accepted.
+
+
+@pytest.mark.parametrize("architecture", ["folded", "serial"])
+@pytest.mark.parametrize("name", ALL)
+def test_examples(name: str, architecture: str) -> None:
+    spec = load(EXAMPLES / name)
+    design = design_core(
+        replace(spec, hardware=replace(spec.hardware, architecture=architecture)), realization="df1_ef2"
+    )
+    verdict = made(design, architecture).check()
+    assert verdict.instructions > 150
+    assert verdict.values > verdict.states > 5
+
+
+@pytest.mark.parametrize("architecture", ["folded", "serial"])
+@pytest.mark.parametrize("realization", FOLDABLE)
+@pytest.mark.parametrize("spec", [PLAIN, INSTRUMENT], ids=["plain", "instrument"])
+def test_every_realization(spec: str, realization: str, architecture: str) -> None:
+    core = small(spec, architecture, realization)
+    assert core.check().instructions == len(core.program.instructions)
+
+
+@pytest.mark.parametrize("architecture", ["folded", "serial"])
+def test_channels_have_one_program(architecture: str) -> None:
+    assert (
+        small(INSTRUMENT, architecture, "df2t", channels=3).check() == small(INSTRUMENT, architecture, "df2t").check()
+    )
+
+
+def test_the_calibration_alone() -> None:
+    design = design_core(specified(INSTRUMENT), core="calibration")
+    assert made(design, "folded").check().states == 0
+
+
+# What is not the graph of the certificate is rejected.
+
+
+def test_another_certificate_is_rejected() -> None:
+    with pytest.raises(RejectedError, match=r"^instruction \d+ \(\w+, address \d+, constant -?\d+\) must .*$"):
+        check_program(small(PLAIN).text, small(PLAIN, realization="df2t").certificate)
+
+
+def changed(core: Made, number: int, code: int) -> str:
+    """Return the core's text with another instruction."""
+    digits = -(-instruction_bits(core.program) // 4)
+    text, count = re.subn(rf"(\\program \[{number}\] = \d+'h)[0-9a-f]+;", rf"\g<1>{code:0{digits}x};", core.text)
+    assert count == 1
+    return text
+
+
+def number_of(core: Made, opcode: Opcode) -> int:
+    return next(k for k, instruction in enumerate(core.program.instructions) if instruction.opcode is opcode)
+
+
+def test_a_wrong_coefficient_is_named() -> None:
+    core = small(PLAIN)
+    number, right = next(
+        (k, i)
+        for k, i in enumerate(core.program.instructions)
+        if i.opcode is Opcode.MULTIPLY and abs(i.constant) > 1000
+    )
+    text = changed(core, number, encoded(right._replace(constant=right.constant ^ 64), core.program))
+    sentence = (
+        rf"instruction {number} must be multiply, address {right.address}, constant {right.constant} for "
+        rf"node \d+ \(.+\) of section0, not multiply, address {right.address}, constant {right.constant ^ 64}"
+    )
+    with pytest.raises(RejectedError, match=rf"^{sentence}$"):
+        core.check(text)
+
+
+@pytest.mark.parametrize(
+    ("opcode", "field", "sentence"),
+    [
+        (Opcode.TAKE, {"constant": 1}, r"instruction 0 must be take, address \d+, constant 0 for .*"),
+        (Opcode.GIVE, {"opcode": Opcode.NOTHING}, r"instruction \d+ must be give, address \d+, constant 0 for .*"),
+    ],
+)
+def test_a_wrong_field_is_named(opcode: Opcode, field: dict[str, int], sentence: str) -> None:
+    core = small(INSTRUMENT)
+    number = number_of(core, opcode)
+    text = changed(core, number, encoded(core.program.instructions[number]._replace(**field), core.program))
+    with pytest.raises(RejectedError, match=rf"^{sentence}$"):
+        core.check(text)
+
+
+def test_an_opcode_that_does_not_exist() -> None:
+    core = small(PLAIN)
+    with pytest.raises(RejectedError, match=r"^instruction 3 must have an opcode below 10, not 12$"):
+        core.check(changed(core, 3, 12))
+
+
+def test_a_word_that_is_not_cleared() -> None:
+    core = small(PLAIN)
+    text = re.sub(r"words0\[2\] = 16'h0000;", "words0[2] = 16'h0005;", core.text)
+    with pytest.raises(RejectedError, match=r"^word 2 must hold 0 before the first sample, not 5$"):
+        core.check(text)
+
+
+def test_other_limits_of_the_calibration() -> None:
+    core = small(INSTRUMENT)
+    sentence = r"^the program must judge voltage by the codes 5\.\.4000, not 0\.\.4095$"
+    with pytest.raises(RejectedError, match=sentence):
+        check_program(core.text, core.certificate, calibrated=[(5, 4000), (0, 1023)])
+
+
+def test_the_limits_of_the_calibration_are_read() -> None:
+    spec = specified(INSTRUMENT)
+    design = design_core(spec, realization="df1")
+    inside = replace(design.datapath, calibrated=((5, 4000), (0, 900)))
+    core = made(replace(design, quantized=replace(design.quantized, datapath=inside)), "folded")
+    assert core.check().judged == ((5, 4000), (0, 900))
+    sentence = r"^instruction \d+ \(judge, .*\) must judge voltage by the codes 6\.\.4000, not 5\.\.4000$"
+    with pytest.raises(RejectedError, match=sentence):
+        check_program(core.text, core.certificate, calibrated=[(6, 4000), (0, 900)])
+
+
+def test_cores_without_a_fixed_program_are_refused() -> None:
+    core = small(PLAIN)
+    with pytest.raises(RejectedError, match=r"^the core must be folded or serial to have a program, not parallel$"):
+        core.check("module plain();\nendmodule\n")
+    loadable = Architecture("folded", core.design.datapath, reload=True)
+    text = to_verilog(to_rtlil(loadable.component(), "plain"))
+    with pytest.raises(RejectedError, match=r"^the program must be fixed to be checked, not loadable at run time$"):
+        core.check(text)
+
+
+# Edits of one bit.
+
+UNUSED = {
+    Opcode.NOTHING: {"address", "constant"},
+    Opcode.OPERAND: {"constant"},
+    Opcode.PRODUCT: {"constant"},
+    Opcode.STORE: {"constant"},
+    Opcode.DROP: {"address", "constant"},
+    Opcode.FINISH: {"constant"},
+    Opcode.JUDGE: {"address", "constant"},
+}
+"""Fields that an opcode does not use; TAKE and GIVE use the low eight bits of their constant."""
+
+
+def edited(core: Made, number: int, bit: int) -> tuple[str, Instruction, str]:
+    """Flip a bit; return the text, the instruction as hardware takes it, and the field of the bit."""
+    width, address_top = core.program.digit_bits + 1, 4 + address_bits(core.program)
+    code = encoded(core.program.instructions[number], core.program) ^ 1 << bit
+    field = "opcode" if bit < 4 else "address" if bit < address_top else "constant"
+    value = code >> address_top
+    value -= value >> (width - 1) << width
+    opcode = Opcode(code & 15) if code & 15 < len(Opcode) else Opcode.NOTHING
+    if opcode is Opcode.TAKE:
+        value = min(value % 256, sum(location.digits for location in core.program.inputs) - 1)
+    if opcode is Opcode.GIVE:
+        value %= 256
+        later = core.program.instructions[number + 1 :]
+        if value >= core.program.output.digits or any(i.opcode is Opcode.GIVE and i.constant == value for i in later):
+            opcode = Opcode.NOTHING
+    address = code >> 4 & ((1 << address_bits(core.program)) - 1)
+    return changed(core, number, code), Instruction(opcode, address, value), field
+
+
+def computed(core: Made, program: Program, codes: Sequence[Sequence[int]]) -> object:
+    """Return what the integer model of a program makes of samples: codes and flags, or why it cannot run."""
+    graph = core.design.datapath.stages[0].graph
+    words = program.reset()
+    try:
+        return [program.step(row, words, [graph.nodes[i].frac for i in graph.inputs]) for row in codes]
+    except OverflowError as error:
+        return str(error)
+
+
+def harmless(core: Made, number: int, new: Instruction, field: str, bit: int) -> str:
+    """Say why an edit that was accepted changes nothing; nothing if there is no reason."""
+    old = core.program.instructions[number]
+    if field in UNUSED.get(old.opcode, ()):
+        return "unused field"
+    if old.opcode in {Opcode.TAKE, Opcode.GIVE} and bit >= 4 + address_bits(core.program) + 8:
+        return "unused bits of a number"
+    if {old.opcode, new.opcode} <= {Opcode.NOTHING, Opcode.OPERAND, Opcode.GIVE}:
+        return "nothing becomes a read that nothing uses"
+    if old.opcode is new.opcode is Opcode.MULTIPLY and field == "address":
+        return "another word with the same digit"
+    return ""
+
+
+def rejection(core: Made, text: str) -> str:
+    """Return the sentence of a rejection; nothing if a text is accepted."""
+    try:
+        core.check(text)
+    except RejectedError as error:
+        return str(error)
+    return ""
+
+
+def sweep(core: Made, edits: int, seed: int) -> Counter[str]:
+    """Flip bits at random; check what is accepted against the integer model, and what is rejected for its sentence."""
+    rng, numbers = random.Random(seed), np.random.default_rng(seed)
+    ports = core.design.datapath.inputs
+    codes = np.stack([numbers.integers(p.lowest, p.highest + 1, 80) for p in ports], axis=1).tolist()
+    right = computed(core, core.program, codes)
+    found: Counter[str] = Counter()
+    for _ in range(edits):
+        number, bit = rng.randrange(len(core.program.instructions)), rng.randrange(instruction_bits(core.program))
+        text, new, field = edited(core, number, bit)
+        instructions = (*core.program.instructions[:number], new, *core.program.instructions[number + 1 :])
+        same = computed(core, replace(core.program, instructions=instructions), codes) == right
+        sentence = rejection(core, text)
+        edit = number, core.program.instructions[number], new, sentence
+        if sentence:
+            named = re.search(rf"\binstruction {number}\b", sentence) is not None
+            assert same or named, edit
+            found["rejected"] += 1
+            found["rejected without a difference in the run"] += same
+        else:
+            why = harmless(core, number, new, field, bit)
+            assert same, edit
+            assert why, edit
+            found["accepted"] += 1
+            found[f"accepted: {why}"] += 1
+    return found
+
+
+def test_a_hundred_edits() -> None:
+    found = sweep(small(PLAIN), 100, seed=1)
+    assert found["accepted"] + found["rejected"] == 100
+    assert found["rejected"] > 30
+    assert found["accepted: unused field"] > 20
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("architecture", ["folded", "serial"])
+@pytest.mark.parametrize("realization", ["df1_ef1", "df2t", "state_space"])
+def test_a_thousand_edits(realization: str, architecture: str) -> None:
+    found = sweep(small(INSTRUMENT, architecture, realization), 150, seed=2)
+    assert found["accepted"] + found["rejected"] == 150
+    assert found["rejected"] > 50
