@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -97,6 +98,22 @@ def check_measurements(about: AboutEntry, path: Path) -> None:
     """
     assert about.measurements is not None
     _compare(str(path), about.measurements.sha256, _content(path))
+
+
+def has_program(path: Path) -> bool:
+    """Whether the manifest at `path`, which is known to be unchanged, is that of a core with a fixed program.
+
+    Raises
+    ------
+    RejectedError
+        If it is no manifest.
+    """
+    try:
+        manifest = json.loads(_content(path))
+        reloads = manifest["spec"].get("hardware", {}).get("reload", False)
+        return manifest["architecture"] in {"folded", "serial"} and not reloads
+    except (ValueError, KeyError, TypeError, AttributeError):
+        raise RejectedError(f"{path} must be the manifest of a core, not another file") from None
 
 
 def check_texts(about: AboutEntry, texts: Mapping[str, str]) -> int:

@@ -36,6 +36,7 @@ def test_against_everything(folder: Path) -> None:
     table = command.good(path, "--spec", str(SPEC), "--files", str(folder), "--rebuild").stdout
     assert "proven: audio_lowpass, " in table
     assert "as specified: ports and allowed error and filter within a peak gain of " in table
+    assert " instructions in the SystemVerilog compute these graphs, for all inputs and states\n" in table
     assert "unchanged: 5 files and the certificate itself, by their SHA-256\n" in table
     assert table.endswith("rebuilt: 5 files, the same byte for byte\n")
     found = json.loads(command.good(path, "--json", "--spec", str(SPEC), "--files", str(folder)).stdout)
@@ -43,6 +44,7 @@ def test_against_everything(folder: Path) -> None:
     assert found["specification"]["calibration_from_measurements"] is False
     assert 0 < found["specification"]["filter_distance"] < 1e-50
     assert (found["files_compared"], found["files_rebuilt"]) == (5, 0)
+    assert found["program_instructions"] > 50
 
 
 def test_without_anything_else_as_before(folder: Path) -> None:

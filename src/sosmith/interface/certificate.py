@@ -17,7 +17,9 @@ from sosmith.gen.verifier.generated_files import (
     check_seal,
     check_text,
     check_texts,
+    has_program,
 )
+from sosmith.gen.verifier.program.check import ProgramVerdict, check_program
 from sosmith.gen.verifier.specified.stated_specification import Agreement, check_specification
 from sosmith.gen.verifier.verification import verify
 from sosmith.interface.quantity import Quantity
@@ -51,6 +53,8 @@ class Proof:
     """What of the specification was compared; None if it was not."""
     files: int = 0
     """Number of files whose content was compared."""
+    program: ProgramVerdict | None = None
+    """What the check of the program in the SystemVerilog found; None if it was not checked."""
     rebuilt: int = 0
     """Number of files that were generated again."""
 
@@ -117,7 +121,8 @@ class Certificate:
             the ideal filter is derived again from its words, and its text must be the one in the certificate.
         files : path
             Folder with the generated files: their SHA-256 must be those in the certificate, and no byte of the
-            certificate's own file may have been changed.
+            certificate's own file may have been changed. The program of a folded or serial core, without loadable
+            constants, is proven to compute the certificate's graph for all inputs and states.
         rebuild : bool
             Whether to generate all files again, from `spec` or the specification's text in the certificate, and compare
             them byte for byte.
@@ -130,7 +135,7 @@ class Certificate:
             If a file cannot be read, or the specification is invalid.
         """
         verdict = verify(self.entries, progress)
-        agreement, compared, again = None, 0, 0
+        agreement, program, compared, again = None, None, 0, 0
         checked = None if spec is None else load(Path(fspath(spec)))
         if checked is not None:
             progress("specification", 0, 0)
@@ -143,7 +148,11 @@ class Certificate:
         if files is not None:
             progress("files", 0, 0)
             content = self.text().encode() if self.path is None else self.path.read_bytes()
-            compared = check_files(check_seal(self.entries, content), Path(fspath(files)))
+            folder = Path(fspath(files))
+            compared = check_files(check_seal(self.entries, content), folder)
+            if has_program(folder / f"{self.name}.json"):
+                progress("program", 0, 0)
+                program = check_program((folder / f"{self.name}.sv").read_text(encoding="utf-8"), self.entries)
         if rebuild:
             from sosmith.gen.output.rebuild import rebuilt
 
@@ -159,6 +168,7 @@ class Certificate:
             ranges=verdict.ranges,
             agreement=agreement,
             files=compared,
+            program=program,
             rebuilt=again,
         )
 

@@ -24,6 +24,11 @@ def print_proof(certificate: Certificate, proof: Proof) -> None:
         console.print(f"[bold green]as specified[/]: {_agreement(proof.agreement)}")
     if proof.files:
         console.print(f"[bold green]unchanged[/]: {proof.files} files and the certificate itself, by their SHA-256")
+    if proof.program is not None:
+        console.print(
+            f"[bold green]program[/]: {proof.program.instructions} instructions in the SystemVerilog compute these "
+            "graphs, for all inputs and states"
+        )
     if proof.rebuilt:
         console.print(f"[bold green]rebuilt[/]: {proof.rebuilt} files, the same byte for byte")
 

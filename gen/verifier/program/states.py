@@ -5,7 +5,7 @@ before they are written are states, and the instructions that write a state last
 state it is, and with how many additional fraction bits, is then read off the numbers of a run: at every sample, the
 words hold the state times the same power of two.
 
-This is a guess, which the checker proves: see `sosmith.gen.verifier.program_check`.
+This is a guess, which the checker proves: see `sosmith.gen.verifier.program.check`.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from sosmith.gen.verifier.certificate_file import Certificate
-from sosmith.gen.verifier.graph_forms import Graph
-from sosmith.gen.verifier.program_run import Machine, samples
-from sosmith.gen.verifier.program_text import ProgramText
+from sosmith.gen.verifier.program.graph_forms import Graph
+from sosmith.gen.verifier.program.run import Machine, samples
+from sosmith.gen.verifier.program.text import ProgramText
 
 _SAMPLES = 32
 _READS = frozenset({"multiply", "operand", "product", "give"})

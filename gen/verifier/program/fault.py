@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from sosmith.gen.verifier.graph_forms import Graph
-from sosmith.gen.verifier.normal_form import Form, plus, scaled, valuation
-from sosmith.gen.verifier.program_text import ProgramText
+from sosmith.gen.verifier.program.graph_forms import Graph
+from sosmith.gen.verifier.program.normal_form import Form, plus, scaled, valuation
+from sosmith.gen.verifier.program.text import ProgramText
 
 
 class Contribution(NamedTuple):

@@ -23,7 +23,7 @@ from sosmith.gen.output.verilog import to_rtlil, to_verilog
 from sosmith.gen.specification.specification import Specification, from_tree, load
 from sosmith.gen.verifier.certificate_file import Certificate, certificate_text
 from sosmith.gen.verifier.graph import RejectedError
-from sosmith.gen.verifier.program_check import ProgramVerdict, check_program
+from sosmith.gen.verifier.program.check import ProgramVerdict, check_program
 from sosmith.hdl.instruction import address_bits, encoded, instruction_bits
 from sosmith.model.dataflow.program import Instruction, Opcode, Program
 

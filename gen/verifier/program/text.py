@@ -24,7 +24,7 @@ from itertools import takewhile
 from typing import NamedTuple
 
 from sosmith.gen.verifier.graph import require
-from sosmith.gen.verifier.logic import Bit, Logic
+from sosmith.gen.verifier.program.logic import Bit, Logic
 
 OPCODES = ("nothing", "take", "multiply", "operand", "product", "store", "drop", "finish", "give", "judge")
 """Opcodes by their codes."""

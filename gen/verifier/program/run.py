@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sosmith.gen.verifier.certificate_file import Certificate
-from sosmith.gen.verifier.program_text import NUMBER_BITS, Instruction, ProgramText
+from sosmith.gen.verifier.program.text import NUMBER_BITS, Instruction, ProgramText
 
 _Integers = NDArray[np.int64]
 

@@ -1,7 +1,7 @@
 """Proves that the program of a folded or serial core computes the graph of its certificate, for all inputs and states.
 
-The program is read from the core's SystemVerilog (`sosmith.gen.verifier.program_text`) and run once, with normal forms
-in place of numbers (`sosmith.gen.verifier.normal_form`)::
+The program is read from the core's SystemVerilog (`sosmith.gen.verifier.program.text`) and run once, with normal forms
+in place of numbers (`sosmith.gen.verifier.program.normal_form`)::
 
     certificate --> graph --> form of each node ---------------------+
                       |                                              v
@@ -31,13 +31,13 @@ from typing import NamedTuple
 
 from sosmith.gen.verifier.certificate_file import Certificate
 from sosmith.gen.verifier.graph import RejectedError, require
-from sosmith.gen.verifier.graph_forms import Graph, joined
-from sosmith.gen.verifier.logic import Bit
-from sosmith.gen.verifier.normal_form import ONE, Form, Forms, constant, plus, scaled, times, valuation
-from sosmith.gen.verifier.program_fault import Contribution, Group, fault
-from sosmith.gen.verifier.program_run import one_bit_away, samples
-from sosmith.gen.verifier.program_states import find_states
-from sosmith.gen.verifier.program_text import NUMBER_BITS, Instruction, ProgramText, read_program
+from sosmith.gen.verifier.program.fault import Contribution, Group, fault
+from sosmith.gen.verifier.program.graph_forms import Graph, joined
+from sosmith.gen.verifier.program.logic import Bit
+from sosmith.gen.verifier.program.normal_form import ONE, Form, Forms, constant, plus, scaled, times, valuation
+from sosmith.gen.verifier.program.run import one_bit_away, samples
+from sosmith.gen.verifier.program.states import find_states
+from sosmith.gen.verifier.program.text import NUMBER_BITS, Instruction, ProgramText, read_program
 
 HAZARD = 4
 """Least number of instructions from one that stores a word to one that reads it: so deep is the pipeline."""

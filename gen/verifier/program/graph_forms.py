@@ -1,7 +1,7 @@
 """A certificate's graphs as one: what each node is in terms of inputs and states, and where these go.
 
 The stages are joined, the inputs of each being the outputs of the one before. A node's value is then a normal form
-(`sosmith.gen.verifier.normal_form`) of the codes of the inputs and of the DELAY nodes at the same sample.
+(`sosmith.gen.verifier.program.normal_form`) of the codes of the inputs and of the DELAY nodes at the same sample.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from fractions import Fraction
 
 from sosmith.gen.verifier.certificate_file import Certificate, NodeEntry, Operation
 from sosmith.gen.verifier.graph import label, require
-from sosmith.gen.verifier.normal_form import Form, Forms, constant, plus, scaled, times
+from sosmith.gen.verifier.program.normal_form import Form, Forms, constant, plus, scaled, times
 
 
 @dataclass(frozen=True)
