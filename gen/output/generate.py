@@ -58,17 +58,15 @@ def generated(
     progress("RTLIL")
     rtlil_text = to_rtlil(design.architecture.component(), datapath.name)
     progress("SystemVerilog")
-    texts = {
+    first = {
         f"{name}.sv": to_verilog(rtlil_text),
         f"{name}.il": rtlil_text,
         f"{name}.json": to_json(manifest(facts or core_facts(design))),
-        f"{name}.c": c_source(datapath),
-        f"{name}.h": c_header(datapath),
-        **_register_files(design),
     }
+    rest = {f"{name}.c": c_source(datapath), f"{name}.h": c_header(datapath), **_register_files(design)}
     progress("certificate")
-    proven = certificate(design.quantized, design.spec.max_error, about(design, texts))
-    return {**texts, f"{name}.certificate.json": certificate_text(proven)}
+    proven = certificate(design.quantized, design.spec.max_error, about(design, {**first, **rest}))
+    return {**first, f"{name}.certificate.json": certificate_text(proven), **rest}
 
 
 def _register_files(design: CoreDesign) -> dict[str, str]:
