@@ -82,10 +82,11 @@ def test_c_model_compiles_without_a_warning_and_computes(compiler: str, tmp_path
     subprocess.run([compiler, *flags, f"{name}.c"], cwd=tmp_path, check=True)
     library = ctypes.CDLL(str(tmp_path / "model.so"))
     step = library[f"{name}_step"]
-    step.restype, step.argtypes = ctypes.c_int64, [ctypes.c_void_p, ctypes.c_int64, ctypes.c_int64]
+    step.restype = ctypes.c_int64
+    step.argtypes = [ctypes.c_void_p, ctypes.c_int64, ctypes.c_int64, ctypes.c_void_p]
     state = np.zeros(64, dtype=np.int64)
     codes = stimulus(design.datapath.inputs, 6, 2000)
-    computed = [step(state.ctypes.data, *sample) for sample in codes.tolist()]
+    computed = [step(state.ctypes.data, *sample, None) for sample in codes.tolist()]
     assert computed == design.datapath.compute(codes).tolist()
 
 
