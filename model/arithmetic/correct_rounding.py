@@ -62,33 +62,22 @@ def nearest_double(value: arb) -> float:
     UndecidedError
         If the ball does not lie between two neighbouring ties.
     """
-    if not value.is_finite():
-        raise UndecidedError
-    low, high = float(_fraction(value.lower())), float(_fraction(value.upper()))
-    if low == high:
-        return low + 0.0  # zero has no sign here
-    if ctx.prec >= _MAX_PRECISION:
-        return float(_fraction(value.mid()))
-    raise UndecidedError
+    return _rounded(value, float) + 0.0  # zero has no sign here
 
 
 def nearest_multiple(value: arb, frac: int) -> Fraction:
-    """Round to the nearest multiple of ``2**-frac``.
+    """Round to the nearest multiple of ``2**-frac``; ties and errors as for `nearest_double`."""
+    return Fraction(_rounded(value, lambda exact: round(exact * 2**frac)), 2**frac)
 
-    A ball that keeps a tie open at the last precision counts as its midpoint.
 
-    Raises
-    ------
-    UndecidedError
-        If the ball does not lie between two neighbouring ties.
-    """
+def _rounded(value: arb, rounding: Callable[[Fraction], T]) -> T:
     if not value.is_finite():
         raise UndecidedError
-    low, high = (round(_fraction(end) * 2**frac) for end in (value.lower(), value.upper()))
+    low, high = rounding(_fraction(value.lower())), rounding(_fraction(value.upper()))
     if low == high:
-        return Fraction(low, 2**frac)
+        return low
     if ctx.prec >= _MAX_PRECISION:
-        return Fraction(round(_fraction(value.mid()) * 2**frac), 2**frac)
+        return rounding(_fraction(value.mid()))
     raise UndecidedError
 
 
