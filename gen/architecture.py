@@ -45,12 +45,15 @@ class Architecture:
         Number of channels.
     reload : bool
         Whether constants can be loaded at run time.
+    protect : str
+        One of `sosmith.model.protection.PROTECTIONS`.
     """
 
     name: str
     datapath: Datapath
     channels: int = 1
     reload: bool = False
+    protect: str = "none"
 
     @cached_property
     def program(self) -> Program | None:
@@ -95,13 +98,15 @@ class Architecture:
             # Cores in the field contain this number, so the text keeps the former name of the class.
             locations = repr(made.locations).replace("Location(", "Place(")
             sizes = f"({locations}, {made.words}, {made.accumulator_bits}, {len(made.instructions)})"
-        return zlib.crc32(f"({shape!r}, {sizes})".encode())
+        # An unprotected core keeps the number that it had before there were protected ones.
+        guarded = "" if self.protect == "none" else f", {self.protect!r}"
+        return zlib.crc32(f"({shape!r}, {sizes}{guarded})".encode())
 
     @property
     def latency_cycles(self) -> int:
         """Clocks from the edge that accepts a sample to the edge that can output it; an upper limit in serial."""
         if self.program is None:
-            return core.latency_cycles(self.built, self.channels)
+            return core.latency_cycles(self.built, self.channels, protect=self.protect)
         return folded.latency_cycles(self.program, serial=self.name == "serial")
 
     @property
@@ -119,13 +124,14 @@ class Architecture:
     def component(self) -> Component:
         """Make the hardware; the top module has the name of the datapath."""
         if self.program is None:
-            return core.Core(self.built, self.channels, fingerprint=self.fingerprint)
+            return core.Core(self.built, self.channels, fingerprint=self.fingerprint, protect=self.protect)
         return folded.FoldedCore(
             self.datapath,
             self.program,
             serial=self.name == "serial",
             channels=self.channels,
             fingerprint=self.fingerprint,
+            protect=self.protect,
         )
 
 
@@ -148,12 +154,15 @@ class Budget:
         Number of channels.
     reload : bool
         Whether the hardware's constants can be loaded.
+    protect : str
+        One of `sosmith.model.protection.PROTECTIONS`.
     """
 
     clock: Fraction
     sample_rate: Fraction
     channels: int = 1
     reload: bool = False
+    protect: str = "none"
 
     @property
     def cycles(self) -> int:
@@ -208,7 +217,7 @@ def fitting(name: str, budget: Budget, datapath: Datapath) -> Architecture:
     ShortfallError
         If the datapath cannot be folded, or the architecture does not keep up.
     """
-    architecture = Architecture(name, datapath, budget.channels, budget.reload)
+    architecture = Architecture(name, datapath, budget.channels, budget.reload, budget.protect)
     budget.check(architecture)
     return architecture
 

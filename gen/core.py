@@ -150,7 +150,13 @@ def design_core(
         return fitting(name, budget, replace(datapath, calibrated=codes, wear=wear))
 
     hardware = spec.hardware
-    budget = Budget(clock=hardware.clock, sample_rate=spec.sample_rate, channels=spec.channels, reload=hardware.reload)
+    budget = Budget(
+        clock=hardware.clock,
+        sample_rate=spec.sample_rate,
+        channels=spec.channels,
+        reload=hardware.reload,
+        protect=hardware.protect,
+    )
     names = candidates(hardware.architecture, board)
     refused = ""
     for name in names:

@@ -8,7 +8,7 @@
     write_bank    --------------->  ..                   ..               --+        `chosen`
 
 A constant wider than 32 bits is written in several words, the lowest first. A write takes one clock; the constants can
-be used in every clock.
+be used in every clock. With parity, each word of each bank has one more register, which is compared in every clock.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from types import MappingProxyType
 
 from amaranth.hdl import Cat, Module, Mux, Signal, Value, signed
 from amaranth.lib import wiring
-from amaranth.lib.wiring import In
+from amaranth.lib.wiring import In, Out
 
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.reload.constants import Constant, packed, values_of
@@ -44,6 +44,8 @@ class ConstantBanks(wiring.Component):
         The datapath.
     loadable : tuple of Constant
         Its loadable constants.
+    parity : bool
+        Whether each word has a parity bit.
 
     Members
     -------
@@ -55,9 +57,12 @@ class ConstantBanks(wiring.Component):
         Number of the word in the bank.
     write_data : In(32)
         The word.
+    wrong : Out(2)
+        Whether a bit of the first bank is wrong, and of the second; only with parity.
     """
 
-    def __init__(self, datapath: Datapath, loadable: tuple[Constant, ...]) -> None:
+    def __init__(self, datapath: Datapath, loadable: tuple[Constant, ...], *, parity: bool = False) -> None:
+        self.parity = parity
         values = values_of(datapath, loadable)
         self.loadable = loadable
         self.words = len(packed(values, loadable))
@@ -69,14 +74,13 @@ class ConstantBanks(wiring.Component):
             for k, (c, value) in enumerate(zip(loadable, values, strict=True))
             for ends in [((0, value), (1, 0))]
         ]
-        super().__init__(
-            {
-                "write_enable": In(1),
-                "write_bank": In(1),
-                "write_address": In(range(self.words)),
-                "write_data": In(_WORD_BITS),
-            }
-        )
+        members = {
+            "write_enable": In(1),
+            "write_bank": In(1),
+            "write_address": In(range(self.words)),
+            "write_data": In(_WORD_BITS),
+        }
+        super().__init__(members | {"wrong": Out(2)} if parity else members)
 
     def of_stage(self, stage: int) -> dict[int, Pair]:
         """Return the constants of stage number `stage`, by node."""
@@ -87,6 +91,7 @@ class ConstantBanks(wiring.Component):
         """Build the logic that writes the registers."""
         m = Module()
         word = 0
+        wrong: tuple[list[Value], list[Value]] = ([], [])
         for constant, pair in zip(self.loadable, self._registers, strict=True):
             for low in range(0, constant.bits, _WORD_BITS):
                 high = min(low + _WORD_BITS, constant.bits)
@@ -94,7 +99,15 @@ class ConstantBanks(wiring.Component):
                     writes = self.write_enable & (self.write_bank == bank) & _is(self.write_address, word)
                     with m.If(writes):
                         m.d.sync += register.eq(Cat(register[:low], self.write_data[: high - low], register[high:]))
+                    if self.parity:
+                        init = (register.init >> low & ((1 << (high - low)) - 1)).bit_count() % 2
+                        parity = Signal(name=f"bank{bank}_parity{word}", init=init, reset_less=True)
+                        with m.If(writes):
+                            m.d.sync += parity.eq(self.write_data[: high - low].xor())
+                        wrong[bank].append(register[low:high].xor() ^ parity)
                 word += 1
+        if self.parity:
+            m.d.comb += self.wrong.eq(Cat(*(Cat(*bank).any() for bank in wrong)))
         return m
 
 

@@ -23,6 +23,14 @@ holds back a sample of a channel whose last one is still in a recursion::
                           |          |       |
                           +-- waits--+-------+   one of them is that of the sample in front
 
+With protection, every sample takes along whether a wrong bit was found in a state or a constant that it met; the first
+such sample raises the flag `fault`, and the core restarts once it has left::
+
+    fault of the sample --> guard --> fault, of all samples from this one on
+                              |
+                              +-----> broken: no sample enters --> [inside] = 0 --> restart: states are cleared
+                              +-----> scrubs: a place in the pipeline without a sample, with several channels
+
 With loadable constants, `sosmith.hdl.constant_banks` has them twice, and each sample takes its bank along.
 """
 
@@ -43,26 +51,28 @@ from sosmith.hdl.axi_stream import (
     width,
 )
 from sosmith.hdl.constant_banks import NO_CONSTANTS, ConstantBanks, Pair
+from sosmith.hdl.fault_guard import FaultGuard
 from sosmith.hdl.interleaved import InterleavedStage, schedule
 from sosmith.hdl.pipelined_logic import banks_in_use
 from sosmith.hdl.reload import ReloadPort
 from sosmith.hdl.stage import PipelinedStage, pipeline_depth
-from sosmith.hdl.status import at_rail, flag_count, outside_calibration, worn
+from sosmith.hdl.status import at_rail, flag_count, outside_calibration, with_fault, worn
 from sosmith.model.dataflow.datapath import Datapath, Stage
 from sosmith.model.reload.constants import constants
 from sosmith.model.reload.registers import ADDRESS_BITS
 
 
-def latency_cycles(datapath: Datapath, channels: int = 1) -> int:
+def latency_cycles(datapath: Datapath, channels: int = 1, *, protect: str = "none") -> int:
     """Clocks from the edge that accepts a sample to the edge that can hand its result on, without a stall."""
-    return sum(_depths(datapath, channels)) + 1 + (channels > 1) + (len(datapath.wear) > 1)
+    return sum(_depths(datapath, channels, protect)) + 1 + (channels > 1) + (len(datapath.wear) > 1)
 
 
-def _depths(datapath: Datapath, channels: int) -> list[int]:
+def _depths(datapath: Datapath, channels: int, protect: str) -> list[int]:
     """Return the number of pipeline stages of each datapath stage."""
     if channels == 1:
         return [pipeline_depth(stage.graph) for stage in datapath.stages]
-    return [schedule(stage.graph, channels).depth for stage in datapath.stages]
+    rewrites = protect != "none"
+    return [schedule(stage.graph, channels, rewrites=rewrites).depth for stage in datapath.stages]
 
 
 class Core(wiring.Component):
@@ -73,6 +83,11 @@ class Core(wiring.Component):
     there are channels. A sample of a channel that does not exist is accepted and dropped. After a reset, the states of
     several channels are cleared in one clock each.
 
+    With protection, a wrong bit in a state that is not corrected, or in a loaded constant, raises the flag `fault` with
+    the first sample that it could change, and with all later ones until a reset. The core then lets the samples inside
+    leave, clears all states as after a reset, and goes on. The states of one channel, and loaded constants, are
+    registers: they have parity, so that a wrong bit is detected even where those in memories are corrected.
+
     Parameters
     ----------
     datapath : Datapath
@@ -82,6 +97,8 @@ class Core(wiring.Component):
     fingerprint : int or None
         Fingerprint of the structure, 32 bits; None for a core whose constants cannot be loaded. Otherwise they can be
         loaded while the core works: each sample is computed with the bank that was active when the core accepted it.
+    protect : str
+        One of `sosmith.model.protection.PROTECTIONS`.
 
     Members
     -------
@@ -101,7 +118,10 @@ class Core(wiring.Component):
         AXI4-Lite slave of a `sosmith.hdl.reload.ReloadPort`; only with a fingerprint.
     """
 
-    def __init__(self, datapath: Datapath, channels: int = 1, fingerprint: int | None = None) -> None:
+    def __init__(
+        self, datapath: Datapath, channels: int = 1, fingerprint: int | None = None, *, protect: str = "none"
+    ) -> None:
+        self.protect = protect
         self.datapath = datapath
         self.channels = channels
         self.fingerprint = fingerprint
@@ -113,21 +133,27 @@ class Core(wiring.Component):
         m = Module()
         m.domains.sync = ClockDomain(local=True)
         m.d.comb += [ClockSignal("sync").eq(self.aclk), ResetSignal("sync").eq(~self.aresetn)]
-        live = flag_count(self.datapath)
+        guarded = self.protect != "none"
+        live = flag_count(self.datapath) + guarded
         buffer = m.submodules.output_buffer = StreamBuffer(
             width([self.datapath.output]) + live + channel_bits(self.channels)
         )
-        banks = None if self.fingerprint is None else ConstantBanks(self.datapath, constants(self.datapath))
+        loadable = constants(self.datapath)
+        banks = None if self.fingerprint is None else ConstantBanks(self.datapath, loadable, parity=guarded)
         stages = [
             self._stage(m, stage, NO_CONSTANTS if banks is None else banks.of_stage(k), buffer.advance)
             for k, stage in enumerate(self.datapath.stages)
         ]
         bank, waiting = Signal(), Signal(2)
-        valid, channel, taken, data = self._source(m, stages, buffer.advance, bank, waiting)
+        guard, empty = FaultGuard(max(1, channel_bits(self.channels))) if guarded else None, Signal()
+        valid, channel, taken, data, scrubs = self._source(m, stages, (buffer.advance, bank, waiting), guard, empty)
+        enters = (valid | scrubs) & buffer.advance
+        port = None
         if banks is not None:
-            self._reload(m, banks, bank, Cat(waiting, *(component.uses for component in stages)))
+            port = self._reload(m, banks, bank, Cat(waiting, *(component.uses for component in stages)))
         status: Value = Cat(at_rail(self.datapath.inputs, data), outside_calibration(self.datapath, data))
         codes: list[Value] = [data[f.offset : f.offset + f.port.bits] for f in fields(self.datapath.inputs)]
+        fault: Value = Const(0, 1)
         for component in stages:
             graph = component.stage.graph
             m.d.comb += [getattr(component, f"i{k}").eq(code) for k, code in enumerate(codes)]
@@ -135,38 +161,96 @@ class Core(wiring.Component):
             if isinstance(component, InterleavedStage):
                 m.d.comb += component.i_channel.eq(channel)
                 channel = component.o_channel
+            if guard is not None:
+                m.d.comb += component.i_fault.eq(fault)
+                fault = component.o_fault
+                if isinstance(component, InterleavedStage):
+                    m.d.comb += component.i_scrub.eq(scrubs)
+                    scrubs = component.o_scrub
             valid, taken = component.o_valid, component.o_bank
             codes = [getattr(component, f"o{k}") for k in range(len(graph.outputs))]
-        for k in range(sum(_depths(self.datapath, self.channels))):
+        for k in range(sum(_depths(self.datapath, self.channels, self.protect))):
             held = Signal(len(status), name=f"status{k + 1}", reset_less=True)
             with m.If(buffer.advance):
                 m.d.sync += held.eq(status)
             status = held
         code, saturated = codes[0], stages[-1].o_saturated
         coming = channel
+        if guard is not None:
+            if banks is not None:
+                fault = fault | (valid & Mux(taken, banks.wrong[1], banks.wrong[0]))
+            fault = fault & (valid | scrubs)
         if len(self.datapath.wear) > 1:  # it takes a clock to read the limits of the channel
             valid, code, status, saturated, channel = self._delayed(
                 m, buffer.advance, [valid, code, status, saturated, channel]
             )
-        wear = worn(m, self.datapath, code, coming, buffer.advance)
+            if guard is not None:
+                (fault,) = self._delayed(m, buffer.advance, [fault], "fault_judged")
+        wear = worn(m, self.datapath, code, coming, buffer.advance, self.protect)
+        flags: Value = Cat(status, saturated, wear.flags)
+        if guard is not None:
+            fault = fault | (valid & wear.failed)
+            flags = Cat(flags, guard.fault | fault)
+            m.submodules.guard = guard
+            m.d.comb += empty.eq(self._restart(m, guard, enters, stages, fault, buffer.advance))
+            repaired = [c.corrected for c in stages if isinstance(c, InterleavedStage)]
+            repaired.append(valid & wear.corrected & buffer.advance)
+            if port is not None:
+                m.d.comb += [
+                    port.corrected.eq(Cat(*repaired).any()),
+                    port.failed.eq(guard.failed),
+                    guard.acknowledge.eq(port.acknowledge),
+                ]
         output = extended(code, self.datapath.output.bytes * 8)
         m.d.comb += [
             buffer.i_valid.eq(valid),
-            buffer.i_data.eq(Cat(output, status, saturated, wear, channel)),
+            buffer.i_data.eq(Cat(output, flags, channel)),
             self.m_axis_tvalid.eq(buffer.o_valid),
             buffer.o_ready.eq(self.m_axis_tready),
         ]
+        handed = buffer.o_data[len(output) : len(output) + live]
         m.d.comb += [
             self.m_axis_tdata.eq(buffer.o_data[: len(output)]),
-            self.m_axis_tuser.eq(buffer.o_data[len(output) : len(output) + live]),
+            self.m_axis_tuser.eq(with_fault(handed[:-1], handed[-1]) if guarded else handed),
         ]
         if self.channels > 1:
             m.d.comb += self.m_axis_tdest.eq(buffer.o_data[len(output) + live :])
         return m
 
-    def _delayed(self, m: Module, advance: Value, values: list[Value]) -> list[Value]:
+    def _restart(
+        self,
+        m: Module,
+        guard: FaultGuard,
+        enters: Value,
+        stages: list[PipelinedStage | InterleavedStage],
+        fault: Value,
+        advance: Value,
+    ) -> Signal:
+        """Tell the guard what leaves with a fault, and clear registers at a restart; return whether none is inside.
+
+        `enters` is whether a sample or a scrub is taken by the first stage at this clock.
+        """
+        inside = Signal(range(self._depth + 1))
+        with m.If(enters):
+            m.d.sync += inside.eq(self._depth)
+        with m.Elif(advance & inside.any()):
+            m.d.sync += inside.eq(inside - 1)
+        m.d.comb += guard.failed.eq(fault & advance)
+        for component in stages:
+            if isinstance(component, PipelinedStage):
+                m.d.comb += component.clear.eq(guard.restart)
+        empty = Signal()
+        m.d.comb += empty.eq(~inside.any())
+        return empty
+
+    @property
+    def _depth(self) -> int:
+        """Clocks of the pipeline from the first stage to the output buffer."""
+        return sum(_depths(self.datapath, self.channels, self.protect)) + (len(self.datapath.wear) > 1)
+
+    def _delayed(self, m: Module, advance: Value, values: list[Value], name: str = "judged") -> list[Value]:
         """Return the values a clock of the pipeline later; the first is the valid bit, which alone is reset."""
-        later = [Signal(value.shape(), name=f"judged{k}", reset_less=k > 0) for k, value in enumerate(values)]
+        later = [Signal(value.shape(), name=f"{name}{k}", reset_less=k > 0) for k, value in enumerate(values)]
         with m.If(advance):
             m.d.sync += [register.eq(value) for register, value in zip(later, values, strict=True)]
         return list(later)
@@ -175,16 +259,22 @@ class Core(wiring.Component):
         self, m: Module, stage: Stage, constants: Mapping[int, Pair], advance: Value
     ) -> PipelinedStage | InterleavedStage:
         several = self.channels > 1
-        component = InterleavedStage(stage, self.channels, constants) if several else PipelinedStage(stage, constants)
+        component = (
+            InterleavedStage(stage, self.channels, constants, protect=self.protect)
+            if several
+            else PipelinedStage(stage, constants, parity=self.protect != "none")
+        )
         m.submodules[stage.name] = component
         m.d.comb += component.advance.eq(advance)
         return component
 
-    def _reload(self, m: Module, banks: ConstantBanks, bank: Signal, uses: Value) -> None:
-        """Connect the reload port to the banks; `uses` are pairs of bits: whether samples use bank 0, and bank 1."""
+    def _reload(self, m: Module, banks: ConstantBanks, bank: Signal, uses: Value) -> ReloadPort:
+        """Connect the reload port, which is returned, to the banks; `uses` are pairs of bits: whether samples use bank 0, and bank 1."""
         assert self.fingerprint is not None
         m.submodules.constant_banks = banks
-        m.submodules.reload_port = port = ReloadPort(banks.words, design=self.fingerprint)
+        m.submodules.reload_port = port = ReloadPort(
+            banks.words, design=self.fingerprint, protected=self.protect != "none"
+        )
         forward_slave(m, self, port)
         m.d.comb += [
             bank.eq(port.bank),
@@ -195,23 +285,42 @@ class Core(wiring.Component):
             banks.write_address.eq(port.write_address),
             banks.write_data.eq(port.write_data),
         ]
+        return port
 
     def _source(
-        self, m: Module, stages: list[PipelinedStage | InterleavedStage], advance: Value, bank: Value, waiting: Signal
-    ) -> tuple[Value, Value, Value, Value]:
+        self,
+        m: Module,
+        stages: list[PipelinedStage | InterleavedStage],
+        control: tuple[Value, Value, Signal],
+        guard: FaultGuard | None,
+        empty: Value,
+    ) -> tuple[Value, Value, Value, Value, Value]:
         """Return whether there is a sample for the first stage, its channel, its bank, and its codes.
 
-        `bank` is that of samples accepted now. `waiting` is driven with the banks that waiting samples use.
+        The last value is whether there is a scrub instead. The control is `advance`; the bank of samples accepted now;
+        and a signal that is driven with the banks that waiting samples use. `empty` is whether the pipeline is.
         """
+        advance, bank, waiting = control
+        blocked: Value = Const(0, 1) if guard is None else guard.broken
         interleaved = [component for component in stages if isinstance(component, InterleavedStage)]
         if not interleaved:
-            m.d.comb += self.s_axis_tready.eq(advance)
-            return self.s_axis_tvalid, Const(0, 0), bank, self.s_axis_tdata
+            if guard is None:
+                m.d.comb += self.s_axis_tready.eq(advance)
+                return self.s_axis_tvalid, Const(0, 0), bank, self.s_axis_tdata, Const(0, 1)
+            m.d.comb += [self.s_axis_tready.eq(advance & ~blocked), guard.idle.eq(blocked & empty)]
+            return self.s_axis_tvalid & ~blocked, Const(0, 0), bank, self.s_axis_tdata, Const(0, 1)
         bits = channel_bits(self.channels)
         buffer = m.submodules.input_buffer = StreamBuffer(len(self.s_axis_tdata) + bits + 1)
         clearing, cleared = Signal(init=1), Signal(bits)
         exists = self.s_axis_tdest < self.channels
-        dest = buffer.o_data[:bits]
+        dest: Value = buffer.o_data[:bits]
+        scrubs: Value = Const(0, 1)
+        if guard is not None:
+            dest = Mux(buffer.o_valid, dest, guard.address)
+            scrubs = guard.scrubs & (guard.address < self.channels)
+            with m.If(guard.restart):
+                m.d.sync += [clearing.eq(1), cleared.eq(0)]
+            blocked = blocked | clearing
         with m.If(clearing):
             m.d.sync += cleared.eq(cleared + 1)
             with m.If(cleared == self.channels - 1):
@@ -222,20 +331,24 @@ class Core(wiring.Component):
         distance = max(component.schedule.distance for component in interleaved)
         valid = Signal()
         for k in range(distance - 1):
-            before = near[-1] if near else (valid, dest)
+            before = near[-1] if near else (valid if guard is None else valid | scrubs, dest)
             taken, channel = Signal(name=f"near{k}"), Signal(bits, name=f"near_channel{k}", reset_less=True)
             with m.If(advance):
                 m.d.sync += [taken.eq(before[0]), channel.eq(before[1])]
             near.append((taken, channel))
             waits = waits | (taken & (channel == dest))
+        moves = ~waits if guard is None else ~waits & ~blocked
         m.d.comb += [
             self.s_axis_tready.eq(buffer.advance & ~clearing),
             buffer.i_valid.eq(self.s_axis_tvalid & exists & ~clearing),
             buffer.i_data.eq(Cat(self.s_axis_tdest[:bits], bank, self.s_axis_tdata)),
             waiting.eq(banks_in_use([buffer.o_valid, ~buffer.advance], [buffer.o_data[bits], buffer.o_next[bits]])),
-            valid.eq(buffer.o_valid & ~waits),
-            buffer.o_ready.eq(advance & ~waits),
+            valid.eq(buffer.o_valid & moves),
+            buffer.o_ready.eq(advance & moves),
         ]
+        if guard is not None:
+            free = advance & moves & ~buffer.o_valid
+            m.d.comb += guard.idle.eq(Mux(guard.broken, empty, free))
         for component in interleaved:
             m.d.comb += [component.clear.eq(clearing), component.clear_channel.eq(cleared)]
-        return valid, dest, buffer.o_data[bits], buffer.o_data[bits + 1 :]
+        return valid, dest, buffer.o_data[bits], buffer.o_data[bits + 1 :], scrubs

@@ -26,6 +26,17 @@ Serial has three pipeline stages and no multiplier block: the word is addressed 
 and in stage 3 shifts and additions multiply in the accumulator itself, one clock for each bit of the second factor,
 while the pipeline waits.
 
+With protection, `sosmith.hdl.check_bits` stands behind both memories, and a scrubber reads them while no sample is in
+work, one address a clock, at least one before each sample. What it corrects is written back::
+
+    +--------+ word + check bits
+    | memory |-----------------> check bits ---> instruction, word
+    +--------+                     |    |
+      ^   ^ scrub                  |    +------> corrected ---> written back, one clock later
+      |   +-- [scrub] + 1          +-----------> failed ------> [broken] ---> all words are cleared after the result
+      |                                               +-------> [fault] ----> m_axis_tuser, until a reset
+      +-- counter, address of the instruction
+
 As an example, the program in `sosmith.model.dataflow.folding`, which computes ``y = floor(3 / 4 y1 + 4 x)`` with digits
 of 4 bits, for x = 7 and y1 = 28 = 12 + 16 * 1. The sample is found at edge 0; at the edges 6 to 13, pipeline stage 5
 holds the instructions 0 to 7::
@@ -47,10 +58,12 @@ from amaranth.lib.memory import Memory
 
 from sosmith.hdl.axi_lite import forward_slave, slave_members
 from sosmith.hdl.axi_stream import channel_bits, core_members, extended, fields
+from sosmith.hdl.check_bits import CheckBits
+from sosmith.hdl.fault_guard import FaultGuard
 from sosmith.hdl.instruction import PipelinedInstruction, address_bits, encoded, instruction_bits
 from sosmith.hdl.pipelined_logic import limits
 from sosmith.hdl.reload import ReloadPort
-from sosmith.hdl.status import at_rail, worn
+from sosmith.hdl.status import at_rail, with_fault, worn
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.graph import Op
 from sosmith.model.dataflow.program import Location, Opcode, Program
@@ -95,6 +108,10 @@ class FoldedCore(wiring.Component):
     `s_axis_tready` waits for `s_axis_tvalid`, which AXI4-Stream allows. A sample of a channel that does not exist is
     accepted and dropped.
 
+    With protection, a wrong bit in a memory that is not corrected raises the flag `fault` with the first sample that it
+    could change, and with all later ones until a reset. After that sample the core clears its memory as after a reset,
+    and goes on. A sample is accepted when its result is there, so that a damaged program neither loses nor doubles one.
+
     With a fingerprint, the core has two banks for its program, so that another one can be loaded while it works. Each
     sample is computed by the bank that was active when the core found it.
 
@@ -110,6 +127,8 @@ class FoldedCore(wiring.Component):
         Number of channels.
     fingerprint : int or None
         Fingerprint of the structure, 32 bits; None for a core whose program cannot be loaded.
+    protect : str
+        One of `sosmith.model.protection.PROTECTIONS`, for all memories.
 
     Members
     -------
@@ -120,13 +139,21 @@ class FoldedCore(wiring.Component):
     """
 
     def __init__(
-        self, datapath: Datapath, program: Program, *, serial: bool, channels: int = 1, fingerprint: int | None = None
+        self,
+        datapath: Datapath,
+        program: Program,
+        *,
+        serial: bool,
+        channels: int = 1,
+        fingerprint: int | None = None,
+        protect: str = "none",
     ) -> None:
         self.datapath = datapath
         self.program = program
         self.serial = serial
         self.channels = channels
         self.fingerprint = fingerprint
+        self.protect = protect
         members = core_members(datapath.inputs, datapath.output, channels)
         super().__init__(members if fingerprint is None else members | slave_members(ADDRESS_BITS))
 
@@ -137,18 +164,55 @@ class FoldedCore(wiring.Component):
         m.d.comb += [ClockSignal("sync").eq(self.aclk), ResetSignal("sync").eq(~self.aresetn)]
         advance, clearing, start = Signal(), Signal(init=1), Signal()
         busy, dropped = Signal(), Signal()
-        channel = self._channel(m, busy | clearing, dropped, start)
+        guard = self._guard(m, busy, clearing)
+        channel = self._channel(m, busy | clearing if guard is None else busy | clearing | guard.broken, dropped, start)
         counter, fetching = self._control(m, (advance, clearing, start, busy), channel)
-        pipeline = self._fetch(m, advance, counter, fetching, self._reload(m, start, busy))
+        reload = self._reload(m, start, busy)
+        pipeline, fetched = self._fetch(m, (advance, start), (counter, fetching), reload, guard)
         read = Signal(signed(self._word))
         total = self._accumulate(m, advance, pipeline, read)
-        self._remember(m, (advance, clearing), (counter, total, read, channel), pipeline)
-        self._hand_out(m, (advance, start), (total, read, channel), pipeline)
+        remembered = self._remember(m, (advance, clearing), (counter, total, read, channel), pipeline, guard)
+        ends = advance & pipeline[-2].valid & ~pipeline[-3].valid
+        limits = self._hand_out(m, (advance, start, ends), (total, read, channel), pipeline, guard)
         taken = Signal()
-        last_digit = pipeline[-1].is_for(sum(location.digits for location in self.program.inputs) - 1)
-        m.d.sync += taken.eq(advance & pipeline[-1].valid & pipeline[-1].has(Opcode.TAKE) & last_digit)
+        if guard is None:
+            last_digit = pipeline[-1].is_for(sum(location.digits for location in self.program.inputs) - 1)
+            m.d.sync += taken.eq(advance & pipeline[-1].valid & pipeline[-1].has(Opcode.TAKE) & last_digit)
+        else:
+            m.d.sync += taken.eq(ends)
+            self._restart(m, guard, (clearing, channel, total))
+            self._report(m, guard, reload, [fetched, remembered, limits])
         m.d.comb += self.s_axis_tready.eq(taken | dropped)
         return m
+
+    def _guard(self, m: Module, busy: Signal, clearing: Signal) -> FaultGuard | None:
+        """Return the guard of the memories; None without protection."""
+        if self.protect == "none":
+            return None
+        depth = max(len(self.program.instructions), memory_depth(self.program, self.channels))
+        m.submodules.guard = guard = FaultGuard((depth - 1).bit_length())
+        m.d.comb += guard.idle.eq(~busy & ~clearing)
+        return guard
+
+    def _restart(self, m: Module, guard: FaultGuard, cleared: tuple[Signal, Signal, Signal]) -> None:
+        """Clear what a damaged program or word may have left: the words as after a reset, and the accumulator."""
+        clearing, channel, total = cleared
+        with m.If(guard.restart):
+            m.d.sync += [clearing.eq(1), channel.eq(0), total.eq(0)]
+
+    def _report(
+        self, m: Module, guard: FaultGuard, reload: tuple[ReloadPort, Signal] | None, found: list[tuple[Value, Value]]
+    ) -> None:
+        """Tell the guard, and the registers if there are any, what was corrected and what was not, at this clock."""
+        corrected, failed = (Cat(*sides).any() for sides in zip(*found, strict=True))
+        m.d.comb += guard.failed.eq(failed)
+        if reload is not None:
+            port, _ = reload
+            m.d.comb += [
+                port.corrected.eq(corrected),
+                port.failed.eq(failed),
+                guard.acknowledge.eq(port.acknowledge),
+            ]
 
     @property
     def _word(self) -> int:
@@ -206,7 +270,9 @@ class FoldedCore(wiring.Component):
         if self.fingerprint is None:
             return None
         depth, bits = len(self.program.instructions), instruction_bits(self.program)
-        m.submodules.reload_port = port = ReloadPort(depth, bits=bits, design=self.fingerprint)
+        m.submodules.reload_port = port = ReloadPort(
+            depth, bits=bits, design=self.fingerprint, protected=self.protect != "none"
+        )
         forward_slave(m, self, port)
         bank = Signal(reset_less=True)
         with m.If(start):
@@ -215,38 +281,96 @@ class FoldedCore(wiring.Component):
         return port, bank
 
     def _fetch(
-        self, m: Module, advance: Signal, counter: Signal, fetching: Signal, reload: tuple[ReloadPort, Signal] | None
-    ) -> list[PipelinedInstruction]:
-        """Read the program; return the instructions in the pipeline stages, the one just read first."""
+        self,
+        m: Module,
+        control: tuple[Signal, Signal],
+        position: tuple[Signal, Signal],
+        reload: tuple[ReloadPort, Signal] | None,
+        guard: FaultGuard | None,
+    ) -> tuple[list[PipelinedInstruction], tuple[Value, Value]]:
+        """Read the program; return the instructions in the pipeline stages, the one just read first.
+
+        Return besides whether a wrong bit was corrected at this clock, and whether one was found that could not be.
+        """
+        (advance, start), (counter, fetching) = control, position
         codes = [encoded(instruction, self.program) for instruction in self.program.instructions]
+        count = len(codes)
         if reload is not None:
             codes += [0] * ((1 << (len(codes) - 1).bit_length()) - len(codes))
             codes += [0] * len(codes)
+        check = CheckBits(instruction_bits(self.program), self.protect)
         m.submodules.program = program = Memory(
-            shape=instruction_bits(self.program), depth=len(codes), init=codes, attrs=_NO_COLLISIONS
+            shape=check.width, depth=len(codes), init=[check.word(code) for code in codes], attrs=_NO_COLLISIONS
         )
         fetch = program.read_port()
-        m.d.comb += [fetch.addr.eq(counter), fetch.en.eq(advance)]
-        if reload is not None:
-            port, bank = reload
-            index_bits = (len(codes) // 2 - 1).bit_length()
-            write = program.write_port()
-            m.d.comb += [
-                fetch.addr.eq(Cat(counter[:index_bits], Const(0, max(0, index_bits - len(counter))), bank)),
-                write.addr.eq(Cat(port.write_address, Const(0, index_bits - len(port.write_address)), ~port.bank)),
-                write.data.eq(port.write_data),
-                write.en.eq(port.write_enable),
-            ]
+        index, bank = self._program_address(m, counter, count, reload, guard)
+        m.d.comb += [fetch.addr.eq(Cat(index, bank)), fetch.en.eq(advance)]
+        found = check.read(m, fetch.data, "instruction1")
         valid = Signal(name="valid1")
-        pipeline = [PipelinedInstruction(fetch.data, valid, self.program)]
+        looks = valid & advance if guard is None else (valid & advance) | guard.read
+        fetched = Signal(len(fetch.addr), reset_less=True)
+        rewrites: Value = Const(0, 1)
+        if self.protect == "correct":
+            with m.If(advance):
+                m.d.sync += fetched.eq(fetch.addr)
+            # A word that is read while it is written would be undefined.
+            rewrites = looks & found.corrected & (fetched != fetch.addr)
+        self._write_program(m, program, check, reload, (rewrites, fetched, found.data))
+        pipeline = [PipelinedInstruction(found.data, valid, self.program)]
         with m.If(advance):
             m.d.sync += valid.eq(fetching)
             for k in range(2, _SERIAL_DEPTH + 1 if self.serial else _FOLDED_DEPTH + 1):
-                code = Signal(len(fetch.data), name=f"instruction{k}", reset_less=True)
+                code = Signal(len(found.data), name=f"instruction{k}", reset_less=True)
                 valid = Signal(name=f"valid{k}")
                 m.d.sync += [code.eq(pipeline[-1].code), valid.eq(pipeline[-1].valid)]
                 pipeline.append(PipelinedInstruction(code, valid, self.program))
-        return pipeline
+        return pipeline, (looks & found.corrected, looks & found.failed)
+
+    def _program_address(
+        self,
+        m: Module,
+        counter: Signal,
+        count: int,
+        reload: tuple[ReloadPort, Signal] | None,
+        guard: FaultGuard | None,
+    ) -> tuple[Value, Value]:
+        """Return the instruction to read, and its bank: that of the sample in work, or one that is scrubbed."""
+        bits = (count - 1).bit_length()
+        index: Value = counter
+        bank: Value = Const(0, 0) if reload is None else reload[1]
+        if guard is not None:
+            index = Mux(guard.scrubs & (guard.address < count), guard.address[:bits], counter[:bits])
+            if reload is not None:
+                bank = Mux(guard.scrubs, reload[0].bank, bank)
+        if reload is not None:
+            index = Cat(index[:bits], Const(0, max(0, bits - len(index))))
+        return index, bank
+
+    def _write_program(
+        self,
+        m: Module,
+        program: Memory,
+        check: CheckBits,
+        reload: tuple[ReloadPort, Signal] | None,
+        rewrite: tuple[Value, Value, Value],
+    ) -> None:
+        """Write the idle bank from the reload port, and otherwise what was corrected."""
+        rewrites, fetched, corrected = rewrite
+        if reload is None and self.protect != "correct":
+            return
+        write = program.write_port()
+        enable, address, data = rewrites, fetched, check.written(corrected)
+        if reload is not None:
+            port, _ = reload
+            index_bits = len(write.addr) - 1
+            loaded = Cat(port.write_address, Const(0, index_bits - len(port.write_address)), ~port.bank)
+            if self.protect == "correct":
+                enable = port.write_enable | rewrites
+                address = Mux(port.write_enable, loaded, fetched)
+                data = check.written(Mux(port.write_enable, port.write_data, corrected))
+            else:
+                enable, address, data = port.write_enable, loaded, check.written(port.write_data)
+        m.d.comb += [write.addr.eq(address), write.data.eq(data), write.en.eq(enable)]
 
     def _accumulate(self, m: Module, advance: Signal, pipeline: list[PipelinedInstruction], read: Signal) -> Signal:
         """Multiply in the last pipeline stage but one, add up in the last; return the accumulator."""
@@ -280,30 +404,54 @@ class FoldedCore(wiring.Component):
         control: tuple[Signal, Signal],
         values: tuple[Signal, Signal, Signal, Signal],
         pipeline: list[PipelinedInstruction],
-    ) -> None:
-        """Read the words at the instructions' addresses, and write those that they store."""
+        guard: FaultGuard | None,
+    ) -> tuple[Value, Value]:
+        """Read the words at the instructions' addresses, and write those that they store.
+
+        Return whether a wrong bit was corrected at this clock, and whether one was found that could not be.
+        """
         (advance, clearing), (counter, total, read, channel) = control, values
         first, last = pipeline[0 if self.serial else 1], pipeline[-1]
         take = last.has(Opcode.TAKE)
         top = total[self._word - 1] & last.has(Opcode.FINISH)
         digit = Mux(take, self._input_digit(last), Cat(total[: self._word - 1], top))
         stores = take | last.has(Opcode.STORE) | last.has(Opcode.FINISH)
-        word = self._memory(
-            m,
-            read=(Cat(first.address, channel), advance),
-            write=(
-                Cat(Mux(clearing, counter[: address_bits(self.program)], last.address), channel),
-                Mux(clearing, self._is_one(counter), digit),
-                clearing | (advance & last.valid & stores),
-            ),
+        address: Value = Cat(first.address, channel)
+        target: Value = Mux(clearing, counter[: address_bits(self.program)], last.address)
+        where, what = Cat(target, channel), Mux(clearing, self._is_one(counter), digit)
+        enable = clearing | (advance & last.valid & stores)
+        check = CheckBits(self._word, self.protect)
+        looks: Value = advance & self._reading(pipeline).valid
+        if guard is not None:
+            address = Mux(guard.scrubs & self._is_word(guard.address), guard.address[: len(address)], address)
+            looks = looks | guard.read
+        word = read if guard is None else Signal(check.width)
+        found = check.read(m, word, "read")
+        if self.protect == "correct":
+            scrubbed = Signal(len(address), reset_less=True)
+            rewrites = guard.read & found.corrected & ~clearing & (scrubbed != address)
+            m.d.sync += scrubbed.eq(address)
+            where = Mux(rewrites, scrubbed, where)
+            what = Mux(rewrites, found.data, what)
+            enable = enable | rewrites
+        m.d.comb += word.eq(
+            self._memory(m, check, read=(address, advance), write=(where, check.written(what), enable))
         )
-        m.d.comb += read.eq(word)
+        if guard is not None:
+            m.d.comb += read.eq(found.data)
+        return looks & found.corrected, looks & found.failed
+
+    def _is_word(self, address: Value) -> Value:
+        """Whether there is a word at an address to scrub."""
+        return address < memory_depth(self.program, self.channels)
 
     def _reading(self, pipeline: list[PipelinedInstruction]) -> PipelinedInstruction:
         """Return the instruction whose word has just been read."""
         return pipeline[-2 if self.serial else -3]
 
-    def _memory(self, m: Module, read: tuple[Value, Value], write: tuple[Value, Value, Value]) -> Value:
+    def _memory(
+        self, m: Module, check: CheckBits, read: tuple[Value, Value], write: tuple[Value, Value, Value]
+    ) -> Value:
         """Make the memory of all channels; return the word read.
 
         It is cut into slices as wide as a block RAM of so many words. Block RAMs side by side need no logic; behind
@@ -312,9 +460,10 @@ class FoldedCore(wiring.Component):
         words, depth = self.program.words, memory_depth(self.program, self.channels)
         width = next((bits for most, bits in _SLICES.items() if depth <= most), _SLICES[max(_SLICES)])
         slices: list[Value] = []
-        for low in range(0, self._word, width):
-            high = min(low + width, self._word)
-            init = [int(low == 0 and address % words == self.program.one) for address in range(depth)]
+        for low in range(0, check.width, width):
+            high = min(low + width, check.width)
+            one = check.word(1) >> low & ((1 << (high - low)) - 1)
+            init = [one if address % words == self.program.one else 0 for address in range(depth)]
             m.submodules[f"words{low}"] = ram = Memory(shape=high - low, depth=depth, init=init, attrs=_NO_COLLISIONS)
             reader, writer = ram.read_port(), ram.write_port()
             m.d.comb += [
@@ -330,19 +479,22 @@ class FoldedCore(wiring.Component):
     def _hand_out(
         self,
         m: Module,
-        control: tuple[Signal, Signal],
+        control: tuple[Signal, Signal, Value],
         values: tuple[Signal, Signal, Signal],
         pipeline: list[PipelinedInstruction],
-    ) -> None:
-        """Collect the digits of the result and its status; the last instruction gives the last digit."""
-        (advance, start), (total, read, channel) = control, values
-        *_, following, present, last = pipeline
-        reading = self._reading(pipeline)
+        guard: FaultGuard | None,
+    ) -> tuple[Value, Value]:
+        """Collect the digits of the result and its status; the last instruction gives the last digit.
+
+        Return whether a wrong bit in the limits of wear was corrected, and whether one was found that could not be.
+        """
+        (advance, start, ends), (total, read, channel) = control, values
+        last, reading = pipeline[-1], self._reading(pipeline)
         given = [Signal(self._word, name=f"given{k}", reset_less=True) for k in range(self.program.output.digits)]
         for k, digit in enumerate(given):
             with m.If(advance & reading.valid & reading.has(Opcode.GIVE) & reading.is_for(k)):
                 m.d.sync += digit.eq(read)
-        with m.If(advance & present.valid & ~following.valid):
+        with m.If(ends):
             m.d.sync += self.m_axis_tvalid.eq(1)
         with m.If(self.m_axis_tvalid & self.m_axis_tready):
             m.d.sync += self.m_axis_tvalid.eq(0)
@@ -353,10 +505,16 @@ class FoldedCore(wiring.Component):
             with m.If(advance & last.valid & last.has(Opcode.JUDGE) & total[-1]):
                 m.d.sync += outside.eq(1)
         code, saturated = self._limited(given)
+        # Without protection the limits are read again and again; with it just once, so that an upset changes no flag
+        # of a result that waits for the sink.
+        wear = worn(m, self.datapath, code, channel, Const(1) if guard is None else ends, self.protect)
+        flags: Value = Cat(rail, outside, saturated, wear.flags)
         m.d.comb += [
             self.m_axis_tdata.eq(extended(code, self.datapath.output.bytes * 8)),
-            self.m_axis_tuser.eq(Cat(rail, outside, saturated, worn(m, self.datapath, code, channel, Const(1)))),
+            self.m_axis_tuser.eq(flags if guard is None else with_fault(flags, guard.fault | wear.failed)),
         ]
+        leaves = self.m_axis_tvalid & self.m_axis_tready
+        return leaves & wear.corrected, leaves & wear.failed
 
     def _multiply_serially(
         self, m: Module, total: Signal, factors: tuple[Value, Value], control: tuple[Signal, Value]

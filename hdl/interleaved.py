@@ -31,6 +31,15 @@ The channels 0, 1, 2, 0, 1 with the codes 1, 1, -2, 1, 1 give::
     o_channel                            0    1    2    0    1
     o0                                   1    1   -2    2    2
 
+With protection, each memory has check bits, and what a sample found wrong goes with it. A scrub goes through the stages
+like a sample of its channel, but that each memory is written with what it has read::
+
+    +----------+                                          scrub?
+    | v2, 3x5+ |--> check bits --> corrected --+--> ..      |
+    |  check   |        |                      +--[passed]--> Mux --> check bits --> data of the memory
+    +----------+        +--> failed --> or -->[fault2]..    ^
+                                               the next state
+
 The latency is 4 clocks. The same recursion takes 3 pipeline stages for 2 channels, and 6 for 17, whose block RAM has a
 register before it and one behind.
 """
@@ -41,12 +50,13 @@ import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from amaranth.hdl import Module, Mux, Signal, Value
+from amaranth.hdl import Const, Module, Mux, Signal, Value
 from amaranth.lib import wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
 from sosmith.hdl.axi_stream import channel_bits
+from sosmith.hdl.check_bits import CheckBits, Read
 from sosmith.hdl.constant_banks import NO_CONSTANTS, Pair
 from sosmith.hdl.pipelined_logic import PipelinedLogic, banks_in_use, limits, shape_of
 from sosmith.hdl.stage import NO_LOGIC
@@ -101,7 +111,7 @@ class Schedule:
         return max((written - addressed[delay] + 1 for delay, written in self.writes.items()), default=1)
 
 
-def schedule(graph: Graph, channels: int) -> Schedule:
+def schedule(graph: Graph, channels: int, *, rewrites: bool = False) -> Schedule:
     """Schedule `graph` with the shortest pipeline stages that let all channels take turns without waiting.
 
     Parameters
@@ -110,14 +120,16 @@ def schedule(graph: Graph, channels: int) -> Schedule:
         What the stage computes.
     channels : int
         Number of channels, at least 2.
+    rewrites : bool
+        Whether a state may have to be written as it was read, which takes until it has been read.
     """
     least = max((_time(graph, node) for node in graph.nodes), default=0)
     reading = 1 if channels <= _MAX_LUT_RAM_CHANNELS else 2
-    periods = itertools.count(max(least, 1))
-    return next(found for period in periods if (found := _spread(graph, period, reading)).distance <= channels)
+    tried = (_spread(graph, period, reading, rewrites) for period in itertools.count(max(least, 1)))
+    return next(found for found in tried if found.distance <= channels)
 
 
-def _spread(graph: Graph, period: int, reading: int) -> Schedule:
+def _spread(graph: Graph, period: int, reading: int, rewrites: bool) -> Schedule:
     """Schedule `graph` with pipeline stages of the time `period`.
 
     A first pass finds the earliest moment at which each value can be there. A second one computes each as late as the
@@ -155,7 +167,7 @@ def _spread(graph: Graph, period: int, reading: int) -> Schedule:
             stages[index] = 0
         elif node.op in NO_LOGIC - {Op.DELAY}:  # bits are dropped as early as possible, before they take registers
             stages[index] = stages[node.operands[0]]
-    writes = {i: max(stages[nodes[i].operands[0]] + behind, stages[i] - 1) for i in graph.delays}
+    writes = {i: max(stages[nodes[i].operands[0]] + behind, stages[i] - (not rewrites)) for i in graph.delays}
     return Schedule(tuple(stages), writes, reading, depth)
 
 
@@ -187,6 +199,8 @@ class InterleavedStage(wiring.Component):
         Number of channels, at least 2.
     constants : dict of int to Pair
         Constants that come from one of two banks, by node.
+    protect : str
+        One of `sosmith.model.protection.PROTECTIONS`, for the memories of the states.
 
     Members
     -------
@@ -208,19 +222,32 @@ class InterleavedStage(wiring.Component):
         Whether the outputs hold a sample, and of which channel.
     o_saturated : Out(1)
         Whether the output had to be limited to its range.
+    i_scrub, o_scrub : In(1), Out(1)
+        Whether the states of `i_channel` are to be written as they are read, and whether that is done for `o_channel`;
+        never with `i_valid`, and by the same rule for channels that come again. Only with protection.
+    i_fault, o_fault : In(1), Out(1)
+        Whether a wrong bit that could not be corrected was found for what is at the inputs, and at the outputs; only
+        with protection.
+    corrected : Out(1)
+        Whether a wrong bit is corrected at this clock; only with protection.
     """
 
-    def __init__(self, stage: Stage, channels: int, constants: Mapping[int, Pair] = NO_CONSTANTS) -> None:
+    def __init__(
+        self, stage: Stage, channels: int, constants: Mapping[int, Pair] = NO_CONSTANTS, *, protect: str = "none"
+    ) -> None:
         self.stage = stage
+        self.protect = protect
         self.constants = constants
         self.channels = channels
-        self.schedule = schedule(stage.graph, channels)
+        self.schedule = schedule(stage.graph, channels, rewrites=protect != "none")
         graph, bits = stage.graph, channel_bits(channels)
         members = {f"i{k}": In(shape_of(graph.nodes[i])) for k, i in enumerate(graph.inputs)}
         members |= {f"o{k}": Out(shape_of(graph.nodes[i])) for k, i in enumerate(graph.outputs)}
         members |= {"i_valid": In(1), "i_channel": In(bits), "advance": In(1)}
         members |= {"i_bank": In(1), "o_bank": Out(1), "uses": Out(2)}
         members |= {"clear": In(1), "clear_channel": In(bits)}
+        if protect != "none":
+            members |= {"i_scrub": In(1), "o_scrub": Out(1), "i_fault": In(1), "o_fault": Out(1), "corrected": Out(1)}
         super().__init__({**members, "o_valid": Out(1), "o_channel": Out(bits), "o_saturated": Out(1)})
 
     def elaborate(self, platform: object) -> Module:
@@ -239,28 +266,39 @@ class InterleavedStage(wiring.Component):
         )
         logic.connect([getattr(self, f"i{k}") for k in range(len(graph.inputs))])
         at, wires, names = logic.at, logic.wires, logic.names
+        scrub = self._scrub(m)
+        found: dict[int, Read] = {}
         for index in graph.delays:
             node, written = graph.nodes[index], plan.writes[index]
+            check = CheckBits(node.width, self.protect)
             m.submodules[f"{names[index]}_memory"] = memory = Memory(
-                shape=shape_of(node),
+                shape=shape_of(node) if self.protect == "none" else check.width,
                 depth=self.channels,
                 init=[0] * self.channels,
                 attrs=_BLOCK_RAM if plan.reading > 1 else {},
             )
             read, write = memory.read_port(), memory.write_port()
-            found = read.data
+            word = read.data
             if plan.reading > 1:
-                found = Signal(shape_of(node), name=f"{names[index]}_read", reset_less=True)
+                word = Signal(read.data.shape(), name=f"{names[index]}_read", reset_less=True)
                 with m.If(self.advance):
-                    m.d.sync += found.eq(read.data)
+                    m.d.sync += word.eq(read.data)
+            found[index] = check.read(m, word, names[index])
+            following, writes = at(node.operands[0], written), valid[written]
+            if self.protect != "none":
+                state = Signal(shape_of(node), name=f"{names[index]}_next")
+                m.d.comb += state.eq(Mux(scrub[written], at(index, written), following))
+                following, writes = state.as_unsigned(), valid[written] | scrub[written]
             m.d.comb += [
                 read.addr.eq(channel[plan.pipeline_stages[index] - plan.reading]),
                 read.en.eq(self.advance),
-                wires[index].eq(found),
+                wires[index].eq(found[index].data),
                 write.addr.eq(Mux(self.clear, self.clear_channel, channel[written])),
-                write.data.eq(Mux(self.clear, 0, at(node.operands[0], written))),
-                write.en.eq(self.clear | (self.advance & valid[written])),
+                write.data.eq(Mux(self.clear, 0, check.written(following))),
+                write.en.eq(self.clear | (self.advance & writes)),
             ]
+        if self.protect != "none":
+            self._judge(m, found, [there | scrubs for there, scrubs in zip(valid, scrub, strict=True)])
         last = plan.depth - 1
         for k, i in enumerate(graph.outputs):
             register = Signal(shape_of(graph.nodes[i]), name=f"{names[i]}_register", reset_less=True)
@@ -271,6 +309,33 @@ class InterleavedStage(wiring.Component):
                     below, above = limits(graph.nodes[i], at(graph.nodes[i].operands[0], last))
                     m.d.sync += self.o_saturated.eq(below | above)
         return m
+
+    def _scrub(self, m: Module) -> list[Value]:
+        """Return for each pipeline stage, and for the outputs, whether it holds a scrub."""
+        if self.protect == "none":
+            return [Const(0, 1)] * (self.schedule.depth + 1)
+        scrub: list[Value] = [self.i_scrub]
+        for k in range(1, self.schedule.depth + 1):
+            scrub.append(Signal(name=f"scrub{k}"))
+            with m.If(self.advance):
+                m.d.sync += scrub[k].eq(scrub[k - 1])
+        m.d.comb += self.o_scrub.eq(scrub[-1])
+        return scrub
+
+    def _judge(self, m: Module, found: Mapping[int, Read], there: list[Value]) -> None:
+        """Let each sample and each scrub take along what was found wrong in the states that it has read."""
+        fault: Value = self.i_fault
+        corrected: Value = Const(0, 1)
+        for k in range(self.schedule.depth):
+            own = [read for index, read in found.items() if self.schedule.pipeline_stages[index] == k]
+            for read in own:
+                fault = fault | read.failed
+                corrected = corrected | (read.corrected & there[k])
+            later = Signal(name=f"fault{k + 1}", reset_less=True)
+            with m.If(self.advance):
+                m.d.sync += later.eq(fault)
+            fault = later
+        m.d.comb += [self.o_fault.eq(fault), self.corrected.eq(corrected & self.advance)]
 
     def _control(self, m: Module) -> tuple[list[Value], list[Value], list[Value]]:
         """Return for each pipeline stage, and for the outputs, whether it holds a sample, its channel, and its bank."""

@@ -29,11 +29,13 @@ from sosmith.model.reload.registers import (
     CRC,
     DATA,
     DESIGN,
+    FAULTS,
     ID,
     INTERFACE,
     LAYOUT,
     MAGIC,
     MAX_WORDS,
+    PROTECTED_REGISTERS,
     REGISTERS,
     STATUS,
     VERSION,
@@ -62,6 +64,8 @@ class ReloadPort(wiring.Component):
         Used bits of a word, 1 to 32.
     design : int
         Fingerprint of the core, which ``DESIGN`` reads.
+    protected : bool
+        Whether there is a register ``FAULTS``, and the memory of the words that are read has each bit three times.
 
     Members
     -------
@@ -81,9 +85,13 @@ class ReloadPort(wiring.Component):
         Whether `bank` may change at the end of this clock.
     shadow_free : In(1)
         Whether no sample inside the core uses the idle bank. While it is low, no load can begin.
+    corrected, failed : In(1)
+        Whether a wrong bit was found at this clock that was corrected, and one that could not be; only if protected.
+    acknowledge : Out(1)
+        High for one clock when ``FAULTS`` is written; only if protected.
     """
 
-    def __init__(self, depth: int, *, bits: int = BITS, design: int = 0) -> None:
+    def __init__(self, depth: int, *, bits: int = BITS, design: int = 0, protected: bool = False) -> None:
         if not 1 <= depth <= MAX_WORDS:
             raise ValueError(f"depth must be 1 to {MAX_WORDS}, not {depth!r}")
         if not 1 <= bits <= BITS:
@@ -91,18 +99,20 @@ class ReloadPort(wiring.Component):
         self.depth = depth
         self.bits = bits
         self.design = design
-        super().__init__(
-            {
-                **slave_members(ADDRESS_BITS),
-                "write_enable": Out(1),
-                "write_address": Out(range(depth)),
-                "write_data": Out(bits),
-                "bank": Out(1),
-                "pending": Out(1),
-                "may_swap": In(1),
-                "shadow_free": In(1),
-            }
-        )
+        self.protected = protected
+        members = {
+            **slave_members(ADDRESS_BITS),
+            "write_enable": Out(1),
+            "write_address": Out(range(depth)),
+            "write_data": Out(bits),
+            "bank": Out(1),
+            "pending": Out(1),
+            "may_swap": In(1),
+            "shadow_free": In(1),
+        }
+        if protected:
+            members |= {"corrected": In(1), "failed": In(1), "acknowledge": Out(1)}
+        super().__init__(members)
 
     def elaborate(self, platform: object) -> Module:
         """Build the slave, the CRC, the control of a load, and what can be read."""
@@ -111,9 +121,10 @@ class ReloadPort(wiring.Component):
         forward_slave(m, self, slave)
         m.submodules.checksum = crc = SerialCrc()
         turns = _is_at(slave, CRC)
+        writes = slave.o_writes & ~_is_at(slave, FAULTS) if self.protected else slave.o_writes
         m.d.comb += [
             crc.i_clear.eq(slave.o_start & _writes(slave, VERSION)),
-            crc.i_shift.eq(slave.o_shift & (slave.o_writes | turns)),
+            crc.i_shift.eq(slave.o_shift & (writes | turns)),
             crc.i_turn.eq(turns),
             crc.i_bit.eq(slave.o_bit),
         ]
@@ -135,7 +146,9 @@ class ReloadPort(wiring.Component):
             | (_is_at(slave, DATA) & loading & ~complete)
             | (_is_at(slave, CRC) & loading & complete)
         )
-        readable = (slave.o_index < len(REGISTERS)) & ~_is_at(slave, DATA)
+        readable = (slave.o_index < len(PROTECTED_REGISTERS if self.protected else REGISTERS)) & ~_is_at(slave, DATA)
+        if self.protected:
+            writable = writable | _is_at(slave, FAULTS)
         m.d.comb += slave.i_refuse.eq(~Mux(slave.o_writes, writable, readable))
         with m.If(slave.o_start & _writes(slave, VERSION)):
             m.d.sync += [loading.eq(1), taken.eq(0)]
@@ -164,12 +177,13 @@ class ReloadPort(wiring.Component):
         seen_bank, seen_pending = Signal(), Signal()  # a swap must not show in the middle of a read
         with m.If(slave.o_check):
             m.d.sync += [seen_bank.eq(bank), seen_pending.eq(self.pending)]
-        init = [word >> bit & 1 for word in self._rows() for bit in range(BITS)]
-        m.submodules.words = words = Memory(shape=1, depth=len(init), init=init, attrs={"ram_style": "block"})
+        copies = 3 if self.protected else 1
+        init = [(word >> bit & 1) * ((1 << copies) - 1) for word in self._rows() for bit in range(BITS)]
+        m.submodules.words = words = Memory(shape=copies, depth=len(init), init=init, attrs={"ram_style": "block"})
         store, fetch = words.write_port(), words.read_port()
         m.d.comb += [
             store.addr.eq(Cat(slave.o_count, slave.o_index ^ ~bank)),
-            store.data.eq(slave.o_bit),
+            store.data.eq(slave.o_bit.replicate(copies)),
             store.en.eq(slave.o_shift & _writes(slave, VERSION)),
             fetch.addr.eq(Cat(slave.o_count, slave.o_index ^ (_is_at(slave, VERSION) & seen_bank))),
         ]
@@ -178,7 +192,33 @@ class ReloadPort(wiring.Component):
         m.d.sync += other.eq(_bit_of(status, slave.o_count[:3]) & ~slave.o_count[3:].any())
         with m.If(_is_at(slave, CRC)):
             m.d.sync += other.eq(crc.o_bit)
-        m.d.comb += slave.i_bit.eq(Mux(_is_at(slave, STATUS) | _is_at(slave, CRC), other, fetch.data))
+        stored: Value = fetch.data
+        if self.protected:
+            first, second, third = fetch.data
+            stored = (first & second) | (second & third) | (first & third)
+            with m.If(_is_at(slave, FAULTS)):
+                m.d.sync += other.eq(self._faults(m, slave))
+        now = _is_at(slave, STATUS) | _is_at(slave, CRC)
+        if self.protected:
+            now = now | _is_at(slave, FAULTS)
+        m.d.comb += slave.i_bit.eq(Mux(now, other, stored))
+
+    def _faults(self, m: Module, slave: SerialSlave) -> Value:
+        """Count the faults; return the bit of ``FAULTS`` that is read."""
+        counts: list[Value] = []
+        m.d.comb += self.acknowledge.eq(slave.o_start & _writes(slave, FAULTS))
+        for name, found in (("CORRECTED", self.corrected), ("UNCORRECTED", self.failed)):
+            field = FAULTS.field(name)
+            count = Signal(field.bits, name=name.lower())
+            seen = Signal(field.bits, name=f"seen_{name.lower()}")  # a count must not change in the middle of a read
+            with m.If(slave.o_check):
+                m.d.sync += seen.eq(count)
+            with m.If(found & ~count.all()):
+                m.d.sync += count.eq(count + 1)
+            with m.If(self.acknowledge):
+                m.d.sync += count.eq(found)
+            counts.append(seen)
+        return _bit_of(Cat(*counts), slave.o_count)
 
     def _rows(self) -> list[int]:
         """Return the words of that memory: a row for each register, and two for the version, one for each bank."""

@@ -18,6 +18,11 @@ names in brackets are registers, and so are the states x1, v1 and v2::
 
     i_valid --------[valid1]-------------------------[valid2]------------> [valid3] --> o_valid
 
+With parity, each state has one more register, [x1_parity] and so on, and what the sample found wrong goes with it::
+
+    i_fault ---> or -->[fault1]-----------------> or -->[fault2]-----> or -->[fault3]-----> or ---> o_fault
+                 ^ x1                             ^ none               ^ v1, v2             ^ v1, v2
+
 The state v2 belongs to pipeline stage 2, which may still hold the sample before. Its update is due then: the value that
 it is about to take is v1.
 
@@ -51,7 +56,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from amaranth.hdl import Cat, Module, Signal, Value
+from amaranth.hdl import Cat, Const, Module, Signal, Value
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
@@ -158,6 +163,8 @@ class PipelinedStage(wiring.Component):
         What it computes.
     constants : dict of int to Pair
         Constants that come from one of two banks, by node.
+    parity : bool
+        Whether each register that holds a state has a parity bit, which every sample checks.
 
     Members
     -------
@@ -177,15 +184,22 @@ class PipelinedStage(wiring.Component):
         Whether the outputs hold a sample.
     o_saturated : Out(1)
         Whether the output had to be limited to its range.
+    i_fault, o_fault : In(1), Out(1)
+        Whether a wrong bit was found for the sample at the inputs, and for the one at the outputs; only with parity.
+    clear : In(1)
+        Whether to set the states to 0; no sample may be inside. Only with parity.
     """
 
-    def __init__(self, stage: Stage, constants: Mapping[int, Pair] = NO_CONSTANTS) -> None:
+    def __init__(self, stage: Stage, constants: Mapping[int, Pair] = NO_CONSTANTS, *, parity: bool = False) -> None:
         self.stage = stage
         self.constants = constants
+        self.parity = parity
         graph = stage.graph
         members = {f"i{k}": In(shape_of(graph.nodes[i])) for k, i in enumerate(graph.inputs)}
         members |= {f"o{k}": Out(shape_of(graph.nodes[i])) for k, i in enumerate(graph.outputs)}
         members |= {"i_bank": In(1), "o_bank": Out(1), "uses": Out(2)}
+        if parity:
+            members |= {"i_fault": In(1), "o_fault": Out(1), "clear": In(1)}
         super().__init__({**members, "i_valid": In(1), "advance": In(1), "o_valid": Out(1), "o_saturated": Out(1)})
 
     def elaborate(self, platform: object) -> Module:
@@ -201,6 +215,8 @@ class PipelinedStage(wiring.Component):
         for i in graph.delays:
             with m.If(takes[stages[i]]):
                 m.d.sync += wires[i].eq(at(graph.nodes[i].operands[0], stages[i]))
+        if self.parity:
+            self._check(m, logic, stages, takes)
         last = len(takes) - 1
         for k, i in enumerate(graph.outputs):
             output = getattr(self, f"o{k}")
@@ -218,6 +234,32 @@ class PipelinedStage(wiring.Component):
                         )
         return m
 
+    def _check(self, m: Module, logic: PipelinedLogic, stages: list[int], takes: list[Value]) -> None:
+        """Give each state a parity bit; a sample takes along whether one of those that it met was wrong.
+
+        A sample checks a state in the pipeline stage that changes it. If it used the state in an earlier one, the state
+        has not changed in between, as no other sample was in the later one. A state that is the output, too, is checked
+        as long as it is there.
+        """
+        graph = self.stage.graph
+        fault: Value = self.i_fault
+        wrong: Value = Const(0, 1)
+        for k, take in enumerate(takes):
+            wrong = Const(0, 1)
+            for i in (i for i in graph.delays if stages[i] == k):
+                state, parity = logic.wires[i], Signal(name=f"{logic.names[i]}_parity")
+                following = logic.at(graph.nodes[i].operands[0], k)
+                wrong = wrong | (state.as_unsigned().xor() ^ parity)
+                with m.If(take):
+                    m.d.sync += parity.eq(_fitting(following, state).xor())
+                with m.If(self.clear):
+                    m.d.sync += [state.eq(0), parity.eq(0)]
+            later = Signal(name=f"fault{k + 1}")
+            with m.If(take):
+                m.d.sync += later.eq(fault | wrong)
+            fault = later
+        m.d.comb += self.o_fault.eq(fault | wrong)
+
     def _control(self, m: Module, depth: int) -> tuple[list[Value], list[Value], list[Value]]:
         """Return for each pipeline stage whether it holds a sample, whether its registers load it now, and its bank."""
         valid: list[Value] = [self.i_valid]
@@ -232,6 +274,11 @@ class PipelinedStage(wiring.Component):
         m.d.comb += [self.o_valid.eq(valid[-1]), self.o_bank.eq(banks[-1])]
         m.d.comb += self.uses.eq(banks_in_use(valid[:-1], banks[:-1]))
         return valid, takes, banks
+
+
+def _fitting(value: Value, state: Value) -> Value:
+    """Return the bits of `value` that a register as wide as `state` takes."""
+    return Cat(value, *([value[-1] if value.shape().signed else Const(0, 1)] * len(state)))[: len(state)]
 
 
 def _held(graph: Graph, output: int, wires: list[Value]) -> Value | None:

@@ -7,6 +7,7 @@
     output code  --+--> CLAMP of the stage --> output_saturated        2
                    +--> worn: >= limits -----> wear_warning            3
       channel ----> memory of the limits       wear_critical           4   if each channel has its own
+    check bits of the memories --------------> fault                   6   of a protected core
 
 All are combinational, but for the memory of limits: it takes one clock.
 """
@@ -14,12 +15,15 @@ All are combinational, but for the memory of limits: it takes one clock.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from amaranth.hdl import Cat, Const, Module, Value
 from amaranth.lib.memory import Memory
 
 from sosmith.hdl.axi_stream import fields
+from sosmith.hdl.check_bits import CheckBits
 from sosmith.model.dataflow.datapath import Datapath
+from sosmith.model.dataflow.status import Flag
 from sosmith.model.port import Port
 
 
@@ -49,29 +53,54 @@ def outside_calibration(datapath: Datapath, tdata: Value) -> Value:
 
 
 def flag_count(datapath: Datapath) -> int:
-    """Return the number of flags that the hardware can set: without limits of wear, all but the last two."""
+    """Return the number of flags below `Flag.FAULT` that the hardware can set: without limits of wear, the first three."""
     return 5 if datapath.wear else 3
 
 
-def worn(m: Module, datapath: Datapath, code: Value, channel: Value, enable: Value) -> Value:
-    """Return two bits: whether an output code has reached the warning, and the limit of wear; none without limits.
+def with_fault(flags: Value, fault: Value) -> Value:
+    """Return the flags of a protected core: `flag_count` of them, and `fault`, in the bits of `Flag`."""
+    return Cat(flags, Const(0, Flag.FAULT - len(flags)), fault)
 
-    If each channel has limits of its own, these are read from a memory: `code` must belong to the channel that
-    `channel` was at the last clock with `enable`.
+
+class Wear(NamedTuple):
+    """What `worn` finds.
+
+    Attributes
+    ----------
+    flags : Value
+        Whether the code has reached the warning, and the limit: two bits, or none without limits.
+    corrected, failed : Value
+        Whether the limits just read had a wrong bit that was corrected, or one that could not be.
+    """
+
+    flags: Value
+    corrected: Value
+    failed: Value
+
+
+def worn(m: Module, datapath: Datapath, code: Value, channel: Value, enable: Value, protect: str) -> Wear:
+    """Return the flags of wear of an output code.
+
+    If each channel has limits of its own, these are read from a memory, with check bits as `protect` asks: `code` must
+    belong to the channel that `channel` was at the last clock with `enable`.
     """
     if not datapath.wear:
-        return Const(0, 0)
+        return Wear(Const(0, 0), Const(0, 1), Const(0, 1))
     bits = datapath.output.bits
     limits: Sequence[Value]
+    corrected: Value = Const(0, 1)
+    failed: Value = Const(0, 1)
     if len(datapath.wear) == 1:
         limits = [Const(code_, code.shape()) for code_ in datapath.wear[0]]
     else:
         mask = (1 << bits) - 1
-        init = [(warning & mask) | (critical & mask) << bits for warning, critical in datapath.wear]
-        m.submodules.wear_limits = memory = Memory(shape=2 * bits, depth=len(init), init=init)
+        check = CheckBits(2 * bits, protect)
+        init = [check.word((warning & mask) | (critical & mask) << bits) for warning, critical in datapath.wear]
+        m.submodules.wear_limits = memory = Memory(shape=check.width, depth=len(init), init=init)
         port = memory.read_port()
         m.d.comb += [port.addr.eq(channel), port.en.eq(enable)]
-        limits = [port.data[:bits], port.data[bits:]]
+        data, corrected, failed = check.read(m, port.data, "limits")
+        limits = [data[:bits], data[bits:]]
         if datapath.output.signed:
             limits = [limit.as_signed() for limit in limits]
-    return Cat(*(code >= limit for limit in limits))
+    return Wear(Cat(*(code >= limit for limit in limits)), corrected, failed)

@@ -74,7 +74,8 @@ def _register_files(design: CoreDesign) -> dict[str, str]:
     if fingerprint is None:
         return {}
     name, (words, _) = design.spec.name, bank_size(design.architecture)
+    protected = design.architecture.protect != "none"
     return {
-        f"{name}_registers.h": c_registers(name, words=words, design=fingerprint),
-        f"{name}.rdl": systemrdl(name, words=words, design=fingerprint),
+        f"{name}_registers.h": c_registers(name, words=words, design=fingerprint, protected=protected),
+        f"{name}.rdl": systemrdl(name, words=words, design=fingerprint, protected=protected),
     }

@@ -3,16 +3,25 @@
 from __future__ import annotations
 
 from sosmith.hdl.axi_lite import BITS
-from sosmith.model.reload.registers import DESIGN, ID, INTERFACE, LAYOUT, MAGIC, REGISTERS, Register
+from sosmith.model.reload.registers import (
+    DESIGN,
+    ID,
+    INTERFACE,
+    LAYOUT,
+    MAGIC,
+    PROTECTED_REGISTERS,
+    REGISTERS,
+    Register,
+)
 from sosmith.model.templates import render
 
 
 def markdown() -> str:
-    """Return the tables of the registers and of their fields."""
+    """Return the tables of the registers of a protected core and of their fields."""
     rows = ["| address | register | access | meaning |", "|---|---|---|---|"]
-    rows += [f"| 0x{r.address:02X} | `{r.name}` | {_access(r)} | {r.text} |" for r in REGISTERS]
+    rows += [f"| 0x{r.address:02X} | `{r.name}` | {_access(r)} | {r.text} |" for r in PROTECTED_REGISTERS]
     rows += ["", "| register | bits | field | meaning |", "|---|---|---|---|"]
-    for register in REGISTERS:
+    for register in PROTECTED_REGISTERS:
         for field in register.fields:
             top = field.low + field.bits - 1
             bits = f"{top}" if field.bits == 1 else f"{top} to {field.low}"
@@ -22,7 +31,7 @@ def markdown() -> str:
     return "".join(f"{row}\n" for row in rows)
 
 
-def c_registers(name: str, *, words: int, design: int) -> str:
+def c_registers(name: str, *, words: int, design: int, protected: bool = False) -> str:
     """Return a C header with addresses, fields and constants of the core `name`.
 
     Parameters
@@ -33,18 +42,22 @@ def c_registers(name: str, *, words: int, design: int) -> str:
         Number of words in a bank.
     design : int
         Fingerprint of the design.
+    protected : bool
+        Whether the core counts faults.
     """
+    registers = PROTECTED_REGISTERS if protected else REGISTERS
     constants = {"ID": MAGIC, "INTERFACE": INTERFACE, "WORDS": words, "DESIGN": design}
     return render(
-        __package__, "registers.h.jinja", name=name, prefix=name.upper(), registers=REGISTERS, constants=constants
+        __package__, "registers.h.jinja", name=name, prefix=name.upper(), registers=registers, constants=constants
     )
 
 
-def systemrdl(name: str, *, words: int, design: int) -> str:
+def systemrdl(name: str, *, words: int, design: int, protected: bool = False) -> str:
     """Return the registers in SystemRDL 2.0, for other tools; parameters as for `c_registers`."""
+    registers = PROTECTED_REGISTERS if protected else REGISTERS
     layout = INTERFACE << LAYOUT.field("INTERFACE").low | words << LAYOUT.field("WORDS").low
     constants = {ID.name: MAGIC, LAYOUT.name: layout, DESIGN.name: design}
-    return render(__package__, "registers.rdl.jinja", name=name, bits=BITS, registers=REGISTERS, constants=constants)
+    return render(__package__, "registers.rdl.jinja", name=name, bits=BITS, registers=registers, constants=constants)
 
 
 def _access(register: Register) -> str:

@@ -1,4 +1,7 @@
-"""Valid names in a specification: families, kinds, methods, realizations, architectures, cores, inputs."""
+"""Valid names in a specification: families, kinds, methods, realizations, architectures, cores, inputs.
+
+Those of `hardware.protect` are in `sosmith.model.protection`.
+"""
 
 FAMILIES = ("butterworth", "chebyshev1", "chebyshev2", "elliptic", "bessel")
 KINDS = ("lowpass", "highpass", "bandpass", "bandstop")

@@ -34,6 +34,7 @@ from sosmith.gen.specification.values import (
     text,
     whole,
 )
+from sosmith.model.protection import PROTECTIONS
 from sosmith.model.suggestion import did_you_mean
 
 MAX_ORDER = 20
@@ -129,6 +130,7 @@ class HardwareTable(Table):
     architecture: Annotated[str, PlainValidator(choice(ARCHITECTURES))] = "auto"
     clock: Annotated[Fraction, PlainValidator(positive("Hz"))] = Fraction(12_000_000)
     reload: Annotated[bool, PlainValidator(flag)] = False
+    protect: Annotated[str, PlainValidator(choice(PROTECTIONS))] = "none"
 
 
 class Document(Table):

@@ -95,12 +95,15 @@ class HardwareSpec:
         In Hz, at least the sample rate.
     reload : bool
         Whether coefficients can be loaded at run time.
+    protect : str
+        One of `sosmith.model.protection.PROTECTIONS`.
     """
 
     realization: str
     architecture: str
     clock: Fraction
     reload: bool
+    protect: str = "none"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -234,6 +237,7 @@ def _specification(path: Path, tree: dict[str, Any], document: Document) -> Spec
             architecture=hardware.architecture,
             clock=hardware.clock,
             reload=hardware.reload,
+            protect=hardware.protect,
         ),
     )
 

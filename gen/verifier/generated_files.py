@@ -101,7 +101,7 @@ def check_measurements(about: AboutEntry, path: Path) -> None:
 
 
 def has_program(path: Path) -> bool:
-    """Whether the manifest at `path`, which is known to be unchanged, is that of a core with a fixed program.
+    """Whether the manifest at `path`, which is known to be unchanged, is that of a core with a plain, fixed program.
 
     Raises
     ------
@@ -110,8 +110,9 @@ def has_program(path: Path) -> bool:
     """
     try:
         manifest = json.loads(_content(path))
-        reloads = manifest["spec"].get("hardware", {}).get("reload", False)
-        return manifest["architecture"] in {"folded", "serial"} and not reloads
+        hardware = manifest["spec"].get("hardware", {})
+        plain = not hardware.get("reload", False) and hardware.get("protect", "none") == "none"
+        return manifest["architecture"] in {"folded", "serial"} and plain
     except (ValueError, KeyError, TypeError, AttributeError):
         raise RejectedError(f"{path} must be the manifest of a core, not another file") from None
 

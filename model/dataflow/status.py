@@ -16,6 +16,7 @@ class Flag(IntEnum):
     OUTPUT_SATURATED = 2
     WEAR_WARNING = 3
     WEAR_CRITICAL = 4
+    FAULT = 6
 
     @property
     def meaning(self) -> str:
@@ -29,4 +30,5 @@ _MEANINGS = {
     Flag.OUTPUT_SATURATED: "the output was limited to its range",
     Flag.WEAR_WARNING: "the wear has reached the warning",
     Flag.WEAR_CRITICAL: "the wear has reached its limit, or the end of the sensor's range",
+    Flag.FAULT: "a bit in the hardware was found wrong and could not be corrected, for this sample or an earlier one",
 }

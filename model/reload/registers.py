@@ -70,8 +70,8 @@ class Register:
 
     @property
     def index(self) -> int:
-        """Index in `REGISTERS`."""
-        return REGISTERS.index(self)
+        """Index in `PROTECTED_REGISTERS`."""
+        return PROTECTED_REGISTERS.index(self)
 
     @property
     def address(self) -> int:
@@ -130,8 +130,22 @@ CRC = Register(
     "first. A write tells what it should be, and ends the load: if it is right, the set becomes active between two "
     "samples, else the write is refused. Refused too while words are missing.",
 )
+FAULTS = Register(
+    "FAULTS",
+    True,
+    True,
+    "Counts the wrong bits that were found, in protected cores; each count stays at its highest value. A write of any "
+    "word sets both to 0 and ends the flag `fault`.",
+    (
+        Field("CORRECTED", 0, 16, "Findings that were corrected; a bit in use counts each time until it is rewritten."),
+        Field("UNCORRECTED", 16, 16, "Findings that could not be corrected; each one ends in a restart."),
+    ),
+)
 REGISTERS = (ID, LAYOUT, DESIGN, STATUS, VERSION, DATA, CRC)
-"""All registers, by ascending address."""
+"""The registers of every reloadable core, by ascending address."""
 
-ADDRESS_BITS = (4 * len(REGISTERS) - 1).bit_length()
+PROTECTED_REGISTERS = (*REGISTERS, FAULTS)
+"""Those of a protected one."""
+
+ADDRESS_BITS = (4 * len(PROTECTED_REGISTERS) - 1).bit_length()
 """Number of address lines of the slave."""
