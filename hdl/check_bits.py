@@ -9,9 +9,9 @@
                                                            +--> no column, not 0 -> failed
 
 Each check bit is the parity of some data bits; the set of check bits that a data bit belongs to is its column. The
-columns are different and have an odd number of ones, so that one wrong bit has its own column for a syndrome and two
-have one with an even number of ones, which is nobody's column (M. Y. Hsiao, "A class of optimal minimum odd-weight-column
-SEC-DED codes", IBM Journal of Research and Development, 1970).
+columns are different and have an odd number of ones, so that one wrong bit has its own column for a syndrome, and two
+have one with an even number of ones, which is nobody's column (M. Y. Hsiao, "A class of optimal minimum
+odd-weight-column SEC-DED codes", IBM Journal of Research and Development, 1970).
 """
 
 from __future__ import annotations

@@ -37,6 +37,7 @@ With loadable constants, `sosmith.hdl.constant_banks` has them twice, and each s
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
 from amaranth.hdl import Cat, ClockDomain, ClockSignal, Const, Module, Mux, ResetSignal, Signal, Value
 from amaranth.lib import wiring
@@ -73,6 +74,19 @@ def _depths(datapath: Datapath, channels: int, protect: str) -> list[int]:
         return [pipeline_depth(stage.graph) for stage in datapath.stages]
     rewrites = protect != "none"
     return [schedule(stage.graph, channels, rewrites=rewrites).depth for stage in datapath.stages]
+
+
+class _Place(NamedTuple):
+    """What goes through the pipeline with the codes: whether there is a sample, its channel, and its bank.
+
+    Besides, whether there is a scrub instead, and whether a wrong bit was found for either.
+    """
+
+    valid: Value
+    channel: Value
+    bank: Value
+    scrub: Value = Const(0, 1)
+    fault: Value = Const(0, 1)
 
 
 class Core(wiring.Component):
@@ -146,61 +160,67 @@ class Core(wiring.Component):
         ]
         bank, waiting = Signal(), Signal(2)
         guard, empty = FaultGuard(max(1, channel_bits(self.channels))) if guarded else None, Signal()
-        valid, channel, taken, data, scrubs = self._source(m, stages, (buffer.advance, bank, waiting), guard, empty)
-        enters = (valid | scrubs) & buffer.advance
+        first, data = self._source(m, stages, (buffer.advance, bank, waiting), guard, empty)
         port = None
         if banks is not None:
             port = self._reload(m, banks, bank, Cat(waiting, *(component.uses for component in stages)))
         status: Value = Cat(at_rail(self.datapath.inputs, data), outside_calibration(self.datapath, data))
-        codes: list[Value] = [data[f.offset : f.offset + f.port.bits] for f in fields(self.datapath.inputs)]
-        fault: Value = Const(0, 1)
-        for component in stages:
-            graph = component.stage.graph
-            m.d.comb += [getattr(component, f"i{k}").eq(code) for k, code in enumerate(codes)]
-            m.d.comb += [component.i_valid.eq(valid), component.i_bank.eq(taken)]
-            if isinstance(component, InterleavedStage):
-                m.d.comb += component.i_channel.eq(channel)
-                channel = component.o_channel
-            if guard is not None:
-                m.d.comb += component.i_fault.eq(fault)
-                fault = component.o_fault
-                if isinstance(component, InterleavedStage):
-                    m.d.comb += component.i_scrub.eq(scrubs)
-                    scrubs = component.o_scrub
-            valid, taken = component.o_valid, component.o_bank
-            codes = [getattr(component, f"o{k}") for k in range(len(graph.outputs))]
+        last, code = self._chain(m, stages, first, data)
         for k in range(sum(_depths(self.datapath, self.channels, self.protect))):
             held = Signal(len(status), name=f"status{k + 1}", reset_less=True)
             with m.If(buffer.advance):
                 m.d.sync += held.eq(status)
             status = held
-        code, saturated = codes[0], stages[-1].o_saturated
-        coming = channel
-        if guard is not None:
-            if banks is not None:
-                fault = fault | (valid & Mux(taken, banks.wrong[1], banks.wrong[0]))
-            fault = fault & (valid | scrubs)
+        saturated, fault = stages[-1].o_saturated, last.fault
+        if banks is not None and guarded:
+            fault = fault | (last.valid & Mux(last.bank, banks.wrong[1], banks.wrong[0]))
+        fault = fault & (last.valid | last.scrub)
+        valid, channel = last.valid, last.channel
         if len(self.datapath.wear) > 1:  # it takes a clock to read the limits of the channel
             valid, code, status, saturated, channel = self._delayed(
                 m, buffer.advance, [valid, code, status, saturated, channel]
             )
-            if guard is not None:
+            if guarded:
                 (fault,) = self._delayed(m, buffer.advance, [fault], "fault_judged")
-        wear = worn(m, self.datapath, code, coming, buffer.advance, self.protect)
+        wear = worn(m, self.datapath, code, last.channel, buffer.advance, self.protect)
         flags: Value = Cat(status, saturated, wear.flags)
         if guard is not None:
             fault = fault | (valid & wear.failed)
             flags = Cat(flags, guard.fault | fault)
             m.submodules.guard = guard
+            enters = (first.valid | first.scrub) & buffer.advance
             m.d.comb += empty.eq(self._restart(m, guard, enters, stages, fault, buffer.advance))
-            repaired = [c.corrected for c in stages if isinstance(c, InterleavedStage)]
-            repaired.append(valid & wear.corrected & buffer.advance)
             if port is not None:
-                m.d.comb += [
-                    port.corrected.eq(Cat(*repaired).any()),
-                    port.failed.eq(guard.failed),
-                    guard.acknowledge.eq(port.acknowledge),
-                ]
+                self._report(m, guard, port, stages, valid & wear.corrected & buffer.advance)
+        self._hand_out(m, buffer, valid, code, flags, channel)
+        return m
+
+    def _chain(
+        self, m: Module, stages: list[PipelinedStage | InterleavedStage], first: _Place, data: Value
+    ) -> tuple[_Place, Value]:
+        """Connect the stages one behind the other; return what is behind the last one, and the code of the result."""
+        place = first
+        codes: list[Value] = [data[f.offset : f.offset + f.port.bits] for f in fields(self.datapath.inputs)]
+        for component in stages:
+            m.d.comb += [getattr(component, f"i{k}").eq(code) for k, code in enumerate(codes)]
+            m.d.comb += [component.i_valid.eq(place.valid), component.i_bank.eq(place.bank)]
+            following = place._replace(valid=component.o_valid, bank=component.o_bank)
+            if self.protect != "none":
+                m.d.comb += component.i_fault.eq(place.fault)
+                following = following._replace(fault=component.o_fault)
+            if isinstance(component, InterleavedStage):
+                m.d.comb += component.i_channel.eq(place.channel)
+                following = following._replace(channel=component.o_channel)
+                if self.protect != "none":
+                    m.d.comb += component.i_scrub.eq(place.scrub)
+                    following = following._replace(scrub=component.o_scrub)
+            place, codes = following, [getattr(component, f"o{k}") for k in range(len(component.stage.graph.outputs))]
+        return place, codes[0]
+
+    def _hand_out(
+        self, m: Module, buffer: StreamBuffer, valid: Value, code: Value, flags: Value, channel: Value
+    ) -> None:
+        """Pass results through the output buffer."""
         output = extended(code, self.datapath.output.bytes * 8)
         m.d.comb += [
             buffer.i_valid.eq(valid),
@@ -208,14 +228,29 @@ class Core(wiring.Component):
             self.m_axis_tvalid.eq(buffer.o_valid),
             buffer.o_ready.eq(self.m_axis_tready),
         ]
-        handed = buffer.o_data[len(output) : len(output) + live]
+        handed = buffer.o_data[len(output) : len(output) + len(flags)]
         m.d.comb += [
             self.m_axis_tdata.eq(buffer.o_data[: len(output)]),
-            self.m_axis_tuser.eq(with_fault(handed[:-1], handed[-1]) if guarded else handed),
+            self.m_axis_tuser.eq(handed if self.protect == "none" else with_fault(handed[:-1], handed[-1])),
         ]
         if self.channels > 1:
-            m.d.comb += self.m_axis_tdest.eq(buffer.o_data[len(output) + live :])
-        return m
+            m.d.comb += self.m_axis_tdest.eq(buffer.o_data[len(output) + len(flags) :])
+
+    def _report(
+        self,
+        m: Module,
+        guard: FaultGuard,
+        port: ReloadPort,
+        stages: list[PipelinedStage | InterleavedStage],
+        corrected: Value,
+    ) -> None:
+        """Let the registers count what was corrected, in the stages and beside them, and what was not."""
+        found = [component.corrected for component in stages if isinstance(component, InterleavedStage)]
+        m.d.comb += [
+            port.corrected.eq(Cat(*found, corrected).any()),
+            port.failed.eq(guard.failed),
+            guard.acknowledge.eq(port.acknowledge),
+        ]
 
     def _restart(
         self,
@@ -269,7 +304,10 @@ class Core(wiring.Component):
         return component
 
     def _reload(self, m: Module, banks: ConstantBanks, bank: Signal, uses: Value) -> ReloadPort:
-        """Connect the reload port, which is returned, to the banks; `uses` are pairs of bits: whether samples use bank 0, and bank 1."""
+        """Connect the reload port to the banks, and return it.
+
+        `uses` are pairs of bits: whether samples use bank 0, and bank 1.
+        """
         assert self.fingerprint is not None
         m.submodules.constant_banks = banks
         m.submodules.reload_port = port = ReloadPort(
@@ -294,10 +332,10 @@ class Core(wiring.Component):
         control: tuple[Value, Value, Signal],
         guard: FaultGuard | None,
         empty: Value,
-    ) -> tuple[Value, Value, Value, Value, Value]:
-        """Return whether there is a sample for the first stage, its channel, its bank, and its codes.
+    ) -> tuple[_Place, Value]:
+        """Return what is there for the first stage, and the sample's codes.
 
-        The last value is whether there is a scrub instead. The control is `advance`; the bank of samples accepted now;
+        The control is `advance`; the bank of samples accepted now;
         and a signal that is driven with the banks that waiting samples use. `empty` is whether the pipeline is.
         """
         advance, bank, waiting = control
@@ -306,9 +344,9 @@ class Core(wiring.Component):
         if not interleaved:
             if guard is None:
                 m.d.comb += self.s_axis_tready.eq(advance)
-                return self.s_axis_tvalid, Const(0, 0), bank, self.s_axis_tdata, Const(0, 1)
+                return _Place(self.s_axis_tvalid, Const(0, 0), bank), self.s_axis_tdata
             m.d.comb += [self.s_axis_tready.eq(advance & ~blocked), guard.idle.eq(blocked & empty)]
-            return self.s_axis_tvalid & ~blocked, Const(0, 0), bank, self.s_axis_tdata, Const(0, 1)
+            return _Place(self.s_axis_tvalid & ~blocked, Const(0, 0), bank), self.s_axis_tdata
         bits = channel_bits(self.channels)
         buffer = m.submodules.input_buffer = StreamBuffer(len(self.s_axis_tdata) + bits + 1)
         clearing, cleared = Signal(init=1), Signal(bits)
@@ -351,4 +389,4 @@ class Core(wiring.Component):
             m.d.comb += guard.idle.eq(Mux(guard.broken, empty, free))
         for component in interleaved:
             m.d.comb += [component.clear.eq(clearing), component.clear_channel.eq(cleared)]
-        return valid, dest, buffer.o_data[bits], buffer.o_data[bits + 1 :], scrubs
+        return _Place(valid, dest, buffer.o_data[bits], scrubs), buffer.o_data[bits + 1 :]

@@ -168,7 +168,7 @@ class FoldedCore(wiring.Component):
         channel = self._channel(m, busy | clearing if guard is None else busy | clearing | guard.broken, dropped, start)
         counter, fetching = self._control(m, (advance, clearing, start, busy), channel)
         reload = self._reload(m, start, busy)
-        pipeline, fetched = self._fetch(m, (advance, start), (counter, fetching), reload, guard)
+        pipeline, fetched = self._fetch(m, advance, (counter, fetching), reload, guard)
         read = Signal(signed(self._word))
         total = self._accumulate(m, advance, pipeline, read)
         remembered = self._remember(m, (advance, clearing), (counter, total, read, channel), pipeline, guard)
@@ -283,7 +283,7 @@ class FoldedCore(wiring.Component):
     def _fetch(
         self,
         m: Module,
-        control: tuple[Signal, Signal],
+        advance: Signal,
         position: tuple[Signal, Signal],
         reload: tuple[ReloadPort, Signal] | None,
         guard: FaultGuard | None,
@@ -292,7 +292,7 @@ class FoldedCore(wiring.Component):
 
         Return besides whether a wrong bit was corrected at this clock, and whether one was found that could not be.
         """
-        (advance, start), (counter, fetching) = control, position
+        counter, fetching = position
         codes = [encoded(instruction, self.program) for instruction in self.program.instructions]
         count = len(codes)
         if reload is not None:
@@ -427,16 +427,14 @@ class FoldedCore(wiring.Component):
             looks = looks | guard.read
         word = read if guard is None else Signal(check.width)
         found = check.read(m, word, "read")
-        if self.protect == "correct":
+        if guard is not None and self.protect == "correct":
             scrubbed = Signal(len(address), reset_less=True)
             rewrites = guard.read & found.corrected & ~clearing & (scrubbed != address)
             m.d.sync += scrubbed.eq(address)
             where = Mux(rewrites, scrubbed, where)
             what = Mux(rewrites, found.data, what)
             enable = enable | rewrites
-        m.d.comb += word.eq(
-            self._memory(m, check, read=(address, advance), write=(where, check.written(what), enable))
-        )
+        m.d.comb += word.eq(self._memory(m, check, read=(address, advance), write=(where, check.written(what), enable)))
         if guard is not None:
             m.d.comb += read.eq(found.data)
         return looks & found.corrected, looks & found.failed

@@ -53,7 +53,7 @@ def outside_calibration(datapath: Datapath, tdata: Value) -> Value:
 
 
 def flag_count(datapath: Datapath) -> int:
-    """Return the number of flags below `Flag.FAULT` that the hardware can set: without limits of wear, the first three."""
+    """Return the number of flags that hardware without protection can set: without limits of wear, the first three."""
     return 5 if datapath.wear else 3
 
 

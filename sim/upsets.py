@@ -2,7 +2,7 @@
 
 ::
 
-    design --> core.sv --> Verilator --> core <-- samples, and for each run: place, element, bit, clock
+    core ----> core.sv --> Verilator --> core <-- samples, and for each run: place, element, bit, clock
                              ^            |
           memories, registers: public     +--> beats --> the same? flagged? --> Upset
 
@@ -22,8 +22,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import NamedTuple
 
-from sosmith.gen.core import CoreDesign
-from sosmith.gen.output.core_facts import interface_facts
+from sosmith.gen.architecture import Architecture
 from sosmith.gen.output.verilog import to_rtlil, to_verilog
 from sosmith.model.errors import ToolError
 from sosmith.sim.simulators import find_simulator
@@ -55,25 +54,42 @@ class Place(NamedTuple):
     width: int
 
 
+class Hit(NamedTuple):
+    """Where and when an upset hits.
+
+    Attributes
+    ----------
+    place : Place
+        The memory or register.
+    element, bit : int
+        Its word, and the bit of it.
+    other : int
+        Another bit of the same word that is hit at the same time; -1 for none.
+    clock : int
+        Clock since the reset; -1 for never.
+    """
+
+    place: Place
+    element: int
+    bit: int
+    other: int
+    clock: int
+
+
 class Upset(NamedTuple):
     """A run with an upset.
 
     Attributes
     ----------
-    place : Place
+    hit : Hit
         What was hit.
-    element, bit, clock : int
-        Its word, the bit of it, and the clock since the reset.
     fate : Fate
         What became of it.
     wrong, flagged : int or None
         First beat that differs from the run without an upset, and first one with the flag `fault`.
     """
 
-    place: Place
-    element: int
-    bit: int
-    clock: int
+    hit: Hit
     fate: Fate
     wrong: int | None
     flagged: int | None
@@ -85,10 +101,18 @@ class Target:
 
     Attributes
     ----------
+    program, samples : Path
+        The simulation, and the file of its input beats.
+    beats : int
+        Number of these.
     places : tuple of Place
         Its memories and registers, by name.
+    numbers : dict of str to int
+        Numbers of the places in the simulation, by name.
     clocks : int
         Clocks of a run without an upset.
+    corrects : bool
+        Whether the core corrects wrong bits in its memories.
     """
 
     program: Path
@@ -118,7 +142,13 @@ class Target:
         return tuple(place for place in self.places if place.depth == 1 and place not in states)
 
     def run(
-        self, places: Sequence[Place], runs: int, seed: int, progress: Callable[[int, int], None] = lambda done, all: None
+        self,
+        places: Sequence[Place],
+        runs: int,
+        seed: int,
+        *,
+        double: bool = False,
+        progress: Callable[[int, int], None] = lambda done, total: None,
     ) -> list[Upset]:
         """Run the core `runs` times, each time with one bit of `places` turned over; every bit is equally likely.
 
@@ -130,6 +160,8 @@ class Target:
             Number of runs.
         seed : int
             Of the random places and clocks.
+        double : bool
+            Whether to turn over another bit of the same word, too, in places with more than one.
         progress : callable
             Called with the number of runs done and their total.
 
@@ -140,20 +172,22 @@ class Target:
         """
         chance = random.Random(seed)
         weights = [place.depth * place.width for place in places]
-        hits = [
-            (place, chance.randrange(place.depth), chance.randrange(place.width), chance.randrange(self.clocks))
-            for place in chance.choices(places, weights, k=runs)
-        ]
+        hits = []
+        for place in chance.choices(places, weights, k=runs):
+            bits = chance.sample(range(place.width), 2 if double and place.width > 1 else 1)
+            element, clock = chance.randrange(place.depth), chance.randrange(self.clocks)
+            hits.append(Hit(place, element, bits[0], bits[1] if bits[1:] else -1, clock))
         found: list[Upset] = []
         for hit, line in zip(hits, self.lines(hits), strict=True):
             found.append(self._judged(hit, line))
             progress(len(found), runs)
         return found
 
-    def lines(self, hits: Sequence[tuple[Place, int, int, int]], *, full: bool = False) -> Iterator[str]:
-        """Yield the program's line for each hit: place, word, bit and clock; with all beats if `full`."""
+    def lines(self, hits: Sequence[Hit], *, full: bool = False) -> Iterator[str]:
+        """Yield the program's line for each hit, with all beats if `full`."""
         flips = self.samples.with_name("flips.txt")
-        flips.write_text("".join(f"{self.numbers[p.name]} {e} {b} {c}\n" for p, e, b, c in hits), encoding="utf-8")
+        rows = (" ".join(map(str, (self.numbers[hit.place.name], *hit[1:]))) for hit in hits)
+        flips.write_text("".join(f"{row}\n" for row in rows), encoding="utf-8")
         command = [str(self.program), "runs", str(self.samples), str(flips), *["full"] * full]
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
             assert process.stdout is not None
@@ -162,8 +196,7 @@ class Target:
         if process.returncode:
             raise ToolError(f"the simulation of upsets must end with status 0, not {process.returncode}")
 
-
-    def _judged(self, hit: tuple[Place, int, int, int], line: str) -> Upset:
+    def _judged(self, hit: Hit, line: str) -> Upset:
         came, noticed, wrong, flagged, silent = map(int, line.split()[:5])
         if silent >= 0:
             fate = Fate.SILENT
@@ -173,16 +206,18 @@ class Target:
             fate = Fate.DETECTED
         else:
             fate = Fate.CORRECTED if noticed and self.corrects else Fate.MASKED
-        return Upset(*hit, fate, None if wrong < 0 else wrong, None if flagged < 0 else flagged)
+        return Upset(hit, fate, None if wrong < 0 else wrong, None if flagged < 0 else flagged)
 
 
-def build(design: CoreDesign, sent: Beats, folder: Path) -> Target:
-    """Build the core of `design` in Verilator so that its memories and registers can be changed.
+def build(architecture: Architecture, sent: Beats, folder: Path) -> Target:
+    """Build a core in Verilator so that its memories and registers can be changed.
 
     Parameters
     ----------
-    design : CoreDesign
-        The core; `sent` are its input beats, at most 64 bits wide.
+    architecture : Architecture
+        The core.
+    sent : Beats
+        Its input beats, at most 64 bits wide.
     folder : Path
         Where everything is written.
 
@@ -193,30 +228,28 @@ def build(design: CoreDesign, sent: Beats, folder: Path) -> Target:
     """
     folder.mkdir(parents=True, exist_ok=True)
     tool = find_simulator("verilator", folder / "bin")
-    name = design.datapath.name
-    text = to_verilog(to_rtlil(design.architecture.component(), name))
+    name = architecture.datapath.name
+    text = to_verilog(to_rtlil(architecture.component(), name))
     (folder / "core.sv").write_text(text, encoding="utf-8")
     (folder / "public.vlt").write_text(_public(text), encoding="utf-8")
     rows = zip(sent.tdest.tolist(), sent.tdata.tolist(), strict=True)
     (folder / "samples.txt").write_text("".join(f"{dest:x} {data:x}\n" for dest, data in rows), encoding="utf-8")
-    dest = ["-CFLAGS", "-DDEST"] if interface_facts(design).inputs.dest_width else []
+    dest = ["-CFLAGS", "-DDEST"] if architecture.channels > 1 else []
     command = ["verilator", "--cc", "--exe", "--build", "--vpi", "-Wno-fatal", "-O3", "-CFLAGS", "-O2", *dest]
     command += ["--prefix", "Vcore", "--top-module", name, "--Mdir", "build", "-o", "core"]
     command += ["public.vlt", "core.sv", str(_MAIN.resolve())]
-    environment = tool.environment
-    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+    done = subprocess.run(command, cwd=folder, env=tool.environment, capture_output=True, text=True, check=False)
     if done.returncode:
         raise ToolError(f"Verilator must build the core, not fail: {(done.stdout + done.stderr)[-2000:]}")
     program = (folder / "build" / "core").resolve()
     listed = _output([str(program), "places"]).splitlines()
-    rows_ = [line.split(" ", 2) for line in listed]
-    numbers = {found: number for number, (_, _, found) in enumerate(rows_)}
-    places = sorted(Place(found, int(depth), int(width)) for depth, width, found in rows_ if depth != "0")
+    lines = [line.split(" ", 2) for line in listed]
+    numbers = {found: number for number, (_, _, found) in enumerate(lines)}
+    places = sorted(Place(found, int(depth), int(width)) for depth, width, found in lines if depth != "0")
     (folder / "none.txt").write_text("", encoding="utf-8")
     samples = (folder / "samples.txt").resolve()
     clocks = int(_output([str(program), "runs", str(samples), str(folder.resolve() / "none.txt")]))
-    corrects = design.architecture.protect == "correct"
-    return Target(program, samples, len(sent), tuple(places), numbers, clocks, corrects)
+    return Target(program, samples, len(sent), tuple(places), numbers, clocks, architecture.protect == "correct")
 
 
 def counted(upsets: Sequence[Upset]) -> dict[str, int]:

@@ -1,0 +1,182 @@
+"""Upsets in protected cores: none in a memory or a state is silent, and after a restart all is as after a reset."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from tests.formal.small import leaky, resonator
+from tests.gen.test_architecture import design_in
+
+from sosmith.gen.architecture import Architecture
+from sosmith.gen.output.core_facts import StreamFacts
+from sosmith.hdl.axi_stream import dest_width, fields
+from sosmith.model.arrays import Codes
+from sosmith.model.dataflow.datapath import Datapath
+from sosmith.sim import upsets
+from sosmith.sim.stream_packing import Beats, Order, pack, random_order, unpack
+from sosmith.sim.upsets import Fate, Hit, Target
+
+FAULT = 1 << 6
+
+
+class Case(NamedTuple):
+    """A core."""
+
+    datapath: str
+    architecture: str
+    channels: int
+    protect: str
+    reload: bool = False
+
+    @property
+    def core(self) -> Architecture:
+        """The core itself."""
+        made = {"leaky": leaky, "resonator": resonator, "audio": audio}[self.datapath]()
+        named = replace(made, name="core")  # "small" is a word of Verilog
+        return Architecture(self.architecture, named, self.channels, self.reload, self.protect)
+
+
+def audio() -> Datapath:
+    return design_in("folded").datapath
+
+
+FAST = (Case("leaky", "folded", 3, "correct"), Case("resonator", "parallel", 1, "detect"))
+CASES = [
+    pytest.param(case, id="-".join(map(str, case)), marks=[] if case in FAST else [pytest.mark.slow])
+    for case in (
+        *FAST,
+        *(
+            Case("audio", architecture, channels, protect, reload)
+            for architecture in ("folded", "serial", "parallel")
+            for channels in (1, 3, 20)
+            for protect in ("detect", "correct")
+            for reload in (False, True)
+            if (channels == 20) <= (architecture == "parallel" and not reload)
+        ),
+    )
+]
+
+
+class Built(NamedTuple):
+    """A built core, with what it was given."""
+
+    case: Case
+    core: Architecture
+    target: Target
+    codes: Codes
+    order: Order
+
+
+@pytest.fixture(scope="module", params=CASES)
+def built(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Built:
+    case: Case = request.param
+    core = case.core
+    ports = core.datapath.inputs
+    samples = 60 if case.datapath != "audio" else 240 if case.architecture == "parallel" else 24
+    samples = max(3, samples // case.channels)
+    rng = np.random.default_rng(1)
+    codes = np.stack([rng.integers(p.lowest, p.highest + 1, (samples, case.channels)) for p in ports], axis=2)
+    order = random_order(samples, case.channels, 1)
+    facts = StreamFacts(fields=fields(ports), dest_width=dest_width(case.channels))
+    target = upsets.build(core, pack(codes, order, facts), tmp_path_factory.mktemp("upsets"))
+    return Built(case, core, target, codes, order)
+
+
+def beats_of(built: Built, hits: list[Hit]) -> list[Beats]:
+    """Return what comes out with each of the hits."""
+    found = []
+    for line in built.target.lines(hits, full=True):
+        rows = [[int(part, 16) for part in beat.split(":")] for beat in line.split()[5:]]
+        dest, data, user = (list(column) for column in zip(*rows, strict=True))
+        found.append(Beats(np.array(dest), np.array(data, dtype=np.uint64), np.array(user, dtype=np.uint8)))
+    return found
+
+
+def from_reset(built: Built, first: int) -> list[int]:
+    """Return the codes that come out if the samples from number `first` on are the first ones after a reset."""
+    datapath, order = built.core.datapath, built.order
+    results = []
+    for channel in range(built.case.channels):
+        skipped = int((order[:first] == channel).sum())
+        left = built.codes[skipped:, channel, :]
+        results.append(iter(datapath.compute(left).tolist() if len(left) else []))
+    return [next(results[channel]) for channel in order[first:]]
+
+
+def codes_of(built: Built, beats: Beats) -> list[int]:
+    output = built.core.datapath.output
+    facts = StreamFacts(fields=fields((output,)), dest_width=dest_width(built.case.channels))
+    codes, _ = unpack(beats, built.order, facts)
+    turns = np.zeros(built.case.channels, dtype=int)
+    found = []
+    for channel in built.order:
+        found.append(int(codes[turns[channel], channel, 0]))
+        turns[channel] += 1
+    return found
+
+
+def test_without_an_upset_it_is_the_model(built: Built) -> None:
+    (beats,) = beats_of(built, [Hit(built.target.places[0], 0, 0, -1, -1)])
+    assert codes_of(built, beats) == from_reset(built, 0)
+    assert not (beats.tuser & FAULT).any()
+
+
+def test_no_upset_in_a_memory_is_silent(built: Built) -> None:
+    memories = built.target.memories
+    assert bool(memories) == (built.case.architecture != "parallel" or built.case.channels > 1 or built.case.reload)
+    if memories:
+        counts = upsets.counted(built.target.run(memories, 600, 1))
+        noticed, other = ("corrected", "detected") if built.case.protect == "correct" else ("detected", "corrected")
+        assert counts["silent"] == counts["lost"] == counts[other] == 0
+        assert bool(counts[noticed]) == any(place.width > 3 for place in memories)  # bits that are there three times
+
+
+def test_two_wrong_bits_of_a_word_are_not_silent_where_one_is_corrected(built: Built) -> None:
+    memories = [place for place in built.target.memories if place.width > 3]
+    if built.case.protect == "correct" and memories:
+        counts = upsets.counted(built.target.run(memories, 600, 4, double=True))
+        assert counts["silent"] == counts["lost"] == 0
+        assert counts["detected"] > 60
+
+
+def test_no_upset_in_a_state_of_one_channel_is_silent(built: Built) -> None:
+    states = built.target.states
+    assert bool(states) == (built.case.architecture == "parallel" and (built.case.channels == 1 or built.case.reload))
+    if states:
+        counts = upsets.counted(built.target.run(states, 600, 2))
+        assert counts["silent"] == counts["lost"] == counts["corrected"] == 0
+        assert counts["detected"] > 60
+
+
+def test_after_a_fault_the_core_restarts(built: Built) -> None:
+    """Those flagged first may still have met the old states; from one of them on all is as after a reset."""
+    places = (*built.target.memories, *built.target.states)
+    kept = [place for place in places if not re.search("bank|program|reload_port", place.name)]
+    found = built.target.run(kept, 60, 3, double=built.case.protect == "correct")
+    hits = [upset for upset in found if upset.fate is Fate.DETECTED]
+    assert hits
+    for upset, beats in zip(hits, beats_of(built, [upset.hit for upset in hits]), strict=True):
+        assert upset.flagged is not None
+        assert (beats.tuser[upset.flagged :] & FAULT).all()
+        codes = codes_of(built, beats)
+        starts = range(upset.flagged, min(upset.flagged + built.core.latency_cycles + 2, len(codes) + 1))
+        assert any(codes[start:] == from_reset(built, start) for start in starts)
+
+
+@pytest.mark.slow
+def test_without_protection_upsets_are_silent(tmp_path: Path) -> None:
+    """Else the others would find nothing, whatever the core does."""
+    core = Case("leaky", "folded", 1, "none").core
+    port = core.datapath.inputs[0]
+    codes = np.random.default_rng(1).integers(port.lowest, port.highest + 1, (40, 1, 1))
+    sent = pack(codes, random_order(40, 1, 1), StreamFacts(fields=fields(core.datapath.inputs)))
+    target = upsets.build(core, sent, tmp_path)
+    counts = upsets.counted(target.run(target.memories, 200, 1))
+    assert counts["silent"] > 50
+    assert counts["detected"] == counts["corrected"] == 0
+    assert counts["silent"] + counts["masked"] + counts["lost"] == 200
