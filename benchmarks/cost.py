@@ -35,6 +35,7 @@ from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.output.verilog import to_rtlil, to_verilog
 from sosmith.gen.picture import settled
 from sosmith.gen.specification.specification import load
+from sosmith.model.dataflow.protection import PROTECTIONS
 
 ROOT = Path(__file__).resolve().parent.parent
 RECORD = ROOT / "benchmarks" / "cost.json"
@@ -63,27 +64,35 @@ class Core:
         One of `ARCHITECTURES`.
     channels : int
         Number of channels.
+    protect : str
+        One of `sosmith.model.dataflow.protection.PROTECTIONS`.
     """
 
     example: str
     architecture: str
     channels: int = 1
+    protect: str = "none"
 
     @property
     def key(self) -> str:
         """Key in the record."""
-        return f"{self.example} {self.architecture} {self.channels}"
+        guarded = "" if self.protect == "none" else f" {self.protect}"
+        return f"{self.example} {self.architecture} {self.channels}{guarded}"
 
     @property
     def label(self) -> str:
         """Name in tables and messages."""
         several = f", {self.channels} channels" if self.channels > 1 else ""
-        return f"{self.example} {self.architecture}{several}"
+        guarded = "" if self.protect == "none" else f", protect = {self.protect}"
+        return f"{self.example} {self.architecture}{several}{guarded}"
 
     @property
     def targets(self) -> list[str]:
         """Targets on which it is measured."""
-        return [key for key in TARGETS if key != _SMALLEST or self.architecture == "serial"]
+        wanted = [key for key in TARGETS if key != _SMALLEST or self.architecture == "serial"]
+        if self.protect == "none":
+            return wanted
+        return [key for key in wanted if key == "ecp5" or (key == "up5k" and self.architecture != "parallel")]
 
     @property
     def extra_channels(self) -> tuple[int, ...]:
@@ -91,10 +100,26 @@ class Core:
         return (8,) if (self.example, self.architecture) == ("audio_lowpass", "parallel") else ()
 
 
-CORES = tuple(
-    replace(core, channels=channels)
-    for core in (Core(example, architecture) for example in EXAMPLES for architecture in ARCHITECTURES)
-    for channels in sorted({*CHANNELS, *core.extra_channels})
+PROTECTED = tuple(
+    Core(example, architecture, channels, protect)
+    for example, architecture, channels in (
+        ("audio_lowpass", "folded", 1),
+        ("flange_wear_locomotive", "serial", 1),
+        ("audio_lowpass", "parallel", 1),
+        ("audio_lowpass", "parallel", 12),
+    )
+    for protect in PROTECTIONS[1:]
+    if (channels, protect) != (1, "correct") or architecture != "parallel"  # registers have parity in both
+)
+"""Cores whose memories and states are protected."""
+
+CORES = (
+    *(
+        replace(core, channels=channels)
+        for core in (Core(example, architecture) for example in EXAMPLES for architecture in ARCHITECTURES)
+        for channels in sorted({*CHANNELS, *core.extra_channels})
+    ),
+    *PROTECTED,
 )
 
 Job = tuple[Core, str]
@@ -108,7 +133,7 @@ def jobs() -> list[Job]:
     def rank(job: Job) -> int:
         core, key = job
         hopeless = core.architecture == "parallel" and TARGETS[key].device.family == "ice40"
-        return 0 if job in wanted else 1 + (core.channels > 1) + 2 * hopeless
+        return 0 if job in wanted or core in PROTECTED else 1 + (core.channels > 1) + 2 * hopeless
 
     return sorted(((core, key) for core in CORES for key in core.targets), key=rank)
 
@@ -124,7 +149,8 @@ def design(example: str, architecture: str) -> CoreDesign:
 @cache
 def verilog(core: Core) -> str:
     """Return the SystemVerilog of a core."""
-    architecture = replace(design(core.example, core.architecture).architecture, channels=core.channels)
+    made = design(core.example, core.architecture).architecture
+    architecture = replace(made, channels=core.channels, protect=core.protect)
     return to_verilog(to_rtlil(architecture.component(), core.example))
 
 
@@ -243,10 +269,36 @@ def fmax(figures: Figures) -> float:
 
 
 def recorded(record: Figures, keys: Iterable[str]) -> Iterable[tuple[Core, str, Figures]]:
-    """Return all figures of some targets, each with its core and target."""
+    """Return all figures of some targets, each with its core and target, but those of protected cores."""
     return [
-        (core, key, targets_in(record, core)[key]) for core in CORES for key in keys if key in targets_in(record, core)
+        (core, key, targets_in(record, core)[key])
+        for core in CORES
+        for key in keys
+        if core not in PROTECTED and key in targets_in(record, core)
     ]
+
+
+def protection_table(record: Figures) -> str:
+    """Return a Markdown table of the protected cores beside the plain ones."""
+    lines = [
+        "| core | `protect` | target | LC, or all LUT4 | FF | RAM | fmax, MHz | logic, against none | fmax, against none |",
+        "|---" * 9 + "|",
+    ]
+    for bare in dict.fromkeys(replace(core, protect="none") for core in PROTECTED):
+        for key in replace(bare, protect="detect").targets:
+            base = targets_in(record, bare).get(key)
+            for core in (bare, *(core for core in PROTECTED if replace(core, protect="none") == bare)):
+                figures = targets_in(record, core).get(key)
+                if base is None or figures is None or figures["cells"] is None:
+                    continue
+                area, logic, least = figures["area"], logic_of(key, figures), logic_of(key, base)
+                more = "" if core == bare else f"{100 * (logic / least - 1):+.0f} %"
+                slower = "" if core == bare else f"{100 * (fmax(figures) / fmax(base) - 1):+.0f} %"
+                lines.append(
+                    f"| {bare.label} | {core.protect} | {title(TARGETS[key])} | {logic:,} | {area['flip_flops']:,} "
+                    f"| {area['rams']} | {fmax(figures):.1f} | {more} | {slower} |"
+                )
+    return "\n".join(lines)
 
 
 def table(record: Figures, keys: tuple[str, ...]) -> str:
@@ -533,6 +585,14 @@ The slowest path between registers, for the median seed; registers have the name
 
 In the parallel architecture a section closes its recursion within one clock: sums, multiplication and state follow one
 another without a register. With several channels the loop is pipelined across them.
+
+## Protection
+
+What it costs to detect a wrong bit, or to correct one and detect two (`[hardware] protect`, [hardware.md](hardware.md)):
+
+{protection_table(record)}
+
+The check bits stand between a memory and its logic, within the same clock; that is what lowers fmax.
 
 ## Goals
 

@@ -46,7 +46,7 @@ class Architecture:
     reload : bool
         Whether constants can be loaded at run time.
     protect : str
-        One of `sosmith.model.protection.PROTECTIONS`.
+        One of `sosmith.model.dataflow.protection.PROTECTIONS`.
     """
 
     name: str
@@ -155,7 +155,7 @@ class Budget:
     reload : bool
         Whether the hardware's constants can be loaded.
     protect : str
-        One of `sosmith.model.protection.PROTECTIONS`.
+        One of `sosmith.model.dataflow.protection.PROTECTIONS`.
     """
 
     clock: Fraction

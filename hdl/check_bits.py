@@ -41,7 +41,7 @@ class CheckBits:
     bits : int
         Width of the data, at least 1.
     protect : str
-        One of `sosmith.model.protection.PROTECTIONS`.
+        One of `sosmith.model.dataflow.protection.PROTECTIONS`.
 
     Attributes
     ----------

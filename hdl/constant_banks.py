@@ -92,7 +92,7 @@ class ConstantBanks(wiring.Component):
         m = Module()
         word = 0
         wrong: tuple[list[Value], list[Value]] = ([], [])
-        for constant, pair in zip(self.loadable, self._registers, strict=True):
+        for k, (constant, pair) in enumerate(zip(self.loadable, self._registers, strict=True)):
             for low in range(0, constant.bits, _WORD_BITS):
                 high = min(low + _WORD_BITS, constant.bits)
                 for bank, register in enumerate(pair):
@@ -101,7 +101,9 @@ class ConstantBanks(wiring.Component):
                         m.d.sync += register.eq(Cat(register[:low], self.write_data[: high - low], register[high:]))
                     if self.parity:
                         init = (register.init >> low & ((1 << (high - low)) - 1)).bit_count() % 2
-                        parity = Signal(name=f"bank{bank}_parity{word}", init=init, reset_less=True)
+                        parity = Signal(
+                            name=f"bank{bank}_constant{k}_parity{low // _WORD_BITS}", init=init, reset_less=True
+                        )
                         with m.If(writes):
                             m.d.sync += parity.eq(self.write_data[: high - low].xor())
                         wrong[bank].append(register[low:high].xor() ^ parity)

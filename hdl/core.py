@@ -112,7 +112,7 @@ class Core(wiring.Component):
         Fingerprint of the structure, 32 bits; None for a core whose constants cannot be loaded. Otherwise they can be
         loaded while the core works: each sample is computed with the bank that was active when the core accepted it.
     protect : str
-        One of `sosmith.model.protection.PROTECTIONS`.
+        One of `sosmith.model.dataflow.protection.PROTECTIONS`.
 
     Members
     -------

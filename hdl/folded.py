@@ -128,7 +128,7 @@ class FoldedCore(wiring.Component):
     fingerprint : int or None
         Fingerprint of the structure, 32 bits; None for a core whose program cannot be loaded.
     protect : str
-        One of `sosmith.model.protection.PROTECTIONS`, for all memories.
+        One of `sosmith.model.dataflow.protection.PROTECTIONS`, for all memories.
 
     Members
     -------

@@ -200,7 +200,7 @@ class InterleavedStage(wiring.Component):
     constants : dict of int to Pair
         Constants that come from one of two banks, by node.
     protect : str
-        One of `sosmith.model.protection.PROTECTIONS`, for the memories of the states.
+        One of `sosmith.model.dataflow.protection.PROTECTIONS`, for the memories of the states.
 
     Members
     -------

@@ -132,7 +132,7 @@ class Target:
     def states(self) -> tuple[Place, ...]:
         """The registers that have a parity bit, and these bits."""
         names = {place.name for place in self.places}
-        bare = [place for place in self.places if f"{place.name}_parity" in names]
+        bare = [place for place in self.places if {f"{place.name}_parity", f"{place.name}_parity0"} & names]
         return tuple(bare) + tuple(place for place in self.places if re.search(r"_parity\d*$", place.name))
 
     @property

@@ -1,6 +1,6 @@
 """Valid names in a specification: families, kinds, methods, realizations, architectures, cores, inputs.
 
-Those of `hardware.protect` are in `sosmith.model.protection`.
+Those of `hardware.protect` are in `sosmith.model.dataflow.protection`.
 """
 
 FAMILIES = ("butterworth", "chebyshev1", "chebyshev2", "elliptic", "bessel")

@@ -34,7 +34,7 @@ from sosmith.gen.specification.values import (
     text,
     whole,
 )
-from sosmith.model.protection import PROTECTIONS
+from sosmith.model.dataflow.protection import PROTECTIONS
 from sosmith.model.suggestion import did_you_mean
 
 MAX_ORDER = 20

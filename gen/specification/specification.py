@@ -96,14 +96,14 @@ class HardwareSpec:
     reload : bool
         Whether coefficients can be loaded at run time.
     protect : str
-        One of `sosmith.model.protection.PROTECTIONS`.
+        One of `sosmith.model.dataflow.protection.PROTECTIONS`.
     """
 
     realization: str
     architecture: str
     clock: Fraction
     reload: bool
-    protect: str = "none"
+    protect: str
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -77,7 +77,7 @@ def test_a_sample_has_the_same_flags_everywhere(channels: int, limits: int, arch
     wear = tuple((int(met[c][8 + c]), int(met[c][14 - c])) for c in range(limits))
     core = replace(plain, datapath=replace(plain.datapath, wear=wear))
     datapath, flags = core.datapath, core.datapath.compute_status(codes)
-    for flag in Flag:
+    for flag in set(Flag) - {Flag.FAULT}:
         for c in range(channels):
             assert {int(value) >> flag & 1 for value in flags[:, c]} == {0, 1}, (flag, c)
 

@@ -1,0 +1,31 @@
+"""docs/assurance.md: its figures are those that the commands recorded, and none of them is a silent upset."""
+
+import json
+
+from benchmarks import upsets
+
+RECORD = json.loads(upsets.RECORD.read_text(encoding="utf-8"))
+
+
+def test_the_upsets_are_those_of_the_record() -> None:
+    assert upsets.TABLE.findall(upsets.DOCUMENT.read_text(encoding="utf-8")) == [upsets.table(RECORD)]
+
+
+def test_every_core_was_hit_in_every_kind_of_place() -> None:
+    assert [row["kind"] for row in RECORD if row["protect"] == "none"] == []
+    for core in upsets.CORES:
+        kinds = {row["kind"] for row in RECORD if upsets.Core(*(row[name] for name in upsets.Core._fields)) == core}
+        assert "other registers" in kinds
+        assert kinds & {"memories", "states in registers"}
+        assert ("two bits of a word in memories" in kinds) == (core.protect == "correct" and "memories" in kinds)
+    assert all(row["runs"] >= 10_000 for row in RECORD)
+
+
+def test_no_upset_was_silent() -> None:
+    assert upsets.silent(RECORD) == 0
+
+
+def test_a_silent_upset_would_be_counted() -> None:
+    (memories, *_) = [row for row in RECORD if row["kind"] == "memories"]
+    (others, *_) = [row for row in RECORD if row["kind"] == "other registers"]
+    assert upsets.silent([memories | {"silent": 2}, memories | {"lost": 1}, others | {"silent": 5}]) == 3
