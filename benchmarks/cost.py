@@ -281,7 +281,7 @@ def recorded(record: Figures, keys: Iterable[str]) -> Iterable[tuple[Core, str, 
 def protection_table(record: Figures) -> str:
     """Return a Markdown table of the protected cores beside the plain ones."""
     lines = [
-        "| core | `protect` | target | LC, or all LUT4 | FF | RAM | fmax, MHz | logic, against none | fmax, against none |",
+        "| core | `protect` | target | LC, or all LUT4 | FF | RAM | fmax, MHz | logic, more | fmax, more |",
         "|---" * 9 + "|",
     ]
     for bare in dict.fromkeys(replace(core, protect="none") for core in PROTECTED):
@@ -588,7 +588,8 @@ another without a register. With several channels the loop is pipelined across t
 
 ## Protection
 
-What it costs to detect a wrong bit, or to correct one and detect two (`[hardware] protect`, [hardware.md](hardware.md)):
+What it costs to detect a wrong bit, or to correct one and detect two, as `[hardware] protect` asks
+([hardware.md](hardware.md)):
 
 {protection_table(record)}
 

@@ -196,8 +196,9 @@ class ReloadPort(wiring.Component):
         if self.protected:
             first, second, third = fetch.data
             stored = (first & second) | (second & third) | (first & third)
+            faults = self._faults(m, slave)
             with m.If(_is_at(slave, FAULTS)):
-                m.d.sync += other.eq(self._faults(m, slave))
+                m.d.sync += other.eq(faults)
         now = _is_at(slave, STATUS) | _is_at(slave, CRC)
         if self.protected:
             now = now | _is_at(slave, FAULTS)

@@ -13,11 +13,14 @@ from tests.formal.small import leaky, resonator
 from tests.gen.test_architecture import design_in
 
 from sosmith.gen.architecture import Architecture
+from sosmith.gen.core import design_core
 from sosmith.gen.output.core_facts import StreamFacts
+from sosmith.gen.stimuli import traces_for
 from sosmith.hdl.axi_stream import dest_width, fields
 from sosmith.model.arrays import Codes
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.sim import upsets
+from sosmith.sim.simulation import simulate
 from sosmith.sim.stream_packing import Beats, Order, pack, random_order, unpack
 from sosmith.sim.upsets import Fate, Hit, Target
 
@@ -180,3 +183,18 @@ def test_without_protection_upsets_are_silent(tmp_path: Path) -> None:
     assert counts["silent"] > 50
     assert counts["detected"] == counts["corrected"] == 0
     assert counts["silent"] + counts["masked"] + counts["lost"] == 200
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("channels", [1, 12])
+@pytest.mark.parametrize("protect", ["detect", "correct"])
+@pytest.mark.parametrize("architecture", ["parallel", "folded", "serial"])
+def test_a_protected_core_keeps_the_rules_of_its_streams(
+    architecture: str, protect: str, channels: int, tmp_path: Path
+) -> None:
+    base = design_in(architecture).spec
+    made = design_core(replace(base, channels=channels, hardware=replace(base.hardware, protect=protect)))
+    traces = [replace(t, codes=t.codes[:60], truth=None, reading=None) for t in traces_for(made, "noise", seed=1)]
+    for gates in (None, "ulx3s_25f") if (architecture, channels) == ("folded", 1) else (None,):
+        evidence = simulate(made, traces, tmp_path / str(gates), seed=1, gates=gates)
+        assert (evidence.mismatches, evidence.samples) == (0, 60 * channels)

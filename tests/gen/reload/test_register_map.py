@@ -9,21 +9,39 @@ from systemrdl import RDLCompiler
 from systemrdl.node import AddrmapNode
 
 from sosmith.gen.reload.register_map import c_registers, markdown, systemrdl
-from sosmith.model.reload.registers import CRC, LAYOUT, MAGIC, REGISTERS, STATUS, Field, Outcome, Register
+from sosmith.model.reload.registers import (
+    CRC,
+    LAYOUT,
+    MAGIC,
+    PROTECTED_REGISTERS,
+    REGISTERS,
+    STATUS,
+    Field,
+    Outcome,
+    Register,
+)
 
 CORE = {"words": 513, "design": 0x89ABCDEF}
 
 
-@pytest.fixture
-def compiled(tmp_path: Path) -> AddrmapNode:
-    path = tmp_path / "core.rdl"
-    path.write_text(systemrdl("core", **CORE), encoding="utf-8")
+def in_systemrdl(folder: Path, *, protected: bool = False) -> AddrmapNode:
+    path = folder / "core.rdl"
+    path.write_text(systemrdl("core", **CORE, protected=protected), encoding="utf-8")
     compiler = RDLCompiler()
     compiler.compile_file(str(path))
     return compiler.elaborate().top
 
 
-def test_systemrdl_has_every_register_and_field(compiled: AddrmapNode) -> None:
+@pytest.fixture
+def compiled(tmp_path: Path) -> AddrmapNode:
+    return in_systemrdl(tmp_path)
+
+
+@pytest.mark.parametrize(("protected", "registers"), [(False, REGISTERS), (True, PROTECTED_REGISTERS)])
+def test_systemrdl_has_every_register_and_field(
+    protected: bool, registers: tuple[Register, ...], tmp_path: Path
+) -> None:
+    compiled = in_systemrdl(tmp_path, protected=protected)
     found = [
         (
             r.inst_name,
@@ -36,8 +54,13 @@ def test_systemrdl_has_every_register_and_field(compiled: AddrmapNode) -> None:
     ]
     assert found == [
         (r.name, r.address, r.reads, r.writes, [(f.name, f.low, f.bits) for f in r.fields] or [("VALUE", 0, 32)])
-        for r in REGISTERS
+        for r in registers
     ]
+
+
+def test_only_a_protected_core_has_the_counts_in_its_header() -> None:
+    assert "CORE_FAULTS_UNCORRECTED_MASK" in c_registers("core", **CORE, protected=True)
+    assert "FAULTS" not in c_registers("core", **CORE)
 
 
 def test_systemrdl_has_constants_and_named_values(compiled: AddrmapNode) -> None:
