@@ -100,8 +100,10 @@ def check_measurements(about: AboutEntry, path: Path) -> None:
     _compare(str(path), about.measurements.sha256, _content(path))
 
 
-def has_program(path: Path) -> bool:
-    """Whether the manifest at `path`, which is known to be unchanged, is that of a core with a fixed program.
+def fixed_architecture(path: Path) -> str | None:
+    """Return the architecture in the manifest at `path`, which is known to be unchanged.
+
+    None if its hardware cannot be proven: with constants that can be loaded, or parallel with several channels.
 
     Raises
     ------
@@ -110,8 +112,10 @@ def has_program(path: Path) -> bool:
     """
     try:
         manifest = json.loads(_content(path))
+        architecture = str(manifest["architecture"])
+        several = architecture == "parallel" and manifest["spec"].get("channels", 1) > 1
         reloads = manifest["spec"].get("hardware", {}).get("reload", False)
-        return manifest["architecture"] in {"folded", "serial"} and not reloads
+        return None if reloads or several else architecture
     except (ValueError, KeyError, TypeError, AttributeError):
         raise RejectedError(f"{path} must be the manifest of a core, not another file") from None
 
