@@ -100,10 +100,10 @@ def check_measurements(about: AboutEntry, path: Path) -> None:
     _compare(str(path), about.measurements.sha256, _content(path))
 
 
-def fixed_architecture(path: Path) -> str | None:
-    """Return the architecture in the manifest at `path`, which is known to be unchanged.
+def fixed_architecture(path: Path) -> tuple[str | None, int]:
+    """Return architecture and number of channels from the manifest at `path`, which is known to be unchanged.
 
-    None if its hardware cannot be proven: with constants that can be loaded, or parallel with several channels.
+    The architecture is None for a core whose constants can be loaded.
 
     Raises
     ------
@@ -112,10 +112,8 @@ def fixed_architecture(path: Path) -> str | None:
     """
     try:
         manifest = json.loads(_content(path))
-        architecture = str(manifest["architecture"])
-        several = architecture == "parallel" and manifest["spec"].get("channels", 1) > 1
         reloads = manifest["spec"].get("hardware", {}).get("reload", False)
-        return None if reloads or several else architecture
+        return None if reloads else str(manifest["architecture"]), int(manifest["spec"].get("channels", 1))
     except (ValueError, KeyError, TypeError, AttributeError):
         raise RejectedError(f"{path} must be the manifest of a core, not another file") from None
 

@@ -27,6 +27,7 @@ from dataclasses import dataclass
 
 from sosmith.gen.verifier.certificate_file import Certificate, Operation
 from sosmith.gen.verifier.graph import RejectedError, require
+from sosmith.gen.verifier.parallel.channels import DEST, find_channels
 from sosmith.gen.verifier.parallel.control import find_control
 from sosmith.gen.verifier.parallel.evaluation import Evaluation
 from sosmith.gen.verifier.parallel.fault import fault
@@ -38,7 +39,7 @@ from sosmith.gen.verifier.parallel.text import read_modules
 from sosmith.gen.verifier.program.normal_form import Form, constant, plus
 
 CLOCK = "aclk"
-OUTPUT, FLAGS = "m_axis_tdata", "m_axis_tuser"
+OUTPUT, FLAGS, OUTPUT_DEST = "m_axis_tdata", "m_axis_tuser", "m_axis_tdest"
 _PORTS = frozenset(
     {CLOCK, "aresetn", DATA, "s_axis_tvalid", "s_axis_tready", OUTPUT, FLAGS, "m_axis_tvalid", "m_axis_tready"}
 )
@@ -63,7 +64,7 @@ class HardwareVerdict:
     latency: int
 
 
-def check_hardware(text: str, certificate: Certificate) -> HardwareVerdict:
+def check_hardware(text: str, certificate: Certificate, channels: int = 1) -> HardwareVerdict:
     """Prove that the hardware in a core's SystemVerilog computes the graph of a certificate.
 
     Parameters
@@ -72,6 +73,8 @@ def check_hardware(text: str, certificate: Certificate) -> HardwareVerdict:
         SystemVerilog of a parallel core.
     certificate : Certificate
         Its certificate, which `verify` has accepted.
+    channels : int
+        Number of channels, each of which has states of its own.
 
     Returns
     -------
@@ -90,19 +93,23 @@ def check_hardware(text: str, certificate: Certificate) -> HardwareVerdict:
         not any(port.startswith("s_axil_") for port in ports),
         "the constants must be fixed to be checked, not loadable at run time",
     )
-    require("s_axis_tdest" not in ports, "the core must have one channel to be checked, not several")
-    require(ports == _PORTS, f"the ports must be {', '.join(sorted(_PORTS))}, not {', '.join(sorted(ports))}")
+    wanted = _PORTS if channels == 1 else _PORTS | {DEST, OUTPUT_DEST}
+    require(ports == wanted, f"the ports must be {', '.join(sorted(wanted))}, not {', '.join(sorted(ports))}")
     netlist = flattened(modules, CLOCK)
-    control = find_control(netlist)
+    control = find_control(netlist) if channels == 1 else find_channels(netlist, channels)
     forms = Forms()
     graph = GraphCodes(certificate, forms)
     pipeline = Pipeline(netlist, control, graph, forms, certificate)
     try:
         pipeline.check_states()
         _check_output(pipeline.buffered(), pipeline, graph, forms, certificate)
+        if channels > 1:
+            dest = pipeline.buffered().net(OUTPUT_DEST)
+            right = pipeline.same(dest, pipeline.channel, netlist.widths[OUTPUT_DEST])
+            require(right, f"{OUTPUT_DEST} must be the channel of the sample, not another value")
     except RejectedError as error:
         raise fault(netlist, pipeline, graph) or error from None
-    return HardwareVerdict(pipeline.registers, len(pipeline.states), len(control.valid))
+    return HardwareVerdict(pipeline.registers, pipeline.state_count, len(control.valid) + (channels > 1))
 
 
 def _check_output(

@@ -16,9 +16,9 @@ samples there are, and where, is then what the pictures of the components say, f
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
-from itertools import product
+from itertools import pairwise, product
 from typing import TypeVar
 
 from sosmith.gen.verifier.graph import RejectedError, require
@@ -55,6 +55,30 @@ def cases(fixed: Case, evaluate: Callable[[Case], _Result]) -> Iterator[tuple[Ca
         yield fixed, found
 
 
+def about(name: str, error: RejectedError) -> RejectedError:
+    """Return an error whose sentence says what it is about."""
+    sentence = str(error)
+    return RejectedError(name + sentence.removeprefix("it")) if sentence.startswith("it ") else error
+
+
+@dataclass(frozen=True)
+class Buffer:
+    """A buffer of two samples: the signals that say what it holds, and what moves it.
+
+    Attributes
+    ----------
+    held, full : str
+        Registers: whether it holds a sample, and whether it holds two.
+    coming, ready : str
+        Whether a sample comes while it is not full, and whether one may leave.
+    """
+
+    held: str
+    full: str
+    coming: str
+    ready: str
+
+
 @dataclass(frozen=True)
 class Control:
     """The registers that move the samples.
@@ -62,19 +86,62 @@ class Control:
     Attributes
     ----------
     valid : tuple of str
-        For each position whether it holds a sample; position 0 is the source.
-    o_valid, full : str
-        Whether the output buffer holds a sample, and whether it holds two.
+        For each position whether it holds a sample that moves on; position 0 is the source.
+    output : Buffer
+        The output buffer.
+    entrance : Entrance or None
+        What stands before position 0 in a core with several channels.
     """
 
     valid: tuple[str, ...]
-    o_valid: str
-    full: str
+    output: Buffer
+    entrance: Entrance | None = None
+
+    @property
+    def full(self) -> str:
+        """Whether the pipeline stands."""
+        return self.output.full
 
     @property
     def names(self) -> set[str]:
         """All control signals."""
-        return {*self.valid, self.o_valid, self.full, RESET, SOURCE, SINK}
+        found = {*self.valid, self.output.held, self.output.full, RESET, SOURCE, SINK}
+        return found if self.entrance is None else found | self.entrance.names
+
+    @property
+    def cuts(self) -> set[str]:
+        """Nets among the control signals."""
+        if self.entrance is None:
+            return set()
+        return {self.valid[0], self.entrance.buffer.coming, self.entrance.buffer.ready}
+
+
+@dataclass(frozen=True)
+class Entrance:
+    """What stands before the pipeline of a core with several channels.
+
+    Attributes
+    ----------
+    buffer : Buffer
+        The input buffer.
+    clearing, word : str
+        Registers: whether the states are being cleared, and those of which channel.
+    channels : int
+        Number of channels.
+    near : tuple of str
+        Registers that repeat the valid bits of positions 1, 2, ..
+    """
+
+    buffer: Buffer
+    clearing: str
+    word: str
+    channels: int
+    near: tuple[str, ...]
+
+    @property
+    def names(self) -> set[str]:
+        """All control signals among these."""
+        return {self.buffer.held, self.buffer.full, self.buffer.coming, self.buffer.ready, self.clearing}
 
 
 def find_control(netlist: Netlist) -> Control:
@@ -85,42 +152,46 @@ def find_control(netlist: Netlist) -> Control:
     RejectedError
         If samples do not move as they must.
     """
-    search = _Search(netlist)
-    o_valid = search.register(search.net("m_axis_tvalid", {}), "m_axis_tvalid")
+    search = Search(netlist)
+    held = search.register(search.net("m_axis_tvalid", {}), "m_axis_tvalid")
     full = search.register(search.inverted(search.net("s_axis_tready", {})), "not s_axis_tready")
-    loading = {RESET: 1, full: 0, o_valid: 0}
-    chain = [search.register(search.loaded(o_valid, loading), f"what {o_valid} takes over")]
-    while chain[-1] != SOURCE:
-        moving = {RESET: 1, full: 0, chain[-1]: 0}
-        before = search.register(search.loaded(chain[-1], moving), f"what {chain[-1]} takes over")
-        require(before not in {*chain, full, o_valid}, f"{chain[-1]} must not follow {before}, which follows it")
-        chain.append(before)
-    control = Control(tuple(reversed(chain)), o_valid, full)
-    search.check(control)
+    chain = search.chain(held, full)
+    last = search.register(search.loaded(chain[0], {RESET: 1, full: 0, chain[0]: 0}), f"what {chain[0]} takes over")
+    require(last == SOURCE, f"{chain[0]} must follow {SOURCE}, not {last}")
+    control = Control((SOURCE, *chain), Buffer(held, full, chain[-1], SINK))
+    search.check_chain(control.valid, full)
+    search.check_buffer(control.output)
     return control
 
 
-class _Search:
-    """Evaluates control logic by itself."""
+class Search:
+    """Evaluates control logic by itself.
 
-    def __init__(self, netlist: Netlist) -> None:
-        self._netlist = netlist
+    Parameters
+    ----------
+    netlist : Netlist
+    cuts : set of str
+        Nets that are taken as signals of their own.
+    """
+
+    def __init__(self, netlist: Netlist, cuts: Set[str] = frozenset()) -> None:
+        self._netlist, self._cuts = netlist, cuts
 
     def net(self, name: str, case: Case) -> tuple[Forms, Form]:
         """Return a net where the signals of a case have values, and all others are variables."""
-        require(self._netlist.widths.get(name) == 1, f"the port {name} must have one bit")
-        forms, logic = self._logic(case)
+        require(self._netlist.widths.get(name) == 1, f"{name} must have one bit")
+        forms, logic = self.logic(case)
         return forms, forms.unsigned(logic.net(name), 1)
 
-    def loaded(self, register: str, case: Case) -> tuple[Forms, Form]:
-        """Return what a register of one bit holds at the next clock."""
-        require(self._netlist.widths[register] == 1, f"{register} must have one bit")
-        forms, logic = self._logic(case)
+    def loaded(self, name: str, case: Case) -> tuple[Forms, Form]:
+        """Return what a register holds at the next clock."""
+        require(name in self._netlist.registers, f"{name} must be a register")
+        forms, logic = self.logic(case)
         try:
-            loaded = logic.loaded(self._netlist.registers[register].statements)
+            loaded = logic.loaded(self._netlist.registers[name].statements)
         except RejectedError as error:
-            raise RejectedError(f"{register}: {error}") from None
-        return forms, forms.unsigned(logic.net(register) if loaded is None else loaded[1], 1)
+            raise about(name, error) from None
+        return forms, forms.unsigned(logic.net(name) if loaded is None else loaded[1], self._netlist.widths[name])
 
     def inverted(self, found: tuple[Forms, Form]) -> tuple[Forms, Form]:
         """Return 1 less a value."""
@@ -128,42 +199,71 @@ class _Search:
         return forms, plus(constant(1), value, -1)
 
     def register(self, found: tuple[Forms, Form], what: str) -> str:
-        """Return the register, or the source, that a value is."""
+        """Return the register, or the source, that a value is.
+
+        Raises
+        ------
+        RejectedError
+            If it is none.
+        """
+        name = self.one_register(found)
+        if name is None:
+            raise RejectedError(f"{what} must be one register, not logic of {len(found[0].keys(found[1]))} signals")
+        return name
+
+    def one_register(self, found: tuple[Forms, Form]) -> str | None:
+        """Return the register, or the source, that a value is; None if it is none."""
         forms, value = found
         keys = forms.keys(value)
         name = next(iter(keys)) if len(keys) == 1 else None
-        known = isinstance(name, str) and (name in self._netlist.registers or name == SOURCE)
-        if not known or value != forms.variable(name, 0, 1):
-            raise RejectedError(f"{what} must be one register, not logic of {len(keys)} signals")
-        assert isinstance(name, str)
-        return name
+        if not isinstance(name, str) or value != forms.variable(name, 0, 1):
+            return None
+        return name if name in self._netlist.registers or name == SOURCE else None
 
-    def check(self, control: Control) -> None:
-        """Check what all control registers do in every case."""
-        for name in (*control.valid[1:], control.o_valid, control.full):
-            register = self._netlist.registers[name]
-            require(register.first == 0, f"{name} must be 0 before the first clock, not {register.first}")
-            self._expect(name, {RESET: 0}, 0, "in reset")
-        for before, name in zip(control.valid, control.valid[1:], strict=False):
-            for full, coming, own in product((0, 1), repeat=3):
-                case = {RESET: 1, control.full: full, before: coming, name: own}
-                self._expect(name, case, own if full else coming, "while the pipeline stands" if full else "")
-        last = control.valid[-1]
+    def chain(self, held: str, full: str) -> list[str]:
+        """Return the valid bits that are registers, from the source to the output buffer."""
+        found = [self.register(self.loaded(held, {RESET: 1, full: 0, held: 0}), f"what {held} takes over")]
+        while True:
+            before = self.one_register(self.loaded(found[-1], {RESET: 1, full: 0, found[-1]: 0}))
+            if before is None or before not in self._netlist.registers:
+                return found[::-1]
+            require(before not in {*found, full, held}, f"{found[-1]} must not follow {before}, which follows it")
+            found.append(before)
+
+    def check_chain(self, valid: Sequence[str], full: str) -> None:
+        """Check that valid bits follow each other in every case while the pipeline does not stand."""
+        for before, name in pairwise(valid):
+            self.expect_empty(name)
+            for stands, coming, own in product((0, 1), repeat=3):
+                case = {RESET: 1, full: stands, before: coming, name: own}
+                self.expect(name, case, own if stands else coming)
+
+    def check_buffer(self, buffer: Buffer) -> None:
+        """Check that a buffer is a queue of two in every case."""
+        for name in (buffer.held, buffer.full):
+            self.expect_empty(name)
         for held, full, ready, coming in product((0, 1), repeat=4):
             if full and not held:
                 continue  # never: both checks below keep it so
-            case = {RESET: 1, control.o_valid: held, control.full: full, SINK: ready, last: coming}
+            case = {RESET: 1, buffer.held: held, buffer.full: full, buffer.ready: ready, buffer.coming: coming}
             leaves = ready or not held
-            self._expect(control.o_valid, case, (full or coming) if leaves else 1, "")
-            self._expect(control.full, case, 0 if leaves else (full or coming), "")
+            self.expect(buffer.held, case, (full or coming) if leaves else 1)
+            self.expect(buffer.full, case, 0 if leaves else (full or coming))
 
-    def _expect(self, name: str, case: Case, wanted: int, when: str) -> None:
+    def expect_empty(self, name: str) -> None:
+        """Check that a register is 0 before the first clock and after a reset."""
+        first = self._netlist.registers[name].first
+        require(first == 0, f"{name} must be 0 before the first clock, not {first}")
+        self.expect(name, {RESET: 0}, 0)
+
+    def expect(self, name: str, case: Case, wanted: int) -> None:
+        """Check what a register holds after a clock in a case."""
         _, value = self.loaded(name, case)
-        if value != constant(wanted):
-            stated = ", ".join(f"{signal} = {bit}" for signal, bit in case.items())
-            raise RejectedError(f"{name} must be {wanted} after a clock with {stated}{f' ({when})' if when else ''}")
+        stated = ", ".join(f"{signal} = {bit}" for signal, bit in case.items())
+        require(value == constant(wanted), f"{name} must be {wanted} after a clock with {stated}")
 
-    def _logic(self, case: Case) -> tuple[Forms, Evaluation]:
+    def logic(self, case: Case) -> tuple[Forms, Evaluation]:
+        """Return the logic where the signals of a case have values, and all others are variables."""
         forms = Forms()
 
         def content(name: str) -> Form:
@@ -171,4 +271,4 @@ class _Search:
                 return constant(case[name])
             return forms.variable(name, 0, (1 << self._netlist.widths[name]) - 1)
 
-        return forms, Evaluation(self._netlist, forms, content)
+        return forms, Evaluation(self._netlist, forms, content, cuts=self._cuts)

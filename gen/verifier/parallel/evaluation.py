@@ -9,7 +9,7 @@ have one side only; choices by anything else become ``b + select (a - b)``.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Sequence, Set
 
 from sosmith.gen.verifier.graph import RejectedError, require
 from sosmith.gen.verifier.parallel.forms import Forms, shifted
@@ -47,12 +47,24 @@ class Evaluation:
         What a register or an input holds.
     shortened : callable
         Gives what enters an instance a shorter form, if it has one.
+    word : callable or None
+        What a memory, by its name, has at an address.
+    cuts : set of str
+        Nets whose value is asked for like that of a register.
     """
 
     def __init__(
-        self, netlist: Netlist, forms: Forms, content: Content, shortened: Callable[[Form], Form] = lambda form: form
+        self,
+        netlist: Netlist,
+        forms: Forms,
+        content: Content,
+        shortened: Callable[[Form], Form] = lambda form: form,
+        *,
+        word: Callable[[str, Form], Form] | None = None,
+        cuts: Set[str] = frozenset(),
     ) -> None:
         self._netlist, self._forms, self._content, self._shortened = netlist, forms, content, shortened
+        self._word, self._cuts = word, cuts
         self._known: dict[tuple[str, int, int], Form] = {}
         self._open: set[tuple[str, int, int]] = set()
 
@@ -109,9 +121,9 @@ class Evaluation:
 
     def _net(self, name: str, low: int, width: int) -> Form:
         drivers = self._netlist.drivers.get(name)
-        if drivers is None:
+        if drivers is None or name in self._cuts:
             require(
-                name in self._netlist.registers or self._netlist.ports.get(name) == "input",
+                name in self._cuts or name in self._netlist.registers or self._netlist.ports.get(name) == "input",
                 f"{name} must be driven to be used",
             )
             return self._cut(self._content(name), low)
@@ -194,7 +206,9 @@ class Evaluation:
         if isinstance(value, Bits):
             return self.net(value.name, value.low, value.width)
         if isinstance(value, Word):
-            raise RejectedError(f"a word of {value.name} must go into a register, not into logic")
+            if self._word is None:
+                raise RejectedError(f"a word of {value.name} must not be used here")
+            return self._word(value.name, self._exact(value.address, signed=False))
         if isinstance(value, Joined):
             total: Form = {}
             at = 0

@@ -24,7 +24,8 @@ def fault(netlist: Netlist, pipeline: Pipeline, graph: GraphCodes) -> RejectedEr
                 right = found is None or pipeline.same(found, graph.codes[index], netlist.widths[name])
             except RejectedError as error:
                 sentence = str(error)
-                return RejectedError(sentence if name in sentence else f"{name} must be {node.label}, but {sentence}")
+                named = node.label in sentence or "node " in sentence
+                return error if named else RejectedError(f"{name} must be {node.label}, but {sentence}")
             if not right:
                 return RejectedError(f"{name} must be {node.label}, not another value")
     return None

@@ -21,42 +21,27 @@ A register that belongs to another position without a known number of samples in
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 
 from sosmith.gen.verifier.certificate_file import Certificate
 from sosmith.gen.verifier.graph import RejectedError, require
-from sosmith.gen.verifier.parallel.control import RESET, SINK, Case, Control, UndecidedError, cases
+from sosmith.gen.verifier.parallel.channels import DEST
+from sosmith.gen.verifier.parallel.control import RESET, Buffer, Case, Control, UndecidedError, about, cases
 from sosmith.gen.verifier.parallel.equality import same_word
 from sosmith.gen.verifier.parallel.evaluation import Evaluation
 from sosmith.gen.verifier.parallel.forms import Forms
 from sosmith.gen.verifier.parallel.graph_codes import GraphCodes
 from sosmith.gen.verifier.parallel.netlist import Netlist
+from sosmith.gen.verifier.parallel.state_memories import State, StateMemories
 from sosmith.gen.verifier.parallel.text import Bits, Choice, Expression, Joined, Load, Operator, Statement, Word
 from sosmith.gen.verifier.program.normal_form import Form, constant, plus
 
 DATA = "s_axis_tdata"
 
 
-@dataclass(frozen=True)
-class State:
-    """A register that is taken to hold the code of a DELAY node.
-
-    Attributes
-    ----------
-    node : int
-        The node.
-    behind : int
-        Position that it is loaded behind.
-    """
-
-    node: int
-    behind: int
-
-
 class Pipeline:
-    """The registers of a core with one channel.
+    """The registers of a core.
 
     Parameters
     ----------
@@ -77,21 +62,35 @@ class Pipeline:
         self._netlist, self._control, self._graph, self._forms = netlist, control, graph, forms
         self._ports = certificate.inputs
         self._numbers = itertools.count()
-        self._behind: dict[str, int] = {}
+        self._behind: dict[str, int | None] = {}
         self._found: dict[str, Form] = {}
         self._second: dict[str, Form] = {}
         self._open: list[str] = []
         self._reached: dict[str, frozenset[str]] = {}
         self.states: dict[str, State] = {}
+        self.memories: StateMemories | None = None
+        entrance = control.entrance
+        self._source, self._apart, channels = 0, set[str](), 1
+        if entrance is not None:
+            self._source, self._apart, channels = -1, {entrance.word, *entrance.near}, entrance.channels
+        self.channel = forms.variable("channel", 0, channels - 1)
+        if entrance is not None:
+            self.memories = StateMemories(self, netlist, control, entrance, graph)
+            return
         for node in graph.delays:
             name = f"{graph.nodes[node].stage}.{graph.nodes[node].name}"
             if name in netlist.registers:
-                self.states[name] = State(node, self._position_by_control(name))
+                self.states[name] = State(node, self.position_by_control(name, netlist.registers[name].statements))
 
     @property
     def registers(self) -> int:
         """Number of registers whose content is known."""
         return len(self._found) + len(self._second) + len(self.states)
+
+    @property
+    def state_count(self) -> int:
+        """Number of registers and memories that hold DELAY nodes."""
+        return len(self.states) + (0 if self.memories is None else len(self.memories.states))
 
     @property
     def last(self) -> int:
@@ -107,15 +106,42 @@ class Pipeline:
         def content(name: str) -> Form:
             if name in self._control.names:
                 return self._control_bit(name, case)
-            if name == DATA:
-                return self._samples() if position == 0 else self._unknown(name, frame)
+            if name in {DATA, DEST}:
+                return self._entering(name) if position == self._source else self._unknown(name, frame)
             require(name in self._netlist.registers, f"the port {name} must not be used here")
             if name in self.states:
                 found = self._state(self.states[name], position, case)
                 return self._unknown(name, frame) if found is None else found
-            return self.held(name) if self.behind(name) + 1 == position else self._unknown(name, frame)
+            known = position >= self._source and name not in self._apart and self.behind(name) == position - 1
+            return self.held(name) if known else self._unknown(name, frame)
 
-        return Evaluation(self._netlist, self._forms, content, self._graph.shortened)
+        def word(name: str, address: Form) -> Form:
+            found = None if self.memories is None else self.memories.word(name, address, position)
+            return self._unknown(name, frame) if found is None else found
+
+        return self.logic(content, word)
+
+    def in_front(self, known: Mapping[str, Form], opened: str) -> Evaluation:
+        """Return the logic as it is while the input buffer holds a sample, where some registers hold what is `known`.
+
+        `opened` is a control signal that is not taken as such, but as the logic that it is.
+        """
+        frame = next(self._numbers)
+
+        def content(name: str) -> Form:
+            if name in known:
+                return known[name]
+            inside = name in self._netlist.registers and name not in self._control.names | self._apart
+            return self.held(name) if inside and self.behind(name) == self._source else self._unknown(name, frame)
+
+        return self.logic(content, opened=opened)
+
+    def logic(
+        self, content: Callable[[str], Form], word: Callable[[str, Form], Form] | None = None, *, opened: str = ""
+    ) -> Evaluation:
+        """Return the logic where registers and inputs hold what `content` says, and memories what `word` does."""
+        cuts = self._control.cuts - {opened}
+        return Evaluation(self._netlist, self._forms, content, self._graph.shortened, word=word, cuts=cuts)
 
     def held(self, name: str) -> Form:
         """Return what a register holds while there is a sample at its position.
@@ -131,8 +157,8 @@ class Pipeline:
                 self._found[name] = self._taken_over(name)
         return self._found[name]
 
-    def behind(self, name: str) -> int:
-        """Return the position that a register is loaded behind."""
+    def behind(self, name: str) -> int | None:
+        """Return the position that a register is loaded behind; None if it only ever takes over constants."""
         require(name in self._netlist.registers, f"{name} must not be used for data")
         if name not in self._behind:
             with self._once(name):
@@ -154,50 +180,47 @@ class Pipeline:
         def content(name: str) -> Form:
             if name in self._control.names or name not in self._netlist.registers:
                 return self._unknown(name, frame)
-            return self._first_of_two(name)
-
-        return Evaluation(self._netlist, self._forms, content, self._graph.shortened)
-
-    def _first_of_two(self, name: str) -> Form:
-        """Return what a register of the buffer holds of the sample that leaves next."""
-        if name in self._found:
+            if name not in self._found:
+                self._found[name] = self._first_of_two(name, self._control.output, self.last)
             return self._found[name]
-        control, last = self._control, self.last
-        fixed = {RESET: 1, control.full: 0, control.valid[last]: 1}
+
+        return self.logic(content)
+
+    def _first_of_two(self, name: str, buffer: Buffer, position: int) -> Form:
+        """Return what a register of a buffer behind a position holds of the sample that leaves it next."""
+        fixed = {RESET: 1, buffer.full: 0, buffer.coming: 1}
         loaded = [
-            self._one_of(name, last, {**fixed, control.o_valid: held, SINK: ready})
+            self._one_of(name, position, {**fixed, buffer.held: held, buffer.ready: ready})
             for held, ready in ((0, 0), (0, 1), (1, 1))
         ]
         for other in loaded[1:]:
             self._require_same(name, loaded[0], other, "whether the buffer is empty or not")
         for full in (0, 1):
-            self._require_kept(name, last, {RESET: 1, control.o_valid: 1, SINK: 0, control.full: full})
-        case = {RESET: 1, control.full: 1, control.o_valid: 1, SINK: 1}
-        moved = self._loaded(name, self._seconds(), case)
+            self._require_kept(name, position, {RESET: 1, buffer.held: 1, buffer.ready: 0, buffer.full: full})
+        case = {RESET: 1, buffer.full: 1, buffer.held: 1, buffer.ready: 1}
+        moved = self._loaded(name, self._seconds(buffer, position), case)
         if moved is None:
             raise RejectedError(f"{name} must take over the second sample when the first leaves")
         self._require_same(name, loaded[0], moved, "from the pipeline and from the second place")
-        self._found[name] = loaded[0]
         return loaded[0]
 
-    def _seconds(self) -> Callable[[Case], Evaluation]:
-        """Return the logic as it is while the buffer holds a second sample."""
+    def _seconds(self, buffer: Buffer, position: int) -> Callable[[Case], Evaluation]:
+        """Return the logic as it is while a buffer holds a second sample."""
         frame = next(self._numbers)
-        control, last = self._control, self.last
 
         def of(case: Case) -> Evaluation:
             def content(name: str) -> Form:
-                if name in control.names:
+                if name in self._control.names:
                     return self._control_bit(name, case)
                 if name not in self._netlist.registers or name in self.states:
                     return self._unknown(name, frame)
                 if name not in self._second:
-                    fixed = {RESET: 1, control.full: 0, control.valid[last]: 1, control.o_valid: 1, SINK: 0}
-                    self._second[name] = self._one_of(name, last, fixed)
-                    self._require_kept(name, last, {RESET: 1, control.full: 1, control.o_valid: 1, SINK: 0})
+                    stays = {RESET: 1, buffer.held: 1, buffer.ready: 0}
+                    self._second[name] = self._one_of(name, position, {**stays, buffer.full: 0, buffer.coming: 1})
+                    self._require_kept(name, position, {**stays, buffer.full: 1})
                 return self._second[name]
 
-            return Evaluation(self._netlist, self._forms, content, self._graph.shortened)
+            return self.logic(content)
 
         return of
 
@@ -205,7 +228,11 @@ class Pipeline:
 
     def _taken_over(self, name: str) -> Form:
         behind = self.behind(name)
-        valid = self._control.valid
+        valid, entrance = self._control.valid, self._control.entrance
+        if behind is None:
+            raise RejectedError(f"{name} must hold a word of a sample, not a constant")
+        if behind < 0 and entrance is not None:
+            return self._first_of_two(name, entrance.buffer, behind)
         require(behind < self.last, f"{name} must hold a word of a sample inside the pipeline")
         found = self._one_of(name, behind, {RESET: 1, self._control.full: 0, valid[behind]: 1})
         self._require_kept(name, behind, {RESET: 1, self._control.full: 1, valid[behind + 1]: 1})
@@ -228,7 +255,7 @@ class Pipeline:
         try:
             loaded = logic(case).loaded(register.statements)
         except RejectedError as error:
-            raise error if name in str(error) else RejectedError(f"{name}: {error}") from None
+            raise about(name, error) from None
         return None if loaded is None else loaded[1]
 
     def _require_kept(self, name: str, position: int, fixed: Case) -> None:
@@ -262,6 +289,8 @@ class Pipeline:
         """
         for name in self.states:
             self._check_state(name)
+        if self.memories is not None:
+            self.memories.check()
 
     def _check_state(self, name: str) -> None:
         state, register = self.states[name], self._netlist.registers[name]
@@ -291,25 +320,34 @@ class Pipeline:
 
     # Where registers are.
 
-    def _position(self, name: str) -> int:
+    def _position(self, name: str) -> int | None:
         """Return the position that a register is loaded behind: by the valid bit that loads it, or by its sources."""
         conditions = self._leaves(_conditions(self._netlist.registers[name].statements))
-        bits = conditions & set(self._control.valid)
-        if bits:
-            return self._position_by_control(name)
+        if conditions & set(self._control.valid):
+            return self.position_by_control(name, self._netlist.registers[name].statements)
         leaves = self._leaves(_values(self._netlist.registers[name].statements)) - self._control.names
-        sources = self._positions_of(leaves) or {self.states[leaf].behind for leaf in leaves}
+        if self._source < 0 and leaves & {DATA, DEST}:
+            return self._source
+        if not leaves:
+            return None
+        sources = self._positions_of(leaves) or {self.states[leaf].behind for leaf in leaves & self.states.keys()}
         require(len(sources) == 1, f"{name} must take over a word of one sample, not of {len(sources)}")
         return sources.pop()
 
     def _positions_of(self, leaves: frozenset[str]) -> set[int]:
         """Return the positions whose samples registers and inputs hold, without states."""
         passed = leaves - self._control.names - self.states.keys()
-        return {0 if leaf == DATA else self.behind(leaf) + 1 for leaf in passed}
+        found = {self._source if leaf in {DATA, DEST} else self._position_of(leaf) for leaf in passed}
+        return {position for position in found if position is not None}
 
-    def _position_by_control(self, name: str) -> int:
-        conditions = self._leaves(_conditions(self._netlist.registers[name].statements))
-        bits = sorted(conditions & set(self._control.valid))
+    def _position_of(self, name: str) -> int | None:
+        """Return the position whose sample a register holds."""
+        behind = self.behind(name)
+        return None if behind is None else behind + 1
+
+    def position_by_control(self, name: str, statements: Sequence[Statement]) -> int:
+        """Return the position behind which statements load something: there is one valid bit among their conditions."""
+        bits = sorted(self._leaves(_conditions(statements)) & set(self._control.valid))
         require(len(bits) == 1, f"{name} must be loaded by one valid bit, not by {', '.join(bits) or 'none'}")
         return self._control.valid.index(bits[0])
 
@@ -323,7 +361,7 @@ class Pipeline:
 
     def _leaves_of(self, name: str) -> frozenset[str]:
         if name not in self._reached:
-            drivers = self._netlist.drivers.get(name)
+            drivers = None if name in self._control.cuts else self._netlist.drivers.get(name)
             self._reached[name] = frozenset()  # within a loop, which `Evaluation` refuses
             self._reached[name] = (
                 frozenset({name}) if drivers is None else self._leaves(driver.value for driver in drivers)
@@ -337,8 +375,11 @@ class Pipeline:
             raise UndecidedError(name)
         return constant(case[name])
 
+    def _entering(self, name: str) -> Form:
+        """Return the input: the channel, which exists, or the fields' codes and bits that mean nothing."""
+        return self.channel if name == DEST else self._samples()
+
     def _samples(self) -> Form:
-        """Return the input: the fields' codes, and bits that mean nothing."""
         total: Form = {}
         offset = 0
         for node, port in zip(self._graph.inputs, self._ports, strict=True):

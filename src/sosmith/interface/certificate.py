@@ -154,14 +154,14 @@ class Certificate:
             content = self.text().encode() if self.path is None else self.path.read_bytes()
             folder = Path(fspath(files))
             compared = check_files(check_seal(self.entries, content), folder)
-            architecture = fixed_architecture(folder / f"{self.name}.json")
+            architecture, channels = fixed_architecture(folder / f"{self.name}.json")
             text = (folder / f"{self.name}.sv").read_text(encoding="utf-8")
             if architecture in {"folded", "serial"}:
                 progress("program", 0, 0)
                 program = check_program(text, self.entries)
             elif architecture == "parallel":
                 progress("hardware", 0, 0)
-                hardware = check_hardware(text, self.entries)
+                hardware = check_hardware(text, self.entries, channels)
         if rebuild:
             from sosmith.gen.output.rebuild import rebuilt
 

@@ -33,6 +33,7 @@ input.x = { bits = 8, signed = true, range = [-1.0, 1.0] }
 filter = { family = "butterworth", kind = "lowpass", order = 2, cutoff = 20.0 }
 output = { bits = 8, signed = true, range = [-1.0, 1.0], unit = "", max_error = "faithful" }
 """
+ODD = PLAIN.replace("order = 2", "order = 3")
 
 
 class Made(NamedTuple):
@@ -44,7 +45,7 @@ class Made(NamedTuple):
     channels: int
 
     def check(self, text: str | None = None) -> HardwareVerdict:
-        return check_hardware(text or self.text, self.certificate)
+        return check_hardware(text or self.text, self.certificate, self.channels)
 
 
 def specified(text: str) -> Specification:
