@@ -149,31 +149,45 @@ class Simulation:
         ]
 
 
-def outputs(text: str, clocks: int, seed: int, channels: int = 1) -> list[dict[str, int]]:
-    """Return the outputs of a core at each clock, as far as they mean something, for random inputs with the seed.
+class Inputs:
+    """Random inputs of a core at each clock.
 
     Source and sink stall for a while now and then, and there are a few resets. Many codes are the largest or smallest.
     """
-    netlist = flattened(read_modules(text), "aclk")
-    simulation = Simulation(netlist)
-    rng = random.Random(seed)
-    width = netlist.widths["s_axis_tdata"]
+
+    def __init__(self, text: str, clocks: int, seed: int, channels: int = 1) -> None:
+        self.netlist = flattened(read_modules(text), "aclk")
+        rng = random.Random(seed)
+        width = self.netlist.widths["s_axis_tdata"]
+        self.rows: list[dict[str, int]] = []
+        busy = {"s_axis_tvalid": 1.0, "m_axis_tready": 1.0}
+        for clock in range(clocks):
+            if clock % 16 == 0:
+                busy = {name: rng.choice((0.2, 0.5, 0.9, 1.0)) for name in busy}
+                extreme = rng.random() < 0.6
+            data = rng.getrandbits(width)
+            if extreme:
+                data = rng.choice((0, (1 << width) - 1, (1 << (width - 1)) - 1, 1 << (width - 1), data))
+            row = {"aclk": 0, "aresetn": int(clock > 1 and rng.random() > 0.004), "s_axis_tdata": data}
+            row |= {name: int(rng.random() < part) for name, part in busy.items()}
+            if channels > 1:
+                row["s_axis_tdest"] = rng.randrange(channels + 1)
+            self.rows.append(row)
+
+
+def run(inputs: Inputs) -> list[dict[str, int]]:
+    """Return the outputs of a core at each clock."""
+    simulation = Simulation(inputs.netlist)
     found = []
-    busy = {"s_axis_tvalid": 1.0, "m_axis_tready": 1.0}
-    for clock in range(clocks):
-        if clock % 16 == 0:
-            busy = {name: rng.choice((0.2, 0.5, 0.9, 1.0)) for name in busy}
-            style = rng.random()
-        data = rng.getrandbits(width)
-        if style < 0.6:  # the same bits in each byte lane: codes at the ends of their ranges, and steps
-            data = rng.choice((0, (1 << width) - 1, (1 << (width - 1)) - 1, 1 << (width - 1), data))
-        inputs = {"aclk": 0, "aresetn": int(clock > 1 and rng.random() > 0.004), "s_axis_tdata": data}
-        inputs |= {name: int(rng.random() < part) for name, part in busy.items()}
-        if channels > 1:
-            inputs["s_axis_tdest"] = rng.randrange(channels + 1)
-        seen = simulation.outputs(inputs)
-        if not seen["m_axis_tvalid"]:
-            seen = {name: value for name, value in seen.items() if name.endswith(("tvalid", "tready"))}
-        found.append(seen)
+    for row in inputs.rows:
+        found.append(simulation.outputs(row))
         simulation.clock()
     return found
+
+
+def outputs(text: str, clocks: int, seed: int, channels: int = 1) -> list[dict[str, int]]:
+    """Return the outputs of a core at each clock, as far as they mean something, for random inputs with the seed."""
+    return [
+        seen if seen["m_axis_tvalid"] else {name: seen[name] for name in ("m_axis_tvalid", "s_axis_tready")}
+        for seen in run(Inputs(text, clocks, seed, channels))
+    ]
