@@ -261,7 +261,7 @@ def sweep(core: Made, count: int, seed: int, clocks: int) -> Counter[str]:
 
 
 def test_sixty_edits() -> None:
-    found = sweep(small(), 60, seed=1, clocks=300)
+    found = sweep(small(), 60, seed=1, clocks=200)
     assert found["accepted"] + found["rejected"] == 60
     assert found["rejected"] > 40
     assert found["rejected, a node named"] > 15
