@@ -25,25 +25,24 @@ LIMITS = [(-8, 7), (0, 15), (-3, 100), (0, 1)]
 def random_words(forms: Forms, rng: random.Random, count: int) -> list[tuple[Form, Value]]:
     """Return forms made from four variables by what hardware does, each with the same in Python's integers."""
     words: list[tuple[Form, Value]] = [
-        (forms.variable(k, *ends), lambda values, k=k: values[k])  # type: ignore[misc]
-        for k, ends in enumerate(LIMITS)
+        (forms.variable(k, *ends), lambda values, k=k: values[k]) for k, ends in enumerate(LIMITS)
     ]
     for _ in range(count):
         (a, x), (b, y) = rng.choice(words), rng.choice(words)
         n, w = rng.randrange(1, 5), rng.randrange(2, 9)
         c = rng.randrange(-9, 10)
         made: list[tuple[Form, Value]] = [
-            (plus(a, b, c), lambda v, x=x, y=y, c=c: x(v) + c * y(v)),  # type: ignore[misc]
-            (forms.floor(shifted(a, -n)), lambda v, x=x, n=n: x(v) >> n),  # type: ignore[misc]
-            (forms.unsigned(a, w), lambda v, x=x, w=w: x(v) % (1 << w)),  # type: ignore[misc]
+            (plus(a, b, c), lambda v, x=x, y=y, c=c: x(v) + c * y(v)),
+            (forms.floor(shifted(a, -n)), lambda v, x=x, n=n: x(v) >> n),
+            (forms.unsigned(a, w), lambda v, x=x, w=w: x(v) % (1 << w)),
             (
                 forms.signed(a, w),
-                lambda v, x=x, w=w: (x(v) + (1 << (w - 1))) % (1 << w) - (1 << (w - 1)),  # type: ignore[misc]
+                lambda v, x=x, w=w: (x(v) + (1 << (w - 1))) % (1 << w) - (1 << (w - 1)),
             ),
-            (forms.negative(plus(a, constant(c))), lambda v, x=x, c=c: int(x(v) + c < 0)),  # type: ignore[misc]
+            (forms.negative(plus(a, constant(c))), lambda v, x=x, c=c: int(x(v) + c < 0)),
         ]
         if len(a) * len(b) < 9:
-            made.append((forms.times(a, b), lambda v, x=x, y=y: x(v) * y(v)))  # type: ignore[misc]
+            made.append((forms.times(a, b), lambda v, x=x, y=y: x(v) * y(v)))
         words.append(rng.choice(made))
     return words
 
