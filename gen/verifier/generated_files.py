@@ -100,8 +100,10 @@ def check_measurements(about: AboutEntry, path: Path) -> None:
     _compare(str(path), about.measurements.sha256, _content(path))
 
 
-def has_program(path: Path) -> bool:
-    """Whether the manifest at `path`, which is known to be unchanged, is that of a core with a plain, fixed program.
+def fixed_architecture(path: Path) -> tuple[str | None, int]:
+    """Return architecture and number of channels from the manifest at `path`, which is known to be unchanged.
+
+    The architecture is None for a core whose constants can be loaded, or whose memories and states are protected.
 
     Raises
     ------
@@ -112,7 +114,7 @@ def has_program(path: Path) -> bool:
         manifest = json.loads(_content(path))
         hardware = manifest["spec"].get("hardware", {})
         plain = not hardware.get("reload", False) and hardware.get("protect", "none") == "none"
-        return manifest["architecture"] in {"folded", "serial"} and plain
+        return str(manifest["architecture"]) if plain else None, int(manifest["spec"].get("channels", 1))
     except (ValueError, KeyError, TypeError, AttributeError):
         raise RejectedError(f"{path} must be the manifest of a core, not another file") from None
 

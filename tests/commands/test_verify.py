@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from tests.commands.invocation import Invocation
 from tests.gen.designs import EXAMPLES, example_design
+from tests.gen.verifier.parallel.cores import PLAIN, specified
 
+from sosmith.gen.core import design_core
 from sosmith.gen.output.generate import generate
 from sosmith.model.errors import ShortfallError
 
@@ -45,6 +49,21 @@ def test_against_everything(folder: Path) -> None:
     assert 0 < found["specification"]["filter_distance"] < 1e-50
     assert (found["files_compared"], found["files_rebuilt"]) == (5, 0)
     assert found["program_instructions"] > 50
+
+
+@pytest.mark.parametrize("channels", [1, 2])
+def test_a_parallel_core(channels: int, tmp_path: Path) -> None:
+    spec = specified(PLAIN.replace("sample_rate", f"channels = {channels}\nsample_rate"))
+    hardware = replace(spec.hardware, architecture="parallel", realization="df1_ef1")
+    generate(design_core(replace(spec, hardware=hardware)), tmp_path)
+    path = str(tmp_path / "plain.certificate.json")
+    table = command.good(path, "--files", str(tmp_path)).stdout
+    assert re.search(
+        r"hardware: the SystemVerilog computes these graphs, each sample \d+ clocks later, in \d+ regis", table
+    )
+    found = json.loads(command.good(path, "--json", "--files", str(tmp_path)).stdout)
+    assert found["hardware_registers"] > 10
+    assert found["program_instructions"] is None
 
 
 def test_without_anything_else_as_before(folder: Path) -> None:

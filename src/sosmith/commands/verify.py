@@ -21,7 +21,7 @@ from sosmith.terminal import JSON_OPTION, print_json, show_progress
     "--files",
     type=click.Path(path_type=Path),
     metavar="DIR",
-    help="Hold the generated files in this folder against the certificate, byte for byte, and prove the program.",
+    help="Hold the generated files in this folder against the certificate, byte for byte, and prove the SystemVerilog.",
 )
 @click.option("--rebuild", is_flag=True, help="Generate all files again and compare them with the certificate.")
 @JSON_OPTION
@@ -65,6 +65,7 @@ def verify(certificate: Path, spec: Path | None, files: Path | None, rebuild: bo
                 },
                 "files_compared": proof.files,
                 "program_instructions": None if proof.program is None else proof.program.instructions,
+                "hardware_registers": None if proof.hardware is None else proof.hardware.registers,
                 "files_rebuilt": proof.rebuilt,
             }
         )

@@ -17,8 +17,9 @@ from sosmith.gen.verifier.generated_files import (
     check_seal,
     check_text,
     check_texts,
-    has_program,
+    fixed_architecture,
 )
+from sosmith.gen.verifier.parallel.check import HardwareVerdict, check_hardware
 from sosmith.gen.verifier.program.check import ProgramVerdict, check_program
 from sosmith.gen.verifier.specified.stated_specification import Agreement, check_specification
 from sosmith.gen.verifier.verification import verify
@@ -55,6 +56,8 @@ class Proof:
     """Number of files whose content was compared."""
     program: ProgramVerdict | None = None
     """What the check of the program in the SystemVerilog found; None if it was not checked."""
+    hardware: HardwareVerdict | None = None
+    """What the check of a parallel core's SystemVerilog found; None if it was not checked."""
     rebuilt: int = 0
     """Number of files that were generated again."""
 
@@ -121,8 +124,9 @@ class Certificate:
             the ideal filter is derived again from its words, and its text must be the one in the certificate.
         files : path
             Folder with the generated files: their SHA-256 must be those in the certificate, and no byte of the
-            certificate's own file may have been changed. The program of a folded or serial core, without loadable
-            constants, is proven to compute the certificate's graph for all inputs and states.
+            certificate's own file may have been changed. From the SystemVerilog, the program of a folded or serial
+            core, and all hardware of a parallel one, is proven to compute the certificate's graph for all inputs and
+            states; cores with loadable constants are not.
         rebuild : bool
             Whether to generate all files again, from `spec` or the specification's text in the certificate, and compare
             them byte for byte.
@@ -135,7 +139,7 @@ class Certificate:
             If a file cannot be read, or the specification is invalid.
         """
         verdict = verify(self.entries, progress)
-        agreement, program, compared, again = None, None, 0, 0
+        agreement, program, hardware, compared, again = None, None, None, 0, 0
         checked = None if spec is None else load(Path(fspath(spec)))
         if checked is not None:
             progress("specification", 0, 0)
@@ -150,9 +154,14 @@ class Certificate:
             content = self.text().encode() if self.path is None else self.path.read_bytes()
             folder = Path(fspath(files))
             compared = check_files(check_seal(self.entries, content), folder)
-            if has_program(folder / f"{self.name}.json"):
+            architecture, channels = fixed_architecture(folder / f"{self.name}.json")
+            text = (folder / f"{self.name}.sv").read_text(encoding="utf-8")
+            if architecture in {"folded", "serial"}:
                 progress("program", 0, 0)
-                program = check_program((folder / f"{self.name}.sv").read_text(encoding="utf-8"), self.entries)
+                program = check_program(text, self.entries)
+            elif architecture == "parallel":
+                progress("hardware", 0, 0)
+                hardware = check_hardware(text, self.entries, channels)
         if rebuild:
             from sosmith.gen.output.rebuild import rebuilt
 
@@ -169,6 +178,7 @@ class Certificate:
             agreement=agreement,
             files=compared,
             program=program,
+            hardware=hardware,
             rebuilt=again,
         )
 

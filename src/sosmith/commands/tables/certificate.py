@@ -29,6 +29,14 @@ def print_proof(certificate: Certificate, proof: Proof) -> None:
             f"[bold green]program[/]: {proof.program.instructions} instructions in the SystemVerilog compute these "
             "graphs, for all inputs and states"
         )
+    if proof.hardware is not None:
+        found = proof.hardware
+        console.print(
+            f"[bold green]hardware[/]: the SystemVerilog computes these graphs, each sample {found.latency} clocks "
+            f"later, in {found.registers} registers, {found.states} of them states: for all inputs, stalls and resets"
+        )
+    if proof.files and proof.program is None and proof.hardware is None:
+        console.print("not read: the SystemVerilog, as that of a core with loadable constants or with protection")
     if proof.rebuilt:
         console.print(f"[bold green]rebuilt[/]: {proof.rebuilt} files, the same byte for byte")
 

@@ -1,0 +1,152 @@
+"""Proves that the hardware of a parallel core computes the graph of its certificate, for all inputs, stalls and resets.
+
+The core is read from its SystemVerilog, which is what tools synthesize, and nothing else is needed to read it
+(`sosmith.gen.verifier.parallel.text`). All its logic is then followed with normal forms in place of numbers::
+
+    certificate --> graph --> code of each node, a form of inputs and of what DELAY nodes hold ---+
+                                                                                                  v
+    core.sv --> netlist --> control: which clock moves which sample                             equal?
+                   |                          |                                                   ^
+                   +--> logic ----------------+--> what each register holds, for its sample ------+
+
+1. The valid bits and the output buffer move samples as a queue does: none is lost, repeated or overtaken, whatever
+   source, sink and reset do (`sosmith.gen.verifier.parallel.control`).
+2. What a register holds is a form of its own sample, and it is loaded exactly when a sample moves there; a register of
+   a recursion holds the code of a DELAY node, by induction over the clocks (`sosmith.gen.verifier.parallel.pipeline`).
+3. What leaves is the output of the graph, extended to whole bytes, with the flags input_at_rail and output_saturated.
+
+Sums and products are those of the hardware, modulo the width of each net; extensions by a sign or by zeros, and bits
+that are left out, change a value unless its range says otherwise. The only ranges are those of the certificate, which
+`sosmith.gen.verifier.verification` proves. Names of nets count in one place: the register of a recursion is looked for
+by the name of its DELAY node. Under a wrong name a proof is not found.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from sosmith.gen.verifier.certificate_file import Certificate, Operation
+from sosmith.gen.verifier.graph import RejectedError, require
+from sosmith.gen.verifier.parallel.channels import DEST, find_channels
+from sosmith.gen.verifier.parallel.control import find_control
+from sosmith.gen.verifier.parallel.evaluation import Evaluation
+from sosmith.gen.verifier.parallel.fault import fault
+from sosmith.gen.verifier.parallel.forms import Forms
+from sosmith.gen.verifier.parallel.graph_codes import GraphCodes
+from sosmith.gen.verifier.parallel.netlist import flattened
+from sosmith.gen.verifier.parallel.pipeline import DATA, Pipeline
+from sosmith.gen.verifier.parallel.text import read_modules
+from sosmith.gen.verifier.program.normal_form import Form, constant, plus
+
+CLOCK = "aclk"
+OUTPUT, FLAGS, OUTPUT_DEST = "m_axis_tdata", "m_axis_tuser", "m_axis_tdest"
+_PORTS = frozenset(
+    {CLOCK, "aresetn", DATA, "s_axis_tvalid", "s_axis_tready", OUTPUT, FLAGS, "m_axis_tvalid", "m_axis_tready"}
+)
+_AT_RAIL, _SATURATED = 0, 2
+"""Bits of the flags."""
+
+
+@dataclass(frozen=True)
+class HardwareVerdict:
+    """What the check of the hardware has found.
+
+    Attributes
+    ----------
+    registers, states : int
+        Number of registers whose content was found, and of those that hold a DELAY node.
+    latency : int
+        Clocks from the edge that accepts a sample to the edge that can hand its result on, without a stall.
+    """
+
+    registers: int
+    states: int
+    latency: int
+
+
+def check_hardware(text: str, certificate: Certificate, channels: int = 1) -> HardwareVerdict:
+    """Prove that the hardware in a core's SystemVerilog computes the graph of a certificate.
+
+    Parameters
+    ----------
+    text : str
+        SystemVerilog of a parallel core.
+    certificate : Certificate
+        Its certificate, which `verify` has accepted.
+    channels : int
+        Number of channels, each of which has states of its own.
+
+    Returns
+    -------
+    HardwareVerdict
+        What was found.
+
+    Raises
+    ------
+    RejectedError
+        If the hardware computes anything else, or the text has anything that cannot be checked; the sentence names the
+        first node that is wrong, or the register that moves samples wrongly.
+    """
+    modules = read_modules(text)
+    ports = set(next(iter(modules.values())).ports)
+    require(
+        not any(port.startswith("s_axil_") for port in ports),
+        "the constants must be fixed to be checked, not loadable at run time",
+    )
+    wanted = _PORTS if channels == 1 else _PORTS | {DEST, OUTPUT_DEST}
+    require(ports == wanted, f"the ports must be {', '.join(sorted(wanted))}, not {', '.join(sorted(ports))}")
+    netlist = flattened(modules, CLOCK)
+    control = find_control(netlist) if channels == 1 else find_channels(netlist, channels)
+    forms = Forms()
+    graph = GraphCodes(certificate, forms)
+    pipeline = Pipeline(netlist, control, graph, forms, certificate)
+    try:
+        pipeline.check_states()
+        _check_output(pipeline.buffered(), pipeline, graph, forms, certificate)
+        if channels > 1:
+            dest = pipeline.buffered().net(OUTPUT_DEST)
+            right = pipeline.same(dest, pipeline.channel, netlist.widths[OUTPUT_DEST])
+            require(right, f"{OUTPUT_DEST} must be the channel of the sample, not another value")
+    except RejectedError as error:
+        raise fault(netlist, pipeline, graph) or error from None
+    return HardwareVerdict(pipeline.registers, pipeline.state_count, len(control.valid) + (channels > 1))
+
+
+def _check_output(
+    logic: Evaluation, pipeline: Pipeline, graph: GraphCodes, forms: Forms, certificate: Certificate
+) -> None:
+    """Check what leaves the core while `m_axis_tvalid` is 1."""
+    label = graph.nodes[graph.output].label
+    width = -(-certificate.output.bits // 8) * 8
+    data = logic.net(OUTPUT, 0, width)
+    require(pipeline.same(data, graph.codes[graph.output], width), f"{OUTPUT} must be {label}, not another value")
+    for bit, flag, wanted in (
+        (_AT_RAIL, "input_at_rail", _at_rail(graph, forms, certificate)),
+        (_SATURATED, "output_saturated", _saturated(graph, forms)),
+    ):
+        require(
+            pipeline.same(logic.net(FLAGS, bit, 1), wanted, 1),
+            f"bit {bit} of {FLAGS} must be {flag}, as the ports and {label} say, not another value",
+        )
+
+
+def _at_rail(graph: GraphCodes, forms: Forms, certificate: Certificate) -> Form:
+    """Whether an input has its lowest or its highest code."""
+    inside = constant(1)
+    for node, port in zip(graph.inputs, certificate.inputs, strict=True):
+        code = graph.codes[node]
+        above = forms.negative(plus(constant(port.lowest), code, -1))
+        below = forms.negative(plus(code, constant(port.highest), -1))
+        inside = forms.times(inside, forms.times(above, below))
+    return plus(constant(1), inside, -1)
+
+
+def _saturated(graph: GraphCodes, forms: Forms) -> Form:
+    """Whether the output was limited to its range."""
+    node = graph.nodes[graph.output]
+    if node.entry.op is not Operation.CLAMP:
+        return {}
+    of = graph.codes[node.operands[0]]
+    below = forms.negative(plus(of, constant(node.entry.low), -1))
+    above = forms.negative(plus(constant(node.entry.high), of, -1))
+    return plus(below, above)

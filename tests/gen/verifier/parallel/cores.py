@@ -1,0 +1,69 @@
+"""Parallel cores in memory, with their SystemVerilog and their certificates."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from decimal import Decimal
+from functools import cache
+from pathlib import Path
+from typing import NamedTuple
+
+from sosmith.gen.architecture import Architecture
+from sosmith.gen.core import CoreDesign, design_core
+from sosmith.gen.output.certificate import certificate
+from sosmith.gen.output.verilog import to_rtlil, to_verilog
+from sosmith.gen.specification.specification import Specification, from_tree
+from sosmith.gen.verifier.certificate_file import Certificate, certificate_text
+from sosmith.gen.verifier.parallel.check import HardwareVerdict, check_hardware
+
+INSTRUMENT = """
+name = "smooth"
+sample_rate = 100.0
+input.voltage = { bits = 12, range = [0.0, 10.0] }
+input.temperature = { bits = 10, range = [0.0, 128.0] }
+calibration.coefficients = [[1.16, -0.0036], [0.3672, 0.0006618], [0.05812]]
+filter = { family = "butterworth", kind = "lowpass", order = 3, cutoff = 10.0 }
+output = { bits = 12, range = [0.0, 16.0], unit = "mm", max_error = 0.01 }
+"""
+PLAIN = """
+name = "plain"
+sample_rate = 100.0
+input.x = { bits = 8, signed = true, range = [-1.0, 1.0] }
+filter = { family = "butterworth", kind = "lowpass", order = 2, cutoff = 20.0 }
+output = { bits = 8, signed = true, range = [-1.0, 1.0], unit = "", max_error = "faithful" }
+"""
+ODD = PLAIN.replace("order = 2", "order = 3")
+
+
+class Made(NamedTuple):
+    """A core with its text and its certificate."""
+
+    design: CoreDesign
+    text: str
+    certificate: Certificate
+    channels: int
+
+    def check(self, text: str | None = None) -> HardwareVerdict:
+        return check_hardware(text or self.text, self.certificate, self.channels)
+
+
+def specified(text: str) -> Specification:
+    return from_tree(tomllib.loads(text, parse_float=Decimal), Path("small.toml"))
+
+
+def made(design: CoreDesign, channels: int = 1, *, reload: bool = False) -> Made:
+    core = Architecture("parallel", design.datapath, channels, reload=reload)
+    text = to_verilog(to_rtlil(core.component(), design.datapath.name))
+    read = json.loads(certificate_text(certificate(design.quantized, design.spec.max_error)))
+    return Made(design, text, Certificate.model_validate(read), channels)
+
+
+@cache
+def small_design(spec: str, realization: str) -> CoreDesign:
+    return design_core(specified(spec), realization=realization)
+
+
+@cache
+def small(spec: str = PLAIN, realization: str = "df1_ef1", channels: int = 1) -> Made:
+    return made(small_design(spec, realization), channels)
