@@ -32,7 +32,7 @@ _SETTLE_NS = 1  # for the probes, several of which fit into half a period
 _PROGRESS_EVERY = 4096  # clocks
 
 
-class _Bench:
+class StreamBench:
     """One run: pins, clock, checks."""
 
     def __init__(self, dut: Any, folder: Path) -> None:
@@ -223,10 +223,20 @@ def _words(beats: Beats) -> list[Word]:
     return [Word(*each) for each in zip(beats.tdest.tolist(), beats.tdata.tolist(), beats.tuser.tolist(), strict=True)]
 
 
-async def _run(bench: _Bench) -> float:
-    """Run everything; return the seconds that the stream took."""
-    bench.dut.aclk.value = 0
-    Clock(bench.dut.aclk, _PERIOD_NS, "ns", impl="gpi").start(start_high=False)
+def start_clock(dut: Any) -> None:
+    """Start the clock of a core, which is low first."""
+    dut.aclk.value = 0
+    Clock(dut.aclk, _PERIOD_NS, "ns", impl="gpi").start(start_high=False)
+
+
+async def run_bench(bench: StreamBench) -> float:
+    """Run the whole stimulus through a core whose clock runs; return the seconds that the long stream took.
+
+    Raises
+    ------
+    ProtocolError
+        If the core breaks a rule of AXI4-Stream.
+    """
     await bench.reset()
     await bench.output_appears_without_ready()
     # Reset in mid-run: earlier inputs must have no effect.
@@ -253,10 +263,11 @@ async def _run(bench: _Bench) -> float:
 async def core_under_test(dut: Any) -> None:
     """Run the whole stimulus and write the outcome to ``result.json`` last."""
     folder = Path(os.environ["SOSMITH_BENCH"])
-    bench = _Bench(dut, folder)
+    bench = StreamBench(dut, folder)
     failure, seconds = None, 0.0
     try:
-        seconds = await _run(bench)
+        start_clock(dut)
+        seconds = await run_bench(bench)
     except ProtocolError as error:
         failure = str(error)
     bench.received.save(folder / "received.npy")

@@ -4,7 +4,7 @@
 // sosmith_stream by ctypes while the clock is low and every input has settled: the loop drives the same model, and
 // leaves it as cocotb's clock would, low and settled. Simulated time stands still meanwhile.
 //
-// One clock here is one clock of `_Bench.stream` in stream_bench.py, rule by rule and draw by draw: tests hold both
+// One clock here is one clock of `StreamBench.stream` in stream_bench.py, rule by rule and draw by draw: tests hold both
 // together. -DBENCH_TDEST and -DBENCH_TUSER tell which optional signals the streams have.
 
 #include <cstdint>
