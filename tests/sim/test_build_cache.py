@@ -78,7 +78,7 @@ def test_a_failure_leaves_no_entry(tmp_path: Path) -> None:
         raise RuntimeError("compiler")
 
     cache = BuildCache(tmp_path)
-    with pytest.raises(RuntimeError, match="^compiler$"):
+    with pytest.raises(RuntimeError, match=r"^compiler$"):
         text_of(cache, "aa", failing)
     assert not cache.has("model", "aa")
     assert text_of(cache, "aa", writing("whole")) == "whole"
