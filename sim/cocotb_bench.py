@@ -152,7 +152,7 @@ def _signals(stream: StreamFacts) -> list[str]:
 
 @contextlib.contextmanager
 def _plain_path(folder: Path) -> Iterator[Path]:
-    """Yield a folder that makefiles can build in: `folder`, or a temporary one if its path contains spaces or such."""
+    """Yield a folder that all tools can build in: `folder`, or a temporary one if its path contains spaces or such."""
     if re.fullmatch(r"[\w./+-]+", str(folder)):
         yield folder
         return

