@@ -105,9 +105,13 @@ class CocotbBench:
         )
 
     def _building(self, folder: Path, tool: Simulator) -> str:
+        """Name the step of building, with its duration if it takes long."""
         step = f"building with {self.simulator}"
         if self.simulator == "verilator":
-            builder = Builder(tool.version, tool.environment, folder / "build")
+            try:
+                builder = Builder(tool.version, tool.environment, folder / "build")
+            except subprocess.CalledProcessError as error:
+                raise ToolError(f"{tool.name} {tool.version} failed: {error.stderr.strip()}") from None
             if not builder.has_library(waves=self.waves):
                 return f"{step}, which takes about {LIBRARY_SECONDS} s the first time"
         return step

@@ -17,7 +17,7 @@ from sosmith.sim.simulators import find_simulator
 from sosmith.sim.verilated_model import Builder, Model
 
 ROOT = Path(__file__).parents[2]
-SAMPLES = 120
+SAMPLES = 200
 FOLLOWS = "outputs must not follow s_axis_tvalid or m_axis_tready within a clock, as they did at clock "
 HUNG = "a sample must move at least every "
 FAULTS = {
@@ -27,18 +27,18 @@ FAULTS = {
     3: HUNG,
     4: "m_axis_tvalid must not wait for m_axis_tready",
     5: FOLLOWS,
-    6: HUNG,
-    7: FOLLOWS,
+    6: "a stalled core must not drop m_axis_tvalid, as it did at sample ",
+    7: "a stalled core must not change m_axis_tdata from ",
     8: "a stalled core must not change m_axis_tuser from ",
-    9: "120 samples must come out, not more",
-    10: "120 samples must come out, not more",
+    9: "200 samples must come out, not more",
+    10: "200 samples must come out, not more",
     11: HUNG,
     12: "a stalled core must not drop m_axis_tvalid, as it did at sample ",
     13: "the first results after a reset must not depend on what came before it",
     14: "a stalled core must not change m_axis_tdest from ",
     15: "a stalled core must not change m_axis_tdata from ",
 }
-"""How the sentence about each fault of faulty.sv begins, in a core that takes no time."""
+"""How the sentence about each fault of faulty.sv begins, in a core that takes no time for a sample."""
 PACES = [(0.5, 0.5), (0.0, 0.3), (0.9, 0.0), (0.3, 0.9)]
 WORKS = {0: 2, 70: 72, 150: 100}
 """Clocks that the core works on a sample, and how long the bench thinks that it may take."""
@@ -62,7 +62,7 @@ def cases() -> list[dict[str, Any]]:
         for fault in FAULTS
         for work, patience in WORKS.items()
         for number, (idle, stall) in enumerate(PACES)
-        if number == 0 or (fault, work) == (0, 0)
+        if fault == 0 or (number == 0 and work != 70)
     ]
 
 
