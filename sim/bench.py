@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
-from sosmith.sim.stream_packing import Beats
+from sosmith.sim.beats import Beats
 
 Progress = Callable[[int, int], None]
 """Called with the number of beats received and their total."""

@@ -1,4 +1,4 @@
-"""The bench's own process: builds the simulation with cocotb's runner and runs the bench in it.
+"""The bench's own process: builds the simulation and runs the bench in it, with cocotb's runner.
 
 ``python -m sosmith.sim.bench_process FOLDER`` reads ``FOLDER/job.json``. All output of simulators, compilers and cocotb
 goes to this process's output, which the parent keeps in a log file.
@@ -8,87 +8,84 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
+import subprocess
 import sys
 from pathlib import Path
 from typing import Any
 
-from cocotb_tools.runner import Icarus, Verilator, VerilatorControlFile
+from cocotb_tools.runner import Icarus, Verilator
 
-
-class _FastVerilator(Verilator):  # type: ignore[misc]
-    """Cocotb's runner with only the ports public, which makes builds and simulations several times faster."""
-
-    def _build_command(self) -> list[list[str]]:
-        return [[word for word in command if word != "--public-flat-rw"] for command in super()._build_command()]
+from sosmith.sim.verilated_model import Builder, Model
 
 
 def main() -> None:
     """Build if anything changed since the last build, then run."""
     job = json.loads((Path(sys.argv[1]) / "job.json").read_text(encoding="utf-8"))
-    folder = Path(job["folder"])
-    if job["simulator"] == "verilator":
-        runner: Any = _FastVerilator()
-        control = folder / "ports.vlt"
-        control.write_text(_control_file(job["top"], job["ports"]), encoding="utf-8")
-        sources = [VerilatorControlFile(control), Path(job["source"])]
-        # Registers without a reset start at random, as they do in hardware.
-        arguments = ["-Wno-fatal", "-O3", "-CFLAGS", "-O2", "--x-initial", "unique"]
-    else:
-        runner = Icarus()
-        sources, arguments = [Path(job["source"])], []
     try:
-        _build_and_test(job, runner, sources, arguments)
-    except RuntimeError:
+        if job["simulator"] == "verilator":
+            _build_with_verilator(job)
+            _test(job, Verilator(), ["+verilator+rand+reset+2", f"+verilator+seed+{job['seed'] % 2**31 or 1}"])
+        else:
+            runner = Icarus()
+            _build_with_icarus(job, runner)
+            _test(job, runner, [])
+    except (RuntimeError, subprocess.CalledProcessError):
         # A command failed: the log should end with its output, not with our traceback.
         sys.exit(1)
 
 
-def _build_and_test(job: dict[str, Any], runner: Any, sources: list[Any], arguments: list[str]) -> None:
-    folder = Path(job["folder"])
-    build = folder / "build"
+def _build_with_verilator(job: dict[str, Any]) -> None:
+    build = Path(job["folder"]) / "build"
+    build.mkdir(exist_ok=True)
+    model = Model(
+        source=Path(job["source"]),
+        top=job["top"],
+        ports=tuple(job["ports"]),
+        signals=tuple(job["signals"]),
+        waves=job["waves"],
+    )
+    Builder(job["version"], os.environ, build).build(model, build / job["top"])
+
+
+def _build_with_icarus(job: dict[str, Any], runner: Any) -> None:
+    build = Path(job["folder"]) / "build"
     record = build / "built.txt"
-    if _changed(job, record, arguments):
-        record.unlink(missing_ok=True)  # an interrupted build must not pass for the previous one
-        runner.build(
-            sources=sources,
-            hdl_toplevel=job["top"],
-            build_dir=build,
-            build_args=arguments,
-            timescale=("1ns", "1ps"),
-            waves=job["waves"],
-            always=True,
-        )
-        record.write_text(_fingerprint(job, arguments), encoding="utf-8")
+    fingerprint = _fingerprint(job)
+    if record.exists() and record.read_text(encoding="utf-8") == fingerprint:
+        return
+    record.unlink(missing_ok=True)  # an interrupted build must not pass for the previous one
+    runner.build(
+        sources=[Path(job["source"])],
+        hdl_toplevel=job["top"],
+        build_dir=build,
+        timescale=("1ns", "1ps"),
+        waves=job["waves"],
+        always=True,
+    )
+    record.write_text(fingerprint, encoding="utf-8")
+
+
+def _fingerprint(job: dict[str, Any]) -> str:
+    choices = [job["version"], job["waves"], sys.version, __file__]
+    return hashlib.sha256(Path(job["source"]).read_bytes() + json.dumps(choices).encode()).hexdigest()
+
+
+def _test(job: dict[str, Any], runner: Any, plusargs: list[str]) -> None:
+    folder = Path(job["folder"])
     runner.test(
         test_module="sosmith.sim.stream_bench",
         hdl_toplevel=job["top"],
         hdl_toplevel_lang="verilog",
-        build_dir=build,
+        build_dir=folder / "build",
         test_dir=folder,
         results_xml=str(folder / "results.xml"),
         seed=job["seed"],
         timescale=("1ns", "1ps"),
         waves=job["waves"],
-        plusargs=["+verilator+rand+reset+2", f"+verilator+seed+{job['seed'] % 2**31 or 1}"]
-        if job["simulator"] == "verilator"
-        else [],
+        plusargs=plusargs,
         extra_env={"SOSMITH_BENCH": str(folder)},
     )
-
-
-def _control_file(top: str, ports: list[str]) -> str:
-    lines = [f'public_flat_rw -module "{top}" -var "{port}"' for port in ports]
-    return "`verilator_config\n" + "\n".join(lines) + "\n"
-
-
-def _changed(job: dict[str, Any], record: Path, arguments: list[str]) -> bool:
-    return not record.exists() or record.read_text(encoding="utf-8") != _fingerprint(job, arguments)
-
-
-def _fingerprint(job: dict[str, Any], arguments: list[str]) -> str:
-    source = Path(job["source"]).read_bytes()
-    choices = [job["simulator"], job["version"], job["waves"], job["ports"], sys.version, arguments, __file__]
-    return hashlib.sha256(source + json.dumps(choices).encode()).hexdigest()
 
 
 if __name__ == "__main__":

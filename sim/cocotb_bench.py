@@ -13,18 +13,17 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 
-import numpy as np
-
 from sosmith.gen.output.core_facts import InterfaceFacts, StreamFacts
 from sosmith.model.errors import ShortfallError, ToolError
+from sosmith.sim.beats import Beats
 from sosmith.sim.bench import BenchRun, Progress
 from sosmith.sim.simulators import Simulator, find_simulator
-from sosmith.sim.stream_packing import Beats
+from sosmith.sim.verilated_model import LIBRARY_SECONDS, Builder
 
 _POLL_SECONDS = 0.05
 _LOG_TAIL = 12  # lines of the log shown in an error
@@ -50,6 +49,11 @@ class CocotbBench:
         Fractions of clocks without input and with back-pressure on the output, in [0, 1).
     waves : bool
         Whether to write a waveform to `build_dir`.
+    compiled : bool
+        Whether the long stream runs in a compiled loop: in Verilator, and without a waveform. It is clock for clock
+        that of Python.
+    announce : callable
+        Called with the name of a step that may take long.
     """
 
     source: Path
@@ -60,6 +64,8 @@ class CocotbBench:
     idle: float = 0.3
     stall: float = 0.3
     waves: bool = False
+    compiled: bool = True
+    announce: Callable[[str], None] = lambda step: None
 
     @property
     def name(self) -> str:
@@ -81,14 +87,14 @@ class CocotbBench:
         with _plain_path(folder) as plain:
             tool = find_simulator(self.simulator, plain / "bin")
             self._write_job(plain, tool)
-            lines = (f"{dest:x} {data:x}" for dest, data in zip(sent.tdest.tolist(), sent.tdata.tolist(), strict=True))
-            (plain / "words.txt").write_text("\n".join(lines), encoding="utf-8")
+            sent.save(plain / "sent.npy")
+            self.announce(self._building(plain, tool))
             _run(plain, tool, len(sent), progress)
         outcome = json.loads((folder / "result.json").read_text(encoding="utf-8"))
         if outcome["failure"] is not None:
             raise ShortfallError(f"{self.interface.name} in {self.simulator}: {outcome['failure']}")
         return BenchRun(
-            received=_received(folder),
+            received=Beats.load(folder / "received.npy"),
             cycles=outcome["clocks"],
             seconds=outcome["seconds"],
             tools={
@@ -98,8 +104,20 @@ class CocotbBench:
             },
         )
 
+    def _building(self, folder: Path, tool: Simulator) -> str:
+        """Name the step of building, with its duration if it takes long."""
+        step = f"building with {self.simulator}"
+        if self.simulator == "verilator":
+            try:
+                builder = Builder(tool.version, tool.environment, folder / "build")
+            except subprocess.CalledProcessError as error:
+                raise ToolError(f"{tool.name} {tool.version} failed: {error.stderr.strip()}") from None
+            if not builder.has_library(waves=self.waves):
+                return f"{step}, which takes about {LIBRARY_SECONDS} s the first time"
+        return step
+
     def _write_job(self, folder: Path, tool: Simulator) -> None:
-        for name in ("result.json", "received.txt", "progress.txt"):
+        for name in ("result.json", "received.npy", "progress.txt"):
             (folder / name).unlink(missing_ok=True)
         inputs, outputs = self.interface.inputs, self.interface.outputs
         ports = ["aclk", "aresetn", *(f"s_axis_{name}" for name in _signals(inputs))]
@@ -113,6 +131,7 @@ class CocotbBench:
             "seed": self.seed,
             "waves": self.waves,
             "ports": ports,
+            "signals": [name for name in ("tdest", "tuser") if name in _signals(outputs)],
         }
         bench = {
             "tdest": "tdest" in _signals(outputs),
@@ -120,6 +139,7 @@ class CocotbBench:
             "seed": self.seed,
             "idle": self.idle,
             "stall": self.stall,
+            "compiled": self.compiled and self.simulator == "verilator" and not self.waves,
             "latency_cycles": self.interface.latency_cycles,
             "reset_cycles": self.interface.reset_cycles,
         }
@@ -134,16 +154,9 @@ def _signals(stream: StreamFacts) -> list[str]:
     return ["tdata", "tvalid", "tready", *(name for name, present in optional.items() if present)]
 
 
-def _received(folder: Path) -> Beats:
-    lines = (folder / "received.txt").read_text(encoding="utf-8").splitlines()
-    rows = [[int(value, 16) for value in line.split()] for line in lines]
-    dest, data, user = zip(*rows, strict=True) if rows else ((), (), ())
-    return Beats(np.array(dest, dtype=np.int64), np.array(data, dtype=np.uint64), np.array(user, dtype=np.uint8))
-
-
 @contextlib.contextmanager
 def _plain_path(folder: Path) -> Iterator[Path]:
-    """Yield a folder that makefiles can build in: `folder`, or a temporary one if its path contains spaces or such."""
+    """Yield a folder that all tools can build in: `folder`, or a temporary one if its path contains spaces or such."""
     if re.fullmatch(r"[\w./+-]+", str(folder)):
         yield folder
         return

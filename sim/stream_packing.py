@@ -2,42 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import numpy.typing as npt
 
 from sosmith.gen.output.core_facts import StreamFacts
 from sosmith.model.arrays import Codes
 from sosmith.model.errors import ShortfallError
+from sosmith.sim.beats import Beats
 
 Order = npt.NDArray[np.int64]
 """Channel of each sample on a stream, shape (samples * channels,)."""
 
 _BLOCK = 8  # samples per channel in each block; blocks in turn alternate with shuffled ones
-
-
-@dataclass(frozen=True, eq=False)
-class Beats:
-    """Transfers on an AXI4-Stream, in order; all arrays have shape (n,).
-
-    Attributes
-    ----------
-    tdest : ndarray of int64
-        Channel; 0 on a stream without ``tdest``.
-    tdata : ndarray of uint64
-        The bus word.
-    tuser : ndarray of uint8
-        Status; 0 on a stream without ``tuser``.
-    """
-
-    tdest: npt.NDArray[np.int64]
-    tdata: npt.NDArray[np.uint64]
-    tuser: npt.NDArray[np.uint8]
-
-    def __len__(self) -> int:
-        """Count the transfers."""
-        return len(self.tdata)
 
 
 def random_order(samples: int, channels: int, seed: int) -> Order:

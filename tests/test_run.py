@@ -23,8 +23,7 @@ def installed(tmp_path: Path, *versions: str) -> subprocess.CompletedProcess[str
     (tmp_path / "bin").mkdir()
     for name in COMMANDS:
         (tmp_path / "bin" / name).symlink_to(shutil.which(name) or name)
-    for name in ("g++", "make"):
-        (tmp_path / "bin" / name).symlink_to("/bin/true")
+    (tmp_path / "bin" / "g++").symlink_to("/bin/true")
     for place, version in enumerate(versions):
         path = tmp_path / "bin" / (f"python{version}" if place else "python3")
         as_told = f"import sys; sys.version_info = ({version.replace('.', ', ')}, 0)"

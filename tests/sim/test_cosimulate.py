@@ -1,5 +1,6 @@
 """The bench itself: a sound core passes in both simulators, and every way of breaking it is found and named."""
 
+import os
 import re
 import shutil
 import threading
@@ -118,10 +119,19 @@ def test_text_that_is_no_verilog_is_a_tool_failure_with_the_log(tmp_path: Path) 
         run(write(tmp_path, "module nonsense"), stimulus(9), build_dir=tmp_path, simulator="icarus")
 
 
+def test_a_verilator_that_does_not_work_is_a_tool_failure(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    broken = tmp_path / "tools" / "verilator"
+    broken.parent.mkdir()
+    broken.write_text('#!/bin/sh\n[ "$1" = --version ] && echo "Verilator 5.040" && exit\necho no memory >&2\nexit 1\n')
+    broken.chmod(0o755)
+    monkeypatch.setenv("PATH", os.pathsep.join([str(broken.parent), os.environ["PATH"]]))
+    with pytest.raises(ToolError, match=r"^verilator 5\.040 failed: no memory$"):
+        run(write(tmp_path), stimulus(9), build_dir=tmp_path)
+
+
 @pytest.mark.parametrize(
     ("simulator", "missing", "message"),
     [
-        ("verilator", "make", "make is needed for co-simulation, and was not found: apt-get install make"),
         ("verilator", "g++", "g++ is needed for co-simulation, and was not found: apt-get install g++"),
         ("icarus", "vvp", "vvp is needed for co-simulation, and was not found: apt-get install iverilog"),
     ],

@@ -11,9 +11,10 @@ from sosmith.gen.output.core_facts import InterfaceFacts, StreamFacts
 from sosmith.hdl.axi_stream import fields
 from sosmith.model.errors import ShortfallError
 from sosmith.model.port import Port
+from sosmith.sim.beats import Beats
 from sosmith.sim.bench import BenchRun, Progress
 from sosmith.sim.cosimulate import cosimulate
-from sosmith.sim.stream_packing import Beats, pack, random_order, unpack
+from sosmith.sim.stream_packing import pack, random_order, unpack
 
 
 def port(name: str, bits: int, *, signed: bool) -> Port:

@@ -46,6 +46,20 @@ class _Share(click.FloatRange):
         return share
 
 
+def _empty_cache(ctx: click.Context, param: click.Parameter, wanted: bool) -> None:
+    """Empty the cache of compiled simulations, and end."""
+    if not wanted or ctx.resilient_parsing:
+        return
+    from sosmith.sim.build_cache import BuildCache, cache_folder
+
+    folder = cache_folder()
+    if folder is None:
+        note("there is no cache folder that can be written")
+    else:
+        note(f"removed {BuildCache(folder).clear() / 1e6:.1f} MB from {folder}")
+    ctx.exit()
+
+
 @click.command("simulate")
 @SPEC
 @CORE
@@ -85,7 +99,15 @@ class _Share(click.FloatRange):
     help="Simulate the netlist that Yosys synthesizes for the FPGA of this board instead: "
     f"{', '.join(BOARDS)}. Synthesis takes seconds, and the simulation is slower.",
 )
-@click.option("--waves", is_flag=True, help="Also write a waveform (VCD).")
+@click.option("--waves", is_flag=True, help="Also write a waveform (VCD); the simulation is slower.")
+@click.option(
+    "--empty-cache",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=_empty_cache,
+    help="Remove the compiled simulations that were kept, and exit.",
+)
 @SECONDS
 @SEED
 @JSON_OPTION
@@ -115,6 +137,9 @@ def simulate_command(
 
     With --gates, the same test bench simulates the netlist of FPGA cells, with random initial values in the flip-flops,
     and an automatic choice of the architecture is made for that board.
+
+    What Verilator compiles is kept for later runs in ~/.cache/sosmith, or in the folder named by XDG_CACHE_HOME, up to
+    256 MB.
 
     \b
         sosmith simulate my.toml

@@ -1,0 +1,159 @@
+"""Compiled files that are kept between runs in the user's cache folder, each found by what it was made from.
+
+An entry is a folder named by a key, a digest of everything that went into it. It is made beside its final place and
+renamed, so that a killed process leaves no half of it; the digests of its files are held against them at each use, and
+a damaged entry is made again. Locks let one process at a time make, use or remove an entry.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import hashlib
+import json
+import os
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+LIMIT = 256 * 2**20
+"""Bytes that all entries together may take; beyond, those that were not used for the longest time are removed."""
+
+_DIGESTS = "digests.json"
+_NEW = ".new"
+_LOCKS = "locks"
+
+
+def cache_folder() -> Path | None:
+    """Return the folder for compiled files in the user's cache folder, None if there is none that can be written."""
+    named = os.environ.get("XDG_CACHE_HOME", "")
+    try:
+        folder = (Path(named) if Path(named).is_absolute() else Path.home() / ".cache") / "sosmith" / "verilator"
+        (folder / _LOCKS).mkdir(parents=True, exist_ok=True)
+    except (OSError, RuntimeError):  # no home, or not writable
+        return None
+    return folder if os.access(folder, os.W_OK | os.X_OK) and os.access(folder / _LOCKS, os.W_OK | os.X_OK) else None
+
+
+def key_of(*parts: object) -> str:
+    """Digest of everything that an entry is made from; `parts` must be representable in JSON."""
+    return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
+
+
+class BuildCache:
+    """Entries in one folder.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder; made if it is missing.
+    limit : int
+        Bytes that all entries together may take.
+    """
+
+    def __init__(self, folder: Path, limit: int = LIMIT) -> None:
+        self._folder, self._limit = folder, limit
+
+    def has(self, kind: str, key: str) -> bool:
+        """Whether there is an undamaged entry."""
+        return _is_whole(self._place(kind, key))
+
+    @contextlib.contextmanager
+    def entry(self, kind: str, key: str, make: Callable[[Path], None]) -> Iterator[Path]:
+        """Lock an entry, made if it is missing or damaged, and yield its folder; what is needed later is to be copied.
+
+        Parameters
+        ----------
+        kind : str
+            First word of the name of the folder. While an entry is locked, another may be asked for if its kind
+            differs.
+        key : str
+            From `key_of`.
+        make : callable
+            Called with an empty folder, to put the files of the entry there.
+        """
+        place = self._place(kind, key)
+        with self._locked(place) as locked:
+            assert locked
+            if not _is_whole(place):
+                new = place.with_name(place.name + _NEW)
+                for rest in (new, place):  # of a killed process, and damaged
+                    shutil.rmtree(rest, ignore_errors=True)
+                new.mkdir()
+                make(new)
+                (new / _DIGESTS).write_text(json.dumps(_digests(new)), encoding="utf-8")
+                new.rename(place)
+                self._shrink(place)
+            os.utime(place)
+            yield place
+
+    def clear(self) -> int:
+        """Remove all entries that no process is using; return the number of bytes."""
+        return sum(self._remove(place) for place in self._entries())
+
+    def _place(self, kind: str, key: str) -> Path:
+        return self._folder / f"{kind}-{key}"
+
+    def _entries(self) -> list[Path]:
+        """All entries, whole or not, those first that were not used for the longest time."""
+        found = {}
+        for place in self._folder.iterdir():
+            with contextlib.suppress(FileNotFoundError):  # removed meanwhile
+                if place.name != _LOCKS:
+                    found[place] = place.stat().st_mtime_ns
+        return sorted(found, key=lambda place: found[place])
+
+    def _shrink(self, kept: Path) -> None:
+        entries = [place for place in self._entries() if place != kept]
+        total = _size(kept) + sum(_size(place) for place in entries)
+        for place in entries:
+            if total > self._limit or place.name.endswith(_NEW):
+                total -= self._remove(place)
+
+    def _remove(self, place: Path) -> int:
+        """Remove an entry unless a process is using it; return the number of bytes."""
+        with self._locked(place.with_name(place.name.removesuffix(_NEW)), wait=False) as locked:
+            if not locked:
+                return 0
+            size = _size(place)
+            shutil.rmtree(place, ignore_errors=True)
+            return size
+
+    @contextlib.contextmanager
+    def _locked(self, place: Path, *, wait: bool = True) -> Iterator[bool]:
+        """Lock what may be at `place`; yield whether that could be done, which is sure with `wait`."""
+        kind, _, key = place.name.rpartition("-")
+        (self._folder / _LOCKS).mkdir(parents=True, exist_ok=True)
+        # A few entries share a lock: locks are never removed, which could not be done safely.
+        handle = os.open(self._folder / _LOCKS / f"{kind}-{key[:2]}", os.O_RDWR | os.O_CREAT, 0o666)
+        try:
+            try:
+                fcntl.flock(handle, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+            except BlockingIOError:
+                yield False
+            else:
+                yield True
+        finally:
+            os.close(handle)
+
+
+def _is_whole(place: Path) -> bool:
+    try:
+        return bool(json.loads((place / _DIGESTS).read_text(encoding="utf-8")) == _digests(place))
+    except (OSError, ValueError):
+        return False
+
+
+def _digests(place: Path) -> dict[str, str]:
+    return {
+        path.name: hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in sorted(place.iterdir())
+        if path.name != _DIGESTS
+    }
+
+
+def _size(place: Path) -> int:
+    try:
+        return sum(path.stat().st_size for path in place.iterdir())
+    except OSError:  # removed meanwhile
+        return 0

@@ -1,0 +1,180 @@
+"""Builds the executable of a Verilated core with cocotb and the compiled loop, or takes it from the cache.
+
+Verilator's own library, which takes far longer to compile than a core, is kept by its text, the compiler and the flags;
+a model is kept by the core's text and all that goes into it besides.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+import shutil
+import subprocess
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+
+import cocotb_tools.config
+
+from sosmith.sim.build_cache import BuildCache, cache_folder, key_of
+
+LIBRARY_SECONDS = 20
+"""About how long the library takes to compile on two cores."""
+
+_ARGUMENTS = ("-Wno-fatal", "-O3", "--x-initial", "unique", "--timescale", "1ns/1ps")
+"""Registers without a reset start at random, as they do in hardware."""
+
+_LIBRARY = ("verilated", "verilated_dpi", "verilated_threads", "verilated_vpi")
+_FLAGS = ("-O2", "-pthread", "-DVERILATOR=1", "-DVM_COVERAGE=0", "-DVM_SC=0", "-DVM_TIMING=0")
+_ONE_FILE = 500_000  # bytes of C++ above which files are compiled by themselves, on all processors
+_LOOP = Path(__file__).with_name("stream_loop.cpp")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Model:
+    """What a model is made from.
+
+    Attributes
+    ----------
+    source : Path
+        The SystemVerilog file.
+    top : str
+        Name of its top module.
+    ports : tuple of str
+        Ports that the bench accesses.
+    signals : tuple of str
+        Those of the optional signals ``tdest`` and ``tuser`` that the streams have.
+    waves : bool
+        Whether it can write waveforms.
+    """
+
+    source: Path
+    top: str
+    ports: tuple[str, ...]
+    signals: tuple[str, ...]
+    waves: bool
+
+
+class Builder:
+    """Verilator and the compiler.
+
+    Parameters
+    ----------
+    version : str
+        Verilator's version.
+    environment : mapping of str to str
+        Environment that its processes need.
+    folder : Path
+        Folder for the files in between, without blanks in its path; the cache is there if the user has none.
+    """
+
+    def __init__(self, version: str, environment: Mapping[str, str], folder: Path) -> None:
+        self._environment, self._folder = environment, folder
+        self._cache = BuildCache(cache_folder() or folder / "cache")
+        root = Path(self._output("verilator", "--getenv", "VERILATOR_ROOT").strip())
+        self._include = root / "include"
+        texts = sorted([*self._include.glob("*.cpp"), *self._include.glob("**/*.h")])
+        self._tools = [
+            version,
+            self._output("g++", "--version"),
+            self._output("g++", "-dumpmachine"),
+            [hashlib.sha256(path.read_bytes()).hexdigest() for path in texts],
+        ]
+
+    def has_library(self, *, waves: bool) -> bool:
+        """Whether Verilator's library is in the cache."""
+        flags = _flags(waves=waves)
+        return self._cache.has("library", self._library_key(_library(waves=waves), flags))
+
+    def build(self, model: Model, target: Path) -> None:
+        """Write the model's executable to `target`.
+
+        Raises
+        ------
+        subprocess.CalledProcessError
+            If a tool fails; it has said why.
+        """
+        control = _control_file(model.top, model.ports)
+        bench = cocotb_tools.config.share_dir / "lib" / "verilator"
+        flags = [*_flags(waves=model.waves), *(f"-DBENCH_{signal.upper()}" for signal in model.signals), f"-I{bench}"]
+        key = key_of(
+            self._tools,
+            flags,
+            _ARGUMENTS,
+            model.top,
+            control,
+            model.source.read_text(encoding="utf-8"),
+            _LOOP.read_text(encoding="utf-8"),
+            (bench / "verilator.cpp").read_text(encoding="utf-8"),
+            metadata.version("cocotb"),
+            str(cocotb_tools.config.libs_dir),  # where the executable looks for cocotb
+        )
+        with self._cache.entry("model", key, lambda entry: self._make(model, control, flags, entry / "model")) as entry:
+            shutil.copy(entry / "model", target)
+
+    def _make(self, model: Model, control: str, flags: Sequence[str], target: Path) -> None:
+        objects = self._folder / "objects"
+        shutil.rmtree(objects, ignore_errors=True)
+        objects.mkdir(parents=True)
+        (objects / "ports.vlt").write_text(control, encoding="utf-8")
+        command = ["verilator", "-cc", "-Mdir", str(objects), "--prefix", "Vtop", "--top-module", model.top, "--vpi"]
+        command += [*_ARGUMENTS, *(["--trace"] if model.waves else []), "ports.vlt", str(model.source)]
+        self._run(command, objects)
+        classes = (objects / "Vtop_classes.mk").read_text(encoding="utf-8")
+        names = sorted({*_library(waves=model.waves), *re.findall(r"^\s+(verilated\w*) \\", classes, re.MULTILINE)})
+        sources = [*sorted(objects.glob("Vtop*.cpp")), _LOOP]
+        if sum(path.stat().st_size for path in sources) < _ONE_FILE:  # the headers are what takes time
+            together = objects / "together.cpp"
+            together.write_text("".join(f'#include "{path}"\n' for path in sources), encoding="utf-8")
+            sources = [together]
+        compiled = self._compile(sources, [*flags, f"-I{objects}"], objects)
+        libraries = cocotb_tools.config.libs_dir
+        plain = _flags(waves=model.waves)
+        key = self._library_key(names, plain)
+        with self._cache.entry("library", key, lambda entry: self._make_library(names, plain, entry)) as library:
+            parts = [*compiled, *(library / f"{name}.o" for name in names)]
+            cocotb = [f"-Wl,-rpath,{libraries}", f"-L{libraries}", "-lcocotbvpi_verilator"]
+            # The compiled loop is called by name.
+            self._run(["g++", "-pthread", "-rdynamic", "-o", str(target), *map(str, parts), *cocotb], objects)
+
+    def _make_library(self, names: Sequence[str], flags: Sequence[str], entry: Path) -> None:
+        self._compile([self._include / f"{name}.cpp" for name in names], flags, entry)
+
+    def _library_key(self, names: Sequence[str], flags: Sequence[str]) -> str:
+        return key_of(self._tools, sorted(names), list(flags))
+
+    def _compile(self, sources: Sequence[Path], flags: Sequence[str], folder: Path) -> list[Path]:
+        """Compile each file into `folder`, on all processors; return the object files."""
+        headers = [f"-I{self._include}", f"-I{self._include / 'vltstd'}"]
+
+        def compiled(source: Path) -> Path:
+            target = folder / f"{source.stem}.o"
+            self._run(["g++", *flags, *headers, "-c", "-o", str(target), str(source)], folder)
+            return target
+
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            return list(pool.map(compiled, sources))
+
+    def _run(self, command: Sequence[str], folder: Path) -> None:
+        subprocess.run(command, cwd=folder, env=self._environment, check=True)
+
+    def _output(self, *command: str) -> str:
+        return subprocess.run(command, env=self._environment, check=True, capture_output=True, text=True).stdout
+
+
+def _library(*, waves: bool) -> list[str]:
+    return [*_LIBRARY, *(["verilated_vcd_c"] if waves else [])]
+
+
+def _flags(*, waves: bool) -> list[str]:
+    trace = {"VM_TRACE": waves, "VM_TRACE_VCD": waves, "VM_TRACE_FST": False, "VM_TRACE_SAIF": False}
+    return [*_FLAGS, *(f"-D{name}={int(value)}" for name, value in trace.items())]
+
+
+def _control_file(top: str, ports: Sequence[str]) -> str:
+    """Control file that makes only these ports accessible, for faster builds and simulations than with all signals."""
+    lines = [f'public_flat_rw -module "{top}" -var "{port}"' for port in ports]
+    return "`verilator_config\n" + "\n".join(lines) + "\n"

@@ -1,0 +1,127 @@
+"""The compiled loop beside the one in Python: the same samples, clocks and words about every broken rule."""
+
+import json
+import random
+import sys
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
+import numpy as np
+import pytest
+from cocotb_tools.runner import Verilator
+
+from sosmith.sim.beats import Beats
+from sosmith.sim.bursts import Pace, below
+from sosmith.sim.simulators import find_simulator
+from sosmith.sim.verilated_model import Builder, Model
+
+ROOT = Path(__file__).parents[2]
+SAMPLES = 200
+FOLLOWS = "outputs must not follow s_axis_tvalid or m_axis_tready within a clock, as they did at clock "
+HUNG = "a sample must move at least every "
+FAULTS = {
+    0: None,
+    1: FOLLOWS,
+    2: FOLLOWS,
+    3: HUNG,
+    4: "m_axis_tvalid must not wait for m_axis_tready",
+    5: FOLLOWS,
+    6: "a stalled core must not drop m_axis_tvalid, as it did at sample ",
+    7: "a stalled core must not change m_axis_tdata from ",
+    8: "a stalled core must not change m_axis_tuser from ",
+    9: "200 samples must come out, not more",
+    10: "200 samples must come out, not more",
+    11: HUNG,
+    12: "a stalled core must not drop m_axis_tvalid, as it did at sample ",
+    13: "the first results after a reset must not depend on what came before it",
+    14: "a stalled core must not change m_axis_tdest from ",
+    15: "a stalled core must not change m_axis_tdata from ",
+}
+"""How the sentence about each fault of faulty.sv begins, in a core that takes no time for a sample."""
+PACES = [(0.5, 0.5), (0.0, 0.3), (0.9, 0.0), (0.3, 0.9)]
+WORKS = {0: 2, 70: 72, 150: 100}
+"""Clocks that the core works on a sample, and how long the bench thinks that it may take."""
+
+
+def cases() -> list[dict[str, Any]]:
+    return [
+        {
+            "fault": fault,
+            "work": work,
+            "bench": {
+                "tdest": True,
+                "tuser": True,
+                "seed": 7 * fault + number,
+                "idle": idle,
+                "stall": stall,
+                "latency_cycles": patience,
+                "reset_cycles": 0,
+            },
+        }
+        for fault in FAULTS
+        for work, patience in WORKS.items()
+        for number, (idle, stall) in enumerate(PACES)
+        if fault == 0 or (number == 0 and work != 70)
+    ]
+
+
+@pytest.fixture(scope="module")
+def outcomes(tmp_path_factory: pytest.TempPathFactory) -> list[list[Any]]:
+    """Outcomes of all cases, with the loop in Python and with the compiled one."""
+    folder = tmp_path_factory.mktemp("both")
+    rng = np.random.default_rng(3)
+    tdest, tdata = rng.integers(0, 4, SAMPLES), rng.integers(0, 2**16, SAMPLES).astype(np.uint64)
+    Beats(tdest, tdata, np.zeros(SAMPLES, np.uint8)).save(folder / "sent.npy")
+    (folder / "cases.json").write_text(json.dumps(cases()), encoding="utf-8")
+    tool = find_simulator("verilator", folder / "bin")
+    signals = ("tdest", "tdata", "tvalid", "tready")
+    ports = ("aclk", "aresetn", "fault", "work", *(f"s_axis_{name}" for name in signals), "m_axis_tuser")
+    ports += tuple(f"m_axis_{name}" for name in signals)
+    model = Model(
+        source=Path(__file__).with_name("faulty.sv"), top="faulty", ports=ports, signals=("tdest", "tuser"), waves=False
+    )
+    Builder(tool.version, tool.environment, folder).build(model, folder / "faulty")
+    with patch.object(sys, "path", [str(ROOT), *sys.path]):  # where the simulator's Python looks
+        Verilator().test(
+            test_module="tests.sim.both_loops_bench",
+            hdl_toplevel="faulty",
+            hdl_toplevel_lang="verilog",
+            build_dir=folder,
+            test_dir=folder,
+            results_xml=str(folder / "results.xml"),
+            timescale=("1ns", "1ps"),
+            extra_env={"BOTH_LOOPS": str(folder), "COCOTB_LOG_LEVEL": "WARNING"},
+        )
+    found: list[list[Any]] = json.loads((folder / "outcomes.json").read_text(encoding="utf-8"))
+    return found
+
+
+def test_both_loops_agree_on_every_sample_clock_and_failure(outcomes: list[list[Any]]) -> None:
+    assert len(outcomes) == len(cases())
+    for case, (in_python, compiled) in zip(cases(), outcomes, strict=True):
+        assert compiled == in_python, case
+
+
+def test_every_rule_is_broken_and_named(outcomes: list[list[Any]]) -> None:
+    for case, ((failure, *_), _) in zip(cases(), outcomes, strict=True):
+        if case["work"] == 0:
+            sentence = FAULTS[case["fault"]]
+            assert failure is None if sentence is None else str(failure).startswith(sentence), (case, failure)
+
+
+def test_a_sound_core_gives_what_was_sent(outcomes: list[list[Any]]) -> None:
+    rng = np.random.default_rng(3)
+    tdest, tdata = rng.integers(0, 4, SAMPLES).tolist(), ((rng.integers(0, 2**16, SAMPLES) + 3) % 2**16).tolist()
+    expected = [tdest, tdata, [word & 3 for word in tdata]]
+    sound = [both for case, both in zip(cases(), outcomes, strict=True) if case["fault"] == 0]
+    assert [found[2:] for both in sound for found in both] == [expected] * (2 * len(sound))
+
+
+def test_the_draws_are_those_that_are_stated() -> None:
+    """`below` is Python's own way to draw an integer, and a pace waits for its share of clocks."""
+    ours, pythons = random.Random(5), random.Random(5)
+    assert [below(180, ours) for _ in range(500)] == [pythons.randrange(180) for _ in range(500)]
+    pace = Pace(random.Random(1), 0.3)
+    waited = sum(not next(pace) for _ in range(200_000)) / 200_000
+    assert abs(waited - 0.3) < 0.01
