@@ -25,8 +25,8 @@ from typing import NamedTuple
 from sosmith.gen.architecture import Architecture
 from sosmith.gen.output.verilog import to_rtlil, to_verilog
 from sosmith.model.errors import ToolError
+from sosmith.sim.beats import Beats
 from sosmith.sim.simulators import find_simulator
-from sosmith.sim.stream_packing import Beats
 
 _MAIN = Path(__file__).parent / "upsets_main.cpp"
 _MODULE = re.compile(r"^module (\S+?)\s*\((.*?)^endmodule", re.MULTILINE | re.DOTALL)

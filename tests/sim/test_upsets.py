@@ -20,8 +20,9 @@ from sosmith.hdl.axi_stream import dest_width, fields
 from sosmith.model.arrays import Codes
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.sim import upsets
+from sosmith.sim.beats import Beats
 from sosmith.sim.simulation import simulate
-from sosmith.sim.stream_packing import Beats, Order, pack, random_order, unpack
+from sosmith.sim.stream_packing import Order, pack, random_order, unpack
 from sosmith.sim.upsets import Fate, Hit, Target
 
 FAULT = 1 << 6
