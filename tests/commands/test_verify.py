@@ -7,6 +7,7 @@ import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from tests.commands.invocation import Invocation
@@ -40,7 +41,10 @@ def test_against_everything(folder: Path) -> None:
     table = command.good(path, "--spec", str(SPEC), "--files", str(folder), "--rebuild").stdout
     assert "proven: audio_lowpass, " in table
     assert "as specified: ports and allowed error and filter within a peak gain of " in table
-    assert " instructions in the SystemVerilog compute these graphs, for all inputs and states\n" in table
+    assert (
+        " instructions in the SystemVerilog compute these graphs, for all inputs and states; the unit that runs them is "
+        "not part of it\n"
+    ) in table
     assert "unchanged: 5 files and the certificate itself, by their SHA-256\n" in table
     assert table.endswith("rebuilt: 5 files, the same byte for byte\n")
     found = json.loads(command.good(path, "--json", "--spec", str(SPEC), "--files", str(folder)).stdout)
@@ -64,6 +68,16 @@ def test_a_parallel_core(channels: int, tmp_path: Path) -> None:
     found = json.loads(command.good(path, "--json", "--files", str(tmp_path)).stdout)
     assert found["hardware_registers"] > 10
     assert found["program_instructions"] is None
+
+
+@pytest.mark.parametrize("key", [{"protect": "detect"}, {"reload": True}])
+@pytest.mark.parametrize("architecture", ["folded", "parallel"])
+def test_what_is_not_read_is_said(architecture: str, key: dict[str, Any], tmp_path: Path) -> None:
+    spec = specified(PLAIN)
+    hardware = replace(spec.hardware, architecture=architecture, realization="df1_ef1", **key)
+    generate(design_core(replace(spec, hardware=hardware)), tmp_path)
+    table = command.good(str(tmp_path / "plain.certificate.json"), "--files", str(tmp_path)).stdout
+    assert table.endswith("not read: the SystemVerilog, as that of a core with loadable constants or with protection\n")
 
 
 def test_without_anything_else_as_before(folder: Path) -> None:

@@ -27,13 +27,14 @@ def print_proof(certificate: Certificate, proof: Proof) -> None:
     if proof.program is not None:
         console.print(
             f"[bold green]program[/]: {proof.program.instructions} instructions in the SystemVerilog compute these "
-            "graphs, for all inputs and states"
+            "graphs, for all inputs and states; the unit that runs them is not part of it"
         )
     if proof.hardware is not None:
         found = proof.hardware
         console.print(
             f"[bold green]hardware[/]: the SystemVerilog computes these graphs, each sample {found.latency} clocks "
-            f"later, in {found.registers} registers, {found.states} of them states: for all inputs, stalls and resets"
+            f"later, in {found.registers} registers, {found.states} of them states: for all inputs, stalls and resets, "
+            "but for the flags outside_calibration, wear_warning and wear_critical"
         )
     if proof.files and proof.program is None and proof.hardware is None:
         console.print("not read: the SystemVerilog, as that of a core with loadable constants or with protection")
