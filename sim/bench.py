@@ -23,7 +23,7 @@ class BenchRun:
     cycles : int
         Clocks from the end of reset to the last beat received.
     seconds : float
-        Duration of the run, excluding the build.
+        How long these clocks took.
     tools : mapping of str to str
         Versions of the tools that ran the core, by name.
     """
