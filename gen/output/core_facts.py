@@ -216,6 +216,8 @@ class CoreFacts:
         Program of the folded and serial architectures; None in the parallel one.
     reload : ReloadFacts or None
         Facts for reloading; None if the core is not reloadable.
+    protect : str
+        One of `sosmith.model.dataflow.protection.PROTECTIONS`.
     reasons : mapping of str to str
         Reasons for this realization and this architecture.
     sections : tuple of SectionFacts
@@ -246,6 +248,7 @@ class CoreFacts:
     architecture: str
     program: Program | None
     reload: ReloadFacts | None
+    protect: str
     reasons: Mapping[str, str]
     sections: tuple[SectionFacts, ...]
     formats: tuple[NodeFormat, ...]
@@ -278,6 +281,7 @@ def core_facts(design: CoreDesign) -> CoreFacts:
         architecture=architecture.name,
         program=architecture.program,
         reload=_reload(design),
+        protect=architecture.protect,
         reasons=design.reasons,
         sections=tuple(each for section in quantized.sections for each in _sections(section)),
         formats=tuple(row for stage in datapath.stages for row in _formats(stage, datapath)),

@@ -29,6 +29,7 @@ def manifest(facts: CoreFacts) -> dict[str, Any]:
         "architecture": facts.architecture,
         "schedule": _schedule(facts.program),
         "reload": None if facts.reload is None else _entry(facts.reload),
+        "protect": facts.protect,
         "reasons": dict(facts.reasons),
         "sections": [_section(section) for section in facts.sections],
         "formats": [_entry(row) for row in facts.formats],

@@ -112,9 +112,8 @@ def fixed_architecture(path: Path) -> tuple[str | None, int]:
     """
     try:
         manifest = json.loads(_content(path))
-        hardware = manifest["spec"].get("hardware", {})
-        plain = not hardware.get("reload", False) and hardware.get("protect", "none") == "none"
-        return str(manifest["architecture"]) if plain else None, int(manifest["spec"].get("channels", 1))
+        plain = manifest["reload"] is None and manifest["protect"] == "none"
+        return str(manifest["architecture"]) if plain else None, int(manifest["channels"])
     except (ValueError, KeyError, TypeError, AttributeError):
         raise RejectedError(f"{path} must be the manifest of a core, not another file") from None
 

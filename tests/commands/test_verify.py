@@ -42,8 +42,8 @@ def test_against_everything(folder: Path) -> None:
     assert "proven: audio_lowpass, " in table
     assert "as specified: ports and allowed error and filter within a peak gain of " in table
     assert (
-        " instructions in the SystemVerilog compute these graphs, for all inputs and states; the unit that runs them is "
-        "not part of it\n"
+        " instructions in the SystemVerilog compute these graphs, for all inputs and states; "
+        "the unit that runs them is not part of it\n"
     ) in table
     assert "unchanged: 5 files and the certificate itself, by their SHA-256\n" in table
     assert table.endswith("rebuilt: 5 files, the same byte for byte\n")
