@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import signal
 import sys
 from collections import Counter
 from collections.abc import Iterable, Iterator
@@ -12,7 +13,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from benchmarks.mutation.bench import ALLOWANCE, SLOWER, Bench
+from benchmarks.mutation.bench import ALLOWANCE, SLOW, SLOWER, Bench
 from benchmarks.mutation.campaign import GOAL, Progress, room_record, share, try_room
 from benchmarks.mutation.exempt import RULES
 from benchmarks.mutation.mutants import population, sample
@@ -38,7 +39,7 @@ another text for the same function. cosmic-ray makes the mutants, of these rooms
 All mutants would take days. A sample is drawn with a seed: places in the text at random, and at each place one
 mutant. Killed means that a test fails which passes on the code as it is. Timed out means that a test takes more CPU
 time than {SLOWER:g} times its own, that of the longest test, and {ALLOWANCE:g} s together; time-outs count as killed
-and are told apart.
+and are told apart. Tests that take more than {SLOW:g} s by themselves are not run.
 
 What cannot matter by construction is left out and counted:
 
@@ -121,6 +122,7 @@ def main() -> int:
             left_out = ", ".join(f"{count:,} {rule}" for rule, count in found.exempt.items()) or "none"
             print(f"{name}: {found.mutants:,} mutants at {len(found.sites):,} places; left out: {left_out}")
         return 0
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         record = run(names, options.sample, options.seed, options.cache)
     except KeyboardInterrupt:
@@ -129,7 +131,7 @@ def main() -> int:
     shown = Table(*heads())
     for row in table(record):
         shown.add_row(*row)
-    Console().print(shown)
+    Console(width=None if sys.stdout.isatty() else 120).print(shown)
     left = list(survivors(record))
     for entry in left:
         print(f"\n{entry}")

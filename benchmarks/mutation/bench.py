@@ -11,7 +11,7 @@ import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -36,6 +36,8 @@ PACKAGES = (
 ALLOWANCE = 10.0
 """CPU seconds that every test may take more than `SLOWER` times its own."""
 SLOWER = 5.0
+SLOW = 6.0
+"""CPU seconds, lines being noted, beyond which a test is not run for mutants."""
 WALL = 900.0
 """Seconds after which a run is given up whatever it does: it may sleep, and then takes no CPU time."""
 
@@ -71,6 +73,16 @@ class Coverage:
         """Return the tests that execute any of some lines; all of the file for lines executed at import."""
         found: set[str] = set().union(*(self.tests.get((path, line), set()) for line in lines))
         return self.of_file(path) if "" in found else found
+
+
+def merged(parts: Iterable[Coverage]) -> Coverage:
+    """Put the coverages of several files of tests together."""
+    whole = Coverage({}, {})
+    for part in parts:
+        whole.seconds.update(part.seconds)
+        for place, tests in part.tests.items():
+            whole.tests.setdefault(place, set()).update(tests)
+    return whole
 
 
 class Bench:
@@ -116,12 +128,14 @@ class Bench:
     def coverage(self, tests: Sequence[str], files: Sequence[str]) -> Coverage:
         """Run tests on the code as it is; note their times and which lines of `files` they execute.
 
+        Tests that take longer than `SLOW` are left out.
+
         Raises
         ------
         RuntimeError
             If a test fails: every mutant would count as killed.
         """
-        found = self._ask(tests, {}, limit=WALL, trace=files)
+        found = self._ask(tests, {}, limit=SLOW, trace=files)
         if found["outcome"] != "passed":
             raise RuntimeError(f"the tests must pass before anything is mutated, and {found['test']} does not")
         lines: dict[tuple[str, int], set[str]] = {}

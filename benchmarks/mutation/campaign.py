@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
-from benchmarks.mutation.bench import Coverage
+from benchmarks.mutation.bench import Coverage, merged
 from benchmarks.mutation.mutants import Mutant, Population, short_digest, statement_lines
 from benchmarks.mutation.results import Cache, Equivalent, Outcome
 from benchmarks.mutation.rooms import Room
@@ -76,10 +76,7 @@ def try_room(
 
 
 def _tried(root: Path, room: Room, mutant: Mutant, bench: Trier, cache: Cache) -> Outcome:
-    coverage = cache.coverage(room)
-    if coverage is None:
-        coverage = bench.coverage(room.tests, room.paths(root))
-        cache.keep_coverage(room, coverage)
+    coverage = _coverage(root, room, bench, cache)
     source = (root / mutant.path).read_text(encoding="utf-8")
     first = coverage.of_lines(mutant.path, statement_lines(source, mutant.line))
     if not first:
@@ -91,6 +88,18 @@ def _tried(root: Path, room: Room, mutant: Mutant, bench: Trier, cache: Cache) -
 
     tests = sorted(coverage.of_file(mutant.path) | first, key=turn)
     return Outcome(*bench.try_mutant(mutant.path, mutant.text, tests, coverage.limits(tests)))
+
+
+def _coverage(root: Path, room: Room, bench: Trier, cache: Cache) -> Coverage:
+    """Find out which tests of the room execute which lines, file by file, each kept at once."""
+    parts = []
+    for test in room.entries(root):
+        part = cache.coverage(room, test)
+        if part is None:
+            part = bench.coverage([test], room.paths(root))
+            cache.keep_coverage(room, test, part)
+        parts.append(part)
+    return merged(parts)
 
 
 def room_record(root: Path, room: Room, found: Population, trials: Sequence[Trial]) -> dict[str, Any]:

@@ -55,7 +55,7 @@ class Mutant:
     line : int
         Line that changes.
     place : str
-        Qualified name of the innermost function or class around it, ``module`` outside of any.
+        Qualified name of the innermost function or class around it, or of the constant of the module; else ``module``.
     offset : int
         Lines from the beginning of `place` to the change.
     digest : str
@@ -176,7 +176,7 @@ def statement_lines(source: str, line: int) -> range:
 
 
 def place_digests(source: str) -> dict[str, str]:
-    """Digest of every function and class of a file, by qualified name, and of the file itself under ``module``."""
+    """Digest of every function, class and constant of a file by its name, and of the file itself under ``module``."""
     return {name: digest for name, _, _, digest in _places(source)}
 
 
@@ -192,18 +192,22 @@ def _changed(before: Sequence[str], after: Sequence[str]) -> tuple[str, str]:
 
 @cache
 def _places(source: str) -> list[tuple[str, int, int, str]]:
-    """Name, first line, last line and digest of the module and of every function and class in it."""
+    """Name, first line, last line and digest of the module and of every function, class and constant in it."""
     lines = source.splitlines()
     found = [("module", 1, len(lines), short_digest(source))]
+
+    def add(name: str, node: ast.stmt, first: int) -> None:
+        last = node.end_lineno or first
+        found.append((name, first, last, short_digest("\n".join(lines[first - 1 : last]))))
 
     def visit(node: ast.AST, prefix: str) -> None:
         for child in ast.iter_child_nodes(node):
             if isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
-                name = prefix + child.name
-                first = min([child.lineno, *(decorator.lineno for decorator in child.decorator_list)])
-                last = child.end_lineno or first
-                found.append((name, first, last, short_digest("\n".join(lines[first - 1 : last]))))
-                visit(child, name + ".")
+                add(prefix + child.name, child, min([child.lineno, *(one.lineno for one in child.decorator_list)]))
+                visit(child, f"{prefix}{child.name}.")
+            elif isinstance(node, ast.Module) and isinstance(child, ast.Assign | ast.AnnAssign):
+                target = child.targets[0] if isinstance(child, ast.Assign) else child.target
+                add(ast.unparse(target), child, child.lineno)
             else:
                 visit(child, prefix)
 

@@ -100,19 +100,19 @@ class Cache:
         row = (_key(mutant), outcome.kind, outcome.test, self._mark(room, outcome.test))
         self._base.execute("INSERT OR REPLACE INTO outcome VALUES (?, ?, ?, ?)", row)
 
-    def coverage(self, room: Room) -> Coverage | None:
-        """Return which tests execute which lines, None if files or tests have changed since."""
-        found = self._base.execute("SELECT content FROM coverage WHERE key = ?", (self._state(room),)).fetchone()
+    def coverage(self, room: Room, test: str) -> Coverage | None:
+        """Return which lines one of the room's entries of tests executes, None if it or the files have changed."""
+        found = self._base.execute("SELECT content FROM coverage WHERE key = ?", (self._state(room, test),)).fetchone()
         if found is None:
             return None
         content = json.loads(found[0])
         return Coverage(content["seconds"], {(path, line): set(tests) for path, line, tests in content["tests"]})
 
-    def keep_coverage(self, room: Room, coverage: Coverage) -> None:
-        """Keep which tests execute which lines."""
+    def keep_coverage(self, room: Room, test: str, coverage: Coverage) -> None:
+        """Keep which lines one of the room's entries of tests executes."""
         tests = [(path, line, sorted(tests)) for (path, line), tests in coverage.tests.items()]
         content = json.dumps({"seconds": coverage.seconds, "tests": tests})
-        self._base.execute("INSERT OR REPLACE INTO coverage VALUES (?, ?)", (self._state(room), content))
+        self._base.execute("INSERT OR REPLACE INTO coverage VALUES (?, ?)", (self._state(room, test), content))
 
     def _row(self, mutant: Mutant) -> tuple[str, str, str] | None:
         query = "SELECT kind, test, mark FROM outcome WHERE key = ?"
@@ -127,8 +127,8 @@ class Cache:
     def _tests(self, room: Room) -> str:
         return _content(self._root, room.test_files(self._root))
 
-    def _state(self, room: Room) -> str:
-        return short_digest(self._tests(room), _content(self._root, room.paths(self._root)))
+    def _state(self, room: Room, test: str) -> str:
+        return short_digest(test, self._mark(room, test), _content(self._root, room.paths(self._root)))
 
 
 def _key(mutant: Mutant) -> str:

@@ -4,14 +4,15 @@ A program of its own, started in a copy of the checkout: nothing of the house is
 run sees the files as they are. Reads requests and writes answers, one JSON object a line.
 
     request   tests      what pytest is to run, in this order, until the first failure
-              trace      files whose executed lines are wanted, each with the tests that execute it
+              trace      files whose executed lines are wanted, each with the tests that execute it; tests that
+                         reach their limit are then left out instead of timed out
               limits     CPU seconds of a test by its identifier, after which it counts as timed out
               limit      the same for the import of the tests, and for all other tests
               wall       seconds of everything together
     answer    outcome    "passed", "failed", "timed out"
               test       the test that failed or timed out, empty if that was before the first one
               why        its message, shortened
-              seconds    CPU seconds of each test
+              seconds    CPU seconds of each test that was not left out
               lines      lists of [file, line] by test; under "" those executed while tests were imported
 """
 
@@ -87,6 +88,7 @@ class Watch:
         self._began = time.process_time()
         if self._lines:
             sys.settrace(self._lines.call)
+            signal.signal(signal.SIGPROF, _left_out)
 
     def note(self, kind: str, *values: Any) -> None:
         """Write down something that stays known even if the process is killed."""
@@ -103,10 +105,13 @@ class Watch:
 
     def pytest_runtest_logfinish(self, nodeid: str) -> None:
         """Note what a test has taken."""
+        signal.setitimer(signal.ITIMER_PROF, 0)
         self.note("seconds", nodeid, time.process_time() - self._began)
 
     def pytest_runtest_logreport(self, report: Any) -> None:
-        """Note a failure."""
+        """Note a failure, or a test that was left out."""
+        if report.skipped:
+            self.note("skipped", report.nodeid)
         if report.failed:
             self.note("failed", report.nodeid, str(report.longrepr)[-_MESSAGE:])
 
@@ -124,6 +129,10 @@ class Watch:
         self.note("end", status)
 
 
+def _left_out(*_: Any) -> NoReturn:
+    pytest.skip("too slow to be run for every mutant", allow_module_level=True)
+
+
 def run_tests(request: Request, notes: TextIO) -> NoReturn:
     """Run the tests in this process, which ends here."""
     nothing = os.open(os.devnull, os.O_RDWR)
@@ -131,7 +140,8 @@ def run_tests(request: Request, notes: TextIO) -> NoReturn:
         os.dup2(nothing, stream)
     resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))
     signal.signal(signal.SIGPROF, signal.SIG_DFL)
-    signal.setitimer(signal.ITIMER_PROF, request["limit"])
+    if not request["trace"]:
+        signal.setitimer(signal.ITIMER_PROF, request["limit"])
     # The first counterexample will do, and none is kept for the next run.
     phases = [hypothesis.Phase.explicit, hypothesis.Phase.generate]
     hypothesis.settings.register_profile("mutation", phases=phases, database=None, deadline=None)
@@ -163,7 +173,10 @@ def answer(request: Request) -> Answer:
         signal.signal(signal.SIGTERM, leave)
         handle = os.pidfd_open(child)
         try:
-            late = not select.select([handle], [], [], request["wall"])[0]
+            over = select.select([handle, sys.stdin], [], [], request["wall"])[0]
+            if over == [sys.stdin]:
+                leave()  # whoever asked has gone
+            late = not over
         finally:
             os.close(handle)
             end(child)
@@ -184,6 +197,7 @@ def end(child: int) -> None:
 def summary(notes: Path, late: bool) -> Answer:
     """Make the answer from what a run has noted."""
     found: Answer = {"outcome": "failed", "test": "", "why": "", "seconds": {}, "lines": {}}
+    skipped: list[str] = []
     for kind, *values in map(json.loads, notes.read_text(encoding="utf-8").splitlines()):
         if kind == "start":
             (found["test"],) = values
@@ -194,6 +208,11 @@ def summary(notes: Path, late: bool) -> Answer:
             found["outcome"], found["test"] = "passed", ""
         elif kind in {"seconds", "lines"}:
             found[kind][values[0]] = values[1]
+        elif kind == "skipped":
+            skipped.append(values[0])
+    for test in skipped:
+        found["seconds"].pop(test, None)
+        found["lines"].pop(test, None)
     if late:
         found["outcome"] = "timed out"
     return found

@@ -48,6 +48,11 @@ def test_larger() -> None:
 
 def test_days() -> None:
     assert days(1) > 0
+
+
+def test_that_takes_long() -> None:
+    while larger(2, 1):
+        pass
 '''
 ROOM = Room(files=("src/toy.py",), tests=("tests",))
 
@@ -70,8 +75,10 @@ LISTED = Equivalent("src/toy.py", "larger", EQUIVALENT.digest, 0, "a > b ", "a >
 
 
 @pytest.fixture
-def toy(tmp_path: Path) -> Path:
-    """Return a checkout of the toy."""
+def toy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return a checkout of the toy, and make fractions of a second count as long."""
+    monkeypatch.setattr("benchmarks.mutation.bench.ALLOWANCE", 0.3)
+    monkeypatch.setattr("benchmarks.mutation.bench.SLOW", 0.3)
     root = tmp_path / "toy"
     for name, text in {"src/toy.py": TOY, "tests/test_toy.py": TESTS, "pyproject.toml": ""}.items():
         (root / name).parent.mkdir(parents=True, exist_ok=True)
@@ -111,11 +118,13 @@ def kinds(trials: list[Trial]) -> list[str]:
     return [trial.kind for trial in trials]
 
 
-def test_a_toy_is_tried(toy: Path, cache: Cache, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("benchmarks.mutation.bench.ALLOWANCE", 0.3)
+def test_a_toy_is_tried(toy: Path, cache: Cache) -> None:
     with closing(Bench(toy, toy / "build", packages=())) as bench:
         mutants = [KILLED, SURVIVES, ENDLESS, EQUIVALENT, UNTRIED]
         trials = try_room(toy, ROOM, mutants, lambda: bench, cache, [LISTED])
+    known = cache.coverage(ROOM, "tests/test_toy.py")
+    assert known is not None
+    assert known.seconds.keys() == {"tests/test_toy.py::test_larger", "tests/test_toy.py::test_days"}
     assert kinds(trials) == ["killed", "survived", "timed_out", "equivalent", "survived"]
     assert [trial.outcome.test.rpartition("::")[2] for trial in trials] == ["test_larger", "", "test_days", "", ""]
     assert (toy / "src/toy.py").read_text(encoding="utf-8") == TOY
