@@ -27,7 +27,7 @@ from rich.table import Table
 
 RECORD = Path(__file__).with_name("record.json")
 EQUIVALENT = Path(__file__).with_name("equivalent.toml")
-SAMPLE = 60
+SAMPLE = 52
 
 _DESCRIPTION = f"""\
 Change one operator, number, comparison, keyword or loop of the code, run the tests that execute it, and see whether
@@ -122,7 +122,8 @@ def main() -> int:
             left_out = ", ".join(f"{count:,} {rule}" for rule, count in found.exempt.items()) or "none"
             print(f"{name}: {found.mutants:,} mutants at {len(found.sites):,} places; left out: {left_out}")
         return 0
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    for number in (signal.SIGTERM, signal.SIGINT):  # a shell lets what runs in the background ignore the latter
+        signal.signal(number, signal.default_int_handler)
     try:
         record = run(names, options.sample, options.seed, options.cache)
     except KeyboardInterrupt:

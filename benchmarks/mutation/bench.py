@@ -36,7 +36,7 @@ PACKAGES = (
 ALLOWANCE = 10.0
 """CPU seconds that every test may take more than `SLOWER` times its own."""
 SLOWER = 5.0
-SLOW = 6.0
+SLOW = 3.0
 """CPU seconds, lines being noted, beyond which a test is not run for mutants."""
 WALL = 900.0
 """Seconds after which a run is given up whatever it does: it may sleep, and then takes no CPU time."""
@@ -125,23 +125,23 @@ class Bench:
         self._server.communicate()
         shutil.rmtree(self._folder, ignore_errors=True)
 
-    def coverage(self, tests: Sequence[str], files: Sequence[str]) -> Coverage:
+    def coverage(self, test: str, without: Sequence[str], files: Sequence[str]) -> Coverage:
         """Run tests on the code as it is; note their times and which lines of `files` they execute.
 
-        Tests that take longer than `SLOW` are left out.
+        Tests that begin like one of `without` are left out, and those that take longer than `SLOW`.
 
         Raises
         ------
         RuntimeError
             If a test fails: every mutant would count as killed.
         """
-        found = self._ask(tests, {}, limit=SLOW, trace=files)
+        found = self._ask([test], {}, limit=SLOW, trace=files, without=without)
         if found["outcome"] != "passed":
             raise RuntimeError(f"the tests must pass before anything is mutated, and {found['test']} does not")
         lines: dict[tuple[str, int], set[str]] = {}
-        for test, executed in found["lines"].items():
+        for name, executed in found["lines"].items():
             for path, line in executed:
-                lines.setdefault((path, line), set()).add(test)
+                lines.setdefault((path, line), set()).add(name)
         return Coverage(found["seconds"], lines)
 
     def try_mutant(self, path: str, text: str, tests: Sequence[str], limits: Mapping[str, float]) -> tuple[str, str]:
@@ -168,9 +168,15 @@ class Bench:
             file.write_bytes(original)
 
     def _ask(
-        self, tests: Sequence[str], limits: Mapping[str, float], *, limit: float, trace: Sequence[str] = ()
+        self,
+        tests: Sequence[str],
+        limits: Mapping[str, float],
+        *,
+        limit: float,
+        trace: Sequence[str] = (),
+        without: Sequence[str] = (),
     ) -> dict[str, Any]:
-        request = {"tests": tests, "trace": trace, "limits": limits, "limit": limit, "wall": WALL}
+        request = {"tests": tests, "without": without, "trace": trace, "limits": limits, "limit": limit, "wall": WALL}
         assert self._server.stdin is not None
         assert self._server.stdout is not None
         self._server.stdin.write(json.dumps(request) + "\n")

@@ -23,8 +23,8 @@ Progress = Callable[[int, Counter[str]], None]
 class Trier(Protocol):
     """What mutants are tried on: a `Bench`, or what stands for one in a test."""
 
-    def coverage(self, tests: Sequence[str], files: Sequence[str]) -> Coverage:
-        """Run the tests on the code as it is."""
+    def coverage(self, test: str, without: Sequence[str], files: Sequence[str]) -> Coverage:
+        """Run tests on the code as it is."""
 
     def try_mutant(self, path: str, text: str, tests: Sequence[str], limits: dict[str, float]) -> tuple[str, str]:
         """Run tests with another text in place of a file."""
@@ -57,9 +57,9 @@ def try_room(
 ) -> list[Trial]:
     """Try every mutant that the cache does not know; each outcome is kept at once.
 
-    The bench is made when the first one has to be tried. Tests that execute the mutated statement come first, the quick
-    ones before the others; then the remaining tests that execute anything of the file, since a test may lean on what
-    an earlier one has left in a cache. A mutant in a statement that no test executes survives untried.
+    The bench is made when the first one has to be tried. Run are the tests that have been seen to execute the mutated
+    statement, the quick ones first. A test that found its result in a cache is not among them: a mutant may count as
+    surviving that it would kill, never the reverse. A mutant in a statement that no test executes survives untried.
     """
     trials: list[Trial] = []
     counts: Counter[str] = Counter()
@@ -78,15 +78,11 @@ def try_room(
 def _tried(root: Path, room: Room, mutant: Mutant, bench: Trier, cache: Cache) -> Outcome:
     coverage = _coverage(root, room, bench, cache)
     source = (root / mutant.path).read_text(encoding="utf-8")
-    first = coverage.of_lines(mutant.path, statement_lines(source, mutant.line))
-    if not first:
+    found = coverage.of_lines(mutant.path, statement_lines(source, mutant.line))
+    if not found:
         return Outcome("survived", "")
     earlier = cache.earlier_test(mutant)
-
-    def turn(test: str) -> tuple[bool, bool, float, str]:
-        return test != earlier, test not in first, coverage.seconds[test], test
-
-    tests = sorted(coverage.of_file(mutant.path) | first, key=turn)
+    tests = sorted(found, key=lambda test: (test != earlier, coverage.seconds[test], test))
     return Outcome(*bench.try_mutant(mutant.path, mutant.text, tests, coverage.limits(tests)))
 
 
@@ -96,7 +92,7 @@ def _coverage(root: Path, room: Room, bench: Trier, cache: Cache) -> Coverage:
     for test in room.entries(root):
         part = cache.coverage(room, test)
         if part is None:
-            part = bench.coverage([test], room.paths(root))
+            part = bench.coverage(test, room.without, room.paths(root))
             cache.keep_coverage(room, test, part)
         parts.append(part)
     return merged(parts)

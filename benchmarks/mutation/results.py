@@ -128,7 +128,7 @@ class Cache:
         return _content(self._root, room.test_files(self._root))
 
     def _state(self, room: Room, test: str) -> str:
-        return short_digest(test, self._mark(room, test), _content(self._root, room.paths(self._root)))
+        return short_digest(test, *room.without, self._mark(room, test), _content(self._root, room.paths(self._root)))
 
 
 def _key(mutant: Mutant) -> str:

@@ -4,6 +4,7 @@ A program of its own, started in a copy of the checkout: nothing of the house is
 run sees the files as they are. Reads requests and writes answers, one JSON object a line.
 
     request   tests      what pytest is to run, in this order, until the first failure
+              without    the beginnings of tests that are not to be run
               trace      files whose executed lines are wanted, each with the tests that execute it; tests that
                          reach their limit are then left out instead of timed out
               limits     CPU seconds of a test by its identifier, after which it counts as timed out
@@ -23,6 +24,7 @@ import json
 import os
 import resource
 import select
+import shutil
 import signal
 import sys
 import tempfile
@@ -100,6 +102,7 @@ class Watch:
         self.note("start", nodeid)
         if self._lines:
             self._lines.begin(nodeid)
+            sys.settrace(self._lines.call)  # again: a test that was left out has ended the tracing as well
         self._began = time.process_time()
         signal.setitimer(signal.ITIMER_PROF, self._request["limits"].get(nodeid, self._request["limit"]))
 
@@ -149,7 +152,8 @@ def run_tests(request: Request, notes: TextIO) -> NoReturn:
     watch = Watch(request, notes)
     os.environ["PYTEST_DISABLE_PLUGIN_AUTOLOAD"] = "1"
     options = ["-x", "-q", "-m", "not slow", "-p", "no:cacheprovider", "-p", _PLUGIN, "--hypothesis-seed=0"]
-    status = pytest.main([*options, "--basetemp", request["folder"], *request["tests"]], plugins=[watch])
+    leave_out = [option for test in request["without"] for option in ("--deselect", test)]
+    status = pytest.main([*options, "--basetemp", request["folder"], *leave_out, *request["tests"]], plugins=[watch])
     watch.close(int(status))
     os._exit(0)
 
@@ -168,6 +172,7 @@ def answer(request: Request) -> Answer:
 
         def leave(*_: Any) -> NoReturn:
             end(child)
+            shutil.rmtree(folder, ignore_errors=True)
             os._exit(1)
 
         signal.signal(signal.SIGTERM, leave)
