@@ -143,7 +143,9 @@ def run_tests(request: Request, notes: TextIO) -> NoReturn:
         os.dup2(nothing, stream)
     resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))
     signal.signal(signal.SIGPROF, signal.SIG_DFL)
-    if not request["trace"]:
+    if request["trace"]:
+        sys.dont_write_bytecode = False  # pytest may keep what it compiles from the tests, which do not change
+    else:
         signal.setitimer(signal.ITIMER_PROF, request["limit"])
     # The first counterexample will do, and none is kept for the next run.
     phases = [hypothesis.Phase.explicit, hypothesis.Phase.generate]

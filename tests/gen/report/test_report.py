@@ -460,6 +460,7 @@ def test_response_agrees_with_scipy(sos: Array) -> None:
     _, gain = signal.sosfreqz(sos, worN=frequency, fs=100)
     expected = 20 * np.log10(np.abs(gain))
     assert response.magnitude_db(sos, frequency, 100.0) == pytest.approx(expected, abs=1e-8)
+    assert response.complex_response(sos, frequency, 100.0) == pytest.approx(gain, abs=1e-9)
 
 
 def test_group_delay_where_the_response_vanishes() -> None:
@@ -548,6 +549,15 @@ def test_frequencies_reach_well_below_the_cutoff() -> None:
         grid = response.frequency_grid(filter_facts)
         assert grid[0] < 0.01
         assert grid[-1] == 50.0
+
+
+def test_measures_are_taken_everywhere_and_at_every_edge() -> None:
+    """A peak of the stop band between its edge and Nyquist counts, and so does an edge between two even steps."""
+    filter_facts = facts(kind="bandpass", cutoff=(8.0123, 12.0456), stopband_edge=(4.0789, 44.0321))
+    grid = response.measurement_grid(filter_facts)
+    assert (grid[0], grid[-1]) == (0.0, 50.0)
+    assert np.diff(grid).max() <= 50 / 4000 * (1 + 1e-9)
+    assert {8.0123, 12.0456, 4.0789, 44.0321} <= set(grid.tolist())
 
 
 # the page
@@ -763,6 +773,13 @@ def test_a_page_that_fails_leaves_the_old_report(tmp_path: Path, monkeypatch: py
 def test_evidence_refuses(changes: dict[str, Any], message: str) -> None:
     with pytest.raises(ValueError, match=f"^{re.escape(message)}$"):
         evidence(**changes)
+
+
+@pytest.mark.parametrize("shape", [(1,), (1, 1), (2, 1), (1, 2)])
+def test_evidence_may_be_as_little_as_one_sample(shape: tuple[int, ...]) -> None:
+    arrays = dict.fromkeys(("golden", "truth", "hardware", "unfiltered"), np.ones(shape))
+    one = evidence(**arrays, time=np.zeros(shape[0]), reading=np.ones(shape, dtype=bool), samples=math.prod(shape))
+    assert one.error.tolist() == np.zeros(shape).tolist()
 
 
 @pytest.mark.parametrize(
