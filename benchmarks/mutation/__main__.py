@@ -107,6 +107,14 @@ def run(names: Iterable[str], size: int, seed: int, cache_file: Path) -> dict[st
     return record
 
 
+def joined(record: dict[str, Any]) -> dict[str, Any]:
+    """Add the rooms that were recorded before, with the same tool and seed, to those of this run."""
+    before = json.loads(RECORD.read_text(encoding="utf-8")) if RECORD.exists() else {"rooms": {}}
+    same = all(before.get(key) == record[key] for key in ("tool", "seed"))
+    rooms = (before["rooms"] if same else {}) | record["rooms"]
+    return record | {"rooms": {name: rooms[name] for name in ROOMS if name in rooms}}
+
+
 def main() -> int:
     """Run what the command line asks for; return the exit status."""
     options = _parser().parse_args()
@@ -136,8 +144,7 @@ def main() -> int:
     left = list(survivors(record))
     for entry in left:
         print(f"\n{entry}")
-    if set(names) == set(ROOMS):
-        RECORD.write_text(json.dumps(record, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    RECORD.write_text(json.dumps(joined(record), indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     return int(bool(left) or any(share(entry) < GOAL for entry in record["rooms"].values()))
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 from benchmarks.mutation.campaign import share
 from benchmarks.mutation.exempt import RULES
+from benchmarks.mutation.rooms import ROOMS
 
 COUNTED = ("mutants", "sites", "sampled", "killed", "timed_out", "survived", "equivalent")
 
@@ -33,6 +34,8 @@ def markdown(record: dict[str, Any]) -> str:
     rooms = record["rooms"]
     lines = [f"| {' | '.join(heads())} |", "|---|" + "---:|" * (len(heads()) - 1)]
     lines += [f"| {' | '.join(row)} |" for row in table(record)]
+    if missing := [name for name in ROOMS if name not in rooms]:
+        lines += ["", f"Not tried yet: {', '.join(missing)}."]
     exempt: Counter[str] = Counter()
     for entry in rooms.values():
         exempt.update(entry["exempt"])

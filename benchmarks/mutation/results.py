@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import json
 import sqlite3
 import tomllib
@@ -69,15 +70,16 @@ def stale(listed: Iterable[Equivalent], root: Path) -> list[Equivalent]:
 class Cache:
     """Outcomes by the content of the mutated file and of the tests that decided.
 
-    A mutant stays killed while the file of the test that killed it is the same, and survives while all tests of its
-    room are the same. Where tests have changed, the one that decided before is told, and may be tried first. Changes of
-    other code are not noticed: a run that must not lean on earlier ones takes another file.
+    A mutant stays killed while the test that killed it and what its file has beside tests are the same, and survives
+    while all tests of its room are the same. Where tests have changed, the one that decided before is told, and may be
+    tried first. Changes of other code are not noticed: a run that must not lean on earlier ones takes another file.
     """
 
     def __init__(self, file: Path, root: Path) -> None:
         file.parent.mkdir(parents=True, exist_ok=True)
         self._root = root
-        self._base = sqlite3.connect(file, isolation_level=None)
+        self._texts: dict[str, str] = {}
+        self._base = sqlite3.connect(file, isolation_level=None, timeout=600)
         self._base.execute("CREATE TABLE IF NOT EXISTS outcome (key TEXT PRIMARY KEY, kind TEXT, test TEXT, mark TEXT)")
         self._base.execute("CREATE TABLE IF NOT EXISTS coverage (key TEXT PRIMARY KEY, content TEXT)")
 
@@ -120,20 +122,44 @@ class Cache:
         return row
 
     def _mark(self, room: Room, test: str) -> str:
-        """Content of the file of a test, of all tests of the room where there is none."""
-        file = self._root / test.partition("::")[0]
-        return short_digest(file.read_text(encoding="utf-8")) if test and file.exists() else self._tests(room)
+        """Content of a test and of what its file has beside tests; of all tests of the room where there is none."""
+        name, _, function = test.partition("::")
+        if not function or not (self._root / name).exists():
+            return self._tests(room)
+        return short_digest(*_with_one_test(self._text(name), function.partition("[")[0]))
+
+    def _text(self, name: str) -> str:
+        """Text of a file when it was first needed: what is edited during a run has not been tried."""
+        if name not in self._texts:
+            self._texts[name] = (self._root / name).read_text(encoding="utf-8")
+        return self._texts[name]
 
     def _tests(self, room: Room) -> str:
-        return _content(self._root, room.test_files(self._root))
+        return self._content(room.test_files(self._root))
 
     def _state(self, room: Room, test: str) -> str:
-        return short_digest(test, *room.without, self._mark(room, test), _content(self._root, room.paths(self._root)))
+        names = [test.partition("::")[0], *room.paths(self._root)]
+        return short_digest(test, *room.without, self._content(names))
+
+    def _content(self, names: Iterable[str]) -> str:
+        return short_digest(*(f"{name}\0{self._text(name)}" for name in names))
 
 
 def _key(mutant: Mutant) -> str:
     return short_digest(mutant.path, mutant.text)
 
 
-def _content(root: Path, names: Iterable[str]) -> str:
-    return short_digest(*(f"{name}\0{(root / name).read_text(encoding='utf-8')}" for name in names))
+def _with_one_test(text: str, function: str) -> list[str]:
+    """Top-level statements of a file of tests without the other tests."""
+    body = ast.parse(text).body
+    lines = text.splitlines()
+    kept = [
+        node
+        for node in body
+        if not (isinstance(node, ast.FunctionDef) and node.name.startswith("test_") and node.name != function)
+    ]
+    return ["\n".join(lines[_first_line(node) - 1 : node.end_lineno]) for node in kept]
+
+
+def _first_line(node: ast.stmt) -> int:
+    return min([node.lineno, *(decorator.lineno for decorator in getattr(node, "decorator_list", []))])

@@ -151,15 +151,26 @@ def test_what_is_known_is_not_tried_again(toy: Path, cache: Cache) -> None:
 
 
 def test_other_tests_are_tried_the_decisive_one_first(toy: Path, cache: Cache) -> None:
-    cache.keep(ROOM, SURVIVES, Outcome("killed", "tests/test_toy.py::test_larger"))
-    assert cache.outcome(ROOM, SURVIVES) == Outcome("killed", "tests/test_toy.py::test_larger")
-    (toy / "tests/test_toy.py").write_text(TESTS + "\n", encoding="utf-8")
-    assert cache.outcome(ROOM, SURVIVES) is None
-    stand_in = StandIn()
-    try_room(toy, ROOM, [SURVIVES], lambda: stand_in, cache, [])
-    assert [name.rpartition("::")[2] for name in stand_in.tried[0][1]] == ["test_larger", "test_days"]
+    """A kill stands while other tests come or go, not when the test or a helper changes."""
+    decided = Outcome("killed", "tests/test_toy.py::test_larger")
+    cache.keep(ROOM, SURVIVES, decided)
+    for text, known in (
+        (TESTS, decided),
+        (TESTS.replace("days(1) > 0", "days(1) > 6"), decided),
+        (TESTS.replace("== 2", "== 1 + 1"), None),
+        (TESTS.replace("import days, larger", "import larger, days"), None),
+    ):
+        (toy / "tests/test_toy.py").write_text(text, encoding="utf-8")
+        with closing(Cache(toy / "build/cache.sqlite", toy)) as again:
+            assert again.outcome(ROOM, SURVIVES) == known
+    with closing(Cache(toy / "build/cache.sqlite", toy)) as again:
+        stand_in = StandIn()
+        try_room(toy, ROOM, [SURVIVES], lambda: stand_in, again, [])
+        assert [name.rpartition("::")[2] for name in stand_in.tried[0][1]] == ["test_larger", "test_days"]
+        assert again.outcome(ROOM, SURVIVES) == Outcome("survived", "")
     (toy / "tests/test_other.py").write_text('"""Others."""\n', encoding="utf-8")
-    assert cache.outcome(ROOM, SURVIVES) is None
+    with closing(Cache(toy / "build/cache.sqlite", toy)) as again:
+        assert again.outcome(ROOM, SURVIVES) is None
 
 
 def test_quick_tests_of_the_statement_come_first(toy: Path, cache: Cache) -> None:

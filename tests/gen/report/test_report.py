@@ -487,6 +487,12 @@ def test_poles_and_zeros_leave_out_the_origin() -> None:
     assert response.zeros(first_order).tolist() == pytest.approx([-1.0])
 
 
+def test_poles_and_zeros_are_roots_the_larger_of_two_real_ones_first() -> None:
+    sos = np.array([[2.0, -3.0, 1.0, 1.0, 0.75, 0.125], [4.0, 4.0, 2.0, 1.0, -1.0, 0.5]])
+    assert response.zeros(sos).tolist() == [1.0, 0.5, -0.5 + 0.5j, -0.5 - 0.5j]
+    assert response.poles(sos).tolist() == [-0.5, -0.25, 0.5 + 0.5j, 0.5 - 0.5j]
+
+
 def test_stopband_attenuation_an_octave_beyond_the_cutoff() -> None:
     """Butterworth: 10 log10(1 + (tan(pi 2 fc/fs) / tan(pi fc/fs))^14), the smallest in the stopband."""
     ratio = math.tan(2 * math.pi * 0.2587803 / 100) / math.tan(math.pi * 0.2587803 / 100)
@@ -825,6 +831,18 @@ def test_examples_in_docstrings(module: Any) -> None:
 )
 def test_quantities(value: float | None, unit: str, words: str) -> None:
     assert quantity.quantity(value, unit) == words
+
+
+def test_the_worst_channel_has_the_largest_error_of_either_sign() -> None:
+    golden = np.zeros((4, 3))
+    hardware = golden.copy()
+    hardware[2, 1] = 2 * LSB
+    arrays = {"golden": golden, "time": np.arange(4) / 100, "truth": None, "reading": None, "unfiltered": None}
+    several = evidence(**arrays, hardware=hardware, channels=3, samples=12)
+    assert several.worst_channel == 1
+    hardware[0, 2] = -3 * LSB
+    assert several.worst_channel == 2
+    assert several.of_channel(1).worst_channel == 0
 
 
 def test_several_channels_are_measured_together_and_the_worst_is_shown() -> None:
