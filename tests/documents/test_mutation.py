@@ -1,20 +1,23 @@
 """The mutation tester, on a toy package: what is killed, what survives, what is remembered, what does not count."""
 
 import ast
+import json
 import re
 import subprocess
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from benchmarks.mutation import __main__ as command
 from benchmarks.mutation import record as records
 from benchmarks.mutation.bench import Bench, Coverage
 from benchmarks.mutation.campaign import Trial, room_record, share, try_room
 from benchmarks.mutation.exempt import exempt_spans, exemption
 from benchmarks.mutation.mutants import Change, Mutant, Population, place_digests, population, sample, statement_lines
-from benchmarks.mutation.results import Cache, Equivalent, Outcome, stale
+from benchmarks.mutation.results import Cache, Equivalent, Outcome, equivalents, stale
 from benchmarks.mutation.rooms import ROOMS, ROOT, Room
 
 TOY = '''"""A toy."""
@@ -281,7 +284,25 @@ def test_every_room_has_files_and_tests() -> None:
         assert all(
             (ROOT / name.partition("::")[0]).exists() for name in (*room.tests, *room.without, *room.whole_messages)
         )
-        assert len(room.test_files(ROOT)) >= len(room.tests)
+        assert all(name.endswith(".py") for name in room.test_files(ROOT))
+
+
+def test_the_record_is_sound_and_every_survivor_has_its_reason() -> None:
+    record = json.loads(command.RECORD.read_text(encoding="utf-8"))
+    assert record["rooms"]
+    assert list(record["rooms"]) == [name for name in ROOMS if name in record["rooms"]]
+    for entry in record["rooms"].values():
+        counts = Counter(trial["outcome"] for trial in entry["sample"])
+        assert {kind: entry[kind] for kind in ("killed", "timed_out", "survived", "equivalent")} == {
+            kind: counts[kind] for kind in ("killed", "timed_out", "survived", "equivalent")
+        }
+        assert entry["sampled"] == len(entry["sample"])
+        assert share(entry) >= 0.9
+    assert list(records.survivors(record)) == []
+    assert all(entry.reason for entry in equivalents(command.EQUIVALENT))
+    text = records.markdown(record)
+    assert text.count("**not known**") == 0
+    assert text.count("\n| `") == sum(entry["equivalent"] for entry in record["rooms"].values())
 
 
 def test_what_nobody_has_explained_is_told() -> None:
