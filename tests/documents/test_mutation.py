@@ -302,7 +302,7 @@ def test_the_record_is_sound_and_every_survivor_has_its_reason() -> None:
     assert all(entry.reason for entry in equivalents(command.EQUIVALENT))
     text = records.markdown(record)
     assert text.count("**not known**") == 0
-    assert text.count("\n| `") == sum(entry["equivalent"] for entry in record["rooms"].values())
+    assert text.count("` becomes `") == sum(entry["equivalent"] for entry in record["rooms"].values())
 
 
 def test_what_nobody_has_explained_is_told() -> None:
