@@ -188,6 +188,16 @@ def test_samples_are_as_exact_as_they_say(bits: int) -> None:
     assert off > 2
 
 
+def test_rounding_costs_one_unit_and_bounds_stay_binary() -> None:
+    """Taps cost a unit, a recursion a unit times its gain: here 4/3, which is rounded up."""
+    start = impulse(Horizon(8, 40, Fraction(5, 4)))
+    assert start.taps(dyadic(0.5)).rounding == 1
+    assert start.taps(dyadic(1)).taps(dyadic(3, -2)).rounding == 6
+    made = start.all_pole(dyadic(1, -0.25))
+    assert Fraction(4, 3) < made.rounding < Fraction(4, 3) + Fraction(1, 2**62)
+    assert made.rounding.denominator.bit_count() == made.magnitude.denominator.bit_count() == 1
+
+
 @st.composite
 def sections(draw: st.DrawFn) -> Section:
     radius, angle = draw(st.floats(0, 0.97)), draw(st.floats(0, math.pi))

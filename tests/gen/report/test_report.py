@@ -460,6 +460,7 @@ def test_response_agrees_with_scipy(sos: Array) -> None:
     _, gain = signal.sosfreqz(sos, worN=frequency, fs=100)
     expected = 20 * np.log10(np.abs(gain))
     assert response.magnitude_db(sos, frequency, 100.0) == pytest.approx(expected, abs=1e-8)
+    assert response.complex_response(sos, frequency, 100.0) == pytest.approx(gain, abs=1e-9)
 
 
 def test_group_delay_where_the_response_vanishes() -> None:
@@ -484,6 +485,12 @@ def test_poles_and_zeros_leave_out_the_origin() -> None:
     first_order = np.array([[0.5, 0.5, 0.0, 1.0, -0.9, 0.0]])
     assert response.poles(first_order).tolist() == pytest.approx([0.9])
     assert response.zeros(first_order).tolist() == pytest.approx([-1.0])
+
+
+def test_poles_and_zeros_are_roots_the_larger_of_two_real_ones_first() -> None:
+    sos = np.array([[2.0, -3.0, 1.0, 1.0, 0.75, 0.125], [4.0, 4.0, 2.0, 1.0, -1.0, 0.5]])
+    assert response.zeros(sos).tolist() == [1.0, 0.5, -0.5 + 0.5j, -0.5 - 0.5j]
+    assert response.poles(sos).tolist() == [-0.5, -0.25, 0.5 + 0.5j, 0.5 - 0.5j]
 
 
 def test_stopband_attenuation_an_octave_beyond_the_cutoff() -> None:
@@ -548,6 +555,15 @@ def test_frequencies_reach_well_below_the_cutoff() -> None:
         grid = response.frequency_grid(filter_facts)
         assert grid[0] < 0.01
         assert grid[-1] == 50.0
+
+
+def test_measures_are_taken_everywhere_and_at_every_edge() -> None:
+    """A peak of the stop band between its edge and Nyquist counts, and so does an edge between two even steps."""
+    filter_facts = facts(kind="bandpass", cutoff=(8.0123, 12.0456), stopband_edge=(4.0789, 44.0321))
+    grid = response.measurement_grid(filter_facts)
+    assert (grid[0], grid[-1]) == (0.0, 50.0)
+    assert np.diff(grid).max() <= 50 / 4000 * (1 + 1e-9)
+    assert {8.0123, 12.0456, 4.0789, 44.0321} <= set(grid.tolist())
 
 
 # the page
@@ -765,6 +781,13 @@ def test_evidence_refuses(changes: dict[str, Any], message: str) -> None:
         evidence(**changes)
 
 
+@pytest.mark.parametrize("shape", [(1,), (1, 1), (2, 1), (1, 2)])
+def test_evidence_may_be_as_little_as_one_sample(shape: tuple[int, ...]) -> None:
+    arrays = dict.fromkeys(("golden", "truth", "hardware", "unfiltered"), np.ones(shape))
+    one = evidence(**arrays, time=np.zeros(shape[0]), reading=np.ones(shape, dtype=bool), samples=math.prod(shape))
+    assert one.error.tolist() == np.zeros(shape).tolist()
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
@@ -808,6 +831,18 @@ def test_examples_in_docstrings(module: Any) -> None:
 )
 def test_quantities(value: float | None, unit: str, words: str) -> None:
     assert quantity.quantity(value, unit) == words
+
+
+def test_the_worst_channel_has_the_largest_error_of_either_sign() -> None:
+    golden = np.zeros((4, 3))
+    hardware = golden.copy()
+    hardware[2, 1] = 2 * LSB
+    arrays = {"golden": golden, "time": np.arange(4) / 100, "truth": None, "reading": None, "unfiltered": None}
+    several = evidence(**arrays, hardware=hardware, channels=3, samples=12)
+    assert several.worst_channel == 1
+    hardware[0, 2] = -3 * LSB
+    assert several.worst_channel == 2
+    assert several.of_channel(1).worst_channel == 0
 
 
 def test_several_channels_are_measured_together_and_the_worst_is_shown() -> None:

@@ -5,7 +5,15 @@ from fractions import Fraction
 import pytest
 from flint import arb, ctx
 
-from sosmith.model.arithmetic.correct_rounding import UndecidedError, ball, ceiling, evaluate, nearest_double, sign
+from sosmith.model.arithmetic.correct_rounding import (
+    UndecidedError,
+    ball,
+    ceiling,
+    evaluate,
+    nearest_double,
+    nearest_multiple,
+    sign,
+)
 
 ULP = Fraction(1, 2**52)
 
@@ -26,6 +34,13 @@ def test_the_nearest_double(value: Fraction, expected: float) -> None:
     assert evaluate(lambda: nearest_double(ball(value))) == expected
 
 
+@pytest.mark.parametrize(("frac", "expected"), [(0, 3), (1, Fraction(7, 2)), (3, Fraction(27, 8))])
+def test_the_nearest_multiple(frac: int, expected: Fraction) -> None:
+    value = Fraction(17, 5)
+    assert evaluate(lambda: nearest_multiple(ball(value), frac)) == expected
+    assert evaluate(lambda: nearest_multiple(ball(-value), frac)) == -expected
+
+
 def test_zero_has_no_sign() -> None:
     assert str(evaluate(lambda: nearest_double(-(arb(2).sqrt() ** 2 - 2)))) == "0.0"
 
@@ -42,10 +57,14 @@ def test_a_ball_across_a_tie_asks_for_more_bits() -> None:
 
 
 def test_what_stays_open_counts_as_equal() -> None:
+    bits = []
+
     def tie() -> float:
+        bits.append(ctx.prec)
         return nearest_double(1 + arb(2) ** -53 + (arb(2).sqrt() ** 2 - 2))
 
     assert evaluate(tie) == 1.0
+    assert bits == [192, 384, 768, 1536, 3072, 6144]
     assert evaluate(lambda: sign(arb(2).sqrt() ** 2 - 2)) == 0
     assert evaluate(lambda: ceiling(arb(2).sqrt() ** 2)) == 2
 

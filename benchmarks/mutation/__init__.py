@@ -1,0 +1,1 @@
+"""Mutation testing: finds operators, numbers and comparisons of the code that no test depends on."""

@@ -1,0 +1,136 @@
+"""The rooms that are mutated, and the tests that belong to each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Room:
+    """Files that are mutated together.
+
+    Attributes
+    ----------
+    files : tuple of str
+        Patterns from the root of the checkout.
+    tests : tuple of str
+        Folders, files and single tests, from the root; slow ones in them are left out.
+    without : tuple of str
+        Tests that are left out, by the beginning of their identifiers: they repeat on many cases what others do on few,
+        or look at something else.
+    whole_messages : tuple of str
+        Files that do nothing but word messages; they are not mutated.
+    """
+
+    files: tuple[str, ...]
+    tests: tuple[str, ...]
+    without: tuple[str, ...] = ()
+    whole_messages: tuple[str, ...] = ()
+
+    def paths(self, root: Path) -> list[str]:
+        """List the files, sorted, relative to `root`."""
+        found = {path.relative_to(root).as_posix() for pattern in self.files for path in root.glob(pattern)}
+        return sorted(name for name in found if not name.endswith("__init__.py"))
+
+    def mutated(self, root: Path) -> list[str]:
+        """List the files of `paths` that are mutated."""
+        return [name for name in self.paths(root) if name not in self.whole_messages]
+
+    def entries(self, root: Path) -> list[str]:
+        """List the files of tests below the folders of `tests`, and what else stands there, in order."""
+        found: list[str] = []
+        for name in self.tests:
+            files = sorted((root / name).rglob("test_*.py")) if (root / name).is_dir() else []
+            found += [path.relative_to(root).as_posix() for path in files] or [name]
+        return found
+
+    def test_files(self, root: Path) -> list[str]:
+        """List the files of the tests, sorted."""
+        return sorted({name.partition("::")[0] for name in self.entries(root)})
+
+
+_CERTIFICATE = "tests/gen/verifier/test_certificate.py::"
+_PROGRAM = "tests/gen/verifier/program/test_check.py::"
+_SPECIFIED = "tests/gen/verifier/specified/"
+_REPORT = "tests/gen/report/test_report.py::"
+
+ROOMS = {
+    "proof": Room(
+        files=("gen/proof/*.py",),
+        tests=(
+            "tests/gen/proof",
+            f"{_CERTIFICATE}test_a_range_too_narrow_for_what_is_possible",
+        ),
+        without=(
+            "tests/gen/proof/test_limit_cycles.py::test_error_feedback",
+            "tests/gen/proof/test_limit_cycles.py::test_plain",
+            "tests/gen/proof/test_limit_cycles.py::test_exhaustive_search_stays_within_the_bound",
+            "tests/gen/proof/test_limit_cycles.py::test_the_manifest",
+            "tests/gen/proof/test_limit_cycles.py::test_design_shows",
+        ),
+    ),
+    "verifier": Room(
+        files=("gen/verifier/**/*.py",),
+        tests=("tests/gen/verifier",),
+        without=(
+            f"{_CERTIFICATE}test_examples_in_every_realization[audio",
+            f"{_CERTIFICATE}test_one_unit_off",
+            f"{_CERTIFICATE}test_designs",
+            f"{_CERTIFICATE}test_the_command",
+            f"{_CERTIFICATE}test_verification_has_nothing_in_common",
+            f"{_PROGRAM}test_examples",
+            f"{_PROGRAM}test_every_realization[instrument",
+            f"{_PROGRAM}test_a_hundred_edits",
+            f"{_PROGRAM}test_channels_have_one_program",
+            f"{_SPECIFIED}test_filter_distance.py::test_the_generators_filter",
+            f"{_SPECIFIED}test_filter_distance.py::test_every_word_counts",
+        ),
+        whole_messages=("gen/verifier/program/fault.py",),
+    ),
+    "arithmetic": Room(
+        files=("model/arithmetic/*.py",),
+        tests=("tests/model/arithmetic",),
+    ),
+    "hdl": Room(
+        files=("hdl/*.py",),
+        tests=("tests/hdl",),
+        without=(
+            "tests/hdl/test_stage.py::test_stages_equal_their_graphs[flange_wear_locomotive",
+            "tests/hdl/test_stage.py::test_stages_equal_their_graphs[audio",
+            "tests/hdl/test_reload.py::test_a_broken_port_is_noticed",
+        ),
+    ),
+    "verdict": Room(
+        files=(
+            "gen/report/report.py",
+            "gen/report/evidence.py",
+            "gen/filter/response.py",
+            "model/reference/accuracy.py",
+        ),
+        tests=("tests/gen/report/test_report.py", "tests/model/reference/test_accuracy.py"),
+        without=tuple(
+            _REPORT + name
+            for name in (
+                "test_a_delay_beyond",
+                "test_a_handful",
+                "test_a_limit_far",
+                "test_a_page",
+                "test_close_up",
+                "test_every_colour",
+                "test_file_holds",
+                "test_many_formats",
+                "test_page",
+                "test_references",
+                "test_same_evidence",
+                "test_summary_has_the_keys",
+                "test_texts",
+                "test_thinning",
+                "test_this_design",
+            )
+        ),
+    ),
+}
+"""Rooms by name. `verdict` holds what decides whether a report says that a run has passed."""
