@@ -17,7 +17,7 @@ from benchmarks.mutation.bench import ALLOWANCE, SLOW, SLOWER, Bench
 from benchmarks.mutation.campaign import GOAL, Progress, room_record, share, try_room
 from benchmarks.mutation.exempt import RULES
 from benchmarks.mutation.mutants import population, sample
-from benchmarks.mutation.record import heads, markdown, survivors, table
+from benchmarks.mutation.record import RECORD, heads, markdown, survivors, table
 from benchmarks.mutation.results import Cache, equivalents, stale
 from benchmarks.mutation.rooms import ROOMS, ROOT
 from rich.console import Console
@@ -25,7 +25,6 @@ from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsed
 from rich.progress import Progress as Bars
 from rich.table import Table
 
-RECORD = Path(__file__).with_name("record.json")
 EQUIVALENT = Path(__file__).with_name("equivalent.toml")
 SAMPLE = 52
 

@@ -5,11 +5,14 @@ from __future__ import annotations
 import json
 from collections import Counter
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 from benchmarks.mutation.campaign import share
 from benchmarks.mutation.exempt import RULES
 from benchmarks.mutation.rooms import ROOMS
+
+RECORD = Path(__file__).with_name("record.json")
 
 COUNTED = ("mutants", "sites", "sampled", "killed", "timed_out", "survived", "equivalent")
 

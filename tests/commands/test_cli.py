@@ -694,7 +694,7 @@ def test_a_full_disk_is_one_sentence(process: Start, tmp_path: Path) -> None:
 def test_tools_that_are_missing(sosmith: Command, monkeypatch: pytest.MonkeyPatch) -> None:
     (Path("empty")).mkdir()
     monkeypatch.setenv("PATH", str(Path("empty").resolve()))
-    for simulator, tool, package in (("verilator", "make", "make"), ("icarus", "iverilog", "iverilog")):
+    for simulator, tool, package in (("verilator", "g++", "g++"), ("icarus", "iverilog", "iverilog")):
         outcome = sosmith("simulate", "plain.toml", "--simulator", simulator)
         assert (outcome.status, outcome.stdout) == (3, "")
         message = f"{tool} is needed for co-simulation, and was not found: apt-get install {package}"

@@ -1,14 +1,23 @@
 """docs/assurance.md: its figures are those that the commands recorded, and none of them is a silent upset."""
 
 import json
+import re
 
 from benchmarks import upsets
+from benchmarks.mutation.record import RECORD as MUTATION
+from benchmarks.mutation.record import markdown
 
 RECORD = json.loads(upsets.RECORD.read_text(encoding="utf-8"))
 
 
 def test_the_upsets_are_those_of_the_record() -> None:
     assert upsets.TABLE.findall(upsets.DOCUMENT.read_text(encoding="utf-8")) == [upsets.table(RECORD)]
+
+
+def test_the_mutations_are_those_of_the_record() -> None:
+    text = upsets.DOCUMENT.read_text(encoding="utf-8")
+    shown = re.findall(r"(?<=<!-- mutation -->\n).*?(?=<!-- end of mutation -->)", text, re.DOTALL)
+    assert shown == [markdown(json.loads(MUTATION.read_text(encoding="utf-8")))]
 
 
 def test_every_core_was_hit_in_every_kind_of_place() -> None:
