@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -44,9 +45,10 @@ class Beats:
 
     def save(self, path: Path) -> None:
         """Write to a file."""
-        with path.open("wb") as file:
-            for column in (self.tdest, self.tdata, self.tuser):
-                np.save(file, column)
+        content = io.BytesIO()
+        for column in (self.tdest, self.tdata, self.tuser):
+            np.save(content, column)
+        path.write_bytes(content.getvalue())
 
     @staticmethod
     def load(path: Path) -> Beats:

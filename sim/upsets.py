@@ -64,9 +64,11 @@ class Hit(NamedTuple):
     element, bit : int
         Its word, and the bit of it.
     other : int
-        Another bit of the same word that is hit at the same time; -1 for none.
+        Another bit of the same word that is hit; -1 for none.
     clock : int
         Clock since the reset; -1 for never.
+    later : int
+        Clocks from then until the other bit is hit.
     """
 
     place: Place
@@ -74,6 +76,7 @@ class Hit(NamedTuple):
     bit: int
     other: int
     clock: int
+    later: int = 0
 
 
 class Upset(NamedTuple):
@@ -172,15 +175,19 @@ class Target:
         """
         chance = random.Random(seed)
         weights = [place.depth * place.width for place in places]
-        hits = []
+        hits: list[Hit] = []
         for place in chance.choices(places, weights, k=runs):
             bits = chance.sample(range(place.width), 2 if double and place.width > 1 else 1)
             element, clock = chance.randrange(place.depth), chance.randrange(self.clocks)
             hits.append(Hit(place, element, bits[0], bits[1] if bits[1:] else -1, clock))
+        return self.hit(hits, progress)
+
+    def hit(self, hits: Sequence[Hit], progress: Callable[[int, int], None] = lambda done, total: None) -> list[Upset]:
+        """Run the core once for each hit; progress and errors as in `run`."""
         found: list[Upset] = []
         for hit, line in zip(hits, self.lines(hits), strict=True):
             found.append(self._judged(hit, line))
-            progress(len(found), runs)
+            progress(len(found), len(hits))
         return found
 
     def lines(self, hits: Sequence[Hit], *, full: bool = False) -> Iterator[str]:

@@ -2,8 +2,8 @@
 // turned over, or with two bits of one word, and prints what came out.
 //
 //   core places                       a line for each memory and register: depth, width, name; then the clocks of a run
-//   core runs SAMPLES FLIPS [full]    a line for each line of FLIPS, "place element bit other clock"; other bit -1:
-//                                     one only; clock -1: none
+//   core runs SAMPLES FLIPS [full]    a line for each line of FLIPS, "place element bit other clock later": the other
+//                                     bit, if it is not -1, is hit `later` clocks after; clock -1: no flip
 //
 // A line of SAMPLES is "tdest tdata" in hexadecimal. A line of the outcome is the number of beats, whether a word with
 // a wrong bit was read, and the first beat that differs from the run without a flip, the first one with the flag
@@ -41,7 +41,7 @@ struct Beat {
 };
 
 struct Flip {
-    long place, element, bit, other, clock;
+    long place, element, bit, other, clock, later;
 };
 
 struct Run {
@@ -111,7 +111,9 @@ Run run(const std::vector<Beat>& samples, const Flip& flip, long most) {
     for (; out.beats.size() < samples.size() && out.clocks < most; ++out.clocks) {
         if (out.clocks == flip.clock) {
             turn(places[flip.place], flip.element, int(flip.bit));
-            if (flip.other >= 0) turn(places[flip.place], flip.element, int(flip.other));
+        }
+        if (flip.other >= 0 && out.clocks == flip.clock + flip.later) {
+            turn(places[flip.place], flip.element, int(flip.other));
         }
         const uint32_t chance = next(pace);
         if (!offered && sent < samples.size() && (chance & 3)) offered = true;
@@ -164,11 +166,11 @@ int main(int argc, char** argv) {
     }
     if (command != "runs" || argc < 4) return 2;
     const std::vector<Beat> samples = samples_in(argv[2]);
-    const Run whole = run(samples, {0, 0, 0, -1, -1}, 1L << 40);
+    const Run whole = run(samples, {0, 0, 0, -1, -1, 0}, 1L << 40);
     std::printf("%ld\n", whole.clocks);
     std::ifstream flips(argv[3]);
     Flip flip;
-    while (flips >> flip.place >> flip.element >> flip.bit >> flip.other >> flip.clock) {
+    while (flips >> flip.place >> flip.element >> flip.bit >> flip.other >> flip.clock >> flip.later) {
         const Run out = run(samples, flip, 4 * whole.clocks + 100000);
         long wrong = -1, flagged = -1, silent = -1;
         for (size_t k = 0; k < out.beats.size(); ++k) {

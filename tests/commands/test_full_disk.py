@@ -117,7 +117,7 @@ def test_a_command_on_a_full_disk(
     assert disk.files() == before
 
 
-@pytest.mark.parametrize("name", ["words.txt", "report.json"])
+@pytest.mark.parametrize("name", ["sent.npy", "report.json"])
 def test_a_disk_that_becomes_full_during_a_simulation(
     name: str, disk: Disk, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

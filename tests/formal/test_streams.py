@@ -217,7 +217,7 @@ def test_a_broken_buffer_is_found_out(right: str, wrong: str, tmp_path: Path) ->
     ("right", "wrong"),
     [
         ("component.advance.eq(advance)", "component.advance.eq(1)"),  # the pipeline moves into a full buffer
-        ("component.i_valid.eq(valid)", "component.i_valid.eq(1)"),  # samples out of nothing
+        ("component.i_valid.eq(place.valid)", "component.i_valid.eq(1)"),  # samples out of nothing
         ("self.s_axis_tready.eq(advance)", "self.s_axis_tready.eq(1)"),  # samples taken and dropped
     ],
 )
@@ -231,7 +231,7 @@ def test_a_broken_core_is_found_out(right: str, wrong: str, tmp_path: Path) -> N
     [
         ("self.s_axis_tready.eq(taken | dropped)", "self.s_axis_tready.eq(1)"),  # taken while at work
         ("busy.eq(1)", "busy.eq(0)"),  # the next one begun before the result is taken
-        ("present.valid & ~following.valid", "present.valid"),  # handed out before it is complete
+        ("pipeline[-2].valid & ~pipeline[-3].valid", "pipeline[-2].valid"),  # handed out before it is complete
     ],
 )
 def test_a_broken_folded_core_is_found_out(right: str, wrong: str, serial: bool, tmp_path: Path) -> None:

@@ -148,6 +148,20 @@ def test_two_wrong_bits_of_a_word_are_not_silent_where_one_is_corrected(built: B
         assert counts["detected"] > 60
 
 
+def test_the_scrubber_mends_the_first_of_two_bits_before_the_second(built: Built) -> None:
+    """A small core scrubs all its words within 16 samples, even those that no sample reads."""
+    if built.case == FAST[0]:
+        (words,) = (place for place in built.target.memories if place.name.endswith("words0"))
+        starts = range(100, built.target.clocks - 700, 29)
+
+        def fates(later: int) -> set[Fate]:
+            hits = [Hit(words, word, 3, 5, clock, later) for word in range(words.depth) for clock in starts]
+            return {upset.fate for upset in built.target.hit(hits)}
+
+        assert fates(600) <= {Fate.CORRECTED, Fate.MASKED}
+        assert Fate.DETECTED in fates(1)
+
+
 def test_no_upset_in_a_state_of_one_channel_is_silent(built: Built) -> None:
     states = built.target.states
     assert bool(states) == (built.case.architecture == "parallel" and (built.case.channels == 1 or built.case.reload))
