@@ -13,7 +13,6 @@ from sosmith.sim.simulation import simulate
 FOLDABLE = ("df1", "df1_ef1", "df1_ef2", "df2t", "delta", "state_space")
 FAST = {
     ("audio_lowpass", "folded", "df1_ef2", "verilator"),
-    ("flange_wear_locomotive", "serial", "df1_ef2", "verilator"),
     ("flange_wear_bench", "folded", "state_space", "icarus"),
     ("flange_wear_bench", "serial", "delta", "icarus"),
 }

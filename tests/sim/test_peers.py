@@ -20,6 +20,7 @@ from sosmith.gen.output.verilog import to_rtlil, to_verilog
 from sosmith.gen.realizations.registry import REALIZATIONS
 from sosmith.gen.specification.specification import load
 from sosmith.hdl.axi_stream import fields
+from sosmith.hdl.check_bits import CheckBits
 from sosmith.hdl.folded import FoldedCore
 
 UNFOLDABLE = {"normal", "lattice_wdf"}
@@ -141,9 +142,11 @@ def run_some(folder: Path, source: str, name: str, sent: list[list[int]], wanted
 class OneMemory(FoldedCore):
     """A core whose channels all have the same words."""
 
-    def _memory(self, m: Module, read: tuple[Value, Value], write: tuple[Value, Value, Value]) -> Value:
+    def _memory(
+        self, m: Module, check: CheckBits, read: tuple[Value, Value], write: tuple[Value, Value, Value]
+    ) -> Value:
         bits = (self.program.words - 1).bit_length()
-        return super()._memory(m, (read[0][:bits], read[1]), (write[0][:bits], *write[1:]))
+        return super()._memory(m, check, (read[0][:bits], read[1]), (write[0][:bits], *write[1:]))
 
 
 def test_a_mixed_up_channel_is_noticed(tmp_path: Path) -> None:

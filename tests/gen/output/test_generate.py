@@ -20,7 +20,9 @@ from sosmith.model.errors import SpecificationError
 from sosmith.model.text_files import write_files
 
 
-@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] if "locomotive" in name else []) for name in ALL]
+)
 def test_two_runs_write_the_same_bytes(name: str, tmp_path: Path) -> None:
     """The second run is another process with another hash seed."""
     design = example_design(name)

@@ -101,7 +101,7 @@ BREAKS = {
     "a stall": (
         r"assign take1 = advance & valid1;",
         "assign take1 = valid1;",
-        r"section\d\.\w+ must keep what it holds while its sample stays",
+        r"(section\d\.\w+ must be node .*, but )?section\d\.\w+ must keep what it holds while its sample stays",
     ),
     "a reset": (
         r"if \(rst\) valid2 <= 1'h0;",
