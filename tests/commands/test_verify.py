@@ -12,7 +12,8 @@ from typing import Any
 import pytest
 from tests.commands.invocation import Invocation
 from tests.gen.designs import EXAMPLES, example_design
-from tests.gen.verifier.parallel.cores import PLAIN, specified
+from tests.gen.verifier.parallel.cores import specified
+from tests.gen.verifier.small_specifications import PLAIN
 
 from sosmith.gen.core import design_core
 from sosmith.gen.output.generate import generate

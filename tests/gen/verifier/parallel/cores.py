@@ -9,6 +9,8 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
+from tests.gen.verifier.small_specifications import PLAIN
+
 from sosmith.gen.architecture import Architecture
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.output.certificate import certificate
@@ -17,22 +19,6 @@ from sosmith.gen.specification.specification import Specification, from_tree
 from sosmith.gen.verifier.certificate_file import Certificate, certificate_text
 from sosmith.gen.verifier.parallel.check import HardwareVerdict, check_hardware
 
-INSTRUMENT = """
-name = "smooth"
-sample_rate = 100.0
-input.voltage = { bits = 12, range = [0.0, 10.0] }
-input.temperature = { bits = 10, range = [0.0, 128.0] }
-calibration.coefficients = [[1.16, -0.0036], [0.3672, 0.0006618], [0.05812]]
-filter = { family = "butterworth", kind = "lowpass", order = 3, cutoff = 10.0 }
-output = { bits = 12, range = [0.0, 16.0], unit = "mm", max_error = 0.01 }
-"""
-PLAIN = """
-name = "plain"
-sample_rate = 100.0
-input.x = { bits = 8, signed = true, range = [-1.0, 1.0] }
-filter = { family = "butterworth", kind = "lowpass", order = 2, cutoff = 20.0 }
-output = { bits = 8, signed = true, range = [-1.0, 1.0], unit = "", max_error = "faithful" }
-"""
 ODD = PLAIN.replace("order = 2", "order = 3")
 
 

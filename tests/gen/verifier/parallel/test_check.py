@@ -5,9 +5,10 @@ from collections import Counter
 
 import pytest
 from tests.gen.designs import ALL, parallel_design
-from tests.gen.verifier.parallel.cores import INSTRUMENT, ODD, PLAIN, Made, made, small
+from tests.gen.verifier.parallel.cores import ODD, Made, made, small
 from tests.gen.verifier.parallel.edits import random_edits
 from tests.gen.verifier.parallel.simulated import outputs
+from tests.gen.verifier.small_specifications import INSTRUMENT, PLAIN
 
 from sosmith.gen.realizations.registry import REALIZATIONS
 from sosmith.gen.verifier.graph import RejectedError

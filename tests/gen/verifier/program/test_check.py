@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from tests.gen.designs import ALL, EXAMPLES
+from tests.gen.verifier.small_specifications import INSTRUMENT, PLAIN
 
 from sosmith.gen.architecture import Architecture
 from sosmith.gen.core import CoreDesign, design_core
@@ -29,23 +30,6 @@ from sosmith.model.dataflow.program import Instruction, Opcode, Program
 
 FOLDABLE = ("df1", "df1_ef1", "df1_ef2", "df2t", "delta", "state_space")
 LOCOMOTIVE = "flange_wear_locomotive.toml"
-
-INSTRUMENT = """
-name = "smooth"
-sample_rate = 100.0
-input.voltage = { bits = 12, range = [0.0, 10.0] }
-input.temperature = { bits = 10, range = [0.0, 128.0] }
-calibration.coefficients = [[1.16, -0.0036], [0.3672, 0.0006618], [0.05812]]
-filter = { family = "butterworth", kind = "lowpass", order = 3, cutoff = 10.0 }
-output = { bits = 12, range = [0.0, 16.0], unit = "mm", max_error = 0.01 }
-"""
-PLAIN = """
-name = "plain"
-sample_rate = 100.0
-input.x = { bits = 8, signed = true, range = [-1.0, 1.0] }
-filter = { family = "butterworth", kind = "lowpass", order = 2, cutoff = 20.0 }
-output = { bits = 8, signed = true, range = [-1.0, 1.0], unit = "", max_error = "faithful" }
-"""
 
 
 class Made(NamedTuple):
