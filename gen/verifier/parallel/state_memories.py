@@ -15,20 +15,17 @@ it is 0 once the states are cleared, and takes over the code of the node's opera
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from sosmith.gen.verifier.graph import RejectedError, require
 from sosmith.gen.verifier.parallel.control import Case, Control, Entrance, cases
 from sosmith.gen.verifier.parallel.evaluation import Evaluation
 from sosmith.gen.verifier.parallel.graph_codes import GraphCodes
 from sosmith.gen.verifier.parallel.netlist import Memory, Netlist
-from sosmith.gen.verifier.parallel.text import Choice, Expression, Load, Word
+from sosmith.gen.verifier.parallel.text import Choice, Expression, Load, Statement, Word
 from sosmith.gen.verifier.program.normal_form import Form, constant
-
-if TYPE_CHECKING:
-    from sosmith.gen.verifier.parallel.pipeline import Pipeline
 
 _NOWHERE = -2
 """A position before all samples."""
@@ -50,12 +47,25 @@ class State:
     behind: int
 
 
+class Registers(Protocol):
+    """What the registers of the core hold, as `Pipeline` finds it; its methods say what they return."""
+
+    channel: Form
+
+    def at(self, position: int, case: Case) -> Evaluation: ...
+    def in_front(self, known: Mapping[str, Form], opened: str) -> Evaluation: ...
+    def held(self, name: str) -> Form: ...
+    def behind(self, name: str) -> int | None: ...
+    def same(self, a: Form, b: Form, width: int) -> bool: ...
+    def position_by_control(self, name: str, statements: Sequence[Statement]) -> int: ...
+
+
 class StateMemories:
     """The memories of a core with several channels that have the names of DELAY nodes.
 
     Parameters
     ----------
-    pipeline : Pipeline
+    registers : Registers
         What the registers hold.
     netlist : Netlist
     control : Control
@@ -65,15 +75,15 @@ class StateMemories:
     """
 
     def __init__(
-        self, pipeline: Pipeline, netlist: Netlist, control: Control, entrance: Entrance, graph: GraphCodes
+        self, registers: Registers, netlist: Netlist, control: Control, entrance: Entrance, graph: GraphCodes
     ) -> None:
-        self._pipeline, self._netlist, self._graph = pipeline, netlist, graph
+        self._registers, self._netlist, self._graph = registers, netlist, graph
         self._control, self._entrance = control, entrance
         self.states: dict[str, State] = {}
         for node in graph.delays:
             name = f"{graph.nodes[node].stage}.{graph.nodes[node].name}_memory"
             if name in netlist.memories:
-                behind = pipeline.position_by_control(name, netlist.memories[name].statements)
+                behind = registers.position_by_control(name, netlist.memories[name].statements)
                 self.states[name] = State(node, behind)
         self._apart: int | None = None
 
@@ -97,7 +107,7 @@ class StateMemories:
         state = self.states[name]
         node = self._graph.nodes[state.node]
         require(
-            self._pipeline.same(address, self._pipeline.channel, 64),
+            self._registers.same(address, self._registers.channel, 64),
             f"{name} must hold {node.label} and be read for the channel of the sample, not for another one",
         )
         ahead = state.behind - position
@@ -127,9 +137,11 @@ class StateMemories:
         """Check that the word of one channel becomes 0 at each clock while states are cleared."""
         address = _address(memory)
         for logic, loaded in self._written(memory, _NOWHERE, {self._entrance.clearing: 1}):
-            require(loaded is not None and self._pipeline.same(loaded, {}, memory.width), f"{what} and be cleared to 0")
             require(
-                self._pipeline.same(logic.word(address), logic.net(self._entrance.word), self._netlist.width(address)),
+                loaded is not None and self._registers.same(loaded, {}, memory.width), f"{what} and be cleared to 0"
+            )
+            require(
+                self._registers.same(logic.word(address), logic.net(self._entrance.word), self._netlist.width(address)),
                 f"{what} and be cleared for one channel after the other",
             )
 
@@ -142,11 +154,11 @@ class StateMemories:
             if loaded is None:
                 raise RejectedError(f"{what}, which is written when a sample leaves position {state.behind}")
             require(
-                self._pipeline.same(logic.word(address), self._pipeline.channel, self._netlist.width(address)),
+                self._registers.same(logic.word(address), self._registers.channel, self._netlist.width(address)),
                 f"{what} and be written for the channel of the sample",
             )
             require(
-                self._pipeline.same(loaded, self._graph.codes[source], memory.width),
+                self._registers.same(loaded, self._graph.codes[source], memory.width),
                 f"{what} and take over {self._graph.nodes[source].label}, not another value",
             )
         for case in ({clearing: 0, full: 1}, {clearing: 0, full: 0, valid: 0}):
@@ -157,7 +169,7 @@ class StateMemories:
         """Return the logic and what is written, in each case that is left; None where nothing is."""
 
         def evaluate(case: Case) -> tuple[Evaluation, Form | None]:
-            logic = self._pipeline.at(position, case)
+            logic = self._registers.at(position, case)
             loaded = logic.loaded(memory.statements)
             return logic, None if loaded is None else loaded[1]
 
@@ -165,20 +177,20 @@ class StateMemories:
 
     def _positions_without_the_channel(self) -> int:
         """Return how many first positions hold no sample of the channel of one that enters."""
-        enters, channel = self._control.valid[0], self._pipeline.channel
+        enters, channel = self._control.valid[0], self._registers.channel
         for count, near in enumerate(self._entrance.near):
             repeated = f"near_channel{count}"
             require(repeated in self._netlist.registers, f"{near} must come with a register {repeated}")
             width = self._netlist.widths[repeated]
-            here = self._pipeline.behind(repeated) == count
+            here = self._registers.behind(repeated) == count
             require(
-                here and self._pipeline.same(self._pipeline.held(repeated), channel, width),
+                here and self._registers.same(self._registers.held(repeated), channel, width),
                 f"{repeated} must hold the channel of the sample at position {count + 1}",
             )
             met: Mapping[str, Form] = {
                 self._entrance.buffer.held: constant(1), near: constant(1), repeated: channel
             }  # fmt: skip
-            if self._pipeline.in_front(met, enters).net(enters):
+            if self._registers.in_front(met, enters).net(enters):
                 return count
         return len(self._entrance.near)
 
