@@ -270,7 +270,7 @@ def _limit_cycles_table(evidence: Evidence) -> Table:
                 "" if found.none else _lsb(found.largest / evidence.lsb),
                 amount(found.dead_band, evidence.unit) if found.dead_band else "none",
                 _lsb(found.dead_band / evidence.lsb) if found.dead_band else "",
-                ", ".join(weights) or "none exist",
+                ", ".join(weights) or "not needed",
             )
         )
     head = ("section", "without input, at most", "", "dead band", "", "Lyapunov weights")

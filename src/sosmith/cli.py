@@ -18,7 +18,7 @@ import click
 import sosmith
 from sosmith.model.errors import SosmithError, ToolError
 from sosmith.model.suggestion import did_you_mean
-from sosmith.terminal import note, reader_may_leave, silence_stdout
+from sosmith.terminal import be_quiet, note, reader_may_leave, silence_stdout
 
 
 class _Command(NamedTuple):
@@ -34,7 +34,7 @@ _COMMANDS = {
     "design": _Command(
         "design",
         "design_command",
-        "Show the design of SPEC: order, sections, realization, formats, error budget and cost.",
+        "Show the design of SPEC: order, realization, architecture, cost and error budget.",
     ),
     "generate": _Command(
         "design",
@@ -99,6 +99,7 @@ class _Commands(click.Group):
         if cmd_name in _COMMANDS:
             place = _COMMANDS[cmd_name]
             command: click.Command = getattr(import_module(f"sosmith.commands.{place.module}"), place.attribute)
+            _let_be_quiet(command)
             return command
         if ctx.resilient_parsing:  # during shell completion
             return None
@@ -113,6 +114,27 @@ class _Commands(click.Group):
     def invoke(self, ctx: click.Context) -> Any:
         with reader_may_leave():
             return super().invoke(ctx)
+
+
+def _let_be_quiet(command: click.Command) -> None:
+    """Give a command, and those of a group, the option ``-q``."""
+    if isinstance(command, click.Group):
+        for one in command.commands.values():
+            _let_be_quiet(one)
+    elif all(parameter.name != "quiet" for parameter in command.params):
+
+        def told(_context: click.Context, _option: click.Parameter, quiet: bool) -> None:
+            be_quiet(quiet)
+
+        command.params.append(
+            click.Option(
+                ["-q", "--quiet"],
+                is_flag=True,
+                expose_value=False,
+                callback=told,
+                help="Show no progress.",
+            )
+        )
 
 
 _HELP = """Turn a filter specification and calibration data into FPGA hardware that is checked bit for bit.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -13,7 +14,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 if TYPE_CHECKING:
-    from rich.progress import Progress
+    from rich.progress import Progress, TaskID
+
+_quiet = False
 
 JSON_OPTION = click.option("--json", "as_json", is_flag=True, help="Print JSON instead of tables.")
 
@@ -39,35 +42,68 @@ def silence_stdout() -> None:
 
 
 class Step:
-    """Progress display on stderr; each call names the current step and can say how much of it is done."""
+    """Progress on stderr: each call names the current step and can say how much of it is done."""
 
-    def __init__(self, progress: Progress) -> None:
-        self._progress = progress
-        self._task = progress.add_task("", total=None)
+    def __call__(self, name: str, done: int = 0, total: int = 0) -> None:
+        """Show the step; this one shows nothing."""
+
+
+class _LogStep(Step):
+    """One line a step, when it begins: what a log file or a CI page is to show."""
+
+    def __init__(self) -> None:
+        self._began = time.monotonic()
         self._name = ""
 
     def __call__(self, name: str, done: int = 0, total: int = 0) -> None:
         if name != self._name:
-            self._finish()
+            self._name = name
+            minutes, seconds = divmod(int(time.monotonic() - self._began), 60)
+            click.echo(f"[{minutes}:{seconds:02}] {_shown(name)}", err=True)
+
+
+class _BarStep(Step):
+    """A bar for each step, on a terminal."""
+
+    def __init__(self, progress: Progress) -> None:
+        self._progress = progress
+        self._task: TaskID | None = None
+        self._name = ""
+
+    def __call__(self, name: str, done: int = 0, total: int = 0) -> None:
+        if name != self._name:
+            self.finish()
             self._name = name
             self._task = self._progress.add_task(name, total=None)
-        if total:
+        if total and self._task is not None:
             self._progress.update(self._task, completed=done, total=total)
 
-    def _finish(self) -> None:
-        if self._name:
+    def finish(self) -> None:
+        """Mark the current step as done."""
+        if self._task is not None:
             self._progress.update(self._task, total=1, completed=1)
-        else:
+
+    def drop(self) -> None:
+        """Remove the current step, which has failed: the error says more than a bar that stands still."""
+        if self._task is not None:
             self._progress.remove_task(self._task)
 
-    def close(self) -> None:
-        """Mark the last step as done."""
-        self._finish()
+
+def be_quiet(quiet: bool) -> None:
+    """Show no progress from now on, or show it again."""
+    global _quiet  # noqa: PLW0603
+    _quiet = quiet
 
 
 @contextmanager
 def show_progress() -> Iterator[Step]:
-    """Show on stderr the progress of the steps inside the context."""
+    """Show on stderr the progress of the steps inside the context: bars on a terminal, else one line a step."""
+    if _quiet:
+        yield Step()
+        return
+    if not sys.stderr.isatty():
+        yield _LogStep()
+        return
     # Imported only when something is shown: help and refusals start faster without rich.
     from rich.console import Console
     from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
@@ -80,15 +116,23 @@ def show_progress() -> Iterator[Step]:
         TimeElapsedColumn(),
     )
     with Progress(*columns, console=Console(stderr=True)) as progress:
-        step = Step(progress)
-        yield step
-        step.close()
+        step = _BarStep(progress)
+        try:
+            yield step
+        except BaseException:
+            step.drop()
+            raise
+        step.finish()
+
+
+def _shown(text: str) -> str:
+    """Escape what a terminal would not show: the text may come from a file."""
+    return "".join(c if c.isprintable() or c in "\n\t" else ascii(c)[1:-1] for c in text)
 
 
 def note(text: str) -> None:
-    """Print a message on stderr, with escapes for what a terminal would not show: the text may come from a file."""
-    shown = "".join(c if c.isprintable() or c in "\n\t" else ascii(c)[1:-1] for c in text)
-    click.echo(f"sosmith: {shown}", err=True)
+    """Print a message on stderr."""
+    click.echo(f"sosmith: {_shown(text)}", err=True)
 
 
 def print_json(tree: Any) -> None:

@@ -53,7 +53,7 @@ STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 HANGS = 1200
 """Seconds after which a process is taken to hang, on however busy a machine."""
 
-PROGRESS = re.compile(r" \d+:\d\d:\d\d$")  # the elapsed time at the end of every line of progress
+PROGRESS = re.compile(r"^\[\d+:\d\d\] ")  # the elapsed time at the beginning of every line of progress
 """Every line of progress has this bar."""
 
 
@@ -68,7 +68,7 @@ class Outcome:
     @property
     def messages(self) -> list[str]:
         """Lines of stderr that are not progress."""
-        return [line for line in self.stderr.splitlines() if line.strip() and not PROGRESS.search(line.rstrip())]
+        return [line for line in self.stderr.splitlines() if line.strip() and not PROGRESS.search(line)]
 
 
 Command = Callable[..., Outcome]
@@ -504,11 +504,61 @@ def test_init_writes_the_example_and_keeps_what_is_there(sosmith: Command) -> No
 def test_design_as_tables_and_as_json(sosmith: Command) -> None:
     outcome = sosmith("design", "demo.toml")
     assert (outcome.status, outcome.messages) == (0, [])
-    for phrase in ("demo: instrument", "Error budget", "Sections", "output rounding", "multipliers"):
+    for phrase in ("demo: instrument", "Error budget", "output rounding", "multipliers"):
         assert phrase in outcome.stdout
+    lines = outcome.stdout.splitlines()
+    assert len(lines) <= 30
+    assert all(line == line.rstrip() for line in lines)
+    detailed = sosmith("design", "demo.toml", "--details")
+    assert detailed.stdout.startswith(outcome.stdout)
+    for phrase in ("Sections", "Limit cycles", "Schedule"):
+        assert phrase not in outcome.stdout
+        assert phrase in detailed.stdout
     as_json = sosmith("design", "demo.toml", "--json", "--core", "calibration")
     assert json.loads(as_json.stdout)["core"] == "calibration"
     assert json.loads(as_json.stdout)["error_unit"] == "mm"
+
+
+def test_options_of_the_hardware_are_shown(sosmith: Command) -> None:
+    plain = sosmith("design", "plain.toml").stdout
+    asked = 'protect = "correct"\nreload = true\nrealization = "df1"\n'
+    Path("plain.toml").write_text(f"{FILTER}\n[hardware]\n{asked}", encoding="utf-8")
+    shown = " ".join(sosmith("design", "plain.toml").stdout.split())
+    for text in (
+        "coefficients are loaded at run time, over AXI4-Lite",
+        "a wrong bit in a memory is corrected, two are",
+    ):
+        assert text in shown
+        assert text not in " ".join(plain.split())
+
+
+def test_progress_is_one_line_a_step_in_a_log(sosmith: Command) -> None:
+    lines = sosmith("design", "plain.toml").stderr.splitlines()
+    assert len(lines) > 3
+    assert all(re.fullmatch(r"\[\d+:\d\d\] \w.*", line) for line in lines)
+    assert len({line.partition("] ")[2] for line in lines}) == len(lines)
+    for arguments in (("design", "plain.toml", "--quiet"), ("reload", "plain.toml", "plain.toml", "-q")):
+        assert "] " not in sosmith(*arguments).stderr
+
+
+def test_progress_on_a_terminal_ends_before_the_error(tmp_path: Path) -> None:
+    """The step that failed leaves no bar; those before it keep theirs."""
+    spec = tmp_path / "plain.toml"
+    spec.write_text(FILTER.replace('"faithful"', "0.00024414062500000001"), encoding="utf-8")
+    ours, theirs = os.openpty()
+    command = [sys.executable, "-m", "sosmith.cli", "design", str(spec)]
+    running = subprocess.Popen(command, stderr=theirs, stdout=subprocess.DEVNULL, env=os.environ | {"TERM": "xterm"})
+    os.close(theirs)
+    shown = b""
+    with contextlib.suppress(OSError):  # the end of a terminal
+        while block := os.read(ours, 4096):
+            shown += block
+    os.close(ours)
+    assert running.wait(HANGS) == 1
+    last = re.split(r"\x1b\[1A\x1b\[2K|\x1b\[2K", shown.decode())[-1]
+    bars, _, message = last.partition("sosmith: error: ")
+    assert message.startswith("none of the 8 realizations meets the specification")
+    assert [line for line in bars.splitlines() if "━" in line and "✓" not in line] == []
 
 
 def test_a_message_escapes_what_a_terminal_would_obey(sosmith: Command) -> None:
@@ -678,7 +728,7 @@ def test_the_reader_of_the_output_may_leave(process: Start, tmp_path: Path) -> N
         os.close(writer)
         _, errors = running.communicate(timeout=HANGS)
         assert running.returncode == 0
-        assert [line for line in errors.splitlines() if not PROGRESS.search(line.rstrip())] == []
+        assert [line for line in errors.splitlines() if not PROGRESS.search(line)] == []
 
 
 def test_a_full_disk_is_one_sentence(process: Start, tmp_path: Path) -> None:
@@ -688,7 +738,7 @@ def test_a_full_disk_is_one_sentence(process: Start, tmp_path: Path) -> None:
         _, errors = running.communicate(timeout=HANGS)
     assert running.returncode == 3
     message = "sosmith: error: the output must be readable and writable, not: No space left on device"
-    assert [line for line in errors.splitlines() if not PROGRESS.search(line.rstrip())] == [message]
+    assert [line for line in errors.splitlines() if not PROGRESS.search(line)] == [message]
 
 
 def test_tools_that_are_missing(sosmith: Command, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -745,7 +795,7 @@ def test_a_signal_in_the_middle_of_the_simulation(
     output, errors = running.communicate(timeout=HANGS)
     assert running.returncode == status
     assert output == ""
-    assert [line for line in errors.splitlines() if line.strip() and not PROGRESS.search(line.rstrip())] == messages
+    assert [line for line in errors.splitlines() if line.strip() and not PROGRESS.search(line)] == messages
     wait_for(lambda: not processes_with("SOSMITH_BENCH", simulation), 5)
     assert not list((tmp_path / "out").glob("report.*"))
     assert not list((tmp_path / "out").glob(".sosmith-*"))

@@ -35,14 +35,22 @@ def init(file: Path, force: bool) -> None:
 @REALIZATION
 @WIDTHS_OF
 @BOARD
+@click.option("--details", is_flag=True, help="Also show sections, limit cycles and schedule.")
 @JSON_OPTION
 def design_command(
-    spec: Path, core: str | None, realization: str | None, widths_of: str | None, board: str | None, as_json: bool
+    spec: Path,
+    core: str | None,
+    realization: str | None,
+    widths_of: str | None,
+    board: str | None,
+    details: bool,
+    as_json: bool,
 ) -> None:
-    """Show the design of SPEC: order, sections, realization, formats, error budget and cost.
+    """Show the design of SPEC: order, realization, architecture, cost and error budget.
 
     \b
         sosmith design my.toml
+        sosmith design my.toml --details
         sosmith design my.toml --board icebreaker --json
     """
     from sosmith.interface.specification import Specification
@@ -57,7 +65,7 @@ def design_command(
     else:
         from sosmith.commands.tables.design import print_design
 
-        print_design(made)
+        print_design(made, details=details)
 
 
 @click.command("generate")

@@ -277,7 +277,7 @@ def demo(output: Path | None, seed: int) -> None:
         report = _simulated(made, step, None, folder=folder, seed=seed)
     from sosmith.commands.tables.design import print_design
 
-    print_design(made, brief=True)
+    print_design(made)
     _finish(report, as_json=False)
 
 

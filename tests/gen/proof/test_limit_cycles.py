@@ -288,4 +288,4 @@ def test_design_shows_them() -> None:
     assert [row[0] for row in shown["df1"]] == [row[0] for row in shown["normal"]] == ["0", "1", "2"]
     assert [row[1] == "none, proven" for row in shown["df1"]] == [False] * 3
     assert [row[1] == "none, proven" for row in shown["normal"]] == [True] * 3
-    assert [row[3] for row in shown["df1"]] == ["1", "none exist", "none exist"]
+    assert [row[3] for row in shown["df1"]] == ["1", "not needed", "not needed"]

@@ -673,7 +673,7 @@ def test_page_shows_what_rounding_keeps_up() -> None:
     words = " ".join(Page(page_of(evidence())).words).replace("\u00a0", " ")
     start = words.index("What rounding can keep up by itself")
     rows = " ".join(words[start:].split())
-    assert "section 0 30.0 nm 0.123 LSB none none exist" in rows
+    assert "section 0 30.0 nm 0.123 LSB none not needed" in rows
     assert "section 1 none, proven 61.0 nm 0.250 LSB 1, 0.3333" in rows
     assert "What rounding can keep up by itself" not in page_of(plain())
 

@@ -2,16 +2,30 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from rich import box
 from rich.console import Console
 from rich.table import Table
 
 
 class TableConsole(Console):
-    """A console that leaves a closed pipe to `sosmith.terminal.reader_may_leave`."""
+    """A console that leaves a closed pipe to `sosmith.terminal.reader_may_leave`, and no blanks at the ends of lines.
+
+    Without a terminal there is nothing that blanks could paint over; a diff or a quotation shows them.
+    """
 
     def on_broken_pipe(self) -> None:
         raise BrokenPipeError
+
+    def print(self, *objects: Any, **options: Any) -> None:
+        """Print as `rich.console.Console.print` does."""
+        if self.is_terminal:
+            super().print(*objects, **options)
+            return
+        with self.capture() as captured:
+            super().print(*objects, **options)
+        self.file.write("".join(f"{line.rstrip()}\n" for line in captured.get().splitlines()))
 
 
 def new_table(title: str, columns: list[str]) -> Table:

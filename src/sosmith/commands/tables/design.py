@@ -19,8 +19,8 @@ from sosmith.model.dataflow.program import Program
 from sosmith.model.port import Port
 
 
-def print_design(design: Design, *, brief: bool = False) -> None:
-    """Print a design; `brief` leaves out sections, limit cycles and schedule."""
+def print_design(design: Design, *, details: bool = False) -> None:
+    """Print a design, with its sections, limit cycles and schedule as `details`."""
     console, made = TableConsole(), design.core
     quantized, datapath = made.quantized, made.datapath
     unit = escape(f" {datapath.output.unit}") if datapath.output.unit else ""
@@ -46,13 +46,13 @@ def print_design(design: Design, *, brief: bool = False) -> None:
     overview.add_row("output", f"{datapath.output.bits} bits, one LSB = {lsb:.6g}{unit}")
     if made.spec.wear is not None:
         overview.add_row("wear flags", _wear_text(made.spec.wear, datapath.output))
-    for name, value in _hardware_rows(made.architecture):
+    for name, value in (*_hardware_rows(made.architecture), *_option_rows(made.architecture)):
         overview.add_row(name, value)
     if made.spec.channels > 1:
         overview.add_row("channels", f"{made.spec.channels:,}, each at {float(made.spec.sample_rate):,.6g} Hz")
     console.print(overview)
     print_budget(console, design.budget, datapath.output.lsb, design.specification.max_error)
-    if brief:
+    if not details:
         return
     sections = new_table("Sections", ["section", "coefficients", "input", "states", "output"])
     for section in design.facts.sections:
@@ -96,6 +96,22 @@ def _hardware_rows(architecture: Architecture) -> list[tuple[str, str]]:
     ]
 
 
+_PROTECTION = {
+    "detect": "a wrong bit in a memory or a state is detected, and the core starts anew",
+    "correct": "a wrong bit in a memory is corrected, two are detected, and the core starts anew",
+}
+
+
+def _option_rows(architecture: Architecture) -> list[tuple[str, str]]:
+    """Return what was asked for beside the arithmetic."""
+    rows = []
+    if architecture.reload:
+        rows.append(("reload", "coefficients are loaded at run time, over AXI4-Lite"))
+    if architecture.protect in _PROTECTION:
+        rows.append(("upsets", _PROTECTION[architecture.protect]))
+    return rows
+
+
 def _print_schedule(console: Console, program: Program | None) -> None:
     if program is None:
         return
@@ -117,7 +133,7 @@ def _print_limit_cycles(console: Console, cycles: Sequence[LimitCycleFacts], lsb
     for found in cycles:
         largest = "none, proven" if found.none else f"up to {found.largest / lsb:.4g}"
         weights = ", ".join(f"{float(weight):.4g}" for weight in found.lyapunov or ())
-        table.add_row(found.section, largest, f"{found.dead_band / lsb:.4g}", weights or "none exist")
+        table.add_row(found.section, largest, f"{found.dead_band / lsb:.4g}", weights or "not needed")
     console.print(table)
 
 
