@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from sosmith.gen.verifier.graph import RejectedError, require
-from sosmith.gen.verifier.parallel.control import Case, Control, Entrance, cases
+from sosmith.gen.verifier.parallel.control import Case, Control, Entrance, UndecidedError, cases
 from sosmith.gen.verifier.parallel.evaluation import Evaluation
 from sosmith.gen.verifier.parallel.graph_codes import GraphCodes
 from sosmith.gen.verifier.parallel.netlist import Memory, Netlist
@@ -130,8 +130,11 @@ class StateMemories:
             memory, channels = self._netlist.memories[name], self._entrance.channels
             what = f"{name} must hold {self._graph.nodes[state.node].label}"
             require(len(memory.first) == channels, f"{what} of {channels} channels, not of {len(memory.first)}")
-            self._check_cleared(memory, what)
-            self._check_taken(memory, state, what)
+            try:
+                self._check_cleared(memory, what)
+                self._check_taken(memory, state, what)
+            except UndecidedError as undecided:
+                raise RejectedError(f"{what}, and {undecided} must not count for what is written") from None
 
     def _check_cleared(self, memory: Memory, what: str) -> None:
         """Check that the word of one channel becomes 0 at each clock while states are cleared."""

@@ -169,6 +169,11 @@ CHANNEL_BREAKS = {
         r"\1clear_channel;",
         rf"section0\.\w+_memory must hold {NODE}section0 and be written for the channel of the sample",
     ),
+    "an address for a reason of its own": (
+        r"(assign \\write__addr\$\d+ +=) clear \?",
+        r"\1 valid1 ?",
+        rf"section0\.\w+_memory must hold {NODE}section0, and section0\.valid1 must not count for what is written",
+    ),
     "an address": (
         r"(_\d_ <= x1_memory\[\\port\S+ )\[1:0\]",
         r"\1[2:1]",
