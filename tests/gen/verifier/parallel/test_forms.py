@@ -16,7 +16,7 @@ from sosmith.gen.verifier.parallel.equality import same_word
 from sosmith.gen.verifier.parallel.forms import Forms, shifted
 from sosmith.gen.verifier.parallel.netlist import flattened
 from sosmith.gen.verifier.parallel.text import read_modules
-from sosmith.gen.verifier.program.normal_form import Form, constant, plus
+from sosmith.gen.verifier.program.normal_form import ONE, Form, constant, plus
 
 Value = Callable[[list[int]], int]
 LIMITS = [(-8, 7), (0, 15), (-3, 100), (0, 1)]
@@ -78,6 +78,20 @@ def test_words_said_to_be_the_same_are(seed: int) -> None:
         (a, x), (b, y) = rng.choice(words), rng.choice(words)
         if same_word(forms, a, b, 3):
             assert all((x(values) - y(values)) % 8 == 0 for values in samples)
+
+
+def test_shifts_are_exact() -> None:
+    assert shifted({ONE: 3, (0,): Fraction(1, 3)}, 2) == {ONE: 12, (0,): Fraction(4, 3)}
+    assert shifted({ONE: 12, (0,): 3}, -2) == {ONE: 3, (0,): Fraction(3, 4)}
+
+
+def test_a_bit_is_one_atom_and_its_own_square() -> None:
+    forms = Forms()
+    a, b = (forms.variable(k, *ends) for k, ends in enumerate(LIMITS[:2]))
+    for bit in (forms.negative(plus(a, b)), forms.bit(forms.negative(plus(a, b)) | forms.negative(a))):
+        assert forms.settled(bit) == bit
+        assert forms.limits(bit) == (0, 1)
+        assert forms.times(bit, bit) == bit
 
 
 def test_a_missing_extension_is_another_word() -> None:
