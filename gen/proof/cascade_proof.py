@@ -15,7 +15,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from sosmith.gen.proof.linear_model import LinearModel, Polynomial
-from sosmith.gen.proof.peak_gain import Drive, Extent, Horizon, Response, extent, horizon, impulse
+from sosmith.gen.proof.peak_gain import Drive, Extent, extent
+from sosmith.gen.proof.response import IMPULSE, Response
 
 StageModel = Sequence[LinearModel]
 """Models of all outputs of a stage, in their order."""
@@ -59,15 +60,14 @@ def prove_cascade(
     ShortfallError
         If a stage is unstable or its response does not decay in time.
     """
-    at = cascade_horizon(stages, ideal)
-    wires: list[Drives] = [{INPUT: Drive(impulse(at), low, high)}]
+    wires: list[Drives] = [{INPUT: Drive(IMPULSE, low, high)}]
     nodes = []
     for number, stage in enumerate(stages):
-        lanes = [Lane(number, model, wires, at) for model in stage]
+        lanes = [Lane(number, model, wires) for model in stage]
         nodes.append({node: extent(list(lane.at(node).values())) for lane in lanes for node in lane.model.bounds})
         wires = [lane.at(lane.model.output) for lane in lanes]
     (drives,) = wires
-    exact = through(ideal, at)
+    exact = through(ideal)
     return CascadeProof(
         nodes=tuple(nodes),
         output=extent(list(drives.values())),
@@ -81,24 +81,23 @@ def coefficient_extent(
     stages: Sequence[StageModel], ideal: Sequence[TransferFunction], low: Fraction, high: Fraction
 ) -> Extent:
     """Limits of the output of the stages' transfer functions minus that of the ideal sections."""
-    at = cascade_horizon(stages, ideal)
-    return extent([Drive(made_response(stages, at).minus(through(ideal, at)), low, high)])
+    return extent([Drive(made_response(stages).minus(through(ideal)), low, high)])
 
 
-def made_response(stages: Sequence[StageModel], at: Horizon) -> Response:
+def made_response(stages: Sequence[StageModel]) -> Response:
     """Impulse response of the stages without their quantizers."""
-    wires = [impulse(at)]
+    wires = [IMPULSE]
     for stage in stages:
         wires = [_joined([(wires[k], t) for k, t in zip(m.entries, m.transfers, strict=True)], m) for m in stage]
     (response,) = wires
     return response
 
 
-def error_drives(stages: Sequence[StageModel], at: Horizon) -> list[Drive]:
+def error_drives(stages: Sequence[StageModel]) -> list[Drive]:
     """Drives at the output by everything except the input: errors of the quantizers, and constants."""
     wires: list[Drives] = [{}]
     for number, stage in enumerate(stages):
-        lanes = [Lane(number, model, wires, at) for model in stage]
+        lanes = [Lane(number, model, wires) for model in stage]
         wires = [lane.at(lane.model.output) for lane in lanes]
     (drives,) = wires
     return list(drives.values())
@@ -106,8 +105,7 @@ def error_drives(stages: Sequence[StageModel], at: Horizon) -> list[Drive]:
 
 def rounding_gains(stages: Sequence[StageModel]) -> list[dict[str, Fraction]]:
     """Error that each stage's quantizers cause at the output, by name: half the width of its range."""
-    at = cascade_horizon(stages, [])
-    wires = [impulse(at)]  # from each output of a stage to the end
+    wires = [IMPULSE]  # from each output of a stage to the end
     gains = []
     for stage in reversed(stages):
         after = [wire.all_pole(model.denominator) for wire, model in zip(wires, stage, strict=True)]
@@ -130,23 +128,15 @@ def rounding_gains(stages: Sequence[StageModel]) -> list[dict[str, Fraction]]:
 
 def ideal_gain(ideal: Sequence[TransferFunction]) -> Fraction:
     """Worst-case peak gain of the ideal sections."""
-    return _gain(through(ideal, cascade_horizon([], ideal)))
+    return _gain(through(ideal))
 
 
-def through(sections: Sequence[TransferFunction], at: Horizon) -> Response:
+def through(sections: Sequence[TransferFunction]) -> Response:
     """Impulse response of cascaded sections."""
-    response = impulse(at)
+    response = IMPULSE
     for numerator, denominator in sections:
         response = response.all_pole(denominator).taps(numerator)
     return response
-
-
-def cascade_horizon(stages: Sequence[StageModel], ideal: Sequence[TransferFunction]) -> Horizon:
-    """Choose a horizon for the responses of stages and ideal sections."""
-    paths: list[list[list[Polynomial]]] = [[[]]]  # the denominators along each path to each wire
-    for stage in stages:
-        paths = [[[*path, m.denominator] for k in m.entries for path in paths[k]] for m in stage]
-    return horizon([*(path for wire in paths for path in wire), [denominator for _, denominator in ideal]])
 
 
 Key = tuple[int, int, str, int]
@@ -160,14 +150,14 @@ INPUT: Key = (-1, 0, "input", 0)
 class Lane:
     """One output of a stage, with everything that drives it."""
 
-    def __init__(self, number: int, model: LinearModel, wires: Sequence[Drives], at: Horizon) -> None:
+    def __init__(self, number: int, model: LinearModel, wires: Sequence[Drives]) -> None:
         self.model = model
         self._number = number
         self._arrived = [
             {key: Drive(d.response.all_pole(model.denominator), d.low, d.high) for key, d in wires[k].items()}
             for k in model.entries
         ]
-        self._own = impulse(at).all_pole(model.denominator)
+        self._own = IMPULSE.all_pole(model.denominator)
 
     def at(self, node: int) -> Drives:
         """Drives at a node: those from earlier stages, then the stage's own sources."""

@@ -25,7 +25,8 @@ from functools import lru_cache
 from itertools import product
 
 from sosmith.gen.proof.linear_model import LinearModel, cone, linear_model, state_matrix
-from sosmith.gen.proof.peak_gain import Drive, extent, horizon, impulse
+from sosmith.gen.proof.peak_gain import Drive, extent
+from sosmith.gen.proof.response import IMPULSE
 from sosmith.model.dataflow.datapath import Stage
 from sosmith.model.dataflow.graph import Graph, Op
 
@@ -93,7 +94,7 @@ def limit_cycles(graph: Graph) -> LimitCycles:
 
 
 def _largest(model: LinearModel) -> Fraction:
-    own = impulse(horizon([[model.denominator]])).all_pole(model.denominator)
+    own = IMPULSE.all_pole(model.denominator)
     drives = [Drive(own.taps(s.numerators[model.output]), s.low, s.high) for s in model.sources[1:]]
     return extent(drives).magnitude
 

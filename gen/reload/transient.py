@@ -19,9 +19,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
-from sosmith.gen.proof.cascade_proof import INPUT, Drives, Key, Lane, cascade_horizon
+from sosmith.gen.proof.cascade_proof import INPUT, Drives, Key, Lane
 from sosmith.gen.proof.linear_model import LinearModel, linear_models
-from sosmith.gen.proof.peak_gain import Drive, Extent, Horizon, Response, extent, impulse
+from sosmith.gen.proof.peak_gain import ACCURACY, Drive, Extent, extent
+from sosmith.gen.proof.response import IMPULSE, Response, common
+from sosmith.gen.proof.sums import recursion
 from sosmith.gen.realizations.registry import Section
 from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.model.dataflow.graph import Graph, Node, Op
@@ -72,18 +74,17 @@ def transient(active: Quantized, other: Quantized) -> Transient:
     """
     pairs = [_Pair(a, b) for a, b in zip(active.sections, other.sections, strict=True)]
     low, high = _input_values(active, other)
-    at = cascade_horizon([linear_models(section.graph) for section in active.sections], [])
-    wires: list[Drives] = [{INPUT: Drive(impulse(at), low, high)}]
-    fading = _Fading(cascade_horizon([linear_models(section.graph) for section in other.sections], []))
+    wires: list[Drives] = [{INPUT: Drive(IMPULSE, low, high)}]
+    fading = _Fading()
     ranges = []
     for number, pair in enumerate(pairs):
-        lanes = [Lane(number, model, wires, at) for model in linear_models(pair.together)]
+        lanes = [Lane(number, model, wires) for model in linear_models(pair.together)]
         outputs = [lane.at(lane.model.output) for lane in lanes]
         starts = {lane.model.output: extent(list(d.values())) for lane, d in zip(lanes, outputs, strict=True)}
         found = {node: extent(list(lane.at(pair.place[node]).values())) for node, lane in pair.bounds(lanes).items()}
         moved = fading.section(number, pair, starts)
         count = len(pair.active.graph.outputs)
-        wires = [_merged(drives, {INPUT}, (number, k, "rounding", 0), at) for k, drives in enumerate(outputs[:count])]
+        wires = [_merged(drives, {INPUT}, (number, k, "rounding", 0)) for k, drives in enumerate(outputs[:count])]
         ranges.append(pair.ranges({node: _sum(found[node], moved[node]) for node in found}))
     return Transient(ranges=tuple(ranges), samples=fading.samples)
 
@@ -205,9 +206,8 @@ def _with_additions(graph: Graph) -> tuple[Graph, tuple[int, ...]]:
 class _Fading:
     """Propagates the difference between the two runs through the other set's sections, in order."""
 
-    def __init__(self, at: Horizon) -> None:
+    def __init__(self) -> None:
         self.samples = 0
-        self._at = at
         self._wires: list[Drives] = [{}]
         self._mismatches: dict[Key, Fraction] = {}
 
@@ -232,9 +232,9 @@ class _Fading:
             left = RESIDUE if mismatch else Fraction(0)
             if mismatch:
                 self._mismatches[key] = mismatch
-            additions.append({key: _drive(self._at, found, left)})
+            additions.append({key: _drive(found, left)})
         models = [_symmetric(model) for model in linear_models(pair.after)]
-        lanes = [Lane(number, model, [*self._wires, *additions], self._at) for model in models]
+        lanes = [Lane(number, model, [*self._wires, *additions]) for model in models]
         moved: dict[int, Extent] = {}
         for lane in lanes:
             for node in lane.model.bounds:
@@ -247,28 +247,21 @@ class _Fading:
         for drives in outputs:
             self._watch(drives, states)
         kept = {key for drives in outputs for key in drives if key[2] == "difference"}
-        self._wires = [_merged(drives, kept, (number, k, "rounding", 0), self._at) for k, drives in enumerate(outputs)]
+        self._wires = [_merged(drives, kept, (number, k, "rounding", 0)) for k, drives in enumerate(outputs)]
         return moved
 
     def _watch(self, drives: Drives, delays: int) -> None:
         """Increase `samples` until the states at the swap no longer matter here, nor after `delays` more samples."""
         weighted = [(d.response, self._mismatches[key]) for key, d in drives.items() if key in self._mismatches]
-        self.samples = max(self.samples, _last_above(weighted, self._at) + delays + 1)
+        self.samples = max(self.samples, _last_above(weighted) + delays + 1)
 
 
-def _last_above(weighted: Sequence[tuple[Response, Fraction]], at: Horizon) -> int:
+def _last_above(weighted: Sequence[tuple[Response, Fraction]]) -> int:
     """Last sample at which the weighted sum of absolute responses may exceed `RESIDUE`."""
-    scale = 1 << 8
-    limit = math.floor(RESIDUE * scale * (1 << at.bits))
-    totals = [0] * at.length
-    tail = Fraction(0)
-    for response, weight in weighted:
-        factor, error = math.ceil(weight * scale), math.ceil(response.rounding)
-        totals = [total + factor * (abs(v) + error) for total, v in zip(totals, response.samples, strict=True)]
-        tail += weight * response.tail
-    last = max((k for k, total in enumerate(totals) if total > limit), default=0)
-    if tail > RESIDUE or last == at.length - 1:
-        raise ShortfallError(f"a swap must fade within {at.length} samples, and is not proven to")
+    under = common([response for response, _ in weighted])
+    last = recursion(under, ACCURACY).last_above([(r.over(under), weight) for r, weight in weighted], RESIDUE)
+    if last is None:
+        raise ShortfallError("a swap must fade in the time in which a response decays, and is not proven to")
     return last
 
 
@@ -282,17 +275,17 @@ def _symmetric(model: LinearModel) -> LinearModel:
     return replace(model, sources=tuple(sources))
 
 
-def _merged(drives: Drives, kept: set[Key], rest: Key, at: Horizon) -> Drives:
+def _merged(drives: Drives, kept: set[Key], rest: Key) -> Drives:
     """Replace all sources except those in `kept` by one that takes any value within their limits at each sample."""
     found = extent([drive for key, drive in drives.items() if key not in kept])
-    return {key: drive for key, drive in drives.items() if key in kept} | {rest: _drive(at, found)}
+    return {key: drive for key, drive in drives.items() if key in kept} | {rest: _drive(found)}
 
 
 def _sum(a: Extent, b: Extent) -> Extent:
     return Extent(a.low + b.low, a.high + b.high)
 
 
-def _drive(at: Horizon, limits: Extent, more: Fraction = Fraction(0)) -> Drive:
+def _drive(limits: Extent, more: Fraction = Fraction(0)) -> Drive:
     """Make a source with the given limits, widened by `more` and rounded outward."""
     low, high = limits.low - more, limits.high + more
-    return Drive(impulse(at), Fraction(math.floor(low * _GRID), _GRID), Fraction(math.ceil(high * _GRID), _GRID))
+    return Drive(IMPULSE, Fraction(math.floor(low * _GRID), _GRID), Fraction(math.ceil(high * _GRID), _GRID))

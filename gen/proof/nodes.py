@@ -1,0 +1,261 @@
+"""A recursion in blocks: the weights with which a few samples of a response determine all others.
+
+All responses ``h = N/D`` over a denominator D of degree d solve the same recursion from sample ``deg N - d + 1`` on. In
+a block of B samples, each is therefore a fixed combination of the d samples at the *nodes* of the block, and so are
+the samples at the nodes of the next block::
+
+    h[j B + i] = sum over m of Phi[i, m] W[j, m],    W[j + 1] = K W[j]
+
+The weights Phi and K depend on D alone. They are enclosed in ball arithmetic: the response of 1/D is computed in
+integers, whose error a bound on the sum of its magnitudes gives, ``L1(1/D) <= prod 1/(1 - |p|)`` over the poles p. The
+nodes are the pivots of an elimination with row pivoting (discrete Leja points: Bos, De Marchi, Sommariva and Vianello
+2010). Phi is then of the order of one, however close the poles are to each other.
+
+The number J of blocks is a power of two for which ``|K**J| < 1`` in the maximum norm. This proves that every response
+decays, and bounds what comes after these blocks.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from fractions import Fraction
+from operator import mul
+
+import numpy as np
+import numpy.typing as npt
+from flint import arb, arb_mat, ctx, fmpq_poly
+
+from sosmith.gen.proof.poles import Coefficients, pole_radii
+from sosmith.model.errors import ShortfallError
+
+Integers = npt.NDArray[np.object_]
+
+LONGEST = 1 << 22
+"""Samples in which a response must decay to the accuracy of the word-length search."""
+
+_LONGEST_BITS = 40  # that accuracy, relative, in bits
+_DECAY_BITS = 16  # to which responses decay beyond the accuracy wanted
+_SMALLEST_BLOCK, _LARGEST_BLOCK = 64, 512
+_WINDOWS = 8  # that the nodes are spread over, in the time in which a response decays to `_LONGEST_BITS`
+_GROUPS, _NEIGHBOURS = 64, 4  # of places among which the nodes are chosen
+_SLACK_BITS = 16
+_DIGITS = 3  # binary digits of the number of blocks
+_GUARD_BITS = 64  # of the first precision that is tried
+_MOST_BITS = 1 << 16  # of a precision
+
+
+class _CoarseError(ArithmeticError):
+    """The precision is too low, by about `bits`."""
+
+    def __init__(self, bits: int) -> None:
+        super().__init__()
+        self.bits = bits
+
+
+class Nodes:
+    """Weights of the samples at the nodes, for responses over one denominator.
+
+    Parameters
+    ----------
+    denominators : sequence of Coefficients
+        Factors of the denominator, each of a degree of at most 2 and with the constant term 1.
+    accuracy : int
+        Bits to which responses decay, relative to their size; a few more.
+    bits : int
+        Fraction bits of the weights.
+
+    Attributes
+    ----------
+    degree : int
+        Degree d of the denominator.
+    block, blocks : int
+        Length B of a block, and number J of blocks.
+    weights : array of int, shape (block, degree)
+        Phi in units of ``2**-bits``, within two units.
+    powers : list of array of int, shape (degree, degree)
+        ``K**(2**k)`` likewise, for every k up to that of J.
+    norms : list of Fraction
+        Bound on the maximum norm of each of `powers`; the last one is far below 1.
+
+    Raises
+    ------
+    ShortfallError
+        If a pole does not lie inside the unit circle, or a response lasts longer than `LONGEST` samples.
+    """
+
+    def __init__(self, denominators: Sequence[Coefficients], accuracy: int, bits: int) -> None:
+        radii = [radius for denominator in denominators for radius in pole_radii(denominator)]
+        if max(radii, default=Fraction(0)) >= 1:
+            raise ShortfallError("every pole must lie inside the unit circle, and one does not")
+        self._denominator = fmpq_poly([1])
+        for denominator in denominators:
+            self._denominator *= polynomial(denominator)
+        self.degree = len(radii)
+        self.bits = bits
+        self._decay = accuracy + _DECAY_BITS
+        self._most = LONGEST * self._decay // (_LONGEST_BITS + _DECAY_BITS)
+        self.gain = math.ceil(math.prod((1 / (1 - radius) for radius in radii), start=Fraction(1)))
+        """Bound on ``L1(1/D)``."""
+        self.spread = 2 * self.gain
+        self._length, self.block = self._lengths(max(radii, default=Fraction(0)))
+        self.blocks = 0
+        self.residue = Fraction(0)
+        self.fine = bits + self.gain.bit_length() + _GUARD_BITS
+        """Fraction bits of `impulse`."""
+        while True:
+            self._impulse: list[int] = []
+            try:
+                self._enclose()
+                break
+            except _CoarseError as error:
+                if self.fine > _MOST_BITS:
+                    raise ShortfallError(
+                        "the poles must not lie so close to each other that a response cannot be enclosed"
+                    ) from None
+                self.fine += error.bits + _GUARD_BITS
+
+    def _lengths(self, radius: Fraction) -> tuple[int, int]:
+        """Estimate the length of the responses from the pole that decays most slowly, and choose that of a block."""
+        per_sample = -math.log2(radius) if radius > Fraction(1, 2**64) else 64.0
+        length = math.ceil((self._decay + 2 * self.degree) / max(per_sample, 2.0**-60)) + 2 * self.degree
+        self._check(length)
+        block = min(max(math.isqrt(length), _SMALLEST_BLOCK), _LARGEST_BLOCK, length)
+        return length, block if self.degree else 0
+
+    def _check(self, length: int) -> None:
+        if length > self._most:
+            shown = length * (_LONGEST_BITS + _DECAY_BITS) // self._decay
+            raise ShortfallError(
+                f"the impulse response must end within {LONGEST} samples, not {shown}: a pole lies too close to the "
+                "unit circle"
+            )
+
+    def impulse(self, length: int) -> list[int]:
+        """Return at least `length` samples of the response of 1/D, within `spread` units of ``2**-fine``.
+
+        Each sample is rounded down, and before it the coefficients so little that it costs less than another unit. That
+        makes an error of less than two units at the input of 1/D.
+        """
+        made = self._impulse or [1 << self.fine]
+        shift = self.fine + self.gain.bit_length() + self.degree.bit_length()
+        scale = int(self._denominator.denom())
+        weights = [-((int(c) << shift) // scale) for c in self._denominator.numer().coeffs()][1:]
+        while len(made) < length:
+            made.append(sum(map(mul, weights, made[: -len(weights) - 1 : -1])) >> shift)
+        self._impulse = made
+        return made
+
+    def _enclose(self) -> None:
+        """Find the nodes, the weights and the powers, at the present precision."""
+        d, size = self.degree, self.block
+        self.places: list[int] = []
+        """Distances of the nodes from the beginning of a block."""
+        self.weights = np.zeros((size, d), dtype=object)
+        self.powers: list[Integers] = []
+        self.norms: list[Fraction] = []
+        if not d:
+            return
+        window = max(self._length * _LONGEST_BITS // (_WINDOWS * self._decay), 2 * d, size)
+        response = [*([0] * d), *self.impulse(window + size)]
+
+        def row(at: int) -> list[int]:
+            return response[at + d : at : -1]
+
+        places = _candidates(window)
+        picked, least = _pivots(np.array([row(at) for at in places], dtype=object), self.fine)
+        short = self.bits + self.gain.bit_length() + _SLACK_BITS - least.bit_length()
+        if short > 0:
+            raise _CoarseError(short)
+        self.places = [places[k] for k in picked]
+        with ctx.workprec(self.fine + max(map(abs, response)).bit_length()):
+            radius = arb(0, self.spread)
+
+            def balls(at: int) -> list[arb]:
+                return [arb(v) + radius if v else arb(0) for v in row(at)]
+
+            try:
+                inverse = arb_mat(d, d, [ball for at in self.places for ball in balls(at)]).inv()
+            except ZeroDivisionError:
+                raise _CoarseError(self.fine) from None
+            wanted = [*range(size), *(size + at for at in self.places)]
+            found = (arb_mat(len(wanted), d, [ball for at in wanted for ball in balls(at)]) * inverse).entries()
+            self.weights = _rounded(found[: size * d], self.bits).reshape(size, d)
+            self._multiply(arb_mat(d, d, found[size * d :]))
+
+    def _multiply(self, step: arb_mat) -> None:
+        """Find the number of blocks and the powers of K up to there."""
+        target = Fraction(1, 1 << self._decay)
+        powers = [step]
+        while _norm(powers[-1]) > target:
+            self._check(self.block << len(powers) - 1)
+            powers.append(powers[-1] * powers[-1])
+        # Between the last two powers of two: in the binary expansion of the number of blocks, from its highest digit.
+        self.blocks, whole = 1 << len(powers) - 1, powers[-1]
+        if len(powers) > 1:
+            self.blocks, whole = self.blocks // 2, powers[-2]
+            for k in reversed(range(max(0, len(powers) - 2 - _DIGITS), len(powers) - 2)):
+                longer = whole * powers[k]
+                if _norm(longer) > target:
+                    self.blocks, whole = self.blocks + (1 << k), longer
+            unit = max(0, len(powers) - 2 - _DIGITS)
+            self.blocks, whole = self.blocks + (1 << unit), whole * powers[unit]
+        self.residue = _norm(whole)
+        self._check(self.block * self.blocks)
+        d = self.degree
+        self.powers = [
+            _rounded(power.entries(), self.bits).reshape(d, d) for power in powers[: self.blocks.bit_length()]
+        ]
+        self.norms = [_norm(power) for power in powers[: len(self.powers)]]
+
+
+def polynomial(values: Sequence[Fraction]) -> fmpq_poly:
+    """Convert coefficients to a polynomial of FLINT."""
+    scale = math.lcm(*(value.denominator for value in values))
+    return fmpq_poly([value.numerator * (scale // value.denominator) for value in values], scale)
+
+
+def _candidates(window: int) -> list[int]:
+    """Places among which the nodes are chosen: the first samples, and groups of neighbours at even distances."""
+    step = max(1, window // _GROUPS)
+    places = {*range(min(window, _GROUPS)), *(k for at in range(0, window, step) for k in range(at, at + _NEIGHBOURS))}
+    return sorted(at for at in places if at < window)
+
+
+def _pivots(matrix: Integers, bits: int) -> tuple[list[int], int]:
+    """Rows that an elimination with row pivoting picks, in integers with `bits` fraction bits, and the least pivot."""
+    picked, least = [], 1 << bits
+    for column in range(matrix.shape[1]):
+        pivot = int(np.argmax(np.abs(matrix[:, column])))
+        value = matrix[pivot, column]
+        least = min(least, abs(value))
+        if not value:
+            break
+        picked.append(pivot)
+        factors = (matrix[:, column] << bits) // value
+        matrix[:, column:] -= (factors[:, None] * matrix[pivot, column:]) >> bits
+        matrix[pivot] = 0
+    return picked, least
+
+
+def _rounded(balls: Sequence[arb], bits: int) -> Integers:
+    """Multiples of ``2**-bits`` within two units of all that the balls enclose."""
+    result = np.empty(len(balls), dtype=object)
+    scale = arb(2) ** bits
+    half = arb(0.5)
+    for index, value in enumerate(balls):
+        scaled = value * scale
+        if not scaled.rad() < half:
+            raise _CoarseError(bits)
+        mantissa, exponent = (int(part) for part in scaled.mid().man_exp())
+        result[index] = mantissa << exponent if exponent >= 0 else mantissa >> -exponent
+    return result
+
+
+def _norm(matrix: arb_mat) -> Fraction:
+    """Bound on the maximum norm of a matrix."""
+    largest = Fraction(0)
+    for row in matrix.tolist():
+        mantissa, exponent = (int(part) for part in sum(map(abs, row), arb(0)).upper().man_exp())
+        largest = max(largest, mantissa * Fraction(2) ** exponent)
+    return largest

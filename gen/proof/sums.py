@@ -1,0 +1,346 @@
+"""Sums over the impulse responses of one denominator: signs in doubles, sums in integers.
+
+The sum of ``|h|`` is that of ``s h`` with s = 1 or -1, the sign of each sample. Doubles find nearly all signs from the
+samples at the nodes (`sosmith.gen.proof.nodes`): a sum of d products is wrong by at most ``d 2**-53 / (1 - d 2**-53)``
+times the sum of their magnitudes, in any order of summation (Higham, Accuracy and Stability of Numerical Algorithms,
+section 3.1). The others are found in integers. In each block, s is summed with the weights Phi; this is exact, because
+the weights are cut into limbs so short that no double ever rounds. What is left are d products of long integers.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import lru_cache
+from itertools import accumulate
+
+import numpy as np
+import numpy.typing as npt
+from flint import fmpq_poly, fmpz_mat
+
+from sosmith.gen.proof.nodes import Integers, Nodes
+from sosmith.gen.proof.poles import Coefficients
+
+Floats = npt.NDArray[np.float64]
+
+_MORE_BITS = 72  # fraction bits of samples and weights beyond the accuracy of a sum
+_AT_ONCE = 1 << 21  # samples in memory at the same time
+_ROUNDING = 2.0**-53
+_SLACK = 1 + 2.0**-30  # for the rounding of a bound itself
+_CLOSE = 64  # blocks in which a largest sum is looked for in integers
+
+
+@dataclass(frozen=True)
+class Total:
+    """Sum of a response's magnitudes.
+
+    Attributes
+    ----------
+    magnitude : Fraction
+        Approximately the sum of ``|h|``.
+    uncertainty : Fraction
+        Bound on its error, and on that of any sum up to some sample that is made with the same samples and signs.
+    """
+
+    magnitude: Fraction
+    uncertainty: Fraction
+
+
+@dataclass(frozen=True)
+class Weighted:
+    """A response of which each sample h counts as ``centre h + radius |h|``; the radius is not negative."""
+
+    numerator: fmpq_poly
+    centre: Fraction
+    radius: Fraction
+
+
+@dataclass(frozen=True)
+class _Samples:
+    """A response before its first block, and at the nodes of its blocks, in units of ``2**-bits``.
+
+    Attributes
+    ----------
+    head : list of int
+        Samples before the first block.
+    nodes : array of int, shape (degree, blocks)
+        Samples at the nodes.
+    values : array of float, shape (degree, blocks)
+        The same, rounded to doubles.
+    error : int
+        Bound on the error of all these samples.
+    """
+
+    head: list[int]
+    nodes: Integers
+    values: Floats
+    error: int
+
+
+@dataclass(frozen=True)
+class _Signs:
+    """Signs of a response in all blocks.
+
+    Attributes
+    ----------
+    signs : array of float, shape (block, blocks)
+        1 or -1.
+    values : array of float, shape (block, blocks)
+        Approximate samples.
+    unsure : array of float, shape (blocks,)
+        Bound on their error.
+    """
+
+    signs: Floats
+    values: Floats
+    unsure: Floats
+
+
+class Recursion:
+    """All responses over one denominator.
+
+    Parameters
+    ----------
+    denominators : tuple of Coefficients
+        Its factors, each of a degree of at most 2 and with the constant term 1.
+    accuracy : int
+        Bits to which sums are computed, relative to the size of a response.
+
+    Raises
+    ------
+    ShortfallError
+        If a pole does not lie inside the unit circle, or a response lasts too long.
+    """
+
+    def __init__(self, denominators: tuple[Coefficients, ...], accuracy: int) -> None:
+        self._bits = accuracy + _MORE_BITS
+        self._table = made = Nodes(denominators, accuracy, self._bits)
+        self._weights = (made.weights.astype(np.float64) * 2.0**-self._bits).reshape(made.block, made.degree)
+        rows = [sum(map(abs, row)) for row in made.weights.tolist()]
+        self._widest = (max(rows, default=0) >> self._bits) + 2
+        self._size = Fraction(sum(rows) + 2 * made.weights.size, 1 << self._bits)
+        self._limb = 52 - made.block.bit_length()
+        self._limbs = _limbs(made.weights, self._limb)
+        self._totals: dict[tuple[str, ...], Total] = {}
+
+    def totals(self, numerators: Sequence[fmpq_poly]) -> list[Total]:
+        """Sum the magnitudes of the responses of ``numerator/D``, each once."""
+        named = {_key(numerator): numerator for numerator in numerators}
+        missing = [key for key in named if key not in self._totals]
+        for keys in self._portions(missing):
+            found = self._samples([named[key] for key in keys])
+            self._totals.update((key, self._total(samples)) for key, samples in zip(keys, found, strict=True))
+        return [self._totals[_key(numerator)] for numerator in numerators]
+
+    def highest(self, weighted: Sequence[Weighted]) -> Fraction:
+        """Bound on the sum, up to any sample, of several responses together; at least 0."""
+        numerators = [part.numerator for part in weighted]
+        slack = sum(
+            (
+                (abs(part.centre) + part.radius) * total.uncertainty
+                for part, total in zip(weighted, self.totals(numerators), strict=True)
+            ),
+            Fraction(0),
+        )
+        scale = math.lcm(*(value.denominator for part in weighted for value in (part.centre, part.radius)))
+        factors = [(int(part.centre * scale), int(part.radius * scale)) for part in weighted]
+        samples = self._samples(numerators)
+        steps = [
+            sum(c * value + r * abs(value) for (c, r), value in zip(factors, values, strict=True)) << self._bits
+            for values in zip(*(part.head for part in samples), strict=True)
+        ]
+        sums = list(accumulate(steps, initial=0))
+        best = max(sums)
+        if self._table.degree:
+            best = max(best, self._highest_in_blocks(samples, factors, sums[-1], best))
+        return Fraction(best, scale << 2 * self._bits) + slack
+
+    def last_above(self, weighted: Sequence[tuple[fmpq_poly, Fraction]], limit: Fraction) -> int | None:
+        """Last sample at which a weighted sum of magnitudes may exceed `limit`, 0 if there is none.
+
+        None if that is not proven to come to an end.
+        """
+        samples = self._samples([numerator for numerator, _ in weighted])
+        unit = Fraction(1, 1 << self._bits)
+        last, rest = 0, Fraction(0)
+        for at, values in enumerate(zip(*(part.head for part in samples), strict=True)):
+            total = sum(w * (abs(v) + s.error) for (_, w), v, s in zip(weighted, values, samples, strict=True))
+            last = at if total * unit > limit else last
+        start = len(samples[0].head) if samples else 0
+        if self._table.degree:
+            sums = np.zeros((self._table.block, self._table.blocks))
+            for (_, weight), part in zip(weighted, samples, strict=True):
+                signs = self._signs(part)
+                sums += float(weight) * (np.abs(signs.values) + signs.unsure)
+                rest += weight * self._tail(part)
+            above = np.flatnonzero(sums.T.ravel() * _SLACK > float(limit))
+            last = start + int(above[-1]) if len(above) else last
+            if last == start + sums.size - 1:
+                return None
+        return None if rest > limit else last
+
+    # Samples.
+
+    def _portions(self, keys: list[tuple[str, ...]]) -> Iterator[list[tuple[str, ...]]]:
+        count = max(1, _AT_ONCE // max(self._table.block * self._table.blocks, 1))
+        return (keys[start : start + count] for start in range(0, len(keys), count))
+
+    def _samples(self, numerators: Sequence[fmpq_poly]) -> list[_Samples]:
+        """Compute several responses at the nodes, in blocks that begin at the same sample."""
+        table, bits = self._table, self._bits
+        start = max(0, max((numerator.degree() for numerator in numerators), default=0) - table.degree + 1)
+        wanted = [*range(start), *(start + at for at in table.places)]
+        impulse = table.impulse(max(wanted, default=0) + 1)
+        heads, firsts, errors = [], [], []
+        for numerator in numerators:
+            scale = int(numerator.denom()) << table.fine - bits
+            taps = [int(value) for value in numerator.numer().coeffs()]
+            found = [sum(n * impulse[at - k] for k, n in enumerate(taps[: at + 1])) // scale for at in wanted]
+            heads.append(found[:start])
+            firsts.append(found[start:])
+            errors.append(2 + sum(map(abs, taps)) * table.spread // scale)
+        count = len(firsts)
+        nodes = np.array(firsts, dtype=object).reshape(count, table.degree).T.reshape(table.degree, 1, count)
+        for power in table.powers:
+            more = min(nodes.shape[1], table.blocks - nodes.shape[1])
+            nodes = np.concatenate([nodes, self._product(power, nodes[:, :more])], axis=1)
+        values = nodes.astype(np.float64) * 2.0**-bits
+        sizes = np.abs(values).sum(axis=0).max(axis=0, initial=0.0) * _SLACK
+        largest = [math.ceil(size) for size in sizes.tolist()]
+        for norm in table.norms:
+            # A power is within two units, and its products are rounded down.
+            errors = [max(e, math.ceil(norm * e) + 2 * big + 1) for e, big in zip(errors, largest, strict=True)]
+        return [
+            _Samples(heads[k], nodes[..., k], np.ascontiguousarray(values[..., k]), errors[k]) for k in range(count)
+        ]
+
+    def _product(self, power: Integers, nodes: Integers) -> Integers:
+        d, *shape = nodes.shape
+        made = fmpz_mat(d, d, power.ravel().tolist()) * fmpz_mat(d, math.prod(shape), nodes.ravel().tolist())
+        result = np.array([int(value) >> self._bits for value in made.entries()], dtype=object)
+        return result.reshape(d, *shape)
+
+    # Signs and sums.
+
+    def _signs(self, samples: _Samples) -> _Signs:
+        d = self._table.degree
+        values = self._weights @ samples.values
+        sizes = np.abs(samples.values).sum(axis=0) * _SLACK
+        rounding = (d + 4) * _ROUNDING * _SLACK
+        rough = rounding * float(np.abs(self._weights).max()) * sizes
+        exact = (self._widest * samples.error + 2 * sizes) * 2.0**-self._bits * _SLACK
+        signs = np.where(values < 0, -1.0, 1.0)
+        # Where doubles are as good as the integers, the sign counts as known: what that may cost is in `_total`.
+        rows, columns = np.nonzero((np.abs(values) <= rough) & (rough > exact))
+        if len(rows):
+            closer = rounding * np.einsum(
+                "km,mk->k", np.abs(self._weights[rows]), np.abs(samples.values[:, columns]), optimize=True
+            )
+            open_ = (np.abs(values[rows, columns]) <= closer) & (closer > exact[columns])
+            rows, columns = rows[open_], columns[open_]
+            sums = (self._table.weights[rows] * samples.nodes[:, columns].T).sum(axis=1)
+            signs[rows, columns] = np.where(sums < 0, -1.0, 1.0)
+        return _Signs(signs, values, rough + exact)
+
+    def _block_sums(self, signs: Floats, nodes: Integers) -> list[int]:
+        """Sum of the samples times `signs` in every block, in units of ``2**-(2 bits)``."""
+        d, blocks = nodes.shape
+        parts = (self._limbs @ signs).reshape(-1, d, blocks).astype(np.int64).astype(object)
+        factors = sum(part << self._limb * k for k, part in enumerate(parts))
+        return list((factors * nodes).sum(axis=0))
+
+    def _total(self, samples: _Samples) -> Total:
+        table, unit = self._table, Fraction(1, 1 << self._bits)
+        found = sum(map(abs, samples.head)) << self._bits
+        uncertainty = len(samples.head) * samples.error * unit
+        if table.degree:
+            signs = self._signs(samples)
+            found += sum(self._block_sums(signs.signs, samples.nodes))
+            sizes = Fraction(float(np.abs(samples.values).sum()) * _SLACK)
+            off = table.block * (table.blocks * self._widest * samples.error + 2 * sizes) * unit
+            # Seven times: the samples themselves are off once. A sign found in doubles no better than this may be wrong
+            # where the sample is within three times this; that counts twice.
+            uncertainty += 7 * off + self._tail(samples)
+        return Total(Fraction(found, 1 << 2 * self._bits), _short(uncertainty))
+
+    def _tail(self, samples: _Samples) -> Fraction:
+        """Bound on the sum of the magnitudes behind the last block."""
+        table = self._table
+        sizes = Fraction(float(np.abs(samples.values).sum()) * _SLACK)
+        sizes += Fraction(table.degree * table.blocks * samples.error, 1 << self._bits)
+        return self._size * sizes * table.residue / (1 - table.residue)
+
+    def _highest_in_blocks(
+        self, samples: Sequence[_Samples], factors: Sequence[tuple[int, int]], start: int, best: int
+    ) -> int:
+        """Largest running sum within the blocks, from `start` on."""
+        table = self._table
+        found = [self._signs(part) for part in samples]
+        largest = max(abs(value) for pair in factors for value in pair)
+        shift = max(0, largest.bit_length() - 60)
+        weights = [(math.ldexp(c, -shift), math.ldexp(r, -shift)) for c, r in factors]
+        steps = np.zeros((table.block, table.blocks))
+        unsure = np.zeros(table.blocks)
+        sums = [0] * table.blocks
+        for part, signs, (centre, radius), (c, r) in zip(samples, found, factors, weights, strict=True):
+            for sign, factor in ((np.ones_like(signs.signs), centre), (signs.signs, radius)):
+                if factor:
+                    sums = [a + factor * b for a, b in zip(sums, self._block_sums(sign, part.nodes), strict=True)]
+            size = np.abs(signs.values)
+            steps += c * signs.values + r * size
+            unsure += (abs(c) + r) * (table.block * signs.unsure + (table.block + 8) * _ROUNDING * size.sum(axis=0))
+        starts = list(accumulate(sums, initial=start))[:-1]
+        peaks = np.maximum(np.cumsum(steps, axis=0).max(axis=0), 0.0)
+        scale = 2 * self._bits + shift
+        high = [s + _scaled(p, scale) for s, p in zip(starts, (peaks + unsure * _SLACK).tolist(), strict=True)]
+        low = [s + _scaled(p, scale) for s, p in zip(starts, (peaks - unsure * _SLACK).tolist(), strict=True)]
+        least = max(best, *low)
+        close = [k for k in range(table.blocks) if high[k] > least]
+        if len(close) > _CLOSE:
+            return max(high)
+        for k in close:
+            best = max(best, starts[k] + self._highest_in_block(k, samples, found, factors))
+        return best
+
+    def _highest_in_block(
+        self, k: int, samples: Sequence[_Samples], found: Sequence[_Signs], factors: Sequence[tuple[int, int]]
+    ) -> int:
+        steps = np.zeros(self._table.block, dtype=object)
+        for part, signs, (centre, radius) in zip(samples, found, factors, strict=True):
+            values = (self._table.weights * part.nodes[:, k]).sum(axis=1)
+            steps = steps + values * (centre + radius * signs.signs[:, k].astype(np.int64).astype(object))
+        return max(accumulate(map(int, steps), initial=0))
+
+
+@lru_cache(maxsize=128)
+def recursion(denominators: tuple[Coefficients, ...], accuracy: int) -> Recursion:
+    """Return the responses over a denominator, given by its factors; the same object for the same factors."""
+    return Recursion(denominators, accuracy)
+
+
+def _key(numerator: fmpq_poly) -> tuple[str, ...]:
+    return tuple(map(str, numerator.coeffs()))
+
+
+def _limbs(weights: Integers, bits: int) -> Floats:
+    """Cut weights, shape (block, degree), into limbs of `bits` bits, lowest first, shape (limbs * degree, block)."""
+    longest = max((abs(value).bit_length() for value in weights.ravel().tolist()), default=0)
+    mask = (1 << bits) - 1
+    parts, rest = [], weights.T
+    while longest > bits:
+        parts.append(rest & mask)
+        rest, longest = rest >> bits, longest - bits
+    return np.concatenate([*parts, rest]).astype(np.float64)
+
+
+def _scaled(value: float, bits: int) -> int:
+    """`value` in units of ``2**-bits``, rounded up."""
+    return math.ceil(Fraction(value) * (1 << bits))
+
+
+def _short(value: Fraction) -> Fraction:
+    """`value` rounded up to about 64 significant bits, to keep numbers short."""
+    scale = Fraction(2) ** (value.denominator.bit_length() - value.numerator.bit_length() + 64)
+    return Fraction(math.ceil(value * scale)) / scale

@@ -1,0 +1,129 @@
+"""Sums over long responses from a few of their samples, against responses in rationals, sample by sample."""
+
+import math
+from fractions import Fraction
+from itertools import accumulate
+
+import pytest
+from flint import fmpq_poly
+
+from sosmith.gen.proof.nodes import Nodes, polynomial
+from sosmith.gen.proof.poles import Coefficients
+from sosmith.gen.proof.response import IMPULSE, common
+from sosmith.gen.proof.sums import Recursion, Weighted
+from sosmith.model.errors import ShortfallError
+
+ACCURACY = 40
+
+
+def dyadic(*values: float) -> Coefficients:
+    return tuple(map(Fraction, values))
+
+
+SLOW = dyadic(1, -1.96875, 0.970703125)
+DENOMINATORS = {
+    "one pole": (dyadic(1, -0.9375),),
+    "two real poles": (dyadic(1, -1.5, 0.5390625),),
+    "the same pair three times": (SLOW, SLOW, SLOW),
+    "every other sample is zero": (dyadic(1, 0, 0.96875),),
+    "at half the sample rate": (dyadic(1, 1.9375, 0.94140625),),
+    "slow and fast": (SLOW, dyadic(1, -0.0625)),
+    "close to each other": (SLOW, dyadic(1, -1.96875, 0.970703125 + 2.0**-30)),
+}
+NUMERATORS = (dyadic(1), dyadic(1, -2, 1), dyadic(0, 0, 0.5, -3, 1, 0.25, -2), dyadic(2.0**-30, 2.0**-31))
+
+
+def exact(numerator: Coefficients, denominators: tuple[Coefficients, ...], length: int) -> list[Fraction]:
+    """Response in rationals, cut to 300 bits, which is more than its sums are compared to."""
+    bits = 300
+    under = math.prod(map(polynomial, denominators), start=fmpq_poly([1]))
+    weights = [Fraction(int(c.p), int(c.q)) for c in under.coeffs()]
+    made: list[int] = []
+    for n in range(length):
+        value = numerator[n] * (1 << bits) if n < len(numerator) else Fraction(0)
+        made.append(math.floor(value - sum(w * made[n - k] for k, w in enumerate(weights) if 0 < k <= n)))
+    return [Fraction(value, 1 << bits) for value in made]
+
+
+@pytest.mark.parametrize("name", DENOMINATORS)
+def test_the_nodes_determine_every_sample_and_the_next_nodes(name: str) -> None:
+    made = Nodes(DENOMINATORS[name], ACCURACY, 100)
+    step = made.powers[0]
+    samples = exact(dyadic(1), DENOMINATORS[name], max(made.places) + 2 * made.block + 1)
+    nodes = [samples[at] for at in made.places]
+    near = 2 * sum(map(abs, nodes)) / 2**100 + Fraction(1, 2**200)
+    for at in range(made.block):
+        assert abs(sum(w * v for w, v in zip(made.weights[at], nodes, strict=True)) / 2**100 - samples[at]) < near
+    for k, at in enumerate(made.places):
+        after = sum(w * v for w, v in zip(step[k], nodes, strict=True)) / 2**100
+        assert abs(after - samples[at + made.block]) < near
+    assert made.residue < Fraction(1, 2**ACCURACY)
+    assert abs(made.weights).max() < 2**103
+
+
+@pytest.mark.parametrize("name", DENOMINATORS)
+def test_totals_enclose_the_sum_of_magnitudes(name: str) -> None:
+    made = Recursion(DENOMINATORS[name], ACCURACY)
+    for numerator, found in zip(NUMERATORS, made.totals(list(map(polynomial, NUMERATORS))), strict=True):
+        total = sum(map(abs, exact(numerator, DENOMINATORS[name], 4000)), Fraction(0))
+        assert abs(found.magnitude - total) <= found.uncertainty < max(total, Fraction(1)) / 2**30
+
+
+@pytest.mark.parametrize("accuracy", [40, 128])
+@pytest.mark.parametrize("name", DENOMINATORS)
+def test_the_largest_sum_up_to_any_sample(name: str, accuracy: int) -> None:
+    """Two responses, one with a constant drive, which may cancel."""
+    parts = [
+        (dyadic(1, -2, 1), Fraction(1, 2), Fraction(1, 2)),
+        (dyadic(0, 1), Fraction(3, 4), Fraction(0)),
+        (dyadic(0, 0, 0, 0.5), Fraction(-1), Fraction(1, 8)),
+    ]
+    responses = [exact(n, DENOMINATORS[name], 6000) for n, _, _ in parts]
+    steps = [
+        sum(c * h + r * abs(h) for h, (_, c, r) in zip(hs, parts, strict=True)) for hs in zip(*responses, strict=True)
+    ]
+    largest = max(accumulate(steps, initial=Fraction(0)))
+    found = Recursion(DENOMINATORS[name], accuracy).highest([Weighted(polynomial(n), c, r) for n, c, r in parts])
+    assert largest <= found < largest + max(largest, 1) * Fraction(1, 2 ** (accuracy - 16))
+
+
+def test_the_last_sample_above_a_limit() -> None:
+    made = Recursion(DENOMINATORS["slow and fast"], ACCURACY)
+    samples = exact(dyadic(1, -1), DENOMINATORS["slow and fast"], 4000)
+    for limit in (Fraction(1, 100), Fraction(1, 10**6)):
+        last = max(k for k, value in enumerate(samples) if 3 * abs(value) > limit)
+        assert made.last_above([(polynomial(dyadic(1, -1)), Fraction(3))], limit) == last
+    assert made.last_above([(polynomial(dyadic(1, -1)), Fraction(3))], Fraction(1000)) == 0
+    assert made.last_above([(polynomial(dyadic(1, -1)), Fraction(3))], Fraction(1, 2**200)) is None
+
+
+def test_a_response_without_poles_is_summed_as_it_is() -> None:
+    made = Recursion((), ACCURACY)
+    (found,) = made.totals([polynomial(dyadic(3, -0.5, 0, -2))])
+    assert abs(found.magnitude - Fraction(11, 2)) <= found.uncertainty < Fraction(1, 2**60)
+    largest = made.highest([Weighted(polynomial(dyadic(3, -0.5, 0, -2)), Fraction(1), Fraction(0))])
+    assert 3 <= largest < 3 + Fraction(1, 2**60)
+
+
+def test_samples_too_close_to_zero_for_doubles_get_their_sign_from_integers(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With a coarse bound on the doubles' error, all signs near zero are looked at again, and the sum is the same."""
+    numerators = [polynomial(dyadic(1, -1))]
+    (before,) = Recursion((SLOW,), ACCURACY).totals(numerators)
+    monkeypatch.setattr("sosmith.gen.proof.sums._ROUNDING", 2.0**-10)
+    (after,) = Recursion((SLOW,), ACCURACY).totals(numerators)
+    assert after == before
+
+
+def test_sums_of_responses_share_what_they_have_in_common() -> None:
+    one = IMPULSE.all_pole(SLOW).taps(dyadic(1, 1))
+    other = IMPULSE.all_pole(SLOW).all_pole(dyadic(1, -0.5))
+    assert common([one, other]) == tuple(sorted([SLOW, dyadic(1, -0.5)]))
+    difference = one.plus(other).minus(one)
+    assert difference.denominators == common([one, other])
+    assert difference.over(difference.denominators) == other.over(difference.denominators)
+    assert one.at_zero_frequency == 2 / sum(SLOW)
+
+
+def test_poles_beyond_the_limit_are_refused() -> None:
+    with pytest.raises(ShortfallError, match=r"^every pole must lie inside the unit circle, and one does not$"):
+        Nodes((dyadic(1, -1),), ACCURACY, 100)
