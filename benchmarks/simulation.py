@@ -26,7 +26,7 @@ from sosmith.gen.output.generate import generate
 from sosmith.gen.specification.specification import load
 from sosmith.sim.beats import Beats
 from sosmith.sim.bench import BenchRun
-from sosmith.sim.cocotb_bench import CocotbBench
+from sosmith.sim.simulator_bench import SimulatorBench
 from sosmith.sim.simulators import find_simulator
 from sosmith.sim.stream_packing import pack, random_order
 
@@ -135,7 +135,7 @@ def measured(architecture: str, repeats: int, folder: Path) -> Speeds:
     source = folder / f"{made.datapath.name}.sv"
 
     def run(sent: Beats, *, compiled: bool) -> BenchRun:
-        bench = CocotbBench(source=source, interface=facts.interface, build_dir=folder, seed=SEED, compiled=compiled)
+        bench = SimulatorBench(source=source, interface=facts.interface, build_dir=folder, seed=SEED, compiled=compiled)
         return bench.run(sent, lambda done, total: None)
 
     long, short = SAMPLES[architecture]

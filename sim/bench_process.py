@@ -1,4 +1,4 @@
-"""The bench's own process: builds the simulation and runs the bench in it, with cocotb's runner.
+"""The bench's own process: builds the simulation and runs the bench in it, with cocotb's runner or in CXXRTL.
 
 ``python -m sosmith.sim.bench_process FOLDER`` reads ``FOLDER/job.json``. All output of simulators, compilers and cocotb
 goes to this process's output, which the parent keeps in a log file.
@@ -16,6 +16,10 @@ from typing import Any
 
 from cocotb_tools.runner import Icarus, Verilator
 
+from sosmith.model.errors import ToolError
+from sosmith.sim.cxxrtl_model import build_cxxrtl
+from sosmith.sim.stream.bench import run_in
+from sosmith.sim.stream.cxxrtl_pins import CxxrtlPins, finished
 from sosmith.sim.verilated_model import Builder, Model
 
 
@@ -23,21 +27,16 @@ def main() -> None:
     """Build if anything changed since the last build, then run."""
     job = json.loads((Path(sys.argv[1]) / "job.json").read_text(encoding="utf-8"))
     try:
-        if job["simulator"] == "verilator":
-            _build_with_verilator(job)
-            _test(job, Verilator(), ["+verilator+rand+reset+2", f"+verilator+seed+{job['seed'] % 2**31 or 1}"])
-        else:
-            runner = Icarus()
-            _build_with_icarus(job, runner)
-            _test(job, runner, [])
+        _RUNS[job["simulator"]](job)
     except (RuntimeError, subprocess.CalledProcessError):
         # A command failed: the log should end with its output, not with our traceback.
         sys.exit(1)
+    except ToolError as error:
+        sys.exit(str(error))
 
 
-def _build_with_verilator(job: dict[str, Any]) -> None:
-    build = Path(job["folder"]) / "build"
-    build.mkdir(exist_ok=True)
+def _run_verilator(job: dict[str, Any]) -> None:
+    build = _build_folder(job)
     model = Model(
         source=Path(job["source"]),
         top=job["top"],
@@ -46,6 +45,29 @@ def _build_with_verilator(job: dict[str, Any]) -> None:
         waves=job["waves"],
     )
     Builder(job["version"], os.environ, build).build(model, build / job["top"])
+    _test(job, Verilator(), ["+verilator+rand+reset+2", f"+verilator+seed+{job['seed'] % 2**31 or 1}"])
+
+
+def _run_cxxrtl(job: dict[str, Any]) -> None:
+    folder, build = Path(job["folder"]), _build_folder(job)
+    library = build / "model.so"
+    build_cxxrtl(Path(job["source"]), job["top"], job["signals"], os.environ, build, library, waves=job["waves"])
+    finished(run_in(folder, CxxrtlPins(library, build / "dump.vcd" if job["waves"] else None)))
+
+
+def _run_icarus(job: dict[str, Any]) -> None:
+    runner = Icarus()
+    _build_with_icarus(job, runner)
+    _test(job, runner, [])
+
+
+_RUNS = {"verilator": _run_verilator, "icarus": _run_icarus, "cxxrtl": _run_cxxrtl}
+
+
+def _build_folder(job: dict[str, Any]) -> Path:
+    build = Path(job["folder"]) / "build"
+    build.mkdir(exist_ok=True)
+    return build
 
 
 def _build_with_icarus(job: dict[str, Any], runner: Any) -> None:
@@ -74,7 +96,7 @@ def _fingerprint(job: dict[str, Any]) -> str:
 def _test(job: dict[str, Any], runner: Any, plusargs: list[str]) -> None:
     folder = Path(job["folder"])
     runner.test(
-        test_module="sosmith.sim.stream_bench",
+        test_module="sosmith.sim.stream.cocotb_pins",
         hdl_toplevel=job["top"],
         hdl_toplevel_lang="verilog",
         build_dir=folder / "build",

@@ -9,7 +9,8 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from sosmith.gen.fpga.synthesis import Netlist, share_folder
+from sosmith.gen.fpga.synthesis import Netlist
+from sosmith.gen.fpga.yosys import share_folder
 from sosmith.model.errors import ToolError
 from sosmith.model.text_files import write_files
 

@@ -28,9 +28,9 @@ from sosmith.model.errors import SpecificationError
 from sosmith.model.reference.golden import calibrated, filtered
 from sosmith.model.text_files import write_files
 from sosmith.model.traces.trace import Trace
-from sosmith.sim.cocotb_bench import CocotbBench
 from sosmith.sim.cosimulate import CosimulationResult, cosimulate
 from sosmith.sim.gate_level import with_cell_models
+from sosmith.sim.simulator_bench import SimulatorBench
 from sosmith.sim.simulators import check_name
 
 _Kind = TypeVar("_Kind", bound=np.generic)
@@ -67,7 +67,7 @@ def simulate(
         If there is no such simulator, or the folder cannot be written or is in use by another run.
     """
     started = time.monotonic()
-    check_name(simulator)
+    check_name(simulator, netlist=gates is not None)
     with _alone_in(directory):
         for stale in ("report.json", "report.html"):  # of a run of another core, in case this run fails
             (directory / stale).unlink(missing_ok=True)
@@ -79,7 +79,7 @@ def simulate(
             build_dir = directory / "gates" / gates.name
             netlist = synthesize(source, design.datapath.name, gates, build_dir)
             source = with_cell_models(netlist, scrambled=not design.spec.hardware.reload)
-        bench = CocotbBench(
+        bench = SimulatorBench(
             source=source,
             interface=facts.interface,
             build_dir=build_dir,

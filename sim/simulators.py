@@ -12,8 +12,12 @@ from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 
+from sosmith.gen.fpga.yosys import yosys_version
 from sosmith.model.errors import SpecificationError, ToolError
 from sosmith.model.suggestion import did_you_mean
+from sosmith.sim.cxxrtl_model import USE
+
+SIMULATORS = ("verilator", "icarus", "cxxrtl")
 
 OLDEST_VERILATOR = (5, 32)
 """First version known to build cocotb 2.1's main program; 5.006 of Debian 12 does not."""
@@ -28,7 +32,7 @@ class Simulator:
     Attributes
     ----------
     name : str
-        ``"verilator"`` or ``"icarus"``.
+        ``"verilator"``, ``"icarus"`` or ``"cxxrtl"``.
     version : str
         Its version, for the report.
     path : tuple of Path
@@ -59,25 +63,32 @@ def find_simulator(name: str, folder: Path) -> Simulator:
     ToolError
         If it, or a tool that it needs, is missing; says how to install it.
     SpecificationError
-        If there is no such simulator, or it is not supported.
+        If there is no such simulator.
     """
     check_name(name)
+    if name == "cxxrtl":
+        return _find_cxxrtl()
     return _find_icarus() if name == "icarus" else _find_verilator(folder)
 
 
-def check_name(name: str) -> None:
-    """Check that a simulator exists and is supported.
+def check_name(name: str, *, netlist: bool = False) -> None:
+    """Check that a simulator exists, and that it takes netlists if `netlist` is set.
 
     Raises
     ------
     SpecificationError
-        If `name` is neither verilator nor icarus.
+        If `name` is not one of `SIMULATORS`, or is CXXRTL, whose reader lacks what the models of cells are written in.
     """
-    if name == "cxxrtl":
-        raise SpecificationError("simulator cxxrtl is not yet available: use verilator or icarus")
-    if name not in {"verilator", "icarus"}:
-        hint = did_you_mean(name, ("verilator", "icarus"))
-        raise SpecificationError(f"simulator must be verilator or icarus, not {name}{hint}")
+    known = tuple(each for each in SIMULATORS if not (netlist and each == "cxxrtl"))
+    if name not in known:
+        what = "simulator of a netlist" if netlist else "simulator"
+        listed = f"{', '.join(known[:-1])} or {known[-1]}"
+        raise SpecificationError(f"{what} must be {listed}, not {name}{did_you_mean(name, known)}")
+
+
+def _find_cxxrtl() -> Simulator:
+    _require("g++", "g++")
+    return Simulator("cxxrtl", f"{yosys_version(USE)} (Yosys)")
 
 
 def _find_icarus() -> Simulator:

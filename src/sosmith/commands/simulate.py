@@ -77,7 +77,7 @@ def _empty_cache(ctx: click.Context, param: click.Parameter, wanted: bool) -> No
     type=OneOf(["verilator", "icarus", "cxxrtl"]),
     default="verilator",
     show_default=True,
-    help="Simulator to use.",
+    help="Simulator to use; cxxrtl is Yosys's own.",
 )
 @click.option(
     "--idle",
@@ -138,7 +138,7 @@ def simulate_command(
     With --gates, the same test bench simulates the netlist of FPGA cells, with random initial values in the flip-flops,
     and an automatic choice of the architecture is made for that board.
 
-    What Verilator compiles is kept for later runs in ~/.cache/sosmith, or in the folder named by XDG_CACHE_HOME, up to
+    Compiled simulations are kept for later runs in ~/.cache/sosmith, or in the folder named by XDG_CACHE_HOME, up to
     256 MB.
 
     \b
@@ -148,7 +148,7 @@ def simulate_command(
     from sosmith.interface.specification import Specification
     from sosmith.sim.simulators import check_name
 
-    check_name(simulator)
+    check_name(simulator, netlist=gates is not None)
     netlist_for = None if gates is None else find_board(gates).name
     asked = Specification.load(spec)
     if source is not None and not _is_file(source):

@@ -309,7 +309,7 @@ class Design:
         seconds : float
             Length of a built-in trace, in seconds of simulated time.
         simulator : str
-            "verilator" or "icarus".
+            "verilator", "icarus" or "cxxrtl".
         gates : str
             Name of a board: simulate the netlist that Yosys synthesizes for its FPGA instead of the SystemVerilog.
         idle, stall : float
@@ -338,7 +338,7 @@ class Design:
         from sosmith.sim.simulation import simulate
         from sosmith.sim.simulators import check_name
 
-        check_name(simulator)
+        check_name(simulator, netlist=gates is not None)
         for name, share in (("idle", idle), ("stall", stall)):
             if not 0 <= share <= 0.99:
                 raise SpecificationError(f"{name} must be from 0 to 0.99, not {share}")

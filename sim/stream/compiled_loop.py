@@ -1,4 +1,4 @@
-"""Streams samples through a Verilated core with the compiled loop of ``stream_loop.cpp``, from within the simulator."""
+"""Streams samples through a core with the loop of ``loop.h``, which is compiled together with the core's model."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ import random
 from collections.abc import Callable
 
 from sosmith.sim.beats import Beats
-from sosmith.sim.bursts import Pace
-from sosmith.sim.stream_rules import BUSY, PROBED_SHARE, SILENCE, ProtocolError, Word, followed, hung, moved
+from sosmith.sim.stream.bursts import Pace
+from sosmith.sim.stream.rules import BUSY, PROBED_SHARE, SILENCE, ProtocolError, Word, followed, hung, moved
 
 _BLOCK = 1 << 17  # clocks between two reports of progress: some tens of milliseconds
 _GOES_ON, _DONE, _FOLLOWED, _MOVED, _HUNG = range(5)
@@ -31,7 +31,7 @@ class _Word(ctypes.Structure):
 
 
 class _Stream(ctypes.Structure):
-    """State of the loop; ``stream_loop.cpp`` has the same structure."""
+    """State of the loop; ``loop.h`` has the same structure."""
 
     _fields_ = (
         ("sent_tdest", ctypes.c_void_p),
@@ -61,6 +61,7 @@ class _Stream(ctypes.Structure):
 
 
 def stream(
+    library: ctypes.CDLL,
     words: Beats,
     received: Beats,
     *,
@@ -76,12 +77,14 @@ def stream(
 
     Parameters
     ----------
+    library : CDLL
+        Where the loop is.
     words : Beats
         What to send.
     received : Beats
         Arrays of the same length, to be filled with what comes out.
     seed, idle, stall
-        The random pace, as in `sosmith.sim.bursts`.
+        The random pace, as in `sosmith.sim.stream.bursts`.
     patience : int
         Clocks that the core may take for one sample.
     progress : callable
@@ -96,7 +99,7 @@ def stream(
     error : ProtocolError or None
         The rule that the core broke.
     """
-    loop = ctypes.CDLL(None).sosmith_stream
+    loop = library.sosmith_stream
     loop.restype, loop.argtypes = ctypes.c_int32, (ctypes.c_void_p, ctypes.c_uint64)
     source = random.Random(seed)
     _, numbers, _ = source.getstate()

@@ -1,41 +1,35 @@
-// The main program of a Verilated core under cocotb, and the loop that streams samples through the core.
+// The loop that streams samples through a simulated core, compiled together with the core's model.
 //
-// cocotb's own main program is included as it is; only the model that it makes is remembered. A cocotb test calls
-// sosmith_stream by ctypes while the clock is low and every input has settled: the loop drives the same model, and
-// leaves it as cocotb's clock would, low and settled. Simulated time stands still meanwhile.
+// The file that includes this one defines the functions declared first, which are all that the loop knows of the model.
 //
-// One clock here is one clock of `StreamBench.stream` in stream_bench.py, rule by rule and draw by draw: tests hold both
-// together. -DBENCH_TDEST and -DBENCH_TUSER tell which optional signals the streams have.
+// sosmith_stream is called by ctypes while the clock is low and every input has settled, and leaves the core so.
+// Simulated time stands still meanwhile. One clock here is one clock of `StreamBench.stream` in bench.py, rule by rule
+// and draw by draw: tests hold both together.
 
 #include <cstdint>
 
-#include "Vtop.h"
-
-static Vtop *core;
-
-class RememberedTop : public Vtop {
-  public:
-    explicit RememberedTop(const char *name) : Vtop(name) { core = this; }
-};
-
-#define Vtop RememberedTop
-#include "verilator.cpp"
-#undef Vtop
-
 namespace {
-
-enum Outcome : int32_t { GOES_ON, DONE, FOLLOWED, MOVED, HUNG };
-
-struct Pace {
-    double waiting, spread, share;
-    uint64_t left;
-};
 
 struct Word {
     uint64_t tdest, tdata, tuser;
     bool operator!=(const Word &other) const {
         return tdest != other.tdest || tdata != other.tdata || tuser != other.tuser;
     }
+};
+
+void settle(bool clock);  // set the clock, and let everything follow
+bool input_ready();       // s_axis_tready
+bool output_valid();      // m_axis_tvalid
+Word output();            // m_axis_tdest, m_axis_tdata, m_axis_tuser; 0 for what the core lacks
+void set_input_valid(bool value);
+void set_output_ready(bool value);
+void set_input(uint64_t tdest, uint64_t tdata);
+
+enum Outcome : int32_t { GOES_ON, DONE, FOLLOWED, MOVED, HUNG };
+
+struct Pace {
+    double waiting, spread, share;
+    uint64_t left;
 };
 
 // State of the loop between its blocks; compiled_loop.py has the same structure.
@@ -105,46 +99,24 @@ bool goes(Pace &pace, Stream &s) {
     return uniform(s) >= pace.share;
 }
 
-void settle(bool clock) {
-    core->aclk = clock;
-    core->eval();
-}
-
-Word output() {
-    Word word{0, static_cast<uint64_t>(core->m_axis_tdata), 0};
-#ifdef BENCH_TDEST
-    word.tdest = core->m_axis_tdest;
-#endif
-#ifdef BENCH_TUSER
-    word.tuser = core->m_axis_tuser;
-#endif
-    return word;
-}
-
 void offer(const Stream &s) {
-    core->s_axis_tvalid = s.offered != 0;
-    if (s.offered) {
-        core->s_axis_tdata = s.sent_tdata[s.sent];
-#ifdef BENCH_TDEST
-        core->s_axis_tdest = s.sent_tdest[s.sent];
-#endif
-    }
+    set_input_valid(s.offered != 0);
+    if (s.offered) set_input(s.sent_tdest[s.sent], s.sent_tdata[s.sent]);
 }
 
-// Whether any output follows s_axis_tvalid or m_axis_tready while the clock is low.
-bool outputs_follow() {
-    const auto valid_held = core->s_axis_tvalid, ready_held = core->m_axis_tready;
-    const auto ready = core->s_axis_tready, valid = core->m_axis_tvalid;
+// Whether any output follows s_axis_tvalid or m_axis_tready while the clock is low. They are left as they are given.
+bool outputs_follow(bool offered, bool accepting) {
+    const bool ready = input_ready(), valid = output_valid();
     const Word word = output();
     for (int inputs = 0; inputs < 4; ++inputs) {
-        core->s_axis_tvalid = inputs >> 1;
-        core->m_axis_tready = inputs & 1;
-        core->eval();
-        if (core->s_axis_tready != ready || core->m_axis_tvalid != valid || output() != word) return true;
+        set_input_valid(inputs >> 1);
+        set_output_ready(inputs & 1);
+        settle(false);
+        if (input_ready() != ready || output_valid() != valid || output() != word) return true;
     }
-    core->s_axis_tvalid = valid_held;
-    core->m_axis_tready = ready_held;
-    core->eval();
+    set_input_valid(offered);
+    set_output_ready(accepting);
+    settle(false);
     return false;
 }
 
@@ -154,9 +126,9 @@ uint64_t sleep_while_busy(uint64_t limit) {
     settle(false);
     uint64_t clocks = 1;
     for (;; ++clocks) {
-        const bool woken = core->s_axis_tready || core->m_axis_tvalid;
+        const bool woken = input_ready() || output_valid();
         settle(true);
-        if (woken || clocks == limit || core->s_axis_tready || core->m_axis_tvalid) return clocks;
+        if (woken || clocks == limit || input_ready() || output_valid()) return clocks;
         settle(false);
     }
 }
@@ -178,14 +150,14 @@ extern "C" int32_t sosmith_stream(Stream *stream, uint64_t clocks) {
         const bool ready = goes(s.stall, s), probed = uniform(s) < s.probed_share;
         if (probed) {
             offer(s);
-            core->m_axis_tready = ready;
+            set_output_ready(ready);
             settle(false);
-            if (outputs_follow()) {
+            if (outputs_follow(s.offered, ready)) {
                 outcome = FOLLOWED;
                 break;
             }
         }
-        const bool valid = core->m_axis_tvalid, accepted = s.offered && core->s_axis_tready;
+        const bool valid = output_valid(), accepted = s.offered && input_ready();
         const Word word = output();
         if (s.held_valid && (!valid || word != s.held)) {
             s.word = word;
@@ -194,7 +166,7 @@ extern "C" int32_t sosmith_stream(Stream *stream, uint64_t clocks) {
             break;
         }
         offer(s);
-        core->m_axis_tready = ready;
+        set_output_ready(ready);
         s.held_valid = valid && !ready;
         s.held = word;
         if (valid && ready) {

@@ -1,4 +1,4 @@
-"""The compiled loop beside the one in Python: the same samples, clocks and words about every broken rule."""
+"""Both loops in both simulators that have them: the same samples, clocks and words about every broken rule."""
 
 import json
 import random
@@ -10,13 +10,17 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 from cocotb_tools.runner import Verilator
+from tests.sim.stream.both_loops import run_cases
 
 from sosmith.sim.beats import Beats
-from sosmith.sim.bursts import Pace, below
+from sosmith.sim.cxxrtl_model import build_cxxrtl
 from sosmith.sim.simulators import find_simulator
+from sosmith.sim.stream.bursts import Pace, below
+from sosmith.sim.stream.cxxrtl_pins import CxxrtlPins, finished
 from sosmith.sim.verilated_model import Builder, Model
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
+FAULTY = Path(__file__).with_name("faulty.sv")
 SAMPLES = 200
 FOLLOWS = "outputs must not follow s_axis_tvalid or m_axis_tready within a clock, as they did at clock "
 HUNG = "a sample must move at least every "
@@ -66,25 +70,33 @@ def cases() -> list[dict[str, Any]]:
     ]
 
 
-@pytest.fixture(scope="module")
-def outcomes(tmp_path_factory: pytest.TempPathFactory) -> list[list[Any]]:
-    """Outcomes of all cases, with the loop in Python and with the compiled one."""
-    folder = tmp_path_factory.mktemp("both")
+def prepare(folder: Path) -> None:
+    folder.mkdir()
     rng = np.random.default_rng(3)
     tdest, tdata = rng.integers(0, 4, SAMPLES), rng.integers(0, 2**16, SAMPLES).astype(np.uint64)
     Beats(tdest, tdata, np.zeros(SAMPLES, np.uint8)).save(folder / "sent.npy")
     (folder / "cases.json").write_text(json.dumps(cases()), encoding="utf-8")
+
+
+def found_in(folder: Path) -> list[list[Any]]:
+    found: list[list[Any]] = json.loads((folder / "outcomes.json").read_text(encoding="utf-8"))
+    return found
+
+
+@pytest.fixture(scope="module")
+def outcomes(tmp_path_factory: pytest.TempPathFactory) -> list[list[Any]]:
+    """Outcomes of all cases in Verilator, with the loop in Python and with the compiled one."""
+    folder = tmp_path_factory.mktemp("both") / "verilator"
+    prepare(folder)
     tool = find_simulator("verilator", folder / "bin")
     signals = ("tdest", "tdata", "tvalid", "tready")
     ports = ("aclk", "aresetn", "fault", "work", *(f"s_axis_{name}" for name in signals), "m_axis_tuser")
     ports += tuple(f"m_axis_{name}" for name in signals)
-    model = Model(
-        source=Path(__file__).with_name("faulty.sv"), top="faulty", ports=ports, signals=("tdest", "tuser"), waves=False
-    )
+    model = Model(source=FAULTY, top="faulty", ports=ports, signals=("tdest", "tuser"), waves=False)
     Builder(tool.version, tool.environment, folder).build(model, folder / "faulty")
     with patch.object(sys, "path", [str(ROOT), *sys.path]):  # where the simulator's Python looks
         Verilator().test(
-            test_module="tests.sim.both_loops_bench",
+            test_module="tests.sim.stream.both_loops",
             hdl_toplevel="faulty",
             hdl_toplevel_lang="verilog",
             build_dir=folder,
@@ -93,14 +105,24 @@ def outcomes(tmp_path_factory: pytest.TempPathFactory) -> list[list[Any]]:
             timescale=("1ns", "1ps"),
             extra_env={"BOTH_LOOPS": str(folder), "COCOTB_LOG_LEVEL": "WARNING"},
         )
-    found: list[list[Any]] = json.loads((folder / "outcomes.json").read_text(encoding="utf-8"))
-    return found
+    return found_in(folder)
 
 
 def test_both_loops_agree_on_every_sample_clock_and_failure(outcomes: list[list[Any]]) -> None:
     assert len(outcomes) == len(cases())
     for case, (in_python, compiled) in zip(cases(), outcomes, strict=True):
         assert compiled == in_python, case
+
+
+def test_cxxrtl_agrees_on_them_too(outcomes: list[list[Any]], tmp_path: Path) -> None:
+    folder = tmp_path / "cxxrtl"
+    prepare(folder)
+    library = folder / "faulty.so"
+    tool = find_simulator("cxxrtl", folder)
+    build_cxxrtl(FAULTY, "faulty", ("tdest", "tuser"), tool.environment, folder, library)
+    finished(run_cases(CxxrtlPins(library), folder))
+    for case, mine, verilators in zip(cases(), found_in(folder), outcomes, strict=True):
+        assert mine == verilators, case
 
 
 def test_every_rule_is_broken_and_named(outcomes: list[list[Any]]) -> None:

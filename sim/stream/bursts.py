@@ -1,6 +1,6 @@
 """The random pace of a bench: bursts of waiting, and the clocks to probe, drawn from one seed.
 
-The draws are stated here down to the bit, because a second implementation in ``stream_loop.cpp`` must draw the same:
+The draws are stated here down to the bit, because a second implementation in ``loop.h`` must draw the same:
 
 - ``random()`` and ``getrandbits()`` are those of Python's `random.Random`: the Mersenne Twister MT19937, whose 32-bit
   words w give ``getrandbits(k) = w >> (32 - k)`` and, from two of them, ``random() = ((w1 >> 5) * 2**26 + (w2 >> 6)) /

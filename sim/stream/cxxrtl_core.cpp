@@ -1,0 +1,96 @@
+// A core as CXXRTL's model, with the loop that streams samples through it, as a library that Python loads.
+//
+// model.cc is what Yosys has written of the core, whose top module it calls "core" there. -DBENCH_TDEST and
+// -DBENCH_TUSER tell which optional signals the streams have.
+
+#include <cstdint>
+#include <fstream>
+#include <string>
+
+#include "loop.h"
+#include "model.cc"
+
+#include <cxxrtl/cxxrtl_vcd.h>
+
+namespace {
+
+cxxrtl_design::p_core core;
+
+const debug_items &items() {
+    static debug_items all;
+    if (all.table.empty()) core.debug_info(&all, nullptr, "core ");
+    return all;
+}
+
+const debug_item &item(const char *port) { return items()[std::string("core ") + port]; }
+
+void settle(bool clock) {
+    core.p_aclk.set(clock);
+    core.step();
+    if (clock) core.step();  // what depends on registers follows them
+}
+
+bool input_ready() { return core.p_s__axis__tready.get<bool>(); }
+bool output_valid() { return core.p_m__axis__tvalid.get<bool>(); }
+void set_input_valid(bool value) { core.p_s__axis__tvalid.set(value); }
+void set_output_ready(bool value) { core.p_m__axis__tready.set(value); }
+
+void set_input([[maybe_unused]] uint64_t tdest, uint64_t tdata) {
+    core.p_s__axis__tdata.set(tdata);
+#ifdef BENCH_TDEST
+    core.p_s__axis__tdest.set(tdest);
+#endif
+}
+
+Word output() {
+    Word word{0, core.p_m__axis__tdata.get<uint64_t>(), 0};
+#ifdef BENCH_TDEST
+    word.tdest = core.p_m__axis__tdest.get<uint64_t>();
+#endif
+#ifdef BENCH_TUSER
+    word.tuser = core.p_m__axis__tuser.get<uint64_t>();
+#endif
+    return word;
+}
+
+// A waveform, written while the core runs.
+struct Waves {
+    std::ofstream file;
+    vcd_writer writer;
+    explicit Waves(const char *path) : file(path) {
+        writer.timescale(1, "ns");
+        writer.add_without_memories(items());
+    }
+    void sample(uint64_t time) {
+        writer.sample(time);
+        file << writer.buffer;
+        file.flush();
+        writer.buffer.clear();
+    }
+};
+
+Waves *waves;
+
+}  // namespace
+
+// Value of a port of up to 64 bits.
+extern "C" uint64_t sosmith_read(const char *port) {
+    const debug_item &found = item(port);
+    return found.curr[0] | (found.width > 32 ? uint64_t{found.curr[1]} << 32 : 0);
+}
+
+// Set an input of up to 64 bits.
+extern "C" void sosmith_write(const char *port, uint64_t value) {
+    const debug_item &found = item(port);
+    found.curr[0] = static_cast<uint32_t>(value);
+    if (found.width > 32) found.curr[1] = static_cast<uint32_t>(value >> 32);
+}
+
+// Write a waveform from now on, in a file that this makes.
+extern "C" void sosmith_open_waves(const char *path) { waves = new Waves(path); }
+
+// Set the clock at a time in nanoseconds, later than all before, and let everything follow.
+extern "C" void sosmith_settle(bool clock, uint64_t time) {
+    settle(clock);
+    if (waves) waves->sample(time);
+}
