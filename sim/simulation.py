@@ -20,6 +20,7 @@ from sosmith.gen.fpga.synthesis import Netlist, synthesize
 from sosmith.gen.output.core_facts import CoreFacts, core_facts
 from sosmith.gen.output.generate import generate
 from sosmith.gen.report.evidence import Alternative, Evidence
+from sosmith.gen.report.provenance import provenance_of
 from sosmith.gen.specification.choices import ERROR_FEEDBACK
 from sosmith.gen.word_lengths.other_realization import with_realization
 from sosmith.gen.word_lengths.quantized import Quantized
@@ -179,6 +180,7 @@ def _evidence(
         limit_cycles=facts.limit_cycles,
         filter=_filter_facts(quantized),
         alternatives=_alternatives(quantized, codes, golden),
+        provenance=provenance_of(design, traces, netlist),
     )
     return evidence.of_channel(0) if len(traces) == 1 else evidence
 

@@ -47,6 +47,10 @@ class Device:
     block_ram: str
     block_rams: int
 
+    def luts(self, cells: dict[str, int]) -> int:
+        """Count the LUT4 that a netlist takes, also as carry cells and distributed memory; `cells` as for `excess`."""
+        return sum(weight * cells.get(kind, 0) for kind, weight in _LUTS.items())
+
     def excess(self, cells: dict[str, int]) -> list[str]:
         """List the cells of which a netlist needs more than the FPGA has; placement may fail even if there are none.
 
@@ -60,9 +64,8 @@ class Device:
         list of str
             Items such as ``"13 SB_MAC16 of 8"``.
         """
-        luts = sum(weight * cells.get(kind, 0) for kind, weight in _LUTS.items())
         needed = [
-            ("LUT4", luts, self.logic_cells),
+            ("LUT4", self.luts(cells), self.logic_cells),
             (self.multiplier, cells.get(self.multiplier or "", 0), self.multipliers),
             (self.block_ram, cells.get(self.block_ram, 0), self.block_rams),
         ]

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from sosmith.gen.filter.response import FilterFacts
 from sosmith.gen.fpga.synthesis import Netlist
 from sosmith.gen.output.core_facts import LimitCycleFacts, NodeFormat, SectionFacts
+from sosmith.gen.report.provenance import Provenance
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
@@ -102,6 +103,8 @@ class Evidence:
         None for a core without a filter.
     alternatives : sequence of Alternative
         Other realizations at the same word lengths, possibly none.
+    provenance : Provenance or None
+        What the run is told by; None if unknown.
     """
 
     name: str
@@ -143,6 +146,7 @@ class Evidence:
     filter: FilterFacts | None = None
     gates: Netlist | None = None
     alternatives: Sequence[Alternative] = ()
+    provenance: Provenance | None = None
 
     def __post_init__(self) -> None:
         for name in ("lsb", "bound", "max_error"):

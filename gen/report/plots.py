@@ -39,8 +39,11 @@ Array = npt.NDArray[np.float64]
 WIDE, NARROW = 940, 460
 """Widths of the drawing in CSS pixels: across the page, and half the page or a telephone."""
 
-ROLES = ("ink", "muted", "grid", "truth", "unfiltered", "golden", "hardware", "limit", "asked")
-COLOUR = {role: f"#00000{index:x}" for index, role in enumerate(ROLES, start=1)}
+SERIES = tuple(f"series{k}" for k in range(8))
+"""Colour roles of curves that lie beside each other as equals."""
+
+ROLES = ("ink", "muted", "grid", "truth", "unfiltered", "golden", "hardware", "limit", "asked", *SERIES)
+COLOUR = {role: f"#0000{index:02x}" for index, role in enumerate(ROLES, start=1)}
 PANEL_HEIGHT = 350
 
 IDEAL_LINE: dict[str, Any] = {"lw": 3.6}
@@ -73,7 +76,7 @@ STYLE: dict[Any, Any] = {
 }
 
 
-def _draw(name: str, title: str, width: int, height: int, paint: Callable[[Figure], None]) -> str:
+def draw(name: str, title: str, width: int, height: int, paint: Callable[[Figure], None]) -> str:
     """Paint a figure of `width` by `height` CSS pixels and return it as one ``<svg>`` element.
 
     Parameters
@@ -148,7 +151,7 @@ def _range_of(values: Array, margin: float) -> tuple[float, float]:
     return low - space, high + space
 
 
-def _time_axis(axes: Axes, time: Array) -> tuple[float, str]:
+def time_axis(axes: Axes, time: Array) -> tuple[float, str]:
     """Label the time axis and return the factor from seconds to its unit."""
     factor, unit = scale(float(np.max(np.abs(time))), "s")
     axes.set_xlabel(f"time in {unit}")
@@ -161,7 +164,7 @@ def trace_figure(evidence: Evidence, width: int) -> str:
 
     def paint(figure: Figure) -> None:
         axes = figure.subplots()
-        factor, _ = _time_axis(axes, evidence.time)
+        factor, _ = time_axis(axes, evidence.time)
         traces = (evidence.unfiltered, evidence.truth, evidence.golden, evidence.hardware)
         shown = [values for values in traces if values is not None]
         scaling, unit = scale(max(float(np.max(np.abs(v))) for v in shown), evidence.unit)
@@ -180,7 +183,7 @@ def trace_figure(evidence: Evidence, width: int) -> str:
         axes.set_ylim(*_range_of(np.concatenate(shown) * scaling, margin=0.06))
         axes.set_ylabel(f"output in {unit}" if unit else "output")
 
-    return _draw("trace", "Output against time", width, 310, paint)
+    return draw("trace", "Output against time", width, 310, paint)
 
 
 def _fills_area(values: Array, width: int) -> bool:
@@ -205,7 +208,7 @@ def close_up_figure(evidence: Evidence, width: int) -> str:
         axes = figure.subplots()
         near = close_up(evidence)
         time, golden, hardware = evidence.time[near], evidence.golden[near], evidence.hardware[near]
-        factor, _ = _time_axis(axes, time)
+        factor, _ = time_axis(axes, time)
         both = np.concatenate([golden, hardware])
         scaling, unit = scale(float(np.max(np.abs(both))), evidence.unit)
         axes.plot(time * factor, golden * scaling, color=COLOUR["golden"], **IDEAL_LINE)
@@ -216,7 +219,7 @@ def close_up_figure(evidence: Evidence, width: int) -> str:
         worst = int(np.argmax(np.abs(hardware - golden)))
         axes.axvline(time[worst] * factor, color=COLOUR["muted"], lw=1.0, ls=":")
 
-    return _draw("close-up", "Output around the largest error", width, 250, paint)
+    return draw("close-up", "Output around the largest error", width, 250, paint)
 
 
 class Limit(NamedTuple):
@@ -250,7 +253,7 @@ def error_figure(evidence: Evidence, width: int) -> str:
 
     def paint(figure: Figure) -> None:
         axes = figure.subplots()
-        factor, _ = _time_axis(axes, evidence.time)
+        factor, _ = time_axis(axes, evidence.time)
         inside, _outside = error_limits(evidence)
         top = 1.25 * max([_error_peak(evidence), *(limit.value for limit in inside)])
         scaling, unit = scale(top, evidence.unit)
@@ -264,7 +267,7 @@ def error_figure(evidence: Evidence, width: int) -> str:
             axes.axvline(evidence.time[evidence.first_mismatch] * factor, color=COLOUR["limit"], lw=1.6)
         axes.set_ylabel(f"error in {unit}" if unit else "error")
 
-    return _draw("error", "Error of the hardware against time", width, 270, paint)
+    return draw("error", "Error of the hardware against time", width, 270, paint)
 
 
 def histogram_figure(evidence: Evidence) -> str:
@@ -283,7 +286,7 @@ def histogram_figure(evidence: Evidence) -> str:
         axes.set_xlabel("error in steps of the output (LSB)")
         axes.set_ylabel("share of samples in %")
 
-    return _draw("histogram", "How often each error occurs", NARROW, PANEL_HEIGHT, paint)
+    return draw("histogram", "How often each error occurs", NARROW, PANEL_HEIGHT, paint)
 
 
 def ranking_figure(
@@ -316,7 +319,7 @@ def ranking_figure(
             if value > 0:
                 axes.plot([low, value], [place, place], color=COLOUR[role], lw=2.5, solid_capstyle="butt")
                 axes.plot([value], [place], color=COLOUR[role], marker="o", ms=9)
-        axes.set_yticks(range(len(rows)), [_clip(name, width // 20) for name, _value, _role in rows])
+        axes.set_yticks(range(len(rows)), [clip(name, width // 20) for name, _value, _role in rows])
         axes.grid(visible=False, axis="y")
         axes.tick_params(axis="y", length=0)
         axes.xaxis.set_major_locator(LogLocator(numticks=5))
@@ -324,10 +327,11 @@ def ranking_figure(
         axes.xaxis.set_major_formatter(FuncFormatter(lambda v, _: quantity(v, unit, 1)))
         axes.set_xlabel("largest error")
 
-    return _draw("ranking", "Largest errors beside each other", width, 80 + 40 * len(rows), paint)
+    return draw("ranking", "Largest errors beside each other", width, 80 + 40 * len(rows), paint)
 
 
-def _clip(name: str, longest: int) -> str:
+def clip(name: str, longest: int) -> str:
+    """Shorten a name that is longer than `longest` characters."""
     return name if len(name) <= longest else name[: longest - 1] + "…"
 
 
@@ -340,7 +344,8 @@ def alternatives_figure(evidence: Evidence) -> str:
     return ranking_figure(rows, marks, evidence.unit, NARROW)
 
 
-def _frequency_axis(axes: Axes, frequency: Array) -> None:
+def frequency_axis(axes: Axes, frequency: Array) -> None:
+    """Make the lower axis logarithmic, over all of `frequency`, in Hz."""
     axes.set_xscale("log")
     axes.set_xlim(float(frequency[0]), float(frequency[-1]))
     axes.xaxis.set_major_locator(LogLocator(numticks=6))
@@ -384,9 +389,9 @@ def magnitude_figure(facts: FilterFacts) -> str:
         lower.set_ylabel(f"difference\nin {unit}")
         lower.yaxis.set_major_locator(MaxNLocator(3))
         lower.set_xlabel("frequency")
-        _frequency_axis(lower, frequency)
+        frequency_axis(lower, frequency)
 
-    return _draw("magnitude", "Gain against frequency", NARROW, PANEL_HEIGHT, paint)
+    return draw("magnitude", "Gain against frequency", NARROW, PANEL_HEIGHT, paint)
 
 
 def delay_figure(facts: FilterFacts) -> str:
@@ -407,9 +412,9 @@ def delay_figure(facts: FilterFacts) -> str:
         axes.set_ylim(min(0.0, 1.08 * float(np.nanmin(both)) * factor), 1.08 * top if top > 0 else None)
         axes.set_ylabel(f"group delay in {unit}")
         axes.set_xlabel("frequency")
-        _frequency_axis(axes, frequency)
+        frequency_axis(axes, frequency)
 
-    return _draw("delay", "Group delay against frequency", NARROW, PANEL_HEIGHT, paint)
+    return draw("delay", "Group delay against frequency", NARROW, PANEL_HEIGHT, paint)
 
 
 def _zoom_box(facts: FilterFacts) -> tuple[float, float, float]:
@@ -480,4 +485,4 @@ def pole_zero_figure(facts: FilterFacts) -> str:
             _paint_plane(panels[1], facts, (real, imag), half)
             panels[1].set_title("close-up of the poles", fontsize=12)
 
-    return _draw("poles", "Poles and zeros in the z plane", NARROW, 250, paint)
+    return draw("poles", "Poles and zeros in the z plane", NARROW, 250, paint)

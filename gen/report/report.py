@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 from sosmith.gen.filter.response import MASK_TOLERANCE_DB, FilterFacts, ResponseMeasures, measure_response
 from sosmith.gen.output.manifest import limit_cycle_entry
 from sosmith.gen.quantity import plain_number, quantity
+from sosmith.gen.report.curves import error_over_time, error_spectrum, filter_curve
 from sosmith.gen.report.evidence import Evidence
 from sosmith.gen.report.page import render_page
+from sosmith.gen.report.provenance import Provenance
 from sosmith.gen.version import __version__
 from sosmith.model.reference.accuracy import accuracy_percent, error_statistics, sqnr_db
 from sosmith.model.text_files import to_json, write_files
@@ -107,7 +110,10 @@ def summarise(evidence: Evidence) -> dict[str, Any]:
         the board whose netlist ran, None if the SystemVerilog itself did), ``lsb``, ``range``, ``max_error``,
         ``error.{max_lsb,mean,proven,parts}``, ``first_mismatch``, ``latency_cycles``, ``cycles_per_sample`` (of
         this run, waiting included), ``alternatives``, ``limit_cycles``, ``tools``, ``sosmith_version``,
-        ``shortfalls`` (why it did not pass) and ``notes``. Lengths are in samples or cycles, errors in
+        ``shortfalls`` (why it did not pass), ``notes``, ``provenance.{specification,specification_sha256,
+        reference_sha256,trace_sha256,datapath_sha256,cycles_per_sample,cost}`` (see
+        `sosmith.gen.report.provenance.Provenance`) and ``curves.{error,spectrum,filter}`` (see
+        `sosmith.gen.report.curves`). Lengths are in samples or cycles, errors in
         ``error.unit``. What is unknown or not finite is None.
         ``passed`` is true if hardware and integer model agree bit for bit, the largest error is within
         ``error.bound`` and ``max_error``, and the quantized filter is stable and meets the specification's
@@ -160,9 +166,19 @@ def summarise(evidence: Evidence) -> dict[str, Any]:
         "wall_seconds": evidence.wall_seconds,
         "sosmith_version": __version__,
         "tools": dict(evidence.tools),
+        "provenance": None if evidence.provenance is None else _entry(evidence.provenance),
+        "curves": {
+            "error": error_over_time(evidence),
+            "spectrum": error_spectrum(evidence),
+            "filter": filter_curve(evidence.filter),
+        },
     }
     cleaned: dict[str, Any] = _without_infinities(summary)
     return cleaned
+
+
+def _entry(provenance: Provenance) -> dict[str, Any]:
+    return {each.name: getattr(provenance, each.name) for each in fields(provenance)}
 
 
 def _response_summary(measures: ResponseMeasures | None) -> dict[str, float | None]:

@@ -175,7 +175,7 @@ NEEDED = {
         "--seed",
     ),
     "emulate": ("SPEC", "[SCENARIO|FILE.toml]", "CSV", "--seconds", "--measurements", "--seed", "stdout"),
-    "compare": ("REPORT REPORT...", "--json", "HTML"),
+    "compare": ("REPORT REPORT...", "--baseline REPORT", "--tolerance", "--markdown", "--json", "HTML"),
     "calibrate": ("clearance_mm", "sosmith calibrate add", "export"),
     "spectrum": ("TRACE", "--tolerance", "--passband", "--motion", "--into SPEC", "--json"),
     "vehicle": ("PARAMETERS is a TOML file", "--speed", "tables 5 to 8", "--json"),
@@ -321,12 +321,24 @@ UNFIT = {
         ("init", "demo.toml"),
         "demo.toml: the file must not exist yet; use --force to overwrite it",
     ),
-    "no report there": (
+    "one report alone": (
         ("compare", "none"),
+        "reports must hold at least two reports, not 1",
+    ),
+    "tolerance without a baseline": (
+        ("compare", "none", "none", "--tolerance", "error=0"),
+        "a tolerance must come with a baseline, not without one",
+    ),
+    "Markdown and JSON": (
+        ("compare", "none", "none", "--markdown", "--json"),
+        "--markdown must come without --json, not with it",
+    ),
+    "no report there": (
+        ("compare", "none", "none"),
         "none must be a readable report.json or a folder that holds one, not: no such file or directory",
     ),
     "report that is none": (
-        ("compare", "plain.toml"),
+        ("compare", "plain.toml", "plain.toml"),
         "plain.toml must be a report.json of sosmith, not text that is no JSON",
     ),
 }
@@ -694,7 +706,7 @@ def test_texts_of_the_user_are_no_markup(sosmith: Command) -> None:
     outcome = sosmith("simulate", "plain.toml", "--trace", "noise", "--seconds", "0.1", "--simulator", "icarus")
     assert (outcome.status, outcome.messages[1:]) == (0, [])
     assert "[/x]" in outcome.stdout
-    compared = sosmith("compare", "build/plain")
+    compared = sosmith("compare", "build/plain", "--baseline", "build/plain", "--tolerance", "error=0,cycles=0,words=0")
     assert compared.status == 0
     assert "[/x]" in compared.stdout
 
@@ -705,8 +717,8 @@ def test_reports_side_by_side(sosmith: Command) -> None:
         assert sosmith("simulate", "plain.toml", *options, "-o", realization).status == 0
     table = sosmith("compare", "df1", "df1_ef2/report.json")
     assert (table.status, table.messages) == (0, [])
-    assert "plain, df1 " in table.stdout
-    assert "plain, df1_ef2" in table.stdout
+    assert "What differs" in table.stdout
+    assert "All 2 cost the same, 42 instructions; df1 has the smallest error limit" in " ".join(table.stdout.split())
     compared = sosmith("compare", "df1", "df1_ef2", "--json", "-o", "pages/both.html")
     assert compared.messages == ["sosmith: wrote pages/both.html"]
     tree = json.loads(compared.stdout)
@@ -714,6 +726,32 @@ def test_reports_side_by_side(sosmith: Command) -> None:
     page = Path("pages/both.html").read_text(encoding="utf-8")
     assert page.count("df1_ef2") > 0
     assert "http" not in re.sub(r"http://www\.w3\.org/[\w/.]*", "", page)
+
+
+def test_the_example_workflow(sosmith: Command) -> None:
+    """A design broken on purpose ends it with 1, a better one with 0; the specification is the user's own."""
+    text = (Path(__file__).parents[2] / "examples" / "workflows" / "accuracy.yml").read_text(encoding="utf-8")
+    (simulate, compare) = re.findall(r"run: sosmith/run (.*)", text)
+    assert simulate == "simulate filter.toml -o build/filter"
+    command, summary = compare.split(" >> ")
+    assert summary == '"$GITHUB_STEP_SUMMARY"'
+    quick = ("--trace", "noise", "--seconds", "0.2", "--simulator", "icarus")
+    parallel = '[hardware]\narchitecture = "parallel"\n'
+    designs = {"accuracy": ("df1", '"faithful"'), "broken": ("df1", "0.01"), "better": ("df1_ef1", "0.0004")}
+    outcomes: dict[str, Outcome] = {}
+    for name, (realization, max_error) in designs.items():
+        Path("filter.toml").write_text(FILTER.replace('"faithful"', max_error) + parallel, encoding="utf-8")
+        folder = name if name == "accuracy" else "build/filter"
+        assert sosmith("simulate", "filter.toml", "--realization", realization, *quick, "-o", folder).status == 0
+        if name != "accuracy":
+            outcomes[name] = sosmith(*command.split())
+    assert (outcomes["broken"].status, outcomes["better"].status) == (1, 0)
+    assert outcomes["broken"].messages[-1] == (
+        "sosmith: error: no report must be worse than the baseline, or impossible to judge, not plain"
+    )
+    assert outcomes["broken"].stdout.startswith("## ❌ plain falls short beside the baseline\n\n- largest error: ")
+    assert outcomes["better"].stdout.startswith("## ✅ plain is not worse than the baseline")
+    assert Path("build/comparison.html").exists()
 
 
 # What only a process shows.

@@ -80,7 +80,7 @@ COMMANDS = {
     "reload": "reload core.toml next.toml -o out.json",
     "simulate": "simulate plain.toml --simulator icarus -o out",
     "emulate": "emulate plain.toml noise -o out.csv",
-    "compare": "compare report.json -o out.html",
+    "compare": "compare report.json report.json -o out.html",
     "calibrate export": "calibrate export --store examples.db -o out.toml",
     "calibrate plot": "calibrate plot --store examples.db -o out.svg",
     "spectrum": "spectrum ramp.csv -o out.toml",

@@ -85,8 +85,12 @@ SUBJECTS = (
     ),
     Subject("short.toml", ("vehicle short.toml --sample-rate 50",), 6),
     Subject("plain.certificate.json", ("verify plain.certificate.json", "verify plain.certificate.json --json"), 100),
-    Subject("report.json", ("compare report.json other.json -o out.html", "compare report.json --json"), 120),
-    Subject("plain.json", ("verify plain.json", "compare plain.json"), 10),
+    Subject(
+        "report.json",
+        ("compare report.json other.json -o out.html", "compare report.json --baseline other.json --json"),
+        120,
+    ),
+    Subject("plain.json", ("verify plain.json", "compare plain.json plain.json"), 10),
 )
 
 
@@ -221,7 +225,7 @@ NAMES = [f"{subject.commands[0].split()[0]}-{subject.file}" for subject in SUBJE
 
 def expected(command: str) -> int:
     """Return the exit status of a command on valid files."""
-    if command in {"verify plain.json", "compare plain.json"}:
+    if command in {"verify plain.json", "compare plain.json plain.json"}:
         return 2  # a manifest is neither a certificate nor a report
     # The trace needs no filter, and nothing is simulated here.
     return 1 if command.startswith(("spectrum trace.csv", "simulate")) else 0

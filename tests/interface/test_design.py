@@ -13,7 +13,7 @@ from tests.interface.small import FILTER, filter_design, instrument_design
 
 import sosmith
 from sosmith import SpecificationError
-from sosmith.gen.report.comparison import load_report
+from sosmith.gen.report.comparison.report_file import load_report
 
 NOISE = np.random.default_rng(1)
 
@@ -160,6 +160,9 @@ def test_co_simulation(tmp_path: Path) -> None:
     assert load_report(tmp_path) == report.summary
     both = sosmith.compare([report, tmp_path])
     assert both.names == ["gauge, df1_ef1 (1)", "gauge, df1_ef1 (2)"]
+    assert (both.choice.taken, both.differences, both.passed) == (0, [], True)
+    beside = sosmith.compare([report], baseline=tmp_path, tolerance="error=0,bound=0,lut=0")
+    assert (beside.passed, beside.names) == (True, ["baseline", "gauge"])
     for shown in (report, both, design):
         html = shown._repr_html_()
         assert html.startswith("<table><caption>")

@@ -11,14 +11,15 @@ from typing import Any
 
 import pytest
 
-from sosmith.gen.report.comparison import (
-    Row,
-    column_names,
-    compare,
-    comparison_json,
-    comparison_page,
-    load_report,
-)
+from sosmith.gen.report.comparison.baseline import Judgement, judge, read_tolerances
+from sosmith.gen.report.comparison.choice import choose
+from sosmith.gen.report.comparison.differences import alike, differences
+from sosmith.gen.report.comparison.fairness import fairness
+from sosmith.gen.report.comparison.markdown import comparison_markdown
+from sosmith.gen.report.comparison.page import comparison_page
+from sosmith.gen.report.comparison.report_file import load_report
+from sosmith.gen.report.comparison.rows import Row, column_names, compare
+from sosmith.gen.report.comparison.summary import comparison_json
 from sosmith.model.errors import SpecificationError
 
 
@@ -26,7 +27,9 @@ def report(**changes: Any) -> dict[str, Any]:
     """Report with the keys a comparison needs; an entry of `changes` with a dot goes one level down."""
     made: dict[str, Any] = {
         "name": "flange_wear",
+        "scenario": "wear_ramp",
         "realization": "df1_ef2",
+        "architecture": "parallel",
         "simulator": "verilator",
         "passed": True,
         "bit_exact": True,
@@ -35,6 +38,36 @@ def report(**changes: Any) -> dict[str, Any]:
         "error": {"unit": "mm", "max_abs": 0.00012, "max_lsb": 0.5, "rms": 0.00007, "bound": 0.0002},
         "sqnr_db": 99.0,
         "accuracy_percent": {"unfiltered": 95.0, "golden": 98.0, "hardware": 98.0},
+        "latency_cycles": 10,
+        "tools": {"cocotb": "2.1.0"},
+        "provenance": {
+            "specification": {"name": "flange_wear", "filter": {"order": 7, "cutoff": [0.25]}},
+            "specification_sha256": "0" * 64,
+            "reference_sha256": "1" * 64,
+            "trace_sha256": "2" * 64,
+            "datapath_sha256": "3" * 64,
+            "cycles_per_sample": 3,
+            "cost": {
+                "source": "estimate",
+                "board": None,
+                "luts": 1000,
+                "multiplier_blocks": 2,
+                "register_bits": 300,
+                "instructions": None,
+                "memory_words": None,
+                "accumulator_bits": None,
+            },
+        },
+        "curves": {
+            "error": {"time": [0.0, 1.0], "low": [-0.0001, 0.0], "high": [0.0, 0.00012]},
+            "spectrum": {"frequency": [1.0, 10.0, 50.0], "density": [1e-6, 2e-6, 1e-6]},
+            "filter": {
+                "sample_rate": 100.0,
+                "kind": "lowpass",
+                "ideal_sos": [[0.25, 0.5, 0.25, 1.0, -0.5, 0.25]],
+                "quantized_sos": [[0.25, 0.5, 0.25, 1.0, -0.5, 0.2501]],
+            },
+        },
     }
     for key, value in changes.items():
         *path, last = key.split(".")
@@ -70,9 +103,9 @@ def test_best_is_smallest_error_and_largest_ratio() -> None:
 
 def test_equal_values_have_no_best() -> None:
     """Equal to the digits shown: 3.0001 and 3 cycles per sample are both 3.00."""
-    rows = rows_of(report(), report(cycles_per_sample=3.0001))
+    rows = rows_of(report(), report(**{"error.rms": 0.0000700001}))
     assert rows["error.max_abs"].best == ()
-    assert rows["cycles_per_sample"].best == ()
+    assert rows["error.rms"].best == ()
 
 
 def test_best_is_shared() -> None:
@@ -92,12 +125,201 @@ def test_unknown_values_never_win() -> None:
 
 
 def test_nothing_to_compare() -> None:
-    with pytest.raises(ValueError, match=r"^reports must hold at least one report, not none$"):
-        compare([])
+    with pytest.raises(ValueError, match=r"^reports must hold at least two reports, not 1$"):
+        compare([report()])
+
+
+OTHER_JOB = {"provenance.reference_sha256": "a" * 64}
+OTHER_TRACE = {"provenance.trace_sha256": "b" * 64, "scenario": "steps"}
+WORSE = {"error.max_abs": 0.00013, "error.rms": 0.00008, "provenance.cost.luts": 1100, "latency_cycles": 12}
+
+
+def test_no_winner_between_different_jobs() -> None:
+    different = report(**WORSE, **OTHER_JOB)
+    assert {row.best for row in compare([report(), different])} == {()}
+    reason = "The exact calculations differ (inputs, calibration, filter, output range or channels)."
+    assert set(vars(fairness([report(), different])).values()) == {reason}
+
+
+def test_errors_on_different_traces_have_no_winner_but_costs_do() -> None:
+    rows = rows_of(report(), report(**WORSE, **OTHER_TRACE))
+    assert rows["error.max_abs"].best == ()
+    assert rows["provenance.cost.luts"].best == rows["latency_cycles"].best == (0,)
+    assert fairness([report(), report(**OTHER_TRACE)]).accuracy == "The input codes differ: traces wear_ramp, steps."
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        (
+            {"provenance.cost.source": "synthesis", "provenance.cost.board": "icestick"},
+            "The costs have different origins: estimate before synthesis, synthesis for icestick.",
+        ),
+        ({"architecture": "serial"}, "Before synthesis, architectures cannot be compared: parallel, serial."),
+    ],
+)
+def test_costs_of_different_origins_have_no_winner(changes: dict[str, Any], reason: str) -> None:
+    reports = [report(), report(**changes, **WORSE)]
+    assert fairness(reports).cost == reason
+    assert rows_of(*reports)["provenance.cost.luts"].best == ()
+    assert rows_of(*reports)["error.max_abs"].best == (0,)
+
+
+def test_reports_of_earlier_versions_have_no_winner() -> None:
+    old = {key: value for key, value in report(**WORSE).items() if key not in {"provenance", "curves"}}
+    assert rows_of(report(), old)["error.max_abs"].best == ()
+    told = "A report of an earlier version does not tell which exact calculation the hardware was held against."
+    assert fairness([report(), old]).bounds == told
+    assert "<svg" in comparison_page([report(), old])
+
+
+def test_what_differs() -> None:
+    """Keys of the specification with what is missing, then the trace, the datapath and the tools."""
+    other = report(**OTHER_TRACE, simulator="icarus", realization="df1")
+    other["provenance"]["specification"] = {"name": "flange_wear", "filter": {"order": 5}, "channels": 2}
+    found = [(one.group, one.title, one.cells) for one in differences([report(), other])]
+    assert found == [
+        ("specification", "filter.order", ("7", "5")),
+        ("specification", "filter.cutoff", ("[0.25]", "not set")),
+        ("specification", "channels", ("not set", "2")),
+        ("trace", "trace", ("wear_ramp", "steps")),
+        ("trace", "input codes, SHA-256", ("2" * 12, "b" * 12)),
+        ("datapath", "realization", ("df1_ef2", "df1")),
+        ("tools", "simulator", ("verilator", "icarus")),
+    ]
+    assert ("samples", "20,000") in alike([report(), other])
+    assert not {"trace", "simulator", "realization"} & {title for title, _ in alike([report(), other])}
+    assert differences([report(), report()]) == []
+
+
+NAMES = ("a", "b", "c")
+
+
+def test_the_cheapest_that_passes_is_taken() -> None:
+    """The first fails, the second is dear but more accurate, the third is cheap."""
+    reports = [
+        report(passed=False, **{"provenance.cost.luts": 1}),
+        report(**{"provenance.cost.luts": 2000, "error.bound": 0.0001}),
+        report(),
+    ]
+    choice = choose(reports, NAMES)
+    assert (choice.taken, choice.beaten) == (2, ())
+    assert choice.reason == (
+        "c is the cheapest of the 2 of 3 that pass: 2,728 LUT4 equivalents, estimated before synthesis; its error "
+        "limit is 200 nm. The smallest limit is b's, 100 nm, at 1.4 times the cost."
+    )
+
+
+def test_of_equal_costs_the_smallest_limit_is_taken() -> None:
+    reports = [report(), report(**{"error.bound": 0.0001})]
+    choice = choose(reports, NAMES)
+    assert (choice.taken, choice.beaten) == (1, (0,))
+    assert choice.reason.endswith("b has the smallest error limit, 100 nm.")
+
+
+def test_without_fair_costs_the_smallest_limit_is_taken() -> None:
+    choice = choose([report(), report(architecture="serial", **{"error.bound": 0.0001})], NAMES)
+    assert choice.taken == 1
+    assert choice.reason.startswith("b has the smallest error limit, 100 nm. Before synthesis, architectures")
+
+
+def test_nothing_is_taken_of_different_jobs_or_of_failures() -> None:
+    assert choose([report(), report(**OTHER_JOB)], NAMES).taken is None
+    assert choose([report(passed=False), report(bit_exact=False)], NAMES).reason == "None of them passed."
+    assert choose([report(passed=False), report()], NAMES).reason == "b is the only one of 2 that passes."
+
+
+# beside a baseline
+
+
+def judged(candidate: dict[str, Any], tolerance: str | None = None) -> Judgement:
+    (one,) = judge(report(), [candidate], None if tolerance is None else read_tolerances(tolerance))
+    return one
+
+
+@pytest.mark.parametrize(
+    ("change", "tolerance", "verdict"),
+    [
+        ({"error.max_abs": 0.000126}, "error=5%", "within"),
+        ({"error.max_abs": 0.0001261}, "error=5%", "worse"),
+        ({"error.max_abs": 0.00011}, "error=0", "better"),
+        ({"error.max_abs": 0.00013}, "error=0.00001", "within"),
+        ({"provenance.cycles_per_sample": 4}, "cycles=0", "worse"),
+        ({"provenance.cycles_per_sample": 4}, "cycles=1", "within"),
+        ({"provenance.cost.luts": 1020}, "lut=2%", "within"),
+        ({"provenance.cost.luts": 1021}, "lut=2%", "worse"),
+        ({"sqnr_db": 98.9}, "sqnr=0", "worse"),
+        ({"sqnr_db": 98.9}, "sqnr=0.2", "within"),
+        ({"sqnr_db": 99.1}, "sqnr=0", "better"),
+        ({}, "bound=0", "equal"),
+        ({"sqnr_db": None}, "sqnr=5%", "not comparable"),
+        (OTHER_TRACE, "error=5%", "not comparable"),
+        (OTHER_TRACE, "lut=0", "equal"),
+    ],
+)
+def test_a_figure_beside_the_baseline(change: dict[str, Any], tolerance: str, verdict: str) -> None:
+    one = judged(report(**change), tolerance)
+    assert [each.verdict for each in one.judged] == [verdict]
+    assert one.passed == (verdict in {"better", "equal", "within"})
+
+
+def test_without_a_tolerance_nothing_may_be_worse() -> None:
+    assert judged(report()).passed
+    assert len(judged(report()).judged) == 10  # all but those of a program
+    assert [each.figure for each in judged(report(**WORSE)).judged if not each.passed] == [
+        "error",
+        "rms",
+        "latency",
+        "lut",
+    ]
+
+
+def test_only_what_a_tolerance_names_is_judged() -> None:
+    assert judged(report(**WORSE), "cycles=0").passed
+    assert judged(report(passed=False), "cycles=0").reasons == ["It falls short of its own specification."]
+
+
+def test_reasons_beside_the_baseline() -> None:
+    worse = judged(report(**WORSE, **OTHER_TRACE), "error=5%,rms=5%,lut=2%")
+    assert worse.reasons == [
+        "LUT4: 1,100 instead of 1,000 (+10.00 %), 2% allowed.",
+        "Not comparable: largest error, typical error (RMS). The input codes differ: traces wear_ramp, steps.",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("eror=5%", "a tolerance must be of error, .*, words, not of eror \\(did you mean error\\?\\)"),
+        ("", "a tolerance must be of error, .*, words, not of nothing"),
+        ("error=1%,error=2%", "a tolerance must be given once, not twice as for error"),
+        ("error", "a tolerance must be a number such as 5% or 0, not error="),
+        ("error=-1", "a tolerance must be a number such as 5% or 0, not error=-1"),
+        ("error=nan", "a tolerance must be a number such as 5% or 0, not error=nan"),
+        ("error=1e999", "a tolerance must be a number such as 5% or 0, not error=1e999"),
+    ],
+)
+def test_bad_tolerances(text: str, message: str) -> None:
+    with pytest.raises(SpecificationError, match=f"^{message}$"):
+        read_tolerances(text)
+
+
+def test_markdown() -> None:
+    """A judgement, with what would be markup escaped."""
+    pair = [report(), report(**WORSE, name="a|b <i>")]
+    text = comparison_markdown(pair, judge(pair[0], pair[1:], read_tolerances("error=5%,cycles=0")))
+    assert text.startswith("## ❌ a\\|b &lt;i&gt; falls short beside the baseline\n\n- largest error: 130 nm instead")
+    assert "| largest error | 120 nm | 130 nm | +8.33 % | 5% allowed | 🔴 worse |" in text
+    assert "| clock cycles per sample | 3 | 3 | +0.00 % | 0 allowed | ⚪ equal |" in text
+    plain_text = comparison_markdown(pair)
+    assert "| largest error | 120 nm ★ | 130 nm |" in plain_text
+    assert "is the cheapest of all 2" in plain_text
 
 
 def test_column_names_tell_reports_apart() -> None:
     assert column_names([report(), report(name="audio")]) == ["flange_wear", "audio"]
+    assert column_names([report(), report(realization="df1")]) == ["df1_ef2", "df1"]
+    assert column_names([report(), report()], baseline=True) == ["baseline", "flange_wear"]
     assert column_names([report(), report(realization="df1"), report()]) == [
         "flange_wear, df1_ef2 (1)",
         "flange_wear, df1",
@@ -107,14 +329,34 @@ def test_column_names_tell_reports_apart() -> None:
 
 def test_json_is_plain_data() -> None:
     content = json.loads(json.dumps(comparison_json([report(), report(**PLAIN)]), allow_nan=False))
-    assert content["names"] == ["flange_wear, df1_ef2", "flange_wear, df1"]
+    assert content["names"] == ["df1_ef2", "df1"]
+    assert content["choice"]["taken"] == 0
+    assert content["differences"] == [{"group": "datapath", "title": "realization", "cells": ["df1_ef2", "df1"]}]
+    assert set(content["unfair"].values()) == {""}
     by_key = {row["key"]: row for row in content["rows"]}
     assert by_key["error.max_abs"] == {
+        "group": "accuracy",
         "key": "error.max_abs",
         "title": "largest error",
         "values": [0.00012, 0.42],
         "best": [0],
     }
+
+
+def test_json_beside_a_baseline() -> None:
+    pair = [report(), report(**WORSE)]
+    content = comparison_json(pair, judge(pair[0], pair[1:], read_tolerances("error=5%")))["baseline"]
+    assert (content["name"], content["passed"]) == ("baseline", False)
+    assert content["candidates"][0]["figures"] == [
+        {
+            "figure": "error",
+            "baseline": 0.00012,
+            "candidate": 0.00013,
+            "tolerance": "5%",
+            "verdict": "worse",
+            "reason": "",
+        }
+    ]
 
 
 class Words(HTMLParser):
@@ -136,8 +378,9 @@ class Words(HTMLParser):
 def test_page() -> None:
     content = comparison_page([report(), report(**PLAIN)])
     assert content == comparison_page([report(), report(**PLAIN)])
-    assert "1 of 2 passed." in content
-    assert content.count('class="best"') == 3
+    assert "1 passed" in content
+    assert content.count('class="best"') == 2
+    assert content.count("<svg viewBox") == 8  # four figures for two widths
     assert not re.search(r"https?:|url\((?!#)|@import|<script", content)
 
 
@@ -147,9 +390,25 @@ def test_page_escapes_names() -> None:
     assert "<script>&amp;" in page.words
 
 
-def test_page_of_different_units_has_no_picture() -> None:
-    assert "<svg" in comparison_page([report(), report()])
-    assert "<svg" not in comparison_page([report(), report(**{"error.unit": "V"})])
+def test_page_of_different_units_has_no_picture_of_errors() -> None:
+    assert "Error over time" in comparison_page([report(), report()])
+    content = comparison_page([report(), report(**{"error.unit": "V"})])
+    assert "Error over time" not in content
+    assert "Errors in mm, V cannot be compared." in content
+
+
+def test_page_beside_a_baseline() -> None:
+    pair = [report(), report(**WORSE)]
+    content = comparison_page(pair, judge(pair[0], pair[1:], read_tolerances("error=5%")))
+    assert "flange_wear falls short beside the baseline" in content
+    assert "largest error: 130 nm instead of 120 nm (+8.33 %), 5% allowed." in content
+
+
+def test_a_filter_that_cannot_be_drawn_is_left_out() -> None:
+    rows = {"ideal_sos": [[1e12, 0, 0, 1e-12, 0, 0]], "quantized_sos": [[0] * 6]}
+    content = comparison_page([report(), report(**{"curves.filter": {"sample_rate": 100.0, **rows}})])
+    assert "Filters with their" not in content
+    assert "Spectrum of the error" in content
 
 
 def test_load_by_file_and_by_folder(tmp_path: Path) -> None:
@@ -176,6 +435,16 @@ _OUT_OF_RANGE = "JSON with a number out of range as error.max_abs"
         (json.dumps(report(passed=1)), "JSON with 1 as passed"),
         (json.dumps(report(name="\ud800")), "JSON with '\\ud800' as name"),
         (json.dumps(report(simulator="one\ntwo")), "JSON with 'one\\ntwo' as simulator"),
+        (json.dumps(report(tools={"cocotb": 2})), "JSON with 2 as tools.'cocotb'"),
+        (json.dumps(report(**{"provenance.trace_sha256": "2"})), "JSON with '2' as provenance.trace_sha256"),
+        (json.dumps(report(**{"provenance.cost": []})), "JSON with [] as provenance.cost"),
+        (json.dumps(report(**{"curves.error.low": [0.0]})), "JSON with [0.0] as curves.error.low"),
+        (
+            json.dumps(report(**{"curves.error.high": [0, 1e13]})),
+            "JSON with [0, 10000000000000.0] as curves.error.high",
+        ),
+        (json.dumps(report(**{"curves.filter.ideal_sos": [[1]]})), "JSON with [[1]] as curves.filter.ideal_sos"),
+        (json.dumps(report(**{"curves.filter.sample_rate": 0})), "JSON with 0 as curves.filter.sample_rate"),
         (json.dumps(report(samples="x" * 1000)), "JSON with 'xxxxxxxxxxxx...xxxxxxxxxxxxx' as samples"),
     ],
 )

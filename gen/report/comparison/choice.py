@@ -1,0 +1,116 @@
+"""Which of several designs to take, and why: the cheapest of those that pass, where they do the same job."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from sosmith.gen.quantity import plain_number, quantity
+from sosmith.gen.report.comparison.fairness import fairness
+from sosmith.gen.report.comparison.report_file import Report, fact
+from sosmith.gen.word_lengths.cost import LUTS_OF_A_BLOCK
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The design to take.
+
+    Attributes
+    ----------
+    taken : int or None
+        Index of the report; None where none can be named.
+    reason : str
+        Why it, or why none; one sentence or two.
+    beaten : tuple of int
+        Indices of those that pass but are both dearer and less accurate, by their bounds, than another one.
+    """
+
+    taken: int | None
+    reason: str
+    beaten: tuple[int, ...] = ()
+
+
+def choose(reports: Sequence[Report], names: Sequence[str]) -> Choice:
+    """Choose among reports, which the reason calls by their `names`.
+
+    The cheapest that passes is taken, of equal ones that with the smallest bound; where costs cannot be compared, the
+    one with the smallest bound.
+    """
+    fair = fairness(reports)
+    passing = [k for k, report in enumerate(reports) if report["passed"] and report["bit_exact"]]
+    if fair.bounds:
+        return Choice(None, f"No choice between different jobs. {fair.bounds}")
+    if not passing:
+        return Choice(None, "None of them passed.")
+    bounds = {k: _bound(reports[k]) for k in passing}
+    costs = {k: hardware_cost(reports[k]) for k in passing}
+    accurate = min(passing, key=lambda k: bounds[k])
+    if fair.cost or any(cost is None for cost in costs.values()):
+        why = fair.cost or "A report does not tell what its hardware costs."
+        limit = quantity(bounds[accurate], _unit(reports))
+        return Choice(accurate, f"{names[accurate]} has the smallest error limit, {limit}. {why}")
+    known = {k: cost for k, cost in costs.items() if cost is not None}
+    taken = min(passing, key=lambda k: (known[k], bounds[k]))
+    beaten = tuple(
+        k
+        for k in passing
+        if any(known[o] <= known[k] and bounds[o] <= bounds[k] and (known[o], bounds[o]) != (known[k], bounds[k])
+               for o in passing)
+    )  # fmt: skip
+    return Choice(taken, _why(reports, names, passing, taken, accurate, known, bounds), beaten)
+
+
+def hardware_cost(report: Report) -> float | None:
+    """Cost of a report's hardware in one figure, None if it does not tell.
+
+    LUT4, with a multiplier block counted as `LUTS_OF_A_BLOCK` of them; of a program, its instructions: the hardware
+    that runs it is nearly the same for all.
+    """
+    luts, blocks = fact(report, "provenance.cost.luts"), fact(report, "provenance.cost.multiplier_blocks")
+    if luts is not None:
+        return float(luts + LUTS_OF_A_BLOCK * (blocks or 0))
+    instructions = fact(report, "provenance.cost.instructions")
+    return None if instructions is None else float(instructions)
+
+
+def cost_unit(report: Report) -> str:
+    """Say in words what `hardware_cost` counts."""
+    if fact(report, "provenance.cost.luts") is None:
+        return "instructions"
+    estimated = fact(report, "provenance.cost.source") == "estimate"
+    return "LUT4 equivalents" + (", estimated before synthesis" if estimated else "")
+
+
+def _bound(report: Report) -> float:
+    bound: Any = report["error"]["bound"]
+    return float("inf") if bound is None else float(bound)
+
+
+def _unit(reports: Sequence[Report]) -> str:
+    return str(reports[0]["error"]["unit"])
+
+
+def _why(
+    reports: Sequence[Report],
+    names: Sequence[str],
+    passing: Sequence[int],
+    taken: int,
+    accurate: int,
+    costs: dict[int, float],
+    bounds: dict[int, float],
+) -> str:
+    unit = _unit(reports)
+    of = f"all {len(reports)}" if len(passing) == len(reports) else f"the {len(passing)} of {len(reports)} that pass"
+    if len(passing) == 1:
+        return f"{names[taken]} is the only one of {len(reports)} that passes."
+    size = f"{costs[taken]:,.0f} {cost_unit(reports[taken])}"
+    if all(costs[k] == costs[taken] for k in passing):
+        limit = quantity(bounds[taken], unit)
+        return f"{of[0].upper()}{of[1:]} cost the same, {size}; {names[taken]} has the smallest error limit, {limit}."
+    first = f"{names[taken]} is the cheapest of {of}: {size}; its error limit is {quantity(bounds[taken], unit)}."
+    if accurate == taken or bounds[accurate] == bounds[taken]:
+        return f"{first} None has a smaller limit."
+    times = plain_number(costs[accurate] / costs[taken], 2)
+    limit = quantity(bounds[accurate], unit)
+    return f"{first} The smallest limit is {names[accurate]}'s, {limit}, at {times} times the cost."

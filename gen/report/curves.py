@@ -1,0 +1,80 @@
+"""Curves of a run that a comparison draws again from `report.json`: error over time, its spectrum, the filter."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy import signal
+
+from sosmith.gen.filter.response import FilterFacts
+from sosmith.gen.report.evidence import Evidence
+
+Array = npt.NDArray[np.float64]
+
+STRETCHES = 160
+"""Stretches of time, at most, of which the smallest and the largest error are kept."""
+
+_SEGMENT = 256
+"""Samples of a segment of the spectrum; its lines are half of that."""
+
+_DIGITS = 6
+"""Significant digits of a drawn value."""
+
+
+def error_over_time(evidence: Evidence) -> dict[str, Any]:
+    """Smallest and largest error in each stretch of time, over all channels.
+
+    Returns
+    -------
+    dict
+        ``time``: where each stretch starts, in s; ``low`` and ``high``: its smallest and largest hardware minus exact
+        calculation, in the output's unit. All lists have one length, at most `STRETCHES`.
+    """
+    error = evidence.error.reshape(len(evidence.time), -1)
+    edges = np.linspace(0, len(error), min(STRETCHES, len(error)) + 1).astype(int)
+    stretches = [error[start:stop] for start, stop in itertools.pairwise(edges)]
+    return {
+        "time": _rounded(evidence.time[edges[:-1]]),
+        "low": _rounded(np.array([part.min() for part in stretches])),
+        "high": _rounded(np.array([part.max() for part in stretches])),
+    }
+
+
+def error_spectrum(evidence: Evidence) -> dict[str, Any] | None:
+    """Amplitude density of the error of the channel with the largest one, by Welch's method.
+
+    Returns
+    -------
+    dict or None
+        ``frequency`` in Hz, without zero; ``density`` in the output's unit per square root of Hz. None for fewer than
+        32 samples.
+    """
+    error = evidence.of_channel(evidence.worst_channel).error
+    if len(error) < 32:
+        return None
+    rate = (len(error) - 1) / float(evidence.time[-1] - evidence.time[0])
+    frequency, power = signal.welch(error, fs=rate, nperseg=min(_SEGMENT, len(error)))
+    return {"frequency": _rounded(frequency[1:]), "density": _rounded(np.sqrt(power[1:]))}
+
+
+def filter_curve(facts: FilterFacts | None) -> dict[str, Any] | None:
+    """Sections and mask of the filter, as `FilterFacts` takes them; None for a core without one."""
+    if facts is None:
+        return None
+    edges = {name: getattr(facts, name) for name in ("passband_edge", "stopband_edge", "cutoff")}
+    return {
+        "sample_rate": facts.sample_rate,
+        "kind": facts.kind,
+        "ideal_sos": facts.ideal_sos.tolist(),
+        "quantized_sos": facts.quantized_sos.tolist(),
+        **{name: None if pair is None else [float(edge) for edge in pair] for name, pair in edges.items()},
+        "passband_loss": facts.passband_loss,
+        "stopband_loss": facts.stopband_loss,
+    }
+
+
+def _rounded(values: Array) -> list[float]:
+    return [float(f"{value:.{_DIGITS}g}") for value in values]

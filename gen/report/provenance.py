@@ -1,0 +1,133 @@
+"""What a run is told by: digests of specification, exact calculation, trace and datapath; the hardware's cost."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from sosmith.gen.core import CoreDesign
+from sosmith.gen.fpga.synthesis import Netlist
+from sosmith.gen.word_lengths.cost import cost_of
+from sosmith.model.dataflow.c_model import c_source
+from sosmith.model.port import Port
+from sosmith.model.traces.trace import Trace
+
+
+@dataclass(frozen=True, kw_only=True)
+class Provenance:
+    """Digests are SHA-256 in hexadecimal digits; two runs can be compared where they agree.
+
+    Attributes
+    ----------
+    specification : Mapping
+        The specification as read, in the types of JSON.
+    specification_sha256 : str
+        Of the specification's text.
+    reference_sha256 : str
+        Of the exact calculation: input formats, polynomial, ideal sections, the output's range and unit, channels.
+    trace_sha256 : str
+        Of the input codes of all channels, with the inputs' formats and the sample rate.
+    datapath_sha256 : str
+        Of the datapath, told as its C model, whatever its name.
+    cycles_per_sample : int
+        Largest number of clocks between samples that the hardware needs, without waiting.
+    cost : Mapping
+        As `hardware_cost` returns it.
+    """
+
+    specification: Mapping[str, Any]
+    specification_sha256: str
+    reference_sha256: str
+    trace_sha256: str
+    datapath_sha256: str
+    cycles_per_sample: int
+    cost: Mapping[str, Any]
+
+
+def provenance_of(design: CoreDesign, traces: Sequence[Trace], netlist: Netlist | None = None) -> Provenance:
+    """Collect the provenance of a run of `design` with `traces`, one for each channel; of `netlist` if that ran."""
+    return Provenance(
+        specification=design.spec.source,
+        specification_sha256=hashlib.sha256(design.spec.text.encode()).hexdigest(),
+        reference_sha256=reference_digest(design),
+        trace_sha256=trace_digest(traces),
+        datapath_sha256=hashlib.sha256(c_source(replace(design.datapath, name="datapath")).encode()).hexdigest(),
+        cycles_per_sample=design.architecture.cycles_per_sample,
+        cost=hardware_cost(design, netlist),
+    )
+
+
+def reference_digest(design: CoreDesign) -> str:
+    """Digest of the exact calculation that the hardware is held against, without how the hardware is built."""
+    quantized, output = design.quantized, design.datapath.output
+    polynomial = quantized.polynomial
+    return _digest(
+        {
+            "inputs": [_port(port) for port in design.datapath.inputs],
+            "polynomial": None if polynomial is None else [[str(a) for a in row] for row in polynomial.coefficients],
+            "sections": [] if quantized.filter is None else quantized.filter.sos.tolist(),
+            "range": [str(output.zero + output.lsb * code) for code in (output.lowest, output.highest + 1)],
+            "unit": output.unit,
+            "channels": design.spec.channels,
+        }
+    )
+
+
+def trace_digest(traces: Sequence[Trace]) -> str:
+    """Digest of the codes of all channels, with the formats that give them a meaning."""
+    first = traces[0]
+    head = {"inputs": [_port(port) for port in first.ports], "sample_rate": str(first.sample_rate)}
+    whole = hashlib.sha256(_digest(head).encode())
+    for trace in traces:
+        whole.update(hashlib.sha256(np.ascontiguousarray(trace.codes, dtype="<i8").tobytes()).digest())
+    return whole.hexdigest()
+
+
+def hardware_cost(design: CoreDesign, netlist: Netlist | None = None) -> dict[str, Any]:
+    """Tell what the hardware takes.
+
+    Returns
+    -------
+    dict
+        ``source``: "synthesis" with the counted cells of `netlist`, or "estimate" of the parallel architecture before
+        synthesis, or "program" of the folded and serial architectures. ``board``: of the netlist, else None. ``luts``
+        (LUT4), ``multiplier_blocks`` and, before synthesis, ``register_bits``; of a program ``instructions``,
+        ``memory_words`` and ``accumulator_bits``. What the source does not tell is None.
+    """
+    made: dict[str, Any] = dict.fromkeys(
+        ("luts", "multiplier_blocks", "register_bits", "instructions", "memory_words", "accumulator_bits")
+    )
+    program = design.architecture.program
+    if program is not None:
+        made |= {
+            "instructions": len(program.instructions),
+            "memory_words": program.words,
+            "accumulator_bits": program.accumulator_bits,
+        }
+    if netlist is not None:
+        device = netlist.board.device
+        made["luts"] = device.luts(netlist.cells)
+        made["multiplier_blocks"] = netlist.cells.get(device.multiplier or "", 0)
+        return {"source": "synthesis", "board": netlist.board.name, **made}
+    if program is not None:
+        return {"source": "program", "board": None, **made}
+    cost = cost_of(design.datapath)
+    made |= {
+        "luts": cost.luts,
+        "multiplier_blocks": cost.multiplier_blocks,
+        "register_bits": cost.register_bits,
+    }
+    return {"source": "estimate", "board": None, **made}
+
+
+def _port(port: Port) -> list[Any]:
+    return [port.name, port.bits, port.signed, str(port.lsb), str(port.zero), port.unit]
+
+
+def _digest(tree: Any) -> str:
+    return hashlib.sha256(json.dumps(tree, sort_keys=True).encode()).hexdigest()
