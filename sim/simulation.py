@@ -19,6 +19,7 @@ from sosmith.gen.fpga.boards import Board
 from sosmith.gen.fpga.synthesis import Netlist, synthesize
 from sosmith.gen.output.core_facts import CoreFacts, core_facts
 from sosmith.gen.output.generate import generate
+from sosmith.gen.output.vectors import Vectors, vector_files
 from sosmith.gen.report.evidence import Alternative, Evidence
 from sosmith.gen.report.provenance import provenance_of
 from sosmith.gen.specification.choices import ERROR_FEEDBACK
@@ -27,7 +28,7 @@ from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.model.arrays import Codes, Values
 from sosmith.model.errors import SpecificationError
 from sosmith.model.reference.golden import calibrated, filtered
-from sosmith.model.text_files import write_files
+from sosmith.model.text_files import write_contents, write_files
 from sosmith.model.traces.trace import Trace
 from sosmith.sim.cosimulate import CosimulationResult, cosimulate
 from sosmith.sim.gate_level import with_cell_models
@@ -51,12 +52,14 @@ def simulate(
     stall: float = 0.3,
     waves: bool = False,
     gates: Board | None = None,
+    vectors: Path | None = None,
     progress: Progress = lambda step, done, total: None,
 ) -> Evidence:
     """Generate the core into `directory`, run `traces` through it, and compare it with model and golden chain.
 
     There is one trace for each channel, all of the same length. With `gates`, the simulation runs the netlist
-    synthesized for that board.
+    synthesized for that board. With `vectors`, what went in and what came out is written to that file, in the format of
+    its suffix (`sosmith.gen.output.vectors.vector_files`).
 
     Raises
     ------
@@ -65,7 +68,7 @@ def simulate(
     ToolError
         If a tool is missing or fails.
     SpecificationError
-        If there is no such simulator, or the folder cannot be written or is in use by another run.
+        If there is no such simulator or format of vectors, or the folder cannot be written or is in use by another run.
     """
     started = time.monotonic()
     check_name(simulator, netlist=gates is not None)
@@ -91,13 +94,18 @@ def simulate(
             waves=waves,
             announce=lambda step: progress(step, 0, 0),
         )
+        codes = np.stack([trace.codes for trace in traces], axis=1)
         result = cosimulate(
             bench,
             facts.interface,
-            np.stack([trace.codes for trace in traces], axis=1),
+            codes,
             seed=seed,
             progress=lambda done, total: progress("co-simulating", done, total),
         )
+    if vectors is not None:
+        progress("writing the vectors", 0, 0)
+        taken = Vectors(stimuli=codes, responses=result.codes[:, :, 0], status=result.status)
+        write_contents(vectors.parent, vector_files(vectors, taken, facts.interface, design.spec.sample_rate))
     progress("comparing", 0, 0)
     return _evidence(design, facts, traces, result, netlist, seed=seed, wall_seconds=time.monotonic() - started)
 

@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sosmith.gen.output.core_facts import StreamFacts
+from sosmith.gen.output.vectors import words
 from sosmith.model.arrays import Codes
 from sosmith.model.errors import ShortfallError
 from sosmith.sim.beats import Beats
@@ -38,13 +39,8 @@ def pack(codes: Codes, order: Order, stream: StreamFacts) -> Beats:
     stream : StreamFacts
         The stream, at most 64 bits wide.
     """
-    if stream.width > 64:
-        raise ValueError(f"stream must be at most 64 bits wide, not {stream.width}")
-    words = np.zeros(len(order), dtype=np.uint64)
-    for column, field in zip(codes[_turns(order), order].T, stream.fields, strict=True):
-        mask = np.uint64((1 << field.padded) - 1)
-        words |= (column.astype(np.uint64) & mask) << np.uint64(field.offset)
-    return Beats(order, words, np.zeros(len(order), dtype=np.uint8))
+    packed = words(codes[_turns(order), order], stream)
+    return Beats(order, packed, np.zeros(len(order), dtype=np.uint8))
 
 
 def unpack(beats: Beats, order: Order, stream: StreamFacts) -> tuple[Codes, npt.NDArray[np.uint8]]:

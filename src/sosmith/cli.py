@@ -41,6 +41,11 @@ _COMMANDS = {
         "generate_command",
         "Write SystemVerilog, RTLIL, a manifest, a certificate and a bit-true C model for SPEC.",
     ),
+    "package": _Command(
+        "package",
+        "package_command",
+        "Write the core of SPEC with what other tools need, and a bench that needs no sosmith.",
+    ),
     "verify": _Command(
         "verify", "verify", "Prove CERTIFICATE by an independent method: the error bound, and no internal overflow."
     ),

@@ -163,6 +163,7 @@ NEEDED = {
     "init": ("[FILE]", "flange_wear.toml", "--force"),
     "design": ("SPEC", "--core", "--realization", "--widths-of", "--json"),
     "generate": ("SPEC", "SystemVerilog", "-o, --output", "build/<name>"),
+    "package": ("SPEC", "bench/", "Makefile", "neither sosmith nor Python", "build/<name>/package"),
     "verify": ("CERTIFICATE", "sosmith generate", "--spec FILE", "--files DIR", "--rebuild", "--json"),
     "reload": ("SPEC OTHER", "max_error", "--active", "--reset", "--version", "docs/registers.md", "reload.json"),
     "simulate": (
@@ -172,6 +173,7 @@ NEEDED = {
         "report.html",
         "[default: verilator]",
         "--gates BOARD",
+        "--vectors FILE.csv|npz|vcd|hex",
         "--seed",
     ),
     "emulate": ("SPEC", "[SCENARIO|FILE.toml]", "CSV", "--seconds", "--measurements", "--seed", "stdout"),

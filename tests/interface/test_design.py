@@ -150,7 +150,14 @@ def test_files_and_certificate(tmp_path: Path) -> None:
 def test_co_simulation(tmp_path: Path) -> None:
     design = instrument_design()
     voltage = NOISE.uniform(0, 10, (60, 2))
-    report = design.simulate({"voltage": voltage, "temperature": 25.0}, folder=tmp_path, simulator="icarus")
+    vectors = tmp_path / "vectors" / "run.npz"
+    report = design.simulate(
+        {"voltage": voltage, "temperature": 25.0}, folder=tmp_path, simulator="icarus", vectors=vectors
+    )
+    with np.load(vectors) as run:
+        assert np.array_equal(run["stimuli"][..., 0], report.input_codes["voltage"])
+        assert np.array_equal(run["responses"], report.hardware_codes)
+        assert np.array_equal(run["status"], design.core.datapath.compute_status(run["stimuli"]))
     assert (report.passed, report.bit_exact, report.shortfalls) == (True, True, ())
     assert np.array_equal(report.hardware, design.run(voltage=voltage, temperature=25.0))
     assert np.array_equal(report.exact, design.run_exact(voltage=voltage, temperature=25.0))
@@ -176,6 +183,7 @@ def test_co_simulation(tmp_path: Path) -> None:
         ({"trace": "nois"}, r"scenario for a plain filter must be one of .*, not 'nois' \(did you mean noise\?\)"),
         ({"simulator": "icarsu"}, r"simulator must be verilator or icarus, not icarsu \(did you mean icarus\?\)"),
         ({"gates": "nexys"}, "the board must be one of .*, not nexys"),
+        ({"vectors": "run.fst"}, r"run\.fst: a file of vectors must end in .*, not '\.fst'"),
         ({"idle": float("nan")}, "idle must be from 0 to 0.99, not nan"),
         (
             {"trace": {"x": [0.0]}, "seconds": 1.0},

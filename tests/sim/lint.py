@@ -7,16 +7,9 @@ import subprocess
 from collections.abc import Collection
 from pathlib import Path
 
+from sosmith.gen.output.packages.lint_waivers import WAIVERS
 from sosmith.model.errors import ShortfallError
 from sosmith.sim.simulators import find_simulator
-
-WAIVERS = {
-    "DECLFILENAME": "all modules of a core stand in one file, which has the name of the top module",
-    "PROCASSINIT": "a register's declaration gives the value that an FPGA loads at configuration, as its reset does",
-    "UNUSEDSIGNAL": "a format drops the bits beyond its proven range or below its rounding, on purpose",
-    "WIDTHEXPAND": "operands of a sum differ in width, and the language extends the narrower one by its sign",
-}
-"""Warnings of Verilator's ``-Wall`` that generated cores cause, and why each is harmless."""
 
 
 def lint(sv: Path, top: str, build_dir: Path, *, waived: Collection[str] = tuple(WAIVERS)) -> list[str]:

@@ -10,11 +10,12 @@ from pathlib import Path
 
 import pytest
 from tests.gen.designs import ALL, example_design
-from tests.sim.lint import WAIVERS, icarus_check, lint
+from tests.sim.lint import icarus_check, lint
 
 from sosmith.gen.architecture import Architecture
 from sosmith.gen.core import design_core
 from sosmith.gen.output.generate import generate
+from sosmith.gen.output.packages.lint_waivers import WAIVERS
 from sosmith.gen.specification.choices import CORES
 from sosmith.model.errors import ShortfallError
 

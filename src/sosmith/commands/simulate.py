@@ -101,6 +101,12 @@ def _empty_cache(ctx: click.Context, param: click.Parameter, wanted: bool) -> No
 )
 @click.option("--waves", is_flag=True, help="Also write a waveform (VCD); the simulation is slower.")
 @click.option(
+    "--vectors",
+    type=click.Path(path_type=Path),
+    metavar="FILE.csv|npz|vcd|hex",
+    help="Also write the codes of all samples, in and out; .hex gives two files for $readmemh.",
+)
+@click.option(
     "--empty-cache",
     is_flag=True,
     is_eager=True,
@@ -124,6 +130,7 @@ def simulate_command(
     stall: float,
     gates: str | None,
     waves: bool,
+    vectors: Path | None,
     seconds: float | None,
     seed: int,
     as_json: bool,
@@ -145,10 +152,13 @@ def simulate_command(
         sosmith simulate my.toml
         sosmith simulate my.toml --trace worst_case --simulator icarus -o build/worst
     """
+    from sosmith.gen.output.vectors import check_format
     from sosmith.interface.specification import Specification
     from sosmith.sim.simulators import check_name
 
     check_name(simulator, netlist=gates is not None)
+    if vectors is not None:
+        check_format(vectors)
     netlist_for = None if gates is None else find_board(gates).name
     asked = Specification.load(spec)
     if source is not None and not _is_file(source):
@@ -176,6 +186,7 @@ def simulate_command(
             stall=stall,
             gates=netlist_for,
             waves=waves,
+            vectors=vectors,
         )
     _finish(report, as_json=as_json)
 

@@ -19,6 +19,8 @@ from sosmith.gen.output.certificate import about, certificate
 from sosmith.gen.output.core_facts import CoreFacts, core_facts
 from sosmith.gen.output.generate import generate
 from sosmith.gen.output.manifest import manifest
+from sosmith.gen.output.packages.package import package
+from sosmith.gen.output.vectors import check_format
 from sosmith.gen.word_lengths.cost import Cost
 from sosmith.interface.certificate import Certificate, Progress, Proof
 from sosmith.interface.inputs import codes_of, encoded, traces_of
@@ -282,6 +284,18 @@ class Design:
         """
         return generate(self.core, Path(fspath(folder)), lambda step: progress(step, 0, 0))
 
+    def package(self, folder: str | PathLike[str], progress: Progress = lambda step, done, total: None) -> list[Path]:
+        """Write the core and what other tools need to take it in into `folder`; return the paths of the files.
+
+        Raises
+        ------
+        SpecificationError
+            If the folder cannot be written.
+        ToolError
+            If Yosys fails, or the disk is full.
+        """
+        return package(self.core, Path(fspath(folder)), lambda step: progress(step, 0, 0))
+
     def simulate(
         self,
         trace: str | PathLike[str] | Mapping[str, npt.ArrayLike] | None = None,
@@ -293,6 +307,7 @@ class Design:
         idle: float = 0.3,
         stall: float = 0.3,
         waves: bool = False,
+        vectors: str | PathLike[str] | None = None,
         seed: int = 1,
         progress: Progress = lambda step, done, total: None,
     ) -> Report:
@@ -316,6 +331,8 @@ class Design:
             Fractions of clocks without an input sample and with the output stalled, 0 to 0.99.
         waves : bool
             Whether to write a waveform (VCD) as well.
+        vectors : path
+            File for the input and output codes of all samples: .csv, .npz, .vcd, or .hex for ``$readmemh``.
         seed : int
             Random seed for noise and handshakes.
 
@@ -327,7 +344,7 @@ class Design:
         Raises
         ------
         SpecificationError
-            If the trace, simulator or board does not exist, or the folder cannot be written.
+            If the trace, simulator, board or format of vectors does not exist, or the folder cannot be written.
         ShortfallError
             If the hardware breaks the stream protocol.
         ToolError
@@ -342,6 +359,8 @@ class Design:
         for name, share in (("idle", idle), ("stall", stall)):
             if not 0 <= share <= 0.99:
                 raise SpecificationError(f"{name} must be from 0 to 0.99, not {share}")
+        if vectors is not None:
+            check_format(Path(fspath(vectors)))
         board = None if gates is None else find_board(gates)
         place = Path("build") / self.core.spec.name if folder is None else Path(fspath(folder))
         progress("trace", 0, 0)
@@ -356,6 +375,7 @@ class Design:
             stall=stall,
             waves=waves,
             gates=board,
+            vectors=None if vectors is None else Path(fspath(vectors)),
             progress=progress,
         )
         progress("writing the report", 0, 0)

@@ -1,0 +1,60 @@
+"""The bench of a package: checks hardware and C model with vectors in files, and needs nothing else of sosmith."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from sosmith.gen.core import CoreDesign
+from sosmith.gen.output.core_facts import CoreFacts
+from sosmith.gen.output.packages.lint_waivers import verilator_waivers
+from sosmith.gen.output.packages.pins import Pin
+from sosmith.gen.output.packages.stimuli import bench_stimuli
+from sosmith.gen.output.vectors import hex_words
+from sosmith.model.dataflow.status import STATUS_BITS
+from sosmith.model.templates import render
+
+_SPARE = 64
+"""Clocks beyond a core's longest pause, in which the bench stalls its output or has no sample ready."""
+
+
+def bench_files(design: CoreDesign, facts: CoreFacts, pins: Sequence[Pin]) -> dict[str, str]:
+    """Return the texts of the bench by their paths in the package.
+
+    Parameters
+    ----------
+    design : CoreDesign
+        The core.
+    facts : CoreFacts
+        Facts about it.
+    pins : sequence of Pin
+        Ports of the top module.
+    """
+    interface, datapath = facts.interface, design.datapath
+    stimuli = bench_stimuli(design)
+    hex_in, hex_out = hex_words(stimuli.vectors, interface)
+    into, out = interface.inputs, interface.outputs
+    values = {
+        "name": facts.name,
+        "parts": stimuli.parts,
+        "samples": stimuli.vectors.responses.size,
+        "dest": into.dest_width,
+        "data_in": into.width,
+        "data_out": out.width,
+        "stimulus": into.dest_width + into.width,
+        "response": out.dest_width + STATUS_BITS + out.width,
+        "registers": [pin for pin in pins if pin.bus == "s_axil"],
+        "patience": interface.reset_cycles + interface.latency_cycles + facts.cycles_per_sample + _SPARE,
+        "channels": facts.channels,
+        "takes_channel": len(datapath.wear) > 1,
+        "inputs": into.fields,
+        "output": datapath.output,
+    }
+    name = facts.name
+    return {
+        f"bench/{name}_bench.sv": render(__package__, "bench.sv.jinja", **values),
+        f"bench/{name}_bench.c": render(__package__, "bench.c.jinja", **values),
+        f"bench/{name}_stimuli.hex": hex_in,
+        f"bench/{name}_responses.hex": hex_out,
+        "bench/Makefile": render(__package__, "Makefile.jinja", **values),
+        f"verilator/{name}.vlt": verilator_waivers(name),
+    }

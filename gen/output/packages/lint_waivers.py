@@ -1,0 +1,18 @@
+"""The warnings of Verilator that generated cores draw, and why each is harmless."""
+
+from __future__ import annotations
+
+from sosmith.model.templates import render
+
+WAIVERS = {
+    "DECLFILENAME": "all modules of a core stand in one file, which has the name of the top module",
+    "PROCASSINIT": "a register's declaration gives the value that an FPGA loads at configuration, as its reset does",
+    "UNUSEDSIGNAL": "a format drops the bits beyond its proven range or below its rounding, on purpose",
+    "WIDTHEXPAND": "operands of a sum differ in width, and the language extends the narrower one by its sign",
+}
+"""Warnings of Verilator's ``-Wall`` that generated cores cause, and why each is harmless."""
+
+
+def verilator_waivers(name: str) -> str:
+    """Return a configuration file for Verilator that waives them in the file of the core `name`, and nowhere else."""
+    return render(__package__, "waivers.vlt.jinja", name=name, waivers=WAIVERS)

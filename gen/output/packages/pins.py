@@ -1,0 +1,95 @@
+"""The pins of a core, as its component has them: what every other tool's description of it has to repeat."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from amaranth.hdl import Shape
+from amaranth.lib.wiring import Out
+
+from sosmith.gen.core import CoreDesign
+from sosmith.gen.output.core_facts import InterfaceFacts
+from sosmith.hdl.axi_lite import slave_members
+from sosmith.hdl.axi_stream import core_members
+from sosmith.model.reload.registers import ADDRESS_BITS
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pin:
+    """A port of the top module.
+
+    Attributes
+    ----------
+    name : str
+        Its name.
+    width : int
+        Bits.
+    output : bool
+        Whether the core drives it.
+    meaning : str
+        What it carries, in words.
+    """
+
+    name: str
+    width: int
+    output: bool
+    meaning: str
+
+    @property
+    def bus(self) -> str:
+        """The bus it belongs to, ``""`` for clock and reset."""
+        return self.name.rpartition("_")[0]
+
+    @property
+    def signal(self) -> str:
+        """Its name within the bus, as the AXI specification has it but in lower case."""
+        return self.name.rpartition("_")[2]
+
+
+def pins(design: CoreDesign, interface: InterfaceFacts) -> tuple[Pin, ...]:
+    """Return the pins of a core: clock and reset, streams, registers, each bus in one piece.
+
+    Parameters
+    ----------
+    design : CoreDesign
+        The core.
+    interface : InterfaceFacts
+        Its streams.
+    """
+    members = core_members(design.datapath.inputs, design.datapath.output, design.spec.channels)
+    if design.architecture.fingerprint is not None:
+        members |= slave_members(ADDRESS_BITS)
+    found = [
+        Pin(
+            name=name,
+            width=Shape.cast(member.shape).width,
+            output=member.flow is Out,
+            meaning=_meaning(name, interface),
+        )
+        for name, member in members.items()
+    ]
+    buses = ["", "s_axis", "m_axis", "s_axil"]
+    return tuple(sorted(found, key=lambda pin: buses.index(pin.bus)))
+
+
+def _meaning(name: str, interface: InterfaceFacts) -> str:
+    if name.startswith("s_axil"):
+        return "AXI4-Lite registers"
+    if name.endswith("tdata"):
+        stream = interface.inputs if name.startswith("s_") else interface.outputs
+        parts = []
+        for field in stream.fields:
+            port = field.port
+            kind = "two's complement" if port.signed else "unsigned"
+            value = f"{float(port.zero):g} + {float(port.lsb):.9g} * code {port.unit}".rstrip()
+            parts.append(f"[{field.offset + port.bits - 1}:{field.offset}] {port.name}, {kind}, = {value}")
+        return "; ".join(parts)
+    if name.endswith("tuser"):
+        return "; ".join(f"[{bit}] {flag}" for flag, bit in interface.outputs.flags.items())
+    return {
+        "aclk": "clock, rising edge",
+        "aresetn": "synchronous reset, active low",
+        "tdest": "channel",
+        "tvalid": "a sample is there" if name.startswith("s_") else "a result is there",
+        "tready": "the core takes it" if name.startswith("s_") else "the receiver takes it",
+    }[name.rpartition("_")[2]]

@@ -1,0 +1,48 @@
+"""The command that packs a core for other tools: `package`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from sosmith.commands.options import BOARD, CORE, REALIZATION, SPEC, WIDTHS_OF, default_folder
+from sosmith.terminal import output_option, show_progress
+
+
+@click.command("package")
+@SPEC
+@CORE
+@REALIZATION
+@WIDTHS_OF
+@BOARD
+@output_option("Folder of the package.  [default: build/<name>/package]")
+def package_command(
+    spec: Path,
+    core: str | None,
+    realization: str | None,
+    widths_of: str | None,
+    board: str | None,
+    output: Path | None,
+) -> None:
+    """Pack the core of SPEC for other tools, with a bench that needs none of ours.
+
+    The folder core/ has what `sosmith generate` writes. In bench/ are a self-checking bench in plain SystemVerilog, one
+    of the C model in C, their vectors and a Makefile; they need neither sosmith nor Python.
+
+    Prints the paths of the files to stdout, one per line. Two runs write identical files.
+
+    \b
+        sosmith package my.toml -o my_core
+        make -C my_core/bench icarus
+    """
+    from sosmith.interface.specification import Specification
+
+    asked = Specification.load(spec)
+    with show_progress() as step:
+        from sosmith.interface.design import design
+
+        made = design(asked, core=core, realization=realization, widths_of=widths_of, board=board, progress=step)
+        paths = made.package(output or default_folder(asked.name) / "package", step)
+    for path in paths:
+        click.echo(path)

@@ -1,0 +1,51 @@
+"""Packages of small cores, each made once, and the tools that take them."""
+
+import os
+import subprocess
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from tests.interface.small import FILTER, INSTRUMENT
+
+import sosmith
+from sosmith.gen.output.packages.package import packed
+from sosmith.sim.simulators import find_simulator
+
+RELOADABLE: dict[str, Any] = {
+    **FILTER,
+    "name": "tunable",
+    "input": {"x": {"bits": 12, "range": [0.0, 5.0]}},
+    "output": {"bits": 12, "range": [0.0, 5.0], "unit": "V"},
+    "hardware": {"realization": "df1_ef1", "architecture": "folded", "clock": 1e6, "reload": True, "protect": "detect"},
+}
+SPECIFICATIONS = {spec["name"]: spec for spec in (FILTER, INSTRUMENT, RELOADABLE)}
+
+
+@cache
+def design_of(name: str) -> sosmith.Design:
+    """Design the core `name`, once."""
+    return sosmith.design(SPECIFICATIONS[name])
+
+
+@cache
+def package_of(name: str) -> dict[str, str]:
+    """Return the package of the core `name`: its texts by their paths."""
+    return packed(design_of(name).core)
+
+
+def unpacked(name: str, folder: Path) -> Path:
+    """Write the package of the core `name` into `folder`, and return that."""
+    for path, text in package_of(name).items():
+        (folder / path).parent.mkdir(parents=True, exist_ok=True)
+        (folder / path).write_text(text, encoding="utf-8")
+    return folder
+
+
+def called(*command: str | Path, at: Path, simulator: str = "icarus") -> subprocess.CompletedProcess[str]:
+    """Run a command in the folder `at`, with a simulator where it finds it and without this package."""
+    environment = find_simulator(simulator, at / ".bin").environment
+    kept = {key: value for key, value in environment.items() if key != "PYTHONPATH"}
+    for key in ("OBJCACHE", "CCACHE_DIR"):
+        kept |= {key: os.environ[key]} if key in os.environ else {}
+    return subprocess.run(command, cwd=at, env=kept, capture_output=True, text=True, check=False)
