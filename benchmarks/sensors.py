@@ -22,10 +22,10 @@ from sosmith.gen.paper.figures import read_paper_figures
 from sosmith.gen.picture import settled
 from sosmith.gen.specification.specification import load
 from sosmith.gen.stimuli import bench_of
+from sosmith.model.arithmetic.random_streams import streams
 from sosmith.model.arrays import Values
 from sosmith.model.calibration.fit import Fit, Measurements, fit
 from sosmith.model.calibration.polynomial import EQUATION_5A, Polynomial
-from sosmith.model.random_streams import streams
 from sosmith.model.reference.accuracy import accuracy_percent
 from sosmith.model.reference.golden import calibrated, filtered
 from sosmith.model.scenarios.depot_measurements import measurements_of

@@ -1,1 +1,1 @@
-"""Arithmetic whose results are the same on every machine: balls, products of matrices, elementary functions."""
+"""Arithmetic that is the same on every machine: balls, products of matrices, elementary functions, random streams."""

@@ -7,6 +7,7 @@ import functools
 import shutil
 import subprocess
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
@@ -24,9 +25,20 @@ class Block(Protocol):
     """A compiled datapath."""
 
     def __call__(
-        self, codes: npt.NDArray[np.int64], *, with_status: bool = False
+        self,
+        codes: npt.NDArray[np.int64],
+        *,
+        with_status: bool = False,
+        states: npt.NDArray[np.int64] | None = None,
     ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.uint8]]:
-        """Compute output codes and status, both of shape (samples, channels); without `with_status`, that is empty."""
+        """Compute output codes and status, both of shape (samples, channels); without `with_status`, that is empty.
+
+        The computation begins with `states`, and leaves its own there; without them, it begins at reset.
+        """
+        ...
+
+    def reset(self, channels: int) -> npt.NDArray[np.int64]:
+        """Return the states after reset, one row for each channel."""
         ...
 
 
@@ -53,19 +65,33 @@ def compile_block(datapath: Datapath) -> Block:
         ctypes.c_void_p,
         ctypes.c_void_p,
     ]
-    state_size = state_bytes(datapath)
+    return _Compiled(function, state_bytes(datapath) // 8)
 
-    def block(
-        codes: npt.NDArray[np.int64], *, with_status: bool = False
+
+class _Compiled:
+    """The loop of a loaded C model, and the size of its state in words of 64 bits."""
+
+    def __init__(self, function: Callable[..., None], words: int) -> None:
+        self._function, self._words = function, words
+
+    def reset(self, channels: int) -> npt.NDArray[np.int64]:
+        # States of 128 bits need an alignment of 16 bytes, which numpy's allocator has for large arrays.
+        return np.zeros((channels, self._words), dtype=np.int64)
+
+    def __call__(
+        self,
+        codes: npt.NDArray[np.int64],
+        *,
+        with_status: bool = False,
+        states: npt.NDArray[np.int64] | None = None,
     ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.uint8]]:
         samples, channels, _ = codes.shape
         source = np.ascontiguousarray(codes, dtype=np.int64)
         result = np.empty((samples, channels), dtype=np.int64)
-        # States of 128 bits need an alignment of 16 bytes, which numpy's allocator has for large arrays.
-        states = np.zeros((channels, state_size // 8), dtype=np.int64)
+        own = self.reset(channels) if states is None else states
         status = np.empty((samples, channels) if with_status else (0, 0), dtype=np.uint8)
-        function(
-            states.ctypes.data,
+        self._function(
+            own.ctypes.data,
             samples,
             channels,
             source.ctypes.data,
@@ -73,8 +99,6 @@ def compile_block(datapath: Datapath) -> Block:
             status.ctypes.data if with_status else None,
         )
         return result, status
-
-    return block
 
 
 def _load(name: str, header: str, source: str) -> ctypes.CDLL:

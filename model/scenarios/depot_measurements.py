@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sosmith.model.arithmetic.random_streams import streams
 from sosmith.model.calibration.fit import COLUMNS
 from sosmith.model.calibration.measurement_files import DATE_COLUMN
-from sosmith.model.random_streams import streams
 from sosmith.model.scenarios.file import ScenarioFile
 
 DIGITS = 6

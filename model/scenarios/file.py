@@ -17,10 +17,10 @@ import numpy as np
 import numpy.typing as npt
 
 from sosmith.model.arithmetic.elementary import exp
+from sosmith.model.arithmetic.random_streams import Streams, streams
 from sosmith.model.arrays import Values
 from sosmith.model.errors import SpecificationError
 from sosmith.model.port import Port
-from sosmith.model.random_streams import Streams, streams
 from sosmith.model.scenarios.catalogue import LIMIT_SAMPLES
 from sosmith.model.scenarios.plateaus import READING_PART, plateau_samples
 from sosmith.model.scenarios.run import Bench

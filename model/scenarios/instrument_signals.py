@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
+from sosmith.model.arithmetic.random_streams import one_stream
 from sosmith.model.arrays import Codes, Values
-from sosmith.model.random_streams import one_stream
 from sosmith.model.scenarios.plateaus import plateaus
 from sosmith.model.scenarios.run import MAX_SAMPLES, MIN_SAMPLES, Bench, Emulated, Run
 from sosmith.model.sensors.instrument import Sensors

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sosmith.model.arithmetic.random_streams import Streams
 from sosmith.model.arrays import Codes, Values
 from sosmith.model.port import Port
-from sosmith.model.random_streams import Streams
 
 
 @dataclass(frozen=True, kw_only=True)

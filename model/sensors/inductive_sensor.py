@@ -9,9 +9,9 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
+from sosmith.model.arithmetic.random_streams import Streams
 from sosmith.model.arrays import Values
 from sosmith.model.calibration.polynomial import EQUATION_4, EQUATION_5A, Polynomial
-from sosmith.model.random_streams import Streams
 from sosmith.model.sensors.coil import Coil
 
 VOLTAGE_NOISE = 0.01

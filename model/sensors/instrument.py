@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from sosmith.model.arithmetic.random_streams import Streams
 from sosmith.model.arrays import Codes, Values
 from sosmith.model.port import Port
-from sosmith.model.random_streams import Streams
 from sosmith.model.sensors.digitizer import CodeFault, Digitizer, with_faults
 from sosmith.model.sensors.inductive_sensor import VOLTAGE_NOISE, InductiveSensor, InductiveState, sensor_voltage
 from sosmith.model.sensors.thermometer import TEMPERATURE_NOISE, IdealThermometer, Thermometer

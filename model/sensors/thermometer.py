@@ -9,9 +9,9 @@ from typing import Protocol
 
 import numpy as np
 
+from sosmith.model.arithmetic.random_streams import Streams
 from sosmith.model.arrays import Codes, Values
 from sosmith.model.port import Port
-from sosmith.model.random_streams import Streams
 from sosmith.model.sensors.digitizer import CodeFault, Digitizer, with_faults
 from sosmith.model.sensors.thermocouple import EMF_RANGE, loop_emf, thermocouple_emf, thermocouple_temperature
 

@@ -1,8 +1,8 @@
 """The documents: what the README shows is what the commands print, and the maps of the code are true.
 
 Run as a script, it renews what is generated in them: the output in the README, the file table of the
-architecture, the register map, the fields of the streams, the commands and the schema of the calibration, the vehicle
-and its parameters, and the page of the Python interface.
+architecture, the register map, the protocol, the fields of the streams, the commands and the schema of the calibration,
+the vehicle and its parameters, and the page of the Python interface.
 """
 
 import contextlib
@@ -15,6 +15,7 @@ from pathlib import Path
 import click
 import pytest
 from click.testing import CliRunner
+from tests.documents.protocol_page import with_parts
 from tests.documents.python_page import first_example, page
 from tests.gen.designs import example_design
 from tests.house import ROOMS, WITH_SUB_ROOMS, file_table, picture
@@ -35,6 +36,7 @@ PRINTING = [CALIBRATION, *(ROOT / "docs" / f"{name}.md" for name in ("spectrum",
 """Documents whose shell blocks stand above what they print."""
 PYTHON = ROOT / "docs" / "python.md"
 HARDWARE = ROOT / "docs" / "hardware.md"
+PROTOCOL = ROOT / "docs" / "protocol.md"
 REGISTERS = ROOT / "docs" / "registers.md"
 VEHICLE = ROOT / "docs" / "vehicle.md"
 DOCUMENTS = [README, ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -156,6 +158,12 @@ def test_the_register_map_is_up_to_date() -> None:
     assert _REGISTERS.findall(REGISTERS.read_text(encoding="utf-8")) == [markdown()]
 
 
+def test_the_tables_and_bytes_of_the_protocol_are_those_of_the_code() -> None:
+    shown = PROTOCOL.read_text(encoding="utf-8")
+    assert shown == with_parts(shown)
+    assert shown.count("    > ") > 5
+
+
 def field_table() -> str:
     """Return the names of the streams' fields in cores of two examples, as their manifests have them, in Markdown."""
     rows = []
@@ -255,5 +263,6 @@ if __name__ == "__main__":
     PYTHON.write_text(page(), encoding="utf-8")
     renew(HARDWARE, _FIELDS, field_table())
     renew(REGISTERS, _REGISTERS, markdown())
+    PROTOCOL.write_text(with_parts(PROTOCOL.read_text(encoding="utf-8")), encoding="utf-8")
     renew(CALIBRATION, _SCHEMA, schema())
     renew(VEHICLE, _PARAMETERS, parameter_table())

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from tests.model.scenarios.scenario_texts import CALIBRATION, PLAIN
 
+from sosmith.model.arithmetic.random_streams import streams
 from sosmith.model.calibration.fit import fit, read_measurements
 from sosmith.model.calibration.measurement_files import read_measurement_file
 from sosmith.model.errors import SpecificationError
-from sosmith.model.random_streams import streams
 from sosmith.model.scenarios.depot_measurements import DepotMeasurement, measurements_csv, measurements_of
 from sosmith.model.scenarios.file import load_scenario
 from sosmith.model.sensors.inductive_sensor import sensor_voltage

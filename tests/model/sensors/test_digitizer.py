@@ -7,9 +7,9 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from sosmith.model.arithmetic.random_streams import streams
 from sosmith.model.arrays import Codes
 from sosmith.model.port import Port
-from sosmith.model.random_streams import streams
 from sosmith.model.sensors.digitizer import CodeFault, Digitizer, with_faults
 
 VOLTAGE = Port.from_range("voltage", 16, Fraction(0), Fraction(10), unit="V")

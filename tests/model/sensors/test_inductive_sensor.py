@@ -9,9 +9,9 @@ import pytest
 from scipy.optimize import least_squares
 
 from sosmith.gen.paper.figures import read_paper_figures
+from sosmith.model.arithmetic.random_streams import streams
 from sosmith.model.arrays import Values
 from sosmith.model.calibration.polynomial import EQUATION_4, EQUATION_5A, Polynomial
-from sosmith.model.random_streams import streams
 from sosmith.model.sensors.coil import REFERENCE_TEMPERATURE, Coil
 from sosmith.model.sensors.inductive_sensor import (
     FORWARD_MODELS,

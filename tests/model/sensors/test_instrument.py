@@ -8,9 +8,9 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from sosmith.model.arithmetic.random_streams import one_stream, streams
 from sosmith.model.arrays import Codes
 from sosmith.model.port import Port
-from sosmith.model.random_streams import one_stream, streams
 from sosmith.model.sensors.digitizer import CodeFault, Digitizer
 from sosmith.model.sensors.inductive_sensor import InductiveSensor, sensor_voltage
 from sosmith.model.sensors.instrument import SensorFaults, Sensors

@@ -1,0 +1,59 @@
+"""The identity of the board that a core is built into, for its memory and for the host."""
+
+from __future__ import annotations
+
+import hashlib
+from typing import Literal
+
+from sosmith.gen.core import CoreDesign
+from sosmith.gen.output.core_facts import interface_facts
+from sosmith.gen.reload.register_writes import bank_size
+from sosmith.gen.version import __version__
+from sosmith.model.link.identity import Identity, Quantity, Reload
+from sosmith.model.link.protocol import VERSION, samples_per_message
+from sosmith.model.port import Port
+
+
+def identity(
+    design: CoreDesign, verilog: str, *, baud: int, clock: float, source: Literal["link", "converter"] = "link"
+) -> Identity:
+    """Return the identity of a board.
+
+    Parameters
+    ----------
+    design : CoreDesign
+        The core.
+    verilog : str
+        Its SystemVerilog, as `generated` gives it.
+    baud : int
+        Rate of the line, in bits per second.
+    clock : float
+        Clock of the core in Hz.
+    source : str
+        Where samples come from.
+    """
+    datapath, fingerprint = design.datapath, design.architecture.fingerprint
+    words, _ = (0, 0) if fingerprint is None else bank_size(design.architecture)
+    made = Identity(
+        protocol=VERSION,
+        name=datapath.name,
+        core=design.core,
+        sosmith=__version__,
+        design=hashlib.sha256(verilog.encode()).hexdigest(),
+        architecture=design.architecture.name,
+        channels=design.spec.channels,
+        sample_rate=float(design.spec.sample_rate),
+        clock=float(clock),
+        baud=baud,
+        source=source,
+        samples=1,
+        inputs=tuple(_quantity(port) for port in datapath.inputs),
+        output=_quantity(datapath.output),
+        flags=dict(interface_facts(design).outputs.flags),
+        reload=None if fingerprint is None else Reload(design=fingerprint, words=words),
+    )
+    return made.model_copy(update={"samples": samples_per_message(made.sample_bytes, made.result_bytes)})
+
+
+def _quantity(port: Port) -> Quantity:
+    return (port.name, port.bits, port.signed, float(port.zero), float(port.lsb), port.unit)

@@ -1,0 +1,153 @@
+"""The identity of a board: the JSON text in its memory that says which core it has, and what its samples mean."""
+
+from __future__ import annotations
+
+import json
+from fractions import Fraction
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from sosmith.model.errors import SpecificationError, ToolError
+from sosmith.model.link.protocol import BLOCK_BYTES, MAX_IDENTITY, samples_per_message
+from sosmith.model.port import Port
+
+Name = Annotated[str, Field(max_length=200)]
+Count = Annotated[int, Field(ge=1, lt=1 << 32)]
+Word = Annotated[int, Field(ge=0, lt=1 << 32)]
+Rate = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Number = Annotated[float, Field(allow_inf_nan=False)]
+Quantity = tuple[Name, Annotated[int, Field(ge=2, le=32)], bool, Number, Rate, Name]
+"""Name, bits, signed, zero, LSB and unit of a port."""
+
+
+class Reload(BaseModel):
+    """The registers of a core: the fingerprint that a set of coefficients must be made for, and its words."""
+
+    model_config = ConfigDict(frozen=True, strict=True, extra="ignore")
+
+    design: Word
+    words: Count
+
+
+class Identity(BaseModel):
+    """What a board is.
+
+    Attributes
+    ----------
+    protocol : int
+        Version of the protocol.
+    name, core : str
+        Name of the core, and which part of the specification it is.
+    sosmith : str
+        Version of sosmith that it was made with.
+    design : str
+        SHA-256 of the core's SystemVerilog, in hexadecimal digits.
+    architecture : str
+        Name of the architecture.
+    channels : int
+        Number of channels.
+    sample_rate : float
+        Samples of a channel in a second.
+    clock : float
+        Clock of the core in Hz.
+    baud : int
+        Rate of the line, in bits per second.
+    source : str
+        ``link`` if samples come over the link, ``converter`` if the board takes them itself.
+    samples : int
+        Most samples in one message.
+    inputs : tuple of tuple
+        Name, bits, signed, zero, LSB and unit of each field of a sample.
+    output : tuple
+        The same of a result.
+    flags : dict of str to int
+        Bit of each flag of a result's status.
+    reload : Reload or None
+        The registers of a core that can load coefficients.
+    """
+
+    model_config = ConfigDict(frozen=True, strict=True, extra="ignore")
+
+    protocol: Count
+    name: Name
+    core: Name
+    sosmith: Name
+    design: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+    architecture: Name
+    channels: Annotated[int, Field(ge=1, le=256)]
+    sample_rate: Rate
+    clock: Rate
+    baud: Count
+    source: Literal["link", "converter"]
+    samples: Annotated[int, Field(ge=1, le=255)]
+    inputs: Annotated[tuple[Quantity, ...], Field(min_length=1, max_length=16)]
+    output: Quantity
+    flags: dict[Name, Annotated[int, Field(ge=0, le=7)]]
+    reload: Reload | None
+
+    @property
+    def input_ports(self) -> tuple[Port, ...]:
+        """The fields of a sample."""
+        return tuple(_port(quantity) for quantity in self.inputs)
+
+    @property
+    def output_port(self) -> Port:
+        """The field of a result."""
+        return _port(self.output)
+
+    @property
+    def sample_bytes(self) -> int:
+        """Bytes of a sample on the link."""
+        return sum(port.bytes for port in self.input_ports)
+
+    @property
+    def result_bytes(self) -> int:
+        """Bytes of a result on the link, with its status."""
+        return self.output_port.bytes + 1
+
+    @property
+    def memory(self) -> bytes:
+        """Content of the board's memory: the text and zero bytes, as many as make the length a power of two.
+
+        Raises
+        ------
+        SpecificationError
+            If the text is too long, as it is for very long names.
+        """
+        text = json.dumps(self.model_dump(mode="json"), ensure_ascii=False, separators=(",", ":")).encode()
+        if len(text) >= MAX_IDENTITY:
+            raise SpecificationError(
+                f"the identity of the board must have fewer than {MAX_IDENTITY} bytes, not {len(text)}; "
+                "shorter names of core, inputs and units help"
+            )
+        return text.ljust(max(1 << len(text).bit_length(), BLOCK_BYTES), b"\0")
+
+    @staticmethod
+    def of_memory(memory: bytes) -> Identity:
+        """Read the identity from a board's memory, or from as much of it as ends with a zero byte.
+
+        Raises
+        ------
+        ToolError
+            If it is no identity, or one that contradicts itself.
+        """
+        try:
+            found = Identity.model_validate_json(memory.split(b"\0", 1)[0])
+        except ValidationError as error:
+            first = error.errors(include_url=False, include_input=False)[0]
+            place = ".".join(map(str, first["loc"])) or "text"
+            raise ToolError(
+                f"the board's identity must be the JSON of docs/protocol.md, not: {place}: {first['msg']}"
+            ) from None
+        fitting = samples_per_message(found.sample_bytes, found.result_bytes)
+        if found.samples > fitting:
+            raise ToolError(
+                f"the board's identity must have at most {fitting} samples in a message, not {found.samples}"
+            )
+        return found
+
+
+def _port(quantity: Quantity) -> Port:
+    name, bits, signed, zero, lsb, unit = quantity
+    return Port(name=name, bits=bits, signed=signed, lsb=Fraction(lsb), zero=Fraction(zero), unit=unit)

@@ -1,0 +1,83 @@
+"""The integer model of a core behind the bytes of the link."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sosmith.model.arrays import Codes
+from sosmith.model.dataflow.compiled import compile_block
+from sosmith.model.dataflow.datapath import Datapath
+
+
+class IntegerCore:
+    """A datapath with the states of its channels, fed with samples as they are on an AXI4-Stream.
+
+    It has no registers.
+
+    Parameters
+    ----------
+    datapath : Datapath
+        What it computes.
+    channels : int
+        Number of channels.
+
+    Raises
+    ------
+    ToolError
+        If no C compiler is found.
+    """
+
+    def __init__(self, datapath: Datapath, channels: int = 1) -> None:
+        self._datapath, self._channels = datapath, channels
+        self._block = compile_block(datapath)
+        self._states = self._block.reset(channels)
+
+    def reset(self) -> None:
+        """Clear the states of all channels."""
+        self._states = self._block.reset(self._channels)
+
+    def feed(self, channel: int, samples: bytes) -> bytes:
+        """Return the results of samples, the first of `channel` and the others of those that follow in turn."""
+        codes = self._codes(samples)
+        rows = -(-(channel + len(codes)) // self._channels)
+        own = slice(channel, channel + len(codes))
+        block = np.zeros((rows * self._channels, codes.shape[1]), dtype=np.int64)
+        block[own] = codes
+        present = np.zeros(rows * self._channels, dtype=bool)
+        present[own] = True
+        turns, present = block.reshape(rows, self._channels, codes.shape[1]), present.reshape(rows, self._channels)
+        results, status = np.zeros((2, rows, self._channels), dtype=np.int64)
+        # Only in the first and the last turn may channels be absent; their states stay.
+        for part in (slice(0, 1), slice(1, max(rows - 1, 1)), slice(max(rows - 1, 1), rows)):
+            if len(turns[part]):
+                before = self._states.copy()
+                results[part], status[part] = self._block(turns[part], with_status=True, states=self._states)
+                absent = ~present[part][0]
+                self._states[absent] = before[absent]
+        return self._packed(results.reshape(-1)[own], status.reshape(-1)[own])
+
+    def read(self, address: int) -> int | None:
+        """Refuse: there are no registers."""
+        return None
+
+    def write(self, address: int, word: int) -> bool:
+        """Refuse: there are no registers."""
+        return False
+
+    def _codes(self, samples: bytes) -> Codes:
+        """Codes of samples, shape (samples, inputs); bits beyond those of a code are ignored, as in hardware."""
+        ports = self._datapath.inputs
+        rows = np.frombuffer(samples, np.uint8).reshape(-1, sum(port.bytes for port in ports)).astype(np.int64)
+        columns, start = [], 0
+        for port in ports:
+            code = sum((rows[:, start + n] << 8 * n for n in range(port.bytes)), np.zeros(len(rows), np.int64))
+            code &= (1 << port.bits) - 1
+            columns.append(np.where(port.signed & (code > port.highest), code - (1 << port.bits), code))
+            start += port.bytes
+        return np.stack(columns, axis=1)
+
+    def _packed(self, results: Codes, status: Codes) -> bytes:
+        """Return results as on the link: the code, the lowest byte first, and the status."""
+        size = self._datapath.output.bytes
+        columns = [results >> 8 * n & 0xFF for n in range(size)] + [status]
+        return np.stack(columns, axis=1).astype(np.uint8).tobytes()

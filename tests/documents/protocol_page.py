@@ -1,0 +1,129 @@
+"""The generated parts of docs/protocol.md: tables, and bytes from the codec and the model of the board."""
+
+import json
+import re
+
+from tests.interface.small import instrument_design
+
+from sosmith.gen.output.identity import identity
+from sosmith.model.link.device import Device
+from sosmith.model.link.frames import Message
+from sosmith.model.link.identity import Identity
+from sosmith.model.link.integer_core import IntegerCore
+from sosmith.model.link.protocol import LAYOUTS, Counter, Status, Type, samples_per_message
+
+_PART = re.compile(r"<!-- (?P<what>[a-z]+) -->\n.*?<!-- end of (?P=what) -->", re.DOTALL)
+_BITS = 10
+"""Bits of the line for a byte, with start and stop bit."""
+
+
+def with_parts(text: str) -> str:
+    """Renew what is generated in `text`, which is the page."""
+    parts = {
+        "frame": _frame,
+        "requests": _requests,
+        "statuses": _statuses,
+        "identity": _identity,
+        "counters": _counters,
+        "session": _session,
+        "throughput": _throughput,
+    }
+
+    def renewed(part: re.Match[str]) -> str:
+        return f"<!-- {part['what']} -->\n{parts[part['what']]()}<!-- end of {part['what']} -->"
+
+    return _PART.sub(renewed, text)
+
+
+def _board() -> tuple[Identity, Device]:
+    core = instrument_design().core
+    made = identity(core, "module gauge; endmodule", baud=1_000_000, clock=12e6)
+    return made, Device(made, IntegerCore(core.datapath, core.spec.channels))
+
+
+def _hex(data: bytes) -> str:
+    return data.hex(" ").upper()
+
+
+def _frame() -> str:
+    message = Message(Type.SAMPLES, 5, bytes([0, 0x12, 0x00, 0x34]))
+    return "    message      " + _hex(message.checked) + "\n    on the line  " + _hex(message.frame) + "\n"
+
+
+def _requests() -> str:
+    rows = [
+        f"| {kind.value} | `{kind.name}` | {layout.request} | {layout.response} | {layout.text} |\n"
+        for kind, layout in LAYOUTS.items()
+    ]
+    return (
+        "| type | | body of the request | body of the response, before the status | |\n|---|---|---|---|---|\n"
+        + "".join(rows)
+    )
+
+
+def _statuses() -> str:
+    rows = [f"| {status.value} | `{status.name}` | {status.meaning} |\n" for status in Status]
+    return "| status | | meaning |\n|---|---|---|\n" + "".join(rows)
+
+
+def _counters() -> str:
+    rows = [f"| {counter.value} | `{counter.name}` | {counter.meaning} |\n" for counter in Counter]
+    return "| byte | counter | counts |\n|---|---|---|\n" + "".join(rows)
+
+
+def _identity() -> str:
+    made, _ = _board()
+    return f"```json\n{json.dumps(made.model_dump(mode='json'))}\n```\n"
+
+
+def _session() -> str:
+    _, board = _board()
+    samples = bytes.fromhex("00 08 00 02 10 08 00 02")
+    steps = [
+        ("begin a session; version 1, window 4", Message(Type.OPEN, 0)),
+        ("the first 64 bytes of the identity", Message(Type.IDENTITY, 1, b"\0")),
+        (
+            "two samples from channel 0 on: codes 0x800 and 0x200, then 0x810 and 0x200",
+            Message(Type.SAMPLES, 2, b"\0" + samples),
+        ),
+        (
+            "the same again, as its response was lost: the same bytes, and the samples are not filtered twice",
+            Message(Type.SAMPLES, 2, b"\0" + samples),
+        ),
+        ("a channel that does not exist", Message(Type.SAMPLES, 3, b"\x09" + samples)),
+        ("a register of a core without registers", Message(Type.READ, 4, b"\x08")),
+        ("a request after one that was lost: no response", Message(Type.COUNTERS, 6)),
+        ("the counters", Message(Type.COUNTERS, 5)),
+    ]
+    lines = []
+    for text, message in steps:
+        lines.append(f"    {text}\n    > {_hex(message.frame)}\n")
+        answer = _hex(board.feed(message.frame))
+        lines += [
+            f"    {mark} {answer[start : start + 96].rstrip()}\n"
+            for mark, start in zip("<" + " " * 9, range(0, len(answer), 96), strict=False)
+        ]
+    return "\n".join("".join(group) for group in _grouped(lines))
+
+
+def _grouped(lines: list[str]) -> list[list[str]]:
+    groups: list[list[str]] = []
+    for line in lines:
+        if ">" in line:
+            groups.append([])
+        groups[-1].append(line)
+    return groups
+
+
+def _throughput() -> str:
+    rows = []
+    for sample, result in ((4, 3), (2, 3), (4, 2), (8, 5)):
+        count = samples_per_message(sample, result)
+        request = len(Message(Type.SAMPLES, 0, bytes(1 + count * sample)).frame)
+        response = len(Message(Type.SAMPLES | 0x80, 0, bytes(count * result + 1)).frame)
+        used = count * max(sample, result) / max(request, response)
+        rates = " | ".join(f"{baud / _BITS * count / max(request, response):,.0f}" for baud in (1_000_000, 3_000_000))
+        rows.append(f"| {sample} | {result} | {count} | {request} | {response} | {100 * used:.1f} % | {rates} |\n")
+    head = "| bytes of a sample | of a result | in a message | bytes of the frames | | of the line "
+    head += "| samples/s at 1 Mbaud | at 3 Mbaud |\n"
+    return head + "|---|---|---|---|---|---|---|---|\n" + "".join(rows)
