@@ -45,14 +45,14 @@ class IntegerCore:
         block[own] = codes
         present = np.zeros(rows * self._channels, dtype=bool)
         present[own] = True
-        turns, present = block.reshape(rows, self._channels, codes.shape[1]), present.reshape(rows, self._channels)
+        turns, taken = block.reshape(rows, self._channels, codes.shape[1]), present.reshape(rows, self._channels)
         results, status = np.zeros((2, rows, self._channels), dtype=np.int64)
         # Only in the first and the last turn may channels be absent; their states stay.
         for part in (slice(0, 1), slice(1, max(rows - 1, 1)), slice(max(rows - 1, 1), rows)):
             if len(turns[part]):
                 before = self._states.copy()
                 results[part], status[part] = self._block(turns[part], with_status=True, states=self._states)
-                absent = ~present[part][0]
+                absent = ~taken[part][0]
                 self._states[absent] = before[absent]
         return self._packed(results.reshape(-1)[own], status.reshape(-1)[own])
 
