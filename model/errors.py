@@ -27,3 +27,15 @@ class ToolError(SosmithError):
     """Something outside is missing or failed: a simulator, a compiler, the disk."""
 
     exit_status = 3
+
+
+class LinkError(ToolError):
+    """The link to a board, or the board at its other end, does not do what it must."""
+
+
+class LinkLostError(LinkError):
+    """The serial port is gone, or the board no longer answers."""
+
+
+class RefusedError(LinkError):
+    """The board answered that it did not carry out a request."""

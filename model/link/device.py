@@ -71,8 +71,8 @@ class Device:
         if isinstance(found, Counter):
             self._count(found)
             return b""
-        if found.type == Type.OPEN and found.sequence == 0:
-            self._next = 0
+        if found.type == Type.OPEN:
+            self._next = found.sequence
             self._retained.clear()
             self._core.reset()
         age = (self._next - found.sequence) % SEQUENCES
@@ -86,7 +86,7 @@ class Device:
         content, status = self._carried_out(found)
         if status is not Status.OK:
             self._count(Counter.REFUSED)
-        response = Message(found.type & 0x7F | RESPONSE, found.sequence, content + bytes([status]))
+        response = Message(found.type | RESPONSE, found.sequence, content + bytes([status]))
         self._retained.append(response)
         return response.frame
 

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from sosmith.model.errors import SpecificationError, ToolError
+from sosmith.model.errors import LinkError, SpecificationError
 from sosmith.model.link.protocol import BLOCK_BYTES, MAX_IDENTITY, samples_per_message
 from sosmith.model.port import Port
 
@@ -129,7 +129,7 @@ class Identity(BaseModel):
 
         Raises
         ------
-        ToolError
+        LinkError
             If it is no identity, or one that contradicts itself.
         """
         try:
@@ -137,12 +137,12 @@ class Identity(BaseModel):
         except ValidationError as error:
             first = error.errors(include_url=False, include_input=False)[0]
             place = ".".join(map(str, first["loc"])) or "text"
-            raise ToolError(
+            raise LinkError(
                 f"the board's identity must be the JSON of docs/protocol.md, not: {place}: {first['msg']}"
             ) from None
         fitting = samples_per_message(found.sample_bytes, found.result_bytes)
         if found.samples > fitting:
-            raise ToolError(
+            raise LinkError(
                 f"the board's identity must have at most {fitting} samples in a message, not {found.samples}"
             )
         return found

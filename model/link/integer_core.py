@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from sosmith.model.arrays import Codes
 from sosmith.model.dataflow.compiled import compile_block
 from sosmith.model.dataflow.datapath import Datapath
+from sosmith.model.link.packing import bytes_of, codes_of
 
 
 class IntegerCore:
@@ -38,7 +38,7 @@ class IntegerCore:
 
     def feed(self, channel: int, samples: bytes) -> bytes:
         """Return the results of samples, the first of `channel` and the others of those that follow in turn."""
-        codes = self._codes(samples)
+        codes = codes_of(samples, self._datapath.inputs)
         rows = -(-(channel + len(codes)) // self._channels)
         own = slice(channel, channel + len(codes))
         block = np.zeros((rows * self._channels, codes.shape[1]), dtype=np.int64)
@@ -54,7 +54,8 @@ class IntegerCore:
                 results[part], status[part] = self._block(turns[part], with_status=True, states=self._states)
                 absent = ~taken[part][0]
                 self._states[absent] = before[absent]
-        return self._packed(results.reshape(-1)[own], status.reshape(-1)[own])
+        columns = np.stack([results.reshape(-1)[own], status.reshape(-1)[own]], axis=1)
+        return bytes_of(columns, [self._datapath.output.bytes, 1])
 
     def read(self, address: int) -> int | None:
         """Refuse: there are no registers."""
@@ -63,21 +64,3 @@ class IntegerCore:
     def write(self, address: int, word: int) -> bool:
         """Refuse: there are no registers."""
         return False
-
-    def _codes(self, samples: bytes) -> Codes:
-        """Codes of samples, shape (samples, inputs); bits beyond those of a code are ignored, as in hardware."""
-        ports = self._datapath.inputs
-        rows = np.frombuffer(samples, np.uint8).reshape(-1, sum(port.bytes for port in ports)).astype(np.int64)
-        columns, start = [], 0
-        for port in ports:
-            code = sum((rows[:, start + n] << 8 * n for n in range(port.bytes)), np.zeros(len(rows), np.int64))
-            code &= (1 << port.bits) - 1
-            columns.append(np.where(port.signed & (code > port.highest), code - (1 << port.bits), code))
-            start += port.bytes
-        return np.stack(columns, axis=1)
-
-    def _packed(self, results: Codes, status: Codes) -> bytes:
-        """Return results as on the link: the code, the lowest byte first, and the status."""
-        size = self._datapath.output.bytes
-        columns = [results >> 8 * n & 0xFF for n in range(size)] + [status]
-        return np.stack(columns, axis=1).astype(np.uint8).tobytes()

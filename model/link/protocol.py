@@ -22,7 +22,7 @@ MIN_MESSAGE, MAX_MESSAGE = HEAD_BYTES + CRC_BYTES, HEAD_BYTES + MAX_BODY + CRC_B
 """Fewest and most bytes of a message."""
 
 RESPONSE = 0x80
-"""What the type of a response has in addition to that of its request."""
+"""The bit that is set in the type of a response."""
 
 SEQUENCES = 256
 """Sequence numbers count modulo this."""
@@ -105,7 +105,7 @@ _COUNTERS = {
     Counter.CRC: "messages with a wrong CRC",
     Counter.SEQUENCE: "messages with a sequence number that is neither the next one nor that of a retained response",
     Counter.REPEATED: "requests that came again, and were answered again",
-    Counter.OVERRUN: "requests beyond the window",
+    Counter.OVERRUN: "frames that began while no buffer was free",
     Counter.REFUSED: "responses with another status than `OK`",
     Counter.MISSED: "results of converters that were overwritten before a `POLL` fetched them",
 }
@@ -125,7 +125,7 @@ LAYOUTS = {
         "nothing",
         "`version`, `window`",
         "Begins a session: sequence numbers start again, what was pending and what was retained is forgotten, and a "
-        "core that is fed over the link is reset. Its sequence number is 0.",
+        "core that is fed over the link is reset.",
     ),
     Type.IDENTITY: Layout(
         "`block`",

@@ -2,7 +2,7 @@
 
 The public interface is the names in `__all__`; docs/python.md documents them. Everything is imported on first use, so
 that importing the package itself is fast. The rooms behind it, each importing only from those to its right:
-``cli -> interface -> sim -> gen -> hdl -> model``.
+``cli -> interface -> host -> sim -> gen -> hdl -> model``.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from sosmith.gen.version import __version__
 
 if TYPE_CHECKING:
+    from sosmith.host.board import Board, Results
     from sosmith.interface.calibration import Calibration
     from sosmith.interface.certificate import Certificate, Proof
     from sosmith.interface.comparison import Comparison, compare
@@ -21,17 +22,30 @@ if TYPE_CHECKING:
     from sosmith.interface.quantity import Quantity
     from sosmith.interface.report import Report
     from sosmith.interface.specification import Specification
-    from sosmith.model.errors import ShortfallError, SosmithError, SpecificationError, ToolError
+    from sosmith.model.errors import (
+        LinkError,
+        LinkLostError,
+        RefusedError,
+        ShortfallError,
+        SosmithError,
+        SpecificationError,
+        ToolError,
+    )
 
 __all__ = [
+    "Board",
     "Calibration",
     "Certificate",
     "Coefficient",
     "Comparison",
     "Design",
+    "LinkError",
+    "LinkLostError",
     "Proof",
     "Quantity",
+    "RefusedError",
     "Report",
+    "Results",
     "Section",
     "ShortfallError",
     "SosmithError",
@@ -44,6 +58,7 @@ __all__ = [
 ]
 
 _MODULES = {
+    "host.board": ("Board", "Results"),
     "interface.calibration": ("Calibration",),
     "interface.certificate": ("Certificate", "Proof"),
     "interface.comparison": ("Comparison", "compare"),
@@ -51,7 +66,15 @@ _MODULES = {
     "interface.quantity": ("Quantity",),
     "interface.report": ("Report",),
     "interface.specification": ("Specification",),
-    "model.errors": ("ShortfallError", "SosmithError", "SpecificationError", "ToolError"),
+    "model.errors": (
+        "LinkError",
+        "LinkLostError",
+        "RefusedError",
+        "ShortfallError",
+        "SosmithError",
+        "SpecificationError",
+        "ToolError",
+    ),
 }
 """The module of each public name; the imports above tell type checkers the same."""
 

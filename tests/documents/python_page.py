@@ -17,8 +17,28 @@ is typed.
 
 """
 
-ORDER = ("Specification", "design", "Design", "Section", "Coefficient", "Certificate", "Proof", "Report", "compare")
-ERRORS = ("SosmithError", "SpecificationError", "ShortfallError", "ToolError")
+ORDER = (
+    "Specification",
+    "design",
+    "Design",
+    "Section",
+    "Coefficient",
+    "Certificate",
+    "Proof",
+    "Report",
+    "compare",
+    "Board",
+    "Results",
+)
+ERRORS = (
+    "SosmithError",
+    "SpecificationError",
+    "ShortfallError",
+    "ToolError",
+    "LinkError",
+    "LinkLostError",
+    "RefusedError",
+)
 
 _SECTION = re.compile(r"^(Parameters|Returns|Raises|Attributes|Examples)\n-+\n", re.MULTILINE)
 

@@ -31,6 +31,7 @@ from sosmith.model.errors import SpecificationError
 from sosmith.model.reference.golden import calibrated, filtered
 
 if TYPE_CHECKING:
+    from sosmith.host.board import Board
     from sosmith.interface.report import Report
 
 Floats = npt.NDArray[np.float64]
@@ -271,6 +272,34 @@ class Design:
             for k in range(block.shape[1])
         ]
         return np.stack(columns, axis=1).reshape(codes.shape[:-1])
+
+    def board(self) -> Board:
+        """Open a `Board` at whose other end is the integer model: for trying out, and for tests without hardware.
+
+        Raises
+        ------
+        ToolError
+            If no C compiler is found.
+
+        Examples
+        --------
+        >>> import sosmith
+        >>> design = sosmith.design({
+        ...     "name": "smooth",
+        ...     "sample_rate": 1000,
+        ...     "input": {"x": {"bits": 12, "range": [-1.0, 1.0], "signed": True}},
+        ...     "filter": {"family": "butterworth", "kind": "lowpass", "order": 2, "cutoff": 100.0},
+        ...     "output": {"bits": 12, "range": [-1.0, 1.0], "signed": True},
+        ... })
+        >>> with design.board() as board:
+        ...     results = board.run(x=[0.5] * 10)
+        >>> bool((results.values == design.run(x=[0.5] * 10)).all())
+        True
+        """
+        from sosmith.host.board import Board
+        from sosmith.host.model_line import ModelLine, model_of
+
+        return Board.on(ModelLine(model_of(self.core)))
 
     def generate(self, folder: str | PathLike[str], progress: Progress = lambda step, done, total: None) -> list[Path]:
         """Write SystemVerilog, RTLIL, manifest, certificate and C model into `folder`; return their paths.

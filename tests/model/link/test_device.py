@@ -90,6 +90,11 @@ def test_a_request_that_comes_again_is_answered_again_with_all_later_ones() -> N
     assert board.counters[Counter.SEQUENCE] == 2
 
 
+def test_a_session_may_begin_with_any_number() -> None:
+    responses = ask(device(filter_design()), Message(Type.OPEN, 77), Message(Type.COUNTERS, 78))
+    assert [response.sequence for response in responses] == [77, 78]
+
+
 def test_sequence_numbers_wrap_around() -> None:
     board = device(filter_design())
     responses = ask(board, OPEN, *(Message(Type.COUNTERS, n % 256) for n in range(1, 600)))
@@ -111,6 +116,7 @@ def test_sequence_numbers_wrap_around() -> None:
         (Type.WRITE, b"\0\0\0\0\0", Status.UNKNOWN, b""),
         (0, b"", Status.UNKNOWN, b""),
         (0x77, b"", Status.UNKNOWN, b""),
+        (0xF3, b"", Status.UNKNOWN, b""),
     ],
 )
 def test_what_becomes_of_a_request(kind: int, body: bytes, status: Status, content: bytes) -> None:

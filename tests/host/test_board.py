@@ -1,0 +1,212 @@
+"""The client: results equal to the integer model's, whatever the line does, and errors that say what is wrong."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from tests.host.lines import BadLine, ScriptedLine, device_of, plain_device
+from tests.interface.small import filter_design, instrument_design
+
+import sosmith
+from sosmith.host.board import Board
+from sosmith.model.link.frames import Message
+from sosmith.model.link.protocol import Counter
+from sosmith.sim.virtual_board.line_damage import LineDamage
+
+
+def random_codes(design: sosmith.Design, samples: int, seed: int = 1) -> np.ndarray:  # type: ignore[type-arg]
+    rng = np.random.default_rng(seed)
+    ports = design.core.datapath.inputs
+    shape = (samples, design.core.spec.channels)
+    return np.stack([rng.integers(p.lowest, p.highest + 1, shape) for p in ports], axis=-1)
+
+
+@pytest.mark.parametrize("window", [2, 8])
+@pytest.mark.parametrize("design", [filter_design, instrument_design], ids=lambda made: made.__name__)
+def test_results_are_those_of_the_model(design, window: int) -> None:  # type: ignore[no-untyped-def]
+    made = design()
+    codes = random_codes(made, 500)
+    with Board.on(BadLine(device_of(made, window))) as board:
+        results = board.run_codes(codes)
+        assert board.faults == {"damaged": 0, "unexpected": 0, "gaps": 0, "timeouts": 0}
+    expected, status = made.core.datapath.compute(codes), made.core.datapath.compute_status(codes)
+    if made.core.spec.channels == 1:
+        expected, status = expected[:, 0], status[:, 0]
+    assert np.array_equal(results.codes, expected)
+    assert np.array_equal(results.status, status)
+    assert np.array_equal(results.values, made.core.datapath.output.decode(expected))
+
+
+def test_physical_values_as_in_a_design() -> None:
+    made = instrument_design()
+    voltage = np.linspace(0, 10, 50)
+    with Board.on(BadLine(device_of(made))) as board:
+        results = board.run(voltage=voltage, temperature=20.0)
+    assert np.array_equal(results.values, made.run(voltage=np.stack([voltage, voltage], 1), temperature=20.0))
+    assert results.flag("input_at_rail")[:, 0].tolist() == [True] + [False] * 48 + [True]
+
+
+def test_the_filter_goes_on_between_calls_and_starts_anew_with_a_session() -> None:
+    made, device = filter_design(), plain_device()
+    codes = random_codes(made, 90)
+    expected = made.core.datapath.compute(codes)[:, 0]
+    with Board.on(BadLine(device)) as board:
+        parts = [board.run_codes(codes[:35]).codes, board.run_codes(codes[35:]).codes]
+    assert np.array_equal(np.concatenate(parts), expected)
+    with Board.on(BadLine(device)) as board:
+        assert np.array_equal(board.run_codes(codes[:10]).codes, expected[:10])
+
+
+def test_what_the_board_says_that_it_is() -> None:
+    line = BadLine(device_of(instrument_design()))
+    with Board.on(line) as board:
+        assert (board.identity["name"], board.channels, board.sample_rate) == ("gauge", 2, 100.0)
+        assert [port.name for port in board.inputs] == ["voltage", "temperature"]
+        assert (board.output.name, board.output.unit) == ("clearance", "mm")
+    assert line.closed
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_damaged_line_costs_time_but_no_sample(seed: int) -> None:
+    made = filter_design()
+    damage = LineDamage(300, seed)
+    line = BadLine(plain_device(), damage)
+    codes = random_codes(made, 4000)
+    with Board.on(line) as board:
+        results = board.run_codes(codes)
+        faults, counters = board.faults, board.counters()
+    assert np.array_equal(results.codes, made.core.datapath.compute(codes)[:, 0])
+    assert damage.count > 20
+    assert faults["damaged"] + faults["gaps"] + faults["timeouts"] > 10
+    assert faults["timeouts"] > 0
+    assert line.device.counters[Counter.REPEATED] > 0
+    assert line.device.counters[Counter.CRC] + line.device.counters[Counter.MALFORMED] > 5
+    assert counters["refused"] == 0
+
+
+@pytest.mark.slow
+def test_two_hundred_thousand_frames_over_a_damaged_line() -> None:
+    made = filter_design()
+    device = plain_device()
+    line = BadLine(device, LineDamage(1000, 7))
+    codes = random_codes(made, 100_000 * 80)
+    with Board.on(line) as board:
+        results = board.run_codes(codes)
+    assert np.array_equal(results.codes, made.core.datapath.compute(codes)[:, 0])
+    assert device.counters[Counter.OVERRUN] == 0
+
+
+def test_counters_go_on_where_bytes_wrap_around() -> None:
+    device = plain_device()
+    with Board.on(BadLine(device)) as board:
+        device.counters[Counter.CRC] = 250
+        assert board.counters()["crc"] == 0
+        device.counters[Counter.CRC] = 4
+        device.counters[Counter.FRAMING] = 3
+        counted = board.counters()
+    assert (counted["crc"], counted["framing"]) == (10, 3)
+
+
+@given(st.lists(st.binary(max_size=300), max_size=20))
+@settings(deadline=None)
+def test_arbitrary_bytes_from_the_board_end_in_a_typed_error(script: list[bytes]) -> None:
+    line = ScriptedLine(*script)
+    with pytest.raises(sosmith.LinkError):
+        Board.on(line)
+    assert line.closed
+
+
+FRAMES = st.builds(
+    lambda kind, sequence, body: Message(kind, sequence, body).frame,
+    st.integers(0x81, 0x83),
+    st.integers(0, 4),
+    st.one_of(st.binary(max_size=12), st.sampled_from([bytes([1, 4, 0]), b'{"protocol":1}\0' + bytes(51)])),
+)
+
+
+@given(st.lists(FRAMES, max_size=40))
+@settings(deadline=None)
+def test_frames_that_make_no_sense_end_in_a_typed_error(script: list[bytes]) -> None:
+    with pytest.raises(sosmith.LinkError):
+        Board.on(ScriptedLine(Message(0x81, 0, bytes([1, 4, 0])).frame, *script))
+
+
+@given(st.lists(st.one_of(FRAMES, st.binary(max_size=99)), max_size=40))
+@settings(deadline=None)
+def test_between_good_responses_nonsense_changes_nothing(noise: list[bytes]) -> None:
+    made = filter_design()
+    codes = random_codes(made, 200)
+    pieces = iter(noise)
+
+    def damage(data: bytes) -> bytes:
+        # Frames of the board's own numbers could be taken for its own: only those of other types are mixed in.
+        return data + next(pieces, b"").replace(b"\x83", b"\x99")
+
+    line = BadLine(plain_device())
+    with Board.on(line) as board:
+        line.damage = damage
+        assert np.array_equal(board.run_codes(codes).codes, made.core.datapath.compute(codes)[:, 0])
+
+
+def test_a_board_that_is_silent() -> None:
+    with pytest.raises(sosmith.LinkLostError, match=r"^the board must answer, not be silent after 6 attempts$"):
+        Board.on(ScriptedLine())
+
+
+def test_a_board_of_another_version() -> None:
+    with pytest.raises(
+        sosmith.LinkError, match=r"^the board must speak version 1 of the protocol, not answer with 02 04$"
+    ):
+        Board.on(ScriptedLine(Message(0x81, 0, bytes([2, 4, 0])).frame))
+
+
+def test_an_identity_without_end() -> None:
+    blocks = [Message(0x82, n, b"x" * 64 + b"\0").frame for n in range(1, 17)]
+    with pytest.raises(sosmith.LinkError, match=r"^the board's identity must end within 1024 bytes$"):
+        Board.on(ScriptedLine(Message(0x81, 0, bytes([1, 4, 0])).frame, *blocks))
+
+
+def test_an_identity_that_is_none() -> None:
+    block = Message(0x82, 1, b'{"protocol":1}' + bytes(50) + b"\0").frame
+    expected = r"^the board's identity must be the JSON of docs/protocol.md, not: name: Field required$"
+    with pytest.raises(sosmith.LinkError, match=expected):
+        Board.on(ScriptedLine(Message(0x81, 0, bytes([1, 4, 0])).frame, block))
+
+
+def test_what_the_board_refuses() -> None:
+    with Board.on(BadLine(plain_device())) as board:
+        with pytest.raises(
+            sosmith.RefusedError, match=r"^the board must carry out READ, not answer: the device has no such request"
+        ):
+            board.read_register(0)
+        with pytest.raises(sosmith.RefusedError, match=r"^the board must carry out POLL, not answer: "):
+            board.poll()
+        assert board.counters()["refused"] == 0  # it counts from its first call
+
+
+@pytest.mark.parametrize(
+    ("codes", "message"),
+    [
+        (np.zeros((3, 2), int), "codes must have the shape (samples, 1, 1), not (3, 2)"),
+        (np.zeros((3, 1)), "codes must be integers, not float64"),
+        (np.full((3, 1), 512), "codes of x must be in -512..511, not 512..512"),
+    ],
+)
+def test_codes_that_do_not_fit(codes: np.ndarray, message: str) -> None:  # type: ignore[type-arg]
+    with Board.on(BadLine(plain_device())) as board, pytest.raises(sosmith.SpecificationError) as caught:
+        board.run_codes(codes)
+    assert str(caught.value) == message
+
+
+def test_inputs_that_do_not_fit() -> None:
+    with Board.on(BadLine(plain_device())) as board:
+        with pytest.raises(sosmith.SpecificationError, match=r"^the inputs must be x, not y$"):
+            board.run(y=1)
+        with pytest.raises(sosmith.SpecificationError, match=r"^the inputs must have the shape \(samples,\) or "):
+            board.run(x=1.0)
+
+
+def test_a_port_that_does_not_exist() -> None:
+    expected = r"^/nowhere must be a serial port that is free, not: No such file or directory$"
+    with pytest.raises(sosmith.ToolError, match=expected):
+        Board("/nowhere")
