@@ -11,7 +11,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 ROOMS = ("model", "hdl", "gen", "sim")
 """The rooms below the command line, the lowest first."""
-WITH_SUB_ROOMS = ("model", "gen", "sim")
+WITH_SUB_ROOMS = ("model", "hdl", "gen", "sim")
 
 
 @cache

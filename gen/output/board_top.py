@@ -1,0 +1,66 @@
+"""From a design to the top of its board: the core, its identity, and the serial link."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+from sosmith.gen.core import CoreDesign
+from sosmith.gen.output.identity import identity
+from sosmith.gen.output.verilog import to_rtlil, to_verilog
+from sosmith.hdl.boards.board_top import BoardTop
+from sosmith.hdl.bus.command_engine import MAX_CHANNELS, MAX_SAMPLE_BYTES
+from sosmith.hdl.bus.uart import MIN_CLOCKS
+from sosmith.model.errors import SpecificationError
+
+RATE = 1_000_000
+"""Line rate of a board that was built without another wish, in baud."""
+
+
+def top_name(design: CoreDesign) -> str:
+    """Name of the top module of a design's board."""
+    return f"{design.datapath.name}_board"
+
+
+def board_top(design: CoreDesign, *, clock: Fraction, rate: int = RATE, verilog: str | None = None) -> BoardTop:
+    """Return the top of a board that has the core of a design.
+
+    Parameters
+    ----------
+    design : CoreDesign
+        The core.
+    clock : Fraction
+        Clock of the board in Hz.
+    rate : int
+        Line rate in baud.
+    verilog : str or None
+        The core's SystemVerilog, whose digest the identity has; None to make it.
+
+    Raises
+    ------
+    SpecificationError
+        If the line rate is too high for the clock, the core has too many channels or a sample too many bytes for the
+        link, or names are too long for the identity.
+    ToolError
+        If Yosys fails.
+    """
+    if rate * MIN_CLOCKS > clock:
+        raise SpecificationError(
+            f"the line rate must be at most {float(clock / MIN_CLOCKS):,.0f} baud at a clock of {float(clock):,.0f} Hz,"
+            f" not {rate:,}"
+        )
+    if design.spec.channels > MAX_CHANNELS:
+        raise SpecificationError(f"channels must be at most {MAX_CHANNELS} over a link, not {design.spec.channels:,}")
+    sample_bytes = sum(port.bytes for port in design.datapath.inputs)
+    if sample_bytes > MAX_SAMPLE_BYTES:
+        raise SpecificationError(f"a sample must have at most {MAX_SAMPLE_BYTES} bytes over a link, not {sample_bytes}")
+    text = verilog or to_verilog(to_rtlil(design.architecture.component(), design.datapath.name))
+    memory = identity(design, text, baud=rate, clock=float(clock)).memory
+    return BoardTop(design.architecture.component(), memory, ratio=clock / rate, channels=design.spec.channels)
+
+
+def board_verilog(design: CoreDesign, *, clock: Fraction, rate: int = RATE) -> str:
+    """Return the SystemVerilog of a design's board, with the top module `top_name`.
+
+    Parameters and errors are those of `board_top`.
+    """
+    return to_verilog(to_rtlil(board_top(design, clock=clock, rate=rate), top_name(design)))

@@ -1,0 +1,1 @@
+"""Tops of boards: a core with its link, and what a particular board connects it to."""
