@@ -40,6 +40,9 @@ _Kind = TypeVar("_Kind", bound=np.generic)
 Progress = Callable[[str, int, int], None]
 """Called with the name of the step, the amount done and the total; the total is 0 if it is not known."""
 
+Hardware = Callable[[str, Codes, Callable[[int, int], None]], CosimulationResult]
+"""Hardware with a core: takes its SystemVerilog, codes of shape (samples, channels, inputs), and whom to tell."""
+
 
 def simulate(
     design: CoreDesign,
@@ -53,13 +56,15 @@ def simulate(
     waves: bool = False,
     gates: Board | None = None,
     vectors: Path | None = None,
+    hardware: Hardware | None = None,
     progress: Progress = lambda step, done, total: None,
 ) -> Evidence:
     """Generate the core into `directory`, run `traces` through it, and compare it with model and golden chain.
 
     There is one trace for each channel, all of the same length. With `gates`, the simulation runs the netlist
-    synthesized for that board. With `vectors`, what went in and what came out is written to that file, in the format of
-    its suffix (`sosmith.gen.output.vectors.vector_files`).
+    synthesized for that board; with `hardware`, that runs the core, and nothing is simulated. With `vectors`, what went
+    in and what came out is written to that file, in the format of its suffix
+    (`sosmith.gen.output.vectors.vector_files`).
 
     Raises
     ------
@@ -78,30 +83,35 @@ def simulate(
         facts = core_facts(design)
         generate(design, directory, lambda step: progress(f"generating {step}", 0, 0), facts=facts)
         source, build_dir, netlist = directory / f"{design.datapath.name}.sv", directory / "simulation", None
-        if gates is not None:
-            progress(f"synthesizing for {gates.title}", 0, 0)
-            build_dir = directory / "gates" / gates.name
-            netlist = synthesize(source, design.datapath.name, gates, build_dir)
-            source = with_cell_models(netlist, scrambled=not design.spec.hardware.reload)
-        bench = SimulatorBench(
-            source=source,
-            interface=facts.interface,
-            build_dir=build_dir,
-            simulator=simulator,
-            seed=seed,
-            idle=idle,
-            stall=stall,
-            waves=waves,
-            announce=lambda step: progress(step, 0, 0),
-        )
         codes = np.stack([trace.codes for trace in traces], axis=1)
-        result = cosimulate(
-            bench,
-            facts.interface,
-            codes,
-            seed=seed,
-            progress=lambda done, total: progress("co-simulating", done, total),
-        )
+        if hardware is not None:
+            result = hardware(
+                source.read_text(encoding="utf-8"), codes, lambda done, total: progress("running", done, total)
+            )
+        else:
+            if gates is not None:
+                progress(f"synthesizing for {gates.title}", 0, 0)
+                build_dir = directory / "gates" / gates.name
+                netlist = synthesize(source, design.datapath.name, gates, build_dir)
+                source = with_cell_models(netlist, scrambled=not design.spec.hardware.reload)
+            bench = SimulatorBench(
+                source=source,
+                interface=facts.interface,
+                build_dir=build_dir,
+                simulator=simulator,
+                seed=seed,
+                idle=idle,
+                stall=stall,
+                waves=waves,
+                announce=lambda step: progress(step, 0, 0),
+            )
+            result = cosimulate(
+                bench,
+                facts.interface,
+                codes,
+                seed=seed,
+                progress=lambda done, total: progress("co-simulating", done, total),
+            )
     if vectors is not None:
         progress("writing the vectors", 0, 0)
         taken = Vectors(stimuli=codes, responses=result.codes[:, :, 0], status=result.status)

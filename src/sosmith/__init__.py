@@ -31,6 +31,7 @@ if TYPE_CHECKING:
         SpecificationError,
         ToolError,
     )
+    from sosmith.model.link.identity import Identity
 
 __all__ = [
     "Board",
@@ -39,6 +40,7 @@ __all__ = [
     "Coefficient",
     "Comparison",
     "Design",
+    "Identity",
     "LinkError",
     "LinkLostError",
     "Proof",
@@ -66,6 +68,7 @@ _MODULES = {
     "interface.quantity": ("Quantity",),
     "interface.report": ("Report",),
     "interface.specification": ("Specification",),
+    "model.link.identity": ("Identity",),
     "model.errors": (
         "LinkError",
         "LinkLostError",

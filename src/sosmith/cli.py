@@ -62,6 +62,9 @@ _COMMANDS = {
         "emulate_command",
         "Write an emulated sensor trace for SPEC as CSV; without SCENARIO, list the scenarios for SPEC.",
     ),
+    "stream": _Command(
+        "stream", "stream_command", "Send the samples of TRACE.csv to the board at PORT, and write its results."
+    ),
     "compare": _Command("compare", "compare_command", "Compare accuracy reports side by side."),
     "calibrate": _Command(
         "calibrate",

@@ -60,9 +60,10 @@ def test_the_filter_goes_on_between_calls_and_starts_anew_with_a_session() -> No
 def test_what_the_board_says_that_it_is() -> None:
     line = BadLine(device_of(instrument_design()))
     with Board.on(line) as board:
-        assert (board.identity["name"], board.channels, board.sample_rate) == ("gauge", 2, 100.0)
-        assert [port.name for port in board.inputs] == ["voltage", "temperature"]
-        assert (board.output.name, board.output.unit) == ("clearance", "mm")
+        about = board.identity
+    assert (about.name, about.channels, about.sample_rate) == ("gauge", 2, 100.0)
+    assert [port.name for port in about.input_ports] == ["voltage", "temperature"]
+    assert (about.output_port.name, about.output_port.unit) == ("clearance", "mm")
     assert line.closed
 
 

@@ -45,6 +45,14 @@ SECONDS = click.option(
     type=click.FloatRange(min=0, min_open=True),
     help="Length of a built-in scenario, in seconds of simulated time.",
 )
+PORT = click.option("--port", metavar="PORT", help="Serial port of a board, real or virtual, that has the core.")
+BAUD = click.option(
+    "--baud",
+    type=click.IntRange(min=1),
+    default=1_000_000,
+    show_default=True,
+    help="Bits per second on the serial port, for which the board was built.",
+)
 
 
 def default_folder(name: str) -> Path:

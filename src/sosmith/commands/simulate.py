@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from sosmith.commands.options import (
+    BAUD,
     BOARD,
     CORE,
+    PORT,
     REALIZATION,
     SECONDS,
     SEED,
@@ -99,6 +101,8 @@ def _empty_cache(ctx: click.Context, param: click.Parameter, wanted: bool) -> No
     help="Simulate the netlist that Yosys synthesizes for the FPGA of this board instead: "
     f"{', '.join(BOARDS)}. Synthesis takes seconds, and the simulation is slower.",
 )
+@PORT
+@BAUD
 @click.option("--waves", is_flag=True, help="Also write a waveform (VCD); the simulation is slower.")
 @click.option(
     "--vectors",
@@ -129,6 +133,8 @@ def simulate_command(
     idle: float,
     stall: float,
     gates: str | None,
+    port: str | None,
+    baud: int,
     waves: bool,
     vectors: Path | None,
     seconds: float | None,
@@ -145,12 +151,15 @@ def simulate_command(
     With --gates, the same test bench simulates the netlist of FPGA cells, with random initial values in the flip-flops,
     and an automatic choice of the architecture is made for that board.
 
+    With --port, a board runs the core instead of a simulator, and the report is the same.
+
     Compiled simulations are kept for later runs in ~/.cache/sosmith, or in the folder named by XDG_CACHE_HOME, up to
     256 MB.
 
     \b
         sosmith simulate my.toml
         sosmith simulate my.toml --trace worst_case --simulator icarus -o build/worst
+        sosmith simulate my.toml --port /dev/ttyUSB1
     """
     from sosmith.gen.output.vectors import check_format
     from sosmith.interface.specification import Specification
@@ -159,6 +168,8 @@ def simulate_command(
     check_name(simulator, netlist=gates is not None)
     if vectors is not None:
         check_format(vectors)
+    if port is not None and (gates is not None or waves):
+        raise SpecificationError("--port must come without --gates and --waves, which need a simulator")
     netlist_for = None if gates is None else find_board(gates).name
     asked = Specification.load(spec)
     if source is not None and not _is_file(source):
@@ -185,6 +196,8 @@ def simulate_command(
             idle=idle,
             stall=stall,
             gates=netlist_for,
+            port=port,
+            baud=baud,
             waves=waves,
             vectors=vectors,
         )

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from types import TracebackType
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -16,7 +15,6 @@ from sosmith.model.errors import LinkError, SpecificationError
 from sosmith.model.link.identity import Identity
 from sosmith.model.link.packing import bytes_of, codes_of
 from sosmith.model.link.protocol import BLOCK_BYTES, MAX_IDENTITY, MAX_WORDS, WORD_BYTES, Counter, Type
-from sosmith.model.port import Port
 
 Codes = npt.NDArray[np.int64]
 
@@ -86,7 +84,7 @@ class Board:
     ... })
     >>> with design.board() as board:
     ...     results = board.run(x=[0.0, 0.5, 1.5])
-    ...     board.identity["name"], board.counters()["crc"]
+    ...     board.identity.name, board.counters()["crc"]
     ('smooth', 0)
     >>> results.flag("input_at_rail").tolist()
     [False, False, True]
@@ -128,29 +126,9 @@ class Board:
         self._line.close()
 
     @property
-    def identity(self) -> dict[str, Any]:
-        """What the board says that it is; docs/protocol.md lists the keys."""
-        return self._identity.model_dump(mode="json")
-
-    @property
-    def inputs(self) -> tuple[Port, ...]:
-        """Name, format and unit of each input."""
-        return self._identity.input_ports
-
-    @property
-    def output(self) -> Port:
-        """Name, format and unit of the output."""
-        return self._identity.output_port
-
-    @property
-    def channels(self) -> int:
-        """Number of channels."""
-        return self._identity.channels
-
-    @property
-    def sample_rate(self) -> float:
-        """Samples of a channel in a second, in Hz."""
-        return self._identity.sample_rate
+    def identity(self) -> Identity:
+        """What the board says that it is."""
+        return self._identity
 
     @property
     def faults(self) -> dict[str, int]:
@@ -192,21 +170,23 @@ class Board:
         LinkError
             If the link fails.
         """
-        names = [port.name for port in self.inputs]
+        names = [port.name for port in self._identity.input_ports]
         if sorted(inputs) != sorted(names):
             raise SpecificationError(f"the inputs must be {' and '.join(names)}, not {' and '.join(inputs) or 'none'}")
         try:
             values = np.broadcast_arrays(*(np.asarray(inputs[name], dtype=np.float64) for name in names))
-            codes = np.stack([port.encode(each) for port, each in zip(self.inputs, values, strict=True)], axis=-1)
+            codes = np.stack(
+                [port.encode(each) for port, each in zip(self._identity.input_ports, values, strict=True)], axis=-1
+            )
         except (TypeError, ValueError) as error:
             raise SpecificationError(f"the inputs must be numbers whose shapes broadcast, not: {error}") from None
-        if codes.ndim == 1 or codes.shape[1:-1] not in {(), (self.channels,)}:
+        if codes.ndim == 1 or codes.shape[1:-1] not in {(), (self._identity.channels,)}:
             shape = codes.shape[:-1]
             raise SpecificationError(
-                f"the inputs must have the shape (samples,) or (samples, {self.channels}), not {shape}"
+                f"the inputs must have the shape (samples,) or (samples, {self._identity.channels}), not {shape}"
             )
         if codes.ndim == 2:
-            codes = np.broadcast_to(codes[:, np.newaxis], (len(codes), self.channels, len(names)))
+            codes = np.broadcast_to(codes[:, np.newaxis], (len(codes), self._identity.channels, len(names)))
         return self.run_codes(codes)
 
     def run_codes(self, codes: Codes, progress: Callable[[int, int], None] = lambda done, total: None) -> Results:
@@ -240,18 +220,18 @@ class Board:
     def _requests(self, rows: Codes) -> Iterator[Request]:
         """Give requests with the samples of all channels in turn."""
         step = self._identity.samples
-        sizes = [port.bytes for port in self.inputs]
+        sizes = [port.bytes for port in self._identity.input_ports]
         for start in range(0, len(rows), step):
-            yield Type.SAMPLES, bytes([start % self.channels]) + bytes_of(rows[start : start + step], sizes)
+            yield Type.SAMPLES, bytes([start % self._identity.channels]) + bytes_of(rows[start : start + step], sizes)
 
     def _results(self, data: bytes) -> Results:
         size = self._identity.result_bytes
         rows = np.frombuffer(data, np.uint8).reshape(-1, size)
-        codes = codes_of(rows[:, :-1].tobytes(), [self.output])[:, 0]
-        shape = (-1,) if self.channels == 1 else (-1, self.channels)
+        codes = codes_of(rows[:, :-1].tobytes(), [self._identity.output_port])[:, 0]
+        shape = (-1,) if self._identity.channels == 1 else (-1, self._identity.channels)
         shaped = codes.reshape(shape)
         return Results(
-            values=self.output.decode(shaped),
+            values=self._identity.output_port.decode(shaped),
             codes=shaped,
             status=rows[:, -1].reshape(shape).copy(),
             flags=dict(self._identity.flags),
@@ -261,13 +241,13 @@ class Board:
         if self._identity.source != "link":
             raise SpecificationError("the samples must come from the board's converters, not over the link")
         array = np.asarray(codes)
-        block = array[:, np.newaxis] if array.ndim == 2 and self.channels == 1 else array
-        if block.ndim != 3 or block.shape[1:] != (self.channels, len(self.inputs)):
-            wanted = f"(samples, {self.channels}, {len(self.inputs)})"
+        block = array[:, np.newaxis] if array.ndim == 2 and self._identity.channels == 1 else array
+        if block.ndim != 3 or block.shape[1:] != (self._identity.channels, len(self._identity.input_ports)):
+            wanted = f"(samples, {self._identity.channels}, {len(self._identity.input_ports)})"
             raise SpecificationError(f"codes must have the shape {wanted}, not {array.shape}")
         if not np.issubdtype(block.dtype, np.integer):
             raise SpecificationError(f"codes must be integers, not {block.dtype}")
-        for k, port in enumerate(self.inputs):
+        for k, port in enumerate(self._identity.input_ports):
             column = block[..., k]
             if column.size and (column.min() < port.lowest or column.max() > port.highest):
                 found = f"{column.min()}..{column.max()}"
@@ -285,9 +265,11 @@ class Board:
         if len(body) == 1:
             return None
         rows = np.frombuffer(body[1:], np.uint8).reshape(-1, self._identity.result_bytes)
-        codes = codes_of(rows[:, :-1].tobytes(), [self.output])[:, 0]
+        codes = codes_of(rows[:, :-1].tobytes(), [self._identity.output_port])[:, 0]
         flags = dict(self._identity.flags)
-        return body[0], Results(values=self.output.decode(codes), codes=codes, status=rows[:, -1].copy(), flags=flags)
+        return body[0], Results(
+            values=self._identity.output_port.decode(codes), codes=codes, status=rows[:, -1].copy(), flags=flags
+        )
 
     def read_register(self, address: int) -> int:
         """Read the register at a byte address of the core; docs/registers.md lists them.

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import ExitStack
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from os import PathLike, fspath
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -333,6 +334,8 @@ class Design:
         seconds: float | None = None,
         simulator: str = "verilator",
         gates: str | None = None,
+        port: str | None = None,
+        baud: int = 1_000_000,
         idle: float = 0.3,
         stall: float = 0.3,
         waves: bool = False,
@@ -356,6 +359,10 @@ class Design:
             "verilator", "icarus" or "cxxrtl".
         gates : str
             Name of a board: simulate the netlist that Yosys synthesizes for its FPGA instead of the SystemVerilog.
+        port : str
+            Serial port of a board, real or virtual, that runs the core instead of a simulator.
+        baud : int
+            Bits per second on that port.
         idle, stall : float
             Fractions of clocks without an input sample and with the output stalled, 0 to 0.99.
         waves : bool
@@ -375,9 +382,11 @@ class Design:
         SpecificationError
             If the trace, simulator, board or format of vectors does not exist, or the folder cannot be written.
         ShortfallError
-            If the hardware breaks the stream protocol.
+            If the hardware breaks the stream protocol, or the board has another core.
         ToolError
             If a tool is missing or fails, or the disk is full.
+        LinkError
+            If the board does not answer.
         """
         # The simulation modules are slow to import; a design that only computes does not need them.
         from sosmith.interface.report import Report
@@ -394,19 +403,27 @@ class Design:
         place = Path("build") / self.core.spec.name if folder is None else Path(fspath(folder))
         progress("trace", 0, 0)
         traces = traces_of(self.core, trace, seed=seed, seconds=seconds)
-        evidence = simulate(
-            self.core,
-            traces,
-            place,
-            simulator=simulator,
-            seed=seed,
-            idle=idle,
-            stall=stall,
-            waves=waves,
-            gates=board,
-            vectors=None if vectors is None else Path(fspath(vectors)),
-            progress=progress,
-        )
+        with ExitStack() as stack:
+            hardware = None
+            if port is not None:
+                from sosmith.host.board import Board
+                from sosmith.host.port_run import run_on
+
+                hardware = partial(run_on, stack.enter_context(Board(port, baud=baud)))
+            evidence = simulate(
+                self.core,
+                traces,
+                place,
+                simulator=simulator,
+                seed=seed,
+                idle=idle,
+                stall=stall,
+                waves=waves,
+                gates=board,
+                hardware=hardware,
+                vectors=None if vectors is None else Path(fspath(vectors)),
+                progress=progress,
+            )
         progress("writing the report", 0, 0)
         return Report.written(self.core, traces, evidence, place)
 

@@ -1,0 +1,58 @@
+"""`sosmith stream`: pushes a trace through a board and pulls the results."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from pathlib import Path
+
+import click
+import numpy as np
+
+from sosmith.commands.options import BAUD
+from sosmith.terminal import note, output_option, show_progress
+
+
+@click.command("stream")
+@click.argument("port")
+@click.argument("trace", type=click.Path(path_type=Path), metavar="TRACE.csv")
+@BAUD
+@output_option("CSV file, or Parquet file if its name ends so, for the results.  [default: stdout]")
+def stream_command(port: str, trace: Path, baud: int, output: Path | None) -> None:
+    """Send the samples of TRACE.csv to the board at PORT, and write its results.
+
+    PORT is a serial port, or the path that `sosmith board SPEC --virtual` prints. TRACE.csv has the columns that
+    `sosmith emulate` writes: for each input its codes or its physical values. A trace without the column channel drives
+    all channels, each one sample later than the one before. The core starts from reset.
+
+    \b
+        sosmith stream /dev/ttyUSB1 ramp.csv -o results.csv
+    """
+    from sosmith.host.board import Board
+    from sosmith.host.recording import recording
+    from sosmith.host.rows import columns, rows
+    from sosmith.model.text_files import write_files
+    from sosmith.model.traces.trace_file import read_traces
+
+    with show_progress() as step, Board(port, baud=baud) as board:
+        about = board.identity
+        step(f"reading {trace}")
+        rate = Fraction(about.sample_rate).limit_denominator(10**9)
+        traces = read_traces(trace, about.input_ports, rate, about.channels)
+        if len(traces) < about.channels:
+            traces = tuple(traces[0].delayed(k) for k in range(about.channels))
+        results = board.run_codes(
+            np.stack([each.codes for each in traces], axis=1), lambda done, total: step("streaming", done, total)
+        )
+        faults = {name: count for name, count in board.faults.items() if count}
+    lines = ((",".join(map(str, row))) for row in [columns(about), *rows(about, results)])
+    if output is None:
+        click.echo("\n".join(lines))
+    elif output.suffix.lower() == ".parquet":
+        with recording(output, columns(about)) as made:
+            made.add(rows(about, results))
+    else:
+        write_files(output.parent, {output.name: "\n".join(lines) + "\n"})
+    if output is not None:
+        note(f"wrote {output}: {results.codes.size} results of {about.name}")
+    if faults:
+        note("mended on the line: " + ", ".join(f"{count} {name}" for name, count in faults.items()))

@@ -1,0 +1,82 @@
+"""Holds a board's identity against the manifest and the certificate of a core."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from sosmith.gen.verifier.certificate_file import read_certificate
+from sosmith.model.errors import ShortfallError, SpecificationError
+from sosmith.model.link.identity import Identity
+
+
+def check_design(identity: Identity, verilog: str) -> None:
+    """Check that the core in a board was made from this SystemVerilog.
+
+    Raises
+    ------
+    ShortfallError
+        If it was not.
+    """
+    _check(identity, "design", hashlib.sha256(verilog.encode()).hexdigest()[:12], identity.design[:12])
+
+
+def check_files(identity: Identity, folder: Path) -> dict[str, Any]:
+    """Check that a board has the core whose manifest and certificate are in `folder`; return the manifest.
+
+    Raises
+    ------
+    ShortfallError
+        If it has another one; says what differs.
+    SpecificationError
+        If the files cannot be read, or are not those of a core.
+    """
+    manifest = _manifest(folder / f"{identity.name}.json")
+    certificate = read_certificate(folder / f"{identity.name}.certificate.json")
+    files = {} if certificate.about is None else {file.name: file.sha256 for file in certificate.about.files}
+    source = f"{identity.name}.sv"
+    if source not in files:
+        raise SpecificationError(f"{folder}: the certificate must be one that lists {source}, not without it")
+    _check(identity, "design", files[source][:12], identity.design[:12])
+    _check(identity, "name", certificate.name, identity.name)
+    try:
+        streams = manifest["streams"]
+        facts: dict[str, tuple[Any, Any]] = {
+            "core": (manifest["core"], identity.core),
+            "channels": (manifest["channels"], identity.channels),
+            "inputs": (_quantities(streams["s_axis"]), [list(quantity) for quantity in identity.inputs]),
+            "output": (_quantities(streams["m_axis"]), [list(identity.output)]),
+            "flags": (streams["m_axis"]["tuser"]["flags"], identity.flags),
+        }
+    except (KeyError, TypeError) as error:
+        raise SpecificationError(f"{folder}: the manifest must have its keys, not be without {error}") from None
+    for key, (expected, found) in facts.items():
+        _check(identity, key, expected, found)
+    return manifest
+
+
+def _check(identity: Identity, key: str, expected: Any, found: Any) -> None:
+    if expected != found:
+        raise ShortfallError(f"the board's {key} must be {expected}, not {found}; its core is {identity.name}")
+
+
+def _manifest(path: Path) -> dict[str, Any]:
+    try:
+        tree = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise SpecificationError(
+            f"{path}: the manifest must be a file that can be read, not: {error.strerror}"
+        ) from None
+    except ValueError:
+        tree = None
+    if not isinstance(tree, Mapping):
+        raise SpecificationError(f"{path}: the manifest must be JSON, an object, not something else")
+    return dict(tree)
+
+
+def _quantities(stream: Mapping[str, Any]) -> list[list[Any]]:
+    keys = ("name", "width", "signed", "zero", "lsb", "unit")
+    return [[field[key] for key in keys] for field in stream["fields"]]

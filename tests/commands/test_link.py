@@ -1,0 +1,106 @@
+"""Commands that talk to a board: streamed traces, and the accuracy suite over a port."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.commands.invocation import Invocation
+from tests.host.ports import plugged
+from tests.interface.small import filter_design, instrument_design
+
+import sosmith
+from sosmith.gen.output.generate import generated
+from sosmith.gen.stimuli import traces_for
+from sosmith.host.board import Board
+from sosmith.host.model_line import ModelLine, model_of
+from sosmith.host.port_run import run_on
+from sosmith.model.errors import ShortfallError, SpecificationError, ToolError
+from sosmith.model.link.device import Device
+from sosmith.model.traces.trace_file import write_traces
+from sosmith.sim.simulation import simulate
+
+STREAM = Invocation("stream")
+
+
+def board_of(design: sosmith.Design) -> Device:
+    return model_of(design.core, generated(design.core)[f"{design.name}.sv"])
+
+
+def test_a_trace_goes_through_a_board(tmp_path: Path) -> None:
+    made = filter_design()
+    (trace,) = traces_for(made.core, "sweep", seed=1, seconds=0.5)
+    write_traces(tmp_path / "sweep.csv", [trace])
+    with plugged(model_of(made.core)) as port:
+        printed = STREAM.good(port, str(tmp_path / "sweep.csv")).stdout
+        STREAM.good(port, str(tmp_path / "sweep.csv"), "-o", str(tmp_path / "out.csv"))
+    assert printed == (tmp_path / "out.csv").read_text()
+    header, *lines = printed.splitlines()
+    assert header == "time_s,y,y_code,status"
+    codes = made.core.datapath.compute(trace.codes)
+    values = made.core.datapath.output.decode(codes).tolist()
+    status = made.core.datapath.compute_status(trace.codes)
+    expected = zip(trace.time.tolist(), values, codes.tolist(), status.tolist(), strict=True)
+    assert lines == [",".join(map(str, row)) for row in expected]
+
+
+def test_one_trace_drives_all_channels(tmp_path: Path) -> None:
+    made = instrument_design()
+    (first, second) = traces_for(made.core, "wear_ramp", seed=1, seconds=1)
+    write_traces(tmp_path / "ramp.csv", [first])
+    with plugged(model_of(made.core)) as port:
+        header, *lines = STREAM.good(port, str(tmp_path / "ramp.csv")).stdout.splitlines()
+    assert header == "time_s,channel,clearance_mm,clearance_code,status"
+    codes = np.stack([first.codes, first.delayed(1).codes], axis=1)
+    assert [int(line.split(",")[3]) for line in lines] == made.core.datapath.compute(codes).reshape(-1).tolist()
+    assert [line.split(",")[1] for line in lines] == ["0", "1"] * len(first)
+    assert second.codes.shape == first.codes.shape
+
+
+def test_a_port_without_a_board(tmp_path: Path) -> None:
+    (tmp_path / "ramp.csv").write_text("x\n1\n")
+    expected = "/dev/nothing must be a serial port that is free, not: No such file or directory"
+    STREAM.refused(expected, "/dev/nothing", str(tmp_path / "ramp.csv"), kind=ToolError)
+
+
+def test_the_accuracy_suite_over_a_port(tmp_path: Path) -> None:
+    made = filter_design()
+    with plugged(board_of(made)) as port:
+        report = made.simulate(folder=tmp_path / "out", seconds=0.5, port=port)
+    assert report.passed
+    assert report.bit_exact
+    assert report.summary["simulator"] == "board"
+    assert report.summary["samples"] == len(report.hardware_codes) == 500
+    assert (tmp_path / "out" / "report.html").exists()
+
+
+def test_a_board_that_computes_something_else_falls_short(tmp_path: Path) -> None:
+    made = filter_design()
+    board = board_of(made)
+    feed = board._core.feed
+    board._core.feed = lambda channel, samples: feed(channel, samples)[:-2] + b"\x01\x00"  # type: ignore[method-assign]
+    traces = traces_for(made.core, "sweep", seed=1, seconds=0.5)
+    with Board.on(ModelLine(board)) as client:
+        evidence = simulate(made.core, traces, tmp_path / "out", hardware=partial(run_on, client))
+    assert evidence.mismatches > 0
+    assert not evidence.bit_exact
+
+
+def test_a_board_with_another_core_is_not_tried(tmp_path: Path) -> None:
+    made = filter_design()
+    expected = r"^the board's design must be [0-9a-f]{12}, not [0-9a-f]{12}; its core is gauge$"
+    with plugged(board_of(instrument_design())) as port, pytest.raises(ShortfallError, match=expected):
+        made.simulate(folder=tmp_path / "out", seconds=0.5, port=port)
+
+
+def test_a_port_needs_no_simulator(tmp_path: Path) -> None:
+    Invocation("simulate").refused(
+        "--port must come without --gates and --waves, which need a simulator",
+        "x.toml",
+        "--port",
+        "/dev/nothing",
+        "--waves",
+        kind=SpecificationError,
+    )
