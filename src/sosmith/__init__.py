@@ -15,6 +15,7 @@ from sosmith.gen.version import __version__
 
 if TYPE_CHECKING:
     from sosmith.host.board import Board, Results
+    from sosmith.host.loading import Loaded
     from sosmith.interface.calibration import Calibration
     from sosmith.interface.certificate import Certificate, Proof
     from sosmith.interface.comparison import Comparison, compare
@@ -43,6 +44,7 @@ __all__ = [
     "Identity",
     "LinkError",
     "LinkLostError",
+    "Loaded",
     "Proof",
     "Quantity",
     "RefusedError",
@@ -61,6 +63,7 @@ __all__ = [
 
 _MODULES = {
     "host.board": ("Board", "Results"),
+    "host.loading": ("Loaded",),
     "interface.calibration": ("Calibration",),
     "interface.certificate": ("Certificate", "Proof"),
     "interface.comparison": ("Comparison", "compare"),

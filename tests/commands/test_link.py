@@ -85,7 +85,6 @@ def test_a_board_that_computes_something_else_falls_short(tmp_path: Path) -> Non
     with Board.on(ModelLine(board)) as client:
         evidence = simulate(made.core, traces, tmp_path / "out", hardware=partial(run_on, client))
     assert evidence.mismatches > 0
-    assert not evidence.bit_exact
 
 
 def test_a_board_with_another_core_is_not_tried(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from sosmith.commands.options import BOARD, CORE, REALIZATION, SPEC, WIDTHS_OF, default_folder
+from sosmith.commands.options import BAUD, BOARD, CORE, PORT, REALIZATION, SPEC, WIDTHS_OF, default_folder
 from sosmith.model.text_files import to_json, write_files
 from sosmith.terminal import JSON_OPTION, note, output_option, print_json, show_progress
 
@@ -35,6 +35,8 @@ from sosmith.terminal import JSON_OPTION, note, output_option, print_json, show_
     show_default=True,
     help="Value of the register VERSION once the new set is active.",
 )
+@PORT
+@BAUD
 @JSON_OPTION
 @output_option("JSON file for the register writes.  [default: build/<name>/<stem of OTHER>.reload.json]")
 def reload_command(
@@ -47,6 +49,8 @@ def reload_command(
     active: Path | None,
     reset: bool,
     version: int,
+    port: str | None,
+    baud: int,
     as_json: bool,
     output: Path | None,
 ) -> None:
@@ -61,11 +65,14 @@ def reload_command(
     from the previous set. The table says after how many samples the bound holds again; do not swap again before that.
     Exits with 1 and the reason if the set is refused; do not load it then.
 
+    With --port, the set is loaded into the board there, and what became active is read back.
+
     `writes` in the JSON file are pairs of a byte address and a data word for the AXI4-Lite port, in order. Check first
     that the register DESIGN equals `design`. docs/registers.md describes the registers.
 
     \b
         sosmith reload my.toml recalibrated.toml
+        sosmith reload my.toml recalibrated.toml --version 2 --port /dev/ttyUSB1
     """
     from sosmith.interface.specification import Specification
 
@@ -92,3 +99,9 @@ def reload_command(
 
         print_swap(made, wanted, swap, tree)
     note(f"wrote {path}")
+    if port is not None:
+        from sosmith.host.board import Board
+
+        with Board(port, baud=baud) as client:
+            loaded = client.load(tree)
+        note(f"active on {port}: version {loaded.version}, CRC {loaded.crc:#010x}, {loaded.words} words")

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from os import PathLike
 from types import TracebackType
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +17,9 @@ from sosmith.model.errors import LinkError, SpecificationError
 from sosmith.model.link.identity import Identity
 from sosmith.model.link.packing import bytes_of, codes_of
 from sosmith.model.link.protocol import BLOCK_BYTES, MAX_IDENTITY, MAX_WORDS, WORD_BYTES, Counter, Type
+
+if TYPE_CHECKING:
+    from sosmith.host.loading import Loaded
 
 Codes = npt.NDArray[np.int64]
 
@@ -296,6 +301,32 @@ class Board:
         bodies = (bytes([address]) + b"".join(word.to_bytes(WORD_BYTES, "little") for word in part) for part in parts)
         for _ in self._session.exchange((Type.WRITE, body) for body in bodies):
             pass
+
+    def load(self, proven: str | PathLike[str] | Mapping[str, Any]) -> Loaded:
+        """Load a set of coefficients, and read back that it is active.
+
+        Parameters
+        ----------
+        proven : path or dict
+            The file that `sosmith reload` has written, or its content.
+
+        Returns
+        -------
+        Loaded
+            What the registers read afterwards.
+
+        Raises
+        ------
+        SpecificationError
+            If it is no such file.
+        ShortfallError
+            If the set was made for another core, or something else is active afterwards.
+        RefusedError
+            If the core refuses the set, or has no registers; the former set stays active.
+        """
+        from sosmith.host.loading import load, read_set
+
+        return load(self, read_set(proven))
 
     def _memory(self) -> bytes:
         """Read the text of the identity."""

@@ -1,0 +1,99 @@
+"""Loads a proven set of coefficients into a board, and reads back what became active."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import groupby
+from os import PathLike, fspath
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from sosmith.model.errors import LinkError, RefusedError, ShortfallError, SpecificationError
+from sosmith.model.reload.registers import CRC, DESIGN, ID, LAYOUT, MAGIC, STATUS, VERSION, Outcome
+
+if TYPE_CHECKING:
+    from sosmith.host.board import Board
+
+PATIENCE = 2.0
+"""Seconds to wait for the gap between two samples in which a set becomes active."""
+
+
+@dataclass(frozen=True)
+class Loaded:
+    """What the registers of a board read after a load: the proof of what is active.
+
+    Attributes
+    ----------
+    version : int
+        Version of the active set.
+    crc : int
+        CRC-32 of its version and words, as proven.
+    design : int
+        Fingerprint of the core that it was made for.
+    words : int
+        Number of words.
+    """
+
+    version: int
+    crc: int
+    design: int
+    words: int
+
+
+def read_set(source: str | PathLike[str] | Mapping[str, Any]) -> Mapping[str, Any]:
+    """Read what `sosmith reload` has written.
+
+    Raises
+    ------
+    SpecificationError
+        If the file cannot be read, or is something else.
+    """
+    if isinstance(source, Mapping):
+        return source
+    path = Path(fspath(source))
+    try:
+        tree = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise SpecificationError(f"{path}: the set must be a file that can be read, not: {error.strerror}") from None
+    except ValueError:
+        tree = None
+    if not isinstance(tree, dict) or not {"design", "version", "words", "writes"} <= tree.keys():
+        raise SpecificationError(f"{path}: the set must be a file that `sosmith reload` has written, not another one")
+    return tree
+
+
+def load(board: Board, proven: Mapping[str, Any]) -> Loaded:
+    """Load a set that `sosmith reload` has proven; parameters and errors as for `Board.load`."""
+    _match("ID", MAGIC, board.read_register(ID.address))
+    _match("DESIGN", proven["design"], board.read_register(DESIGN.address))
+    layout = board.read_register(LAYOUT.address)
+    _match("LAYOUT.WORDS", proven["words"], LAYOUT.field("WORDS").of(layout))
+    writes: list[tuple[int, int]] = [(address, word) for address, word in proven["writes"]]
+    try:
+        for address, group in groupby(writes, key=lambda pair: pair[0]):
+            board.write_register(address, *(word for _, word in group))
+    except RefusedError as error:
+        outcome = Outcome(STATUS.field("OUTCOME").of(board.read_register(STATUS.address)))
+        raise RefusedError(f"{error}; the load ended as {outcome.name}, and the former set is active") from None
+    deadline = time.monotonic() + PATIENCE
+    while STATUS.field("PENDING").of(status := board.read_register(STATUS.address)):
+        if time.monotonic() > deadline:
+            raise LinkError(f"the set must become active within {PATIENCE:g} s, not still be pending")
+    _match("STATUS.OUTCOME", Outcome.ACCEPTED, STATUS.field("OUTCOME").of(status))
+    found = Loaded(
+        version=board.read_register(VERSION.address),
+        crc=board.read_register(CRC.address),
+        design=proven["design"],
+        words=proven["words"],
+    )
+    _match("VERSION", proven["version"], found.version)
+    _match("CRC", writes[-1][1], found.crc)
+    return found
+
+
+def _match(register: str, expected: int, found: int) -> None:
+    if expected != found:
+        raise ShortfallError(f"the board's register {register} must read {expected:#x}, not {found:#x}")
