@@ -117,10 +117,43 @@ class Builder:
         with self._cache.entry("model", key, lambda entry: self._make(model, control, flags, entry / "model")) as entry:
             shutil.copy(entry / "model", target)
 
-    def _make(self, model: Model, control: str, flags: Sequence[str], target: Path) -> None:
+    def build_program(self, source: Path, top: str, main: Path, target: Path) -> None:
+        """Write an executable to `target` whose main program, in C++, runs the module `top` of `source` as ``Vtop``.
+
+        Raises
+        ------
+        subprocess.CalledProcessError
+            If a tool fails; it has said why.
+        """
+        texts = [path.read_text(encoding="utf-8") for path in (source, main)]
+        key = key_of(self._tools, _flags(waves=False), _ARGUMENTS, top, texts)
+
+        def make(entry: Path) -> None:
+            objects = self._emptied()
+            command = ["verilator", "-cc", "-Mdir", str(objects), "--prefix", "Vtop", "--top-module", top]
+            self._run([*command, *_ARGUMENTS, str(source)], objects)
+            sources = [*sorted(objects.glob("Vtop*.cpp")), main]
+            compiled = self._compile(sources, [*_flags(waves=False), f"-I{objects}"], objects)
+            names = _library(waves=False)
+            library_key = self._library_key(names, _flags(waves=False))
+            with self._cache.entry(
+                "library", library_key, lambda place: self._make_library(names, _flags(waves=False), place)
+            ) as library:
+                parts = [*compiled, *(library / f"{name}.o" for name in names)]
+                self._run(["g++", "-pthread", "-o", str(entry / "program"), *map(str, parts)], objects)
+
+        with self._cache.entry("program", key, make) as entry:
+            shutil.copy(entry / "program", target)
+
+    def _emptied(self) -> Path:
+        """Return the folder for objects, which is empty."""
         objects = self._folder / "objects"
         shutil.rmtree(objects, ignore_errors=True)
         objects.mkdir(parents=True)
+        return objects
+
+    def _make(self, model: Model, control: str, flags: Sequence[str], target: Path) -> None:
+        objects = self._emptied()
         (objects / "ports.vlt").write_text(control, encoding="utf-8")
         command = ["verilator", "-cc", "-Mdir", str(objects), "--prefix", "Vtop", "--top-module", model.top, "--vpi"]
         command += [*_ARGUMENTS, *(["--trace"] if model.waves else []), "ports.vlt", str(model.source)]
