@@ -16,6 +16,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
+from typing import IO
 
 import cocotb_tools.config
 
@@ -70,10 +71,12 @@ class Builder:
         Environment that its processes need.
     folder : Path
         Folder for the files in between, without blanks in its path; the cache is there if the user has none.
+    log : file or None
+        Where the tools' output goes; None for that of this process.
     """
 
-    def __init__(self, version: str, environment: Mapping[str, str], folder: Path) -> None:
-        self._environment, self._folder = environment, folder
+    def __init__(self, version: str, environment: Mapping[str, str], folder: Path, log: IO[str] | None = None) -> None:
+        self._environment, self._folder, self._log = environment, folder, log
         self._cache = BuildCache(cache_folder() or folder / "cache")
         root = Path(self._output("verilator", "--getenv", "VERILATOR_ROOT").strip())
         self._include = root / "include"
@@ -194,7 +197,7 @@ class Builder:
             return list(pool.map(compiled, sources))
 
     def _run(self, command: Sequence[str], folder: Path) -> None:
-        subprocess.run(command, cwd=folder, env=self._environment, check=True)
+        subprocess.run(command, cwd=folder, env=self._environment, stdout=self._log, stderr=self._log, check=True)
 
     def _output(self, *command: str) -> str:
         return subprocess.run(command, env=self._environment, check=True, capture_output=True, text=True).stdout

@@ -1,10 +1,12 @@
 // Runs the top of a board, with a file descriptor at the other end of its serial line.
 //
-//   board FD CLOCKS_PER_BIT CLOCKS_PER_SECOND QUIET
+//   board FD CLOCKS_PER_BIT CLOCKS_PER_SECOND QUIET [WAIT]
 //
 // What arrives at FD is sent to `rx`, 8 data bits, no parity, one stop bit; what `tx` sends is written to FD. At most
 // CLOCKS_PER_SECOND clocks are simulated in a second, or as many as can be if it is 0. After QUIET clocks without
-// a bit on the line, the clock stops until a byte arrives. Ends when the other side of FD is closed.
+// a bit on the line, the clock stops until a byte arrives. With WAIT, the clock also stops behind every frame from the
+// board, for that many milliseconds or until a byte arrives, so that the host seems to answer at once. Ends when the
+// other side of FD is closed, and prints the number of clocks, of bytes that were sent to the board, and of bytes from it.
 #include "Vtop.h"
 #include "verilated.h"
 
@@ -35,26 +37,30 @@ double now() {
 // Bytes from the file descriptor, as bits on `rx`.
 class Sender {
 public:
-    Sender(int fd, uint64_t clocks) : fd_(fd), clocks_(clocks) {}
+    Sender(int fd, double per_bit) : fd_(fd), per_bit_(per_bit) {}
 
     bool closed() const { return closed_; }
-    bool busy() const { return left_ > 0 || next_ < bytes_.size(); }
+    uint64_t bytes() const { return sent_; }
+    bool waiting() const { return next_ < bytes_.size(); }
+    bool busy() const { return sending_ || waiting(); }
 
     // The level of the line in the next clock.
     bool level() {
-        if (left_ == 0) {
+        if (!sending_) {
             if (next_ >= bytes_.size()) return true;
             frame_ = (1u << 9) | (uint32_t(bytes_[next_++]) << 1);
-            left_ = kBits * clocks_;
+            sending_ = true;
+            ++sent_;
+            clock_ = 0;
         }
-        const uint64_t bit = kBits - 1 - (left_ - 1) / clocks_;
-        --left_;
-        return (frame_ >> bit) & 1;
+        const bool level = (frame_ >> int(double(clock_) / per_bit_)) & 1;
+        sending_ = double(++clock_) < kBits * per_bit_;
+        return level;
     }
 
     // Take what has arrived, if everything before has been sent.
     void refill() {
-        if (next_ < bytes_.size()) return;
+        if (waiting()) return;
         bytes_.resize(kRoom);
         const ssize_t count = read(fd_, bytes_.data(), kRoom);
         bytes_.resize(count > 0 ? size_t(count) : 0);
@@ -64,43 +70,46 @@ public:
 
 private:
     int fd_;
-    uint64_t clocks_, left_ = 0;
+    double per_bit_;
+    bool sending_ = false, closed_ = false;
+    uint64_t clock_ = 0, sent_ = 0;
     uint32_t frame_ = 0;
     size_t next_ = 0;
     std::vector<uint8_t> bytes_;
-    bool closed_ = false;
 };
 
 // Bits on `tx`, as bytes to the file descriptor. A byte with a wrong stop bit is left out.
 class Receiver {
 public:
-    Receiver(int fd, uint64_t clocks) : fd_(fd), clocks_(clocks) {}
+    Receiver(int fd, double per_bit) : fd_(fd), per_bit_(per_bit) {}
 
-    bool busy() const { return left_ > 0 || !bytes_.empty(); }
+    bool busy() const { return receiving_ || !bytes_.empty(); }
 
-    void take(bool level) {
-        if (left_ == 0) {
-            if (!level) {
-                left_ = kBits * clocks_ - clocks_ / 2;  // ends in the middle of the stop bit
-                until_sample_ = clocks_ + clocks_ / 2;  // the middle of the first data bit
-                count_ = 0;
-                byte_ = 0;
-            }
-            return;
+    uint64_t bytes() const { return received_; }
+
+    // Take the level of the line in this clock; tell whether it ends a frame.
+    bool take(bool level) {
+        if (!receiving_) {
+            if (level) return false;
+            receiving_ = true;
+            clock_ = 0;
+            bit_ = 1;
+            byte_ = 0;
+            return false;
         }
-        --left_;
-        if (--until_sample_ == 0) {
-            until_sample_ = clocks_;
-            if (count_ < 8) {
-                byte_ |= uint32_t(level) << count_;
-            } else if (level && bytes_.size() < kMostWaiting) {
-                bytes_.push_back(uint8_t(byte_));
-            }
-            if (count_++ == 8) {
-                left_ = 0;
-                if (byte_ == 0) flush();  // the end of a frame
-            }
+        if (double(++clock_) < (bit_ + 0.5) * per_bit_) return false;  // the middle of a bit
+        if (bit_ < kBits - 1) {
+            byte_ |= uint32_t(level) << (bit_ - 1);
+            ++bit_;
+            return false;
         }
+        receiving_ = false;
+        ++received_;
+        if (level && bytes_.size() < kMostWaiting) bytes_.push_back(uint8_t(byte_));
+        const bool ends = byte_ == 0 && inside_;
+        inside_ = byte_ != 0;
+        if (ends) flush();
+        return ends;
     }
 
     // Write what has been received; what the other side does not take stays.
@@ -112,8 +121,10 @@ public:
 
 private:
     int fd_;
-    uint64_t clocks_, left_ = 0, until_sample_ = 0;
-    int count_ = 0;
+    double per_bit_;
+    bool receiving_ = false, inside_ = false;
+    uint64_t clock_ = 0, received_ = 0;
+    int bit_ = 0;
     uint32_t byte_ = 0;
     std::vector<uint8_t> bytes_;
 };
@@ -121,14 +132,15 @@ private:
 }  // namespace
 
 int main(int argc, char** argv) {
-    if (argc != 5) {
-        std::fprintf(stderr, "usage: board FD CLOCKS_PER_BIT CLOCKS_PER_SECOND QUIET\n");
+    if (argc < 5) {
+        std::fprintf(stderr, "usage: board FD CLOCKS_PER_BIT CLOCKS_PER_SECOND QUIET [WAIT]\n");
         return 2;
     }
     const int fd = std::atoi(argv[1]);
-    const uint64_t per_bit = std::strtoull(argv[2], nullptr, 10);
+    const double per_bit = std::atof(argv[2]);
     const double per_second = std::atof(argv[3]);
     const uint64_t quiet = std::strtoull(argv[4], nullptr, 10);
+    const int wait = argc > 5 ? std::atoi(argv[5]) : 0;
     fcntl(fd, F_SETFL, fcntl(fd, F_GETFL) | O_NONBLOCK);
 
     VerilatedContext context;
@@ -137,10 +149,11 @@ int main(int argc, char** argv) {
     Receiver receiver(fd, per_bit);
     board->rst = 0;
     board->rx = 1;
+    const uint64_t turn = uint64_t(kBits * per_bit);  // a byte
     uint64_t clocks = 0, silent = 0, paced = 0;
     double started = now();
     while (!sender.closed()) {
-        if (clocks % (kBits * per_bit) == 0) {
+        if (clocks % turn == 0) {
             sender.refill();
             receiver.flush();
         }
@@ -149,8 +162,13 @@ int main(int argc, char** argv) {
         board->eval();
         board->clk = 1;
         board->eval();
-        receiver.take(board->tx);
+        const bool answered = receiver.take(board->tx);
         ++clocks;
+        if (answered && wait > 0 && !sender.waiting()) {
+            pollfd byte{fd, POLLIN, 0};
+            poll(&byte, 1, wait);
+            sender.refill();
+        }
         silent = sender.busy() || receiver.busy() ? 0 : silent + 1;
         if (silent > quiet) {
             pollfd waiting{fd, POLLIN, 0};
@@ -171,5 +189,7 @@ int main(int argc, char** argv) {
         }
     }
     board->final();
+    std::printf("%llu %llu %llu\n", (unsigned long long)clocks, (unsigned long long)sender.bytes(),
+                (unsigned long long)receiver.bytes());
     return 0;
 }

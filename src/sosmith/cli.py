@@ -62,6 +62,9 @@ _COMMANDS = {
         "emulate_command",
         "Write an emulated sensor trace for SPEC as CSV; without SCENARIO, list the scenarios for SPEC.",
     ),
+    "board": _Command(
+        "board", "board_command", "Run the board of SPEC behind a pseudo-terminal, a port for the commands below."
+    ),
     "stream": _Command(
         "stream", "stream_command", "Send the samples of TRACE.csv to the board at PORT, and write its results."
     ),
@@ -91,7 +94,7 @@ _COMMANDS = {
 }
 """The commands in the order they are used; the module of each one is imported when the command is called."""
 
-_LATER = ("build", "explore", "monitor", "board")
+_LATER = ("build", "explore", "monitor")
 """Commands that are planned but not available yet."""
 
 _INTERRUPTED = 130

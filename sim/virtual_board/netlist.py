@@ -1,0 +1,151 @@
+"""The netlist of a board's top in Verilator, at the end of a pseudo-terminal.
+
+::
+
+    host <--> pseudo-terminal <--> [damage] <--> board_main.cpp: bits on rx, tx <--> top of the board <--> core
+"""
+
+from __future__ import annotations
+
+import os
+import select
+import socket
+import subprocess
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+
+from sosmith.gen.core import CoreDesign
+from sosmith.gen.output.board_top import board_verilog, top_name
+from sosmith.model.errors import SpecificationError, ToolError
+from sosmith.model.link.protocol import MAX_BODY, WINDOWS
+from sosmith.model.text_files import write_files
+from sosmith.sim.simulators import find_simulator
+from sosmith.sim.verilated_model import LIBRARY_SECONDS, Builder
+
+_MAIN = Path(__file__).with_name("board_main.cpp")
+_ROOM = 1 << 12
+_TURN = 0.1  # seconds
+
+Damage = Callable[[bytes], bytes]
+
+
+@dataclass(frozen=True)
+class Netlist:
+    """A board's top as a program.
+
+    Attributes
+    ----------
+    program : Path
+        The executable.
+    clock : Fraction
+        Clock in Hz.
+    baud : int
+        Bits per second on the line.
+    quiet : int
+        Clocks without a bit on the line after which the board has nothing left to do.
+    """
+
+    program: Path
+    clock: Fraction
+    baud: int
+    quiet: int
+
+    @contextmanager
+    def at(self, end: int, *, speed: float = 0.0, wait: int = 0) -> Iterator[subprocess.Popen[str]]:
+        """Run the board with a file descriptor at the other end of its line, until the context ends.
+
+        When the other side of the file descriptor is closed, the process prints how many clocks it simulated, and how
+        many bytes went to the board and came from it.
+
+        Parameters
+        ----------
+        end : int
+            The file descriptor.
+        speed : float
+            1 for real time, 2 for twice as fast; 0 for as fast as it can.
+        wait : int
+            Milliseconds for which the board's time stands still behind each of its frames, unless a byte arrives.
+        """
+        arguments = (end, float(self.clock / self.baud), float(self.clock) * speed, self.quiet, wait)
+        command = [str(self.program), *map(str, arguments)]
+        with subprocess.Popen(
+            command, pass_fds=[end], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, text=True
+        ) as process:
+            try:
+                yield process
+            finally:
+                process.kill()
+
+
+def build(
+    design: CoreDesign,
+    folder: Path,
+    *,
+    clock: Fraction | None = None,
+    baud: int = 1_000_000,
+    progress: Callable[[str], None] = lambda step: None,
+) -> Netlist:
+    """Build the board's top of a design in Verilator.
+
+    Parameters
+    ----------
+    design : CoreDesign
+        The core.
+    folder : Path
+        For ``<name>_board.sv``, the program, and the files in between.
+    clock : Fraction or None
+        Clock of the board in Hz; None for that of the specification.
+    baud : int
+        Bits per second on the line.
+    progress : callable
+        Called with the name of each step.
+
+    Raises
+    ------
+    SpecificationError
+        If the line is too fast for the clock, the folder has a blank in its path, or cannot be written.
+    ToolError
+        If a tool is missing or fails.
+    """
+    rate = design.spec.hardware.clock if clock is None else clock
+    top = top_name(design)
+    progress("SystemVerilog of the board")
+    (source,) = write_files(folder, {f"{top}.sv": board_verilog(design, clock=rate, rate=baud)})
+    place = folder.resolve()
+    if len(str(place).split()) > 1:
+        raise SpecificationError(f"the output folder must have no blanks in its path for Verilator, not {place}")
+    tool = find_simulator("verilator", place / "bin")
+    program = place / top
+    with (place / "build.log").open("w", encoding="utf-8") as log:
+        try:
+            builder = Builder(tool.version, tool.environment, place / "build", log)
+            time = "" if builder.has_library(waves=False) else f", which takes about {LIBRARY_SECONDS} s the first time"
+            progress(f"building with {tool.name}{time}")
+            (place / "build").mkdir(exist_ok=True)
+            builder.build_program(source.resolve(), top, _MAIN, program)
+        except subprocess.CalledProcessError as error:
+            raise ToolError(f"{Path(error.cmd[0]).name} must build the board, not fail: see {log.name}") from None
+    # No request keeps the board busier than one whose samples fill a message.
+    quiet = max(WINDOWS) * MAX_BODY * (design.architecture.cycles_per_sample + 100)
+    return Netlist(program, rate, baud, quiet)
+
+
+def forward(end: int, board: socket.socket, damage: Damage, goes_on: Callable[[], bool]) -> None:
+    """Pass bytes between a pseudo-terminal and a board, with damage in both directions, until told to stop."""
+    board.setblocking(True)
+    while goes_on():
+        ready, _, _ = select.select([end, board.fileno()], [], [], _TURN)
+        if end in ready:
+            board.sendall(damage(os.read(end, _ROOM)))
+        if board.fileno() in ready:
+            data = board.recv(_ROOM)
+            if not data:
+                return
+            rest = damage(data)
+            while rest and goes_on():
+                _, free, _ = select.select([], [end], [], _TURN)
+                if free:
+                    rest = rest[os.write(end, rest[:1024]) :]

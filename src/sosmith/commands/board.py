@@ -1,0 +1,131 @@
+"""`sosmith board`: the board of a specification, virtual, at a pseudo-terminal."""
+
+from __future__ import annotations
+
+import socket
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import click
+
+from sosmith.commands.options import BAUD, CORE, REALIZATION, SEED, SPEC, default_folder
+from sosmith.model.errors import SpecificationError, ToolError
+from sosmith.terminal import note, output_option, show_progress
+
+
+class _Speed(click.ParamType[float]):
+    """A factor of real time, or max, which is 0."""
+
+    name = "speed"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        if value in {"max", 0.0}:
+            return 0.0
+        try:
+            factor = float(value)
+        except ValueError:
+            factor = 0.0
+        if not 0 < factor < 1e6:
+            self.fail(f"{value!r} is neither max nor a factor of real time, such as 1", param, ctx)
+        return factor
+
+
+@click.command("board")
+@SPEC
+@click.option("--virtual", is_flag=True, help="Run the board in this computer; required.")
+@click.option(
+    "--model",
+    is_flag=True,
+    help="Take the integer model and a model of the link instead of the netlist: faster, and needs no Verilator.",
+)
+@CORE
+@REALIZATION
+@click.option(
+    "--clock", type=click.FloatRange(min=0, min_open=True), help="Clock in Hz.  [default: that of the specification]"
+)
+@BAUD
+@click.option(
+    "--speed", type=_Speed(), default="max", show_default=True, metavar="FACTOR|max", help="Factor of real time."
+)
+@click.option(
+    "--fault",
+    type=click.FloatRange(min=1),
+    metavar="N",
+    help="Damage one in N bytes on the line, on average, in both directions.",
+)
+@click.option(
+    "--fault-kinds",
+    default="flip,drop,insert",
+    show_default=True,
+    help="What damage does to a byte, separated by commas.",
+)
+@SEED
+@output_option("Folder for the files.  [default: build/<name>/board]")
+def board_command(
+    spec: Path,
+    virtual: bool,
+    model: bool,
+    core: str | None,
+    realization: str | None,
+    clock: float | None,
+    baud: int,
+    speed: float,
+    fault: float | None,
+    fault_kinds: str,
+    seed: int,
+    output: Path | None,
+) -> None:
+    """Run the board of SPEC behind a pseudo-terminal, whose path is the first line on stdout.
+
+    The board's top, with link and core, is built by Verilator from the same SystemVerilog as for a real board, so that
+    a host cannot tell the difference. It runs until it is interrupted. `sosmith stream`, `monitor`, `reload --port` and
+    `simulate --port` take its path as a port.
+
+    \b
+        sosmith board my.toml --virtual
+        sosmith board my.toml --virtual --speed 1 --fault 1000
+    """
+    if not virtual:
+        raise SpecificationError("--virtual must be given: a real board is made by `sosmith build`")
+    from sosmith.interface.specification import Specification
+    from sosmith.sim.virtual_board.line_damage import LineDamage
+    from sosmith.sim.virtual_board.terminal import Terminal
+
+    asked = Specification.load(spec)
+    damage = None if fault is None else LineDamage(fault, seed, tuple(fault_kinds.split(",")))
+    rate = asked.checked.hardware.clock if clock is None else Fraction(clock)
+    with show_progress() as step:
+        from sosmith.interface.design import design
+
+        made = design(asked, core=core, realization=realization, progress=step).core
+        folder = output or default_folder(asked.name) / "board"
+        if model:
+            from sosmith.gen.output.generate import generated
+            from sosmith.host.model_line import model_of
+
+            step("model of the board")
+            device = model_of(made, generated(made)[f"{asked.name}.sv"], baud=baud)
+        else:
+            from sosmith.sim.virtual_board.netlist import build
+
+            netlist = build(made, folder, clock=rate, baud=baud, progress=step)
+    with Terminal() as terminal:
+        click.echo(terminal.path)
+        if model:
+            from sosmith.sim.virtual_board.serve import serve
+
+            note(f"the model of {asked.name} is at {terminal.path}; Ctrl-C ends it")
+            serve(device, terminal.end, damage=damage or (lambda data: data))
+            return
+        from sosmith.sim.virtual_board.netlist import forward
+
+        note(f"{asked.name} is at {terminal.path}; Ctrl-C ends it")
+        ours, theirs = socket.socketpair()
+        with ours, theirs, netlist.at(terminal.end if damage is None else theirs.fileno(), speed=speed) as process:
+            if damage is None:
+                process.wait()
+            else:
+                theirs.close()
+                forward(terminal.end, ours, damage, lambda: process.poll() is None)
+        raise ToolError(f"the simulation of the board must go on, not end with status {process.returncode}")

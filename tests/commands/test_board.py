@@ -1,0 +1,60 @@
+"""`sosmith board`: the port's path comes first, a host works with it, and an interruption ends it."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.commands.invocation import Invocation
+from tests.commands.test_cli import FILTER
+
+import sosmith
+
+BOARD = Invocation("board")
+SMALL = FILTER + '[hardware]\nrealization = "df1_ef1"\narchitecture = "parallel"\n'
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        pytest.param(["--model", "--fault", "1000", "--seed", "4"], id="damaged model"),
+        pytest.param([], id="netlist", marks=pytest.mark.slow),
+        pytest.param(["--fault", "1000"], id="damaged netlist", marks=pytest.mark.slow),
+    ],
+)
+def test_a_board_serves_a_host_until_it_is_interrupted(options: list[str], tmp_path: Path) -> None:
+    (tmp_path / "spec.toml").write_text(SMALL, encoding="utf-8")
+    design = sosmith.design(tmp_path / "spec.toml")
+    codes = np.random.default_rng(1).integers(-500, 500, (2000, 1))
+    command = [sys.executable, "-m", "sosmith.cli", "board", "spec.toml", "--virtual", *options]
+    with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        path = process.stdout.readline().strip()
+        try:
+            for _ in range(2):  # a host may leave, and another one come
+                with sosmith.Board(path) as board:
+                    assert np.array_equal(board.run_codes(codes).codes, design.core.datapath.compute(codes))
+                    assert (sum(board.faults.values()) > 0) == bool(board.faults["damaged"] or "--fault" in options)
+        finally:
+            process.send_signal(signal.SIGINT)
+        out, err = process.communicate()
+    assert (process.returncode, out) == (130, "")
+    assert f"{path}; Ctrl-C ends it" in err
+    assert err.endswith("sosmith: interrupted\n")
+
+
+def test_what_is_refused() -> None:
+    BOARD.refused("--virtual must be given: a real board is made by `sosmith build`", "spec.toml")
+    result = BOARD.run("spec.toml", "--virtual", "--speed", "0")
+    assert result.exit_code == 2
+    assert "'0' is neither max nor a factor of real time, such as 1" in result.stderr
+
+
+def test_kinds_of_damage_that_do_not_exist(tmp_path: Path) -> None:
+    (tmp_path / "spec.toml").write_text(FILTER, encoding="utf-8")
+    expected = "a fault must be one of flip, drop, insert, not lose"
+    BOARD.refused(expected, str(tmp_path / "spec.toml"), "--virtual", "--fault", "9", "--fault-kinds", "lose")

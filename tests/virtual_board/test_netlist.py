@@ -1,0 +1,187 @@
+"""The netlist of a board's top in Verilator: bit for bit the integer model, at line rate, whatever the line does."""
+
+import random
+import select
+import socket
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.gen.designs import example_design
+from tests.host.lines import ScriptedLine
+from tests.interface.small import filter_design, instrument_design
+
+import sosmith
+from sosmith.gen.core import CoreDesign
+from sosmith.gen.stimuli import traces_for
+from sosmith.host.board import Board
+from sosmith.host.identity_check import check_files
+from sosmith.model.link.protocol import Type
+from sosmith.sim.virtual_board.line_damage import LineDamage
+from sosmith.sim.virtual_board.netlist import Damage, Netlist, build, forward
+from sosmith.sim.virtual_board.terminal import Terminal
+
+BUILT: dict[Path, Netlist] = {}
+
+
+class SocketLine(ScriptedLine):
+    """A line over a socket, to a board without a pseudo-terminal."""
+
+    def __init__(self, end: socket.socket) -> None:
+        super().__init__()
+        self._socket = end
+
+    def write(self, data: bytes) -> None:
+        self._socket.sendall(data)
+
+    def read(self, timeout: float) -> bytes:
+        ready, _, _ = select.select([self._socket], [], [], max(timeout, 0))
+        return self._socket.recv(1 << 16) if ready else b""
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("boards")
+
+
+def netlist_of(design: CoreDesign, place: Path, clocks_per_bit: int = 4) -> Netlist:
+    """Build a board, each one once."""
+    folder = place / f"{design.spec.name}_{clocks_per_bit}"
+    if folder not in BUILT:
+        BUILT[folder] = build(design, folder, clock=Fraction(1_000_000 * clocks_per_bit), baud=1_000_000)
+    return BUILT[folder]
+
+
+@contextmanager
+def running(netlist: Netlist, damage: Damage | None = None) -> Iterator[str]:
+    """Run a board behind a pseudo-terminal; give its path."""
+    with Terminal() as terminal:
+        if damage is None:
+            with netlist.at(terminal.end):
+                yield terminal.path
+            return
+        ours, theirs = socket.socketpair()
+        stop = threading.Event()
+        with ours, netlist.at(theirs.fileno()):
+            theirs.close()
+            between = threading.Thread(target=forward, args=(terminal.end, ours, damage, lambda: not stop.is_set()))
+            between.start()
+            try:
+                yield terminal.path
+            finally:
+                stop.set()
+                between.join()
+
+
+def codes_for(design: CoreDesign, samples: int, seed: int = 1) -> np.ndarray:  # type: ignore[type-arg]
+    rng = np.random.default_rng(seed)
+    shape = (samples, design.spec.channels) if design.spec.channels > 1 else (samples,)
+    return np.stack([rng.integers(p.lowest, p.highest + 1, shape) for p in design.datapath.inputs], axis=-1)
+
+
+def test_results_are_those_of_the_model_and_the_identity_is_that_of_the_files(place: Path) -> None:
+    made = filter_design()
+    codes = codes_for(made.core, 3000)
+    made.generate(place / "files")
+    with running(netlist_of(made.core, place)) as port, Board(port) as board:
+        manifest = check_files(board.identity, place / "files")
+        results = board.run_codes(codes)
+        faults = board.faults
+        counters = board.counters()
+    assert np.array_equal(results.codes, made.core.datapath.compute(codes))
+    assert np.array_equal(results.status, made.core.datapath.compute_status(codes))
+    assert set(counters.values()) == {0}
+    assert (faults["damaged"], faults["gaps"]) == (0, 0)
+    assert manifest["name"] == "plain"
+
+
+def test_another_core_is_recognized(place: Path) -> None:
+    instrument_design().generate(place / "gauge")
+    for name in ("json", "certificate.json"):
+        text = (place / "gauge" / f"gauge.{name}").read_text(encoding="utf-8")
+        (place / "gauge" / f"plain.{name}").write_text(text.replace("gauge.sv", "plain.sv"), encoding="utf-8")
+    expected = r"^the board's design must be [0-9a-f]{12}, not [0-9a-f]{12}; its core is plain$"
+    with running(netlist_of(filter_design().core, place)) as port, Board(port) as board:
+        about = board.identity
+    with pytest.raises(sosmith.ShortfallError, match=expected):
+        check_files(about, place / "gauge")
+
+
+def test_the_line_is_busy_for_four_fifths_of_the_time(place: Path) -> None:
+    """At 4 clocks per bit, as for 3 Mbaud at 12 MHz; the time that counts is the board's own."""
+    made = filter_design().core
+    ours, theirs = socket.socketpair()
+    with netlist_of(made, place).at(theirs.fileno(), wait=1000) as process:
+        theirs.close()
+        with Board.on(SocketLine(ours)) as board:
+            results = board.run_codes(codes_for(made, 60 * 80))
+        assert process.stdout is not None
+        clocks, _, sent = map(int, process.stdout.read().split())
+    assert np.array_equal(results.codes, made.datapath.compute(codes_for(made, 60 * 80)))
+    useful = 10 * 4 * 3 * 60 * 80  # bits of a byte, clocks of a bit, bytes of a result
+    assert sent * 10 * 4 <= clocks
+    assert useful >= 0.8 * clocks
+
+
+def test_damage_is_mended_and_counted(place: Path) -> None:
+    made = filter_design().core
+    codes = codes_for(made, 4000)
+    damage = LineDamage(1000, 5)
+    with running(netlist_of(made, place), damage) as port, Board(port) as board:
+        board.counters()
+        results = board.run_codes(codes)
+        counters = board.counters()
+    assert np.array_equal(results.codes, made.datapath.compute(codes))
+    assert damage.count > 10
+    assert counters["crc"] + counters["malformed"] > 3
+    assert counters["overrun"] == counters["refused"] == counters["framing"] == 0
+
+
+def test_arbitrary_bytes_do_not_wedge_the_board(place: Path) -> None:
+    made = filter_design().core
+    codes = codes_for(made, 100)
+    chance = random.Random(3)
+    ours, theirs = socket.socketpair()
+    with netlist_of(made, place).at(theirs.fileno()):
+        theirs.close()
+        for _ in range(10):
+            noise = bytes(chance.choice([0, chance.randrange(256), chance.randrange(9)]) for _ in range(700))
+            ours.sendall(noise)
+            board = Board.on(SocketLine(ours.dup()))
+            assert np.array_equal(board.run_codes(codes).codes, made.datapath.compute(codes))
+            board.close()
+    ours.close()
+
+
+@pytest.mark.slow
+def test_the_locomotive_over_the_port(place: Path) -> None:
+    design = example_design("flange_wear_locomotive.toml")
+    traces = traces_for(design, "wear_ramp", seed=1, seconds=10_000 / 12 / float(design.spec.sample_rate))
+    codes = np.stack([trace.codes for trace in traces], axis=1)
+    with running(netlist_of(design, place, 12)) as port, Board(port) as board:
+        results = board.run_codes(codes)
+    assert results.codes.size >= 10_000
+    assert np.array_equal(results.codes, design.datapath.compute(codes))
+    assert np.array_equal(results.status, design.datapath.compute_status(codes))
+
+
+@pytest.mark.slow
+def test_two_hundred_thousand_frames_over_a_damaged_line(place: Path) -> None:
+    made = filter_design().core
+    count = 200_000
+    codes = codes_for(made, count)
+    samples = codes[:, 0].astype("<i2").tobytes()
+    with running(netlist_of(made, place), LineDamage(1000, 9)) as port, Board(port) as board:
+        requests = ((Type.SAMPLES, b"\0" + samples[2 * n : 2 * n + 2]) for n in range(count))
+        received = b"".join(board._session.exchange(requests))
+        counters = board.counters()
+    found = np.frombuffer(received, "<i2,u1")
+    assert np.array_equal(found["f0"], made.datapath.compute(codes))
+    assert counters["overrun"] == 0
