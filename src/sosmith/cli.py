@@ -44,7 +44,7 @@ _COMMANDS = {
     "package": _Command(
         "package",
         "package_command",
-        "Write the core of SPEC with what other tools need, and a bench that needs no sosmith.",
+        "Pack the core of SPEC for other tools, with a bench that needs none of ours.",
     ),
     "verify": _Command(
         "verify", "verify", "Prove CERTIFICATE by an independent method: the error bound, and no internal overflow."

@@ -181,7 +181,10 @@ def test_co_simulation(tmp_path: Path) -> None:
     ("options", "message"),
     [
         ({"trace": "nois"}, r"scenario for a plain filter must be one of .*, not 'nois' \(did you mean noise\?\)"),
-        ({"simulator": "icarsu"}, r"simulator must be verilator or icarus, not icarsu \(did you mean icarus\?\)"),
+        (
+            {"simulator": "icarsu"},
+            r"simulator must be verilator, icarus or cxxrtl, not icarsu \(did you mean icarus\?\)",
+        ),
         ({"gates": "nexys"}, "the board must be one of .*, not nexys"),
         ({"vectors": "run.fst"}, r"run\.fst: a file of vectors must end in .*, not '\.fst'"),
         ({"idle": float("nan")}, "idle must be from 0 to 0.99, not nan"),

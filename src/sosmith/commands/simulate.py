@@ -161,12 +161,13 @@ def simulate_command(
         sosmith simulate my.toml --trace worst_case --simulator icarus -o build/worst
         sosmith simulate my.toml --port /dev/ttyUSB1
     """
-    from sosmith.gen.output.vectors import check_format
     from sosmith.interface.specification import Specification
     from sosmith.sim.simulators import check_name
 
     check_name(simulator, netlist=gates is not None)
     if vectors is not None:
+        from sosmith.gen.output.vectors import check_format
+
         check_format(vectors)
     if port is not None and (gates is not None or waves):
         raise SpecificationError("--port must come without --gates and --waves, which need a simulator")

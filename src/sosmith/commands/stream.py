@@ -6,7 +6,6 @@ from fractions import Fraction
 from pathlib import Path
 
 import click
-import numpy as np
 
 from sosmith.commands.options import BAUD
 from sosmith.terminal import note, output_option, show_progress
@@ -27,6 +26,8 @@ def stream_command(port: str, trace: Path, baud: int, output: Path | None) -> No
     \b
         sosmith stream /dev/ttyUSB1 ramp.csv -o results.csv
     """
+    import numpy as np
+
     from sosmith.host.board import Board
     from sosmith.host.recording import recording
     from sosmith.host.rows import columns, rows
