@@ -1,31 +1,45 @@
-"""Measures how fast the compiled integer model is beside scipy in double precision: `python -m benchmarks.model`.
+"""Measures how fast the compiled integer model is beside scipy, for docs/speed.md: `python -m benchmarks.model`.
 
-Both compute the same channels of the same random codes on one core, in turn. A rate is that of the fastest of several
-runs, in samples a second over all channels; where the core has a calibration, scipy's side evaluates the polynomial in
-NumPy before it filters.
+Both compute the same channels of the same random codes, in turn. A rate is that of the fastest of several runs, in
+samples a second of processor time, over all channels; where the core has a calibration, scipy's side evaluates the
+polynomial in NumPy before it filters. The rates are recorded in benchmarks/model.json; `--document` only writes the
+section of the document from that record again. `--check` writes nothing, and fails if the model has lost more than 25 %
+of its recorded speed beside scipy, or is slower than scipy.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import sys
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
+from benchmarks.speed_page import renew
 from scipy import signal
 
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.specification.specification import load
 from sosmith.model.arrays import Codes, Values
 
-EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
-CORES = (("audio_lowpass", "filter"), ("flange_wear_bench", "filter"), ("flange_wear_bench", "instrument"))
-CHANNELS = (1, 2, 8)
+ROOT = Path(__file__).resolve().parent.parent
+EXAMPLES = ROOT / "examples"
+RECORD = ROOT / "benchmarks" / "model.json"
+CORES = (
+    ("audio_lowpass", "filter"),
+    ("flange_wear_bench", "filter"),
+    ("flange_wear_bench", "instrument"),
+    ("flange_wear_locomotive", "filter"),
+    ("flange_wear_locomotive", "instrument"),
+)
+CHANNELS = (1, 12)
+SAMPLES = 1_200_000
+"""Samples in one run, over all channels."""
+LOSS = 0.25
+"""Share of the recorded ratio that may be lost."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +61,11 @@ class Rates:
     channels: int
     model: float
     scipy: float
+
+    @property
+    def ratio(self) -> float:
+        """Speed of the model beside that of scipy."""
+        return self.model / self.scipy
 
 
 def in_scipy(design: CoreDesign) -> Callable[[Codes], Values]:
@@ -72,42 +91,84 @@ def measured(design: CoreDesign, channels: int, samples: int, repeats: int) -> t
     design.datapath.compute(codes[:1])  # compiles it
     for _ in range(repeats):
         for side, durations in zip(sides, seconds, strict=True):
-            start = time.perf_counter()
+            start = time.thread_time()
             side(codes)
-            durations.append(time.perf_counter() - start)
+            durations.append(time.thread_time() - start)
     ours, theirs = (samples * channels / min(durations) for durations in seconds)
     return ours, theirs
 
 
-def measure(samples: int, repeats: int) -> list[Rates]:
-    """Measure every core with every number of channels, about `samples` samples in all each time."""
+def measure(repeats: int) -> list[Rates]:
+    """Measure every core with every number of channels."""
     rows = []
     for example, core in CORES:
         design = design_core(load(EXAMPLES / f"{example}.toml"), core=core)
         for channels in CHANNELS:
-            rates = measured(design, channels, max(1, samples // channels), repeats)
+            rates = measured(design, channels, SAMPLES // channels, repeats)
             rows.append(Rates(example, core, channels, *rates))
     return rows
 
 
-def main() -> None:
-    """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--samples", type=int, default=2_000_000, help="samples in one run, over all channels")
-    parser.add_argument("--repeats", type=int, default=10, help="runs, of which the fastest counts")
-    parser.add_argument("--json", action="store_true", help="print JSON, rates in samples a second")
-    options = parser.parse_args()
-    rows = measure(options.samples, options.repeats)
-    if options.json:
-        print(json.dumps([asdict(row) for row in rows], indent=2))
-        return
-    table = Table(title="Million samples a second on one core, over all channels")
-    for name in ("specification", "core", "channels", "integer model", "scipy", "ratio"):
-        table.add_column(name, justify="left" if name in {"specification", "core"} else "right")
+def table(rows: list[Rates]) -> str:
+    """Return the rates as a table in Markdown."""
+    lines = [
+        "| specification | core | channels | integer model | scipy | beside scipy |",
+        "|---|---|---|---|---|---|",
+    ]
     for row in rows:
-        figures = [f"{row.model / 1e6:.1f}", f"{row.scipy / 1e6:.1f}", f"{row.model / row.scipy:.2f}"]
-        table.add_row(row.example, row.core, str(row.channels), *figures)
-    Console().print(table)
+        figures = f"{row.model / 1e6:.0f} | {row.scipy / 1e6:.0f} | {row.ratio:.2f}"
+        lines.append(f"| {row.example} | {row.core} | {row.channels} | {figures} |")
+    return "\n".join(lines) + "\n"
+
+
+def section(rows: list[Rates]) -> str:
+    """Return the section of the document."""
+    return f"""
+## The bit-true model
+
+Written by `python -m benchmarks.model` from the rates that it records in `benchmarks/model.json`. `--check` measures
+again and fails if the model has lost more than {LOSS:.0%} of its speed beside scipy, or is slower than scipy.
+
+The compiled integer model (`Datapath.compute`, with its check of the codes) and scipy's `sosfilt` in double precision,
+behind NumPy's polynomial where there is a calibration, on the same {SAMPLES:,} random samples. Rates are millions of
+samples a second of processor time, over all channels; the fastest of several runs in turn counts.
+
+{table(rows)}
+"""
+
+
+def recorded() -> list[Rates]:
+    """Read the recorded rates."""
+    return [Rates(**row) for row in json.loads(RECORD.read_text(encoding="utf-8"))]
+
+
+def losses(old: list[Rates], new: list[Rates]) -> list[str]:
+    """Say which models have lost speed beside scipy, or are slower."""
+    faults = []
+    for before, after in zip(old, new, strict=True):
+        least = max(1.0, (1 - LOSS) * before.ratio)
+        if after.ratio < least:
+            name = f"{after.example}, {after.core}, {after.channels} channels"
+            faults.append(f"{name}: the model must reach {least:.2f} of scipy's speed, not {after.ratio:.2f}")
+    return faults
+
+
+def main() -> None:
+    """Measure and write, or check."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--repeats", type=int, default=10, help="runs, of which the fastest counts")
+    parser.add_argument("--check", action="store_true", help="fail if the model has become slower")
+    parser.add_argument("--document", action="store_true", help="only write the document from the record")
+    options = parser.parse_args()
+    rows = recorded() if options.document else measure(options.repeats)
+    print(table(rows), end="")
+    if options.check:
+        if faults := losses(recorded(), rows):
+            sys.exit("\n".join(faults))
+        return
+    if not options.document:
+        RECORD.write_text(json.dumps([asdict(row) for row in rows], indent=2) + "\n", encoding="utf-8")
+    renew("model", section(rows))
 
 
 if __name__ == "__main__":

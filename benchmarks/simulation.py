@@ -1,24 +1,32 @@
-"""Measures how fast co-simulations run, and writes docs/speed.md: `python -m benchmarks.simulation`.
+"""Measures how fast co-simulations run and are built, for docs/speed.md: `python -m benchmarks.simulation`.
 
-The locomotive's instrument runs on one core of the machine in three benches, in turn: the bench of `sosmith simulate`,
-the same with its loop in Python, and a bare C++ loop around Verilator's model that checks the same rules
-(`benchmarks/bare_loop.cpp`). The fastest of several runs counts. The figures are recorded in
-benchmarks/simulation.json; `--document` only writes the document from that record again. `--check` writes nothing, and
-fails if the bench has lost more than 15 % of its recorded speed beside the bare loop.
+The locomotive's instrument runs in four benches, in turn: the bench of `sosmith simulate` in Verilator and in CXXRTL,
+the one in Verilator with its loop in Python, and a bare C++ loop around Verilator's model that checks the same rules
+(`benchmarks/bare_loop.cpp`). All times are processor time, and the fastest of several runs counts. The figures are
+recorded in benchmarks/simulation.json; `--document` only writes the section of the document from that record again.
+`--check` writes nothing, and fails if the bench has lost more than 15 % of its recorded speed beside the bare loop, or
+if a build takes longer than it may.
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
+import os
+import resource
+import secrets
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from benchmarks.speed_page import renew
 
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.output.core_facts import InterfaceFacts, core_facts
@@ -26,18 +34,21 @@ from sosmith.gen.output.generate import generate
 from sosmith.gen.specification.specification import load
 from sosmith.sim.beats import Beats
 from sosmith.sim.bench import BenchRun
-from sosmith.sim.simulator_bench import SimulatorBench
+from sosmith.sim.cxxrtl_model import build_cxxrtl
+from sosmith.sim.simulator_bench import SimulatorBench, optional_signals, ports_of
 from sosmith.sim.simulators import find_simulator
 from sosmith.sim.stream_packing import pack, random_order
+from sosmith.sim.verilated_model import Builder, Model
 
 ROOT = Path(__file__).resolve().parent.parent
 RECORD = ROOT / "benchmarks" / "simulation.json"
-DOCUMENT = ROOT / "docs" / "speed.md"
 EXAMPLE = "flange_wear_locomotive"
 SAMPLES = {"parallel": (1_000_000, 20_000), "folded": (60_000, 1_500)}
 """Samples in the compiled loop and the bare one, and in Python."""
 LOSS = 0.15
 """Share of the recorded ratio that may be lost."""
+BUILD = 4.0
+"""Seconds that building for a new core may take once the cache has Verilator's library."""
 SEED = 1
 
 
@@ -51,8 +62,11 @@ class Speeds:
         Its architecture.
     samples, clocks : int
         Size of the run, in samples and clocks of the bench.
-    bare, bench, python : float
-        Clocks a second: of the bare loop, of the bench, and of the bench with its loop in Python.
+    bare, bench, python, cxxrtl : float
+        Clocks a second: of the bare loop, of the bench in Verilator, of that with its loop in Python, and of the bench
+        in CXXRTL.
+    build, cxxrtl_build : float
+        Seconds that building for the core takes, for Verilator and for CXXRTL.
     """
 
     architecture: str
@@ -61,6 +75,9 @@ class Speeds:
     bare: float
     bench: float
     python: float
+    cxxrtl: float
+    build: float
+    cxxrtl_build: float
 
     @property
     def ratio(self) -> float:
@@ -127,6 +144,42 @@ def bare_speed(program: Path, sent: Beats, patience: int) -> float:
     return int(clocks) / float(seconds)
 
 
+def build_seconds(source: Path, interface: InterfaceFacts, folder: Path) -> tuple[float, float]:
+    """Measure how long building takes for a core that the cache does not have, for Verilator and for CXXRTL."""
+    new = folder / "new.sv"
+    new.write_text(f"// {secrets.token_hex()}\n{source.read_text(encoding='utf-8')}", encoding="utf-8")
+    signals = tuple(optional_signals(interface))
+    model = Model(source=new, top=interface.name, ports=tuple(ports_of(interface)), signals=signals, waves=False)
+    tool = find_simulator("verilator", folder / "bin")
+    builder = Builder(tool.version, tool.environment, folder)
+    with _silence():
+        started = _children_seconds()
+        builder.build(model, folder / "new")
+        between = _children_seconds()
+        build_cxxrtl(new, interface.name, signals, tool.environment, folder, folder / "new.so")
+        return between - started, _children_seconds() - between
+
+
+@contextlib.contextmanager
+def _silence() -> Iterator[None]:
+    """Drop what programs print meanwhile."""
+    kept = os.dup(1), os.dup(2)
+    with Path(os.devnull).open("wb") as nowhere:
+        for stream in (1, 2):
+            os.dup2(nowhere.fileno(), stream)
+        try:
+            yield
+        finally:
+            for stream, each in zip((1, 2), kept, strict=True):
+                os.dup2(each, stream)
+                os.close(each)
+
+
+def _children_seconds() -> float:
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
 def measured(architecture: str, repeats: int, folder: Path) -> Speeds:
     """Measure one core in all benches."""
     made = design(architecture)
@@ -134,21 +187,34 @@ def measured(architecture: str, repeats: int, folder: Path) -> Speeds:
     generate(made, folder, lambda step: None, facts=facts)
     source = folder / f"{made.datapath.name}.sv"
 
-    def run(sent: Beats, *, compiled: bool) -> BenchRun:
-        bench = SimulatorBench(source=source, interface=facts.interface, build_dir=folder, seed=SEED, compiled=compiled)
+    def run(sent: Beats, **options: Any) -> BenchRun:
+        bench = SimulatorBench(source=source, interface=facts.interface, build_dir=folder, seed=SEED, **options)
         return bench.run(sent, lambda done, total: None)
+
+    def speed(found: BenchRun) -> float:
+        return found.cycles / found.seconds
 
     long, short = SAMPLES[architecture]
     sent = beats(made, facts.interface, long)
     bare = build_bare(source, made.datapath.name, folder)
     patience = facts.interface.latency_cycles + facts.interface.reset_cycles
-    speeds: tuple[list[float], list[float]] = ([], [])
+    speeds: dict[str, list[float]] = {"bare": [], "bench": [], "cxxrtl": []}
     for _ in range(repeats):
-        speeds[0].append(bare_speed(bare, sent, patience))
-        found = run(sent, compiled=True)
-        speeds[1].append(found.cycles / found.seconds)
-    slow = run(beats(made, facts.interface, short), compiled=False)
-    return Speeds(architecture, long, found.cycles, max(speeds[0]), max(speeds[1]), slow.cycles / slow.seconds)
+        speeds["bare"].append(bare_speed(bare, sent, patience))
+        found = run(sent)
+        speeds["bench"].append(speed(found))
+        speeds["cxxrtl"].append(speed(run(sent, simulator="cxxrtl")))
+    builds = [build_seconds(source, facts.interface, folder) for _ in range(repeats)]
+    build, cxxrtl_build = (min(times) for times in zip(*builds, strict=True))
+    return Speeds(
+        architecture=architecture,
+        samples=long,
+        clocks=found.cycles,
+        **{name: max(each) for name, each in speeds.items()},
+        python=speed(run(beats(made, facts.interface, short), compiled=False)),
+        build=build,
+        cxxrtl_build=cxxrtl_build,
+    )
 
 
 def measure(repeats: int) -> list[Speeds]:
@@ -163,32 +229,44 @@ def measure(repeats: int) -> list[Speeds]:
 def table(rows: list[Speeds]) -> str:
     """Return the speeds as a table in Markdown."""
     lines = [
-        "| architecture | samples | clocks | bare loop | bench | beside the bare loop | loop in Python |",
-        "|---|---|---|---|---|---|---|",
+        "| architecture | samples | clocks | bare loop | bench | beside the bare loop | loop in Python | CXXRTL |",
+        "|---|---|---|---|---|---|---|---|",
     ]
     for row in rows:
-        speeds = (f"{speed / 1e6:.2f}" for speed in (row.bare, row.bench))
-        figures = (*speeds, f"{row.ratio:.2f}", f"{row.python / 1e6:.3f}")
+        bare, bench, cxxrtl = (f"{speed / 1e6:.2f}" for speed in (row.bare, row.bench, row.cxxrtl))
+        figures = (bare, bench, f"{row.ratio:.2f}", f"{row.python / 1e6:.3f}", cxxrtl)
         lines.append(f"| {row.architecture} | {row.samples:,} | {row.clocks:,} | {' | '.join(figures)} |")
     return "\n".join(lines) + "\n"
 
 
-def document(rows: list[Speeds]) -> str:
-    """Return the document."""
-    return f"""# How fast it runs
+def build_table(rows: list[Speeds]) -> str:
+    """Return how long building takes as a table in Markdown."""
+    lines = ["| architecture | for Verilator, s | for CXXRTL, s |", "|---|---|---|"]
+    lines += [f"| {row.architecture} | {row.build:.1f} | {row.cxxrtl_build:.1f} |" for row in rows]
+    return "\n".join(lines) + "\n"
 
+
+def section(rows: list[Speeds]) -> str:
+    """Return the section of the document."""
+    return f"""
 ## Co-simulation
 
 Written by `python -m benchmarks.simulation` from the figures that it records in `benchmarks/simulation.json`. `--check`
-measures again and fails if the bench has lost more than {LOSS:.0%} of its speed beside the bare loop.
+measures again and fails if the bench has lost more than {LOSS:.0%} of its speed beside the bare loop, or if a build for
+Verilator takes more than {BUILD:g} s.
 
 The instrument of {EXAMPLE} gets random samples with 30 % of the clocks idle and 30 % stalled, in bursts, and every
 clock is checked. The bare loop is C++ around Verilator's model with the same checks (`benchmarks/bare_loop.cpp`): no
 cocotb, no Python. The bench is that of `sosmith simulate`, and the loop in Python is the same bench as it runs in
-Icarus and with `--waves`. Speeds are millions of clocks a second on one core of the machine, in the same model of the
+Icarus and with `--waves`. Speeds are millions of clocks a second of processor time, on one core of the machine, for the
 same core; the fastest of several runs in turn counts.
 
-{table(rows)}"""
+{table(rows)}
+Building for a core that was never simulated before, once the cache has Verilator's library, takes this much processor
+time:
+
+{build_table(rows)}
+"""
 
 
 def recorded() -> list[Speeds]:
@@ -197,12 +275,17 @@ def recorded() -> list[Speeds]:
 
 
 def losses(old: list[Speeds], new: list[Speeds]) -> list[str]:
-    """Say which cores have lost speed beside the bare loop."""
-    return [
+    """Say which cores have lost speed beside the bare loop, and which take too long to build."""
+    faults = [
         f"{before.architecture}: the bench must reach {(1 - LOSS) * before.ratio:.2f} of the bare loop's speed, "
         f"not {after.ratio:.2f}"
         for before, after in zip(old, new, strict=True)
         if after.ratio < (1 - LOSS) * before.ratio
+    ]
+    return faults + [
+        f"{row.architecture}: building for Verilator must take at most {BUILD:g} s, not {row.build:.1f} s"
+        for row in new
+        if row.build > BUILD
     ]
 
 
@@ -214,14 +297,14 @@ def main() -> None:
     parser.add_argument("--document", action="store_true", help="only write the document from the record")
     options = parser.parse_args()
     rows = recorded() if options.document else measure(options.repeats)
-    print(table(rows), end="")
+    print(table(rows), build_table(rows), sep="\n", end="")
     if options.check:
         if faults := losses(recorded(), rows):
             sys.exit("\n".join(faults))
         return
     if not options.document:
         RECORD.write_text(json.dumps([asdict(row) for row in rows], indent=2) + "\n", encoding="utf-8")
-    DOCUMENT.write_text(document(rows), encoding="utf-8")
+    renew("simulation", section(rows))
 
 
 if __name__ == "__main__":

@@ -23,7 +23,7 @@ class BenchRun:
     cycles : int
         Clocks from the end of reset to the last beat received.
     seconds : float
-        How long these clocks took.
+        Processor time that these clocks took, in a simulator; the rest of the machine's load is not in it.
     tools : mapping of str to str
         Versions of the tools that ran the core, by name.
     """

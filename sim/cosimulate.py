@@ -30,7 +30,7 @@ class CosimulationResult:
     wall_seconds : float
         Duration of build and run.
     cycles_per_second : float
-        Speed of these clocks, without resets and start-up.
+        Speed of these clocks, without resets and start-up, in processor time.
     simulator : str
         Name of the bench.
     tools : mapping of str to str

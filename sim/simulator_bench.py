@@ -107,21 +107,14 @@ class SimulatorBench:
     def _building(self, folder: Path, tool: Simulator) -> str:
         """Name the step of building, with its duration if it takes long."""
         step = f"building with {self.simulator}"
-        if self.simulator == "verilator":
-            try:
-                builder = Builder(tool.version, tool.environment, folder / "build")
-            except subprocess.CalledProcessError as error:
-                raise ToolError(f"{tool.name} {tool.version} failed: {error.stderr.strip()}") from None
-            if not builder.has_library(waves=self.waves):
-                return f"{step}, which takes about {LIBRARY_SECONDS} s the first time"
+        if self.simulator == "verilator" and not _builder(tool, folder / "build").has_library(waves=self.waves):
+            return f"{step}, which takes about {LIBRARY_SECONDS} s the first time"
         return step
 
     def _write_job(self, folder: Path, tool: Simulator) -> None:
         for name in ("result.json", "received.npy", "progress.txt"):
             (folder / name).unlink(missing_ok=True)
-        inputs, outputs = self.interface.inputs, self.interface.outputs
-        ports = ["aclk", "aresetn", *(f"s_axis_{name}" for name in _signals(inputs))]
-        ports += [f"m_axis_{name}" for name in _signals(outputs)]
+        optional = optional_signals(self.interface)
         job = {
             "folder": str(folder),
             "source": str(folder / "core.sv"),
@@ -130,12 +123,12 @@ class SimulatorBench:
             "version": tool.version,
             "seed": self.seed,
             "waves": self.waves,
-            "ports": ports,
-            "signals": [name for name in ("tdest", "tuser") if name in _signals(outputs)],
+            "ports": ports_of(self.interface),
+            "signals": optional,
         }
         bench = {
-            "tdest": "tdest" in _signals(outputs),
-            "tuser": "tuser" in _signals(outputs),
+            "tdest": "tdest" in optional,
+            "tuser": "tuser" in optional,
             "seed": self.seed,
             "idle": self.idle,
             "stall": self.stall,
@@ -146,6 +139,37 @@ class SimulatorBench:
         (folder / "core.sv").write_bytes(self.source.read_bytes())
         (folder / "job.json").write_text(json.dumps(job), encoding="utf-8")
         (folder / "bench.json").write_text(json.dumps(bench), encoding="utf-8")
+
+
+def has_library() -> bool:
+    """Whether Verilator's library has been compiled for earlier simulations, and need not be for the next one.
+
+    Raises
+    ------
+    ToolError
+        If Verilator or the compiler is missing.
+    """
+    with tempfile.TemporaryDirectory(prefix="sosmith-") as folder:
+        tool = find_simulator("verilator", Path(folder) / "bin")
+        return _builder(tool, Path(folder)).has_library(waves=False)
+
+
+def _builder(tool: Simulator, folder: Path) -> Builder:
+    try:
+        return Builder(tool.version, tool.environment, folder)
+    except subprocess.CalledProcessError as error:
+        raise ToolError(f"{tool.name} {tool.version} failed: {error.stderr.strip()}") from None
+
+
+def ports_of(interface: InterfaceFacts) -> list[str]:
+    """Names of the ports that a bench drives and reads."""
+    streams = {"s_axis": interface.inputs, "m_axis": interface.outputs}
+    return ["aclk", "aresetn", *(f"{name}_{signal}" for name, each in streams.items() for signal in _signals(each))]
+
+
+def optional_signals(interface: InterfaceFacts) -> list[str]:
+    """Those of ``tdest`` and ``tuser`` that the output stream has."""
+    return [name for name in ("tdest", "tuser") if name in _signals(interface.outputs)]
 
 
 def _signals(stream: StreamFacts) -> list[str]:

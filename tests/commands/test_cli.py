@@ -784,12 +784,22 @@ def test_a_full_disk_is_one_sentence(process: Start, tmp_path: Path) -> None:
 def test_tools_that_are_missing(sosmith: Command, monkeypatch: pytest.MonkeyPatch) -> None:
     (Path("empty")).mkdir()
     monkeypatch.setenv("PATH", str(Path("empty").resolve()))
-    for simulator, tool, package in (("verilator", "g++", "g++"), ("icarus", "iverilog", "iverilog")):
+    needed = {"verilator": ("g++", "g++"), "icarus": ("iverilog", "iverilog"), "cxxrtl": ("g++", "g++")}
+    for simulator, (tool, package) in needed.items():
         outcome = sosmith("simulate", "plain.toml", "--simulator", simulator)
         assert (outcome.status, outcome.stdout) == (3, "")
         message = f"{tool} is needed for co-simulation, and was not found: apt-get install {package}"
         assert outcome.messages == [f"sosmith: error: {message}"]
         assert not Path("build/plain/report.json").exists()
+
+
+@pytest.mark.parametrize("first", [True, False])
+def test_the_first_demo_says_how_long_it_takes(first: bool, sosmith: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sosmith.sim.simulator_bench.has_library", lambda: not first)
+    outcome = sosmith("demo", "-o", "demo.toml/out")  # which ends it soon
+    said = "the first run takes about 35 s, as Verilator's library is compiled, and later ones about 15 s"
+    assert (said in outcome.stderr) == first
+    assert "demo.toml/out: the output folder must be a folder" in outcome.stderr
 
 
 def test_no_verilator(sosmith: Command, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,24 +1,48 @@
-"""The speeds: the document shows what was recorded, and a slower bench is noticed."""
+"""The speeds: the document shows what was recorded, and a slower bench or model is noticed."""
 
 from dataclasses import replace
-from pathlib import Path
 
-from benchmarks import simulation
-
-ROOT = Path(__file__).parents[2]
+import pytest
+from benchmarks import model, simulation, speed_page
 
 
 def test_the_document_shows_the_recorded_figures() -> None:
-    assert (ROOT / "docs" / "speed.md").read_text(encoding="utf-8") == simulation.document(simulation.recorded())
+    assert speed_page.shown("simulation") == simulation.section(simulation.recorded())
+    assert speed_page.shown("model") == model.section(model.recorded())
+    with pytest.raises(ValueError, match=r"speed\.md must have a section none$"):
+        speed_page.shown("none")
 
 
-def test_both_architectures_are_recorded_with_long_runs() -> None:
+def test_both_architectures_are_recorded_with_long_runs_at_the_speed_that_is_asked() -> None:
     rows = {row.architecture: row for row in simulation.recorded()}
     assert {name: row.samples for name, row in rows.items()} == {"parallel": 1_000_000, "folded": 60_000}
+    assert all(row.ratio > 0.8 and row.build < simulation.BUILD for row in rows.values())
+
+
+def test_one_and_twelve_channels_are_recorded_faster_than_scipy() -> None:
+    rows = model.recorded()
+    assert {(row.example, row.core, row.channels) for row in rows} == {
+        (*core, channels) for core in model.CORES for channels in (1, 12)
+    }
+    assert all(row.ratio > 1 for row in rows)
 
 
 def test_a_bench_that_has_become_slower_is_named() -> None:
-    old = [replace(row, bare=100.0, bench=90.0) for row in simulation.recorded()]
+    old = [replace(row, bare=100.0, bench=90.0, build=2.0) for row in simulation.recorded()]
     assert simulation.losses(old, [replace(row, bare=200.0, bench=154.0) for row in old]) == []
-    slower = [old[0], replace(old[1], bare=200.0, bench=152.0)]
-    assert simulation.losses(old, slower) == ["folded: the bench must reach 0.77 of the bare loop's speed, not 0.76"]
+    slower = [replace(old[0], build=4.1), replace(old[1], bare=200.0, bench=152.0)]
+    assert simulation.losses(old, slower) == [
+        "folded: the bench must reach 0.77 of the bare loop's speed, not 0.76",
+        "parallel: building for Verilator must take at most 4 s, not 4.1 s",
+    ]
+
+
+def test_a_model_that_has_become_slower_is_named() -> None:
+    old = [replace(row, model=200.0, scipy=100.0) for row in model.recorded()]
+    assert model.losses(old, [replace(row, model=152.0) for row in old]) == []
+    slower = [replace(old[0], model=148.0), *old[1:]]
+    name = "audio_lowpass, filter, 1 channels"
+    assert model.losses(old, slower) == [f"{name}: the model must reach 1.50 of scipy's speed, not 1.48"]
+    below = [replace(each, model=99.0) for each in old]
+    old = [replace(each, model=105.0) for each in old]
+    assert f"{name}: the model must reach 1.00 of scipy's speed, not 0.99" in model.losses(old, below)

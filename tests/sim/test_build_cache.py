@@ -12,6 +12,7 @@ import pytest
 from tests.sim.stand_in import SOUND, write
 
 from sosmith.sim.build_cache import LIMIT, BuildCache, cache_folder, key_of
+from sosmith.sim.simulator_bench import has_library
 from sosmith.sim.simulators import find_simulator
 from sosmith.sim.verilated_model import Builder, Model
 
@@ -163,7 +164,7 @@ def test_the_folder_is_the_users_cache(tmp_path: Path, monkeypatch: pytest.Monke
     assert cache_folder() is None
 
 
-def test_a_core_built_elsewhere_is_not_built_again(tmp_path: Path) -> None:
+def test_a_core_built_elsewhere_is_not_built_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """In the user's own cache, for the sake of the library; the text of the core is new to it."""
     text = f"// {tmp_path} {os.getpid()}\n{SOUND}"
     tool = find_simulator("verilator", tmp_path / "bin")
@@ -177,3 +178,6 @@ def test_a_core_built_elsewhere_is_not_built_again(tmp_path: Path) -> None:
     one, two, other = ((tmp_path / name / "model").read_bytes() for name in ("one", "two", "other"))
     assert one == two != other
     assert [(tmp_path / name / "objects").exists() for name in ("one", "two", "other")] == [True, False, True]
+    assert has_library()
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    assert not has_library()

@@ -35,6 +35,10 @@ if TYPE_CHECKING:
     from sosmith.interface.specification import Specification
 
 
+DEMO_SECONDS = 15
+"""About how long the demo takes on two cores, without Verilator's library."""
+
+
 class _Share(click.FloatRange):
     """Fraction of clocks; unlike its parent, refuses NaN."""
 
@@ -293,6 +297,7 @@ def demo(output: Path | None, seed: int) -> None:
     from sosmith.interface.specification import Specification
 
     folder = output or Path("build/demo")
+    _say_how_long()
     with show_progress() as step:
         step("writing the example specification")
         (spec,) = write_files(folder, {"flange_wear.toml": example()})
@@ -304,6 +309,18 @@ def demo(output: Path | None, seed: int) -> None:
 
     print_design(made)
     _finish(report, as_json=False)
+
+
+def _say_how_long() -> None:
+    """Say how long the demo takes if this is the first simulation, which takes longer."""
+    from sosmith.sim.simulator_bench import has_library
+    from sosmith.sim.verilated_model import LIBRARY_SECONDS
+
+    if not has_library():
+        note(
+            f"the first run takes about {DEMO_SECONDS + LIBRARY_SECONDS} s, as Verilator's library is compiled, and "
+            f"later ones about {DEMO_SECONDS} s"
+        )
 
 
 def _simulated(made: Design, step: Step, source: str | None, **options: Any) -> Report:

@@ -42,6 +42,17 @@ def test_channels_are_independent() -> None:
         assert together[:, channel].tolist() == datapath.compute(codes[:, channel]).tolist()
 
 
+@pytest.mark.parametrize("samples", [1428, 1429, 1430, 2860, 4001])
+def test_channels_in_turns_go_on_where_they_were(samples: int) -> None:
+    """Twelve channels take turns of 1,429 samples."""
+    datapath = cascade(butterworth(3, 0.05))
+    codes = np.random.default_rng(6).integers(-32768, 32768, (samples, 12, 1))
+    together, status = datapath.compute(codes), datapath.compute_status(codes)
+    for channel in range(12):
+        assert together[:, channel].tolist() == datapath.compute(codes[:, channel]).tolist()
+        assert status[:, channel].tolist() == datapath.compute_status(codes[:, channel]).tolist()
+
+
 def test_values_wider_than_a_machine_word_stay_exact() -> None:
     variables = (Variable(name="x", bits=31, signed=True),)
     horner = HornerPolynomial(coefficients=((3,), (-(1 << 40) + 1,), (1 << 41,)), frac=40, variables=variables)
