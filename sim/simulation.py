@@ -196,7 +196,7 @@ def _evidence(
         formats=facts.formats,
         sections=facts.sections,
         limit_cycles=facts.limit_cycles,
-        filter=_filter_facts(quantized),
+        filter=filter_facts(quantized),
         alternatives=_alternatives(quantized, codes, golden),
         provenance=provenance_of(design, traces, netlist),
     )
@@ -209,7 +209,8 @@ def _stacked(columns: Sequence[npt.NDArray[_Kind] | None]) -> npt.NDArray[_Kind]
     return np.stack(present, axis=1) if present else None
 
 
-def _filter_facts(quantized: Quantized) -> FilterFacts | None:
+def filter_facts(quantized: Quantized) -> FilterFacts | None:
+    """Collect the facts about the filter of a core; None for a core without one."""
     ideal = quantized.filter
     if ideal is None:
         return None

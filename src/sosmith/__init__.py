@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from sosmith.interface.certificate import Certificate, Proof
     from sosmith.interface.comparison import Comparison, compare
     from sosmith.interface.design import Coefficient, Design, Section, design
+    from sosmith.interface.exploration import Exploration, explore
     from sosmith.interface.quantity import Quantity
     from sosmith.interface.report import Report
     from sosmith.interface.specification import Specification
@@ -41,6 +42,7 @@ __all__ = [
     "Coefficient",
     "Comparison",
     "Design",
+    "Exploration",
     "Identity",
     "LinkError",
     "LinkLostError",
@@ -59,6 +61,7 @@ __all__ = [
     "__version__",
     "compare",
     "design",
+    "explore",
 ]
 
 _MODULES = {
@@ -68,6 +71,7 @@ _MODULES = {
     "interface.certificate": ("Certificate", "Proof"),
     "interface.comparison": ("Comparison", "compare"),
     "interface.design": ("Coefficient", "Design", "Section", "design"),
+    "interface.exploration": ("Exploration", "explore"),
     "interface.quantity": ("Quantity",),
     "interface.report": ("Report",),
     "interface.specification": ("Specification",),

@@ -69,6 +69,11 @@ _COMMANDS = {
         "stream", "stream_command", "Send the samples of TRACE.csv to the board at PORT, and write its results."
     ),
     "compare": _Command("compare", "compare_command", "Compare accuracy reports side by side."),
+    "explore": _Command(
+        "explore",
+        "explore_command",
+        "Design every combination of values, and show the front of accuracy against cost.",
+    ),
     "calibrate": _Command(
         "calibrate",
         "calibrate",
@@ -94,7 +99,7 @@ _COMMANDS = {
 }
 """The commands in the order they are used; the module of each one is imported when the command is called."""
 
-_LATER = ("build", "explore", "monitor")
+_LATER = ("build", "monitor")
 """Commands that are planned but not available yet."""
 
 _INTERRUPTED = 130

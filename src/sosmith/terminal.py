@@ -96,8 +96,11 @@ def be_quiet(quiet: bool) -> None:
 
 
 @contextmanager
-def show_progress() -> Iterator[Step]:
-    """Show on stderr the progress of the steps inside the context: bars on a terminal, else one line a step."""
+def show_progress(*, remaining: bool = False) -> Iterator[Step]:
+    """Show on stderr the progress of the steps inside the context: bars on a terminal, else one line a step.
+
+    With `remaining`, bars tell the time that is left as well.
+    """
     if _quiet:
         yield Step()
         return
@@ -106,15 +109,24 @@ def show_progress() -> Iterator[Step]:
         return
     # Imported only when something is shown: help and refusals start faster without rich.
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import (
+        BarColumn,
+        Progress,
+        ProgressColumn,
+        SpinnerColumn,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
 
-    columns = (
+    columns: list[ProgressColumn] = [
         SpinnerColumn(finished_text="[green]✓[/]"),
         TextColumn("{task.description}", markup=False),
         BarColumn(bar_width=30),
         TextColumn("{task.percentage:>3.0f} %"),
+        *([TimeRemainingColumn(), TextColumn("left")] if remaining else []),
         TimeElapsedColumn(),
-    )
+    ]
     with Progress(*columns, console=Console(stderr=True)) as progress:
         step = _BarStep(progress)
         try:

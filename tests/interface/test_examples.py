@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 PAGE = Path(__file__).parents[2] / "docs" / "python.md"
-MODULES = ("calibration", "certificate", "comparison", "design", "quantity", "report", "specification")
+MODULES = ("calibration", "certificate", "comparison", "design", "exploration", "quantity", "report", "specification")
 
 
 @pytest.fixture(autouse=True)

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
-from numbers import Integral, Real
 from os import PathLike, fspath
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from sosmith.gen.specification.exact_values import exact
 from sosmith.gen.specification.specification import Specification as Checked
 from sosmith.gen.specification.specification import example, from_tree, load
 from sosmith.gen.specification.toml_text import toml_text
@@ -69,7 +69,7 @@ class Specification:
             For the first error, with the path of its key, what was expected and what was found.
         """
         if isinstance(source, Mapping):
-            return cls(from_tree(_exact(source), _UNNAMED))
+            return cls(from_tree(exact(source), _UNNAMED))
         return cls(load(Path(fspath(source))))
 
     @classmethod
@@ -187,7 +187,7 @@ class Specification:
         {'architecture': 'serial'}
         """
         tree = {key: value for key, value in (self.as_dict() | keys).items() if value is not None}
-        return type(self)(from_tree(_exact(tree), self.checked.path))
+        return type(self)(from_tree(exact(tree), self.checked.path))
 
     @property
     def name(self) -> str:
@@ -242,20 +242,3 @@ def _format(bits: int, ends: Sequence[float]) -> dict[str, Any]:
 def _plain(tree: dict[str, Any]) -> dict[str, Any]:
     """Copy nested tables, so that changes by the caller have no effect here."""
     return {key: _plain(value) if isinstance(value, dict) else value for key, value in tree.items()}
-
-
-def _exact(value: Any) -> Any:
-    """Return nested values as `tomllib` gives them, with every float as the `Decimal` that prints the same."""
-    if isinstance(value, Mapping):
-        return {str(key): _exact(item) for key, item in value.items()}
-    if isinstance(value, str | bool | Decimal):
-        return value
-    if hasattr(value, "tolist"):  # a numpy array or number
-        return _exact(value.tolist())
-    if isinstance(value, Integral):
-        return int(value)
-    if isinstance(value, Real):
-        return Decimal(repr(float(value)))
-    if isinstance(value, Sequence):
-        return [_exact(item) for item in value]
-    return value

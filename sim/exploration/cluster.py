@@ -1,0 +1,52 @@
+"""Runs tasks on a Dask cluster that exists; its workers need sosmith and a C compiler."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from sosmith.model.errors import ToolError
+from sosmith.sim.exploration.evaluation import Point, evaluate
+from sosmith.sim.exploration.grid import Task
+
+_BATCH = 2_000
+"""Tasks that the scheduler knows of at a time; each takes it well under a millisecond."""
+
+_CONNECT = 10
+"""Seconds until a scheduler must have answered."""
+
+
+def on_cluster(tasks: Sequence[Task], address: str) -> Iterator[Point]:
+    """Yield the results of `tasks` as they come from the workers of the scheduler at `address`.
+
+    A task whose worker dies is done again by another one; the scheduler hands out each result once. When the caller
+    stops, what has not begun is dropped.
+
+    Raises
+    ------
+    ToolError
+        If the package distributed is missing, the scheduler does not answer, a task has killed several workers, or as
+        `evaluate`.
+    """
+    try:
+        from distributed import Client, as_completed
+        from distributed.scheduler import KilledWorker
+    except ImportError:
+        raise ToolError(
+            "the package distributed is needed for --scheduler, and was not found: pip install 'sosmith[cluster]'"
+        ) from None
+    try:
+        client = Client(address, timeout=_CONNECT, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise ToolError(f"a Dask scheduler must answer at {address}, not: {error}") from None
+    try:
+        for start in range(0, len(tasks), _BATCH):
+            futures = [
+                client.submit(evaluate, task, key=f"sosmith-{task.key}") for task in tasks[start : start + _BATCH]
+            ]
+            for future in as_completed(futures):
+                yield future.result()
+                future.release()
+    except KilledWorker as error:
+        raise ToolError(f"the cluster's workers must live until their designs are done, not: {error}") from None
+    finally:
+        client.close()

@@ -1,0 +1,59 @@
+"""Co-simulates the designs of a front, with a report for each."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+from sosmith.gen.core import design_core
+from sosmith.gen.report.report import write_report
+from sosmith.sim.exploration.evaluation import traces_of
+from sosmith.sim.exploration.run import Outcome
+from sosmith.sim.simulation import simulate
+
+Progress = Callable[[str, int, int], None]
+
+
+def confirmed(outcome: Outcome, folder: Path, *, simulator: str = "verilator", progress: Progress) -> Outcome:
+    """Co-simulate the front on the traces of the exploration; reports that are there already are kept.
+
+    Returns
+    -------
+    Outcome
+        The same, with ``report`` and ``report_passed`` in the points of the front.
+
+    Raises
+    ------
+    ToolError
+        If the simulator is missing or fails.
+    ShortfallError
+        If hardware breaks the stream protocol.
+    """
+    tasks = {task.key: task for task in outcome.tasks}
+    front = outcome.front
+    passed: dict[str, bool] = {}
+    for done, point in enumerate(front):
+        progress("co-simulating the front", done, len(front))
+        place = folder / _place(point["key"])
+        kept = place / "report.json"
+        if kept.exists():
+            passed[point["key"]] = bool(json.loads(kept.read_text(encoding="utf-8"))["passed"])
+            continue
+        task = tasks[point["key"]]
+        design = design_core(task.specification(), core=task.core)
+        evidence = simulate(design, traces_of(design, task), place, simulator=simulator, seed=task.seed)
+        passed[point["key"]] = bool(write_report(evidence, place)["passed"])
+    progress("co-simulating the front", len(front), len(front))
+    points = tuple(
+        point | {"report": f"{_place(point['key'])}/report.html", "report_passed": passed[point["key"]]}
+        if point["key"] in passed
+        else point
+        for point in outcome.points
+    )
+    return dataclasses.replace(outcome, points=points)
+
+
+def _place(key: str) -> str:
+    return f"front/{key[:12]}"

@@ -1,0 +1,66 @@
+"""Runs tasks in processes of this machine."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import threading
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+
+from sosmith.model.errors import ToolError
+from sosmith.sim.exploration.evaluation import Point, evaluate
+from sosmith.sim.exploration.grid import Task
+
+
+def processors() -> int:
+    """Count the processors that this process may use."""
+    return len(os.sched_getaffinity(0))
+
+
+def in_processes(tasks: Sequence[Task], jobs: int) -> Iterator[Point]:
+    """Yield the results of `tasks` as they come, from `jobs` processes; one job runs in this process.
+
+    When the caller stops, whatever the reason, what has not begun is dropped and the processes end.
+
+    Raises
+    ------
+    ToolError
+        If a process dies, or as `evaluate`.
+    """
+    if jobs == 1 or len(tasks) < 2:
+        yield from map(evaluate, tasks)
+        return
+    # Processes that are forked would inherit locks of the threads that draw the progress.
+    pool = ProcessPoolExecutor(
+        min(jobs, len(tasks)), mp_context=multiprocessing.get_context("spawn"), initializer=_prepare
+    )
+    try:
+        waiting: list[Future[Point]] = [pool.submit(evaluate, task) for task in tasks]
+        for future in as_completed(waiting):
+            yield future.result()
+    except BrokenProcessPool:
+        raise ToolError(
+            "every process must live until its designs are done, and one ended before; "
+            "the same command goes on from what is done"
+        ) from None
+    finally:
+        workers = list((pool._processes or {}).values())
+        pool.shutdown(wait=False, cancel_futures=True)
+        for worker in workers:
+            worker.terminate()  # in the middle of a design that nobody waits for, or idle
+
+
+def _prepare() -> None:
+    """Leave Ctrl-C to the parent, which ends its workers, and end if the parent has died."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+
+
+def _end_with(parent: multiprocessing.process.BaseProcess) -> None:
+    parent.join()
+    os._exit(1)

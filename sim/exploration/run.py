@@ -1,0 +1,165 @@
+"""Runs an exploration: what is not yet on record, on the cores of this machine or on a cluster."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from sosmith.gen.specification.specification import Specification
+from sosmith.sim.exploration.evaluation import Point
+from sosmith.sim.exploration.front import pareto_front
+from sosmith.sim.exploration.grid import Task, tasks_of
+from sosmith.sim.exploration.record import record_in
+
+Progress = Callable[[str, int, int], None]
+Runner = Callable[[Sequence[Task]], Iterator[Point]]
+
+_COLUMNS = (
+    "on_front",
+    "passed",
+    "realization",
+    "architecture",
+    "error.bound",
+    "error.max_abs",
+    "error.rms",
+    "error.unit",
+    "sqnr_db",
+    "stopband_attenuation_db",
+    "cost.value",
+    "cost.unit",
+    "cost.luts",
+    "cost.multiplier_blocks",
+    "cost.instructions",
+    "cycles_per_sample",
+    "latency_cycles",
+    "refused",
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outcome:
+    """A finished exploration.
+
+    Attributes
+    ----------
+    name : str
+        Of the specification.
+    parameters : dict
+        Swept keys and their values.
+    samples : int
+        Length of the trace for each channel.
+    board : str or None
+        Board of the synthesis.
+    points : tuple of dict
+        Results in the order of the grid, as `evaluate` returns them; those of the front that were co-simulated have
+        ``report``, the path of their page from the folder.
+    tasks : tuple of Task
+        What they are results of.
+    """
+
+    name: str
+    parameters: dict[str, list[Any]]
+    samples: int
+    board: str | None
+    points: tuple[Point, ...]
+    tasks: tuple[Task, ...]
+
+    @property
+    def front(self) -> list[Point]:
+        """The Pareto front, see `pareto_front`."""
+        return pareto_front(self.points)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Everything but the tasks, in the types of JSON."""
+        return {
+            "name": self.name,
+            "parameters": self.parameters,
+            "samples": self.samples,
+            "board": self.board,
+            "front": self.front,
+            "points": list(self.points),
+        }
+
+    def table(self) -> str:
+        """All points as CSV: the swept keys, and the figures."""
+        stream = io.StringIO()
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow([*self.parameters, *_COLUMNS])
+        front = {point["key"] for point in self.front}
+        for point in self.points:
+            told = {**point, "on_front": point["key"] in front}
+            writer.writerow(
+                [*(point["changes"][key] for key in self.parameters), *(_at(told, column) for column in _COLUMNS)]
+            )
+        return stream.getvalue()
+
+
+def _at(point: Mapping[str, Any], column: str) -> Any:
+    value: Any = point
+    for part in column.split("."):
+        value = None if value is None else value.get(part)
+    return "" if value is None else value
+
+
+def explore(
+    spec: Specification,
+    parameters: Mapping[str, Sequence[Any]],
+    folder: Path,
+    runner: Runner,
+    *,
+    core: str | None = None,
+    samples: int = 20_000,
+    seed: int = 1,
+    board: str | None = None,
+    progress: Progress = lambda step, done, total: None,
+) -> Outcome:
+    """Evaluate every combination that `folder` has no result of; results are written as they come.
+
+    Parameters
+    ----------
+    spec : Specification
+        The specification.
+    parameters : mapping of str to sequence
+        Keys with dots, and their values in the types of JSON.
+    folder : Path
+        Folder of the results, made if missing.
+    runner : callable
+        Yields the results of tasks in any order, such as `sosmith.sim.exploration.processes.in_processes`.
+    core, samples, seed, board
+        As in `Task`.
+    progress : callable
+        Called with the name of the step, the amount done and the total.
+
+    Raises
+    ------
+    SpecificationError
+        As `tasks_of` and `record_in`.
+    ToolError
+        As the runner, or if the disk is full.
+    """
+    progress("checking combinations", 0, 0)
+    tasks = tasks_of(spec, parameters, core=core, samples=samples, seed=seed, board=board)
+    with record_in(folder) as record:
+        missing = {task.key: task for task in tasks if task.key not in record.points}
+        done, total = len(tasks) - len(missing), len(tasks)
+        progress("designs", done, total)
+        results = runner(list(missing.values()))
+        with closing(results):  # type: ignore[type-var]  # every runner is a generator
+            for point in results:
+                record.add(point)
+                done += 1
+                progress("designs", done, total)
+        points = tuple(record.points[task.key] for task in tasks)
+    return Outcome(
+        name=spec.name,
+        parameters={key: list(values) for key, values in parameters.items()},
+        samples=samples,
+        board=board,
+        points=points,
+        tasks=tuple(tasks),
+    )

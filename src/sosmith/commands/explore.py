@@ -1,0 +1,116 @@
+"""The command `explore`: many designs of one specification, and the front of accuracy against cost."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from sosmith.commands.options import CORE, SEED, SPEC, OneOf
+from sosmith.gen.fpga.boards import BOARDS, find_board
+from sosmith.model.errors import SpecificationError
+from sosmith.terminal import JSON_OPTION, note, output_option, print_json, reader_may_leave, show_progress
+
+
+@click.command("explore")
+@SPEC
+@click.option(
+    "-p",
+    "parameters",
+    multiple=True,
+    metavar="KEY=V1,V2...",
+    help="Values of a key of the specification, such as hardware.realization=df1,delta; several make a grid.  "
+    "[default: all realizations, parallel and folded, at 1, 2 and 4 times the allowed error]",
+)
+@CORE
+@click.option(
+    "--board",
+    metavar="BOARD",
+    callback=lambda ctx, parameter, name: None if name is None else find_board(name).name,
+    help="Count the cost after synthesis for the FPGA of this board, which takes seconds for each design: "
+    f"{', '.join(BOARDS)}.  [default: an estimate]",
+)
+@click.option(
+    "--samples",
+    type=click.IntRange(min=1),
+    default=20_000,
+    show_default=True,
+    help="Samples to run each design on, for each channel.",
+)
+@click.option("--simulate", is_flag=True, help="Co-simulate the designs of the front, each with a report.")
+@click.option(
+    "--simulator",
+    type=OneOf(["verilator", "icarus"]),
+    default="verilator",
+    show_default=True,
+    help="Simulator for --simulate.",
+)
+@click.option("--jobs", type=click.IntRange(min=1), help="Number of processes.  [default: one for each processor]")
+@click.option("--scheduler", metavar="ADDRESS", help="Have the workers of this Dask scheduler do the designs.")
+@SEED
+@JSON_OPTION
+@output_option("Folder for the results.  [default: build/<name>-exploration]")
+def explore_command(
+    spec: Path,
+    parameters: tuple[str, ...],
+    core: str | None,
+    board: str | None,
+    samples: int,
+    simulate: bool,
+    simulator: str,
+    jobs: int | None,
+    scheduler: str | None,
+    seed: int,
+    as_json: bool,
+    output: Path | None,
+) -> None:
+    """Design every combination of values, and show the Pareto front of proven error against cost.
+
+    Every design is proven and run bit-true. Results are kept as they come: interrupted, the same command goes on from
+    there. Writes exploration.html, exploration.json and points.csv; exits with 1 if no design passes.
+
+    \b
+        sosmith explore my.toml
+        sosmith explore my.toml -p hardware.realization=df1,df1_ef2,delta -p output.bits=12,14,16
+        sosmith explore my.toml --scheduler tcp://10.0.0.1:8786
+    """
+    from sosmith.interface.specification import Specification
+
+    asked = Specification.load(spec)
+    with show_progress(remaining=True) as step:
+        from sosmith.interface.exploration import explore
+        from sosmith.sim.exploration.grid import read_parameter
+
+        read = [read_parameter(text) for text in parameters]
+        twice = [key for k, (key, _) in enumerate(read) if key in dict(read[:k])]
+        if twice:
+            raise SpecificationError(f"a parameter must be given once, not twice as {twice[0]}")
+        folder = output or Path("build") / f"{asked.name}-exploration"
+        try:
+            found = explore(
+                asked,
+                dict(read) or None,
+                folder=folder,
+                core=core,
+                board=board,
+                samples=samples,
+                seed=seed,
+                simulate=simulate,
+                simulator=simulator,
+                jobs=jobs,
+                scheduler=scheduler,
+                progress=step,
+            )
+        except KeyboardInterrupt:
+            note(f"what is done is kept in {folder}; the same command goes on from there")
+            raise
+    with reader_may_leave():
+        if as_json:
+            print_json(found.as_dict())
+        else:
+            from sosmith.commands.tables.exploration import print_exploration
+
+            print_exploration(found)
+    note(f"page: {(found.folder / 'exploration.html').resolve().as_uri()}")
+    if not found.front:
+        raise SystemExit(1)

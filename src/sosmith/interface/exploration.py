@@ -1,0 +1,197 @@
+"""Many designs of one specification: every combination of some values, and the front of accuracy against cost."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from os import PathLike, fspath
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from sosmith.gen.fpga.boards import find_board
+from sosmith.gen.quantity import quantity
+from sosmith.gen.specification.exact_values import exact
+from sosmith.interface.certificate import Progress
+from sosmith.interface.notebook import table_html
+from sosmith.interface.specification import Specification, specification_of
+from sosmith.model.errors import SpecificationError
+from sosmith.model.text_files import to_json, write_files
+
+if TYPE_CHECKING:
+    from sosmith.sim.exploration.run import Outcome
+
+
+@dataclass(frozen=True)
+class Exploration:
+    """Designs with their figures, as returned by `explore`."""
+
+    outcome: Outcome = field(repr=False)
+    """The same in the form of the inner packages."""
+
+    folder: Path
+    """Folder of ``exploration.html``, ``exploration.json``, ``points.csv``, and of what a later run goes on from."""
+
+    @property
+    def points(self) -> list[dict[str, Any]]:
+        """Every combination in the order of the grid: `changes`, and `refused` or the figures of the design.
+
+        The figures are `error` (`bound` is proven, `max_abs` and `rms` are measured on the bit-true model), `sqnr_db`,
+        `cost` (`value` and `unit`, and what it is made of), `cycles_per_sample`, `latency_cycles`, `realization`,
+        `architecture`, `passed` and `shortfalls`.
+        """
+        return list(self.outcome.points)
+
+    @property
+    def front(self) -> list[dict[str, Any]]:
+        """Points that pass and that no other one beats in both error bound and cost, by rising cost.
+
+        Costs before synthesis are compared within one architecture only.
+        """
+        return self.outcome.front
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return `name`, `parameters`, `samples`, `board`, `front` and `points`, in JSON types."""
+        return self.outcome.as_dict()
+
+    def page(self) -> str:
+        """Return the front and all designs as a self-contained HTML page."""
+        from sosmith.sim.exploration.page import exploration_page
+
+        return exploration_page(self.outcome)
+
+    def _repr_html_(self) -> str:
+        rows = [
+            (
+                point["realization"],
+                point["architecture"],
+                quantity(point["error"]["bound"], point["error"]["unit"]),
+                f"{point['cost']['value']:,.0f} {point['cost']['unit']}",
+            )
+            for point in self.front
+        ]
+        return table_html(f"{self.outcome.name}: the front", rows, header=("", "", "error bound", "cost"))
+
+    def __repr__(self) -> str:
+        return f"<sosmith.Exploration {self.outcome.name}: {len(self.points)} points, {len(self.front)} on the front>"
+
+
+def explore(
+    specification: Specification | str | PathLike[str] | Mapping[str, Any],
+    parameters: Mapping[str, Sequence[Any]] | None = None,
+    *,
+    folder: str | PathLike[str] | None = None,
+    core: str | None = None,
+    board: str | None = None,
+    samples: int = 20_000,
+    seed: int = 1,
+    simulate: bool = False,
+    simulator: str = "verilator",
+    jobs: int | None = None,
+    scheduler: str | None = None,
+    progress: Progress = lambda step, done, total: None,
+) -> Exploration:
+    """Design every combination of some values, and find the Pareto front of proven error against cost.
+
+    Every design is proven and run bit-true. Results are kept in `folder` as they come: after an interruption, the same
+    call goes on from there. The result does not depend on how many processes or workers took part.
+
+    Parameters
+    ----------
+    specification : Specification, path or mapping
+        The specification; a path or a mapping is passed to `Specification.load`.
+    parameters : mapping of str to sequence
+        Keys of the specification with dots, such as "hardware.realization", and the values of each. By default all
+        realizations, parallel and folded, at one, two and four times the allowed error.
+    folder : path
+        Folder of the results, ``build/<name>-exploration`` by default.
+    core : str
+        The part to design, "instrument", "filter" or "calibration"; by default everything in the specification.
+    board : str
+        Name of a board: the cost is counted after synthesis for its FPGA, which takes seconds for each design, once.
+        By default it is estimated for the parallel architecture, and the length of the program for the others.
+    samples : int
+        Length of the trace for each channel, the default one of `Design.simulate`.
+    seed : int
+        Seed of its noise.
+    simulate : bool
+        Whether to co-simulate the designs of the front, each with a report.
+    simulator : str
+        "verilator" or "icarus".
+    jobs : int
+        Number of processes; by default one for each processor.
+    scheduler : str
+        Address of a Dask scheduler, such as "tcp://127.0.0.1:8786", whose workers do the designs instead.
+
+    Raises
+    ------
+    SpecificationError
+        If a key or value does not exist, or the folder cannot be written or is in use.
+    ToolError
+        If a tool is missing or fails, a process dies, or the scheduler does not answer.
+
+    Examples
+    --------
+    >>> import sosmith, tempfile
+    >>> spec = sosmith.Specification.from_sos([[0.25, 0.5, 0.25, 1.0, -0.5, 0.25]], 1000, input_bits=8)
+    >>> sweep = {"hardware.architecture": ["parallel"], "output.max_error": [0.006, 0.03], "output.bits": [8, 10]}
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     found = sosmith.explore(spec, sweep, folder=folder, samples=500, jobs=1)
+    >>> found
+    <sosmith.Exploration sos_filter: 4 points, ... on the front>
+    """
+    from sosmith.sim.exploration.confirmation import confirmed
+    from sosmith.sim.exploration.grid import default_parameters
+    from sosmith.sim.exploration.processes import in_processes, processors
+    from sosmith.sim.exploration.run import explore as run
+
+    for name, number in (("samples", samples), ("jobs", 1 if jobs is None else jobs)):
+        if number < 1:
+            raise SpecificationError(f"{name} must be at least 1, not {number}")
+    if jobs is not None and scheduler is not None:
+        raise SpecificationError("jobs must come without a scheduler, whose workers do the designs, not with one")
+    asked = specification_of(specification).checked
+    swept = default_parameters(asked) if parameters is None else _plain(parameters)
+    place = Path("build") / f"{asked.name}-exploration" if folder is None else Path(fspath(folder))
+    if scheduler is None:
+        runner = partial(in_processes, jobs=jobs or processors())
+    else:
+        from sosmith.sim.exploration.cluster import on_cluster
+
+        runner = partial(on_cluster, address=scheduler)
+    outcome = run(
+        asked,
+        swept,
+        place,
+        runner,
+        core=core,
+        samples=samples,
+        seed=seed,
+        board=None if board is None else find_board(board).name,
+        progress=progress,
+    )
+    if simulate:
+        outcome = confirmed(outcome, place, simulator=simulator, progress=progress)
+    progress("writing the results", 0, 0)
+    made = Exploration(outcome, place)
+    files = {
+        "exploration.json": to_json(made.as_dict()),
+        "points.csv": outcome.table(),
+        "exploration.html": made.page(),
+    }
+    write_files(place, files)
+    return made
+
+
+def _plain(parameters: Mapping[str, Sequence[Any]]) -> dict[str, list[Any]]:
+    """Copy parameters in the types of JSON."""
+    from decimal import Decimal
+
+    def plain(value: Any) -> Any:
+        if isinstance(value, list):
+            return [plain(item) for item in value]
+        return float(value) if isinstance(value, Decimal) else value
+
+    if not parameters or not all(len(values) for values in parameters.values()):
+        raise SpecificationError("parameters must have a key and a value, not none")
+    return {key: [plain(exact(value)) for value in values] for key, values in parameters.items()}

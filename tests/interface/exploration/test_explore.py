@@ -1,0 +1,236 @@
+"""Explorations as a whole: figures, files, the same result from any number of processes and after interruptions."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.interface.small import FILTER
+
+import sosmith
+from sosmith import SpecificationError, ToolError
+from sosmith.gen.stimuli import traces_for
+from sosmith.sim.exploration import processes
+from sosmith.sim.exploration.evaluation import evaluate
+
+SWEEP: dict[str, list[Any]] = {
+    "hardware.realization": ["df1", "df1_ef1"],
+    "output.max_error": [0.0011, 0.004],
+    "output.bits": [9, 10],
+}
+"""Eight combinations; 9 bits have an LSB of 0.0039, so two of them cannot keep within 0.0011."""
+
+FILES = ("exploration.json", "exploration.html", "points.csv")
+
+
+def explored(folder: Path, **changes: Any) -> sosmith.Exploration:
+    return sosmith.explore(FILTER, SWEEP, folder=folder, **({"samples": 300, "jobs": 1} | changes))
+
+
+@pytest.fixture(scope="module", name="found")
+def exploration(tmp_path_factory: pytest.TempPathFactory) -> sosmith.Exploration:
+    return explored(tmp_path_factory.mktemp("explored"))
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {name: (folder / name).read_bytes() for name in FILES}
+
+
+def test_figures_are_those_of_the_design(found: sosmith.Exploration) -> None:
+    point = found.points[3]
+    assert point["changes"] == {"hardware.realization": "df1", "output.max_error": 0.004, "output.bits": 10}
+    tables = {key: dict(value) if isinstance(value, dict) else value for key, value in FILTER.items()}
+    tables["output"]["max_error"] = 0.004
+    design = sosmith.design(tables, realization="df1")
+    (trace,) = traces_for(design.core, "sweep", seed=1, seconds=0.3)
+    error = design.run_codes(x=trace.codes[:, 0]) * 2 / 1024 - design.run_exact(x=trace.values()[:, 0])
+    assert len(error) == 300
+    assert point["error"]["max_abs"] == pytest.approx(np.abs(error).max(), rel=1e-12)
+    assert point["error"]["bound"] == design.bound
+    assert (point["cost"]["value"], point["cost"]["luts"]) == (design.cost.area, design.cost.luts)
+    assert (point["cycles_per_sample"], point["architecture"], point["passed"]) == (1, "parallel", True)
+
+
+def test_refused_combinations_say_why(found: sosmith.Exploration) -> None:
+    refused = [point for point in found.points if point["refused"] is not None]
+    assert len(refused) == 2
+    assert all("max_error" in point["refused"] for point in refused)
+    assert all(point["changes"]["output.bits"] == 9 for point in refused)
+
+
+def test_the_front_is_of_points_that_nobody_beats(found: sosmith.Exploration) -> None:
+    designs = [point for point in found.points if point["refused"] is None]
+    for one in found.front:
+        assert not any(
+            other["error"]["bound"] < one["error"]["bound"] and other["cost"]["value"] <= one["cost"]["value"]
+            for other in designs
+        )
+    best = min(point["error"]["bound"] for point in designs)
+    assert best in [point["error"]["bound"] for point in found.front]
+
+
+def test_files(found: sosmith.Exploration) -> None:
+    tree = json.loads((found.folder / "exploration.json").read_text(encoding="utf-8"))
+    assert tree == found.as_dict()
+    assert tree["front"] == found.front
+    with (found.folder / "points.csv").open(encoding="utf-8", newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert len(rows) == 8
+    assert sum(row["on_front"] == "True" for row in rows) == len(found.front)
+    assert [row["error.bound"] for row in rows if row["refused"] == ""] == [
+        str(point["error"]["bound"]) for point in found.points if point["refused"] is None
+    ]
+
+
+def test_page_leads_from_a_point_to_its_design(found: sosmith.Exploration) -> None:
+    page = (found.folder / "exploration.html").read_text(encoding="utf-8")
+    links = set(re.findall(r'href="#(design-\d+)"', page))
+    assert links == set(re.findall(r'id="(design-\d+)"', page))
+    assert len(links) == 6
+    assert not re.search(r"https?:|url\((?!#)|@import|<script", page.replace("http://www.w3.org/1999/xlink", ""))
+    assert "2 combinations have none." in page
+
+
+def test_a_second_run_evaluates_nothing(found: sosmith.Exploration, monkeypatch: pytest.MonkeyPatch) -> None:
+    def never(task: Any) -> Any:
+        raise AssertionError(task)
+
+    before = contents(found.folder)
+    monkeypatch.setattr(processes, "evaluate", never)
+    assert explored(found.folder) == found
+    assert contents(found.folder) == before
+
+
+def test_a_run_that_failed_goes_on(found: sosmith.Exploration, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What was done is kept; nothing is evaluated twice, and the files are the same."""
+    evaluated: list[str] = []
+
+    def fails_at_the_fourth(task: Any) -> Any:
+        if len(evaluated) == 3:
+            raise ToolError("the compiler must work, not fail")
+        evaluated.append(task.key)
+        return evaluate(task)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(processes, "evaluate", fails_at_the_fourth)
+        with pytest.raises(ToolError, match="the compiler must work"):
+            explored(tmp_path)
+    assert len((tmp_path / "points.jsonl").read_text(encoding="utf-8").splitlines()) == 3
+    explored(tmp_path)
+    keys = [json.loads(line)["key"] for line in (tmp_path / "points.jsonl").read_text(encoding="utf-8").splitlines()]
+    assert len(set(keys)) == len(keys) == 8
+    assert contents(tmp_path) == contents(found.folder)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"samples": 0}, "samples must be at least 1, not 0"),
+        ({"jobs": 0}, "jobs must be at least 1, not 0"),
+        ({"scheduler": "tcp://x"}, "jobs must come without a scheduler, whose workers do the designs, not with one"),
+    ],
+)
+def test_options_that_do_not_fit(options: dict[str, Any], message: str, tmp_path: Path) -> None:
+    with pytest.raises(SpecificationError, match=f"^{message}$"):
+        explored(tmp_path, **options)
+
+
+def test_a_scheduler_that_is_not_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    message = r"the package distributed is needed for --scheduler, and was not found: pip install 'sosmith\[cluster\]'"
+    with pytest.raises(ToolError, match=f"^{message}$"):
+        explored(tmp_path, jobs=None, scheduler="tcp://127.0.0.1:1")
+
+
+# processes
+
+
+@contextmanager
+def started(*command: str, folder: Path) -> Iterator[subprocess.Popen[str]]:
+    """Start a process in a group of its own, of which nothing outlives the context."""
+    running = subprocess.Popen(
+        [sys.executable, *command],
+        cwd=folder,
+        text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        start_new_session=True,
+    )
+    try:
+        yield running
+    finally:
+        with suppress(ProcessLookupError):
+            os.killpg(running.pid, signal.SIGKILL)
+        running.communicate()
+
+
+def command_line(folder: Path, *more: str) -> list[str]:
+    (folder / "spec.toml").write_text(sosmith.Specification.load(FILTER).toml(), encoding="utf-8")
+    values = [f"-p{key}={','.join(map(str, values))}" for key, values in SWEEP.items()]
+    return ["-m", "sosmith.cli", "explore", "spec.toml", *values, "--samples", "300", "-o", "out", *more]
+
+
+def lines(folder: Path) -> int:
+    path = folder / "out" / "points.jsonl"
+    return path.read_bytes().count(b"\n") if path.exists() else 0
+
+
+def wait_for_lines(folder: Path, running: subprocess.Popen[str], count: int) -> None:
+    end = time.monotonic() + 1200
+    while lines(folder) < count and running.poll() is None:
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+def test_interrupted_by_a_signal_it_goes_on(found: sosmith.Exploration, number: signal.Signals, tmp_path: Path) -> None:
+    """Two processes; whatever ends the run, no process is left and the next one ends with the same files."""
+    with started(*command_line(tmp_path, "--jobs", "2"), folder=tmp_path) as running:
+        wait_for_lines(tmp_path, running, 1)
+        os.kill(running.pid, number)
+        said, _ = running.communicate(timeout=1200)  # ends when the last process has closed its stdout
+        assert running.returncode == (130 if number == signal.SIGINT else -number), said
+        assert number != signal.SIGINT or "the same command goes on from there" in said
+    assert 1 <= lines(tmp_path) < 8
+    with started(*command_line(tmp_path, "--jobs", "2"), folder=tmp_path) as running:
+        said, _ = running.communicate(timeout=1200)
+        assert running.returncode == 0, said
+    assert lines(tmp_path) == 8
+    assert contents(tmp_path / "out") == contents(found.folder)
+
+
+@pytest.mark.slow
+def test_a_cluster_of_which_a_worker_is_killed(found: sosmith.Exploration, tmp_path: Path) -> None:
+    """A real scheduler with two worker processes, one killed in the middle: nothing lost, nothing twice."""
+    with ExitStack() as stack:
+        contact = tmp_path / "scheduler.json"
+        options = ["--scheduler-file", str(contact)]
+        scheduler = ["-m", "distributed.cli.dask_scheduler", *options, "--host", "127.0.0.1", "--port", "0"]
+        stack.enter_context(started(*scheduler, "--no-dashboard", folder=tmp_path))
+        worker = ["-m", "distributed.cli.dask_worker", *options, "--nthreads", "1", "--no-nanny", "--no-dashboard"]
+        workers = [stack.enter_context(started(*worker, folder=tmp_path)) for _ in range(2)]
+        end = time.monotonic() + 300
+        while not contact.exists():
+            assert time.monotonic() < end
+            time.sleep(0.05)
+        address = json.loads(contact.read_text(encoding="utf-8"))["address"]
+        running = stack.enter_context(started(*command_line(tmp_path, "--scheduler", address), folder=tmp_path))
+        wait_for_lines(tmp_path, running, 2)
+        os.killpg(workers[0].pid, signal.SIGKILL)
+        said, _ = running.communicate(timeout=1200)
+        assert running.returncode == 0, said
+    assert lines(tmp_path) == 8
+    assert contents(tmp_path / "out") == contents(found.folder)
