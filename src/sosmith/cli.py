@@ -63,7 +63,9 @@ _COMMANDS = {
         "Write an emulated sensor trace for SPEC as CSV; without SCENARIO, list the scenarios for SPEC.",
     ),
     "board": _Command(
-        "board", "board_command", "Run the board of SPEC behind a pseudo-terminal, whose path is the first line on stdout."
+        "board",
+        "board_command",
+        "Run the board of SPEC behind a pseudo-terminal, whose path is the first line on stdout.",
     ),
     "stream": _Command(
         "stream", "stream_command", "Send the samples of TRACE.csv to the board at PORT, and write its results."
