@@ -70,6 +70,9 @@ _COMMANDS = {
     "stream": _Command(
         "stream", "stream_command", "Send the samples of TRACE.csv to the board at PORT, and write its results."
     ),
+    "monitor": _Command(
+        "monitor", "monitor_command", "Watch the board at PORT: live values, wear, rate and flags in the terminal."
+    ),
     "compare": _Command("compare", "compare_command", "Compare accuracy reports side by side."),
     "explore": _Command(
         "explore",
@@ -101,7 +104,7 @@ _COMMANDS = {
 }
 """The commands in the order they are used; the module of each one is imported when the command is called."""
 
-_LATER = ("build", "monitor")
+_LATER = ("build", "studio")
 """Commands that are planned but not available yet."""
 
 _INTERRUPTED = 130

@@ -65,6 +65,15 @@ def test_a_port_without_a_board(tmp_path: Path) -> None:
     STREAM.refused(expected, "/dev/nothing", str(tmp_path / "ramp.csv"), kind=ToolError)
 
 
+def test_a_board_that_computes_what_it_must(tmp_path: Path) -> None:
+    made = filter_design()
+    traces = traces_for(made.core, "sweep", seed=1, seconds=0.5)
+    with Board.on(ModelLine(board_of(made))) as client:
+        evidence = simulate(made.core, traces, tmp_path / "out", hardware=partial(run_on, client))
+    assert (evidence.mismatches, evidence.samples, evidence.simulator) == (0, 500, "board")
+
+
+@pytest.mark.slow
 def test_the_accuracy_suite_over_a_port(tmp_path: Path) -> None:
     made = filter_design()
     with plugged(board_of(made)) as port:
@@ -103,3 +112,61 @@ def test_a_port_needs_no_simulator(tmp_path: Path) -> None:
         "--waves",
         kind=SpecificationError,
     )
+
+
+MONITOR = Invocation("monitor")
+
+
+@pytest.fixture
+def ramp(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Write a trace of two channels whose voltage ends at the rail, in a folder of its own."""
+    monkeypatch.chdir(tmp_path)
+    voltage = np.repeat(np.linspace(0, 4095, 100).astype(int), 2)
+    rows = [f"{n % 2},{code},512" for n, code in enumerate(voltage.tolist())]
+    (tmp_path / "ramp.csv").write_text("\n".join(["channel,voltage_code,temperature_code", *rows]) + "\n")
+    return tmp_path / "ramp.csv"
+
+
+def test_monitor_records_and_tells_alarms(ramp: Path) -> None:
+    made = instrument_design()
+    arguments = ("--trace", "ramp.csv", "--speed", "0", "-o", "out.csv", "--alarm", "input_at_rail", "--influx")
+    with plugged(model_of(made.core)) as port:
+        result = MONITOR.run(port, *arguments)
+    assert result.exit_code == 1
+    voltage = np.linspace(0, 4095, 100).astype(int)
+    codes = np.stack([voltage, np.full(100, 512)], axis=1)[:, np.newaxis].repeat(2, axis=1)
+    expected = made.core.datapath.compute(codes)
+    values = made.core.datapath.output.decode(expected)
+    assert result.stderr.splitlines() == [
+        f"sosmith: the board has the core gauge; it was not checked, as there is no {Path('build/gauge')}: see --files",
+        *(
+            f"sosmith: alarm: input_at_rail of channel {channel} at {n / 100:.3f} s, {values[n, channel]:g} mm"
+            for n in (0, 99)
+            for channel in (0, 1)
+        ),
+    ]
+    header, *lines = (ramp.parent / "out.csv").read_text().splitlines()
+    assert header == "utc,time_s,session,channel,clearance_mm,clearance_code,status"
+    assert [int(line.split(",")[5]) for line in lines] == expected.reshape(-1).tolist()
+    assert {line.split(",")[2] for line in lines} == {"1"}
+    assert len(result.stdout.splitlines()) == 200
+    assert result.stdout.startswith("gauge,channel=0 clearance=")
+
+
+def test_monitor_without_an_alarm(ramp: Path) -> None:
+    with plugged(model_of(instrument_design().core)) as port:
+        result = MONITOR.good(port, "--trace", "ramp.csv", "--speed", "0")
+    assert result.stdout == ""
+
+
+def test_monitor_checks_the_board(ramp: Path) -> None:
+    filter_design().generate(ramp.parent / "files")
+    expected = ramp.parent / "files" / "gauge.json"
+    with plugged(model_of(instrument_design().core)) as port:
+        result = MONITOR.run(port, "--trace", "ramp.csv", "--files", str(ramp.parent / "files"))
+    assert isinstance(result.exception, SpecificationError)
+    assert str(result.exception).startswith(f"{expected}: the manifest must be a file that can be read, not: ")
+
+
+def test_monitor_needs_samples() -> None:
+    MONITOR.refused("--trace must be given: the board takes its samples over the link", "/dev/ttyUSB1")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
 from pathlib import Path
 
 import click
@@ -31,19 +30,14 @@ def stream_command(port: str, trace: Path, baud: int, output: Path | None) -> No
     from sosmith.host.board import Board
     from sosmith.host.recording import recording
     from sosmith.host.rows import columns, rows
+    from sosmith.host.trace_samples import samples_for
     from sosmith.model.text_files import write_files
-    from sosmith.model.traces.trace_file import read_traces
 
     with show_progress() as step, Board(port, baud=baud) as board:
         about = board.identity
         step(f"reading {trace}")
-        rate = Fraction(about.sample_rate).limit_denominator(10**9)
-        traces = read_traces(trace, about.input_ports, rate, about.channels)
-        if len(traces) < about.channels:
-            traces = tuple(traces[0].delayed(k) for k in range(about.channels))
-        results = board.run_codes(
-            np.stack([each.codes for each in traces], axis=1), lambda done, total: step("streaming", done, total)
-        )
+        codes = samples_for(about, trace)
+        results = board.run_codes(codes, lambda done, total: step("streaming", done, total))
         faults = {name: count for name, count in board.faults.items() if count}
     lines = ((",".join(map(str, row))) for row in [columns(about), *rows(about, results)])
     if output is None:

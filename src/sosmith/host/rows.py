@@ -10,7 +10,8 @@ from sosmith.host.board import Results
 from sosmith.model.link.identity import Identity
 from sosmith.model.port import Port
 
-Row = tuple[object, ...]
+Row = tuple[float, *tuple[float, ...]]
+"""Time, channel if there are several, value, code, status."""
 
 
 def columns(identity: Identity) -> tuple[str, ...]:
