@@ -60,7 +60,7 @@ class Device:
         self._identity, self._core, self._window = identity, core, window
         self._memory = identity.memory
         self._receiver = Receiver()
-        self._next = 0
+        self._next: int | None = None  # before the first session
         self._retained: deque[Message] = deque(maxlen=window)
 
     def feed(self, data: bytes) -> bytes:
@@ -75,6 +75,9 @@ class Device:
             self._next = found.sequence
             self._retained.clear()
             self._core.reset()
+        if self._next is None:
+            self._count(Counter.SEQUENCE)
+            return b""
         age = (self._next - found.sequence) % SEQUENCES
         if 0 < age <= len(self._retained):
             self._count(Counter.REPEATED)

@@ -90,6 +90,12 @@ def test_a_request_that_comes_again_is_answered_again_with_all_later_ones() -> N
     assert board.counters[Counter.SEQUENCE] == 2
 
 
+def test_before_the_first_session_there_is_no_answer() -> None:
+    board = device(filter_design())
+    assert ask(board, Message(Type.COUNTERS, 0), Message(Type.SAMPLES, 255)) == []
+    assert board.counters[Counter.SEQUENCE] == 2
+
+
 def test_a_session_may_begin_with_any_number() -> None:
     responses = ask(device(filter_design()), Message(Type.OPEN, 77), Message(Type.COUNTERS, 78))
     assert [response.sequence for response in responses] == [77, 78]
