@@ -4,7 +4,7 @@ Synthesizes, places and routes a fixed set of designs, which takes several hours
 figures in benchmarks/cost.json after each design; document and plot are generated from that record. It can be
 stopped at any time: figures are kept while SystemVerilog and tools are unchanged. Designs with goals come first.
 `--document` only regenerates document and plot. `--check` only synthesizes recorded designs that have changed, writes
-nothing, and fails if a core has grown. Needs the packages of the extra "cost".
+nothing, and fails if a core has grown. Needs the packages of the extra "boards".
 """
 
 from __future__ import annotations

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from sosmith.model.errors import SpecificationError
 from sosmith.model.suggestion import did_you_mean
+
+RATE = 1_000_000
+"""Rate of a board's serial line without another wish, in baud."""
 
 _LUTS = {"SB_LUT4": 1, "LUT4": 1, "CCU2C": 2, "TRELLIS_DPR16X4": 4}
 """Number of LUT4 that a cell uses."""
@@ -18,7 +22,7 @@ class Device:
     Attributes
     ----------
     family : str
-        ``"ice40"`` or ``"ecp5"``: the name of the cell library.
+        ``"ice40"``, ``"ecp5"`` or ``"gowin"``: the name of the cell library.
     title : str
         Name for display.
     synthesis : str
@@ -32,7 +36,7 @@ class Device:
     multipliers : int
         Number of multiplier blocks.
     block_ram : str
-        Cell type of the block RAM: SB_RAM40_4K holds 4,096 bits, DP16KD 18,432.
+        Cell type of the block RAM: SB_RAM40_4K holds 4,096 bits, DP16KD 18,432, SDPB 16,384.
     block_rams : int
         Number of block RAMs.
     """
@@ -88,6 +92,10 @@ class Board:
         Names in nextpnr; iCE40 devices have no speed grade.
     clock : int
         Frequency of the oscillator at a clock pin, in Hz.
+    platform : str or None
+        Class that knows its pins, as ``module:name``; None for a board that no bitstream is made for.
+    loader : str or None
+        Its name in openFPGALoader.
     """
 
     name: str
@@ -96,6 +104,8 @@ class Board:
     package: str
     speed: str
     clock: int
+    platform: str | None = None
+    loader: str | None = None
 
 
 # Numbers of cells are those that nextpnr 0.11.1 reports for an empty design.
@@ -133,23 +143,88 @@ _ECP5_25 = Device(
     block_ram="DP16KD",
     block_rams=56,
 )
+_ECP5_12 = replace(_ECP5_25, title="ECP5 LFE5U-12F", placer="--12k")  # the same die
 _ECP5_45 = replace(_ECP5_25, title="ECP5 LFE5U-45F", placer="--45k", logic_cells=43848, multipliers=72, block_rams=108)
 _ECP5_85 = replace(_ECP5_25, title="ECP5 LFE5U-85F", placer="--85k", logic_cells=83640, multipliers=156, block_rams=208)
 _ECP5_85_5G = replace(_ECP5_85, title="ECP5 LFE5UM5G-85F", placer="--um5g-85k")
 
-_ULX3S = Board(name="ulx3s_25f", title="ULX3S 25F", device=_ECP5_25, package="CABGA381", speed="6", clock=25_000_000)
+# Placers do not know how long a Gowin multiplier takes, so none is used.
+_GW1NR_9C = Device(
+    family="gowin",
+    title="GW1NR-9C",
+    synthesis="synth_gowin -nodsp",
+    placer="GW1NR-LV9QN88PC6/I5",
+    logic_cells=8640,
+    multiplier=None,
+    multipliers=0,
+    block_ram="SDPB",
+    block_rams=26,
+)
+_GW2AR_18C = replace(
+    _GW1NR_9C,
+    title="GW2AR-18C",
+    synthesis="synth_gowin -nodsp -family gw2a",
+    placer="GW2AR-LV18QN88C8/I7",
+    logic_cells=20736,
+    block_rams=46,
+)
+
+_ULX3S = Board(
+    name="ulx3s_25f",
+    title="ULX3S 25F",
+    device=_ECP5_25,
+    package="CABGA381",
+    speed="6",
+    clock=25_000_000,
+    platform="amaranth_boards.ulx3s:ULX3S_25F_Platform",
+    loader="ulx3s",
+)
+
+
+def _ulx3s(size: str, device: Device) -> Board:
+    platform = f"amaranth_boards.ulx3s:ULX3S_{size.upper()}_Platform"
+    return replace(_ULX3S, name=f"ulx3s_{size}", title=f"ULX3S {size.upper()}", device=device, platform=platform)
+
 
 # FPGA, package, speed grade and clock are from amaranth-boards 0.0.21; those of the Colorlight i5, 7.0, from its pinout
 # in wuxx/Colorlight-FPGA-Projects. On an UPduino 3, a solder jumper connects the oscillator to its pin.
 _ALL = (
-    Board(name="icebreaker", title="iCEBreaker", device=_UP5K, package="sg48", speed="", clock=12_000_000),
+    Board(
+        name="icebreaker",
+        title="iCEBreaker",
+        device=_UP5K,
+        package="sg48",
+        speed="",
+        clock=12_000_000,
+        platform="amaranth_boards.icebreaker:ICEBreakerPlatform",
+        loader="ice40_generic",
+    ),
     Board(name="upduino", title="UPduino 3", device=_UP5K, package="sg48", speed="", clock=12_000_000),
-    Board(name="ice40_hx8k_b_evn", title="iCE40-HX8K-B-EVN", device=_HX8K, package="ct256", speed="", clock=12_000_000),
-    Board(name="icestick", title="iCEstick", device=_HX1K, package="tq144", speed="", clock=12_000_000),
+    Board(
+        name="ice40_hx8k_b_evn",
+        title="iCE40-HX8K-B-EVN",
+        device=_HX8K,
+        package="ct256",
+        speed="",
+        clock=12_000_000,
+        platform="amaranth_boards.ice40_hx8k_b_evn:ICE40HX8KBEVNPlatform",
+        loader="ice40_generic",
+    ),
+    Board(
+        name="icestick",
+        title="iCEstick",
+        device=_HX1K,
+        package="tq144",
+        speed="",
+        clock=12_000_000,
+        platform="amaranth_boards.icestick:ICEStickPlatform",
+        loader="ice40_generic",
+    ),
+    _ulx3s("12f", _ECP5_12),
     _ULX3S,
-    replace(_ULX3S, name="ulx3s_45f", title="ULX3S 45F", device=_ECP5_45),
-    replace(_ULX3S, name="ulx3s_85f", title="ULX3S 85F", device=_ECP5_85),
-    replace(_ULX3S, name="colorlight_i5", title="Colorlight i5"),
+    _ulx3s("45f", _ECP5_45),
+    _ulx3s("85f", _ECP5_85),
+    replace(_ULX3S, name="colorlight_i5", title="Colorlight i5", platform=None, loader=None),
     Board(
         name="orangecrab_25f",
         title="OrangeCrab 25F",
@@ -166,21 +241,45 @@ _ALL = (
         speed="8",
         clock=12_000_000,
     ),
+    Board(
+        name="tang_nano_9k",
+        title="Tang Nano 9K",
+        device=_GW1NR_9C,
+        package="",
+        speed="",
+        clock=27_000_000,
+        platform="amaranth_boards.tang_nano_9k:TangNano9kPlatform",
+        loader="tangnano9k",
+    ),
+    Board(
+        name="tang_nano_20k",
+        title="Tang Nano 20K",
+        device=_GW2AR_18C,
+        package="",
+        speed="",
+        clock=27_000_000,
+        platform="sosmith.gen.fpga.tang_nano_20k:TangNano20kPlatform",
+        loader="tangnano20k",
+    ),
 )
 
 BOARDS = {board.name: board for board in _ALL}
 """Boards by name."""
 
+BUILDABLE = tuple(name for name, board in BOARDS.items() if board.platform is not None)
+"""Names of the boards that bitstreams are made for."""
 
-def find_board(name: str) -> Board:
-    """Return the board `name`.
+
+def find_board(name: str, among: Iterable[str] = BOARDS) -> Board:
+    """Return the board `name`, which may be written with hyphens and capitals.
 
     Raises
     ------
     SpecificationError
-        If there is no such board; lists the available ones.
+        If it is not `among` these; lists them.
     """
-    if name not in BOARDS:
-        hint = did_you_mean(name, BOARDS)
-        raise SpecificationError(f"the board must be one of {', '.join(BOARDS)}, not {name}{hint}")
-    return BOARDS[name]
+    known = tuple(among)
+    plain = name.lower().replace("-", "_")
+    if plain not in known:
+        raise SpecificationError(f"the board must be one of {', '.join(known)}, not {name}{did_you_mean(plain, known)}")
+    return BOARDS[plain]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from fractions import Fraction
 
 from sosmith.gen.core import CoreDesign
+from sosmith.gen.fpga.boards import RATE
 from sosmith.gen.output.identity import identity
 from sosmith.gen.output.verilog import to_rtlil, to_verilog
 from sosmith.hdl.boards.board_top import BoardTop
@@ -12,16 +13,13 @@ from sosmith.hdl.bus.command_engine import MAX_CHANNELS, MAX_SAMPLE_BYTES
 from sosmith.hdl.bus.uart import MIN_CLOCKS
 from sosmith.model.errors import SpecificationError
 
-RATE = 1_000_000
-"""Line rate of a board that was built without another wish, in baud."""
-
 
 def top_name(design: CoreDesign) -> str:
     """Name of the top module of a design's board."""
     return f"{design.datapath.name}_board"
 
 
-def board_top(design: CoreDesign, *, clock: Fraction, rate: int = RATE, verilog: str | None = None) -> BoardTop:
+def board_top(design: CoreDesign, *, clock: Fraction, rate: int = RATE, core: str | None = None) -> BoardTop:
     """Return the top of a board that has the core of a design.
 
     Parameters
@@ -32,7 +30,7 @@ def board_top(design: CoreDesign, *, clock: Fraction, rate: int = RATE, verilog:
         Clock of the board in Hz.
     rate : int
         Line rate in baud.
-    verilog : str or None
+    core : str or None
         The core's SystemVerilog, whose digest the identity has; None to make it.
 
     Raises
@@ -53,14 +51,14 @@ def board_top(design: CoreDesign, *, clock: Fraction, rate: int = RATE, verilog:
     sample_bytes = sum(port.bytes for port in design.datapath.inputs)
     if sample_bytes > MAX_SAMPLE_BYTES:
         raise SpecificationError(f"a sample must have at most {MAX_SAMPLE_BYTES} bytes over a link, not {sample_bytes}")
-    text = verilog or to_verilog(to_rtlil(design.architecture.component(), design.datapath.name))
+    text = core or to_verilog(to_rtlil(design.architecture.component(), design.datapath.name))
     memory = identity(design, text, baud=rate, clock=float(clock)).memory
     return BoardTop(design.architecture.component(), memory, ratio=clock / rate, channels=design.spec.channels)
 
 
-def board_verilog(design: CoreDesign, *, clock: Fraction, rate: int = RATE) -> str:
+def board_verilog(design: CoreDesign, *, clock: Fraction, rate: int = RATE, core: str | None = None) -> str:
     """Return the SystemVerilog of a design's board, with the top module `top_name`.
 
     Parameters and errors are those of `board_top`.
     """
-    return to_verilog(to_rtlil(board_top(design, clock=clock, rate=rate), top_name(design)))
+    return to_verilog(to_rtlil(board_top(design, clock=clock, rate=rate, core=core), top_name(design)))

@@ -44,8 +44,8 @@ class BoardTop(wiring.Component):
     clk : In(1)
         Clock, rising edge.
     rst : In(1)
-        Reset of all but the counters of faults, synchronous, active high. It may be tied to 0: registers have initial
-        values.
+        Reset of the core, synchronous, active high. It may be tied to 0: registers have initial values, and the first
+        request resets the core.
     rx : In(1)
         Line from the host, 8N1; asynchronous.
     tx : Out(1)

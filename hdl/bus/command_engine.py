@@ -34,7 +34,7 @@ from amaranth.lib.wiring import In, Out
 
 from sosmith.hdl.axi_lite import BITS, slave_members
 from sosmith.hdl.bus.checked_bytes import CheckedBytes
-from sosmith.hdl.bus.frame_receiver import LENGTH_ADDRESS
+from sosmith.hdl.bus.frame_receiver import BLOCK_RAM, LENGTH_ADDRESS
 from sosmith.model.dataflow.status import STATUS_BITS
 from sosmith.model.link.protocol import (
     BLOCK_BYTES,
@@ -183,7 +183,7 @@ class CommandEngine(wiring.Component):
         """Build the state machine."""
         m = Module()
         m.submodules.bytes = unit = CheckedBytes()
-        m.submodules.identity = rom = Memory(shape=8, depth=len(self.memory), init=self.memory)
+        m.submodules.identity = rom = Memory(shape=8, depth=len(self.memory), init=self.memory, attrs=BLOCK_RAM)
         machine = _Machine(m, self, unit, rom.read_port())
         # Every state waits until the last byte is through.
         with m.If(~unit.o_busy), m.FSM(name="engine"):

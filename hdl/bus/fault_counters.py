@@ -18,6 +18,7 @@ from amaranth.lib import wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
+from sosmith.hdl.bus.frame_receiver import BLOCK_RAM
 from sosmith.model.link.protocol import Counter
 
 COUNT = len(Counter)
@@ -44,7 +45,7 @@ class FaultCounters(wiring.Component):
     def elaborate(self, platform: object) -> Module:
         """Build the memory and its updater."""
         m = Module()
-        m.submodules.counts = counts = Memory(shape=8, depth=COUNT, init=[])
+        m.submodules.counts = counts = Memory(shape=8, depth=COUNT, init=[], attrs=BLOCK_RAM)
         store, fetch = counts.write_port(), counts.read_port()
         pending, writes = Signal(COUNT), Signal()
         chosen: Value = Const(0, range(COUNT))

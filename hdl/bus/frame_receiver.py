@@ -26,6 +26,9 @@ from amaranth.lib.wiring import In, Out
 
 from sosmith.model.link.protocol import MAX_MESSAGE, MIN_MESSAGE
 
+BLOCK_RAM = {"ram_style": "block", "no_rw_check": 1}
+"""Attributes of the link's memories: no word is used that is read at the clock at which it is written."""
+
 LENGTH_ADDRESS = 255
 """Where the length of a message lies in its buffer, behind any message."""
 
@@ -71,7 +74,7 @@ class FrameReceiver(wiring.Component):
     def elaborate(self, platform: object) -> Module:
         """Build the decoder and the buffers."""
         m = Module()
-        m.submodules.buffers = buffers = Memory(shape=8, depth=512, init=[])
+        m.submodules.buffers = buffers = Memory(shape=8, depth=512, init=[], attrs=BLOCK_RAM)
         store, fetch = buffers.write_port(), buffers.read_port()
         left, index = Signal(8), Signal(8)
         begun, dropped, too_long = Signal(), Signal(), Signal()

@@ -23,6 +23,8 @@ from amaranth.lib import wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
+from sosmith.hdl.bus.frame_receiver import BLOCK_RAM
+
 
 class FrameSender(wiring.Component):
     """Encodes messages into two buffers, and sends each once when it is complete, and again when asked to.
@@ -79,7 +81,7 @@ class FrameSender(wiring.Component):
     def elaborate(self, platform: object) -> Module:
         """Build the encoder, the buffers and the reader."""
         m = Module()
-        m.submodules.buffers = buffers = Memory(shape=8, depth=512, init=[])
+        m.submodules.buffers = buffers = Memory(shape=8, depth=512, init=[], attrs=BLOCK_RAM)
         store, fetch = buffers.write_port(), buffers.read_port()
         slot, code, index = Signal(), Signal(8), Signal(8)
         zero = self.i_code | (self.i_write & (self.i_data == 0))
@@ -103,7 +105,7 @@ class FrameSender(wiring.Component):
             self.o_valid.eq(there),
             sent.eq(goes & (self.o_byte == 0) & (place != 0)),
         ]
-        m.d.sync += there.eq((self.o_unsent != 0) & ~goes & ~sent)
+        m.d.sync += there.eq((self.o_unsent != 0) & ~goes)
         with m.If(goes):
             m.d.sync += place.eq(Mux(sent, 0, place + 1))
         with m.If(sent):

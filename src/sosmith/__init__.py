@@ -16,6 +16,7 @@ from sosmith.gen.version import __version__
 if TYPE_CHECKING:
     from sosmith.host.board import Board, Results
     from sosmith.host.loading import Loaded
+    from sosmith.interface.build import Build
     from sosmith.interface.calibration import Calibration
     from sosmith.interface.certificate import Certificate, Proof
     from sosmith.interface.comparison import Comparison, compare
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Board",
+    "Build",
     "Calibration",
     "Certificate",
     "Coefficient",
@@ -67,6 +69,7 @@ __all__ = [
 _MODULES = {
     "host.board": ("Board", "Results"),
     "host.loading": ("Loaded",),
+    "interface.build": ("Build",),
     "interface.calibration": ("Calibration",),
     "interface.certificate": ("Certificate", "Proof"),
     "interface.comparison": ("Comparison", "compare"),

@@ -54,6 +54,7 @@ _COMMANDS = {
         "reload_command",
         "Prove that a running core can load new coefficients, and save the register writes.",
     ),
+    "build": _Command("build", "build_command", "Build a bitstream with the core of SPEC for a board."),
     "simulate": _Command(
         "simulate", "simulate_command", "Simulate the generated hardware of SPEC and report its accuracy."
     ),
@@ -104,7 +105,7 @@ _COMMANDS = {
 }
 """The commands in the order they are used; the module of each one is imported when the command is called."""
 
-_LATER = ("build", "studio")
+_LATER = ("studio",)
 """Commands that are planned but not available yet."""
 
 _INTERRUPTED = 130

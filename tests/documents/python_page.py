@@ -26,6 +26,7 @@ ORDER = (
     "Certificate",
     "Proof",
     "Report",
+    "Build",
     "compare",
     "Board",
     "Results",

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.filter.response import complex_response
-from sosmith.gen.fpga.boards import find_board
+from sosmith.gen.fpga.boards import BUILDABLE, RATE, find_board
 from sosmith.gen.output.certificate import about, certificate
 from sosmith.gen.output.core_facts import CoreFacts, core_facts
 from sosmith.gen.output.generate import generate
@@ -33,6 +33,7 @@ from sosmith.model.reference.golden import calibrated, filtered
 
 if TYPE_CHECKING:
     from sosmith.host.board import Board
+    from sosmith.interface.build import Build
     from sosmith.interface.report import Report
 
 Floats = npt.NDArray[np.float64]
@@ -325,6 +326,49 @@ class Design:
             If Yosys fails, or the disk is full.
         """
         return package(self.core, Path(fspath(folder)), lambda step: progress(step, 0, 0))
+
+    def build(
+        self,
+        board: str,
+        *,
+        folder: str | PathLike[str] | None = None,
+        rate: int = RATE,
+        progress: Progress = lambda step, done, total: None,
+    ) -> Build:
+        """Make a bitstream for a board, with the core behind the serial link; takes some tens of seconds.
+
+        Parameters
+        ----------
+        board : str
+            Name of the board.
+        folder : path
+            Folder for the files, ``build/<name>`` by default.
+        rate : int
+            Rate of the serial line in baud, at most a fourth of the board's clock.
+        progress : callable
+            Called with the name of each step, 0 and 0.
+
+        Returns
+        -------
+        Build
+            Utilisation and timing; bitstream, log and ``build.json`` are in `folder`.
+
+        Raises
+        ------
+        SpecificationError
+            If there is no such board, the line rate is too high, or the folder cannot be written.
+        ShortfallError
+            If the design does not fit the FPGA.
+        ToolError
+            If a tool is missing or fails, or the disk is full.
+        """
+        from sosmith.gen.output.board_build import build_board
+        from sosmith.interface.build import Build
+
+        target = find_board(board, BUILDABLE)
+        place = Path("build") / self.core.spec.name if folder is None else Path(fspath(folder))
+        made = build_board(self.core, target, rate=rate, progress=lambda step: progress(step, 0, 0))
+        return Build.written(made, place)
 
     def simulate(
         self,

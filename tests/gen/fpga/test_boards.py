@@ -11,13 +11,23 @@ from sosmith.model.errors import SpecificationError
 def test_boards_are_found_by_name() -> None:
     assert all(find_board(name).name == name for name in BOARDS)
     families = {board.device.family for board in BOARDS.values()}
-    assert families == {"ice40", "ecp5"}
+    assert families == {"ice40", "ecp5", "gowin"}
+
+
+def test_hyphens_and_capitals_do_not_matter() -> None:
+    assert find_board("Tang-Nano-9K") is BOARDS["tang_nano_9k"]
+    assert find_board("ulx3s-85f") is BOARDS["ulx3s_85f"]
+
+
+def test_a_name_that_is_nearly_right_is_suggested() -> None:
+    with pytest.raises(SpecificationError, match=r", not icebraker \(did you mean icebreaker\?\)$"):
+        find_board("icebraker")
 
 
 def test_an_unknown_board_is_refused_with_those_that_exist() -> None:
     message = (
-        "the board must be one of icebreaker, upduino, ice40_hx8k_b_evn, icestick, ulx3s_25f, ulx3s_45f, ulx3s_85f, "
-        "colorlight_i5, orangecrab_25f, ecp5_evn, not arty"
+        "the board must be one of icebreaker, upduino, ice40_hx8k_b_evn, icestick, ulx3s_12f, ulx3s_25f, ulx3s_45f, "
+        "ulx3s_85f, colorlight_i5, orangecrab_25f, ecp5_evn, tang_nano_9k, tang_nano_20k, not arty"
     )
     with pytest.raises(SpecificationError, match=f"^{re.escape(message)}$"):
         find_board("arty")

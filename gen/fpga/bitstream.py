@@ -1,0 +1,220 @@
+"""Makes a bitstream from the top of a board: synthesis, placement, timing, packing."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from amaranth.build.run import BuildPlan
+
+from sosmith.gen.fpga.boards import Board
+from sosmith.gen.fpga.tools import EXTRA, Tool, find_tool
+from sosmith.hdl.boards.on_platform import OnPlatform
+from sosmith.model.errors import ShortfallError, ToolError
+
+SEED = 1
+"""Seed of the placer: the same input gives the same bitstream."""
+
+_SUFFIX = {"ice40": "bin", "ecp5": "bit", "gowin": "fs"}
+"""Suffix of a bitstream's file, by family."""
+
+_STEPS = {"yosys": "synthesis", "icepack": "packing", "ecppack": "packing", "gowin_pack": "packing"}
+_LOG = "build.log"
+_LOG_TAIL = 12  # lines of a program's output shown in an error
+_ERROR = re.compile(r"^ERROR: (.*)$", re.MULTILINE)
+_USED = re.compile(r"^Info:\s+(\w+):\s+(\d+)/\s*(\d+)\s+\d+%$", re.MULTILINE)
+
+
+@dataclass(frozen=True)
+class Clock:
+    """A clock: its name, the highest frequency that the placed design takes, and the one it has, in MHz."""
+
+    name: str
+    achieved: float
+    wanted: float
+
+    @property
+    def met(self) -> bool:
+        """Whether timing closes."""
+        return self.achieved >= self.wanted
+
+
+@dataclass(frozen=True)
+class Step:
+    """A step of a path: a wire or what a cell does, in ns, and where it ends."""
+
+    kind: str
+    delay: float
+    end: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bitstream:
+    """A design in an FPGA.
+
+    Attributes
+    ----------
+    board : Board
+        The board.
+    name : str
+        Name of the design.
+    content : bytes
+        The bitstream, whether or not timing closes.
+    used : dict of str to tuple of int
+        Number of cells that are used, and that there are, by their kind in the placer.
+    clocks : tuple of Clock
+        All clocks.
+    path : tuple of Step
+        The slowest path between two registers.
+    versions : dict of str to str
+        Version of each program.
+    log : str
+        All that the programs said.
+    """
+
+    board: Board
+    name: str
+    content: bytes
+    used: dict[str, tuple[int, int]]
+    clocks: tuple[Clock, ...]
+    path: tuple[Step, ...]
+    versions: dict[str, str]
+    log: str
+
+    @property
+    def file(self) -> str:
+        """Name of the bitstream's file."""
+        return f"{self.name}.{_SUFFIX[self.board.device.family]}"
+
+    @property
+    def met(self) -> bool:
+        """Whether timing closes."""
+        return all(clock.met for clock in self.clocks)
+
+    @property
+    def slowest(self) -> Clock:
+        """The clock with the least margin."""
+        return min(self.clocks, key=lambda clock: clock.achieved / clock.wanted)
+
+
+def build(verilog: str, top: str, board: Board, progress: Callable[[str], None] = lambda step: None) -> Bitstream:
+    """Make a bitstream; takes some tens of seconds, and a minute more on the very first call.
+
+    Two calls with the same programs give the same bytes.
+
+    Parameters
+    ----------
+    verilog : str
+        SystemVerilog of what goes into the FPGA.
+    top : str
+        Its top module, with the ports of `sosmith.hdl.boards.board_top.BoardTop`, for the board's clock.
+    board : Board
+        The board.
+    progress : callable
+        Called with the name of each step.
+
+    Raises
+    ------
+    ToolError
+        If a program is missing or fails.
+    ShortfallError
+        If the design has more cells than the FPGA, or cannot be placed for another reason.
+    """
+    name = f"{top}_{board.name}"
+    plan = _plan(verilog, top, name, board)
+    commands = [_translated(command) for command in json.loads(_text(plan, f"build_{name}.json"))["commands"]]
+    tools = {command[0]: find_tool(command[0]) for command in commands}
+    with TemporaryDirectory(prefix="sosmith-") as scratch:
+        place = Path(scratch)
+        for file in plan.files:
+            (place / file).write_bytes(_text(plan, file).encode())
+        for command in commands:
+            progress(_STEPS.get(command[0], "placement and routing"))
+            _carry_out(tools[command[0]], command[1:], place, board)
+        report = json.loads((place / "report.json").read_text(encoding="utf-8"))
+        made = place / f"{name}.{_SUFFIX[board.device.family]}"
+        clocks = tuple(
+            Clock(clock, round(found["achieved"], 2), round(found["constraint"], 2))
+            for clock, found in sorted(report["fmax"].items())
+        )
+        return Bitstream(
+            board=board,
+            name=name,
+            content=made.read_bytes(),
+            used={
+                kind: (cells["used"], cells["available"])
+                for kind, cells in sorted(report["utilization"].items())
+                if cells["available"]
+            },
+            clocks=clocks,
+            path=_slowest_path(report),
+            versions={tool.name: tool.version for tool in tools.values()},
+            log=_read(place / _LOG),
+        )
+
+
+def _plan(verilog: str, top: str, name: str, board: Board) -> BuildPlan:
+    """Files and commands for a board, from its Amaranth platform."""
+    assert board.platform is not None
+    module, _, kind = board.platform.partition(":")
+    try:
+        platform = getattr(import_module(module), kind)()
+    except ModuleNotFoundError:
+        raise ToolError(
+            f"amaranth-boards is needed to build for a board, and was not found: pip install 'sosmith[{EXTRA}]'"
+        ) from None
+    _, _, options = board.device.synthesis.partition(" ")
+    wishes = f"--seed {SEED} --freq {board.clock / 1e6:g} --timing-allow-fail --report report.json"
+    platform.add_file(f"{top}.sv", verilog)
+    return platform.prepare(OnPlatform(top), name, emit_src=False, synth_opts=options, nextpnr_opts=wishes)
+
+
+def _text(plan: BuildPlan, file: str) -> str:
+    content = plan.files[file]
+    return content if isinstance(content, str) else content.decode()
+
+
+def _translated(command: Sequence[str]) -> list[str]:
+    """Return a command of Amaranth for the programs that there are: nextpnr-gowin has become a part of another one."""
+    words = [word for word in command if word not in {"-q", "--quiet"}]
+    if words[0] != "nextpnr-gowin":
+        return words
+    options = {"--family": "family", "--cst": "cst"}
+    made = ["nextpnr-himbaechel-gowin"]
+    rest = iter(words[1:])
+    for word in rest:
+        made += ["--vopt", f"{options[word]}={next(rest)}"] if word in options else [word]
+    return made
+
+
+def _carry_out(tool: Tool, arguments: Sequence[str], folder: Path, board: Board) -> None:
+    """Run a program in `folder`; its output goes to the log there."""
+    log = folder / _LOG
+    if tool.run(arguments, folder, log) == 0:
+        return
+    said = _read(log).rpartition(f"$ {tool.name} ")[2]
+    if tool.name.startswith("nextpnr") and (errors := _ERROR.findall(said)):
+        cells = [(kind, int(used), int(there)) for kind, used, there in _USED.findall(said)]
+        excess = [f"{used:,} {kind} of {there:,}" for kind, used, there in cells if used > there]
+        raise ShortfallError(f"the design must fit the {board.title}, but: {', '.join(excess) or errors[0]}")
+    tail = "\n".join(said.splitlines()[-_LOG_TAIL:])
+    raise ToolError(f"{tool.name} {tool.version} failed:\n{tail}")
+
+
+def _slowest_path(report: dict[str, Any]) -> tuple[Step, ...]:
+    """Return the path between registers with the longest delay."""
+    inside = [found["path"] for found in report["critical_paths"] if "<async>" not in found["from"] + found["to"]]
+    if not inside:
+        return ()
+    longest = max(inside, key=lambda path: sum(step["delay"] for step in path))
+    return tuple(Step(step["type"], round(step["delay"], 3), step["to"]["cell"]) for step in longest)
+
+
+def _read(path: Path) -> str:
+    return path.read_text(encoding="utf-8", errors="replace")

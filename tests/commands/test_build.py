@@ -1,0 +1,102 @@
+"""`sosmith build`: what it prints, and its exit status; the programs are stubs here."""
+
+import json
+from pathlib import Path
+
+import pytest
+from tests.commands.invocation import Invocation
+from tests.gen.fpga.test_bitstream import REPORT, Stub
+
+from sosmith.gen.fpga import bitstream
+from sosmith.gen.fpga.boards import BUILDABLE
+from sosmith.model.errors import ShortfallError
+
+BUILD = Invocation("build")
+SPEC = """\
+name = "plain"
+sample_rate = {rate}
+[input.x]
+bits = 8
+signed = true
+range = [-1.0, 1.0]
+[filter]
+family = "butterworth"
+kind = "lowpass"
+order = 1
+cutoff = 100.0
+[output]
+bits = 8
+signed = true
+range = [-1.0, 1.0]
+[hardware]
+realization = "df1"
+clock = 1.0e9
+architecture = "serial"
+"""
+
+
+@pytest.fixture
+def programs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, str]:
+    """Go to an empty folder with a specification; programs are stubs, and fail with the words that are put in here."""
+    fails: dict[str, str] = {}
+    monkeypatch.chdir(tmp_path)
+    Path("plain.toml").write_text(SPEC.format(rate=1000.0), encoding="utf-8")
+    monkeypatch.setattr(bitstream, "find_tool", lambda name: Stub(name, [], REPORT, fails.get(name)))
+    return fails
+
+
+def test_a_build_prints_cells_and_timing_and_writes_its_files(programs: dict[str, str]) -> None:
+    result = BUILD.good("plain.toml", "--board", "iCEstick")
+    assert "plain on iCEstick" in result.stdout
+    assert "7 of 1,280, 1 %" in result.stdout
+    assert "closes: 70.12 MHz, of which 12.00 MHz are needed" in result.stdout
+    assert "sosmith: bitstream: build/plain/plain_board_icestick.bin\n" in result.stderr
+    assert {path.name for path in Path("build/plain").iterdir()} >= {
+        "build.json",
+        "build.log",
+        "plain.sv",
+        "plain.json",
+        "plain.certificate.json",
+        "plain_board.sv",
+        "plain_board_icestick.bin",
+    }
+    told = BUILD.good("plain.toml", "--board", "icestick", "--json", "-o", "other")
+    assert json.loads(told.stdout) == json.loads(Path("other/build.json").read_text(encoding="utf-8"))
+    assert json.loads(told.stdout)["passed"] is True
+
+
+def test_a_core_that_is_too_slow_at_the_clock_of_the_board_is_noted(programs: dict[str, str]) -> None:
+    Path("fast.toml").write_text(SPEC.format(rate=1e6), encoding="utf-8")
+    result = BUILD.good("fast.toml", "--board", "icestick")
+    assert "sosmith: note: at the board's clock the core takes " in result.stderr
+    assert "samples a second per channel, not 1,000,000\n" in result.stderr
+
+
+def test_timing_that_does_not_close_is_told_with_its_path(
+    monkeypatch: pytest.MonkeyPatch, programs: dict[str, str]
+) -> None:
+    monkeypatch.setitem(REPORT, "fmax", {"board.clk": {"achieved": 11.5, "constraint": 12.0}})
+    result = BUILD.run("plain.toml", "--board", "icestick")
+    assert result.exit_code == 1
+    assert "does not close: 11.50 MHz, of which 12.00 MHz are needed" in result.stdout
+    assert result.stderr.endswith(
+        "sosmith: error: plain must run at 12.00 MHz on iCEstick, not 11.50 MHz: the path takes 1.75 ns: "
+        "clk-to-q 1.50 ns to a, setup 0.25 ns to b\n"
+    )
+
+
+def test_a_design_that_does_not_fit_is_told_with_what_it_lacks(programs: dict[str, str]) -> None:
+    programs["nextpnr-ice40"] = "Info:   ICESTORM_LC:  1400/ 1280  109%\nERROR: no place left\n"
+    message = "the design must fit the iCEstick, but: 1,400 ICESTORM_LC of 1,280"
+    BUILD.refused(message, "plain.toml", "--board", "icestick", kind=ShortfallError)
+
+
+def test_what_is_no_board_for_a_bitstream_is_refused(programs: dict[str, str]) -> None:
+    known = ", ".join(BUILDABLE)
+    for name, hint in (("icebraker", " (did you mean icebreaker?)"), ("upduino", "")):
+        BUILD.refused(f"the board must be one of {known}, not {name}{hint}", "plain.toml", "--board", name)
+
+
+def test_a_line_rate_above_a_fourth_of_the_clock_is_refused(programs: dict[str, str]) -> None:
+    message = "the line rate must be at most 3,000,000 baud at a clock of 12,000,000 Hz, not 3,000,001"
+    BUILD.refused(message, "plain.toml", "--board", "icestick", "--baud", "3000001")
