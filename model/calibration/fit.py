@@ -71,12 +71,15 @@ class Measurements:
         Temperature at the sensor in degC.
     source : str
         Origin of the measurements, for messages.
+    days : tuple of int
+        Proleptic ordinal of the day of each measurement; empty if unknown.
     """
 
     clearance: Values
     voltage: Values
     temperature: Values
     source: str = "measurements"
+    days: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("clearance", "voltage", "temperature"):
@@ -85,6 +88,8 @@ class Measurements:
                 raise ValueError(f"{name} must be of shape ({len(self.clearance)},), not {values.shape}")
             if not np.all(np.isfinite(values)):
                 raise ValueError(f"{name} must be finite, not {values[~np.isfinite(values)][0]}")
+        if len(self.days) not in (0, len(self.clearance)):
+            raise ValueError(f"days must be of length {len(self.clearance)}, not {len(self.days)}")
 
     def __len__(self) -> int:
         """Return the number of measurements."""
@@ -140,7 +145,7 @@ class Fit:
     covered : tuple of (float, float)
         Lowest and highest voltage in V and temperature in degC of the measurements.
     weights : tuple of float
-        Weight of each measurement, in (0, 1]; empty if the fit is not robust.
+        Weight of each measurement, from 0 (left out) to 1; empty if all are equal.
     """
 
     polynomial: Polynomial
@@ -221,7 +226,7 @@ def fit(
         If there are fewer measurements than the linear polynomial needs; if a quantity does not vary, or voltage and
         temperature vary only together; if no polynomial up to `MAX_ORDER` reaches `required_r`.
     """
-    _check_variation(measurements)
+    check_variation(measurements)
     count = len(measurements)
     rejected: list[Trial] = []
     minimize = _huber(measurements) if robust else _least_squares(measurements)
@@ -315,7 +320,8 @@ def terms_of(orders: tuple[int, int]) -> tuple[Term, ...]:
     return tuple((i, j) for i in range(m + 1) for j in range(n + 1) if i + j <= max(m, n))
 
 
-def _check_variation(measurements: Measurements) -> None:
+def check_variation(measurements: Measurements) -> None:
+    """Refuse measurements that are too few or do not vary; raises `SpecificationError`."""
     fewest = len(terms_of((1, 1))) + 1
     if len(measurements) < fewest:
         raise SpecificationError(

@@ -1,0 +1,140 @@
+"""What the measurements of each day say about the sensor's deviations, once the day's systematic error is eliminated.
+
+For a day with the columns A of the deviations, the columns H of the systematic curves, the residuals r from the type
+curve, and a ratio ``rho = systematic**2 / scatter**2``, the covariance of the measurements is ``scatter**2 C`` with
+``C = I + rho H H'``. By the matrix inversion lemma, all that is needed of C are sums over the day's measurements.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from decimal import Decimal
+
+import numpy as np
+import numpy.typing as npt
+
+from sosmith.model.arrays import Values
+from sosmith.model.calibration.stacked_matrices import (
+    applied,
+    cholesky,
+    dot,
+    identity,
+    product,
+    solved,
+    solved_transposed,
+    transposed,
+)
+
+
+@dataclass(frozen=True, eq=False)
+class DaySums:
+    """Sums of products over the measurements of each day; the last axis is the day.
+
+    Attributes
+    ----------
+    aa, ar, rr : ndarray, shapes (5, 5, days), (5, days), (days,)
+        Deviations with deviations, with residuals, and residuals with residuals.
+    ha, hr, hh : ndarray, shapes (m, 5, days), (m, days), (m, m, days)
+        Systematic curves with deviations, with residuals, and with systematic curves.
+    count : ndarray, shape (days,)
+        Number of measurements.
+    """
+
+    aa: Values
+    ar: Values
+    rr: Values
+    ha: Values
+    hr: Values
+    hh: Values
+    count: Values
+
+    @classmethod
+    def of(cls, a: Values, h: Values, r: Values, weights: Values, day: npt.NDArray[np.int64], days: int) -> DaySums:
+        """Sum over measurements: a of shape (5, n), h (m, n), r, weights and the index of the day (n,)."""
+        columns = np.concatenate((a, r[None], h, np.ones((1, len(r)))))
+        size, k = len(columns), len(a)
+        sums = np.zeros((size, size, days))
+        for i in range(size):
+            weighted = columns[i] * weights
+            for j in range(i + 1):
+                sums[i, j] = sums[j, i] = np.bincount(day, weights=weighted * columns[j], minlength=days)
+        last = size - 1
+        return cls(
+            aa=sums[:k, :k],
+            ar=sums[:k, k],
+            rr=sums[k, k],
+            ha=sums[k + 1 : last, :k],
+            hr=sums[k + 1 : last, k],
+            hh=sums[k + 1 : last, k + 1 : last],
+            count=sums[last, last],
+        )
+
+    def information(self, rho: Values) -> Information:
+        """Eliminate the systematic error for each ratio in `rho`, shape (ratios,), 0 or more."""
+        m = len(self.hh)
+        lower = cholesky(identity(m, (len(self.rr), len(rho))) + self.hh[..., None] * rho)
+        of_a, of_r = solved(lower, self.ha[..., None]), solved(lower, self.hr[:, None, :, None])
+        diagonal = np.stack([lower[k, k] for k in range(m)])
+        mantissa, exponent = np.ones(diagonal.shape[1:]), np.zeros(diagonal.shape[1:])
+        for pivot in diagonal:
+            mantissa, more = np.frexp(mantissa * pivot)
+            exponent = exponent + more
+        return Information(
+            j=self.aa[..., None] - rho * product(transposed(of_a), of_a),
+            h=self.ar[..., None] - rho * applied(transposed(of_a), of_r[:, 0]),
+            q=self.rr[..., None] - rho * dot(of_r[:, 0], of_r[:, 0]),
+            root=Scaled(mantissa, exponent),
+        )
+
+    def only(self, day: int) -> DaySums:
+        """Return the sums of one day, with an axis of length 1 for the day."""
+        at = slice(day, day + 1)
+        return DaySums(*(getattr(self, field.name)[..., at] for field in fields(self)))
+
+    def day_curves(self, rho: Values) -> tuple[Values, Values, Values]:
+        """Return what the weights w of each day's systematic curves are, given the deviations z.
+
+        For each ratio: ``w = offset - slope z`` on average, and L with the covariance ``scatter**2 rho L' L``.
+        Shapes (m, days, ratios), (m, 5, days, ratios) and (m, m, days, ratios).
+        """
+        m, stack = len(self.hh), (len(self.rr), len(rho))
+        lower = cholesky(identity(m, stack) + self.hh[..., None] * rho)
+
+        def divided(b: Values) -> Values:
+            return rho * solved_transposed(lower, solved(lower, b))
+
+        return divided(self.hr[:, None, :, None])[:, 0], divided(self.ha[..., None]), solved(lower, identity(m, stack))
+
+
+@dataclass(frozen=True, eq=False)
+class Scaled:
+    """Positive products as ``mantissa * 2**exponent``, which neither overflow nor need a logarithm on the way."""
+
+    mantissa: Values
+    exponent: Values
+
+    def times(self, other: Values) -> Scaled:
+        """Multiply by positive numbers."""
+        mantissa, more = np.frexp(self.mantissa * other)
+        return Scaled(mantissa, self.exponent + more)
+
+    def logarithm(self) -> list[Decimal]:
+        """Return natural logarithms, correctly rounded by the decimal module; in the order of the flattened arrays."""
+        two = Decimal(2).ln()
+        return [
+            Decimal(mantissa).ln() + int(exponent) * two
+            for mantissa, exponent in zip(self.mantissa.ravel().tolist(), self.exponent.ravel().tolist(), strict=True)
+        ]
+
+
+@dataclass(frozen=True, eq=False)
+class Information:
+    """About the deviations z of each day, times the squared scatter; the last axes are the day and the ratio.
+
+    The likelihood of a day is ``exp(-(q - 2 h'z + z'J z) / (2 scatter**2)) / (scatter**count root)``, up to a factor.
+    """
+
+    j: Values
+    h: Values
+    q: Values
+    root: Scaled
