@@ -14,6 +14,9 @@ from sosmith.model.calibration.fit_quality import HIGH_LEVERAGE
 from sosmith.model.calibration.measurement_store import Version
 from sosmith.model.calibration.self_updating import Calibration
 
+MESH = 25
+"""Voltages, and temperatures, at which the interval of a reading is drawn."""
+
 _BLUE, _RED, _GREY = "#2563a8", "#b4432f", "#8a8a8a"
 
 
@@ -31,15 +34,17 @@ def calibration_plot(made: Calibration, versions: Sequence[Version], file_format
     """
 
     def paint(figure: Figure) -> None:
-        axes = figure.subplots(2, 2)
+        axes = figure.subplots(3, 2)
         version = made.version
         figure.suptitle(f"Sensor {made.sensor}, version {version.number} of {version.date}")
         _draw_coverage(figure, axes[0, 0], made)
         _draw_residuals(axes[0, 1], made)
         _draw_leverage(axes[1, 0], made)
         _draw_history(axes[1, 1], versions)
+        _draw_intervals(figure, axes[2, 0], made)
+        _draw_over_voltage(axes[2, 1], made)
 
-    return picture("calibration", (11, 8), paint, file_format)
+    return picture("calibration", (11, 12), paint, file_format)
 
 
 def _draw_coverage(figure: Figure, axes: Axes, made: Calibration) -> None:
@@ -69,6 +74,27 @@ def _draw_residuals(axes: Axes, made: Calibration) -> None:
     axes.axhline(0, color=_GREY, lw=0.8)
     axes.set(xlabel="clearance (mm)", ylabel="measured minus fitted (mm)")
     axes.set_title(f"Residuals: {made.version.rms:.3g} mm rms", loc="left")
+
+
+def _draw_intervals(figure: Figure, axes: Axes, made: Calibration) -> None:
+    (v_low, v_high), (t_low, t_high) = made.fit.covered
+    V, T = np.meshgrid(np.linspace(v_low, v_high, MESH), np.linspace(t_low, t_high, MESH))
+    half = made.quality.uncertainty.half_width(V.ravel(), T.ravel()).reshape(V.shape)
+    levels = axes.contourf(V, T, half, levels=10, cmap="viridis")
+    axes.set(xlabel="voltage (V)", ylabel="temperature (°C)")
+    low, high = made.quality.uncertainty.limits
+    axes.set_title(f"95 % interval of a reading: ±{low:.3g} to ±{high:.3g} mm", loc="left")
+    figure.colorbar(levels, ax=axes, label="half-width (mm)")
+
+
+def _draw_over_voltage(axes: Axes, made: Calibration) -> None:
+    voltage = np.array([one.reading.values[1] for one in made.stored])
+    axes.plot(voltage, made.quality.residual, ".", color=_BLUE, ms=4)
+    axes.axhline(0, color=_GREY, lw=0.8)
+    axes.set(xlabel="voltage (V)", ylabel="measured minus fitted (mm)")
+    lack = made.quality.uncertainty.lack
+    verdict = f"a curve of {lack.missed:.2g} mm rms" if lack.structured else "no structure"
+    axes.set_title(f"Lack of fit: {verdict}, pure scatter {lack.pure:.2g} mm rms", loc="left")
 
 
 def _draw_leverage(axes: Axes, made: Calibration) -> None:

@@ -4,9 +4,17 @@ from __future__ import annotations
 
 from typing import Any
 
-from sosmith.model.calibration.fit import COLUMNS, terms_of
+import numpy as np
+
+from sosmith.model.arrays import Values
+from sosmith.model.calibration.advice import Advice
+from sosmith.model.calibration.fit import COLUMNS
 from sosmith.model.calibration.measurement_store import StoredMeasurement, Version
 from sosmith.model.calibration.self_updating import Addition, Calibration
+from sosmith.model.calibration.uncertainty import SHARE
+
+PLANE = (6, 4)
+"""Voltages and temperatures at which the interval of a reading is told."""
 
 CALLED_OUT = 5
 """Count of measurements that the report lists by their residuals, and by their leverage."""
@@ -32,13 +40,59 @@ def calibration_json(made: Calibration) -> dict[str, Any]:
         "weighted_down": sum(weight < 1 for weight in weights),
         "largest_residuals": [_measurement(made, index) for index in quality.largest_residuals(CALLED_OUT)],
         "leverage": {
-            "mean": len(terms_of(made.fit.orders)) / len(made.stored),
+            "mean": float(quality.leverage.mean()),
             "largest": float(quality.leverage.max()),
             "high": len(high),
             "highest": [_measurement(made, index) for index in high[:CALLED_OUT]],
         },
+        "uncertainty": _uncertainty(made),
+        "warnings": list(made.warnings),
         "drift_mm": {str(number): drift for number, drift in made.drift.items()},
     }
+
+
+def uncertainty_plane(made: Calibration) -> tuple[Values, Values, Values]:
+    """Return voltages, temperatures, and half-widths in mm of 95 % intervals, shape (temperatures, voltages)."""
+    voltages, temperatures = (
+        np.linspace(low, high, count) for (low, high), count in zip(made.fit.covered, PLANE, strict=True)
+    )
+    V, T = np.meshgrid(voltages, temperatures)
+    return voltages, temperatures, made.quality.uncertainty.half_width(V.ravel(), T.ravel()).reshape(V.shape)
+
+
+def _uncertainty(made: Calibration) -> dict[str, Any]:
+    found, model = made.quality.uncertainty, made.bayesian
+    voltages, temperatures, half = uncertainty_plane(made)
+    V, T = np.meshgrid(voltages, temperatures)
+    error = found.standard_error(V.ravel(), T.ravel()).reshape(V.shape)
+    days = found.over_days
+    return {
+        "probability": SHARE,
+        "half_width_mm": {"smallest": _nanometres(found.limits[0]), "largest": _nanometres(found.limits[1])},
+        "plane": {
+            "voltage_V": voltages.tolist(),
+            "temperature_C": temperatures.tolist(),
+            "standard_error_mm": [[_nanometres(value) for value in row] for row in error.tolist()],
+            "half_width_mm": [[_nanometres(value) for value in row] for row in half.tolist()],
+        },
+        "scatter_mm": None if model is None else model.posterior.scatter,
+        "systematic_mm": None if model is None else model.posterior.systematic,
+        "day_curve": model is not None and not model.plain,
+        "lack_of_fit": {
+            "pure_scatter_mm": found.lack.pure,
+            "missed_mm": found.lack.missed,
+            "along": found.lack.along,
+            "structured": found.lack.structured,
+        },
+        "over_days": None
+        if days is None
+        else {"rms_mm": _nanometres(days.rms), "inside": days.inside, "measurements": days.count},
+    }
+
+
+def _nanometres(value: float) -> float:
+    """Round to a nanometre: quantiles may differ in the last bits from machine to machine."""
+    return round(value, 6)
 
 
 def _measurement(made: Calibration, index: int) -> dict[str, Any]:
@@ -68,6 +122,9 @@ def version_json(sensor: str, version: Version) -> dict[str, Any]:
         "orders": list(version.polynomial.orders),
         "coefficients": _coefficients(version),
         "adjusted_r": max(version.adjusted_r_squared, 0.0) ** 0.5,
+        "method": version.method,
+        "type": None if version.sensor_type is None else version.sensor_type.name,
+        "accept_mm": version.accept,
         "rms_mm": version.rms,
         "cross_validated_mm": version.cross_validated,
         "drift_from_previous_mm": version.drift,
@@ -83,6 +140,29 @@ def addition_json(addition: Addition) -> dict[str, Any]:
         "refused": [{"line": refusal.line, "reason": refusal.reason} for refusal in addition.file.refusals],
         "shortfall": addition.shortfall,
         "calibration": None if made is None else calibration_json(made),
+    }
+
+
+def advice_json(sensor: str, date: str, within: float, found: Advice) -> dict[str, Any]:
+    """Return what to measure on a day, and the half-widths of 95 % intervals to expect, in mm."""
+    return {
+        "sensor": sensor,
+        "date": date,
+        "within_mm": within,
+        "reached": found.reached,
+        "measurements": [
+            {"clearance_mm": clearance, "temperature_C": temperature, "count": count}
+            for clearance, temperature, count in found.plan
+        ],
+        "half_width_mm": [
+            {
+                "clearance_mm": clearance,
+                "temperature_C": temperature,
+                "without": _nanometres(before),
+                "with": _nanometres(after),
+            }
+            for (clearance, temperature), before, after in zip(found.targets, found.before, found.after, strict=True)
+        ],
     }
 
 

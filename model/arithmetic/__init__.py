@@ -1,1 +1,1 @@
-"""Arithmetic that is the same on every machine: balls, products of matrices, elementary functions, random streams."""
+"""Arithmetic that is the same on every machine: balls, algebra of matrices, elementary functions, random streams."""

@@ -1,5 +1,12 @@
 """Acceptance criteria of a calibration: the valid ranges of measurements, and the required quality of the fit."""
 
+from typing import Literal
+
+Method = Literal["paper", "bayes"]
+"""How a calibration is fitted: by the paper's rule, or by the mixed-effects model."""
+
+METHODS: tuple[Method, ...] = ("bayes", "paper")
+
 REQUIRED_R = 0.975
 """Adjusted r at which a polynomial is accepted (the paper's section 2.2)."""
 

@@ -29,9 +29,9 @@ from sosmith.model.calibration.fit import (
     untold,
 )
 from sosmith.model.calibration.least_squares import Sums
-from sosmith.model.calibration.mixed_effects import NONE, SCATTERS, Model, Posterior, Rows, Scatters
+from sosmith.model.calibration.mixed_effects import NONE, RATIOS, SCATTERS, Index, Model, Posterior, Rows, Scatters
 from sosmith.model.calibration.polynomial import Polynomial
-from sosmith.model.calibration.sensor_type import TERMS, SensorType
+from sosmith.model.calibration.sensor_type import DEVIATIONS, SYSTEMATIC_FACTOR, TERMS, SensorType
 from sosmith.model.calibration.systematic_error import SystematicCurves
 from sosmith.model.errors import SpecificationError
 
@@ -49,6 +49,9 @@ PROJECTED = (33, 9)
 
 SMALLEST = 1.0
 """Clearance in mm below which the projection weights errors equally; above it, relative to the clearance."""
+
+SURPRISING, SYSTEMATIC_SURPRISING = 4.0, 2.0
+"""Deviations beyond this many tolerances, and systematic errors beyond this many standard deviations, are told."""
 
 MOST_REJECTED = 0.25
 """Share of outliers above which it is the sensor that is not of the type."""
@@ -69,12 +72,36 @@ class BayesianFit:
     plain : bool
         Whether the day's own curve is left out of the polynomial: no measurement is of that day, or a polynomial with
         it would leave the range of the clearance or not rise with the voltage.
+    order : ndarray, shape (n,)
+        The measurement of each row of the model.
     """
 
     fit: Fit
     posterior: Posterior
     model: Model
     plain: bool
+    order: Index
+
+    @property
+    def surprise(self) -> str:
+        """A sentence if the measurements are far from what is known of the sensor's type, else empty."""
+        posterior = self.posterior
+        deviations = dict(zip(DEVIATIONS, posterior.deviations, strict=True))
+        name, most = max(deviations.items(), key=lambda one: abs(one[1]))
+        known = posterior.sensor_type
+        if abs(most) > SURPRISING:
+            return f"the sensor's {name} is {abs(most):.1f} tolerances off that of the type {known.name}"
+        if posterior.systematic > SYSTEMATIC_FACTOR**SYSTEMATIC_SURPRISING * known.systematic:
+            return (
+                f"the systematic error of a day is {posterior.systematic:.2g} mm rms, and {known.systematic:g} mm is "
+                f"that of the type {known.name}"
+            )
+        return ""
+
+    @property
+    def kept(self) -> Index:
+        """Rows of the model that are no outliers."""
+        return np.flatnonzero(np.array(self.fit.weights)[self.order])
 
 
 def bayesian_fit(
@@ -132,7 +159,7 @@ def bayesian_fit(
     curves = SystematicCurves(float(clearance.min()), float(clearance.max()), sensor_type.correlation)
     rows = Rows(rows.a, curves.columns(clearance), rows.r, rows.day, rows.days)
     progress(1, 3)
-    model, at, weights = _rejecting(sensor_type, rows, weights, None)
+    model, _, weights = _rejecting(sensor_type, rows, weights, RATIOS)
     progress(2, 3)
     outliers = int(np.count_nonzero(weights == 0))
     if outliers > MOST_REJECTED * len(d):
@@ -140,30 +167,26 @@ def bayesian_fit(
             f"{measurements.source}: at most a quarter of the measurements must be outliers for a sensor of the type "
             f"{sensor_type.name}, not {outliers:,} of {len(d):,}"
         )
-    posterior = model.posterior(at, curves, max(date, rows.days[-1]))
+    posterior = model.posterior(model.scatters(), curves, max(date, rows.days[-1]))
     polynomial, plain = _polynomial(posterior, measurements, ranges)
     given = np.empty(len(d))
     given[order] = weights
-    return BayesianFit(_as_fit(measurements, polynomial, given), posterior, model, plain)
+    return BayesianFit(_as_fit(measurements, polynomial, given), posterior, model, plain, order)
 
 
-def _rejecting(
-    sensor_type: SensorType, rows: Rows, weights: Values, ratios: Values | None
-) -> tuple[Model, Scatters, Values]:
-    """Fit, leaving out outliers; return the model, its scatters and weights of 0 or 1."""
+def _rejecting(sensor_type: SensorType, rows: Rows, weights: Values, ratios: Values) -> tuple[Model, Scatters, Values]:
+    """Fit on the coarse grid, leaving out outliers; return the model, its scatters and weights of 0 or 1."""
     for _ in range(MAX_ROUNDS):
         model = Model.of(sensor_type, rows, weights)
-        at = model.scatters() if ratios is None else model.weighed(SCATTERS, ratios)
+        at = model.weighed(SCATTERS, ratios)
         off = np.abs(model.residuals(at.likeliest))
         allowed = REJECTED * max(NORMAL_CONSISTENCY * float(np.median(off)), MIN_SCATTER)
         kept = np.where(off > allowed, 0.0, 1.0)
         if np.array_equal(kept, weights):
-            break
+            return model, at, weights
         weights = kept
-    else:
-        model = Model.of(sensor_type, rows, weights)
-        at = model.scatters() if ratios is None else model.weighed(SCATTERS, ratios)
-    return model, at, weights
+    model = Model.of(sensor_type, rows, weights)
+    return model, model.weighed(SCATTERS, ratios), weights
 
 
 def _polynomial(

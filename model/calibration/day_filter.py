@@ -10,9 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sosmith.model.arrays import Values
-from sosmith.model.calibration.day_sums import Scaled
-from sosmith.model.calibration.stacked_matrices import (
+from sosmith.model.arithmetic.stacked_matrices import (
     applied,
     cholesky,
     dot,
@@ -22,6 +20,8 @@ from sosmith.model.calibration.stacked_matrices import (
     solved_transposed,
     transposed,
 )
+from sosmith.model.arrays import Values
+from sosmith.model.calibration.day_sums import Scaled
 
 
 @dataclass(frozen=True, eq=False)

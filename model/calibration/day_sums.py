@@ -13,8 +13,7 @@ from decimal import Decimal
 import numpy as np
 import numpy.typing as npt
 
-from sosmith.model.arrays import Values
-from sosmith.model.calibration.stacked_matrices import (
+from sosmith.model.arithmetic.stacked_matrices import (
     applied,
     cholesky,
     dot,
@@ -24,6 +23,7 @@ from sosmith.model.calibration.stacked_matrices import (
     solved_transposed,
     transposed,
 )
+from sosmith.model.arrays import Values
 
 
 @dataclass(frozen=True, eq=False)

@@ -53,6 +53,30 @@ Progress = Callable[[int, int], None]
 """Callback that receives the number of steps done and their total."""
 
 
+@dataclass(frozen=True)
+class Accept:
+    """The largest interval of a reading's clearance that is acceptable.
+
+    Attributes
+    ----------
+    limit : float
+        Largest half-width in mm over the region that the measurements cover.
+    half_width : callable
+        Computes it for a fit to measurements.
+    """
+
+    limit: float
+    half_width: Callable[[Measurements, Fit], float]
+
+
+def unacceptable(measurements: Measurements, limit: float, half_width: float) -> str:
+    """Return why a calibration is not accepted: its largest half-width in mm is above the limit."""
+    return (
+        f"{measurements.source}: the calibration must hold 95 % of the clearances within {limit:g} mm wherever there "
+        f"are measurements, not within {half_width:.3g} mm only"
+    )
+
+
 def untold(done: int, total: int) -> None:
     """Ignore progress."""
 
@@ -199,6 +223,7 @@ def fit(
     required_r: float = REQUIRED_R,
     *,
     robust: bool = False,
+    accept: Accept | None = None,
     progress: Progress = untold,
 ) -> Fit:
     """Find the smallest polynomial whose adjusted r reaches `required_r`.
@@ -218,17 +243,20 @@ def fit(
     by iteratively reweighted least squares). RSS and TSS are weighted likewise. An outlier in clearance that is also
     far out in voltage or temperature can still pull the fit towards itself; its leverage shows that.
 
+    With `accept`, a polynomial must also keep its largest interval within a limit, or the orders are raised further.
+
     `progress` receives the number of orders tried and the number of all orders.
 
     Raises
     ------
     SpecificationError
         If there are fewer measurements than the linear polynomial needs; if a quantity does not vary, or voltage and
-        temperature vary only together; if no polynomial up to `MAX_ORDER` reaches `required_r`.
+        temperature vary only together; if no polynomial up to `MAX_ORDER` reaches `required_r`, or keeps `accept`.
     """
     check_variation(measurements)
     count = len(measurements)
     rejected: list[Trial] = []
+    widths: list[float] = []
     minimize = _huber(measurements) if robust else _least_squares(measurements)
     every = candidate_orders()
     for tried, orders in enumerate(every):
@@ -247,8 +275,15 @@ def fit(
         trial = Trial(orders, len(terms), 1.0 - float(unexplained))
         if trial.adjusted_r >= required_r:
             rms = root_mean_square(residuals(measurements, solution.polynomial))
-            return Fit(solution.polynomial, trial, rms, tuple(rejected), measurements.covered, weights)
+            found_fit = Fit(solution.polynomial, trial, rms, tuple(rejected), measurements.covered, weights)
+            if accept is None:
+                return found_fit
+            widths.append(accept.half_width(measurements, found_fit))
+            if widths[-1] <= accept.limit:
+                return found_fit
         rejected.append(trial)
+    if accept is not None and widths:
+        raise SpecificationError(unacceptable(measurements, accept.limit, min(widths)))
     best = max(rejected, key=lambda trial: trial.adjusted_r_squared)
     raise SpecificationError(
         f"{measurements.source}: adjusted r must reach {required_r} "

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass
 
 import numpy as np
 
 from sosmith.model.arrays import Values
+from sosmith.model.calibration.bayesian_fit import BayesianFit
 from sosmith.model.calibration.covered_region import CoveredRegion
 from sosmith.model.calibration.fit import Fit, Measurements, residuals, root_mean_square, terms_of
 from sosmith.model.calibration.least_squares import Sums
+from sosmith.model.calibration.uncertainty import Uncertainty, of_polynomial, of_posterior
 
 CELLS = 10
 """Grid cells along each axis for the share of filled cells."""
@@ -37,20 +38,28 @@ class FitQuality:
     filled_cells : float
         Share of the cells that hold a measurement, in a grid of `CELLS` by `CELLS` over the range of voltage and
         temperature.
+    uncertainty : Uncertainty
+        The intervals of the calibration, and whether they hold.
+    by_days : bool
+        Whether whole days are left out for cross-validation, as a Bayesian calibration does, or single measurements.
     """
 
     residual: Values
     leverage: Values
     region: CoveredRegion
     filled_cells: float
+    uncertainty: Uncertainty
+    by_days: bool = False
 
     @property
     def cross_validated(self) -> float | None:
-        """Root mean square error in mm by leave-one-out cross-validation.
+        """Root mean square error in mm by cross-validation, leaving out one measurement or one day at a time.
 
-        None if it is undefined because a measurement alone determines a coefficient. For a robust fit, the weights
-        of the full fit are used.
+        None if it is undefined because a measurement alone determines a coefficient, or there is one day only. For a
+        robust fit, the weights of the full fit are used.
         """
+        if self.by_days:
+            return None if self.uncertainty.over_days is None else self.uncertainty.over_days.rms
         if np.any(1.0 - self.leverage < _ALONE):
             return None
         return root_mean_square(self.residual / (1.0 - self.leverage))
@@ -66,39 +75,41 @@ class FitQuality:
 
 
 def assess(measurements: Measurements, fit: Fit) -> FitQuality:
-    """Assess `fit`, which must have been fitted to `measurements`."""
-    region = CoveredRegion.of(measurements.voltage, measurements.temperature)
+    """Assess `fit`, which must have been fitted to `measurements` by least squares."""
+    uncertainty = of_polynomial(measurements, fit)
     return FitQuality(
-        residuals(measurements, fit.polynomial), _leverage(measurements, fit), region, _filled_cells(measurements)
+        residuals(measurements, fit.polynomial),
+        _leverage(measurements, fit),
+        uncertainty.region,
+        _filled_cells(measurements),
+        uncertainty,
+    )
+
+
+def assess_posterior(measurements: Measurements, made: BayesianFit) -> FitQuality:
+    """Assess a Bayesian calibration, which must have been made from `measurements`.
+
+    The leverage is that of least squares with the same terms, without the outliers.
+    """
+    uncertainty = of_posterior(measurements, made)
+    return FitQuality(
+        residuals(measurements, made.fit.polynomial),
+        _leverage(measurements, made.fit),
+        uncertainty.region,
+        _filled_cells(measurements),
+        uncertainty,
+        by_days=True,
     )
 
 
 def _leverage(measurements: Measurements, fit: Fit) -> Values:
-    """Return the diagonal of the hat matrix, ``w x' N**-1 x``.
-
-    With ``N = L D L'`` and ``z = L**-1 x`` it is w times the sum of ``z**2 / D``.
-    """
+    """Return the diagonal of the hat matrix; 1 if the measurements do not determine the terms, as a prior allows."""
     weights = np.array(fit.weights) if fit.weights else np.ones(len(measurements))
-    terms = terms_of(fit.orders)
     sums = Sums(measurements.clearance, measurements.voltage, measurements.temperature, weights)
-    solution = sums.solve(terms)
-    assert solution is not None, "a fit has terms that the measurements determine"
-    x, y = sums.centred(measurements.voltage, measurements.temperature)
-    powers_x, powers_y = _powers(x, fit.orders[0]), _powers(y, fit.orders[1])
-    leverage = np.zeros(len(measurements))
-    reduced: list[Values] = []
-    # Element by element: matrix products and the power function round differently from machine to machine.
-    for (i, j), row, pivot in zip(terms, solution.factor, solution.pivots, strict=True):
-        column = powers_x[i] * powers_y[j]
-        for factor, before in zip(row, reduced, strict=True):
-            column = column - factor * before
-        reduced.append(column)
-        leverage = leverage + column**2 / pivot
-    return np.asarray(weights * leverage)
-
-
-def _powers(values: Values, highest: int) -> list[Values]:
-    return list(itertools.accumulate([values] * highest, np.multiply, initial=np.ones(len(values))))
+    solution = sums.solve(terms_of(fit.orders))
+    if solution is None:
+        return weights
+    return weights * sums.leverage(solution, measurements.voltage, measurements.temperature)
 
 
 def _filled_cells(measurements: Measurements) -> float:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import copy
 import decimal
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -162,6 +163,26 @@ class Sums:
                 pivots=tuple(map(float, pivots)),
             )
 
+    def leverage(self, solution: Solution, V: Values, T: Values) -> Values:
+        """Return ``x' N**-1 x`` at V and T, shape (n,), for the matrix N of the normal equations.
+
+        It is the variance of the fitted value, relative to that of a measurement of weight 1. With ``N = L D L'`` and
+        ``z = L**-1 x`` it is the sum of ``z**2 / D``.
+        """
+        x, y = self.centred(V, T)
+        highest = [max(term[axis] for term in solution.terms) for axis in (0, 1)]
+        powers_x, powers_y = _powers(x, highest[0]), _powers(y, highest[1])
+        leverage = np.zeros(len(V))
+        reduced: list[Values] = []
+        # Element by element: matrix products and the power function round differently from machine to machine.
+        for (i, j), row, pivot in zip(solution.terms, solution.factor, solution.pivots, strict=True):
+            column = powers_x[i] * powers_y[j]
+            for factor, before in zip(row, reduced, strict=True):
+                column = column - factor * before
+            reduced.append(column)
+            leverage = leverage + column**2 / pivot
+        return leverage
+
     def _expand(self, scaled: dict[Term, Decimal]) -> Polynomial:
         """Return the polynomial in V and T, not centred."""
         m, n = (max(term[axis] for term in scaled) for axis in (0, 1))
@@ -175,6 +196,10 @@ class Sums:
         widths = [max(j for i, j in scaled if i == p) + 1 for p in range(m + 1)]
         rounded = [[float(a) for a in row[:width]] for row, width in zip(sums, widths, strict=True)]
         return Polynomial.from_numbers(rounded)
+
+
+def _powers(values: Values, highest: int) -> list[Values]:
+    return list(itertools.accumulate([values] * highest, np.multiply, initial=np.ones(len(values))))
 
 
 class _Part:

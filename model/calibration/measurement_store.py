@@ -6,6 +6,7 @@ each other. `docs/calibration.md` describes the tables.
 
 from __future__ import annotations
 
+import datetime
 import hashlib
 import json
 import math
@@ -18,17 +19,19 @@ from typing import Any
 
 import numpy as np
 
-from sosmith.model.calibration.acceptance import Range
+from sosmith.model.calibration.acceptance import METHODS, Method, Range
 from sosmith.model.calibration.fit import Measurements
 from sosmith.model.calibration.measurement_files import MeasurementFile, Reading
 from sosmith.model.calibration.polynomial import Polynomial
+from sosmith.model.calibration.sensor_type import DEFAULT_TYPE, SENSOR_TYPES, SensorType
 from sosmith.model.errors import SpecificationError, ToolError
 from sosmith.model.tables.csv_table import shortened
 
 APPLICATION_ID = 0x534F534D
 """SQLite application ID that marks a file as a measurement store."""
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
+"""Version 2 added the columns of `ADDED`; a store of version 1 gets them when it is opened."""
 
 PATIENCE = 60.0
 """Time in s that a writer waits for another one."""
@@ -39,7 +42,8 @@ SCHEMA = (
         name TEXT NOT NULL UNIQUE,
         clearance_low_mm REAL NOT NULL, clearance_high_mm REAL NOT NULL,
         voltage_low_V REAL NOT NULL, voltage_high_V REAL NOT NULL,
-        temperature_low_C REAL NOT NULL, temperature_high_C REAL NOT NULL
+        temperature_low_C REAL NOT NULL, temperature_high_C REAL NOT NULL,
+        type TEXT
     ) STRICT""",
     """CREATE TABLE source (
         id INTEGER PRIMARY KEY AUTOINCREMENT,
@@ -72,6 +76,9 @@ SCHEMA = (
         rms_mm REAL NOT NULL,
         cross_validated_mm REAL,
         drift_mm REAL,
+        method TEXT NOT NULL DEFAULT 'paper',
+        type TEXT,
+        accept_mm REAL,
         PRIMARY KEY (sensor, number)
     ) STRICT""",
     *(
@@ -81,6 +88,14 @@ SCHEMA = (
         for event in ("UPDATE", "DELETE")
     ),
 )
+
+ADDED = (
+    "ALTER TABLE sensor ADD COLUMN type TEXT",
+    "ALTER TABLE version ADD COLUMN method TEXT NOT NULL DEFAULT 'paper'",
+    "ALTER TABLE version ADD COLUMN type TEXT",
+    "ALTER TABLE version ADD COLUMN accept_mm REAL",
+)
+"""What makes a store of version 1 one of version 2: type of sensor, method of the fit, acceptance in mm."""
 
 _COMPLAINTS = {
     "database is locked": "must be free within a minute, not locked by another program",
@@ -104,7 +119,8 @@ _UNREACHABLE = {
 
 _OPTIONAL = (float, type(None))
 _MEASUREMENT = (int, str, int, str, float, float, float, str)
-_VERSION = (int, str, int, int, str, float, int, str, float, float, _OPTIONAL, _OPTIONAL)
+_TEXT = (str, type(None))
+_VERSION = (int, str, int, int, str, float, int, str, float, float, _OPTIONAL, _OPTIONAL, str, _TEXT, _OPTIONAL)
 """Types of the values of a row; SQLite checks them only when it writes."""
 
 
@@ -132,7 +148,7 @@ class Version:
     data_sha256 : str
         SHA-256 over the hashes of these measurements.
     required_r : float
-        Adjusted r that was required.
+        Adjusted r that was required; 0 for a Bayesian calibration.
     robust : bool
         Whether outliers were weighted down.
     polynomial : Polynomial
@@ -142,6 +158,12 @@ class Version:
     drift : float or None
         Largest difference in mm from the previous version, over the region that the measurements cover; None for
         the first version.
+    method : str
+        One of `acceptance.METHODS`.
+    sensor_type : SensorType or None
+        The prior of a Bayesian calibration; None for the paper's method.
+    accept : float or None
+        Largest half-width of an interval in mm that was acceptable; None if not limited.
     """
 
     number: int
@@ -156,6 +178,9 @@ class Version:
     rms: float
     cross_validated: float | None
     drift: float | None
+    method: Method = "paper"
+    sensor_type: SensorType | None = None
+    accept: float | None = None
 
 
 class MeasurementStore:
@@ -195,12 +220,28 @@ class MeasurementStore:
     def set_ranges(self, sensor: str, ranges: tuple[Range, Range, Range]) -> None:
         """Insert a sensor, or change its ranges."""
         self._sql.execute(
-            "INSERT INTO sensor VALUES (NULL, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (name) DO UPDATE SET "
+            "INSERT INTO sensor VALUES (NULL, ?, ?, ?, ?, ?, ?, ?, NULL) ON CONFLICT (name) DO UPDATE SET "
             "(clearance_low_mm, clearance_high_mm, voltage_low_V, voltage_high_V, temperature_low_C, "
             "temperature_high_C) = (excluded.clearance_low_mm, excluded.clearance_high_mm, excluded.voltage_low_V, "
             "excluded.voltage_high_V, excluded.temperature_low_C, excluded.temperature_high_C)",
             (sensor, *(limit for pair in ranges for limit in pair)),
         )
+
+    def sensor_type(self, sensor: str) -> SensorType:
+        """Return the type of a sensor; equation 5a if none was given.
+
+        Raises
+        ------
+        SpecificationError
+            If the store is damaged.
+        """
+        rows = self._rows((_TEXT,), "SELECT type FROM sensor WHERE name = ?", sensor)
+        text = next((text for (text,) in rows), None)
+        return SENSOR_TYPES[DEFAULT_TYPE] if text is None else self._type(text)
+
+    def set_sensor_type(self, sensor: str, sensor_type: SensorType) -> None:
+        """Change the type of a sensor that is in the store."""
+        self._sql.execute("UPDATE sensor SET type = ? WHERE name = ?", (sensor_type.json(), sensor))
 
     def source_of(self, sensor: str, sha256: str) -> str | None:
         """Return the name under which a file with this hash was added, or None."""
@@ -264,7 +305,7 @@ class MeasurementStore:
         rows = self._rows(
             _VERSION,
             "SELECT number, date, measurements, last_measurement, data_sha256, required_r, robust, coefficients, "
-            "adjusted_r_squared, rms_mm, cross_validated_mm, drift_mm FROM version "
+            "adjusted_r_squared, rms_mm, cross_validated_mm, drift_mm, method, type, accept_mm FROM version "
             "WHERE sensor = (SELECT id FROM sensor WHERE name = ?) ORDER BY number",
             sensor,
         )
@@ -282,15 +323,34 @@ class MeasurementStore:
                 rms,
                 left_out,
                 drift,
+                self._method(method),
+                None if sensor_type is None else self._type(sensor_type),
+                accept,
             )
-            for number, date, count, last, data, required_r, robust, text, r, rms, left_out, drift in rows
+            for (
+                number,
+                date,
+                count,
+                last,
+                data,
+                required_r,
+                robust,
+                text,
+                r,
+                rms,
+                left_out,
+                drift,
+                method,
+                sensor_type,
+                accept,
+            ) in rows
         ]
 
     def insert_version(self, sensor: str, version: Version) -> None:
         """Insert a version; its number must be the next one."""
         coefficients = [[float(a).hex() for a in row] for row in version.polynomial.coefficients]
         self._sql.execute(
-            "INSERT INTO version SELECT id, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ? FROM sensor WHERE name = ?",
+            "INSERT INTO version SELECT id, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ? FROM sensor WHERE name = ?",
             (
                 version.number,
                 version.date,
@@ -304,6 +364,9 @@ class MeasurementStore:
                 version.rms,
                 version.cross_validated,
                 version.drift,
+                version.method,
+                None if version.sensor_type is None else version.sensor_type.json(),
+                version.accept,
                 sensor,
             ),
         )
@@ -335,6 +398,18 @@ class MeasurementStore:
             return Polynomial.from_numbers([[float.fromhex(a) for a in row] for row in json.loads(coefficients)])
         except (ValueError, TypeError, ArithmeticError, RecursionError):
             raise self._damaged(coefficients) from None
+
+    def _type(self, text: str) -> SensorType:
+        try:
+            return SensorType.from_json(text)
+        except (ValueError, TypeError, KeyError, SpecificationError, RecursionError):
+            raise self._damaged(text) from None
+
+    def _method(self, text: str) -> Method:
+        for method in METHODS:
+            if text == method:
+                return method
+        raise self._damaged(text)
 
     def _damaged(self, value: Any) -> SpecificationError:
         return SpecificationError(
@@ -393,6 +468,13 @@ def _prepare(store: MeasurementStore, connection: sqlite3.Connection) -> None:
     application, version = _pragmas(connection)
     if application != APPLICATION_ID:
         raise SpecificationError(f"{store.path} must be a store of measurements, not another SQLite database")
+    if version == 1:
+        with store.transaction():
+            if _pragmas(connection)[1] == 1:  # unless another process was faster
+                for statement in ADDED:
+                    connection.execute(statement)
+                connection.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
+        version = SCHEMA_VERSION
     if version != SCHEMA_VERSION:
         raise SpecificationError(f"{store.path}: the store's schema must be version {SCHEMA_VERSION}, not {version}")
 
@@ -420,7 +502,8 @@ def as_measurements(stored: Sequence[StoredMeasurement], source: str) -> Measure
     """Return stored measurements as arrays for `fit`; `source` names them in messages."""
     values = np.array([one.reading.values for one in stored], dtype=np.float64).reshape(-1, 3)
     clearance, voltage, temperature = values.T
-    return Measurements(clearance.copy(), voltage.copy(), temperature.copy(), source)
+    days = tuple(datetime.date.fromisoformat(one.reading.date).toordinal() for one in stored)
+    return Measurements(clearance.copy(), voltage.copy(), temperature.copy(), source, days)
 
 
 def data_sha256(stored: Sequence[StoredMeasurement], sensor: str) -> str:

@@ -19,17 +19,17 @@ import numpy as np
 import numpy.typing as npt
 from scipy import special
 
+from sosmith.model.arithmetic.stacked_matrices import applied, dot, product, transposed
 from sosmith.model.arrays import Values
 from sosmith.model.calibration.day_filter import Course, course, moved, smoothed
 from sosmith.model.calibration.day_sums import DaySums, Information, Scaled
 from sosmith.model.calibration.sensor_type import SYSTEMATIC_FACTOR, SensorType
-from sosmith.model.calibration.stacked_matrices import applied, dot, product, transposed
 from sosmith.model.calibration.systematic_error import SystematicCurves
 
-SCATTERS = np.array(list(itertools.accumulate([1.25] * 40, operator.mul, initial=0.0005)))
-"""Scatter of a measurement in mm rms: the points of the coarse grid, 0.5 um to 3.8 mm."""
+SCATTERS = np.array(list(itertools.accumulate([1.5] * 23, operator.mul, initial=0.0005)))
+"""Scatter of a measurement in mm rms: the points of the coarse grid, 0.5 um to 5.6 mm."""
 
-RATIOS = np.array(list(itertools.accumulate([1.5] * 17, operator.mul, initial=0.02)))
+RATIOS = np.array(list(itertools.accumulate([2.0] * 10, operator.mul, initial=0.02)))
 """Systematic error of a day over the scatter: the points of the coarse grid, up to 20. 0.02 is as good as none."""
 
 NONE = np.zeros(1)

@@ -2,16 +2,28 @@
 
 from __future__ import annotations
 
+import datetime
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from sosmith.model.calibration.acceptance import DEFAULT_RANGES, REQUIRED_R, Range
+from sosmith.model.calibration.acceptance import DEFAULT_RANGES, REQUIRED_R, Method, Range
+from sosmith.model.calibration.advice import Advice, advise
+from sosmith.model.calibration.bayesian_fit import BayesianFit, bayesian_fit
 from sosmith.model.calibration.covered_region import CoveredRegion
-from sosmith.model.calibration.fit import Fit, Measurements, Progress, fit, root_mean_square, untold
-from sosmith.model.calibration.fit_quality import FitQuality, assess
+from sosmith.model.calibration.fit import (
+    Accept,
+    Fit,
+    Measurements,
+    Progress,
+    fit,
+    root_mean_square,
+    unacceptable,
+    untold,
+)
+from sosmith.model.calibration.fit_quality import FitQuality, assess, assess_posterior
 from sosmith.model.calibration.measurement_files import (
     MeasurementFile,
     Refusal,
@@ -24,6 +36,8 @@ from sosmith.model.calibration.measurement_store import (
     as_measurements,
     data_sha256,
 )
+from sosmith.model.calibration.sensor_type import SensorType
+from sosmith.model.calibration.uncertainty import largest_half_width
 from sosmith.model.errors import ShortfallError, SpecificationError
 
 SWAPPED_FITS, SWAPPED_OFF = 2.0, 4.0
@@ -59,6 +73,8 @@ class Calibration:
         Valid ranges of the sensor: clearance in mm, voltage in V, temperature in degC.
     drift : dict
         Largest difference in mm from each earlier version, by its number, over the region covered now.
+    bayesian : BayesianFit or None
+        The model behind the fit; None for the paper's method.
     """
 
     sensor: str
@@ -69,6 +85,16 @@ class Calibration:
     quality: FitQuality
     ranges: tuple[Range, Range, Range]
     drift: dict[int, float]
+    bayesian: BayesianFit | None = None
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Sentences about what is wrong with the calibration, if anything is."""
+        lack = self.quality.uncertainty.lack
+        found = [lack.warning] if lack.structured else []
+        if self.bayesian is not None:
+            found += [text for text in (self.bayesian.surprise,) if text]
+        return tuple(found)
 
     @property
     def coverage(self) -> float:
@@ -107,8 +133,11 @@ def add(
     *,
     ranges: tuple[Range | None, Range | None, Range | None] = (None, None, None),
     keep_good: bool = False,
+    method: Method = "paper",
+    sensor_type: SensorType | None = None,
     required_r: float = REQUIRED_R,
     robust: bool = False,
+    accept: float | None = None,
     progress: Progress = untold,
 ) -> Addition:
     """Add a file to the store and fit again, in one transaction.
@@ -127,8 +156,15 @@ def add(
         New valid ranges of clearance in mm, voltage in V and temperature in degC; None keeps the present one.
     keep_good : bool
         Whether to store the valid rows of a file that also has rejected ones.
+    method : str
+        "paper" for the paper's rule, `fit`; "bayes" for `bayesian_fit`, for the day of the version.
+    sensor_type : SensorType or None
+        New type of the sensor, the prior of the method "bayes"; None keeps the present one.
     required_r, robust, progress
-        As in `fit`.
+        As in `fit`; the first two are of the method "paper" only.
+    accept : float or None
+        Largest half-width in mm of the interval of a reading's clearance, over the region that the measurements
+        cover; None if not limited.
 
     Raises
     ------
@@ -149,9 +185,12 @@ def add(
             return Addition(file, False, None, "")
         if now != before:
             store.set_ranges(sensor, now)
+        if sensor_type is not None:
+            store.set_sensor_type(sensor, sensor_type)
         store.insert(sensor, file)
         try:
-            return Addition(file, True, _fit(store, sensor, date, required_r, progress, robust=robust), "")
+            settings = _Settings(method, required_r, robust, accept, store.sensor_type(sensor))
+            return Addition(file, True, _fit(store, sensor, date, settings, progress), "")
         except SpecificationError as error:
             return Addition(file, True, None, str(error))
 
@@ -183,8 +222,11 @@ def refit(
     sensor: str,
     date: str,
     *,
+    method: Method = "paper",
+    sensor_type: SensorType | None = None,
     required_r: float = REQUIRED_R,
     robust: bool = False,
+    accept: float | None = None,
     progress: Progress = untold,
 ) -> Calibration:
     """Fit to all measurements of a sensor. A new version is created only if something has changed.
@@ -195,11 +237,16 @@ def refit(
         If the sensor has no measurements.
     ShortfallError
         If no polynomial is good enough.
+
+    The parameters are those of `add`.
     """
     with store.transaction():
         _known(store, sensor)
+        if sensor_type is not None:
+            store.set_sensor_type(sensor, sensor_type)
         try:
-            return _fit(store, sensor, date, required_r, progress, robust=robust)
+            settings = _Settings(method, required_r, robust, accept, store.sensor_type(sensor))
+            return _fit(store, sensor, date, settings, progress)
         except SpecificationError as error:
             raise ShortfallError(str(error)) from None
 
@@ -236,7 +283,8 @@ def calibration_of(store: MeasurementStore, sensor: str, number: int | None = No
     version = find_version(store, sensor, number)
     stored = store.measurements(sensor, version.last_measurement)
     try:
-        again = _calibration(store, sensor, stored, version.date, version.required_r, version.robust, version.number)
+        settings = _Settings(version.method, version.required_r, version.robust, version.accept, version.sensor_type)
+        again = _calibration(store, sensor, stored, version.date, settings, version.number)
     except SpecificationError as error:
         raise ShortfallError(
             f"version {version.number} of sensor {sensor} must be reproducible, not fail: {error}"
@@ -246,6 +294,40 @@ def calibration_of(store: MeasurementStore, sensor: str, number: int | None = No
             f"version {version.number} of sensor {sensor} must be reproducible, not give another polynomial"
         )
     return again
+
+
+def advice_for(
+    store: MeasurementStore,
+    sensor: str,
+    date: str,
+    clearances: tuple[float, ...],
+    temperatures: tuple[float, ...],
+    within: float,
+    most: int,
+) -> Advice:
+    """Return what to measure on `date`, a day after the last measurement; see `advise`.
+
+    Without `temperatures`, the lowest, middle and highest one measured are taken.
+
+    Raises
+    ------
+    SpecificationError
+        If the sensor has no measurements, or `date` is not after the last of them; as for `bayesian_fit` and `advise`.
+    """
+    _known(store, sensor)
+    ranges = store.ranges(sensor)
+    assert ranges is not None, "a sensor has ranges"
+    measurements = as_measurements(store.measurements(sensor), f"{store.path}, sensor {sensor}")
+    day, last = datetime.date.fromisoformat(date).toordinal(), max(measurements.days)
+    if day <= last:
+        raise SpecificationError(
+            f"the day to measure on must be after {datetime.date.fromordinal(last)}, that of the last measurement, "
+            f"not {date}"
+        )
+    made = bayesian_fit(measurements, store.sensor_type(sensor), day, ranges)
+    low, high = measurements.covered[1]
+    usual = (low, (low + high) / 2, high)
+    return advise(made, ranges, clearances, temperatures or usual, within=within, days=day - last, most=most)
 
 
 def _known(store: MeasurementStore, sensor: str) -> None:
@@ -308,12 +390,21 @@ def _swapped(file: MeasurementFile, version: Version) -> str:
     )
 
 
-def _fit(
-    store: MeasurementStore, sensor: str, date: str, required_r: float, progress: Progress, *, robust: bool
-) -> Calibration:
+@dataclass(frozen=True)
+class _Settings:
+    """How to fit: the parameters of `add`."""
+
+    method: Method
+    required_r: float
+    robust: bool
+    accept: float | None
+    sensor_type: SensorType | None
+
+
+def _fit(store: MeasurementStore, sensor: str, date: str, settings: _Settings, progress: Progress) -> Calibration:
     versions = store.versions(sensor)
     stored = store.measurements(sensor)
-    made = _calibration(store, sensor, stored, date, required_r, robust, len(versions) + 1, progress)
+    made = _calibration(store, sensor, stored, date, settings, len(versions) + 1, progress)
     if versions:
         newest = versions[-1]
         if replace(made.version, number=newest.number, date=newest.date, drift=newest.drift) == newest:
@@ -327,15 +418,25 @@ def _calibration(
     sensor: str,
     stored: Sequence[StoredMeasurement],
     date: str,
-    required_r: float,
-    robust: bool,
+    settings: _Settings,
     number: int,
     progress: Progress = untold,
 ) -> Calibration:
     """Fit, and compare with the versions before `number`."""
     measurements: Measurements = as_measurements(stored, f"{store.path}, sensor {sensor}")
-    fitted = fit(measurements, required_r, robust=robust, progress=progress)
-    quality = assess(measurements, fitted)
+    ranges = store.ranges(sensor)
+    assert ranges is not None, "measurements belong to a sensor"
+    made, bayesian, accept = None, settings.method == "bayes", settings.accept
+    if bayesian and settings.sensor_type is not None:
+        day = datetime.date.fromisoformat(date).toordinal()
+        made = bayesian_fit(measurements, settings.sensor_type, day, ranges, progress)
+        fitted, quality = made.fit, assess_posterior(measurements, made)
+        if accept is not None and quality.uncertainty.limits[1] > accept:
+            raise SpecificationError(unacceptable(measurements, accept, quality.uncertainty.limits[1]))
+    else:
+        limit = None if accept is None else Accept(accept, largest_half_width)
+        fitted = fit(measurements, settings.required_r, robust=settings.robust, accept=limit, progress=progress)
+        quality = assess(measurements, fitted)
     region: CoveredRegion = quality.region
     drift = {
         version.number: region.largest_difference(fitted.polynomial, version.polynomial)
@@ -347,14 +448,15 @@ def _calibration(
         measurements=len(stored),
         last_measurement=stored[-1].number,
         data_sha256=data_sha256(stored, sensor),
-        required_r=required_r,
-        robust=robust,
+        required_r=0.0 if bayesian else settings.required_r,
+        robust=settings.robust and not bayesian,
         polynomial=fitted.polynomial,
         adjusted_r_squared=fitted.adjusted_r_squared,
         rms=fitted.rms,
         cross_validated=quality.cross_validated,
         drift=drift.get(number - 1),
+        method=settings.method,
+        sensor_type=settings.sensor_type if bayesian else None,
+        accept=accept,
     )
-    ranges = store.ranges(sensor)
-    assert ranges is not None, "measurements belong to a sensor"
-    return Calibration(sensor, version, False, stored, fitted, quality, ranges, drift)
+    return Calibration(sensor, version, False, stored, fitted, quality, ranges, drift, made)

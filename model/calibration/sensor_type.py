@@ -16,6 +16,9 @@ from sosmith.model.errors import SpecificationError
 TERMS = ((0, 0), (1, 0), (0, 1), (1, 1), (2, 0))
 """Powers of voltage and temperature in a type curve: those of the paper's equations 4 and 5a."""
 
+DEVIATIONS = ("offset", "gain", "offset over temperature", "gain over temperature", "curvature")
+"""Names of the deviations from a type curve, in their order."""
+
 REFERENCE_VOLTAGE, REFERENCE_TEMPERATURE = 5.0, 20.0
 """Middle of the voltage's range in V, where the slope is taken, and reference temperature in degC."""
 
@@ -156,3 +159,6 @@ def _of(name: str, polynomial: Polynomial) -> SensorType:
 
 SENSOR_TYPES = {one.name: one for one in (_of("equation_5a", EQUATION_5A), _of("equation_4", EQUATION_4))}
 """Built-in types: the paper's two regressions of its inductive sensor."""
+
+DEFAULT_TYPE = "equation_5a"
+"""Type of a sensor of which nothing else is said."""

@@ -9,8 +9,8 @@ from functools import cached_property
 
 import numpy as np
 
+from sosmith.model.arithmetic.stacked_matrices import cholesky, product
 from sosmith.model.arrays import Values
-from sosmith.model.calibration.stacked_matrices import cholesky, product
 
 NODES_PER_LENGTH = 2
 """Nodes in one correlation length; cubic interpolation between them loses below 1 % of the standard deviation."""

@@ -24,6 +24,7 @@ INVOCATION = Invocation("calibrate", columns=100)
 run, good, refused = INVOCATION.run, INVOCATION.good, INVOCATION.refused
 
 DAY = ("--date", "2024-03-01")
+PAPER = ("--method", "paper")
 
 
 @pytest.fixture(autouse=True)
@@ -36,7 +37,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_add_reports_the_fit() -> None:
-    printed = good("add", "a.csv", *DAY, "--required-r", "0.999")
+    printed = good("add", "a.csv", *DAY, *PAPER, "--required-r", "0.999")
     assert "sosmith: stored 60 measurements from a.csv in calibration.db\n" in printed.stderr
     shown = re.sub(r" {2,}", "  ", printed.stdout)
     for row in (
@@ -48,11 +49,11 @@ def test_add_reports_the_fit() -> None:
     for row in ("adjusted r", "residual, rms", "cross-validated error", "covered", "leverage", "Largest residuals"):
         assert row in shown
     assert "drift" not in shown
-    assert "drift from version 1" in good("add", "b.csv", *DAY, "--required-r", "0.999").stdout
+    assert "drift from version 1" in good("add", "b.csv", *DAY, *PAPER, "--required-r", "0.999").stdout
 
 
 def test_add_as_json() -> None:
-    added = json.loads(good("add", "a.csv", *DAY, "--json").stdout)
+    added = json.loads(good("add", "a.csv", *DAY, *PAPER, "--json").stdout)
     assert (added["file"], added["kept"], added["refused"], added["shortfall"]) == ("a.csv", 60, [], "")
     made = added["calibration"]
     assert (made["version"], made["measurements"], made["new"], made["orders"]) == (1, 60, True, [1, 1])
@@ -124,7 +125,7 @@ def test_a_shortfall_keeps_the_measurements_and_says_so() -> None:
     message = (
         "calibration.db, sensor sensor: adjusted r must reach 0.99999 with a polynomial up to order 6, not at most "
     )
-    result = run("add", "a.csv", *DAY, "--required-r", "0.99999")
+    result = run("add", "a.csv", *DAY, *PAPER, "--required-r", "0.99999")
     assert isinstance(result.exception, ShortfallError)
     assert str(result.exception).startswith(message)
     assert "sosmith: stored 60 measurements" in result.stderr
@@ -132,8 +133,8 @@ def test_a_shortfall_keeps_the_measurements_and_says_so() -> None:
 
 
 def test_history_lists_and_verifies() -> None:
-    good("add", "a.csv", *DAY)
-    good("add", "b.csv", "--date", "2024-03-08", "--robust", "--required-r", "0.999")
+    good("add", "a.csv", *DAY, *PAPER)
+    good("add", "b.csv", *PAPER, "--date", "2024-03-08", "--robust", "--required-r", "0.999")
     result = good("history", "--verify")
     assert "sosmith: every version is reproduced bit for bit: 2 of 2\n" in result.stderr
     assert re.search(r"1 +2024-03-01 +60 +1, 1 +0\.\d{5} ", result.stdout)
@@ -149,7 +150,7 @@ def test_history_lists_and_verifies() -> None:
 
 def test_exports_feed_a_specification_and_give_the_same_polynomial() -> None:
     for name in ("a.csv", "b.csv"):
-        good("add", name, "--sensor", "left", *DAY)
+        good("add", name, "--sensor", "left", *DAY, *PAPER)
     good("export", "--sensor", "left", "-o", "left.toml")
     good("export", "--sensor", "left", "--format", "csv", "-o", "left.csv")
     table = good("export", "--sensor", "left").stdout
@@ -168,17 +169,17 @@ def test_exports_feed_a_specification_and_give_the_same_polynomial() -> None:
 
 
 def test_an_older_version_can_be_exported() -> None:
-    good("add", "a.csv", *DAY)
+    good("add", "a.csv", *DAY, *PAPER)
     before = good("export").stdout
-    good("add", "b.csv", *DAY)
+    good("add", "b.csv", *DAY, *PAPER)
     assert good("export", "--version", "1").stdout == before != good("export").stdout
     refused("the version of sensor sensor must be 1 to 2, not 3", "export", "--version", "3")
 
 
 @pytest.mark.parametrize(("name", "start"), [("p.svg", b"<?xml"), ("p.png", b"\x89PNG")])
 def test_plots_are_the_same_bytes_twice(name: str, start: bytes) -> None:
-    good("add", "a.csv", *DAY, "--robust")
-    good("add", "b.csv", *DAY)
+    good("add", "a.csv", *DAY, *PAPER, "--robust")
+    good("add", "b.csv", *DAY, *PAPER)
     drawn = []
     for _ in range(2):
         good("plot", "-o", name)
@@ -190,12 +191,114 @@ def test_plots_are_the_same_bytes_twice(name: str, start: bytes) -> None:
             assert text in drawn[0].decode()
 
 
+def test_a_bayesian_calibration_says_what_it_is_worth() -> None:
+    good("add", "a.csv", *DAY)
+    shown = re.sub(r" {2,}", "  ", good("add", "b.csv", "--date", "2024-03-08").stdout)
+    for row in (
+        "  method  bayes, type equation_5a, for 2024-03-08, with the day's own curve",
+        "  orders  2 in voltage, 1 in temperature",
+        "95 % interval of a reading, ± mm",
+    ):
+        assert row in shown
+    assert re.search(r"95 % interval of a reading  ±0\.0\d+ to ±0\.0\d+ mm where there are measurements", shown)
+    assert re.search(r"inside their 95 % intervals  \d+\.\d % of 1[12]\d measurements, each from other days", shown)
+    made = json.loads(good("fit", "--date", "2024-03-08", "--json").stdout)
+    assert (made["method"], made["type"], made["new"], made["warnings"]) == ("bayes", "equation_5a", False, [])
+    worth = made["uncertainty"]
+    assert 0.04 < worth["scatter_mm"] < 0.06
+    assert worth["day_curve"] is True
+    assert worth["lack_of_fit"]["structured"] is False
+    assert 0.85 < worth["over_days"]["inside"] <= 1
+    half, error = worth["plane"]["half_width_mm"], worth["plane"]["standard_error_mm"]
+    assert [len(row) for row in half] == [6] * 4
+    assert all(h > e > 0 for some, others in zip(half, error, strict=True) for h, e in zip(some, others, strict=True))
+    low, high = worth["half_width_mm"]["smallest"], worth["half_width_mm"]["largest"]
+    assert 0 < low < high < 0.2
+    assert "2 of 2" in good("history", "--verify").stderr
+    assert "2, 1 bayes" in good("history").stdout
+
+
+def test_a_fit_with_a_curve_in_its_residuals_is_warned_of() -> None:
+    """The linear polynomial that reaches r = 0.975 misses the curve of the sensor."""
+    warned = good("add", "a.csv", *DAY, *PAPER)
+    assert re.search(
+        r"^sosmith: warning: the residuals follow a curve along the voltage of about 0\.3\d* mm rms that the fit "
+        r"misses: neighbours differ by a scatter of 0\.\d+ mm rms only$",
+        warned.stderr,
+        re.M,
+    )
+    (warning,) = json.loads(good("fit", *DAY, *PAPER, "--json").stdout)["warnings"]
+    assert warning in warned.stderr
+    assert "warning" not in good("fit", *DAY).stderr
+
+
+def test_acceptance_in_millimetres_raises_the_orders() -> None:
+    printed = good("add", "a.csv", *DAY, *PAPER, "--accept", "0.2mm").stdout
+    shown = re.sub(r" {2,}", "  ", printed)
+    assert "  orders  2 in voltage, 1 in temperature" in shown
+    assert "  accepted  ±0.2 mm or less" in shown
+    assert "1 of 1" in good("history", "--verify").stderr
+
+
+@pytest.mark.parametrize("method", ["paper", "bayes"])
+def test_a_calibration_that_is_not_good_enough_in_millimetres_is_not_accepted(method: str) -> None:
+    result = run("add", "a.csv", *DAY, "--method", method, "--accept", "0.001mm")
+    assert isinstance(result.exception, ShortfallError)
+    assert re.fullmatch(
+        r"calibration\.db, sensor sensor: the calibration must hold 95 % of the clearances within 0\.001 mm wherever "
+        r"there are measurements, not within 0\.0\d+ mm only",
+        str(result.exception),
+    )
+
+
+def test_the_type_of_a_sensor_is_kept() -> None:
+    Path("own.toml").write_text('name = "own"\ncurve = [1.2, 0.37, -0.004, 0.0007, 0.058]\ngain = 0.1\n')
+    first = json.loads(good("add", "a.csv", *DAY, "--type", "own.toml", "--json").stdout)["calibration"]
+    assert first["type"] == "own"
+    assert json.loads(good("fit", *DAY, "--json").stdout)["new"] is False
+    other = json.loads(good("fit", *DAY, "--type", "equation_4", "--json").stdout)
+    assert (other["type"], other["version"], other["new"]) == ("equation_4", 2, True)
+    assert other["coefficients"] != first["coefficients"]
+    assert "2 of 2" in good("history", "--verify").stderr
+
+
+def test_advice_reaches_what_it_promises() -> None:
+    good("add", "a.csv", *DAY)
+    call = ("advise", "2mm", "4 mm", "--within", "0.05mm", "--temperature", "60", "--date", "2024-03-02")
+    shown = good(*call).stdout
+    assert re.search(r"^Sensor sensor, 2024-03-02: \d measurements$", shown, re.M)
+    told = json.loads(good(*call, "--json").stdout)
+    assert told["reached"] is True
+    assert sum(one["count"] for one in told["measurements"]) < 20
+    assert [one["clearance_mm"] for one in told["half_width_mm"]] == [2, 4]
+    assert all(one["with"] <= 0.05 < one["without"] for one in told["half_width_mm"])
+    result = run(*call, "--most", "1")
+    assert isinstance(result.exception, ShortfallError)
+    assert re.fullmatch(
+        r"the intervals must be within 0\.05 mm, and 1 measurements bring them to 0\.\d+ mm only", str(result.exception)
+    )
+
+
 UNFIT = {
     "no store": (
         ("history",),
         "calibration.db must be an existing store of measurements; sosmith calibrate add creates one",
     ),
     "no file": (("add", "none.csv"), "none.csv must be a readable CSV or XLSX file (no such file or directory)"),
+    "r of the other method": (
+        ("add", "a.csv", "--required-r", "0.99"),
+        "--required-r must go with --method paper, not with --method bayes",
+    ),
+    "robust of the other method": (
+        ("add", "a.csv", "--robust"),
+        "--robust must go with --method paper, not with --method bayes",
+    ),
+    "no length": (("add", "a.csv", "--accept", "0.2"), "--accept must be a length such as 0.2mm, not '0.2'"),
+    "no clearance": (("advise", "two"), "CLEARANCE must be a length such as 0.2mm, not 'two'"),
+    "no type": (
+        ("add", "a.csv", "--type", "coil"),
+        "the type of a sensor must be one of equation_5a, equation_4, or a TOML file, not 'coil'",
+    ),
     "no day": (("add", "a.csv", "--date", "yesterday"), "date must be a date such as 2024-03-01, not 'yesterday'"),
     "range upside down": (
         ("add", "a.csv", "--voltage-range", "10", "0"),
@@ -221,7 +324,7 @@ def test_an_unknown_sensor_is_told_which_there_are() -> None:
 
 
 def test_help_shows_every_command_and_its_options() -> None:
-    assert list(calibrate.commands) == ["add", "fit", "history", "export", "plot"]
+    assert list(calibrate.commands) == ["add", "fit", "history", "export", "plot", "advise"]
     for command in calibrate.commands:
         shown = good(command, "--help").stdout
         for option in ("--store", "--sensor"):

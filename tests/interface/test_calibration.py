@@ -1,5 +1,6 @@
 """Calibrations from Python: from arrays and files, into a specification."""
 
+import re
 import tomllib
 from pathlib import Path
 
@@ -35,6 +36,17 @@ def test_the_table_goes_into_a_specification() -> None:
         == calibration.coefficients
     )
     assert tomllib.loads(calibration.toml()) == {"calibration": calibration.table()}
+
+
+def test_a_calibration_says_what_it_is_worth() -> None:
+    line, curve = Calibration.load(MARCH), Calibration.load(MARCH, required_r=0.999)
+    assert re.fullmatch(r"the residuals follow a curve along the voltage of about 0\.3\d* mm rms .*", line.warning)
+    assert curve.warning == ""
+    V, T = np.meshgrid([2.0, 5.0, 8.0], [30.0, 60.0])
+    assert curve.half_width(V, T).shape == (2, 3)
+    assert curve.half_width(V, T).max() < 0.03
+    assert line.half_width(V, T).min() > 0.5
+    assert "95 % interval of a reading" in curve._repr_html_()
 
 
 @pytest.mark.parametrize(

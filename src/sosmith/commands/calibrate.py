@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,13 +11,16 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from sosmith.gen.picture import format_of
-from sosmith.model.calibration.acceptance import DEFAULT_RANGES, REQUIRED_R, Range
+from sosmith.model.calibration.acceptance import DEFAULT_RANGES, METHODS, REQUIRED_R, Method, Range
 from sosmith.model.errors import ShortfallError, SpecificationError
+from sosmith.model.tables.csv_table import shortened
 from sosmith.model.text_files import write_contents, write_files
 from sosmith.terminal import JSON_OPTION, note, output_option, print_json, show_progress
 
 if TYPE_CHECKING:
     from sosmith.model.calibration.measurement_files import Refusal
+    from sosmith.model.calibration.self_updating import Calibration
+    from sosmith.model.calibration.sensor_type import SensorType
 
 _SHOWN = 20
 """Number of refused lines that are printed; JSON has all of them."""
@@ -24,13 +28,16 @@ _SHOWN = 20
 _HELP = """Store sensor measurements, and refit the calibration with every addition.
 
 Measurements are rows of a CSV or XLSX file with the columns clearance_mm, voltage_V, temperature_C and, optionally,
-date. They are kept in a store, a single SQLite file. Each addition fits the smallest polynomial of voltage and
-temperature whose adjusted r reaches the required value, and stores it as a new version. To get started:
+date. They are kept in a store, a single SQLite file. Each addition fits a polynomial of voltage and temperature, says
+what it is worth in mm, and stores it as a new version. --method bayes weighs all measurements with what is known of the
+sensor's type, its drift and the error of the day; --method paper takes the smallest polynomial whose adjusted r
+reaches the required value. To get started:
 
 \b
     sosmith calibrate add bench.csv --sensor left      add measurements, show the fit
     sosmith calibrate history --sensor left            list all versions and their drift
     sosmith calibrate export --sensor left             print [calibration] for a specification
+    sosmith calibrate advise --sensor left 2mm 3mm     what to measure next
 """
 
 
@@ -67,10 +74,43 @@ def _check_range(ctx: click.Context, parameter: click.Parameter, given: Range | 
     return given
 
 
-def _check_required_r(ctx: click.Context, parameter: click.Parameter, given: float) -> float:
-    if not 0 <= given < 1:  # NaN too
+def _check_required_r(ctx: click.Context, parameter: click.Parameter, given: float | None) -> float | None:
+    if given is not None and not 0 <= given < 1:  # NaN too
         raise SpecificationError(f"--required-r must be 0 or more and less than 1, not {given:g}")
     return given
+
+
+def _millimetres(ctx: click.Context, parameter: click.Parameter, text: str | None) -> float | None:
+    return None if text is None else _length(parameter.opts[0], text)
+
+
+def _lengths(ctx: click.Context, parameter: click.Parameter, texts: tuple[str, ...]) -> tuple[float, ...]:
+    return tuple(_length("CLEARANCE", text) for text in texts)
+
+
+def _length(name: str, text: str) -> float:
+    found = re.fullmatch(r"(\d+(?:\.\d+)?) ?mm", text.strip())
+    if found is None or not 0 < float(found[1]) <= 1000:
+        raise SpecificationError(f"{name} must be a length such as 0.2mm, not {shortened(text)}")
+    return float(found[1])
+
+
+def _sensor_type(ctx: click.Context, parameter: click.Parameter, given: str | None) -> SensorType | None:
+    if given is None:
+        return None
+    from sosmith.model.calibration.sensor_type_file import sensor_type_named
+
+    return sensor_type_named(given)
+
+
+def _method(method: str, required_r: float | None, robust: bool) -> tuple[Method, float]:
+    """Return the method and the required r."""
+    if method == "paper":
+        return "paper", REQUIRED_R if required_r is None else required_r
+    for name, given in (("--required-r", required_r is not None), ("--robust", robust)):
+        if given:
+            raise SpecificationError(f"{name} must go with --method paper, not with --method {method}")
+    return "bayes", REQUIRED_R
 
 
 _STORE = click.option(
@@ -88,11 +128,27 @@ _REQUIRED_R = click.option(
     "--required-r",
     type=float,
     callback=_check_required_r,
-    default=REQUIRED_R,
-    show_default=True,
-    help="Required adjusted r; orders are raised until it is reached.",
+    help=f"With --method paper: required adjusted r; orders are raised until it is reached.  [default: {REQUIRED_R:g}]",
 )
-_ROBUST = click.option("--robust", is_flag=True, help="Give outliers less weight (Huber).")
+_ROBUST = click.option("--robust", is_flag=True, help="With --method paper: give outliers less weight (Huber).")
+_METHOD = click.option(
+    "--method", type=click.Choice(METHODS), default=METHODS[0], show_default=True, help="How to fit the measurements."
+)
+_TYPE = click.option(
+    "--type",
+    "sensor_type",
+    callback=_sensor_type,
+    metavar="NAME|FILE",
+    help="With --method bayes: type of the sensor, equation_5a, equation_4 or a TOML file; kept for later fits.  "
+    "[default: unchanged; equation_5a for a new sensor]",
+)
+_ACCEPT = click.option(
+    "--accept",
+    callback=_millimetres,
+    metavar="LENGTH",
+    help="Largest acceptable 95 % interval of a reading's clearance, such as 0.2mm for +-0.2 mm, wherever there are "
+    "measurements.",
+)
 _VERSION = click.option("--version", "number", type=int, help="Version number.  [default: the newest]")
 
 
@@ -105,6 +161,9 @@ _VERSION = click.option("--version", "number", type=int, help="Version number.  
 @_range("clearance", "mm", DEFAULT_RANGES[0])
 @_range("voltage", "V", DEFAULT_RANGES[1])
 @_range("temperature", "degC", DEFAULT_RANGES[2])
+@_METHOD
+@_TYPE
+@_ACCEPT
 @_REQUIRED_R
 @_ROBUST
 @JSON_OPTION
@@ -117,7 +176,10 @@ def add_command(
     clearance_range: Range | None,
     voltage_range: Range | None,
     temperature_range: Range | None,
-    required_r: float,
+    method: str,
+    sensor_type: SensorType | None,
+    accept: float | None,
+    required_r: float | None,
     robust: bool,
     as_json: bool,
 ) -> None:
@@ -126,7 +188,7 @@ def add_command(
     An invalid row is refused with its line number and the reason: text in place of a number, a value out of range, or a
     measurement that is already in the store. Unless --keep-good is given, one invalid row refuses the whole file, and
     the exit status is 2. The measurements and the version fitted to them are on disk when this command ends. Exits
-    with 1 if the measurements are stored but no polynomial reaches the required r.
+    with 1 if the measurements are stored but no polynomial is good enough.
 
     \b
         sosmith calibrate add bench.csv --sensor left
@@ -137,6 +199,7 @@ def add_command(
     from sosmith.model.calibration.self_updating import add, refused_first_file
 
     ranges = (clearance_range, voltage_range, temperature_range)
+    chosen, needed_r = _method(method, required_r, robust)
     with show_progress() as step:
         step(f"adding {file}")
         addition = None
@@ -151,8 +214,11 @@ def add_command(
                     date,
                     ranges=ranges,
                     keep_good=keep_good,
-                    required_r=required_r,
+                    method=chosen,
+                    sensor_type=sensor_type,
+                    required_r=needed_r,
                     robust=robust,
+                    accept=accept,
                     progress=lambda tried, count: step("fitting", tried, count),
                 )
     if as_json:
@@ -167,6 +233,7 @@ def add_command(
     note(f"stored {_counted(good, 'measurement')} from {file} in {store}{left_out}")
     if addition.calibration is None:
         raise ShortfallError(addition.shortfall)
+    _warn(addition.calibration)
     if not as_json:
         from sosmith.commands.tables.calibration import print_calibration
 
@@ -177,18 +244,33 @@ def add_command(
 @_STORE
 @_SENSOR
 @_DATE
+@_METHOD
+@_TYPE
+@_ACCEPT
 @_REQUIRED_R
 @_ROBUST
 @JSON_OPTION
-def fit_command(store: Path, sensor: str, date: str, required_r: float, robust: bool, as_json: bool) -> None:
+def fit_command(
+    store: Path,
+    sensor: str,
+    date: str,
+    method: str,
+    sensor_type: SensorType | None,
+    accept: float | None,
+    required_r: float | None,
+    robust: bool,
+    as_json: bool,
+) -> None:
     """Refit to all measurements of a sensor.
 
-    Use it to change --robust or --required-r without new measurements. Creates a new version if the polynomial or the
-    options have changed. Exits with 1 if no polynomial reaches the required r.
+    Use it to change the method or its options, or for another day, without new measurements. Creates a new version if
+    the polynomial or the options have changed. Exits with 1 if no polynomial is good enough.
 
     \b
-        sosmith calibrate fit --sensor left --robust --required-r 0.99
+        sosmith calibrate fit --sensor left --accept 0.2mm
+        sosmith calibrate fit --sensor left --method paper --robust --required-r 0.99
     """
+    chosen, needed_r = _method(method, required_r, robust)
     from sosmith.commands.tables.calibration import print_calibration
     from sosmith.gen.instrument.calibration_report import calibration_json
     from sosmith.model.calibration.measurement_store import open_store
@@ -200,10 +282,14 @@ def fit_command(store: Path, sensor: str, date: str, required_r: float, robust: 
             opened,
             sensor,
             date,
-            required_r=required_r,
+            method=chosen,
+            sensor_type=sensor_type,
+            required_r=needed_r,
             robust=robust,
+            accept=accept,
             progress=lambda tried, count: step(f"fitting {sensor}", tried, count),
         )
+    _warn(made)
     if as_json:
         print_json(calibration_json(made))
     else:
@@ -314,6 +400,64 @@ def plot_command(store: Path, sensor: str, number: int | None, output: Path | No
         drawn = calibration_plot(made, versions, file_format)
     write_contents(path.parent, {path.name: drawn})
     note(f"wrote {path}: version {made.version.number} of sensor {sensor}")
+
+
+@calibrate.command("advise")
+@click.argument("clearances", nargs=-1, required=True, metavar="CLEARANCE...", callback=_lengths)
+@click.option("--within", default="0.2mm", show_default=True, callback=_millimetres, help="Wanted 95 % interval, +-.")
+@click.option(
+    "--temperature",
+    "temperatures",
+    type=click.FloatRange(-273.15, 2000.0),
+    multiple=True,
+    help="Temperature of the readings and of the measurements in degC; may be given several times.  "
+    "[default: lowest, middle and highest one measured]",
+)
+@click.option("--most", type=click.IntRange(1, 1000), default=60, show_default=True, help="Most measurements.")
+@_STORE
+@_SENSOR
+@_DATE
+@JSON_OPTION
+def advise_command(
+    clearances: tuple[float, ...],
+    within: float,
+    temperatures: tuple[float, ...],
+    most: int,
+    store: Path,
+    sensor: str,
+    date: str,
+    as_json: bool,
+) -> None:
+    """Say what to measure on a day, to know the clearances that matter well enough on that day.
+
+    CLEARANCE, such as 2mm, is where the readings must be good. The command lists where to measure and how many times,
+    and the 95 % intervals to expect without and with these measurements. Exits with 1 if --most of them are not enough.
+
+    \b
+        sosmith calibrate advise 2mm 3mm 4mm --sensor left --within 0.2mm
+    """
+    from sosmith.commands.tables.calibration import print_advice
+    from sosmith.gen.instrument.calibration_report import advice_json
+    from sosmith.model.calibration.measurement_store import open_store
+    from sosmith.model.calibration.self_updating import advice_for
+
+    with show_progress() as step, open_store(store) as opened:
+        step(f"fitting {sensor}")
+        found = advice_for(opened, sensor, date, clearances, temperatures, within, most)
+    if as_json:
+        print_json(advice_json(sensor, date, within, found))
+    else:
+        print_advice(sensor, date, found)
+    if not found.reached:
+        raise ShortfallError(
+            f"the intervals must be within {within:g} mm, and {found.count} measurements bring them to "
+            f"{max(found.after):.3g} mm only"
+        )
+
+
+def _warn(made: Calibration) -> None:
+    for warning in made.warnings:
+        note(f"warning: {warning}")
 
 
 def _counted(count: int, what: str) -> str:

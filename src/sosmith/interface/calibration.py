@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from sosmith.interface.notebook import table_html
 from sosmith.interface.quantity import Quantity
 from sosmith.model.calibration.acceptance import REQUIRED_R
 from sosmith.model.calibration.fit import Fit, Measurements, fit, read_measurements, residuals
+from sosmith.model.calibration.uncertainty import Uncertainty, of_polynomial
 from sosmith.model.errors import SpecificationError
 
 
@@ -32,6 +34,8 @@ class Calibration:
     (2, 1)
     >>> calibration(5.0, 50.0).round(6).item()
     4.55
+    >>> calibration.half_width(5.0, 50.0).item() < 0.001  # mm, 95 % interval of a reading
+    True
     >>> spec = sosmith.Specification.example().replaced(calibration=calibration.table())
     """
 
@@ -122,6 +126,24 @@ class Calibration:
         """Root mean square of `residual`."""
         return Quantity(self.fitted.rms, "mm")
 
+    @cached_property
+    def _uncertainty(self) -> Uncertainty:
+        return of_polynomial(self.measurements, self.fitted)
+
+    @property
+    def warning(self) -> str:
+        """A sentence if the residuals follow a curve that the polynomial misses, else empty."""
+        return self._uncertainty.lack.warning
+
+    def half_width(self, voltage: npt.ArrayLike, temperature: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        """Return the half-width in mm of the 95 % interval of a reading's clearance; shapes are broadcast.
+
+        It is that of the calibration alone: the standard error of the curve, and what the curve misses if the residuals
+        follow a curve.
+        """
+        V, T = np.broadcast_arrays(np.asarray(voltage, dtype=np.float64), np.asarray(temperature, dtype=np.float64))
+        return self._uncertainty.half_width(V.ravel(), T.ravel()).reshape(V.shape)
+
     @property
     def covered(self) -> dict[str, tuple[float, float]]:
         """Smallest and largest measured "voltage" in V and "temperature" in degC."""
@@ -141,12 +163,14 @@ class Calibration:
 
     def _repr_html_(self) -> str:
         m, n = self.orders
+        low, high = self._uncertainty.limits
         rows = [
             ("measurements", f"{len(self.measurements.clearance):,}"),
             ("orders", f"{m} in voltage, {n} in temperature"),
             ("adjusted r", f"{self.adjusted_r:.6f}"),
             ("residual, rms", str(self.rms)),
             ("residual, largest", str(Quantity(float(abs(self.residual).max()), "mm"))),
+            ("95 % interval of a reading", f"±{low:.3g} to ±{high:.3g} mm where there are measurements"),
         ]
         return table_html("Calibration", rows)
 

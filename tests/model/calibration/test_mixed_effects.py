@@ -130,9 +130,10 @@ def test_the_interval_of_a_mixture_holds_its_share() -> None:
     assert sum(w * (high - low) for w, (high, low) in zip(weight, inside, strict=True)) == pytest.approx(0.9, rel=1e-9)
 
 
-@pytest.mark.parametrize("name", ["stacked_matrices", "systematic_error", "day_sums", "day_filter", "mixed_effects"])
+@pytest.mark.parametrize("name", ["day_filter", "day_sums", "mixed_effects", "stacked_matrices", "systematic_error"])
 def test_no_kernel_of_a_machine_has_a_part_in_it(name: str) -> None:
     """Matrix products and elementary functions of numpy differ in the last bits from machine to machine."""
-    source = (Path(mixed_effects.__file__).parent / f"{name}.py").read_text(encoding="utf-8")
+    (path,) = Path(mixed_effects.__file__).parents[1].glob(f"*/{name}.py")
+    source = path.read_text(encoding="utf-8")
     used = set(re.findall(r"np\.(?:exp|log|power|matmul|dot|einsum|inner|linalg)\b| @ ", source))
     assert used == set()

@@ -20,6 +20,7 @@ from tests.model.calibration.measuring import readings, write_csv
 from sosmith.model.calibration.measurement_store import MeasurementStore, open_store
 from sosmith.model.calibration.polynomial import EQUATION_5A, Polynomial
 from sosmith.model.calibration.self_updating import add, calibration_of, find_version, refit
+from sosmith.model.calibration.sensor_type import SENSOR_TYPES
 from sosmith.model.errors import ShortfallError, SpecificationError, ToolError
 
 DAY = "2024-03-01"
@@ -253,6 +254,43 @@ def opening(path: Path, message: str, kind: type[Exception] = SpecificationError
         pass
 
 
+def test_a_store_of_version_1_is_brought_up_to_date(tmp_path: Path) -> None:
+    path = tmp_path / "c.db"
+    with open_store(path, create=True) as store:
+        made = add(store, "left", write_csv(tmp_path / "a.csv", readings(60)), "2024-03-01").calibration
+    assert made is not None
+    with sqlite3.connect(path) as connection:
+        for table, column in (("sensor", "type"), ("version", "method"), ("version", "type"), ("version", "accept_mm")):
+            connection.execute(f"ALTER TABLE {table} DROP COLUMN {column}")
+        connection.execute("PRAGMA user_version = 1")
+    connection.close()
+    with open_store(path) as store:
+        assert calibration_of(store, "left").version == made.version
+        other = refit(store, "left", "2024-03-01", method="bayes", sensor_type=SENSOR_TYPES["equation_4"])
+        assert other.version.sensor_type == store.sensor_type("left") == SENSOR_TYPES["equation_4"]
+    with open_store(path) as store:
+        assert [one.method for one in store.versions("left")] == ["paper", "bayes"]
+        assert calibration_of(store, "left").version == other.version
+
+
+@pytest.mark.parametrize(("column", "value"), [("method", "guess"), ("type", "{}"), ("accept_mm", "wide")])
+def test_a_spoilt_version_is_refused(tmp_path: Path, column: str, value: str) -> None:
+    path = tmp_path / "c.db"
+    with open_store(path, create=True) as store:
+        add(store, "left", write_csv(tmp_path / "a.csv", readings(60)), "2024-03-01")
+    with sqlite3.connect(path) as connection:
+        connection.execute("DROP TRIGGER version_update")
+        connection.execute("PRAGMA writable_schema = ON")
+        connection.execute("UPDATE sqlite_schema SET sql = replace(sql, 'STRICT', '') WHERE name = 'version'")
+    connection.close()
+    with sqlite3.connect(path) as connection:
+        connection.execute(f"UPDATE version SET {column} = ?", (value,))
+    connection.close()
+    text = re.escape(f"{path} must be an undamaged store, not one with the value ") + ".*"
+    with open_store(path) as store, pytest.raises(SpecificationError, match=f"^{text}$"):
+        store.versions("left")
+
+
 def test_files_that_are_no_store(tmp_path: Path) -> None:
     path = tmp_path / "c.db"
     opening(path, " must be an existing store of measurements; sosmith calibrate add creates one")
@@ -270,9 +308,9 @@ def test_files_that_are_no_store(tmp_path: Path) -> None:
     with open_store(path, create=True):
         pass
     with sqlite3.connect(path) as connection:
-        connection.execute("PRAGMA user_version = 2")
+        connection.execute("PRAGMA user_version = 3")
     connection.close()
-    opening(path, ": the store's schema must be version 1, not 2")
+    opening(path, ": the store's schema must be version 2, not 3")
 
 
 def test_a_damaged_store_is_noticed(store: MeasurementStore, tmp_path: Path) -> None:

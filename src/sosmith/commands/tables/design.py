@@ -11,10 +11,13 @@ from rich.markup import escape
 from sosmith.commands.tables.console import TableConsole, new_table
 from sosmith.gen.architecture import Architecture
 from sosmith.gen.output.core_facts import LimitCycleFacts
+from sosmith.gen.specification.specification import Specification
 from sosmith.gen.specification.wear_limits import WearSpec
 from sosmith.gen.word_lengths.cost import cost_of
 from sosmith.interface.design import Design
 from sosmith.interface.quantity import Quantity
+from sosmith.model.calibration.fit import Fit, read_measurements
+from sosmith.model.calibration.uncertainty import of_polynomial
 from sosmith.model.dataflow.program import Program
 from sosmith.model.port import Port
 
@@ -38,6 +41,7 @@ def print_design(design: Design, *, details: bool = False) -> None:
             "calibration",
             f"fitted: orders {m} in voltage, {n} in temperature, adjusted r {made.fit.adjusted_r:.4f}",
         )
+        overview.add_row("its measurements", _worth(made.spec, made.fit))
     elif quantized.polynomial is not None:
         m, n = quantized.polynomial.orders
         overview.add_row("calibration", f"given: orders {m} in voltage, {n} in temperature")
@@ -63,6 +67,16 @@ def print_design(design: Design, *, details: bool = False) -> None:
         console.print(sections)
         _print_limit_cycles(console, design.facts.limit_cycles, lsb)
     _print_schedule(console, made.architecture.program)
+
+
+def _worth(spec: Specification, fitted: Fit) -> str:
+    """Return what a fitted calibration is worth, in the unit of its measurements: the proof covers arithmetic only."""
+    assert spec.calibration is not None
+    assert spec.calibration.data is not None
+    found = of_polynomial(read_measurements(spec.calibration.data), fitted)
+    low, high = found.limits
+    missed = f"; {found.lack.warning}" if found.lack.structured else ""
+    return f"hold 95 % of the clearances within ±{low:.3g} to ±{high:.3g} mm of the polynomial{missed}"
 
 
 def _wear_text(wear: WearSpec, output: Port) -> str:
