@@ -25,8 +25,6 @@ def stream_command(port: str, trace: Path, baud: int, output: Path | None) -> No
     \b
         sosmith stream /dev/ttyUSB1 ramp.csv -o results.csv
     """
-    import numpy as np
-
     from sosmith.host.board import Board
     from sosmith.host.recording import recording
     from sosmith.host.rows import columns, rows
