@@ -54,7 +54,11 @@ _COMMANDS = {
         "reload_command",
         "Prove that a running core can load new coefficients, and save the register writes.",
     ),
-    "build": _Command("build", "build_command", "Build a bitstream with the core of SPEC for a board."),
+    "build": _Command(
+        "build",
+        "build_command",
+        "Build a bitstream with the core of SPEC and the serial link of docs/protocol.md for a board.",
+    ),
     "simulate": _Command(
         "simulate", "simulate_command", "Simulate the generated hardware of SPEC and report its accuracy."
     ),

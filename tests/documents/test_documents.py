@@ -75,13 +75,12 @@ def run(line: str, folder: Path) -> str:
 
 
 def worked_example(folder: Path) -> str:
-    """Print what the README shows under its specification: the design, up to its sections."""
+    """Print what the README shows under its specification: the design."""
     lines = shell_lines()
     specification = next(line for line in lines if line.startswith("cat > "))
     run(specification, folder)
     printed = run(next(line for line in lines if line.startswith("./run design ")), folder)
-    lines = [line.rstrip() for line in printed.strip().splitlines()]
-    return "\n".join(lines[: lines.index("Sections") - 1]) + "\n"
+    return printed.strip() + "\n"
 
 
 def with_output(text: str, folder: Path) -> str:

@@ -13,7 +13,6 @@ import click
 from sosmith.gen.picture import format_of
 from sosmith.model.calibration.acceptance import DEFAULT_RANGES, METHODS, REQUIRED_R, Method, Range
 from sosmith.model.errors import ShortfallError, SpecificationError
-from sosmith.model.tables.csv_table import shortened
 from sosmith.model.text_files import write_contents, write_files
 from sosmith.terminal import JSON_OPTION, note, output_option, print_json, show_progress
 
@@ -91,7 +90,7 @@ def _lengths(ctx: click.Context, parameter: click.Parameter, texts: tuple[str, .
 def _length(name: str, text: str) -> float:
     found = re.fullmatch(r"(\d+(?:\.\d+)?) ?mm", text.strip())
     if found is None or not 0 < float(found[1]) <= 1000:
-        raise SpecificationError(f"{name} must be a length such as 0.2mm, not {shortened(text)}")
+        raise SpecificationError(f"{name} must be a length such as 0.2mm, not {text[:60]!r}")
     return float(found[1])
 
 
