@@ -43,7 +43,7 @@ def on_cluster(tasks: Sequence[Task], address: str) -> Iterator[Point]:
             futures = [
                 client.submit(evaluate, task, key=f"sosmith-{task.key}") for task in tasks[start : start + _BATCH]
             ]
-            for future in as_completed(futures):
+            for future in as_completed(futures, loop=client.loop):
                 yield future.result()
                 future.release()
     except KilledWorker as error:
