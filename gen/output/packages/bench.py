@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from sosmith.gen.core import CoreDesign
-from sosmith.gen.output.core_facts import CoreFacts
+from sosmith.gen.output.packages.facts import PackageFacts
 from sosmith.gen.output.packages.lint_waivers import verilator_waivers
-from sosmith.gen.output.packages.pins import Pin
 from sosmith.gen.output.packages.stimuli import bench_stimuli
 from sosmith.gen.output.vectors import hex_words
 from sosmith.model.dataflow.status import STATUS_BITS
@@ -17,17 +14,15 @@ _SPARE = 64
 """Clocks beyond a core's longest pause, in which the bench stalls its output or has no sample ready."""
 
 
-def bench_files(design: CoreDesign, facts: CoreFacts, pins: Sequence[Pin]) -> dict[str, str]:
+def bench_files(design: CoreDesign, facts: PackageFacts) -> dict[str, str]:
     """Return the texts of the bench by their paths in the package.
 
     Parameters
     ----------
     design : CoreDesign
         The core.
-    facts : CoreFacts
-        Facts about it.
-    pins : sequence of Pin
-        Ports of the top module.
+    facts : PackageFacts
+        What its package says about it.
     """
     interface, datapath = facts.interface, design.datapath
     stimuli = bench_stimuli(design)
@@ -42,9 +37,9 @@ def bench_files(design: CoreDesign, facts: CoreFacts, pins: Sequence[Pin]) -> di
         "data_out": out.width,
         "stimulus": into.dest_width + into.width,
         "response": out.dest_width + STATUS_BITS + out.width,
-        "registers": [pin for pin in pins if pin.bus == "s_axil"],
-        "patience": interface.reset_cycles + interface.latency_cycles + facts.cycles_per_sample + _SPARE,
-        "channels": facts.channels,
+        "registers": [pin for pin in facts.pins if pin.bus == "s_axil"],
+        "patience": interface.reset_cycles + interface.latency_cycles + facts.core.cycles_per_sample + _SPARE,
+        "channels": facts.core.channels,
         "takes_channel": len(datapath.wear) > 1,
         "inputs": into.fields,
         "output": datapath.output,

@@ -6,14 +6,28 @@ from collections.abc import Callable
 from pathlib import Path
 
 from sosmith.gen.core import CoreDesign
-from sosmith.gen.output.core_facts import core_facts
 from sosmith.gen.output.generate import generated
 from sosmith.gen.output.packages.bench import bench_files
-from sosmith.gen.output.packages.pins import pins
+from sosmith.gen.output.packages.driver import driver_files
+from sosmith.gen.output.packages.facts import package_facts
+from sosmith.gen.output.packages.fusesoc import fusesoc_files
+from sosmith.gen.output.packages.ip_xact import ip_xact_files
+from sosmith.gen.output.packages.python_wrappers import wrapper_files
+from sosmith.gen.output.packages.readme import readme_files
+from sosmith.gen.output.packages.timing_diagram import timing_files
+from sosmith.gen.output.packages.vendor_tools import vendor_files
+from sosmith.gen.output.packages.vhdl import vhdl_files
+from sosmith.gen.output.packages.vlnv import Vlnv
 from sosmith.model.text_files import write_files
 
 
-def package(design: CoreDesign, directory: Path, progress: Callable[[str], None] = lambda step: None) -> list[Path]:
+def package(
+    design: CoreDesign,
+    directory: Path,
+    progress: Callable[[str], None] = lambda step: None,
+    *,
+    vlnv: Vlnv | None = None,
+) -> list[Path]:
     """Write the package of a core into `directory`; return the paths of the files.
 
     Two runs on the same specification write the same bytes.
@@ -26,6 +40,8 @@ def package(design: CoreDesign, directory: Path, progress: Callable[[str], None]
         Folder of the package, made if missing.
     progress : callable
         Called with the name of each step.
+    vlnv : Vlnv or None
+        Name of the package for FuseSoC and IP-XACT; None for `Vlnv.default`.
 
     Raises
     ------
@@ -35,19 +51,30 @@ def package(design: CoreDesign, directory: Path, progress: Callable[[str], None]
         If the folder cannot be written.
     """
     folders: dict[Path, dict[str, str]] = {}
-    for path, text in packed(design, progress).items():
+    for path, text in packed(design, progress, vlnv=vlnv).items():
         place = directory / path
         folders.setdefault(place.parent, {})[place.name] = text
     return [path for folder, texts in folders.items() for path in write_files(folder, texts)]
 
 
-def packed(design: CoreDesign, progress: Callable[[str], None] = lambda step: None) -> dict[str, str]:
+def packed(
+    design: CoreDesign, progress: Callable[[str], None] = lambda step: None, *, vlnv: Vlnv | None = None
+) -> dict[str, str]:
     """Return the texts that `package` writes, by their paths in the package; parameters and errors as there."""
-    facts = core_facts(design)
-    core = generated(design, progress, facts=facts)
+    facts = package_facts(design, vlnv)
+    core = generated(design, progress, facts=facts.core)
     progress("bench")
-    ports = pins(design, facts.interface)
+    bench = bench_files(design, facts)
+    progress("files of other tools")
     return {
+        **readme_files(facts),
+        **fusesoc_files(facts),
         **{f"core/{name}": text for name, text in core.items()},
-        **bench_files(design, facts, ports),
+        **bench,
+        **ip_xact_files(facts),
+        **vendor_files(facts),
+        **vhdl_files(facts),
+        **wrapper_files(facts),
+        **driver_files(facts),
+        **timing_files(facts),
     }

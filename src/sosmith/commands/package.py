@@ -16,6 +16,11 @@ from sosmith.terminal import output_option, show_progress
 @REALIZATION
 @WIDTHS_OF
 @BOARD
+@click.option(
+    "--vlnv",
+    metavar="VENDOR:LIBRARY:NAME:VERSION",
+    help="Name of the package for FuseSoC and IP-XACT.  [default: user:sosmith:<name>:1.0]",
+)
 @output_option("Folder of the package.  [default: build/<name>/package]")
 def package_command(
     spec: Path,
@@ -23,12 +28,15 @@ def package_command(
     realization: str | None,
     widths_of: str | None,
     board: str | None,
+    vlnv: str | None,
     output: Path | None,
 ) -> None:
     """Pack the core of SPEC for other tools, with a bench that needs none of ours.
 
     The folder core/ has what `sosmith generate` writes. In bench/ are a self-checking bench in plain SystemVerilog, one
-    of the C model in C, their vectors and a Makefile; they need neither sosmith nor Python.
+    of the C model in C, their vectors and a Makefile; they need neither sosmith nor Python. Beside them are a core file
+    for FuseSoC, an IP-XACT component, scripts for Vivado and Quartus, VHDL, wrappers for Amaranth and LiteX, a driver
+    for cocotb, and for a reloadable core one in C. README.md says how each is used.
 
     Prints the paths of the files to stdout, one per line. Two runs write identical files.
 
@@ -36,13 +44,16 @@ def package_command(
         sosmith package my.toml -o my_core
         make -C my_core/bench icarus
     """
+    from sosmith.gen.output.packages.vlnv import Vlnv
     from sosmith.interface.specification import Specification
 
+    if vlnv is not None:
+        Vlnv.read(vlnv)
     asked = Specification.load(spec)
     with show_progress() as step:
         from sosmith.interface.design import design
 
         made = design(asked, core=core, realization=realization, widths_of=widths_of, board=board, progress=step)
-        paths = made.package(output or default_folder(asked.name) / "package", step)
+        paths = made.package(output or default_folder(asked.name) / "package", vlnv=vlnv, progress=step)
     for path in paths:
         click.echo(path)

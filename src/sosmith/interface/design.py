@@ -21,6 +21,7 @@ from sosmith.gen.output.core_facts import CoreFacts, core_facts
 from sosmith.gen.output.generate import generate
 from sosmith.gen.output.manifest import manifest
 from sosmith.gen.output.packages.package import package
+from sosmith.gen.output.packages.vlnv import Vlnv
 from sosmith.gen.output.vectors import check_format
 from sosmith.gen.word_lengths.cost import Cost
 from sosmith.interface.certificate import Certificate, Progress, Proof
@@ -315,17 +316,33 @@ class Design:
         """
         return generate(self.core, Path(fspath(folder)), lambda step: progress(step, 0, 0))
 
-    def package(self, folder: str | PathLike[str], progress: Progress = lambda step, done, total: None) -> list[Path]:
+    def package(
+        self,
+        folder: str | PathLike[str],
+        *,
+        vlnv: str | None = None,
+        progress: Progress = lambda step, done, total: None,
+    ) -> list[Path]:
         """Write the core and what other tools need to take it in into `folder`; return the paths of the files.
+
+        Parameters
+        ----------
+        folder : path
+            Folder of the package; its README.md says what the files are for.
+        vlnv : str
+            Name for FuseSoC and IP-XACT, "vendor:library:name:version"; "user:sosmith:<name>:1.0" by default.
+        progress : callable
+            Called with the name of each step, 0 and 0.
 
         Raises
         ------
         SpecificationError
-            If the folder cannot be written.
+            If the folder cannot be written, or `vlnv` is not of that form.
         ToolError
             If Yosys fails, or the disk is full.
         """
-        return package(self.core, Path(fspath(folder)), lambda step: progress(step, 0, 0))
+        named = None if vlnv is None else Vlnv.read(vlnv)
+        return package(self.core, Path(fspath(folder)), lambda step: progress(step, 0, 0), vlnv=named)
 
     def build(
         self,

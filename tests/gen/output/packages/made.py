@@ -45,7 +45,7 @@ def unpacked(name: str, folder: Path) -> Path:
 def called(*command: str | Path, at: Path, simulator: str = "icarus") -> subprocess.CompletedProcess[str]:
     """Run a command in the folder `at`, with a simulator where it finds it and without this package."""
     environment = find_simulator(simulator, at / ".bin").environment
-    kept = {key: value for key, value in environment.items() if key != "PYTHONPATH"}
+    kept = {key: value for key, value in environment.items() if key not in {"PYTHONPATH", "PYTEST_CURRENT_TEST"}}
     for key in ("OBJCACHE", "CCACHE_DIR"):
         kept |= {key: os.environ[key]} if key in os.environ else {}
     return subprocess.run(command, cwd=at, env=kept, capture_output=True, text=True, check=False)

@@ -1,16 +1,20 @@
 """A package: the same bytes on every run, its core the one that `generate` writes."""
 
+import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from lxml import etree
 from tests.commands.invocation import Invocation
 from tests.gen.output.packages.made import SPECIFICATIONS, design_of, package_of
 
 import sosmith
 from sosmith.gen.output.generate import generated
+from sosmith.gen.output.packages.facts import package_facts
 
 PACKAGE = Invocation("package")
 
@@ -36,3 +40,49 @@ def test_two_runs_write_the_same_bytes(tmp_path: Path) -> None:
 def test_the_core_is_the_one_that_generate_writes(name: str) -> None:
     core = {path.removeprefix("core/"): text for path, text in package_of(name).items() if path.startswith("core/")}
     assert core == generated(design_of(name).core)
+
+
+@pytest.mark.parametrize("name", SPECIFICATIONS)
+def test_the_readme_names_every_folder_and_only_files_that_exist(name: str) -> None:
+    texts = package_of(name)
+    readme = texts["README.md"]
+    named = set(re.findall(r"[`(]([\w/]+/[\w.]*|[\w]+\.core)[`)]", readme))
+    assert {path.split("/")[0] for path in texts} - {"README.md"} == {path.split("/")[0] for path in named}
+    present = {*texts, *(f"{path.rpartition('/')[0]}/" for path in texts)}
+    assert named <= present
+
+
+def test_the_readme_has_a_row_for_every_port() -> None:
+    rows = re.findall(r"^\| `(\w+)` \| (in|out) \| (\d+) \| \S", package_of("tunable")["README.md"], flags=re.MULTILINE)
+    pins = package_facts(design_of("tunable").core).pins
+    assert rows == [(pin.name, "out" if pin.output else "in", str(pin.width)) for pin in pins]
+    header = package_of("tunable")["core/tunable.sv"]
+    assert set(re.findall(r"^  (?:input|output) (?:\[\d+:0\] )?(\w+);", header, flags=re.MULTILINE)) >= {
+        pin.name for pin in pins
+    }
+
+
+@pytest.mark.parametrize("name", SPECIFICATIONS)
+@pytest.mark.parametrize("tool", ["vivado", "quartus"])
+def test_scripts_for_vendors_tools_name_files_that_exist(tool: str, name: str) -> None:
+    """All that is checked of them here: neither tool is at hand."""
+    texts = package_of(name)
+    script = texts[f"{tool}/synthesize.tcl"]
+    named = {tuple(path.split()) for path in re.findall(r"\[file join \$here ([\w. ]+)\]", script)}
+    suffix = "xdc" if tool == "vivado" else "sdc"
+    assert named == {("..", "core", f"{name}.sv"), (f"{name}.{suffix}",)}
+    assert {f"{tool}/{name}.{suffix}", f"core/{name}.sv"} <= texts.keys()
+    assert "sosmith has not run this script" in script
+    period = {"plain": "83.333", "gauge": "83.333", "tunable": "1000.000"}[name]
+    assert f"-period {period} [get_ports aclk]" in texts[f"{tool}/{name}.{suffix}"]
+
+
+@pytest.mark.parametrize("name", SPECIFICATIONS)
+def test_the_timing_diagram_shows_two_samples_and_their_results(name: str) -> None:
+    source = json.loads(package_of(name)[f"doc/{name}_timing.json"])
+    waves = {signal["name"]: signal["wave"] for signal in source["signal"]}
+    assert len({len(wave) for wave in waves.values()}) == 1
+    assert f"{design_of(name).latency_cycles} clocks after its sample" in source["head"]["text"]
+    picture = etree.fromstring(package_of(name)[f"doc/{name}_timing.svg"].encode())
+    shown = {text for text in picture.itertext() if text.strip()}
+    assert {*waves, "sample 0", "sample 1", "result 0", "result 1"} <= shown

@@ -1,0 +1,77 @@
+"""What the files of a package say about their core, collected once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+from sosmith.gen.core import CoreDesign
+from sosmith.gen.output.core_facts import CoreFacts, InterfaceFacts, core_facts
+from sosmith.gen.output.packages.pins import Pin, pins
+from sosmith.gen.output.packages.vlnv import Vlnv
+from sosmith.model.reload.registers import PROTECTED_REGISTERS, REGISTERS, Register
+
+
+@dataclass(frozen=True, kw_only=True)
+class PackageFacts:
+    """A core as its package describes it.
+
+    Attributes
+    ----------
+    core : CoreFacts
+        Facts about the core.
+    pins : tuple of Pin
+        Ports of the top module.
+    vlnv : Vlnv
+        Its name among other cores.
+    clock : Fraction
+        Clock in the specification, in Hz.
+    registers : tuple of Register
+        Registers on its AXI4-Lite port; empty if it has none.
+    """
+
+    core: CoreFacts
+    pins: tuple[Pin, ...]
+    vlnv: Vlnv
+    clock: Fraction
+    registers: tuple[Register, ...]
+
+    @property
+    def name(self) -> str:
+        """Name of the top module."""
+        return self.core.name
+
+    @property
+    def interface(self) -> InterfaceFacts:
+        """Streams of the core."""
+        return self.core.interface
+
+    @property
+    def period(self) -> float:
+        """Period of the clock in ns, rounded to ps."""
+        return round(float(10**9 / self.clock), 3)
+
+    @property
+    def description(self) -> str:
+        """What the core is, in one line."""
+        core = self.core
+        parts = [core.core, *([core.realization] if core.realization else []), core.architecture]
+        inputs = ", ".join(field.port.name for field in core.interface.inputs.fields)
+        (output,) = core.interface.outputs.fields
+        error = f"error at most {core.error_bound:.6g} {core.unit}".strip()
+        return f"{', '.join(parts)}: {inputs} to {output.port.name}, {error}"
+
+
+def package_facts(design: CoreDesign, vlnv: Vlnv | None = None) -> PackageFacts:
+    """Collect what a package says about a core; without `vlnv`, under the usual name."""
+    facts = core_facts(design)
+    registers: tuple[Register, ...] = ()
+    if facts.reload is not None:
+        registers = REGISTERS if facts.protect == "none" else PROTECTED_REGISTERS
+    return PackageFacts(
+        core=facts,
+        pins=pins(design, facts.interface),
+        vlnv=vlnv or Vlnv.default(facts.name),
+        clock=design.spec.hardware.clock,
+        registers=registers,
+    )
