@@ -510,7 +510,9 @@ def test_good_measurements_are_fitted(sosmith: Command) -> None:
     Path("demo.toml").write_text(fitted, encoding="utf-8")
     outcome = sosmith("design", "demo.toml")
     assert outcome.status == 0
-    assert "fitted: orders 1 in voltage, 1 in temperature, adjusted r 1.0000" in " ".join(outcome.stdout.split())
+    shown = " ".join(outcome.stdout.split())
+    assert "fitted: orders 1 in voltage, 1 in temperature, adjusted r 1.0000" in shown
+    assert re.search(r"hold 95 % of the clearances within ±\S+ to ±\S+ mm of the polynomial", shown)
 
 
 # What the commands do.
