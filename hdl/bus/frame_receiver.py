@@ -76,17 +76,22 @@ class FrameReceiver(wiring.Component):
         m = Module()
         m.submodules.buffers = buffers = Memory(shape=8, depth=512, init=[], attrs=BLOCK_RAM)
         store, fetch = buffers.write_port(), buffers.read_port()
-        left, index = Signal(8), Signal(8)
+        left = Signal(8)
+        index = Signal(8)
         begun, dropped, too_long = Signal(), Signal(), Signal()
-        slot, first, held = Signal(), Signal(), Signal(2)
+        slot = Signal()
+        first = Signal()
+        held = Signal(2)
         ends, code = self.i_data == 0, left == 0
         # The first code of a frame stands for no byte; every other one for a zero byte.
         gives = ~ends & (begun | ~code)
         accepted = Signal()
+        stores = Signal()
         m.d.comb += [
             store.addr.eq(Cat(Mux(ends, LENGTH_ADDRESS, index), slot)),
             store.data.eq(Mux(ends, index, Mux(code, 0, self.i_data))),
-            store.en.eq(self.i_valid & (accepted | (gives & ~dropped & (index != MAX_MESSAGE)))),
+            stores.eq(self.i_valid & (accepted | (gives & ~dropped & (index != MAX_MESSAGE)))),
+            store.en.eq(stores),
             fetch.addr.eq(Cat(self.i_address, first)),
             self.o_data.eq(fetch.data),
             self.o_full.eq(held != 0),
