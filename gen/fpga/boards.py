@@ -269,6 +269,9 @@ BOARDS = {board.name: board for board in _ALL}
 BUILDABLE = tuple(name for name, board in BOARDS.items() if board.platform is not None)
 """Names of the boards that bitstreams are made for."""
 
+MODELLED = tuple(name for name, board in BOARDS.items() if board.device.family in {"ice40", "ecp5"})
+"""Names of the boards whose netlists can be simulated: there are models of all cells."""
+
 
 def find_board(name: str, among: Iterable[str] = BOARDS) -> Board:
     """Return the board `name`, which may be written with hyphens and capitals.

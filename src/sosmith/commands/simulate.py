@@ -22,7 +22,7 @@ from sosmith.commands.options import (
     OneOf,
     default_folder,
 )
-from sosmith.gen.fpga.boards import BOARDS, find_board
+from sosmith.gen.fpga.boards import MODELLED, find_board
 from sosmith.model.errors import SpecificationError
 from sosmith.model.scenarios.summaries import SUMMARIES, check_scenario, fitting
 from sosmith.model.suggestion import did_you_mean
@@ -103,7 +103,7 @@ def _empty_cache(ctx: click.Context, param: click.Parameter, wanted: bool) -> No
     "--gates",
     metavar="BOARD",
     help="Simulate the netlist that Yosys synthesizes for the FPGA of this board instead: "
-    f"{', '.join(BOARDS)}. Synthesis takes seconds, and the simulation is slower.",
+    f"{', '.join(MODELLED)}. Synthesis takes seconds, and the simulation is slower.",
 )
 @PORT
 @BAUD
@@ -175,7 +175,7 @@ def simulate_command(
         check_format(vectors)
     if port is not None and (gates is not None or waves):
         raise SpecificationError("--port must come without --gates and --waves, which need a simulator")
-    netlist_for = None if gates is None else find_board(gates).name
+    netlist_for = None if gates is None else find_board(gates, MODELLED).name
     asked = Specification.load(spec)
     if source is not None and not _is_file(source):
         check_scenario(source, _kind(asked, core))

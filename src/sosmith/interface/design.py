@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.filter.response import complex_response
-from sosmith.gen.fpga.boards import BUILDABLE, RATE, find_board
+from sosmith.gen.fpga.boards import BUILDABLE, MODELLED, RATE, find_board
 from sosmith.gen.output.certificate import about, certificate
 from sosmith.gen.output.core_facts import CoreFacts, core_facts
 from sosmith.gen.output.generate import generate
@@ -460,7 +460,7 @@ class Design:
                 raise SpecificationError(f"{name} must be from 0 to 0.99, not {share}")
         if vectors is not None:
             check_format(Path(fspath(vectors)))
-        board = None if gates is None else find_board(gates)
+        board = None if gates is None else find_board(gates, MODELLED)
         place = Path("build") / self.core.spec.name if folder is None else Path(fspath(folder))
         progress("trace", 0, 0)
         traces = traces_of(self.core, trace, seed=seed, seconds=seconds)
