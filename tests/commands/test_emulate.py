@@ -69,7 +69,7 @@ def test_measurements_that_the_store_takes(folder: Path) -> None:
     written = run("emulate", "spec.toml", "depot.toml", "--measurements", "-o", "m.csv")
     assert (folder / "m.csv").read_text(encoding="utf-8") == shown.stdout
     assert "wrote m.csv: 72 measurements" in written.stderr
-    added = run("calibrate", "add", "m.csv", "--required-r", "0.9")
+    added = run("calibrate", "add", "m.csv", "--method", "paper", "--required-r", "0.9")
     assert added.exit_code == 0, added.output
     assert "stored 72 measurements" in added.stderr
 
