@@ -11,15 +11,12 @@ if a build takes longer than it may.
 from __future__ import annotations
 
 import argparse
-import contextlib
 import json
-import os
 import resource
 import secrets
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
 from pathlib import Path
@@ -151,28 +148,13 @@ def build_seconds(source: Path, interface: InterfaceFacts, folder: Path) -> tupl
     signals = tuple(optional_signals(interface))
     model = Model(source=new, top=interface.name, ports=tuple(ports_of(interface)), signals=signals, waves=False)
     tool = find_simulator("verilator", folder / "bin")
-    builder = Builder(tool.version, tool.environment, folder)
-    with _silence():
+    with (folder / "build.log").open("w", encoding="utf-8") as log:
+        builder = Builder(tool.version, tool.environment, folder, log)
         started = _children_seconds()
         builder.build(model, folder / "new")
         between = _children_seconds()
         build_cxxrtl(new, interface.name, signals, tool.environment, folder, folder / "new.so")
         return between - started, _children_seconds() - between
-
-
-@contextlib.contextmanager
-def _silence() -> Iterator[None]:
-    """Drop what programs print meanwhile."""
-    kept = os.dup(1), os.dup(2)
-    with Path(os.devnull).open("wb") as nowhere:
-        for stream in (1, 2):
-            os.dup2(nowhere.fileno(), stream)
-        try:
-            yield
-        finally:
-            for stream, each in zip((1, 2), kept, strict=True):
-                os.dup2(each, stream)
-                os.close(each)
 
 
 def _children_seconds() -> float:
