@@ -90,7 +90,7 @@ def test_two_hundred_thousand_frames_over_a_damaged_line() -> None:
     made = filter_design()
     device = plain_device()
     line = BadLine(device, LineDamage(1000, 7))
-    codes = random_codes(made, 100_000 * 80)
+    codes = random_codes(made, 100_000 * 80)  # so many requests, and as many responses
     with Board.on(line) as board:
         results = board.run_codes(codes)
     assert np.array_equal(results.codes, made.core.datapath.compute(codes)[:, 0])

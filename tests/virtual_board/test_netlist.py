@@ -175,7 +175,7 @@ def test_the_locomotive_over_the_port(place: Path) -> None:
 @pytest.mark.slow
 def test_two_hundred_thousand_frames_over_a_damaged_line(place: Path) -> None:
     made = filter_design().core
-    count = 200_000
+    count = 100_000  # requests, and as many responses
     codes = codes_for(made, count)
     samples = codes[:, 0].astype("<i2").tobytes()
     with running(netlist_of(made, place), LineDamage(1000, 9)) as port, Board(port) as board:
