@@ -40,7 +40,7 @@ from sosmith.terminal import JSON_OPTION, note, output_option, print_json, reade
 @click.option("--simulate", is_flag=True, help="Co-simulate the designs of the front, each with a report.")
 @click.option(
     "--simulator",
-    type=OneOf(["verilator", "icarus"]),
+    type=OneOf(["verilator", "icarus", "cxxrtl"]),
     default="verilator",
     show_default=True,
     help="Simulator for --simulate.",

@@ -117,7 +117,7 @@ def explore(
     simulate : bool
         Whether to co-simulate the designs of the front, each with a report.
     simulator : str
-        "verilator" or "icarus".
+        "verilator", "icarus" or "cxxrtl".
     jobs : int
         Number of processes; by default one for each processor.
     scheduler : str
