@@ -82,7 +82,7 @@ _COMMANDS = {
     "explore": _Command(
         "explore",
         "explore_command",
-        "Design every combination of values, and show the front of accuracy against cost.",
+        "Design every combination of values, and show the Pareto front of proven error against cost.",
     ),
     "calibrate": _Command(
         "calibrate",

@@ -279,7 +279,7 @@ def test_the_manifest_tells_them_in_the_outputs_unit() -> None:
 def test_design_shows_them() -> None:
     shown = {}
     for realization in ("df1", "normal"):
-        arguments = ["design", str(EXAMPLES / "flange_wear_bench.toml"), "--realization", realization]
+        arguments = ["design", str(EXAMPLES / "flange_wear_bench.toml"), "--realization", realization, "--details"]
         text = CliRunner().invoke(cli, arguments, env={"COLUMNS": "120"}).stdout
         table = text[text.index("Limit cycles") :]
         shown[realization] = re.findall(

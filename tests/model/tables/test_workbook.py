@@ -63,8 +63,9 @@ FORTY = [(k, 2 * k, 3 * k) for k in range(1, 41)]
 def test_all_rows_are_read_whatever_range_the_sheet_states(stated: str | None) -> None:
     def dimension(sheet: bytes) -> bytes:
         tag = b"" if stated is None else b'<dimension ref="%s" />' % stated.encode()
-        assert b'<dimension ref="A1:C40" />' in sheet
-        return sheet.replace(b'<dimension ref="A1:C40" />', tag)
+        changed_sheet, count = re.subn(rb'<dimension ref="A1:C40" ?/>', tag, sheet)  # the blank depends on the writer
+        assert count == 1
+        return changed_sheet
 
     rows = workbook_rows(PATH, changed(written(FORTY), {SHEET: dimension}))
     assert [(number, tuple(values)) for number, values in rows] == list(enumerate(FORTY, start=1))
