@@ -41,6 +41,7 @@ Array = npt.NDArray[np.float64]
 
 _MAX_RESPONSE = 1 << 24  # samples; poles so close to the unit circle that responses are longer are refused
 _DECAY = 1e-12  # relative to its envelope, where an impulse response counts as decayed
+_LONG = 1 << 15  # samples, beyond which responses are cut shorter where they are only estimated
 _COMFORTABLE = 20  # samples per period of the band edge; fewer hardly reduce the word lengths
 _UNITY = 1e-14  # relative distance within which the gain of given sections counts as one: rounding, not intent
 _LARGEST_RADIUS = 1 - 2.0**-52  # of a pole that a double can tell from 1
@@ -148,6 +149,12 @@ def decay_length(sos: Array) -> int:
             "close to the unit circle"
         )
     return int(samples)
+
+
+def estimated_length(sos: Array) -> int:
+    """Count the samples that estimates need: half of a long response, which leaves out 1e-6 of its envelope."""
+    length = decay_length(sos)
+    return max(_LONG, length // 2) if length > _LONG else length
 
 
 def _radius(a1: float, a2: float) -> float:

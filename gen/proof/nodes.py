@@ -31,15 +31,16 @@ from sosmith.model.errors import ShortfallError
 
 Integers = npt.NDArray[np.object_]
 
-LONGEST = 1 << 22
+LONGEST = 1 << 21
 """Samples in which a response must decay to the accuracy of the word-length search."""
 
 _LONGEST_BITS = 40  # that accuracy, relative, in bits
 _DECAY_BITS = 16  # to which responses decay beyond the accuracy wanted
 _SMALLEST_BLOCK, _LARGEST_BLOCK = 64, 512
-_WINDOWS = 8  # that the nodes are spread over, in the time in which a response decays to `_LONGEST_BITS`
+_WINDOWS = 12  # that the nodes are spread over, in the time in which a response decays to `_LONGEST_BITS`
 _GROUPS, _NEIGHBOURS = 64, 4  # of places among which the nodes are chosen
 _SLACK_BITS = 16
+_LARGEST_GROWTH = 1 << 32  # of an error from block to block; more distant nodes make it smaller
 _DIGITS = 3  # binary digits of the number of blocks
 _GUARD_BITS = 64  # of the first precision that is tried
 _MOST_BITS = 1 << 16  # of a precision
@@ -101,8 +102,9 @@ class Nodes:
         self._length, self.block = self._lengths(max(radii, default=Fraction(0)))
         self.blocks = 0
         self.residue = Fraction(0)
-        self.fine = bits + self.gain.bit_length() + _GUARD_BITS
+        self.fine = bits + 2 * self.gain.bit_length() + _GUARD_BITS
         """Fraction bits of `impulse`."""
+        self._wider = 1
         while True:
             self._impulse: list[int] = []
             try:
@@ -113,7 +115,7 @@ class Nodes:
                     raise ShortfallError(
                         "the poles must not lie so close to each other that a response cannot be enclosed"
                     ) from None
-                self.fine += error.bits + _GUARD_BITS
+                self.fine += error.bits + (_GUARD_BITS // 2 if error.bits else 0)
 
     def _lengths(self, radius: Fraction) -> tuple[int, int]:
         """Estimate the length of the responses from the pole that decays most slowly, and choose that of a block."""
@@ -156,7 +158,7 @@ class Nodes:
         self.norms: list[Fraction] = []
         if not d:
             return
-        window = max(self._length * _LONGEST_BITS // (_WINDOWS * self._decay), 2 * d, size)
+        window = max(self._length * _LONGEST_BITS * self._wider // (_WINDOWS * self._decay), 2 * d, size)
         response = [*([0] * d), *self.impulse(window + size)]
 
         def row(at: int) -> list[int]:
@@ -182,6 +184,9 @@ class Nodes:
             found = (arb_mat(len(wanted), d, [ball for at in wanted for ball in balls(at)]) * inverse).entries()
             self.weights = _rounded(found[: size * d], self.bits).reshape(size, d)
             self._multiply(arb_mat(d, d, found[size * d :]))
+        if self._wider < _WINDOWS and math.prod(max(norm, Fraction(1)) for norm in self.norms) > _LARGEST_GROWTH:
+            self._wider *= 2
+            raise _CoarseError(0)
 
     def _multiply(self, step: arb_mat) -> None:
         """Find the number of blocks and the powers of K up to there."""

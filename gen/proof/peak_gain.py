@@ -5,6 +5,9 @@ With a drive in [low, high] from reset on, the largest contribution of a respons
 together is the largest sum of these, over all responses, up to any sample. If every range contains zero, no
 contribution is negative, and the limit is that of all samples together: c times the gain at zero frequency, which is
 exact, and r times the sum of magnitudes (`sosmith.gen.proof.sums`).
+
+Drives whose responses are multiples of one another act as one. The half that rounds to nearest and the error of the
+quantizer behind it make such a pair: together, their range contains zero.
 """
 
 from __future__ import annotations
@@ -13,10 +16,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
+from flint import fmpq_poly
+
 from sosmith.gen.proof.poles import Coefficients
 from sosmith.gen.proof.response import IMPULSE, Response, common
 from sosmith.gen.proof.sums import Weighted, recursion
 
+ZERO = Fraction(0)
 ACCURACY = 40
 """Approximate relative accuracy of a sum in bits, unless another one is asked for."""
 
@@ -66,21 +72,40 @@ def extent(drives: Sequence[Drive], accuracy: int = ACCURACY) -> Extent:
         return Extent(Fraction(0), Fraction(0))
     under = common([drive.response for drive in live])
     made = recursion(under, accuracy)
-    numerators = [drive.response.over(under) for drive in live]
-    centres = [(drive.low + drive.high) / 2 for drive in live]
-    radii = [(drive.high - drive.low) / 2 for drive in live]
-    if all(drive.low <= 0 <= drive.high for drive in live):
-        middle = sum((c * d.response.at_zero_frequency for c, d in zip(centres, live, strict=True)), Fraction(0))
-        reach = sum(
-            (r * (t.magnitude + t.uncertainty) for r, t in zip(radii, made.totals(numerators), strict=True)),
-            Fraction(0),
-        )
+    joined = _joined([(drive.response.over(under), drive.low, drive.high) for drive in live])
+    numerators = [numerator for numerator, _, _ in joined]
+    centres = [(low + high) / 2 for _, low, high in joined]
+    radii = [(high - low) / 2 for _, low, high in joined]
+    if all(low <= 0 <= high for _, low, high in joined):
+        middle = sum((c * Response(n, under).at_zero_frequency for n, c in zip(numerators, centres, strict=True)), ZERO)
+        sizes = [total.magnitude + total.uncertainty for total in made.totals(numerators)]
+        reach = sum((r * size for r, size in zip(radii, sizes, strict=True)), ZERO)
         return Extent(middle - reach, middle + reach)
     above, below = (
         made.highest([Weighted(n, side * c, r) for n, c, r in zip(numerators, centres, radii, strict=True)])
         for side in (1, -1)
     )
     return Extent(-below, above)
+
+
+def _joined(
+    drives: Sequence[tuple[fmpq_poly, Fraction, Fraction]],
+) -> list[tuple[fmpq_poly, Fraction, Fraction]]:
+    """Join drives whose numerators are multiples of one another; drop those with a numerator of zero."""
+    found: dict[tuple[str, ...], tuple[fmpq_poly, Fraction, Fraction]] = {}
+    for numerator, low, high in drives:
+        leading = numerator.leading_coefficient()
+        if not leading:
+            continue
+        key = tuple(map(str, (numerator / leading).coeffs()))
+        if key not in found:
+            found[key] = numerator, low, high
+            continue
+        first, before_low, before_high = found[key]
+        ratio = leading / first.leading_coefficient()
+        ends = [Fraction(int(ratio.p), int(ratio.q)) * end for end in (low, high)]
+        found[key] = first, before_low + min(ends), before_high + max(ends)
+    return list(found.values())
 
 
 def peak_gain(sections: Sequence[tuple[Coefficients, Coefficients]]) -> Fraction:

@@ -25,7 +25,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from sosmith.gen.filter.design import decay_length
+from sosmith.gen.filter.design import estimated_length
 from sosmith.gen.proof.linear_model import LinearModel
 
 Norm = Literal["l1", "l2", "linf"]
@@ -155,7 +155,7 @@ _Placed = tuple[int, int]
 def _length(sections: Sequence[NoisySection]) -> int:
     """Length of the spectra: eight times that of the responses, which resolves resonance peaks to 0.1 %."""
     rows = [[1.0, 0.0, 0.0, *s.denominator, *[0.0] * (3 - len(s.denominator))] for s in sections]
-    return 1 << (8 * decay_length(np.array(rows)) - 1).bit_length()
+    return 1 << (8 * estimated_length(np.array(rows)) - 1).bit_length()
 
 
 def _feasible(sections: Sequence[NoisySection], *, pairing: bool) -> bool:

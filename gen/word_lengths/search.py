@@ -23,7 +23,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import signal
 
-from sosmith.gen.filter.design import decay_length
+from sosmith.gen.filter.design import estimated_length
 from sosmith.gen.proof.linear_model import Source, linear_model
 from sosmith.gen.realizations.coefficients import lowest_terms, round_significant
 from sosmith.gen.realizations.registry import REALIZATIONS, Section
@@ -38,6 +38,12 @@ Array = npt.NDArray[np.float64]
 
 _EXACT_BITS = 50
 """Significant bits at which a coefficient counts as exact."""
+
+_ENOUGH = 1 << 14
+"""Number of values to which long responses are added up."""
+
+_LOST = 2.0**-16
+"""Share of a response's sum of magnitudes that may be lost when samples with different signs are added up."""
 
 _STEPS = (1, 2, 3)
 """Bits that one step may drop: several, because a shorter fraction may save area only once it is the shortest one."""
@@ -278,7 +284,8 @@ class _Estimate:
     ideal : dict of str to float
         Coefficients by name.
     slopes : dict of str to array
-        Change of the filter's impulse response for a unit change of each coefficient.
+        Change of the filter's impulse response for a unit change of each coefficient; long ones as sums of neighbouring
+        samples.
     gains : dict of str to float
         Largest centred error at the filter's output for each quantizer, if it rounds to integers.
     limits : dict of str to tuple of float
@@ -305,7 +312,7 @@ class _Estimate:
 
 def _estimates(rows: Sequence[Sequence[float]], realization: str, ends: tuple[float, float]) -> list[_Estimate]:
     sos = np.array(rows, dtype=np.float64)
-    impulse = np.zeros(decay_length(sos))
+    impulse = np.zeros(estimated_length(sos))
     impulse[0] = 1.0
     through = [np.asarray(signal.sosfilt(sos[:k], impulse)) if k else impulse for k in range(len(rows))]
     behind = [
@@ -335,7 +342,25 @@ def _estimates(rows: Sequence[Sequence[float]], realization: str, ends: tuple[fl
                 optional=section.optional_quantizers,
             )
         )
-    return result
+    return _added_up(result)
+
+
+def _added_up(estimates: Sequence[_Estimate]) -> list[_Estimate]:
+    """Replace slopes that are much longer than `_ENOUGH` by sums of neighbours, as long as these have the same sign."""
+    slopes = [slope for estimate in estimates for slope in estimate.slopes.values()]
+    step = 1
+    while len(slopes[0]) >= 2 * step * _ENOUGH and all(
+        np.abs(_sums(slope, 2 * step)).sum() >= (1 - _LOST) * np.abs(slope).sum() for slope in slopes
+    ):
+        step *= 2
+    return [
+        replace(estimate, slopes={name: _sums(slope, step) for name, slope in estimate.slopes.items()})
+        for estimate in estimates
+    ]
+
+
+def _sums(values: Array, step: int) -> Array:
+    return values if step == 1 else np.add.reduceat(values, np.arange(0, len(values), step))
 
 
 def _gain(quantizer: Source, node: int, poles: Sequence[float], behind: Array) -> float:

@@ -86,7 +86,7 @@ def test_calibration() -> None:
 @pytest.mark.parametrize("realization", ["df1", "df1_ef2"])
 def test_a_cutoff_too_low_for_any_format(realization: str) -> None:
     refused(
-        "the impulse response must end within 4194304 samples, not 34703473: a pole lies too close to the unit "
+        "the impulse response must end within 2097152 samples, not 34703473: a pole lies too close to the unit "
         "circle, decimate by 32768 first",
         beyond_half=Fraction(1, 2),
         ideal=butterworth(7, 0.000001),
@@ -94,7 +94,7 @@ def test_a_cutoff_too_low_for_any_format(realization: str) -> None:
     )
 
 
-LONG = r"the impulse response must end within 4194304 samples, not \d+: a pole lies too close to the unit circle"
+LONG = r"the impulse response must end within 2097152 samples, not \d+: a pole lies too close to the unit circle"
 AWAY = ", move the cutoff further from 0 and from half the sample rate"
 
 
