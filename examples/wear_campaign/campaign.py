@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from examples.wear_campaign import bench, depot, hardware, ride, week
+from examples.wear_campaign import bench, depot, hardware, methods, ride, week
 from examples.wear_campaign.spread import spread
 
 from sosmith.gen.core import CoreDesign, design_core
@@ -28,8 +28,25 @@ def carry_out(settings: dict[str, Any], folder: Path, progress: Progress) -> tup
     on_bench, bench_series = bench_campaign(settings, folder / "bench", progress)
     on_track, ride_series = ride_campaign(settings, folder / "ride", progress)
     in_service, week_series = week_campaign(settings, on_track["filters"][-1]["table"], folder / "week", progress)
-    results = {"settings": settings, "bench": on_bench, "ride": on_track, "week": in_service}
-    return results, {"bench": bench_series, "ride": ride_series, "week": week_series}
+    compared = methods_campaign(settings, on_track["filters"][-1]["table"], folder / "methods", progress)
+    results = {
+        "settings": settings,
+        "methods": compared,
+        "bench": on_bench,
+        "ride": on_track,
+        "week": in_service,
+    }
+    series = {"bench": bench_series, "runs": bench_series, "ride": ride_series, "week": week_series}
+    return results, series
+
+
+def methods_campaign(
+    settings: dict[str, Any], filter_table: str, folder: Path, progress: Progress
+) -> list[dict[str, Any]]:
+    """Fit in different ways, on the bench and in the week, with different true sensors."""
+    names = [*settings["bench"]["scenarios"], settings["week"]["scenario"]]
+    scenarios = {name: load_scenario(SCENARIOS / f"{name}.toml") for name in names}
+    return methods.side_by_side(settings, scenarios, filter_table, folder, progress)
 
 
 def bench_campaign(settings: dict[str, Any], folder: Path, progress: Progress) -> tuple[dict[str, Any], dict[str, Any]]:

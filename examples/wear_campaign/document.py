@@ -6,6 +6,7 @@ import textwrap
 from collections.abc import Sequence
 from typing import Any
 
+from examples.wear_campaign.methods_document import section
 from examples.wear_campaign.pictures import stated
 
 from sosmith.gen.paper.figures import read_paper_figures
@@ -34,6 +35,7 @@ def document(results: dict[str, Any]) -> str:
         "equation 7: 100 % "
         "minus "
         "the mean of |measured - true| / true over the readings.",
+        *section(results["methods"], settings),
         _bench(results["bench"], settings),
         _ride(results["ride"], settings),
         _week(results["week"], settings),

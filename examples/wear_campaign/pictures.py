@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from examples.wear_campaign.methods_document import draw
 from matplotlib.figure import Figure
 
 from sosmith.gen.paper.figures import PaperFigures, read_paper_figures
@@ -24,14 +25,16 @@ POINTS = 900
 def pictures(results: dict[str, Any], series: dict[str, Any]) -> dict[str, bytes]:
     """Draw all pictures; return their files by name."""
     painted: dict[str, tuple[float, Callable[[Figure], None]]] = {
+        "methods": (6.4, lambda figure: draw(figure, results["methods"])),
         "bench": (3.4, lambda figure: bench(figure, results["bench"])),
-        "runs": (3.4, lambda figure: runs(figure, series["bench"])),
+        "runs": (3.4, lambda figure: runs(figure, series["runs"])),
         "ride": (5.4, lambda figure: ride(figure, results["ride"], series["ride"])),
         "week": (3.4, lambda figure: week(figure, results["week"], series["week"])),
     }
+    drawn = {name: one for name, one in painted.items() if name == "methods" or name in series}
     return {
         f"campaign_{name}.svg": picture("campaign", (8.6, height), paint, style={"legend.frameon": False})
-        for name, (height, paint) in painted.items()
+        for name, (height, paint) in drawn.items()
     }
 
 

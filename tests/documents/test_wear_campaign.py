@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from examples.wear_campaign import bench, campaign, ride
+from examples.wear_campaign import bench, campaign, methods, ride
 from examples.wear_campaign.document import document
 from examples.wear_campaign.spread import spread
 from scipy import signal
@@ -46,6 +46,48 @@ def test_the_means_are_those_of_the_recorded_seeds() -> None:
         assert values.shape == (found["settings"]["seeds"], 2)
         for what, column in zip(("unfiltered", "golden"), values.T, strict=True):
             assert row[what] == pytest.approx(spread(column.tolist(), found["settings"]["confidence"]), rel=1e-12)
+
+
+def test_the_figures_of_methods_are_those_of_the_recorded_seeds() -> None:
+    found = outcome()
+    rows = found["methods"]
+    assert [(row["case"], row["sensor"]) for row in rows[:9]] == [
+        (case, sensor)
+        for sensor in ("equation_5a", "equation_4", "coil")
+        for case in ("bench_43_50", "bench_92_96", "a_week_in_service")
+    ]
+    assert len(rows) == 9 + 4
+    for row in rows:
+        for method, figures in row["methods"].items():
+            seeds = found["settings"]["methods"]["variant_seeds"] if "," in row["case"] else found["settings"]["seeds"]
+            assert {len(values) for values in figures.values()} == {seeds}
+            expected = spread(figures["accuracy"], found["settings"]["confidence"])
+            assert row["accuracy"][method] == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("number", [4, pytest.param(8, marks=pytest.mark.slow)])
+def test_methods_give_the_recorded_figures_again(number: int, tmp_path: Path) -> None:
+    """The first seeds of a bench, and of a week with the coil."""
+    settings = outcome()["settings"] | {"seeds": 2}
+    names = [*settings["bench"]["scenarios"], settings["week"]["scenario"]]
+    scenarios = {name: load_scenario(campaign.SCENARIOS / f"{name}.toml") for name in names}
+    table = outcome()["ride"]["filters"][-1]["table"]
+    made = methods.figures(methods.cases(settings, scenarios, table, tmp_path)[number], 0.95, lambda seed: None)
+    recorded = outcome()["methods"][number]
+    assert (made["case"], made["sensor"]) == (recorded["case"], recorded["sensor"])
+    for method, figures in made["methods"].items():
+        for figure, values in figures.items():
+            assert values == pytest.approx(recorded["methods"][method][figure][:2], abs=2e-4), (method, figure)
+
+
+def test_outliers_are_as_many_as_stated() -> None:
+    scenario = load_scenario(campaign.SCENARIOS / "bench_43_50.toml")
+    clean, spoilt = methods.measured(scenario, 1), methods.measured(scenario, 1, 0.05)
+    off = np.abs(clean.clearance - spoilt.clearance)
+    assert 0.03 < np.mean(off > 0) < 0.07
+    assert off.max() == pytest.approx(3.0)
+    kept = methods.until(clean, min(clean.days))
+    assert len(kept) == clean.days.count(min(clean.days))
 
 
 def test_a_filter_that_is_not_exact_is_called_so() -> None:
