@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from importlib import import_module
+from importlib import import_module, metadata
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -23,6 +24,13 @@ SEED = 1
 
 _SUFFIX = {"ice40": "bin", "ecp5": "bit", "gowin": "fs"}
 """Suffix of a bitstream's file, by family."""
+
+_PROGRAMS = {
+    "ice40": ("yosys", "nextpnr-ice40", "icepack"),
+    "ecp5": ("yosys", "nextpnr-ecp5", "ecppack"),
+    "gowin": ("yosys", "nextpnr-himbaechel-gowin", "gowin_pack"),
+}
+"""What makes a bitstream, by family."""
 
 _STEPS = {"yosys": "synthesis", "icepack": "packing", "ecppack": "packing", "gowin_pack": "packing"}
 _LOG = "build.log"
@@ -101,6 +109,19 @@ class Bitstream:
     def slowest(self) -> Clock:
         """The clock with the least margin."""
         return min(self.clocks, key=lambda clock: clock.achieved / clock.wanted)
+
+
+def fingerprint(verilog: str, board: Board) -> str:
+    """Return a digest of all that a bitstream depends on: SystemVerilog, board, and the programs' versions.
+
+    Raises
+    ------
+    ToolError
+        If a program is missing.
+    """
+    versions = [find_tool(name).version for name in _PROGRAMS[board.device.family]]
+    parts = [verilog, repr(board), *versions, metadata.version("amaranth"), str(SEED)]
+    return hashlib.sha256("\0".join(parts).encode()).hexdigest()
 
 
 def build(verilog: str, top: str, board: Board, progress: Callable[[str], None] = lambda step: None) -> Bitstream:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
@@ -11,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from sosmith.gen.core import CoreDesign
-from sosmith.gen.fpga.bitstream import SEED, Bitstream, build
+from sosmith.gen.fpga.bitstream import SEED, Bitstream, build, fingerprint
 from sosmith.gen.fpga.boards import RATE, Board
 from sosmith.gen.output.board_top import board_verilog, top_name
 from sosmith.gen.output.verilog import to_rtlil, to_verilog
@@ -146,8 +147,45 @@ def build_board(
     SpecificationError
         If the design does not fit the link.
     """
-    progress("SystemVerilog")
-    core = to_verilog(to_rtlil(design.architecture.component(), design.datapath.name))
-    verilog = board_verilog(design, clock=Fraction(board.clock), rate=rate, core=core)
+    core, verilog = _texts(design, board, rate, progress)
     made = build(verilog, top_name(design), board, progress)
     return BoardBuild(design, rate, verilog, core, made)
+
+
+def board_cost(
+    design: CoreDesign, board: Board, cache: Path | None, progress: Callable[[str], None] = lambda step: None
+) -> dict[str, Any]:
+    """Return `BoardBuild.summary` of a design; what was built from the same text by the same programs is in `cache`.
+
+    Parameters
+    ----------
+    design : CoreDesign
+        The design.
+    board : Board
+        The board.
+    cache : Path or None
+        Folder of the summaries, made if missing; None to keep nothing.
+    progress : callable
+        Called with the name of each step.
+
+    Raises
+    ------
+    SpecificationError, ShortfallError, ToolError
+        As `build_board`.
+    """
+    core, verilog = _texts(design, board, RATE, progress)
+    name = f"{fingerprint(verilog, board)}.json"
+    if cache is not None and (cache / name).exists():
+        found: dict[str, Any] = json.loads((cache / name).read_text(encoding="utf-8"))
+        return found
+    made = BoardBuild(design, RATE, verilog, core, build(verilog, top_name(design), board, progress)).summary
+    if cache is not None:
+        write_contents(cache, {name: to_json(made).encode()})
+    return made
+
+
+def _texts(design: CoreDesign, board: Board, rate: int, progress: Callable[[str], None]) -> tuple[str, str]:
+    """Return the SystemVerilog of the core, and of the board's top."""
+    progress("SystemVerilog")
+    core = to_verilog(to_rtlil(design.architecture.component(), design.datapath.name))
+    return core, board_verilog(design, clock=Fraction(board.clock), rate=rate, core=core)

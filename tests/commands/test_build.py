@@ -100,3 +100,20 @@ def test_what_is_no_board_for_a_bitstream_is_refused(programs: dict[str, str]) -
 def test_a_line_rate_above_a_fourth_of_the_clock_is_refused(programs: dict[str, str]) -> None:
     message = "the line rate must be at most 3,000,000 baud at a clock of 12,000,000 Hz, not 3,000,001"
     BUILD.refused(message, "plain.toml", "--board", "icestick", "--baud", "3000001")
+
+
+def test_a_design_for_a_board_shows_what_it_takes_there_and_builds_it_once(
+    programs: dict[str, str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    design = Invocation("design")
+    first = design.good("plain.toml", "--board", "icestick")
+    assert "plain on iCEstick" in first.stdout
+    assert "7 of 1,280, 1 %" in first.stdout
+    assert "placement and routing" in first.stderr
+    again = design.good("plain.toml", "--board", "icestick")
+    assert again.stdout == first.stdout
+    assert "placement and routing" not in again.stderr
+    told = json.loads(design.good("plain.toml", "--board", "icestick", "--json").stdout)["board"]
+    assert told["utilisation"] == {"ICESTORM_LC": {"used": 7, "available": 1280}}
+    assert told["bitstream"]["file"] == "plain_board_icestick.bin"

@@ -72,7 +72,7 @@ def build_command(
     else:
         from sosmith.commands.tables.build import print_build
 
-        print_build(built)
+        print_build(built.summary)
     most, wanted = built.summary["samples_per_second"], float(asked.checked.sample_rate)
     if most < wanted:
         note(f"note: at the board's clock the core takes {most:,.0f} samples a second per channel, not {wanted:,.0f}")

@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from sosmith.commands.options import BOARD, CORE, REALIZATION, SPEC, WIDTHS_OF, default_folder
+from sosmith.gen.fpga.boards import BUILDABLE
 from sosmith.model.errors import SpecificationError
 from sosmith.model.text_files import write_files
 from sosmith.terminal import JSON_OPTION, note, output_option, print_json, show_progress
@@ -48,6 +49,9 @@ def design_command(
 ) -> None:
     """Show the design of SPEC: order, realization, architecture, cost and error budget.
 
+    With --board, it is built for that board as `sosmith build` does, which takes some tens of seconds the first time,
+    and the cells are those that it takes there, with the serial link.
+
     \b
         sosmith design my.toml
         sosmith design my.toml --details
@@ -60,12 +64,17 @@ def design_command(
         from sosmith.interface.design import design
 
         made = design(asked, core=core, realization=realization, widths_of=widths_of, board=board, progress=step)
+        cost = None if board not in BUILDABLE else made.cost_on(board, step)
     if as_json:
-        print_json(made.manifest)
+        print_json(made.manifest if cost is None else made.manifest | {"board": cost})
     else:
         from sosmith.commands.tables.design import print_design
 
         print_design(made, details=details)
+        if cost is not None:
+            from sosmith.commands.tables.build import print_build
+
+            print_build(cost)
 
 
 @click.command("generate")

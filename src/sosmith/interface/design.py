@@ -387,6 +387,23 @@ class Design:
         made = build_board(self.core, target, rate=rate, progress=lambda step: progress(step, 0, 0))
         return Build.written(made, place)
 
+    def cost_on(self, board: str, progress: Progress = lambda step, done, total: None) -> dict[str, Any]:
+        """Return what the design takes of a board's FPGA, with the serial link: the content of ``build.json``.
+
+        It is built for the board as `build` does, and the result is kept in the user's cache folder.
+
+        Raises
+        ------
+        SpecificationError, ShortfallError, ToolError
+            As `build`.
+        """
+        from sosmith.gen.output.board_build import board_cost
+        from sosmith.sim.build_cache import cache_folder
+
+        target, cache = find_board(board, BUILDABLE), cache_folder()
+        place = None if cache is None else cache.parent / "boards"
+        return board_cost(self.core, target, place, lambda step: progress(step, 0, 0))
+
     def simulate(
         self,
         trace: str | PathLike[str] | Mapping[str, npt.ArrayLike] | None = None,

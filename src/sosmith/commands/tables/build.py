@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from sosmith.commands.tables.console import TableConsole, new_table
-from sosmith.interface.build import Build
 
 
-def print_build(built: Build) -> None:
-    """Print what a design takes of the FPGA, and how fast it could run."""
-    facts = built.summary
+def print_build(facts: dict[str, Any]) -> None:
+    """Print what a design takes of the FPGA, and how fast it could run: the content of ``build.json``."""
     table = new_table(f"{facts['name']} on {facts['title']}", ["", ""])
     table.add_row("device", facts["device"])
     table.add_row("architecture", facts["architecture"])
