@@ -81,3 +81,13 @@ def test_a_file_that_is_no_set(tmp_path) -> None:  # type: ignore[no-untyped-def
         client.load(tmp_path / "set.json")
     with pytest.raises(sosmith.SpecificationError, match=r"none.json: the set must be a file that can be read, not: "):
         client.load(tmp_path / "none.json")
+
+
+def test_what_is_active_is_read_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    _, _, proven = swap()
+    client, core = board()
+    read = core.read
+    monkeypatch.setattr(core, "read", lambda address: 5 if address == CRC.address else read(address))
+    expected = rf"^the board's register CRC must read {proven['writes'][-1][1]:#x}, not 0x5$"
+    with pytest.raises(sosmith.ShortfallError, match=expected):
+        client.load(proven)
