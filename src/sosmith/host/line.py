@@ -48,7 +48,7 @@ class SerialLine:
 
     def __init__(self, port: str, baud: int) -> None:
         try:
-            self._serial = serial.Serial(port, baud, timeout=0, write_timeout=2.0, exclusive=True)
+            self._serial = serial.Serial(port, baud, timeout=0, write_timeout=10.0, exclusive=True)
         except (serial.SerialException, OSError, ValueError) as error:
             raise ToolError(f"{port} must be a serial port that is free, not: {_reason(error)}") from None
         self._port = port

@@ -18,7 +18,7 @@ MAX_ATTEMPTS = 32
 OPEN_ATTEMPTS = 6
 """The same of the first request, which meets a board that may not be there."""
 
-_SHORTEST, _LONGEST, _FIRST = 0.02, 0.2, 0.3
+_SHORTEST, _LONGEST, _FIRST = 0.02, 1.0, 0.3
 """Limits of the time in s to wait for a response before asking again, and what is waited for the first one."""
 
 Request = tuple[Type, bytes]
