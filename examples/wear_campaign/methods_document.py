@@ -58,7 +58,7 @@ def section(rows: list[dict[str, Any]], settings: dict[str, Any]) -> list[str]:
             ],
         ),
         "![Accuracy of every seed by method, case and sensor](images/campaign_methods.svg)",
-        f"In the week, `bayes` gains on average {told} points; its worst seed is better by {worst}. The day's own "
+        f"In the week, `bayes` gains on average, in points: {told}; in the worst seed: {worst}. The day's own "
         f"curve was left out on {100 * fell:.1f} % of the days, because a polynomial with it left the output's range "
         "or fell.",
         "An interval says what a calibration is worth if it holds as often as it claims. Those of `bayes` hold "
