@@ -875,7 +875,7 @@ def test_two_runs_in_one_folder_at_once(process: Start, tmp_path: Path) -> None:
     """The second is refused at once, and the first is none the worse for it."""
     parallel = f'{FILTER}\n[hardware]\narchitecture = "parallel"\n'  # many clocks a second
     (tmp_path / "plain.toml").write_text(parallel, encoding="utf-8")
-    arguments = ["simulate", "plain.toml", "--trace", "noise", "--seconds", "80", "--simulator", "icarus", "-o", "out"]
+    arguments = ["simulate", "plain.toml", "--trace", "noise", "--seconds", "40", "--simulator", "icarus", "-o", "out"]
     first = process(*arguments)
     wait_for((tmp_path / "out" / "simulation").exists)
     second = process(*arguments)
