@@ -10,7 +10,7 @@ the weights are cut into limbs so short that no double ever rounds. What is left
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
@@ -129,7 +129,7 @@ class Recursion:
         """Sum the magnitudes of the responses of ``numerator/D``, each once."""
         named = {_key(numerator): numerator for numerator in numerators}
         missing = [key for key in named if key not in self._totals]
-        for keys in self._portions(missing):
+        for keys in self._portions(missing, {key: self._start(named[key]) for key in missing}):
             found = self._samples([named[key] for key in keys])
             self._totals.update((key, self._total(samples)) for key, samples in zip(keys, found, strict=True))
         return [self._totals[_key(numerator)] for numerator in numerators]
@@ -183,14 +183,23 @@ class Recursion:
 
     # Samples.
 
-    def _portions(self, keys: list[tuple[str, ...]]) -> Iterator[list[tuple[str, ...]]]:
+    def _portions(
+        self, keys: list[tuple[str, ...]], starts: Mapping[tuple[str, ...], int]
+    ) -> Iterator[list[tuple[str, ...]]]:
+        """Share out what is computed together: responses that begin alike, so that none depends on the others."""
         count = max(1, _AT_ONCE // max(self._table.block * self._table.blocks, 1))
-        return (keys[start : start + count] for start in range(0, len(keys), count))
+        for begin in sorted(set(starts.values())):
+            alike = [key for key in keys if starts[key] == begin]
+            yield from (alike[at : at + count] for at in range(0, len(alike), count))
+
+    def _start(self, numerator: fmpq_poly) -> int:
+        """Sample from which a response solves the recursion alone."""
+        return max(0, int(numerator.degree()) - self._table.degree + 1)
 
     def _samples(self, numerators: Sequence[fmpq_poly]) -> list[_Samples]:
         """Compute several responses at the nodes, in blocks that begin at the same sample."""
         table, bits = self._table, self._bits
-        start = max(0, max((numerator.degree() for numerator in numerators), default=0) - table.degree + 1)
+        start = max(map(self._start, numerators), default=0)
         wanted = [*range(start), *(start + at for at in table.places)]
         impulse = table.impulse(max(wanted, default=0) + 1)
         heads, firsts, errors = [], [], []

@@ -127,3 +127,11 @@ def test_sums_of_responses_share_what_they_have_in_common() -> None:
 def test_poles_beyond_the_limit_are_refused() -> None:
     with pytest.raises(ShortfallError, match=r"^every pole must lie inside the unit circle, and one does not$"):
         Nodes((dyadic(1, -1),), ACCURACY, 100)
+
+
+@pytest.mark.parametrize("name", DENOMINATORS)
+def test_a_sum_does_not_depend_on_what_was_summed_with_it(name: str) -> None:
+    """Certificates are the same bytes whatever was designed before in the same process."""
+    together = Recursion(DENOMINATORS[name], ACCURACY).totals([polynomial(one) for one in NUMERATORS])
+    alone = [Recursion(DENOMINATORS[name], ACCURACY).totals([polynomial(one)])[0] for one in NUMERATORS]
+    assert together == alone
