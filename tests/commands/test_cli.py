@@ -750,6 +750,7 @@ def test_reports_side_by_side(sosmith: Command) -> None:
     assert "http" not in re.sub(r"http://www\.w3\.org/[\w/.]*", "", page)
 
 
+@pytest.mark.slow
 def test_the_example_workflow(sosmith: Command) -> None:
     """A design broken on purpose ends it with 1, a better one with 0; the specification is the user's own."""
     text = (Path(__file__).parents[2] / "examples" / "workflows" / "accuracy.yml").read_text(encoding="utf-8")

@@ -61,7 +61,7 @@ def step_of(datapath: Datapath, folder: Path) -> Any:
     return step
 
 
-@pytest.mark.parametrize("architecture", ["parallel", "folded", "serial"])
+@pytest.mark.parametrize("architecture", ["parallel", "folded", pytest.param("serial", marks=pytest.mark.slow)])
 @pytest.mark.parametrize(("channels", "limits"), [(1, 1), (3, 1), (3, 3)], ids=["1", "3", "3-different"])
 def test_a_sample_has_the_same_flags_everywhere(channels: int, limits: int, architecture: str, tmp_path: Path) -> None:
     plain = made(tmp_path, architecture, channels)

@@ -156,6 +156,7 @@ def test_every_pace_of_the_streams(example: str, tmp_path: Path) -> None:
             assert evidence.cycles <= evidence.samples + evidence.latency_cycles + 1
 
 
+@pytest.mark.slow
 def test_plain_direct_form_at_the_same_widths_falls_short(tmp_path: Path) -> None:
     """At 1/386 of the sample rate the rounding of plain direct form I is far above one LSB; the command says so."""
     command = [sys.executable, "-m", "sosmith.cli", "simulate", str(EXAMPLES / LOCOMOTIVE)]

@@ -183,6 +183,7 @@ def test_reloads_at_any_moment(architecture: str, example: str, channels: int, c
     assert [dest for dest, _ in outcome["received"]] == outcome["dests"]
 
 
+@pytest.mark.slow
 def test_a_sample_that_sees_two_banks_is_noticed(tmp_path: Path) -> None:
     """Break the core: what a sample uses follows the swap at once."""
 

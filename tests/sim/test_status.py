@@ -112,7 +112,7 @@ def worn(architecture: str, channels: int, initial: tuple[str, ...], *, signed: 
     )
 
 
-@pytest.mark.parametrize("architecture", ["parallel", "folded", "serial"])
+@pytest.mark.parametrize("architecture", ["parallel", "folded", pytest.param("serial", marks=pytest.mark.slow)])
 @pytest.mark.parametrize(
     ("channels", "initial"), [(1, ("1.5",)), (3, ("1.5",)), (3, ("1.5", "2", "0.5"))], ids=["1", "3", "3-different"]
 )

@@ -500,6 +500,7 @@ def kill_while_adding(folder: Path, times: int) -> None:
         assert torn > 0
 
 
+@pytest.mark.slow
 def test_killed_ten_times_at_random(tmp_path: Path) -> None:
     kill_while_adding(tmp_path, 10)
 

@@ -78,6 +78,7 @@ def test_front_and_rear_mirror_each_other() -> None:
         assert mirrored == pytest.approx(matrix, abs=1e-9 * np.abs(matrix).max())
 
 
+@pytest.mark.slow
 def test_without_contact_energy_is_lost_to_the_dampers_alone() -> None:
     suspension = lateral_suspension(GIVEN)
     mass = lateral_dynamics(GIVEN, 20.0).system.mass

@@ -287,6 +287,7 @@ def sweep(core: Made, edits: int, seed: int) -> Counter[str]:
     return found
 
 
+@pytest.mark.slow
 def test_a_hundred_edits() -> None:
     found = sweep(small(PLAIN), 100, seed=1)
     assert found["accepted"] + found["rejected"] == 100
