@@ -94,7 +94,7 @@ def errors(quantized: Quantized, codes: np.ndarray) -> np.ndarray:
 
 
 def case(name: str, realization: str) -> Any:
-    """An example in a realization: the locomotive takes long but in one."""
+    """Pair an example with a realization; the locomotive takes long in all but one."""
     long = "locomotive" in name and realization != "df1_ef2"
     return pytest.param(name, realization, marks=[pytest.mark.slow] if long else [])
 
