@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
 
 from sosmith.model.errors import ToolError
 from sosmith.sim.exploration.evaluation import Point, evaluate
@@ -15,7 +15,7 @@ _CONNECT = 10
 """Seconds until a scheduler must have answered."""
 
 
-def on_cluster(tasks: Sequence[Task], address: str) -> Iterator[Point]:
+def on_cluster(tasks: Sequence[Task], address: str) -> Generator[Point, None, None]:
     """Yield the results of `tasks` as they come from the workers of the scheduler at `address`.
 
     A task whose worker dies is done again by another one; the scheduler hands out each result once. When the caller

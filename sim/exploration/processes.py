@@ -6,7 +6,7 @@ import multiprocessing
 import os
 import signal
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 
@@ -20,7 +20,7 @@ def processors() -> int:
     return len(os.sched_getaffinity(0))
 
 
-def in_processes(tasks: Sequence[Task], jobs: int) -> Iterator[Point]:
+def in_processes(tasks: Sequence[Task], jobs: int) -> Generator[Point, None, None]:
     """Yield the results of `tasks` as they come, from `jobs` processes; one job runs in this process.
 
     When the caller stops, whatever the reason, what has not begun is dropped and the processes end.

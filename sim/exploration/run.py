@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +17,7 @@ from sosmith.sim.exploration.grid import Task, tasks_of
 from sosmith.sim.exploration.record import record_in
 
 Progress = Callable[[str, int, int], None]
-Runner = Callable[[Sequence[Task]], Iterator[Point]]
+Runner = Callable[[Sequence[Task]], Generator[Point, None, None]]
 
 _COLUMNS = (
     "on_front",
@@ -149,7 +149,7 @@ def explore(
         done, total = len(tasks) - len(missing), len(tasks)
         progress("designs", done, total)
         results = runner(list(missing.values()))
-        with closing(results):  # type: ignore[type-var]  # every runner is a generator
+        with closing(results):
             for point in results:
                 record.add(point)
                 done += 1

@@ -235,17 +235,6 @@ def test_each_kind_of_break_is_named(kind: str) -> None:
     assert re.fullmatch(sentence, rejection(core, text)), rejection(core, text)
 
 
-def test_bits_without_a_meaning_do_not_count() -> None:
-    """Seven bits of eight: the last one of a byte may be anything."""
-    core = small(PLAIN.replace("bits = 8", "bits = 7", 1))
-    text = core.text.replace(".i0(s_axis_tdata[6:0])", ".i0({ s_axis_tdata[6:1], either })")
-    port = "  wire [7:0] s_axis_tdata;\n"
-    broken = text.replace(port, f"{port}  wire either;\n  assign either = s_axis_tdata[0] | s_axis_tdata[7];\n")
-    assert core.text != text != broken
-    assert core.check().states == small().check().states
-    assert re.fullmatch(rf"section0\.\w+ must .*{NODE}section0.*", rejection(core, broken))
-
-
 def test_names_of_registers_do_not_make_a_proof() -> None:
     core = small()
     swapped = re.sub(r"\bv([12])\b", lambda found: f"v{3 - int(found[1])}", core.text)
