@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 
+from sosmith.gen.fpga.yowasp import compile_first
 from sosmith.model.errors import ToolError
 
 EXTRA = "boards"
@@ -50,17 +51,22 @@ class Tool:
         Where it is.
     version : str
         Its version.
+    package : str or None
+        The package from pip that it belongs to; None for a program of the system.
     """
 
     name: str
     path: Path
     version: str
+    package: str | None = None
 
     def run(self, arguments: Sequence[str], folder: Path, log: Path) -> int:
         """Run it in `folder`, append what it says to `log`, and return its exit status.
 
         YoWASP's programs run in a sandbox and see only files below `folder`, by relative paths.
         """
+        if self.package is not None:
+            compile_first((str(self.path),), self.name, self.package)
         with log.open("ab") as output:
             output.write(f"$ {self.name} {' '.join(arguments)}\n".encode())
             output.flush()
@@ -92,4 +98,4 @@ def find_tool(name: str) -> Tool:
         script = None
     if script is None:
         raise ToolError(f"{name} is needed to build for a board, and was not found: pip install 'sosmith[{EXTRA}]'")
-    return Tool(name, Path(script), version)
+    return Tool(name, Path(script), version, kind.package)

