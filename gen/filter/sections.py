@@ -35,7 +35,7 @@ _SPARE_BITS = 192
 
 
 @dataclass(frozen=True)
-class _Root:
+class Root:
     """A real zero or pole, or one of a conjugate pair; for a pair on the unit circle, `cosine` is its real part."""
 
     place: acb
@@ -69,14 +69,36 @@ def sections(filter_: DigitalFilter) -> list[Section]:
     """
     if not filter_.zero_cosines and len(set(filter_.real_zeros)) == 1:
         return _with_equal_zeros(filter_, filter_.real_zeros[0])
-    origin = (0,) if len(filter_.real_poles) % 2 else ()  # an odd order gets a pole and a zero at the origin
-    poles = _sorted([_Root(pole, real=False) for pole in filter_.pole_pairs])
-    poles += _sorted([_Root(acb(pole), real=True) for pole in (*filter_.real_poles, *origin)])
-    zeros = _sorted([_on_circle(cosine) for cosine in filter_.zero_cosines])
-    zeros += _sorted([_Root(acb(zero), real=True) for zero in (*filter_.real_zeros, *origin)])
+    return paired(
+        poles=[Root(pole, real=False) for pole in filter_.pole_pairs]
+        + [Root(acb(pole), real=True) for pole in filter_.real_poles],
+        zeros=[_on_circle(cosine) for cosine in filter_.zero_cosines]
+        + [Root(acb(zero), real=True) for zero in filter_.real_zeros],
+    )
+
+
+def paired(*, poles: Sequence[Root], zeros: Sequence[Root]) -> list[Section]:
+    """Pair poles with zeros as `scipy.signal.zpk2sos`; poles closest to the unit circle come last.
+
+    Parameters
+    ----------
+    poles, zeros : sequence of Root
+        As many zeros as poles, a conjugate pair counting as two.
+
+    Raises
+    ------
+    UndecidedError
+        If the precision is too low for a choice.
+    """
+    # an odd order gets a pole and a zero at the origin
+    origin = [Root(acb(0), real=True)] if sum(pole.real for pole in poles) % 2 else []
+    left, free = (
+        _sorted([root for root in roots if not root.real]) + _sorted([root for root in [*roots, *origin] if root.real])
+        for roots in (poles, zeros)
+    )
     made = []
-    while poles:
-        made.append(_next(poles, zeros))
+    while left:
+        made.append(_next(left, free))
     return made[::-1]
 
 
@@ -156,24 +178,22 @@ def _magnitude(polynomial: Sequence[arb], z: acb) -> arb:
     return abs((c0 * z + c1) * z + c2)
 
 
-def _on_circle(cosine: arb) -> _Root:
-    return _Root(acb(cosine, (1 - cosine**2).sqrt()), real=False, cosine=cosine)
+def _on_circle(cosine: arb) -> Root:
+    return Root(acb(cosine, (1 - cosine**2).sqrt()), real=False, cosine=cosine)
 
 
-def _sorted(roots: list[_Root]) -> list[_Root]:
+def _sorted(roots: list[Root]) -> list[Root]:
     return sorted(roots, key=lambda root: root.key)
 
 
 def _with_equal_zeros(filter_: DigitalFilter, zero: int) -> list[Section]:
     one, zero_ball = arb(1), arb(0)
     made = [Section((one, arb(-zero), zero_ball), (one, -pole, zero_ball)) for pole in filter_.real_poles]
-    pairs = sorted(
-        (_Root(pole, real=False) for pole in filter_.pole_pairs), key=lambda pole: (-_margin(pole), pole.key)
-    )
+    pairs = sorted((Root(pole, real=False) for pole in filter_.pole_pairs), key=lambda pole: (-_margin(pole), pole.key))
     return made + [Section((one, arb(-2 * zero), one), _pair(pole)) for pole in pairs]
 
 
-def _next(poles: list[_Root], zeros: list[_Root]) -> Section:
+def _next(poles: list[Root], zeros: list[Root]) -> Section:
     """Take the remaining pole closest to the unit circle, its partner, and their zeros, as `scipy.signal.zpk2sos`."""
     pole = _taken(poles, min(poles, key=_margin))
     others = [other for other in poles if other.real]
@@ -187,18 +207,18 @@ def _next(poles: list[_Root], zeros: list[_Root]) -> Section:
     return Section(numerator, denominator)
 
 
-def _margin(pole: _Root) -> float:
+def _margin(pole: Root) -> float:
     """``1 - |pole|**2``, a measure of its distance from the unit circle."""
     return nearest_double(1 - _square(pole.place))
 
 
-def _nearest(zeros: list[_Root], pole: _Root, *, real: bool | None = None) -> _Root:
+def _nearest(zeros: list[Root], pole: Root, *, real: bool | None = None) -> Root:
     """Take the zero nearest to a pole, only among real or only among complex ones if `real` is given."""
     allowed = [zero for zero in zeros if real is None or zero.real == real]
     return _taken(zeros, min(allowed, key=lambda zero: nearest_double(_square(zero.place - pole.place))))
 
 
-def _taken(roots: list[_Root], chosen: _Root) -> _Root:
+def _taken(roots: list[Root], chosen: Root) -> Root:
     return roots.pop(next(k for k, root in enumerate(roots) if root is chosen))
 
 
@@ -206,14 +226,14 @@ def _square(value: acb) -> arb:
     return value.real**2 + value.imag**2
 
 
-def _pair(root: _Root) -> Quadratic:
+def _pair(root: Root) -> Quadratic:
     """Polynomial of a conjugate pair."""
     if root.cosine is not None:
         return arb(1), -2 * root.cosine, arb(1)
     return arb(1), -2 * root.place.real, _square(root.place)
 
 
-def _two(root: _Root, other: _Root | None) -> Quadratic:
+def _two(root: Root, other: Root | None) -> Quadratic:
     """Polynomial of one real root, or of two."""
     first, second = root.place.real, other.place.real if other is not None else arb(0)
     return arb(1), -(first + second), first * second

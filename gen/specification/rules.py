@@ -22,8 +22,11 @@ coefficients would have that many leading bits without information.
 
 _BY_ORDER = ("order", "cutoff")
 _BY_EDGES = ("passband_edge", "stopband_edge", "passband_loss", "stopband_loss")
-_BY_SECTIONS = ("sos",)
-_FORMS = "given by order and cutoff, by passband_edge, stopband_edge, passband_loss and stopband_loss, or by sos"
+_BY_SECTIONS = ("sos", "sos_file")
+_FORMS = (
+    "given by order and cutoff, by passband_edge, stopband_edge, passband_loss and stopband_loss, "
+    "or by one of sos and sos_file"
+)
 
 _LOSSES = {"chebyshev1": ("passband_loss",), "chebyshev2": ("stopband_loss",), "elliptic": _BY_EDGES[2:]}
 """Losses that a family needs in addition to order and cutoff: they set the size of its ripples."""
@@ -163,9 +166,10 @@ def _check_impulse_invariant(table: FilterTable, family: str, kind: str) -> None
 
 
 def _check_sections(table: FilterTable, given: Sequence[str]) -> None:
+    form = "sos" if table.sos is not None else "sos_file"
     for key in given:
-        if key != "sos":
-            raise UnfitError("left out with sos", literal(getattr(table, key)), where=f"filter.{key}")
+        if key != form:
+            raise UnfitError(f"left out with {form}", literal(getattr(table, key)), where=f"filter.{key}")
     for k, (b0, b1, b2, a0, a1, a2) in enumerate(table.sos or ()):
         where = f"filter.sos[{k}]"
         if a0 != 1:

@@ -110,6 +110,7 @@ class FilterTable(Table):
         Rows | None,
         PlainValidator(list_of(list_of(number, 6, 6), 1, MAX_ORDER // 2, "rows [b0, b1, b2, 1.0, a1, a2]")),
     ] = None
+    sos_file: Annotated[str | None, PlainValidator(file_name)] = None
 
 
 class WearTable(Table):

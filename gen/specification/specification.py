@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sosmith.gen.specification.choices import CALIBRATION_INPUTS
+from sosmith.gen.specification.sections_file import sections_of
 from sosmith.gen.specification.toml_text import toml_text
 from sosmith.gen.specification.values import UnfitError
 from sosmith.gen.specification.wear_limits import WearSpec
@@ -50,7 +51,7 @@ class CalibrationSpec:
 
 @dataclass(frozen=True, kw_only=True)
 class FilterSpec:
-    """The required filter: by `order` and `cutoff`, by edges and losses, or by `sos`; the other attributes are None.
+    """The required filter: by `order` and `cutoff`, by edges and losses, or by sections; the other attributes are None.
 
     Attributes
     ----------
@@ -66,7 +67,10 @@ class FilterSpec:
         In dB, 1e-6 to 200, the first below the second. With `order` and `cutoff`, only those that the family
         needs.
     sos : tuple of tuples of Fraction or None
-        1 to 10 stable rows (b0, b1, b2, a0, a1, a2) with a0 = 1 and the sign convention of scipy.
+        1 to 10 stable rows (b0, b1, b2, a0, a1, a2) with a0 = 1 and the sign convention of scipy; of the
+        specification or of its `sos_file`.
+    origin : str
+        How `sos_file` was read, a sentence; empty without one.
     """
 
     family: str
@@ -79,6 +83,7 @@ class FilterSpec:
     passband_loss: Fraction | None
     stopband_loss: Fraction | None
     sos: tuple[tuple[Fraction, ...], ...] | None
+    origin: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -213,11 +218,10 @@ def _specification(path: Path, tree: dict[str, Any], document: Document) -> Spec
     calibrated = document.calibration is not None
     output_port = _port("clearance" if calibrated else "y", output, output.unit)
     hardware, wear = document.hardware, document.wear
-    source = {key: _to_json(value) for key, value in tree.items()}
     return Specification(
         path=path,
-        source=source,
-        text=toml_text(source),
+        source={key: _to_json(value) for key, value in tree.items()},
+        text=toml_text(tree),
         name=document.name,
         sample_rate=document.sample_rate,
         channels=document.channels,
@@ -226,7 +230,7 @@ def _specification(path: Path, tree: dict[str, Any], document: Document) -> Spec
             for name in (CALIBRATION_INPUTS if calibrated else document.input)
         ),
         calibration=_calibration(path, document),
-        filter=_filter(document.filter),
+        filter=_filter(path, document.filter),
         output=output_port,
         max_error=output_port.lsb if output.max_error is None else output.max_error,
         wear=None
@@ -270,8 +274,9 @@ def _calibration(path: Path, document: Document) -> CalibrationSpec | None:
     )
 
 
-def _filter(table: FilterTable) -> FilterSpec:
-    by_sections = table.sos is not None
+def _filter(path: Path, table: FilterTable) -> FilterSpec:
+    sections, origin = (table.sos, "") if table.sos_file is None else sections_of(path.parent / table.sos_file)
+    by_sections = sections is not None
     return FilterSpec(
         family=table.family or SECTIONS,
         kind=table.kind or SECTIONS,
@@ -282,5 +287,6 @@ def _filter(table: FilterTable) -> FilterSpec:
         stopband_edge=table.stopband_edge,
         passband_loss=table.passband_loss,
         stopband_loss=table.stopband_loss,
-        sos=table.sos,
+        sos=sections,
+        origin=origin,
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from decimal import Decimal
 from typing import Any
 
 from sosmith.gen.specification.values import key_text
@@ -15,7 +16,8 @@ def toml_text(tree: Mapping[str, Any]) -> str:
     Parameters
     ----------
     tree : mapping of str
-        Texts, numbers, bools, lists of these, and mappings, which become tables. Empty mappings are left out.
+        Texts, numbers (`Decimal` ones exactly), bools, lists of these, and mappings, which become tables. Empty
+        mappings are left out.
 
     Examples
     --------
@@ -45,6 +47,9 @@ def _value(value: Any) -> str:
             return "true" if value else "false"
         case str():
             return json.dumps(value, ensure_ascii=False)
+        case Decimal():
+            # As a float prints where that is the same number: the usual case.
+            return repr(float(value)) if Decimal(repr(float(value))) == value else str(value)
         case list() | tuple():
             return f"[{', '.join(map(_value, value))}]"
         case _:

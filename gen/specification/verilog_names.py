@@ -39,3 +39,15 @@ _IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 def is_identifier(name: str) -> bool:
     """Whether `name` is a simple identifier without ``$``, of at most `MAX_NAME` characters."""
     return len(name) <= MAX_NAME and _IDENTIFIER.fullmatch(name) is not None
+
+
+def identifier_from(text: str) -> str:
+    """Make an identifier of a text such as the name of a file.
+
+    Examples
+    --------
+    >>> identifier_from("8 kHz notch"), identifier_from("output")
+    ('filter_8_kHz_notch', 'filter_output')
+    """
+    name = re.sub(r"[^A-Za-z0-9_]+", "_", text).strip("_")[: MAX_NAME - len("filter_")]
+    return name if is_identifier(name) and name not in KEYWORDS else f"filter_{name}".rstrip("_")

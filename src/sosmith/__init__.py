@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from sosmith.interface.build import Build
     from sosmith.interface.calibration import Calibration
     from sosmith.interface.certificate import Certificate, Proof
+    from sosmith.interface.coefficients import Coefficients
     from sosmith.interface.comparison import Comparison, compare
     from sosmith.interface.design import Coefficient, Design, Section, design
     from sosmith.interface.exploration import Exploration, explore
@@ -42,6 +43,7 @@ __all__ = [
     "Calibration",
     "Certificate",
     "Coefficient",
+    "Coefficients",
     "Comparison",
     "Design",
     "Exploration",
@@ -72,6 +74,7 @@ _MODULES = {
     "interface.build": ("Build",),
     "interface.calibration": ("Calibration",),
     "interface.certificate": ("Certificate", "Proof"),
+    "interface.coefficients": ("Coefficients",),
     "interface.comparison": ("Comparison", "compare"),
     "interface.design": ("Coefficient", "Design", "Section", "design"),
     "interface.exploration": ("Exploration", "explore"),

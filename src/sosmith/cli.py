@@ -31,6 +31,9 @@ class _Command(NamedTuple):
 
 _COMMANDS = {
     "init": _Command("design", "init", "Write a commented example specification to FILE (default: flange_wear.toml)."),
+    "import": _Command(
+        "import_filter", "import_command", "Write a specification with the filter of another tool's FILE."
+    ),
     "design": _Command(
         "design",
         "design_command",

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
 from itertools import zip_longest
+from pathlib import Path
 from typing import Any
 
 from sosmith.gen.verifier.certificate_file import Certificate, PortEntry
@@ -21,6 +22,7 @@ from sosmith.gen.verifier.graph import RejectedError, require
 from sosmith.gen.verifier.l1_response import UndecidedError
 from sosmith.gen.verifier.specified.filter_distance import distance
 from sosmith.gen.verifier.specified.ideal_filter import stated_filter
+from sosmith.gen.verifier.specified.sections_file import sections_in
 
 _CALIBRATED = {"voltage": "V", "temperature": "degC"}
 """Inputs of a calibration, in the order of the ports, and their units."""
@@ -46,7 +48,7 @@ class Agreement:
     fitted: bool
 
 
-def check_specification(certificate: Certificate, text: str, margin: Fraction) -> Agreement:
+def check_specification(certificate: Certificate, text: str, margin: Fraction, folder: Path = Path()) -> Agreement:
     """Hold a proven certificate against the TOML `text` of a specification.
 
     Parameters
@@ -56,6 +58,8 @@ def check_specification(certificate: Certificate, text: str, margin: Fraction) -
         The specification, which has been found to be valid.
     margin : Fraction
         Peak gain by which the ideal filter may differ, from `sosmith.gen.verifier.verification.Verdict`.
+    folder : Path
+        Where the specification lies: the `sos_file` of its filter is relative to it.
 
     Raises
     ------
@@ -67,12 +71,12 @@ def check_specification(certificate: Certificate, text: str, margin: Fraction) -
     except (ValueError, ArithmeticError, RecursionError):
         raise RejectedError("the specification must be TOML") from None
     try:
-        return _checked(certificate, tree, margin)
+        return _checked(certificate, tree, margin, folder)
     except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
         raise RejectedError(f"the specification must be valid and complete, not: {error!r}") from None
 
 
-def _checked(certificate: Certificate, tree: Mapping[str, Any], margin: Fraction) -> Agreement:
+def _checked(certificate: Certificate, tree: Mapping[str, Any], margin: Fraction, folder: Path) -> Agreement:
     polynomial, sections = certificate.ideal.polynomial, certificate.ideal.sections
     core = "filter" if polynomial is None else "instrument" if sections else "calibration"
     calibration: Mapping[str, Any] | None = tree.get("calibration")
@@ -99,12 +103,15 @@ def _checked(certificate: Certificate, tree: Mapping[str, Any], margin: Fraction
         if not fitted:
             _check_polynomial(polynomial, calibration["coefficients"])
     require(bool(sections) or core == "calibration", "the filter must not be left out")
-    return Agreement(core, _filter_distance(certificate, tree, margin) if sections else None, fitted)
+    return Agreement(core, _filter_distance(certificate, tree, margin, folder) if sections else None, fitted)
 
 
-def _filter_distance(certificate: Certificate, tree: Mapping[str, Any], margin: Fraction) -> Fraction:
+def _filter_distance(certificate: Certificate, tree: Mapping[str, Any], margin: Fraction, folder: Path) -> Fraction:
+    table = dict(tree["filter"])
+    if "sos_file" in table:
+        table["sos"] = sections_in(folder / table.pop("sos_file"))
     try:
-        apart = distance(stated_filter(tree["filter"], _number(tree["sample_rate"])), certificate.ideal.sections)
+        apart = distance(stated_filter(table, _number(tree["sample_rate"])), certificate.ideal.sections)
     except UndecidedError as error:
         raise RejectedError(f"the filter could not be compared with the specified one: {error}") from None
     require(

@@ -60,6 +60,8 @@ def design_command(
     from sosmith.interface.specification import Specification
 
     asked = Specification.load(spec)
+    if asked.checked.filter.origin:
+        note(asked.checked.filter.origin)
     with show_progress() as step:
         from sosmith.interface.design import design
 

@@ -143,7 +143,7 @@ class Certificate:
         checked = None if spec is None else load(Path(fspath(spec)))
         if checked is not None:
             progress("specification", 0, 0)
-            agreement = check_specification(self.entries, checked.text, verdict.margin)
+            agreement = check_specification(self.entries, checked.text, verdict.margin, checked.path.parent)
             about = about_of(self.entries)
             check_text(about, checked.text)
             data = checked.calibration.data if checked.calibration is not None else None

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any, Literal
 from sosmith.gen.specification.exact_values import exact
 from sosmith.gen.specification.specification import Specification as Checked
 from sosmith.gen.specification.specification import example, from_tree, load
-from sosmith.gen.specification.toml_text import toml_text
 from sosmith.interface.quantity import Quantity
 from sosmith.model.errors import SpecificationError
 
@@ -219,8 +218,8 @@ class Specification:
         return _plain(self.checked.source)
 
     def toml(self) -> str:
-        """Return the specification as the text of a TOML file; `load` reads back the same specification."""
-        return toml_text(self.checked.source)
+        """Return the specification as the text of a TOML file, its own if it has one; `load` reads back the same."""
+        return self.checked.text
 
     def __repr__(self) -> str:
         rate = f"{self.sample_rate:g} Hz"

@@ -63,12 +63,15 @@ TABLES = (
 )
 FILTER_KEYS = (
     "one of the keys family, kind, method, order, cutoff, passband_edge, stopband_edge, passband_loss,"
-    " stopband_loss, sos, not an unknown one"
+    " stopband_loss, sos, sos_file, not an unknown one"
 )
 IDENTIFIER = "a Verilog identifier of at most 64 letters, digits and underscores"
 IN_PROPORTION = "a number of at most 50 digits, zero or from 1e-30 to below 1e30 in size"
 FAMILIES = "one of butterworth, chebyshev1, chebyshev2, elliptic, bessel"
-FORMS = "given by order and cutoff, by passband_edge, stopband_edge, passband_loss and stopband_loss, or by sos"
+FORMS = (
+    "given by order and cutoff, by passband_edge, stopband_edge, passband_loss and stopband_loss, "
+    "or by one of sos and sos_file"
+)
 MARGIN = (
     "at least a millionth of the sample_rate (0.0001 Hz) away from 0 and from half the sample_rate,"
     " as no word length suffices for a filter closer to them"

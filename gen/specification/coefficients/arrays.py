@@ -1,0 +1,167 @@
+"""Files of arrays with filters: NumPy's ``.npy`` and ``.npz``, MATLAB's ``.mat``, and pyfda's ``.json``.
+
+Doubles are taken as the numbers that they are.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import warnings
+from collections.abc import Mapping
+from decimal import Decimal
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sosmith.gen.specification.coefficients.content import Complex, Content, StatedSections, ZerosAndPoles
+from sosmith.gen.specification.coefficients.text import of_rows
+from sosmith.model.errors import SpecificationError
+from sosmith.model.tables.toml_file import read_text
+
+MAX_BYTES = 1 << 22
+"""Largest size of a file in bytes."""
+
+_MAX_NUMBERS = 4096
+_WAYS = ("sos", "zpk", "ba")
+"""Names of arrays, the exact one first: pyfda keeps a filter in all three."""
+
+
+def read_array_file(path: Path) -> Content:
+    """Read a ``.npy``, ``.npz``, ``.mat`` or ``.json`` file with a filter.
+
+    Raises
+    ------
+    SpecificationError
+        If the file cannot be read, is too large, or holds no filter that can be told.
+    """
+    suffix = path.suffix.lower()
+    if suffix == ".json":
+        return _json(path)
+    try:
+        if path.stat().st_size > MAX_BYTES:
+            raise SpecificationError(f"{path}: the filter must be at most {MAX_BYTES} bytes, not longer")
+        if suffix == ".mat":
+            return _matlab(path)
+        return _numpy(path, suffix)
+    except OSError as error:
+        found = (error.strerror or str(error)).lower()
+        raise SpecificationError(f"{path}: the filter must be a readable file, not: {found}") from None
+
+
+def _numpy(path: Path, suffix: str) -> Content:
+    what = f"a NumPy file {suffix}"
+    try:
+        # Objects could run code when they are read; a filter needs none.
+        with path.open("rb") as file:
+            loaded = np.load(file, allow_pickle=False)
+            if isinstance(loaded, np.ndarray):
+                return of_rows(path, _matrix(path, loaded), kind=what)
+            name = next((name for name in _WAYS if name in loaded.files), None)
+            if name is None:
+                raise SpecificationError(f"{path}: arrays must have one named {', '.join(_WAYS)}, not {loaded.files}")
+            array = loaded[name]
+    except (ValueError, EOFError, KeyError, TypeError, SyntaxError, NotImplementedError, MemoryError) as error:
+        raise SpecificationError(f"{path}: the filter must be {what} of numbers, not: {_first_line(error)}") from None
+    except Exception as error:  # zipfile and zlib have errors of their own for damaged archives
+        if isinstance(error, OSError | SpecificationError):
+            raise
+        raise SpecificationError(f"{path}: the filter must be {what}, not a damaged one") from None
+    if name == "zpk":
+        return _zpk(path, array)
+    return of_rows(path, _matrix(path, array), kind=f"{name} in {what}")
+
+
+def _matlab(path: Path) -> Content:
+    from scipy.io import loadmat  # noqa: PLC0415 - slow to load
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            held = {name: value for name, value in loadmat(path).items() if not name.startswith("__")}
+    except NotImplementedError:
+        raise SpecificationError(
+            f"{path}: the filter must be a MAT file up to version 7, not 7.3: save with -v7"
+        ) from None
+    except OSError:
+        raise
+    except Exception:
+        # Whatever a damaged file makes of the reader: there is no list of its errors.
+        raise SpecificationError(f"{path}: the filter must be a MAT file, not a damaged one or another kind") from None
+    names = {name.lower(): name for name in held}
+    if "sos" in names:
+        matrix = _matrix(path, held[names["sos"]])
+        scale = next((names[name] for name in ("g", "scalevalues") if name in names), None)
+        gains = () if scale is None else tuple(value for row in _matrix(path, held[scale]) for value in row)
+        if any(len(row) != 6 for row in matrix):
+            raise SpecificationError(f"{path}: {names['sos']} must have 6 columns, not {len(matrix[0])}")
+        stated = f"MATLAB's {names['sos']}" + ("" if scale is None else f" and {scale}")
+        return StatedSections(format=stated, rows=tuple(matrix), gains=gains)
+    if "ba" in names:
+        return of_rows(path, _matrix(path, held[names["ba"]]), kind=f"{names['ba']} in a MAT file")
+    raise SpecificationError(
+        f"{path}: variables must have SOS, with or without G, not only {', '.join(held) or 'none'}"
+    )
+
+
+def _json(path: Path) -> Content:
+    text = read_text(path, what="the filter", max_bytes=MAX_BYTES)
+    try:
+        tree = json.loads(text, parse_float=Decimal)
+    except (ValueError, RecursionError, ArithmeticError):
+        raise SpecificationError(f"{path}: the filter must be JSON, not something else") from None
+    rows = tree.get("sos") if isinstance(tree, Mapping) else None
+    if not isinstance(rows, list) or not rows:
+        raise SpecificationError(f"{path}: the filter must have sections in sos, as pyfda saves them, not none")
+    exact = [_row(path, row) for row in rows]
+    if any(len(row) != 6 for row in exact):
+        raise SpecificationError(f"{path}: sos must have rows of 6 numbers, not {len(exact[0])}")
+    return StatedSections(format="sos in a JSON file", rows=tuple(exact))
+
+
+def _row(path: Path, row: Any) -> tuple[Fraction, ...]:
+    if not isinstance(row, list) or any(isinstance(v, bool) or not isinstance(v, int | Decimal) for v in row):
+        raise SpecificationError(f"{path}: sos must have rows of numbers, not {str(row)[:60]!r}")
+    if any(isinstance(v, Decimal) and (not v.is_finite() or abs(v.adjusted()) > 400) for v in row):
+        raise SpecificationError(f"{path}: sos must have finite numbers within reason, not {str(row)[:60]!r}")
+    return tuple(Fraction(value) for value in row)
+
+
+def _matrix(path: Path, array: np.ndarray[Any, Any]) -> list[tuple[Fraction, ...]]:
+    """Return a matrix of finite real numbers exactly, one row for a vector."""
+    if array.dtype.kind not in "fiu" or not 1 <= array.ndim <= 2 or not 0 < array.size <= _MAX_NUMBERS:
+        raise SpecificationError(
+            f"{path}: the filter must be a matrix of 1 to {_MAX_NUMBERS} real numbers, "
+            f"not {' x '.join(map(str, array.shape)) or 'one'} of type {array.dtype}"
+        )
+    rows = np.atleast_2d(array)
+    if array.dtype.kind == "f" and not np.isfinite(rows).all():
+        raise SpecificationError(f"{path}: the filter must have finite numbers, not nan or infinite ones")
+    return [tuple(Fraction(value) for value in row) for row in rows.tolist()]
+
+
+def _zpk(path: Path, array: np.ndarray[Any, Any]) -> ZerosAndPoles:
+    """Read pyfda's zeros, poles and gains as three rows."""
+    if array.dtype.kind not in "cfiu" or array.ndim != 2 or array.shape[0] != 3 or not 0 < array.size <= _MAX_NUMBERS:
+        raise SpecificationError(f"{path}: zpk must be three rows of zeros, poles and gain, not of shape {array.shape}")
+    values = array.astype(complex)
+    if not np.isfinite(values).all():
+        raise SpecificationError(f"{path}: zpk must have finite numbers, not nan or infinite ones")
+    gain = math.fsum(values[2].real.tolist())
+    return ZerosAndPoles(
+        format="zpk in a NumPy file .npz",
+        zeros=tuple(map(exact_complex, values[0].tolist())),
+        poles=tuple(map(exact_complex, values[1].tolist())),
+        gain=Fraction(gain),
+    )
+
+
+def exact_complex(value: complex) -> Complex:
+    """Real and imaginary part as the rationals that they are."""
+    return Fraction(value.real), Fraction(value.imag)
+
+
+def _first_line(error: Exception) -> str:
+    return str(error).splitlines()[0][:100] if str(error) else type(error).__name__
