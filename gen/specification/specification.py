@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sosmith.gen.specification.choices import CALIBRATION_INPUTS
-from sosmith.gen.specification.sections_file import sections_of
 from sosmith.gen.specification.toml_text import toml_text
 from sosmith.gen.specification.values import UnfitError
 from sosmith.gen.specification.wear_limits import WearSpec
@@ -275,7 +274,11 @@ def _calibration(path: Path, document: Document) -> CalibrationSpec | None:
 
 
 def _filter(path: Path, table: FilterTable) -> FilterSpec:
-    sections, origin = (table.sos, "") if table.sos_file is None else sections_of(path.parent / table.sos_file)
+    sections, origin = table.sos, ""
+    if table.sos_file is not None:
+        from sosmith.gen.specification.sections_file import sections_of  # only a file of arrays needs numpy
+
+        sections, origin = sections_of(path.parent / table.sos_file)
     by_sections = sections is not None
     return FilterSpec(
         family=table.family or SECTIONS,
