@@ -51,7 +51,9 @@ def run(made: CoreDesign, board: str, folder: Path, *, samples: int, simulator: 
     ("board", "architecture", "simulator", "kinds"),
     [
         ("icebreaker", "folded", "icarus", {"SB_LUT4", "SB_CARRY", "SB_DFFESR", "SB_MAC16", "SB_RAM40_4K"}),
-        ("ulx3s_25f", "parallel", "verilator", {"LUT4", "CCU2C", "TRELLIS_FF", "MULT18X18D"}),
+        pytest.param(
+            "ulx3s_25f", "parallel", "verilator", {"LUT4", "CCU2C", "TRELLIS_FF", "MULT18X18D"}, marks=pytest.mark.slow
+        ),
     ],
 )
 def test_a_netlist_computes_what_the_integer_model_does(
