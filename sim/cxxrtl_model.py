@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from sosmith.gen.fpga.yosys import run_yosys, share_folder, yosys_version
+from sosmith.gen.output.header import without_comments
 from sosmith.sim.build_cache import BuildCache, cache_folder, key_of
 
 USE = "simulation in CXXRTL"
@@ -75,7 +76,7 @@ def build_cxxrtl(
         subprocess.run(["g++", "-v"], env=environment, check=True, capture_output=True, text=True).stderr,
         script,
         flags,
-        text,
+        without_comments(text),
         main.read_text(encoding="utf-8"),
         loop.read_text(encoding="utf-8"),
     )

@@ -20,6 +20,7 @@ from typing import IO
 
 import cocotb_tools.config
 
+from sosmith.gen.output.header import without_comments
 from sosmith.sim.build_cache import BuildCache, cache_folder, key_of
 
 LIBRARY_SECONDS = 20
@@ -110,7 +111,7 @@ class Builder:
             _ARGUMENTS,
             model.top,
             control,
-            model.source.read_text(encoding="utf-8"),
+            without_comments(model.source.read_text(encoding="utf-8")),
             _MAIN.read_text(encoding="utf-8"),
             _LOOP.read_text(encoding="utf-8"),
             (bench / "verilator.cpp").read_text(encoding="utf-8"),

@@ -8,6 +8,7 @@ from pathlib import Path
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.output.certificate import about, certificate
 from sosmith.gen.output.core_facts import CoreFacts, core_facts
+from sosmith.gen.output.header import with_comments
 from sosmith.gen.output.manifest import manifest
 from sosmith.gen.output.verilog import to_rtlil, to_verilog
 from sosmith.gen.reload.register_map import c_registers, systemrdl
@@ -58,10 +59,11 @@ def generated(
     progress("RTLIL")
     rtlil_text = to_rtlil(design.architecture.component(), datapath.name)
     progress("SystemVerilog")
+    known = facts or core_facts(design)
     first = {
-        f"{name}.sv": to_verilog(rtlil_text),
+        f"{name}.sv": with_comments(to_verilog(rtlil_text), design, known),
         f"{name}.il": rtlil_text,
-        f"{name}.json": to_json(manifest(facts or core_facts(design))),
+        f"{name}.json": to_json(manifest(known)),
     }
     rest = {f"{name}.c": c_source(datapath), f"{name}.h": c_header(datapath), **_register_files(design)}
     progress("certificate")

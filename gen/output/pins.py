@@ -81,7 +81,8 @@ def _meaning(name: str, interface: InterfaceFacts) -> str:
         for field in stream.fields:
             port = field.port
             kind = "two's complement" if port.signed else "unsigned"
-            value = f"{float(port.zero):g} + {float(port.lsb):.9g} * code {port.unit}".rstrip()
+            offset = f"{float(port.zero):g} + " if port.zero else ""
+            value = f"{offset}{float(port.lsb):.9g} * code {port.unit}".rstrip()
             parts.append(f"[{field.offset + port.bits - 1}:{field.offset}] {port.name}, {kind}, = {value}")
         return "; ".join(parts)
     if name.endswith("tuser"):

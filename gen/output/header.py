@@ -1,0 +1,115 @@
+"""Comments in the SystemVerilog: what the core is and how it is used, and above each stage what it computes.
+
+::
+
+    // name: what it is             one line for the reader who opens the file
+    // licence, version, hash       where it comes from
+    // bound, timing, ports         what it promises, and how it is connected
+    // sections                     H(z) of each, with the integer coefficients
+
+    // section0: y[n] = ...         the same above the module of a stage, in the parallel architecture
+    module name_section0(...)
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Sequence
+
+from sosmith.gen.core import CoreDesign
+from sosmith.gen.output.core_facts import CoreFacts, SectionFacts
+from sosmith.gen.output.pins import pins
+from sosmith.gen.version import __version__
+from sosmith.model.templates import render
+
+_COMMENT = re.compile(r"^ *//.*\n", re.MULTILINE)
+
+
+def with_comments(text: str, design: CoreDesign, facts: CoreFacts) -> str:
+    """Put the header before the SystemVerilog of a core, and a comment before each of its stages."""
+    names = {stage.name: _stage_lines(stage.name, facts) for stage in design.datapath.stages}
+
+    def described(found: re.Match[str]) -> str:
+        lines = names.get(found["stage"], [])
+        return "".join(f"// {line}\n" for line in lines) + found[0]
+
+    stages = re.sub(rf"^module {re.escape(facts.name)}_(?P<stage>\w+)\(", described, text, flags=re.MULTILINE)
+    return _header(design, facts) + stages
+
+
+def without_comments(text: str) -> str:
+    """Remove the lines that are comments: what is left decides what the hardware does."""
+    return _COMMENT.sub("", text)
+
+
+def _header(design: CoreDesign, facts: CoreFacts) -> str:
+    found = pins(design, facts.interface)
+    return render(
+        __package__,
+        "header.sv.jinja",
+        name=facts.name,
+        title=_title(design, facts),
+        version=__version__,
+        sha256=hashlib.sha256(design.spec.text.encode()).hexdigest(),
+        what=_promise(facts),
+        timing=_timing(design, facts),
+        pins=found,
+        width=max(len(pin.name) for pin in found),
+        recursions=[line for section in facts.sections for line in _section_lines(section)],
+    )
+
+
+def _title(design: CoreDesign, facts: CoreFacts) -> str:
+    inputs = " and ".join(field.port.name for field in facts.interface.inputs.fields)
+    (output,) = facts.interface.outputs.fields
+    made = " ".join(filter(None, (facts.architecture, facts.realization)))
+    channels = "1 channel" if facts.channels == 1 else f"{facts.channels} channels"
+    return f"{inputs} to {output.port.name}, {channels} at {float(design.spec.sample_rate):g} Hz, {made}"
+
+
+def _promise(facts: CoreFacts) -> Sequence[str]:
+    (output,) = facts.interface.outputs.fields
+    bound = f"{facts.error_bound:.6g} {facts.unit}".rstrip()
+    return (
+        f"Proven for all inputs in range: |{output.port.name} - exact| <= {bound}.",
+        f"{facts.name}.certificate.json has the proof; `sosmith verify` repeats it.",
+    )
+
+
+def _timing(design: CoreDesign, facts: CoreFacts) -> Sequence[str]:
+    every = "clock" if facts.cycles_per_sample == 1 else f"{facts.cycles_per_sample} clocks"
+    ready = facts.interface.reset_cycles
+    first = f", the first {ready} clocks after reset" if ready else ""
+    return (
+        f"Clock: {float(design.spec.hardware.clock) / 1e6:g} MHz in the specification. "
+        f"A sample is taken every {every} at best{first}.",
+        f"A result leaves at most {facts.interface.latency_cycles} clocks after its sample, if it need not wait.",
+    )
+
+
+def _stage_lines(name: str, facts: CoreFacts) -> list[str]:
+    sections = [section for section in facts.sections if section.name.split()[0] == name]
+    lines = [line for section in sections for line in _section_lines(section)]
+    rows = [row for row in facts.formats if row.stage == name]
+    lines += [f"{row.node}: {row.format}, {row.low:.6g} to {row.high:.6g} {row.unit}".rstrip() for row in rows]
+    return lines or [name]
+
+
+def _section_lines(section: SectionFacts) -> list[str]:
+    terms = [*_terms(section.b, "x", 1), *_terms((0.0, *section.a[1:]), "y", -1)]
+    lines = [f"{section.name}: y[n] = {' '.join(terms).removeprefix('+ ')}"]
+    if section.coefficients:
+        parts = (f"{each.name} = {each.integer} / 2**{each.frac}" for each in section.coefficients)
+        lines.append(f"  {', '.join(parts)}")
+    return lines
+
+
+def _terms(coefficients: Sequence[float], signal: str, sign: int) -> list[str]:
+    terms = []
+    for delay, coefficient in enumerate(coefficients):
+        if coefficient:
+            value = sign * coefficient
+            at = f"{signal}[n-{delay}]" if delay else f"{signal}[n]"
+            terms.append(f"{'-' if value < 0 else '+'} {abs(value):.9g} {at}")
+    return terms
