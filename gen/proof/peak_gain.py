@@ -65,7 +65,7 @@ def extent(drives: Sequence[Drive], accuracy: int = ACCURACY) -> Extent:
     Raises
     ------
     ShortfallError
-        If a pole does not lie inside the unit circle, or a response lasts longer than four million samples.
+        If a pole does not lie inside the unit circle, or a response lasts too long.
     """
     live = [drive for drive in drives if drive.low or drive.high]
     if not live:

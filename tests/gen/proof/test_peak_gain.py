@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import signal
 
+from sosmith.gen.proof.cascade_proof import ideal_gain
 from sosmith.gen.proof.nodes import LONGEST
 from sosmith.gen.proof.peak_gain import Drive, Extent, extent, peak_gain
 from sosmith.gen.proof.poles import Coefficients, pole_radii
@@ -94,6 +95,7 @@ def test_sections_of_the_fifth_order_filter(
 def test_the_whole_seventh_order_filter() -> None:
     """Its gain, and the overshoot of its step response: the extent of a constant drive."""
     assert f"{float(peak_gain(F7)):.6f}" == "1.558978"
+    assert ideal_gain(F7) == peak_gain(F7)
     made = IMPULSE
     for numerator, denominator in F7:
         made = made.all_pole(denominator).taps(numerator)
@@ -200,6 +202,9 @@ def test_nothing_drives_nothing() -> None:
     assert extent([]) == Extent(Fraction(0), Fraction(0))
     still = Drive(response_of(1, 2).response, Fraction(0), Fraction(0))
     assert extent([still]) == Extent(Fraction(0), Fraction(0))
+    nothing = Drive(still.response.minus(still.response), Fraction(-1), Fraction(1))
+    other = response_of(3, -1)
+    assert extent([nothing, other]) == extent([other])
 
 
 def test_the_difference_of_equal_responses_is_nothing() -> None:

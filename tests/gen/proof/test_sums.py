@@ -2,12 +2,13 @@
 
 import math
 from fractions import Fraction
-from itertools import accumulate
+from itertools import accumulate, pairwise
 
 import pytest
-from flint import fmpq_poly
+from flint import arb, arb_mat, ctx, fmpq_poly
 
-from sosmith.gen.proof.nodes import Nodes, polynomial
+from sosmith.gen.proof import nodes
+from sosmith.gen.proof.nodes import LONGEST, Nodes, polynomial
 from sosmith.gen.proof.poles import Coefficients
 from sosmith.gen.proof.response import IMPULSE, common
 from sosmith.gen.proof.sums import Recursion, Weighted
@@ -62,11 +63,67 @@ def test_the_nodes_determine_every_sample_and_the_next_nodes(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", DENOMINATORS)
+def test_there_are_no_more_blocks_than_needed(name: str) -> None:
+    """The next smaller number of four binary digits does not let responses decay far enough."""
+    made = Nodes(DENOMINATORS[name], ACCURACY, 400)
+    unit = 1 << max(0, (made.blocks - 1).bit_length() - 4)
+    target = arb(2) ** -(ACCURACY + 16)
+    assert made.blocks % unit == 0
+    with ctx.workprec(1000):
+        step = arb_mat(made.powers[0].tolist()) * (arb(2) ** -400)
+        powers = [(step**blocks).tolist() for blocks in (made.blocks, made.blocks - unit)]
+        after, before = (max(sum(map(abs, row), arb(0)) for row in power) for power in powers)
+    assert after < target < before
+
+
+def test_a_precision_that_never_suffices_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With all pivots said to be 0, the precision rises by what is missing and half the guard bits, up to 65,536."""
+    tried: list[int] = []
+
+    def flat(matrix: nodes.Integers, bits: int) -> tuple[list[int], int]:
+        tried.append(bits)
+        return list(range(matrix.shape[1])), 0
+
+    monkeypatch.setattr(nodes, "_pivots", flat)
+    with pytest.raises(ShortfallError, match=r"^the poles must not lie so close to each other that a response cannot"):
+        Nodes((dyadic(1, -0.5),), ACCURACY, 20_000)
+    missing = 20_000 + (2).bit_length() + 16
+    assert [b - a for a, b in pairwise(tried)] == [missing + 32] * 3
+    assert tried[-2] <= 1 << 16 < tried[-1]
+
+
+def test_a_response_may_last_longer_for_sums_of_more_bits() -> None:
+    """As long as it decays to the accuracy of the word-length search in time; blocks do not grow without end."""
+    slow = (dyadic(1, -(1 - 2.0**-15)),)
+    for accuracy in (ACCURACY, 128):
+        made = Nodes(slow, accuracy, accuracy + 72)
+        assert made.block == 512
+        assert (made.block * made.blocks > LONGEST) == (accuracy == 128)
+
+
+@pytest.mark.parametrize("name", DENOMINATORS)
 def test_totals_enclose_the_sum_of_magnitudes(name: str) -> None:
     made = Recursion(DENOMINATORS[name], ACCURACY)
     for numerator, found in zip(NUMERATORS, made.totals(list(map(polynomial, NUMERATORS))), strict=True):
         total = sum(map(abs, exact(numerator, DENOMINATORS[name], 4000)), Fraction(0))
         assert abs(found.magnitude - total) <= found.uncertainty < max(total, Fraction(1)) / 2**30
+
+
+@pytest.mark.parametrize(
+    ("name", "uncertainty"),
+    [
+        ("one pole", 2.469602135e-26),
+        ("the same pair three times", 7.488816524e-17),
+        ("every other sample is zero", 2.006581797e-25),
+    ],
+)
+def test_the_uncertainty_of_a_small_response_is_what_it_was(name: str, uncertainty: float) -> None:
+    """Its parts lie far apart, and it is larger than needed: of a mistake in a small part, nothing else would tell.
+
+    Whoever changes the bound gives the figures that it has now.
+    """
+    (found,) = Recursion(DENOMINATORS[name], ACCURACY).totals([polynomial(NUMERATORS[-1])])
+    assert float(found.uncertainty) == pytest.approx(uncertainty, rel=1e-9)
 
 
 @pytest.mark.parametrize("accuracy", [40, 128])

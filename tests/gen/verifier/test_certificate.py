@@ -24,7 +24,7 @@ from sosmith.gen.filter.design import design
 from sosmith.gen.output.certificate import certificate
 from sosmith.gen.realizations.registry import CASCADES, REALIZATIONS
 from sosmith.gen.specification.specification import FilterSpec
-from sosmith.gen.verifier import certificate_file
+from sosmith.gen.verifier import certificate_file, verification
 from sosmith.gen.verifier.certificate_file import Certificate, Operation, certificate_text, on_grid, read_certificate
 from sosmith.gen.verifier.l1_response import Inverse, UndecidedError, inverse, is_stable, response
 from sosmith.gen.verifier.verification import RejectedError, verify
@@ -129,6 +129,27 @@ def test_an_input_to_be_scaled_before_sections_in_another_order() -> None:
     assert quantized.filter is not None
     assert quantized.filter.rows != ideal.rows
     proven(quantized)
+
+
+@pytest.mark.parametrize(("cutoff", "smaller"), [(0.1, "coefficients"), (0.3, "gain")])
+def test_the_margin_is_what_rounding_up_adds(cutoff: float, smaller: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Another ideal filter may add that much to the gain, and, times the largest input, to the error."""
+    exact: dict[Fraction, Fraction] = {}
+
+    def noted(value: Fraction) -> Fraction:
+        exact[on_grid(value)] = value
+        return on_grid(value)
+
+    ports = (Port.from_range(name, 4, Fraction(-end), Fraction(end), signed=True) for name, end in (("x", 1), ("y", 2)))
+    made = plain(butterworth(1, cutoff), inputs=next(ports), output=next(ports))
+    read = Certificate.model_validate(json.loads(certificate_text(certificate(made, made.datapath.output.lsb))))
+    monkeypatch.setattr(verification, "on_grid", noted)
+    verdict = verify(read)
+    claims = {"gain": read.claims.peak_gain, "coefficients": verdict.budget["filter coefficients"]}
+    room = {name: value - exact[value] for name, value in claims.items() if value is not None}
+    room["coefficients"] /= 4  # the largest input, in output LSBs
+    assert min(room, key=lambda name: room[name]) == smaller
+    assert verdict.margin == room[smaller]
 
 
 def test_the_same_section_twice() -> None:

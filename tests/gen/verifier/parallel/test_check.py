@@ -58,6 +58,13 @@ def accept(core: Made) -> None:
     assert found.states == sum(len(stage.graph.delays) for stage in core.design.datapath.stages) > 0
 
 
+def test_registers_are_counted_but_for_those_of_the_control() -> None:
+    core = small()
+    names = re.findall(r"^ *reg (?:\[\d+:0\] )?([^\s;]+)", core.text, re.MULTILINE)
+    control = [name for name in names if re.fullmatch(r"full|o_valid|valid\d|bank\d", name)]
+    assert core.check().registers == len(names) - len(control) > len(control) > 4
+
+
 # What is not the graph of the certificate is rejected.
 
 
@@ -233,6 +240,16 @@ def test_each_kind_of_break_is_named(kind: str) -> None:
     text, count = re.subn(old, new, core.text, count=1)
     assert count == 1
     assert re.fullmatch(sentence, rejection(core, text)), rejection(core, text)
+
+
+def test_bits_beside_a_field_may_be_anything() -> None:
+    """Even a single one: the eighth bit of seven counts as 0 nowhere."""
+    core = small(PLAIN.replace("bits = 8", "bits = 7", 1))
+    assert rejection(core, core.text) == ""
+    word = "wire [6:0] word;\n  assign word = s_axis_tdata[6:0] + s_axis_tdata[7];"
+    text = core.text.replace(".i0(s_axis_tdata[6:0])", ".i0(word)")
+    text = text.replace("wire [7:0] s_axis_tdata;", f"wire [7:0] s_axis_tdata;\n  {word}", 1)
+    assert re.fullmatch(rf"section0\.\w+ must be {NODE}section0, not another value", rejection(core, text))
 
 
 def test_names_of_registers_do_not_make_a_proof() -> None:
