@@ -10,13 +10,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from flint import ctx
+from flint import arb, ctx
 from scipy import signal
 
 from sosmith.gen.filter.design import design
 from sosmith.gen.specification.specification import FilterSpec
 from sosmith.gen.verifier.certificate_file import SectionEntry
 from sosmith.gen.verifier.l1_response import UndecidedError
+from sosmith.gen.verifier.specified import filter_distance
 from sosmith.gen.verifier.specified.filter_distance import distance
 from sosmith.gen.verifier.specified.ideal_filter import StatedFilter, stated_filter
 
@@ -122,6 +123,22 @@ def test_equal_filters_are_as_near_as_the_arithmetic_can_tell() -> None:
     assert distance(stated(sos=rows), exact) < Fraction(1, 2**1024)
     mean = entries([[0.5, 0.5, 0, 1, 0, 0]])
     assert distance(stated(**by_order("butterworth", "lowpass", "0.25", 1)), mean) < Fraction(1, 2**1024)
+
+
+@pytest.mark.parametrize(("width", "precisions"), [(0.75, 1), (1.5, 6)])
+def test_right_bits_are_wanted_down_to_the_limit(
+    width: float, precisions: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Just below 2**-1024 the first precision is enough; just above, all are tried."""
+    tried: list[int] = []
+
+    def unknown(stated: StatedFilter, sections: Sequence[SectionEntry], bits: int) -> arb:
+        tried.append(bits)
+        return arb(0, width) * arb(2) ** -1024
+
+    monkeypatch.setattr(filter_distance, "_bound", unknown)
+    assert distance(NOTHING, []) < Fraction(2, 2**1024)
+    assert tried == [256 << k for k in range(precisions)]
 
 
 def test_the_order_of_sections_and_how_they_are_split_do_not_matter() -> None:
