@@ -173,10 +173,12 @@ def _run(command: list[str], folder: Path) -> subprocess.CompletedProcess[str]:
     )
 
 
-def broken(module: ModuleType, right: str, wrong: str) -> ModuleType:
-    """Return a module whose source has `wrong` in place of `right`, which must be there once."""
+def broken(module: ModuleType, right: str, wrong: str, *more: tuple[str, str]) -> ModuleType:
+    """Return a module whose source has `wrong` in place of `right`, which must be there once; `more` likewise."""
     source = Path(str(module.__file__)).read_text(encoding="utf-8")
-    assert source.count(right) == 1, f"{module.__name__} must hold {right!r} once, not {source.count(right)} times"
+    for old, new in ((right, wrong), *more):
+        assert source.count(old) == 1, f"{module.__name__} must hold {old!r} once, not {source.count(old)} times"
+        source = source.replace(old, new)
     result = ModuleType(module.__name__)
-    exec(compile(source.replace(right, wrong), str(module.__file__), "exec"), vars(result))
+    exec(compile(source, str(module.__file__), "exec"), vars(result))
     return result
