@@ -13,15 +13,16 @@ if TYPE_CHECKING:
     from jinja2 import Environment
 
 
-def render(package: str, template: str, **values: Any) -> str:
+def render(package: str | tuple[str, ...], template: str, **values: Any) -> str:
     """Fill a template.
 
     Values are escaped in templates whose names end in ``.html.jinja``, and only there.
 
     Parameters
     ----------
-    package : str
-        Package in whose folder the template lies, such as ``"sosmith.gen.report"``.
+    package : str or tuple of str
+        Package in whose folder the template lies, such as ``"sosmith.gen.report"``; or packages to look in, one after
+        the other.
     template : str
         Name of the file.
     **values
@@ -32,16 +33,22 @@ def render(package: str, template: str, **values: Any) -> str:
     jinja2.UndefinedError
         If the template names something that is not given.
     """
-    return _environment(package).get_template(template).render(values)
+    packages = (package,) if isinstance(package, str) else package
+    return _environment(packages).get_template(template).render(values)
 
 
 @cache
-def _environment(package: str) -> Environment:
+def _environment(packages: tuple[str, ...]) -> Environment:
     from jinja2 import Environment, FunctionLoader, StrictUndefined
 
-    folder = files(package)
+    folders = [files(package) for package in packages]
+
+    def text(name: str) -> str | None:
+        places = (folder.joinpath(name) for folder in folders)
+        return next((place.read_text(encoding="utf-8") for place in places if place.is_file()), None)
+
     return Environment(
-        loader=FunctionLoader(lambda name: folder.joinpath(name).read_text(encoding="utf-8")),
+        loader=FunctionLoader(text),
         autoescape=lambda name: name is not None and name.endswith(".html.jinja"),
         undefined=StrictUndefined,
         trim_blocks=True,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import partial
 from pathlib import Path
 
@@ -157,6 +158,12 @@ def test_monitor_without_an_alarm(ramp: Path) -> None:
     with plugged(model_of(instrument_design().core)) as port:
         result = MONITOR.good(port, "--trace", "ramp.csv", "--speed", "0")
     assert result.stdout == ""
+
+
+def test_monitor_tells_where_its_page_is(ramp: Path) -> None:
+    with plugged(model_of(instrument_design().core)) as port:
+        result = MONITOR.good(port, "--trace", "ramp.csv", "--speed", "0", "--page")
+    assert re.search(r"^sosmith: the live view is at http://127\.0\.0\.1:\d+/[\w-]{32}/$", result.stderr, re.MULTILINE)
 
 
 def test_monitor_checks_the_board(ramp: Path) -> None:

@@ -17,7 +17,8 @@ from sosmith.host.alarms import Alarm, Alarms, Hook
 from sosmith.host.board import Results
 from sosmith.host.identity_check import check_files
 from sosmith.host.line_protocol import influx_lines
-from sosmith.host.live_view import LiveView, plot
+from sosmith.host.live_view import plot, render
+from sosmith.host.readings import History, Readings
 from sosmith.model.errors import ShortfallError, SpecificationError, ToolError
 from sosmith.model.link.identity import Identity
 
@@ -86,17 +87,17 @@ def test_a_plot_runs_from_the_lowest_to_the_highest_value() -> None:
     assert [len(row) for row in plot(range(1000), 40, 3)] == [40, 40, 40]
 
 
-def shown(view: LiveView) -> str:
+def shown(readings: Readings) -> str:
     console = Console(width=80, file=None, record=True, quiet=False, force_terminal=False)
     with console.capture() as capture:
-        console.print(view.render(80))
+        console.print(render(readings, 80))
     return capture.get()
 
 
 def test_the_live_view() -> None:
     about = identity(instrument_design()).model_copy(update={"flags": FLAGS})
     manifest = {"spec": {"wear": {"initial": [1.0, 1.5]}}}
-    view = LiveView(about, manifest, "/dev/ttyUSB1")
+    view = Readings(about, manifest, "/dev/ttyUSB1")
     values = np.stack([1.0 + np.arange(300) / 3600, np.full(300, 2.0)], axis=1)
     view.add(results(values, np.stack([np.zeros(300), np.full(300, 8)], axis=1)), 0)
     text = shown(view)
@@ -108,7 +109,7 @@ def test_the_live_view() -> None:
 
 
 def test_the_live_view_without_wear_and_with_much_to_show() -> None:
-    view = LiveView(identity(filter_design()).model_copy(update={"flags": FLAGS}), None, "port")
+    view = Readings(identity(filter_design()).model_copy(update={"flags": FLAGS}), None, "port")
     for first in range(0, 20_000, 1000):
         view.add(results(np.linspace(first, first + 999, 1000) / 1000, np.zeros(1000)), first)
     view.state, view.alarms = "lost", 2
@@ -116,6 +117,21 @@ def test_the_live_view_without_wear_and_with_much_to_show() -> None:
     assert text.startswith("plain at port: lost, 20,000 samples, 20.0 s, 2 alarms")
     assert "+3600.000" in text
     assert "█" in text
+
+
+def test_a_history_that_is_thinned_out_keeps_the_flags() -> None:
+    history = History()
+    status = np.zeros(9000, dtype=np.uint8)
+    status[[0, 4321, 8999]] = 1, 8, 16
+    for first in range(0, 9000, 7):
+        history.add(first, np.arange(first, min(first + 7, 9000)) / 2, status[first : first + 7])
+    assert history.numbers.tolist() == list(range(0, 9000, 8))
+    assert history.values.tolist() == [number / 2 for number in range(0, 9000, 8)]
+    assert np.flatnonzero(history.status).tolist() == [0, 541]
+    history.add(9000, np.zeros(1), np.zeros(1, dtype=np.uint8))
+    assert history.status[-1] == 16
+    numbers, values, flags = history.thinned(100)
+    assert (len(numbers), numbers[-1], values[-1], sorted(set(flags.tolist()))) == (100, 9000, 0.0, [0, 1, 8, 16])
 
 
 @pytest.fixture(scope="module")

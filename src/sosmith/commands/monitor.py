@@ -17,6 +17,7 @@ from sosmith.terminal import note, output_option
 
 if TYPE_CHECKING:
     from sosmith.host.monitor import Event
+    from sosmith.host.readings import Readings
     from sosmith.model.link.identity import Identity
 
 REFRESHES = 8
@@ -43,6 +44,7 @@ REFRESHES = 8
 @click.option(
     "--hook", metavar="COMMAND", help="Command to run for each alarm; SOSMITH_FLAG, SOSMITH_CHANNEL, ... tell it why."
 )
+@click.option("--page", is_flag=True, help="Show the same in a browser, at a local address that is told on stderr.")
 @click.option("--influx", is_flag=True, help="Print every result in the line protocol of InfluxDB.")
 @BAUD
 @output_option("Recording: a CSV file, or a Parquet file if its name ends so; CSV is continued.")
@@ -53,11 +55,12 @@ def monitor_command(
     files: Path | None,
     alarms: tuple[str, ...],
     hook: str | None,
+    page: bool,
     influx: bool,
     baud: int,
     output: Path | None,
 ) -> None:
-    """Watch the board at PORT: live values, wear, rate and flags in the terminal.
+    """Watch the board at PORT: live values, wear, rate and flags in the terminal, or in a browser.
 
     The samples of --trace are fed at the board's sample rate. The board must have the core whose manifest and
     certificate are in --files. After it was unplugged, it is waited for; its filter then starts from reset, and the
@@ -67,7 +70,7 @@ def monitor_command(
     and its status. Ctrl-C and even a kill leave every row that was received.
 
     \b
-        sosmith monitor /dev/ttyUSB1 --trace ramp.csv -o week.csv
+        sosmith monitor /dev/ttyUSB1 --trace ramp.csv -o week.csv --page
         sosmith monitor /dev/ttyUSB1 --trace ramp.csv --alarm wear_warning --hook 'mail-the-depot now'
     """
     from sosmith.host.board import Board
@@ -77,7 +80,7 @@ def monitor_command(
     if trace is None:
         raise SpecificationError("--trace must be given: the board takes its samples over the link")
     with ExitStack() as stack:
-        shown = stack.enter_context(_Monitor(port, files, alarms, hook, influx, output))
+        shown = stack.enter_context(_Monitor(port, files, alarms, hook, page, influx, output))
         for event in watch(
             lambda: Board(port, baud=baud),
             lambda identity: samples_for(identity, trace),
@@ -98,24 +101,29 @@ class _Monitor:
         files: Path | None,
         alarms: tuple[str, ...],
         hook: str | None,
+        page: bool,
         influx: bool,
         output: Path | None,
     ) -> None:
         from sosmith.host.alarms import ALARMS
 
-        self.raised = 0
-        self._port, self._files, self._influx, self._output = port, files, influx, output
+        self._port, self._files, self._with_page, self._influx, self._output = port, files, page, influx, output
         self._flags, self._hook_command = alarms or ALARMS, hook
         self._manifest: dict[str, Any] | None = None
         self._stack = ExitStack()
         self._start = 0.0
-        self._began = False
+        self._readings: Readings | None = None
 
     def __enter__(self) -> _Monitor:
         return self
 
     def __exit__(self, *error: object) -> None:
         self._stack.close()
+
+    @property
+    def raised(self) -> int:
+        """Alarms so far."""
+        return 0 if self._readings is None else self._readings.alarms
 
     def check(self, identity: Identity) -> None:
         """Hold a board against the files of its core."""
@@ -133,7 +141,7 @@ class _Monitor:
         from sosmith.host.monitor import Connected, Lost, Received
 
         if isinstance(event, Connected):
-            if not self._began:
+            if self._readings is None:
                 self._begin(event.identity)
             else:
                 note(f"{self._port}: connected again")
@@ -146,11 +154,11 @@ class _Monitor:
 
     def _begin(self, identity: Identity) -> None:
         from sosmith.host.alarms import Alarms, Hook
-        from sosmith.host.live_view import LiveView
+        from sosmith.host.readings import Readings
         from sosmith.host.recording import recording
         from sosmith.host.rows import columns
 
-        self._began, self._identity, self._start = True, identity, time.time()
+        self._identity, self._start = identity, time.time()
         self._alarms = Alarms(self._flags, identity.flags)
         self._hook = None
         if self._hook_command is not None:
@@ -160,7 +168,13 @@ class _Monitor:
         self._recording = None
         if self._output is not None:
             self._recording = self._stack.enter_context(recording(self._output, ("utc", first, "session", *rest)))
-        self._view = LiveView(identity, self._manifest, self._port)
+        self._readings = Readings(identity, self._manifest, self._port)
+        self._page = None
+        if self._with_page:
+            from sosmith.host.page import LivePage
+
+            self._page = self._stack.enter_context(LivePage(self._readings))
+            note(f"the live view is at {self._page.address}")
         self._live = None
         if sys.stderr.isatty():
             from rich.console import Console
@@ -174,6 +188,7 @@ class _Monitor:
         from sosmith.host.line_protocol import influx_lines
         from sosmith.host.rows import rows
 
+        assert self._readings is not None
         results = event.results
         if self._recording is not None:
             made = rows(self._identity, results, event.first)
@@ -182,20 +197,24 @@ class _Monitor:
             click.echo("\n".join(influx_lines(self._identity, results, event.first, self._start)))
             sys.stdout.flush()
         for alarm in self._alarms.rises(results, event.first):
-            self.raised += 1
+            self._readings.alarm(alarm)
             unit = self._identity.output_port.unit
             when = alarm.sample / self._identity.sample_rate
             note(f"alarm: {alarm.flag} of channel {alarm.channel} at {when:.3f} s, {alarm.value:g} {unit}".rstrip())
             if self._hook is not None:
                 self._hook.run(alarm)
-        self._view.alarms = self.raised
-        self._view.add(results, event.first)
+        self._readings.add(results, event.first)
         self._show("connected")
 
     def _show(self, state: str) -> None:
-        self._view.state = state
+        assert self._readings is not None
+        self._readings.state = state
+        if self._page is not None:
+            self._page.update()
         if self._live is not None:
-            self._live.update(self._view.render(self._live.console.width))
+            from sosmith.host.live_view import render
+
+            self._live.update(render(self._readings, self._live.console.width))
 
     def _utc(self, seconds: float) -> str:
         return (

@@ -1,0 +1,152 @@
+"""The live view in a browser: who may see it, what it is sent, and that the page shows it and asks for nothing else."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+from urllib.error import HTTPError
+from urllib.request import urlopen
+
+import numpy as np
+import pytest
+from tests.host.browser import BROWSER, browser
+from tests.host.lines import device_of
+from tests.interface.small import instrument_design
+from websockets.exceptions import InvalidStatus
+from websockets.sync.client import connect
+
+from sosmith.host.alarms import Alarm
+from sosmith.host.board import Results
+from sosmith.host.page import LivePage, picture
+from sosmith.host.page import page as html
+from sosmith.host.readings import Readings
+
+FLAGS = {"wear_warning": 3, "wear_critical": 4}
+MANIFEST = {"spec": {"wear": {"initial": 1.0, "warning": 0.5, "limit": 2.0}}}
+
+
+def gauge(**changes: Any) -> Readings:
+    about = device_of(instrument_design())._identity.model_copy(update={"flags": FLAGS, **changes})
+    return Readings(about, MANIFEST, "/dev/ttyUSB1")
+
+
+def feed(readings: Readings, count: int = 1000) -> None:
+    """Add results whose first channel rises by 36 mm/h, and whose second has a warning once."""
+    first = readings.samples
+    numbers = np.arange(first, first + count)
+    values = np.stack([1 + numbers / 10_000, np.full(count, 2.0)], axis=1)
+    status = np.stack([np.zeros(count), np.where(numbers == 500, 8, 0)], axis=1).astype(np.uint8)
+    readings.add(Results(values, values.astype(np.int64), status, FLAGS), first)
+
+
+@pytest.fixture
+def live() -> Iterator[tuple[Readings, LivePage]]:
+    readings = gauge()
+    with LivePage(readings) as page:
+        yield readings, page
+
+
+def test_what_the_page_is_sent() -> None:
+    readings = gauge()
+    assert picture(readings, "connected")["now"] == []
+    feed(readings)
+    readings.alarm(Alarm("wear_critical", 1, 200, 3.25))
+    sent = picture(readings, "lost")
+    assert {key: sent[key] for key in ("state", "samples", "seconds", "alarms")} == {
+        "state": "lost",
+        "samples": 1000,
+        "seconds": 10.0,
+        "alarms": 1,
+    }
+    assert sent["newest"] == [["wear_critical", 1, 2.0, 3.25]]
+    (value, wear, rate, flags), second = sent["now"]
+    assert (value, wear, rate) == pytest.approx((1.0999, 0.0999, 36.0))
+    assert flags == []
+    assert second[:2] == [2.0, 1.0]
+    assert len(sent["times"]) == len(sent["values"][0]) == len(sent["rates"][0]) == len(sent["status"][0]) == 400
+    assert (sent["times"][-1], sent["values"][0][-1]) == (9.99, 1.0999)
+    assert sent["rates"][0][:40] == [None] * 40
+    assert sent["rates"][0][40:] == pytest.approx([36.0] * 360)
+    assert sum(sent["status"][1]) == 8
+
+
+def test_only_who_knows_the_address_sees_anything(live: tuple[Readings, LivePage]) -> None:
+    address = live[1].address
+    root = address[: address.index("/", 8) + 1]
+    assert root.startswith("http://127.0.0.1:")
+    assert len(address) - len(root) > 30
+    for path in ("", "live", "0" * 32 + "/", address[len(root) : -2] + "/"):
+        with pytest.raises(HTTPError) as refused:
+            urlopen(root + path)
+        assert refused.value.code == 404
+        refused.value.close()
+    with pytest.raises(InvalidStatus):
+        connect(root.replace("http", "ws") + "live")
+
+
+def test_the_page_may_ask_for_nothing_but_its_websocket(live: tuple[Readings, LivePage]) -> None:
+    with urlopen(live[1].address) as answer:
+        headers, text = answer.headers, answer.read().decode()
+    assert headers["Content-Type"] == "text/html; charset=utf-8"
+    assert headers["Content-Security-Policy"].startswith("default-src 'none'; script-src 'nonce-")
+    assert (headers["Referrer-Policy"], headers["Cache-Control"]) == ("no-referrer", "no-store")
+    assert "http" not in text.replace("http://www.w3.org/2000/svg", "").replace('"https:"', "")
+
+
+def test_each_reader_gets_pictures_until_the_end(live: tuple[Readings, LivePage]) -> None:
+    readings, page = live
+    with connect(page.address.replace("http", "ws") + "live") as first:
+        assert json.loads(first.recv(60))["samples"] == 0
+        feed(readings)
+        with connect(page.address.replace("http", "ws") + "live") as second:
+            assert json.loads(second.recv(60))["samples"] == 0
+            page.close()
+            for reader in (first, second):
+                assert [json.loads(each)["samples"] for each in reader] == [1000]
+                assert reader.close_code == 1000
+
+
+def test_what_the_board_says_is_text_and_no_markup() -> None:
+    nasty = "</script><img src=x onerror=alert(1)>"
+    text = html(gauge(name=nasty, sosmith=nasty, output=("y", 12, False, 0.0, 1.0, nasty)), "nonce")
+    assert "<img" not in text
+    assert text.count("</script>") == 2
+
+
+@pytest.mark.skipif(BROWSER is None, reason="there is no Chromium on this machine")
+def test_the_page_in_a_browser(live: tuple[Readings, LivePage], tmp_path: Path) -> None:
+    readings, page = live
+    with browser(tmp_path) as tab:
+        tab.window(1200, 900)
+        tab.open(page.address)
+        tab.until("document.getElementById('state')?.textContent === 'No alarm, connected'")
+        feed(readings)
+        readings.alarm(Alarm("wear_critical", 1, 200, 3.25))
+        readings.state = "lost"
+        page.update()
+        tab.until("document.getElementById('state').textContent === '1 alarm, board lost, waiting for it'")
+        rows = tab.value("[...document.querySelectorAll('#channels tbody tr')].map((row) => row.innerText.trim())")
+        assert [row.split() for row in rows] == [
+            ["0", "1.100", "0.100", "+36.000", "–"],
+            ["1", "2.000", "1.000", "0.000", "–"],
+        ]
+        assert tab.value("document.querySelector('#alarms tbody').innerText").split() == [
+            *("0:00:02.00", "1", "3.250"),
+            *("wear", "critical"),
+        ]
+        assert tab.value("document.querySelectorAll('#plot path.line').length") == 2
+        assert tab.value("document.querySelectorAll('#plot .raised').length") == 1
+        tab.value("document.querySelector('#channels input').click()")
+        assert tab.value("document.querySelectorAll('#plot path.line').length") == 1
+        tab.value("document.querySelector('input[data-what=wear]').click(); document.getElementById('plot').focus()")
+        tab.key("End")
+        assert tab.value("document.getElementById('cursor').textContent") == "At 0:00:09.99, wear in mm: 1: 1.000"
+        for width in (375, 1200):
+            tab.window(width, 800)
+            assert tab.value("document.documentElement.scrollWidth - innerWidth") <= 0
+        page.close()
+        tab.until("document.getElementById('state').textContent === '1 alarm, the monitor has ended'")
+        assert tab.said == []
+        assert tab.asked == [page.address, page.address.replace("http", "ws") + "live"]
