@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Callable
 from contextlib import ExitStack
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,8 +18,11 @@ from sosmith.model.errors import SpecificationError
 from sosmith.terminal import note, output_option
 
 if TYPE_CHECKING:
+    from sosmith.host.alarms import Alarm
     from sosmith.host.monitor import Event
+    from sosmith.host.mqtt import Broker, Publisher
     from sosmith.host.readings import Readings
+    from sosmith.host.recording import Recording
     from sosmith.model.link.identity import Identity
 
 REFRESHES = 8
@@ -45,6 +50,19 @@ REFRESHES = 8
     "--hook", metavar="COMMAND", help="Command to run for each alarm; SOSMITH_FLAG, SOSMITH_CHANNEL, ... tell it why."
 )
 @click.option("--page", is_flag=True, help="Show the same in a browser, at a local address that is told on stderr.")
+@click.option("--mqtt", metavar="URL", help="Publish to the broker at mqtt://HOST[:PORT][/TOPIC], or mqtts:// for TLS.")
+@click.option(
+    "--mqtt-credentials",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="File with user:password, for its owner only.  [default: SOSMITH_MQTT_USER, SOSMITH_MQTT_PASSWORD]",
+)
+@click.option(
+    "--mqtt-ca",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Certificates that mqtts:// trusts.  [default: the system's]",
+)
 @click.option("--influx", is_flag=True, help="Print every result in the line protocol of InfluxDB.")
 @BAUD
 @output_option("Recording: a CSV file, or a Parquet file if its name ends so; CSV is continued.")
@@ -56,6 +74,9 @@ def monitor_command(
     alarms: tuple[str, ...],
     hook: str | None,
     page: bool,
+    mqtt: str | None,
+    mqtt_credentials: Path | None,
+    mqtt_ca: Path | None,
     influx: bool,
     baud: int,
     output: Path | None,
@@ -69,18 +90,29 @@ def monitor_command(
     The recording has the columns utc, time_s, session, channel if there are several, the result with its unit, its code
     and its status. Ctrl-C and even a kill leave every row that was received.
 
+    --mqtt publishes TOPIC/status, TOPIC/channel/0 and so on, which are retained, and TOPIC/alarm, all with QoS 1.
+    Alarms wait while the broker is away. TOPIC is sosmith/NAME, by the name of the core, unless the URL has one.
+
     \b
         sosmith monitor /dev/ttyUSB1 --trace ramp.csv -o week.csv --page
         sosmith monitor /dev/ttyUSB1 --trace ramp.csv --alarm wear_warning --hook 'mail-the-depot now'
     """
+    from sosmith.host.alarms import ALARMS
     from sosmith.host.board import Board
     from sosmith.host.monitor import watch
     from sosmith.host.trace_samples import samples_for
 
     if trace is None:
         raise SpecificationError("--trace must be given: the board takes its samples over the link")
+    broker = None
+    if mqtt is not None:
+        from sosmith.host.mqtt import Broker, paho
+
+        paho()
+        broker = Broker.at(mqtt, credentials=mqtt_credentials, authorities=mqtt_ca)
+    asked = _Asked(port, files, alarms or ALARMS, hook, page, broker, influx, output)
     with ExitStack() as stack:
-        shown = stack.enter_context(_Monitor(port, files, alarms, hook, page, influx, output))
+        shown = stack.enter_context(_Monitor(asked))
         for event in watch(
             lambda: Board(port, baud=baud),
             lambda identity: samples_for(identity, trace),
@@ -92,27 +124,33 @@ def monitor_command(
         sys.exit(1)
 
 
+@dataclass(frozen=True)
+class _Asked:
+    """What the options ask for."""
+
+    port: str
+    files: Path | None
+    flags: tuple[str, ...]
+    hook: str | None
+    page: bool
+    broker: Broker | None
+    influx: bool
+    output: Path | None
+
+
 class _Monitor:
     """Everything that is done with what a board says."""
 
-    def __init__(
-        self,
-        port: str,
-        files: Path | None,
-        alarms: tuple[str, ...],
-        hook: str | None,
-        page: bool,
-        influx: bool,
-        output: Path | None,
-    ) -> None:
-        from sosmith.host.alarms import ALARMS
-
-        self._port, self._files, self._with_page, self._influx, self._output = port, files, page, influx, output
-        self._flags, self._hook_command = alarms or ALARMS, hook
+    def __init__(self, asked: _Asked) -> None:
+        self._asked = asked
         self._manifest: dict[str, Any] | None = None
         self._stack = ExitStack()
         self._start = 0.0
         self._readings: Readings | None = None
+        self._recording: Recording | None = None
+        self._publisher: Publisher | None = None
+        self._told: list[Callable[[Alarm], None]] = []
+        self._views: list[Callable[[], None]] = []
 
     def __enter__(self) -> _Monitor:
         return self
@@ -129,8 +167,8 @@ class _Monitor:
         """Hold a board against the files of its core."""
         from sosmith.host.identity_check import check_files
 
-        folder = self._files or default_folder(identity.name)
-        if self._files is None and not (folder / f"{identity.name}.json").exists():
+        folder = self._asked.files or default_folder(identity.name)
+        if self._asked.files is None and not (folder / f"{identity.name}.json").exists():
             note(f"the board has the core {identity.name}; it was not checked, as there is no {folder}: see --files")
             return
         self._manifest = check_files(identity, folder)
@@ -144,7 +182,7 @@ class _Monitor:
             if self._readings is None:
                 self._begin(event.identity)
             else:
-                note(f"{self._port}: connected again")
+                note(f"{self._asked.port}: connected again")
             self._show("connected")
         elif isinstance(event, Lost):
             note(f"{event.reason}; waiting for it")
@@ -158,31 +196,42 @@ class _Monitor:
         from sosmith.host.recording import recording
         from sosmith.host.rows import columns
 
-        self._identity, self._start = identity, time.time()
-        self._alarms = Alarms(self._flags, identity.flags)
-        self._hook = None
-        if self._hook_command is not None:
-            self._hook = Hook(self._hook_command, identity.output_port.unit)
-            self._stack.callback(self._hook.finish)
+        asked, self._identity, self._start = self._asked, identity, time.time()
+        self._alarms = Alarms(asked.flags, identity.flags)
+        self._readings = Readings(identity, self._manifest, asked.port)
+        self._told += [self._note, self._readings.alarm]
+        if asked.hook is not None:
+            hook = Hook(asked.hook, identity.output_port.unit)
+            self._stack.callback(hook.finish)
+            self._told.append(hook.run)
         first, *rest = columns(identity)
-        self._recording = None
-        if self._output is not None:
-            self._recording = self._stack.enter_context(recording(self._output, ("utc", first, "session", *rest)))
-        self._readings = Readings(identity, self._manifest, self._port)
-        self._page = None
-        if self._with_page:
+        if asked.output is not None:
+            self._recording = self._stack.enter_context(recording(asked.output, ("utc", first, "session", *rest)))
+        if asked.broker is not None:
+            from sosmith.host.mqtt import Publisher
+
+            self._publisher = self._stack.enter_context(Publisher(asked.broker, self._readings, self._start))
+            self._told.append(self._publisher.alarm)
+            self._views.append(self._publisher.update)
+        if asked.page:
             from sosmith.host.page import LivePage
 
-            self._page = self._stack.enter_context(LivePage(self._readings))
-            note(f"the live view is at {self._page.address}")
-        self._live = None
+            page = self._stack.enter_context(LivePage(self._readings))
+            note(f"the live view is at {page.address}")
+            self._views.append(page.update)
         if sys.stderr.isatty():
-            from rich.console import Console
-            from rich.live import Live
+            self._views.append(self._on_terminal(self._readings))
 
-            console = Console(stderr=True)
-            self._live = Live(console=console, refresh_per_second=REFRESHES, transient=False)
-            self._stack.enter_context(self._live)
+    def _on_terminal(self, readings: Readings) -> Callable[[], None]:
+        """Begin the live view in the terminal; return what renews it."""
+        from rich.console import Console
+        from rich.live import Live
+
+        from sosmith.host.live_view import render
+
+        console = Console(stderr=True)
+        live = self._stack.enter_context(Live(console=console, refresh_per_second=REFRESHES, transient=False))
+        return lambda: live.update(render(readings, console.width))
 
     def _received(self, event: Any) -> None:
         from sosmith.host.line_protocol import influx_lines
@@ -193,28 +242,27 @@ class _Monitor:
         if self._recording is not None:
             made = rows(self._identity, results, event.first)
             self._recording.add((self._utc(row[0]), row[0], event.session, *row[1:]) for row in made)
-        if self._influx:
+        if self._asked.influx:
             click.echo("\n".join(influx_lines(self._identity, results, event.first, self._start)))
             sys.stdout.flush()
         for alarm in self._alarms.rises(results, event.first):
-            self._readings.alarm(alarm)
-            unit = self._identity.output_port.unit
-            when = alarm.sample / self._identity.sample_rate
-            note(f"alarm: {alarm.flag} of channel {alarm.channel} at {when:.3f} s, {alarm.value:g} {unit}".rstrip())
-            if self._hook is not None:
-                self._hook.run(alarm)
+            for tell in self._told:
+                tell(alarm)
         self._readings.add(results, event.first)
         self._show("connected")
+
+    def _note(self, alarm: Alarm) -> None:
+        unit = self._identity.output_port.unit
+        when = alarm.sample / self._identity.sample_rate
+        note(f"alarm: {alarm.flag} of channel {alarm.channel} at {when:.3f} s, {alarm.value:g} {unit}".rstrip())
 
     def _show(self, state: str) -> None:
         assert self._readings is not None
         self._readings.state = state
-        if self._page is not None:
-            self._page.update()
-        if self._live is not None:
-            from sosmith.host.live_view import render
-
-            self._live.update(render(self._readings, self._live.console.width))
+        for renew in self._views:
+            renew()
+        for text in self._publisher.news() if self._publisher is not None else ():
+            note(text)
 
     def _utc(self, seconds: float) -> str:
         return (

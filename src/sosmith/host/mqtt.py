@@ -1,0 +1,334 @@
+"""Readings and alarms to an MQTT broker: a retained state, a last will, and alarms that wait while it is away."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import re
+import ssl
+import stat
+import threading
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+from queue import Empty, SimpleQueue
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, TypeVar
+from urllib.parse import urlsplit
+
+from sosmith.host.alarms import Alarm
+from sosmith.host.readings import Readings
+from sosmith.model.errors import SpecificationError, ToolError
+
+if TYPE_CHECKING:
+    from paho.mqtt.client import Client
+
+INTERVAL = 1.0
+"""Seconds between two publications of a channel's reading, at least."""
+
+PATIENCE = 10.0
+"""Seconds to wait for the broker: for its answer at first, and for its acknowledgements at the end."""
+
+KEEP_ALIVE = 15
+"""Seconds after which a silent connection is tried; after half as many again, the broker publishes the last will."""
+
+Item = TypeVar("Item")
+
+_PORTS = {"mqtt": 1883, "mqtts": 8883}
+_QOS = 1  # at least once, acknowledged
+
+
+@dataclass(frozen=True)
+class Broker:
+    """Where to publish, and as whom.
+
+    Attributes
+    ----------
+    host : str
+        Name or address.
+    port : int
+        TCP port.
+    tls : bool
+        Whether the connection is encrypted, and the broker's certificate checked.
+    topic : str
+        Beginning of all topics; empty for ``sosmith/<name of the core>``.
+    user, password : str or None
+        Credentials.
+    authorities : Path or None
+        File with the certificates to trust instead of the system's, in PEM.
+    """
+
+    host: str
+    port: int
+    tls: bool
+    topic: str
+    user: str | None = None
+    password: str | None = field(default=None, repr=False)
+    authorities: Path | None = None
+
+    @classmethod
+    def at(
+        cls,
+        url: str,
+        *,
+        credentials: Path | None = None,
+        authorities: Path | None = None,
+        environment: Mapping[str, str] = os.environ,
+    ) -> Broker:
+        """Return the broker at ``mqtt://HOST[:PORT][/TOPIC]``, or ``mqtts://`` for TLS.
+
+        Parameters
+        ----------
+        url : str
+            The address, without user and password.
+        credentials : Path or None
+            File with ``user:password`` that nobody else may read; None for the variables SOSMITH_MQTT_USER and
+            SOSMITH_MQTT_PASSWORD.
+        authorities : Path or None
+            File with the certificates to trust instead of the system's.
+        environment : mapping
+            Where the variables are.
+
+        Raises
+        ------
+        SpecificationError
+            If the address is none, or the file with the credentials is open to others.
+        """
+        try:
+            parts = urlsplit(url)
+            host, port = parts.hostname, parts.port
+        except ValueError as error:
+            raise SpecificationError(f"--mqtt must be mqtt://HOST[:PORT][/TOPIC], not {url}: {error}") from None
+        if parts.username is not None or parts.password is not None:
+            raise SpecificationError(
+                "--mqtt must be without user and password, which others could see in the list of processes: "
+                "--mqtt-credentials FILE, or SOSMITH_MQTT_USER and SOSMITH_MQTT_PASSWORD, take them"
+            )
+        topic = parts.path.strip("/")
+        if parts.scheme not in _PORTS or not host or parts.query or re.search(r"[+#\0]|//", url.split("://", 1)[1]):
+            raise SpecificationError(f"--mqtt must be mqtt://HOST[:PORT][/TOPIC] or mqtts://..., not {url}")
+        user, password = environment.get("SOSMITH_MQTT_USER"), environment.get("SOSMITH_MQTT_PASSWORD")
+        if credentials is not None:
+            user, password = _credentials(credentials)
+        tls = parts.scheme == "mqtts"
+        return cls(host, port or _PORTS[parts.scheme], tls, topic, user, password, authorities)
+
+    def __str__(self) -> str:
+        """Return what a message calls it."""
+        return f"{self.host}:{self.port}"
+
+
+def _credentials(path: Path) -> tuple[str, str]:
+    """Read ``user:password`` from a file that is its owner's alone."""
+    try:
+        with path.open(encoding="utf-8") as file:
+            about = os.fstat(file.fileno())
+            if stat.S_IMODE(about.st_mode) & 0o077:
+                raise SpecificationError(
+                    f"{path}: the credentials must be readable by their owner only (chmod 600), "
+                    f"not have mode {stat.S_IMODE(about.st_mode):o}"
+                )
+            user, colon, password = file.readline().rstrip("\r\n").partition(":")
+    except (OSError, UnicodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "no UTF-8"
+        raise SpecificationError(f"{path}: the credentials must be a text that can be read, not: {reason}") from None
+    if not (user and colon):
+        raise SpecificationError(f"{path}: the credentials must be a line user:password, not something else")
+    return user, password
+
+
+class Publisher:
+    """Publishes under the topic T, everything with QoS 1.
+
+    - ``T/status``, retained: ``connected`` or ``lost``, as the board is; ``ended``; ``offline``, the last will, when
+      this program is gone or does not answer.
+    - ``T/channel/K``, retained: the newest reading of channel K as JSON, once a second, while there is a connection.
+    - ``T/alarm``: each alarm as JSON. Alarms wait for the broker's acknowledgement, through any number of connections;
+      the same one may come twice, with the same ``number``.
+
+    Parameters
+    ----------
+    broker : Broker
+        The broker.
+    readings : Readings
+        What is published; read in the thread that calls `update` and `close`.
+    start : float
+        Time of sample 0, in seconds since 1970.
+
+    Raises
+    ------
+    ToolError
+        If paho-mqtt is missing, or the broker does not accept the connection within 10 s; later it is waited for.
+    """
+
+    def __init__(self, broker: Broker, readings: Readings, start: float) -> None:
+        self._broker, self._readings, self._start = broker, readings, start
+        self._topic = broker.topic or f"sosmith/{readings.identity.name}"
+        self._number, self._due, self._state = 0, -math.inf, readings.state
+        # By their numbers: the library's own objects fail for what is published while there is no connection.
+        self._waiting: set[int] = set()
+        self._acknowledged: SimpleQueue[int] = SimpleQueue()
+        self._news: SimpleQueue[str] = SimpleQueue()
+        self._answered, self._refusal = threading.Event(), ""
+        self._client = self._connected()
+
+    def update(self) -> None:
+        """Publish what is new: a change of the state at once, readings once a second."""
+        readings = self._readings
+        if readings.state != self._state:
+            self._state = readings.state
+            self._status(self._state)
+        if time.monotonic() >= self._due and self._client.is_connected():
+            self._due = time.monotonic() + INTERVAL
+            for one in readings.now:
+                self._publish(
+                    f"channel/{one.channel}",
+                    {
+                        "time": self._utc(readings.samples - 1),
+                        "sample": readings.samples - 1,
+                        "quantity": readings.identity.output_port.name,
+                        "unit": readings.identity.output_port.unit,
+                        "value": one.value,
+                        "wear": one.wear,
+                        "per_hour": one.per_hour,
+                        "flags": one.flags,
+                    },
+                    retain=True,
+                )
+
+    def alarm(self, alarm: Alarm) -> None:
+        """Publish an alarm, now or when the broker is back."""
+        self._number += 1
+        made = {
+            "number": self._number,
+            "since": self._utc(0),
+            "time": self._utc(alarm.sample),
+            "sample": alarm.sample,
+            "channel": alarm.channel,
+            "flag": alarm.flag,
+            "value": alarm.value,
+            "unit": self._readings.identity.output_port.unit,
+        }
+        self._waiting.add(self._publish("alarm", made))
+        self._take_acknowledgements()
+
+    def news(self) -> list[str]:
+        """Return what has happened to the connection since the last call, a sentence each."""
+        return _drained(self._news)
+
+    def close(self) -> None:
+        """Publish the last readings and the end, and leave when all of it is acknowledged.
+
+        Raises
+        ------
+        ToolError
+            If alarms are not acknowledged within 10 s.
+        """
+        self._due = -math.inf
+        self.update()
+        last = self._status("ended")
+        self._waiting.add(last)
+        end = time.monotonic() + PATIENCE
+        while self._waiting and time.monotonic() < end:
+            time.sleep(0.01)
+            self._take_acknowledgements()
+        self._client.disconnect()
+        self._client.loop_stop()
+        if left := self._waiting - {last}:
+            raise ToolError(f"the broker at {self._broker} must acknowledge every alarm, not leave out {len(left)}")
+
+    def __enter__(self) -> Publisher:
+        """Return the publisher."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Publish the end, and leave."""
+        self.close()
+
+    def _connected(self) -> Client:
+        """Return a client that is connected, and connects again whenever it has to."""
+        mqtt = paho()
+        client: Client = mqtt.Client(mqtt.CallbackAPIVersion.VERSION2, reconnect_on_failure=True)
+        client.reconnect_delay_set(1, 30)
+        client.will_set(f"{self._topic}/status", "offline", _QOS, retain=True)
+        if self._broker.user is not None:
+            client.username_pw_set(self._broker.user, self._broker.password)
+        client.on_connect, client.on_disconnect = self._on_connect, self._on_disconnect
+        client.on_publish = lambda client, data, number, reason, properties: self._acknowledged.put(number)
+        try:
+            if self._broker.tls:
+                client.tls_set(None if self._broker.authorities is None else str(self._broker.authorities))
+            client.connect(self._broker.host, self._broker.port, KEEP_ALIVE)
+        except (OSError, ssl.SSLError) as error:
+            reason = getattr(error, "verify_message", None) or error.strerror or str(error)
+            raise ToolError(f"the broker at {self._broker} must be there, not: {reason}") from None
+        client.loop_start()
+        if not self._answered.wait(PATIENCE) or self._refusal:
+            client.disconnect()
+            client.loop_stop()
+            reason = self._refusal or f"silent for {PATIENCE:g} s"
+            raise ToolError(f"the broker at {self._broker} must accept the connection, not: {reason}")
+        return client
+
+    def _on_connect(self, client: Client, data: Any, flags: Any, reason: Any, properties: Any) -> None:
+        """Take the answer of the broker; called in the client's thread, at every connection."""
+        again = self._answered.is_set()
+        if reason.is_failure:
+            self._refusal = str(reason)
+            if again:
+                self._news.put(f"the broker at {self._broker} refuses: {reason}; trying again")
+        else:
+            # After an absence, the last will stands there.
+            client.publish(f"{self._topic}/status", self._state, _QOS, retain=True)
+            if again:
+                self._news.put(f"the broker at {self._broker} is connected again")
+        self._answered.set()
+
+    def _on_disconnect(self, client: Client, data: Any, flags: Any, reason: Any, properties: Any) -> None:
+        if reason.is_failure and self._answered.is_set():
+            self._news.put(f"the broker at {self._broker} is gone; waiting for it")
+
+    def _take_acknowledgements(self) -> None:
+        acknowledged: list[int] = _drained(self._acknowledged)
+        self._waiting.difference_update(acknowledged)
+
+    def _status(self, state: str) -> int:
+        return self._client.publish(f"{self._topic}/status", state, _QOS, retain=True).mid
+
+    def _publish(self, topic: str, made: dict[str, Any], *, retain: bool = False) -> int:
+        text = json.dumps(made, ensure_ascii=False, allow_nan=False)
+        return self._client.publish(f"{self._topic}/{topic}", text, _QOS, retain=retain).mid
+
+    def _utc(self, sample: int) -> str:
+        seconds = self._start + sample / self._readings.identity.sample_rate
+        return datetime.fromtimestamp(seconds, UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
+
+
+def _drained(queue: SimpleQueue[Item]) -> list[Item]:
+    """Take everything out of a queue that another thread fills."""
+    taken = []
+    while True:
+        try:
+            taken.append(queue.get_nowait())
+        except Empty:
+            return taken
+
+
+def paho() -> Any:
+    """Return the module of the MQTT client.
+
+    Raises
+    ------
+    ToolError
+        If it is missing.
+    """
+    try:
+        from paho.mqtt import client
+    except ImportError:
+        raise ToolError("paho-mqtt must be installed for MQTT: pip install 'sosmith[mqtt]'") from None
+    return client
