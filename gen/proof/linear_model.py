@@ -13,6 +13,8 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
 
+from flint import fmpq
+
 from sosmith.model.dataflow.graph import Graph, Node, Op
 
 Polynomial = tuple[Fraction, ...]
@@ -163,13 +165,31 @@ def _model(graph: Graph, indices: Sequence[int], entries: tuple[int, ...]) -> Li
     watched = tuple(dict.fromkeys((output, *bounds)))
     sources = []
     for key in _source_keys(graph):
-        # A numerator's degree is at most the number of states and the longest delay of an error together.
-        responses = _impulse_responses(graph, key, watched, 2 * len(graph.delays) + 1)
-        numerators = {indices[i]: _trim(_product(responses[i], denominator, len(responses[i]))) for i in watched}
+        numerators = {indices[i]: p for i, p in _numerators(graph, key, watched, denominator).items()}
         low, high = _range(graph, key)
         kept = key[2] if key[0] in {"error", "truncation"} else None
         sources.append(Source(_name(graph, key), low, high, kept, numerators))
     return LinearModel(denominator, indices[output], entries, tuple(indices[i] for i in bounds), tuple(sources))
+
+
+def transfer_function(graph: Graph) -> tuple[Polynomial, Polynomial]:
+    """Numerator and denominator from the only input of a graph to its only output, as in `linear_model`."""
+    (source,), (output,) = graph.inputs, graph.outputs
+    denominator = _denominator(state_matrix(graph))
+    return _numerators(graph, ("input", source, 0), [output], denominator)[output], denominator
+
+
+def quantizers(graph: Graph) -> list[str]:
+    """Names of the quantized nodes, in the order of the sources of `linear_model`."""
+    return [_name(graph, key) for key in _source_keys(graph) if key[0] in {"error", "truncation"}]
+
+
+def _numerators(graph: Graph, key: _Key, watched: Sequence[int], denominator: Polynomial) -> dict[int, Polynomial]:
+    """Numerators from a source to the nodes `watched`."""
+    # A numerator's degree is at most the number of states and the longest delay of an error together.
+    responses = _impulse_responses(graph, key, watched, 2 * len(graph.delays) + 1)
+    under = [fmpq(c.numerator, c.denominator) for c in denominator]
+    return {i: _trim(_fractions(_product(found, under, len(found)))) for i, found in responses.items()}
 
 
 _Key = tuple[str, int, int]
@@ -219,9 +239,9 @@ def _name(graph: Graph, key: _Key) -> str:
     return kind if kind in {"input", "constant"} else graph.nodes[index].name or f"node{index}"
 
 
-def _impulse_responses(graph: Graph, key: _Key, watched: Sequence[int], length: int) -> dict[int, list[Fraction]]:
-    state = [Fraction(0)] * len(graph.delays)
-    result: dict[int, list[Fraction]] = {i: [] for i in watched}
+def _impulse_responses(graph: Graph, key: _Key, watched: Sequence[int], length: int) -> dict[int, list[fmpq]]:
+    state = [fmpq(0)] * len(graph.delays)
+    result: dict[int, list[fmpq]] = {i: [] for i in watched}
     for time in range(length):
         values = _step(graph, state, key, time)
         for i in watched:
@@ -230,31 +250,31 @@ def _impulse_responses(graph: Graph, key: _Key, watched: Sequence[int], length: 
     return result
 
 
-def _step(graph: Graph, state: Sequence[Fraction], key: _Key | None, time: int) -> list[Fraction]:
+def _step(graph: Graph, state: Sequence[fmpq], key: _Key | None, time: int) -> list[fmpq]:
     """Values of all nodes for a unit impulse of the source `key` at time 0, with all other sources at 0."""
     kind, source, kept = key or ("", -1, 0)
     memory = iter(state)
-    values: list[Fraction] = []
+    values: list[fmpq] = []
     for index, node in enumerate(graph.nodes):
         operands = [values[i] for i in node.operands if node.op is not Op.DELAY]
-        value = Fraction(0)
+        value = fmpq(0)
         if node.op is Op.DELAY:
             value = next(memory)
         elif node.op in {Op.INPUT, Op.CONSTANT}:
-            value = Fraction(int(index == source and kind in {"input", "constant"} and time == 0))
+            value = fmpq(int(index == source and kind in {"input", "constant"} and time == 0))
         elif node.op is Op.ADD:
             value = operands[0] + operands[1]
         elif node.op is Op.SUBTRACT:
             value = operands[0] - operands[1]
         elif node.op is Op.SHIFT:
-            value = operands[0] * Fraction(2) ** node.parameter
+            value = operands[0] * (1 << max(node.parameter, 0)) / (1 << max(-node.parameter, 0))
         elif node.op is Op.SCALE:
-            value = operands[0] * node.parameter * Fraction(2) ** -node.parameter_frac
+            value = operands[0] * fmpq(node.parameter, 1 << node.parameter_frac)
         elif node.op is Op.BOUND:
             value = operands[0]
         else:
             root, delay = _undelayed(graph, node.operands[0])
-            error = Fraction(int((_kind(node), root, _kept(node), delay) == (kind, source, kept, time)))
+            error = fmpq(int((_kind(node), root, _kept(node), delay) == (kind, source, kept, time)))
             value = error if node.op is Op.FRACTION else operands[0] - error
         values.append(value)
     return values
@@ -265,8 +285,8 @@ def state_matrix(graph: Graph) -> list[list[Fraction]]:
     size = len(graph.delays)
     columns = []
     for j in range(size):
-        values = _step(graph, [Fraction(int(i == j)) for i in range(size)], None, 0)
-        columns.append([values[graph.nodes[i].operands[0]] for i in graph.delays])
+        values = _step(graph, [fmpq(int(i == j)) for i in range(size)], None, 0)
+        columns.append(_fractions([values[graph.nodes[i].operands[0]] for i in graph.delays]))
     return [[columns[j][i] for j in range(size)] for i in range(size)]
 
 
@@ -291,13 +311,17 @@ def _matrix_product(a: list[list[Fraction]], b: list[list[Fraction]]) -> list[li
     ]
 
 
-def _product(a: Sequence[Fraction], b: Sequence[Fraction], length: int) -> list[Fraction]:
-    result = [Fraction(0)] * length
+def _product(a: Sequence[fmpq], b: Sequence[fmpq], length: int) -> list[fmpq]:
+    result = [fmpq(0)] * length
     for i, x in enumerate(a):
         if x:
             for j, y in enumerate(b[: length - i]):
                 result[i + j] += x * y
     return result
+
+
+def _fractions(values: Sequence[fmpq]) -> list[Fraction]:
+    return [Fraction(int(value.p), int(value.q)) for value in values]
 
 
 def _trim(values: Sequence[Fraction]) -> Polynomial:

@@ -108,10 +108,14 @@ def arrange(
     ValueError
         If there are too many sections for the length of their responses.
     """
-    table = _Costs(sections, scale, noise, pairing=pairing)
+    return _arranged(_Costs(sections, scale, noise, pairing=pairing), worst=worst)
+
+
+def _arranged(table: _Costs, *, worst: bool = False) -> Arrangement:
+    """Find the best arrangement by dynamic programming."""
     sign = -1 if worst else 1
     reached: dict[_Placed, tuple[float, tuple[tuple[int, int], ...]]] = {(0, 0): (0.0, ())}
-    for _ in sections:
+    for _ in range(table.count):
         longer: dict[_Placed, tuple[float, tuple[tuple[int, int], ...]]] = {}
         for placed, (cost, order) in reached.items():
             for pole, zero in table.choices(placed):
@@ -133,8 +137,8 @@ def best_order(models: Sequence[LinearModel]) -> tuple[int, ...]:
     sections = [_section(model) for model in models]
     if len(models) < 2 or not _feasible(sections, pairing=False):
         return present
-    best = arrange(sections, scale="l1", noise="l1")
     table = _Costs(sections, "l1", "l1", pairing=False)
+    best = _arranged(table)
     now = sum(table.cost((placed, placed), k) for k in present for placed in [(1 << k + 1) - 1])
     return tuple(pole for pole, _ in best.order) if best.cost < _WORTH_IT * now else present
 
@@ -173,6 +177,7 @@ class _Costs:
                 f"sections must be so few that their spectra have at most {_MAX_WORK} samples, not {len(sections)}"
             )
         self._sections = sections
+        self.count = len(sections)
         self._pairing = pairing
         self._scale, self._noise = scale, noise
         self._full = (1 << len(sections)) - 1
@@ -180,12 +185,13 @@ class _Costs:
         if "linf" not in {scale, noise}:
             length //= 8
         self._length = length
+        self._spectrum = cache(self._spectrum_uncached)
         self._all_pole = [1 / self._spectrum(s.denominator) for s in sections]
         self._numerators = [self._spectrum(s.numerator) for s in sections]
         self._gain_to = cache(self._gain_to_uncached)
         self._gains_from = cache(self._gains_from_uncached)
 
-    def _spectrum(self, polynomial: tuple[float, ...]) -> Spectrum:
+    def _spectrum_uncached(self, polynomial: tuple[float, ...]) -> Spectrum:
         return np.asarray(np.fft.rfft(polynomial, self._length), dtype=np.complex128)
 
     def choices(self, placed: _Placed) -> Iterator[tuple[int, int]]:

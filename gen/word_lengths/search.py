@@ -24,7 +24,7 @@ import numpy.typing as npt
 from scipy import signal
 
 from sosmith.gen.filter.design import estimated_length
-from sosmith.gen.proof.linear_model import Source, linear_model
+from sosmith.gen.proof.linear_model import Source, linear_model, quantizers, transfer_function
 from sosmith.gen.realizations.coefficients import lowest_terms, round_significant
 from sosmith.gen.realizations.registry import REALIZATIONS, Section
 from sosmith.gen.realizations.section_format import SectionFormat, unknown_range
@@ -376,9 +376,8 @@ def _exact(
     build = REALIZATIONS[realization].build
     formats = SectionFormat(coefficient_bits=_EXACT_BITS, coefficients=coefficients or {})
     section = build(row, formats, "section")
-    required = [source.name for source in linear_model(section.graph).sources if source.kept is not None]
     # An operand has bits to drop only if its terms have fraction bits.
-    fracs = dict.fromkeys(required, 1) | dict.fromkeys(section.optional_quantizers, 0)
+    fracs = dict.fromkeys(quantizers(section.graph), 1) | dict.fromkeys(section.optional_quantizers, 0)
     return build(row, replace(formats, fracs=fracs), "section")
 
 
@@ -389,19 +388,17 @@ def _slope(row: Sequence[float], realization: str, section: Section, name: str, 
     step = max(1, abs(integer) << shift >> 24)
     moved = (integer << shift) + step, frac + shift
     try:
-        changed = linear_model(_exact(row, realization, {name: moved}).graph)
+        moved_to = _exact(row, realization, {name: moved})
     except ShortfallError:
-        changed = linear_model(_exact(row, realization, {name: (moved[0] - 2 * step, moved[1])}).graph)
+        moved_to = _exact(row, realization, {name: (moved[0] - 2 * step, moved[1])})
         step = -step
-    model = linear_model(section.graph)
+    (b, a), (changed_b, changed_a) = transfer_function(section.graph), transfer_function(moved_to.graph)
     delta = step * Fraction(2) ** -moved[1]
     terms = [
-        Fraction(a - b) / delta
-        for a, b in zip_longest(
-            _product(changed.transfer, model.denominator), _product(model.transfer, changed.denominator), fillvalue=0
-        )
+        (above - below) / delta
+        for above, below in zip_longest(_product(changed_b, a), _product(b, changed_a), fillvalue=Fraction(0))
     ]
-    return _filtered((1,), _floats(changed.denominator), _filtered(terms, _floats(model.denominator), others))
+    return _filtered((1,), _floats(changed_a), _filtered(terms, _floats(a), others))
 
 
 def _bits_below(error: float, share: float) -> int:
