@@ -374,9 +374,9 @@ def _exact(
 ) -> Section:
     """Build a section with exact coefficients, except for those given, in which every quantizer drops bits."""
     build = REALIZATIONS[realization].build
-    formats = SectionFormat(coefficient_bits=_EXACT_BITS, coefficients=coefficients or {})
+    # An operand has bits to drop only if its terms have fraction bits: those of the input, too, as b0's has no others.
+    formats = SectionFormat(coefficient_bits=_EXACT_BITS, coefficients=coefficients or {}, x=unknown_range(1))
     section = build(row, formats, "section")
-    # An operand has bits to drop only if its terms have fraction bits.
     fracs = dict.fromkeys(quantizers(section.graph), 1) | dict.fromkeys(section.optional_quantizers, 0)
     return build(row, replace(formats, fracs=fracs), "section")
 

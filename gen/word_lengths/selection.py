@@ -102,7 +102,7 @@ class Selection:
             f"{quantized.realization}: {why}, {round(area):,} LUT4 with a multiplier block counted as {LUTS_OF_A_BLOCK}"
         )
         others = [
-            ", ".join(f"{name} {round(self._area(name)):,}" for name in left),
+            ", ".join(f"{name} {round(self._known_area(name)):,}" for name in left),
             _falling_short([name for name in REALIZATIONS if name in short]),
         ]
         rest = "; ".join(other for other in others if other)
@@ -110,6 +110,10 @@ class Selection:
 
     def _area(self, name: str) -> float:
         return self._plans[name].area
+
+    def _known_area(self, name: str) -> float:
+        """Area as proven, if it was: a proof may have needed longer words than were planned."""
+        return cost_of(self._proven[name].datapath).area if name in self._proven else self._area(name)
 
     def _plan(self, name: str) -> None:
         if name in self._plans or name in self._failures:

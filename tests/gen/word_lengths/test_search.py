@@ -111,6 +111,19 @@ def test_what_is_estimated_is_what_is_proven(name: str, realization: str) -> Non
     assert trimmed.area == pytest.approx(cost_of(made.datapath).area, rel=1e-3)
 
 
+@pytest.mark.parametrize("realization", ["df1", "df1_ef1", "df1_ef2"])
+def test_bits_dropped_from_an_operand_of_inputs_alone_are_not_free(realization: str) -> None:
+    """In a band-pass of direct form I, b0 multiplies a difference of two inputs, whose bits are worth something."""
+    trimmed = filter_plan("bandpass", 4, 0.05, realization).trimmed()
+    search, choice = search_of(trimmed)
+    made = prove(trimmed)
+    assert any("taps_b0" in estimate.optional for estimate in search._estimates)
+    assert all(estimate.gains["taps_b0"] > 0 for estimate in search._estimates if "taps_b0" in estimate.optional)
+    proven = float(made.budget["filter rounding"] + made.budget["filter coefficients"])
+    assert 0.999 < search.error(choice) / proven < 1.08
+    assert trimmed.area == pytest.approx(cost_of(made.datapath).area, rel=1e-3)
+
+
 @pytest.mark.parametrize("realization", CASCADES)
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_the_start_keeps_each_part_to_its_share(name: str, realization: str) -> None:
