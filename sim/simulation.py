@@ -14,13 +14,13 @@ import numpy as np
 import numpy.typing as npt
 
 from sosmith.gen.core import CoreDesign
-from sosmith.gen.filter.response import FilterFacts
 from sosmith.gen.fpga.boards import Board
 from sosmith.gen.fpga.synthesis import Netlist, synthesize
 from sosmith.gen.output.core_facts import CoreFacts, core_facts
 from sosmith.gen.output.generate import generate
 from sosmith.gen.output.vectors import Vectors, vector_files
 from sosmith.gen.report.evidence import Alternative, Evidence
+from sosmith.gen.report.filter_facts import filter_facts
 from sosmith.gen.report.provenance import provenance_of
 from sosmith.gen.specification.choices import ERROR_FEEDBACK
 from sosmith.gen.word_lengths.other_realization import with_realization
@@ -207,24 +207,6 @@ def _stacked(columns: Sequence[npt.NDArray[_Kind] | None]) -> npt.NDArray[_Kind]
     """Columns of all channels side by side, or None if there are none."""
     present = [column for column in columns if column is not None]
     return np.stack(present, axis=1) if present else None
-
-
-def filter_facts(quantized: Quantized) -> FilterFacts | None:
-    """Collect the facts about the filter of a core; None for a core without one."""
-    ideal = quantized.filter
-    if ideal is None:
-        return None
-    return FilterFacts(
-        sample_rate=ideal.sample_rate,
-        ideal_sos=ideal.sos,
-        quantized_sos=quantized.quantized_sos,
-        kind=ideal.kind,
-        passband_edge=ideal.passband_edge,
-        stopband_edge=ideal.stopband_edge,
-        passband_loss=ideal.passband_loss,
-        stopband_loss=ideal.stopband_loss,
-        cutoff=ideal.cutoff,
-    )
 
 
 def _alternatives(quantized: Quantized, codes: Codes, golden: Values) -> list[Alternative]:

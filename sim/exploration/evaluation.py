@@ -12,6 +12,7 @@ from sosmith.gen.filter.response import measure_response
 from sosmith.gen.fpga.boards import find_board
 from sosmith.gen.quantity import quantity
 from sosmith.gen.report.comparison.choice import cost_unit, hardware_cost
+from sosmith.gen.report.filter_facts import filter_facts
 from sosmith.gen.report.provenance import provenance_of
 from sosmith.gen.report.report import mask_shortfalls
 from sosmith.gen.stimuli import default_scenario, traces_for
@@ -21,7 +22,6 @@ from sosmith.model.reference.golden import calibrated, filtered
 from sosmith.model.traces.trace import Trace
 from sosmith.sim.exploration.grid import Task
 from sosmith.sim.exploration.synthesis import synthesized
-from sosmith.sim.simulation import filter_facts
 
 Point = dict[str, Any]
 """What `evaluate` returns, in the types of JSON."""

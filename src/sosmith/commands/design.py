@@ -8,6 +8,7 @@ import click
 
 from sosmith.commands.options import BOARD, CORE, REALIZATION, SPEC, WIDTHS_OF, default_folder
 from sosmith.gen.fpga.boards import BUILDABLE
+from sosmith.gen.picture import format_of
 from sosmith.model.errors import SpecificationError
 from sosmith.model.text_files import write_files
 from sosmith.terminal import JSON_OPTION, note, output_option, print_json, show_progress
@@ -37,6 +38,9 @@ def init(file: Path, force: bool) -> None:
 @WIDTHS_OF
 @BOARD
 @click.option("--details", is_flag=True, help="Also show sections, limit cycles and schedule.")
+@click.option(
+    "--plot", type=click.Path(path_type=Path), help="SVG or PNG file for a plot of gain, delay and calibration."
+)
 @JSON_OPTION
 def design_command(
     spec: Path,
@@ -45,6 +49,7 @@ def design_command(
     widths_of: str | None,
     board: str | None,
     details: bool,
+    plot: Path | None,
     as_json: bool,
 ) -> None:
     """Show the design of SPEC: order, realization, architecture, cost and error budget.
@@ -54,11 +59,13 @@ def design_command(
 
     \b
         sosmith design my.toml
-        sosmith design my.toml --details
+        sosmith design my.toml --details --plot my.svg
         sosmith design my.toml --board icebreaker --json
     """
     from sosmith.interface.specification import Specification
 
+    if plot is not None:
+        format_of(plot)
     asked = Specification.load(spec)
     if asked.checked.filter.origin:
         note(asked.checked.filter.origin)
@@ -67,6 +74,11 @@ def design_command(
 
         made = design(asked, core=core, realization=realization, widths_of=widths_of, board=board, progress=step)
         cost = None if board not in BUILDABLE else made.cost_on(board, step)
+        if plot is not None:
+            step("drawing")
+            made.plot(plot)
+    if plot is not None:
+        note(f"wrote {plot}")
     if as_json:
         print_json(made.manifest if cost is None else made.manifest | {"board": cost})
     else:

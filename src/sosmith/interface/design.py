@@ -304,6 +304,27 @@ class Design:
 
         return Board.on(ModelLine(model_of(self.core)))
 
+    def plot(self, path: str | PathLike[str]) -> Path:
+        """Draw gain and group delay, specified and with integer coefficients, and the curves of the calibration.
+
+        Parameters
+        ----------
+        path : path
+            File to write; its name ends in .svg or .png.
+
+        Raises
+        ------
+        SpecificationError
+            If the name ends in neither, or the folder cannot be written.
+        """
+        from sosmith.gen.picture import format_of
+        from sosmith.gen.report.design_plot import design_plot
+        from sosmith.model.text_files import write_contents
+
+        place = Path(fspath(path))
+        content = design_plot(self.core.quantized, format_of(place))
+        return write_contents(place.parent, {place.name: content})[0]
+
     def generate(self, folder: str | PathLike[str], progress: Progress = lambda step, done, total: None) -> list[Path]:
         """Write SystemVerilog, RTLIL, manifest, certificate and C model into `folder`; return their paths.
 

@@ -5,8 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 from rich import box
+from rich.cells import cell_len
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
+
+_MAX_TITLE = 76
+"""Columns that the narrowest terminals have."""
 
 
 class TableConsole(Console):
@@ -31,6 +36,7 @@ class TableConsole(Console):
 def new_table(title: str, columns: list[str]) -> Table:
     """Make an empty table; it has no header if all column names are empty."""
     table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left", title_style="bold", show_header=any(columns))
+    table.min_width = min(cell_len(Text.from_markup(title).plain), _MAX_TITLE)  # a title is wrapped to its table
     for column in columns:
         table.add_column(column, overflow="fold")
     return table

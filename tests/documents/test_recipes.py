@@ -1,0 +1,61 @@
+"""The recipes: what their pages show is the specification, what the command prints, and what it draws.
+
+Run as a script, it renews their pages and pictures; arguments name some of them.
+"""
+
+import contextlib
+import re
+import sys
+import tempfile
+from pathlib import Path
+
+import pytest
+from tests.documents.test_documents import ROOT, furnish, with_output
+
+RECIPES = ROOT / "docs" / "recipes"
+PAGES = sorted(page.stem for page in RECIPES.glob("*.md") if page.stem != "README")
+QUICK = ("linearizer", "notch")
+"""Designed within a few seconds; the others are among the slow tests."""
+
+_SPECIFICATION = re.compile(r"(?<=```toml\n).*?(?=```)", re.DOTALL)
+
+
+def drawn(name: str) -> Path:
+    return ROOT / "docs" / "images" / "recipes" / f"{name}.svg"
+
+
+def specification(name: str) -> str:
+    return (ROOT / "examples" / "recipes" / f"{name}.toml").read_text(encoding="utf-8")
+
+
+def page(name: str) -> str:
+    return (RECIPES / f"{name}.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("name", [pytest.param(n, marks=[] if n in QUICK else [pytest.mark.slow]) for n in PAGES])
+def test_a_recipe_prints_and_draws_what_its_page_shows(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(furnish(tmp_path))
+    assert page(name) == with_output(page(name), tmp_path)
+    assert (tmp_path / f"{name}.svg").read_bytes() == drawn(name).read_bytes()
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_the_specification_shown_is_that_of_the_example(name: str) -> None:
+    assert _SPECIFICATION.findall(page(name)) == [specification(name)]
+    assert f"images/recipes/{name}.svg" in page(name)
+
+
+def test_each_recipe_is_listed() -> None:
+    listed = re.findall(r"\]\((\w+)\.md\)", (RECIPES / "README.md").read_text(encoding="utf-8"))
+    assert sorted(listed) == PAGES
+
+
+if __name__ == "__main__":
+    for name in sys.argv[1:] or PAGES:
+        with tempfile.TemporaryDirectory() as scratch, contextlib.chdir(scratch):
+            text = _SPECIFICATION.sub(lambda _, name=name: specification(name), page(name))
+            (RECIPES / f"{name}.md").write_text(with_output(text, furnish(Path(scratch))), encoding="utf-8")
+            drawn(name).parent.mkdir(parents=True, exist_ok=True)
+            drawn(name).write_bytes((Path(scratch) / f"{name}.svg").read_bytes())
