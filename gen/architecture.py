@@ -12,6 +12,8 @@ from amaranth.lib.wiring import Component
 
 from sosmith.gen.fpga.boards import Board
 from sosmith.hdl import core, folded
+from sosmith.hdl.axi_lite import BITS
+from sosmith.hdl.instruction import instruction_bits
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.folding import FoldingError, program
 from sosmith.model.dataflow.graph import Node, Op
@@ -25,6 +27,9 @@ DIGIT_BITS = 15
 
 SPARE_ACCUMULATOR_BITS = 2
 """Additional bits, beyond the needs of its own program, in hardware that can load other programs."""
+
+SPARE_WORDS = 4
+"""Words of memory beyond the needs of its own program, in hardware that can load other programs."""
 
 SPARE_INSTRUCTIONS = 4
 """A replaceable program has spare instructions: one for each group of this many."""
@@ -67,7 +72,11 @@ class Architecture:
         if self.name == "parallel":
             return None
         try:
-            made = program(self.datapath, DIGIT_BITS)
+            made = program(self.datapath, DIGIT_BITS, spare_words=SPARE_WORDS * self.reload)
+            for digit_bits in range(DIGIT_BITS - 1, 0, -1):
+                if not self.reload or instruction_bits(made) <= BITS:  # one register holds an instruction
+                    break
+                made = program(self.datapath, digit_bits, spare_words=SPARE_WORDS)
         except FoldingError as error:
             raise ShortfallError(
                 f"the realization must suit the {self.name} architecture: {error}; parallel takes every realization"
@@ -95,9 +104,7 @@ class Architecture:
         shape = (self.name, self.channels, self.datapath.inputs, self.datapath.output, stages)
         sizes = "None"
         if made is not None:
-            # Cores in the field contain this number, so the text keeps the former name of the class.
-            locations = repr(made.locations).replace("Location(", "Place(")
-            sizes = f"({locations}, {made.words}, {made.accumulator_bits}, {len(made.instructions)})"
+            sizes = f"({made.locations}, {made.words}, {made.accumulator_bits}, {len(made.instructions)})"
         # An unprotected core keeps the number that it had before there were protected ones.
         guarded = "" if self.protect == "none" else f", {self.protect!r}"
         return zlib.crc32(f"({shape!r}, {sizes}{guarded})".encode())
@@ -107,7 +114,7 @@ class Architecture:
         """Clocks from the edge that accepts a sample to the edge that can output it; an upper limit in serial."""
         if self.program is None:
             return core.latency_cycles(self.built, self.channels, protect=self.protect)
-        return folded.latency_cycles(self.program, serial=self.name == "serial")
+        return folded.latency_cycles(self.program, serial=self.name == "serial", protect=self.protect)
 
     @property
     def reset_cycles(self) -> int:
@@ -119,7 +126,9 @@ class Architecture:
     @property
     def cycles_per_sample(self) -> int:
         """Clocks between samples at the highest rate; an upper limit in serial."""
-        return 1 if self.program is None else self.latency_cycles + 1
+        if self.program is None:
+            return 1
+        return folded.cycles_per_sample(self.program, serial=self.name == "serial", protect=self.protect)
 
     def component(self) -> Component:
         """Make the hardware; the top module has the name of the datapath."""

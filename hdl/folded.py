@@ -2,29 +2,31 @@
 
 The unit is a pipeline that holds an instruction in each of its stages. Folded, with words of w = digit_bits + 1 bits::
 
-    stage 1                    2                 3                 4                5
+    stage 1               2                3                   4
 
-    +-----------+ address  +-----------+
-    |  program  |--------->|   words   |--+--> data -----------+
-    |  memory   |          |           |  |     w              v  2w
-    +-----------+      +-->|           |  |                    * ----> product --> + ---> total --+
-      ^    |           |   +-----------+  |                    ^                   ^        |     |
-      |    |           |                  +--> operand ------->+ PRODUCT           +--------+     |
-    counter|           |                  |      w             |                accumulator_bits  |
-           +-----------|------------------|--- constant ------>+ MULTIPLY                         |
-                       |                  |       w                                               |
-                       |                  +--> given0, given1, .. (GIVE) ---> m_axis_tdata        |
-                       |                                                                          |
-                       +--- low digit (STORE), signed low digit (FINISH), w ----------------------+
-                       +--- digit of s_axis_tdata (TAKE), w
+    +---------+ address +-------+  w
+    | program |-------->| words |--+--> [data] ------------+
+    | memory  |         |       |  |                       v   2w
+    +---------+         |       |  |                       * -----> [product] --> + ---> added --+--> [total]
+      ^     |     +---->|       |  |                       ^                      ^              |       |
+      |     |     |     +-------+  +--> [operand] -------->+ PRODUCT              +--------------|-------+
+    counter |     |                |       w               |                                     |  accumulator_bits
+            |     |                |                       |                                     |
+            +-----|----------------|--- constant --------->+ else                                |
+                  |                |       w                                                     |
+                  +--- [moved] <---+ MOVE; TAKE: digit of s_axis_tdata                           |
+                  |                                                                              |
+                  +--- low digit (STORE), signed low digit (FINISH), w <-------------------------+
+                       [given0], .. (GIVE) ---> m_axis_tdata <-----------------------------------+
 
-An instruction in pipeline stage 1 has been read from the program memory, in 2 it addresses the words, in 3 its word has
-been read, in 4 it is multiplied, and in 5 it is added up, stored or dropped. A word is written three stages after it is
-read, so that an instruction must follow the one that writes its word by `sosmith.model.dataflow.program.HAZARD`.
+An instruction in pipeline stage 1 has been read from the program memory and addresses the words, in 2 its word has been
+read, in 3 it is multiplied, and in 4 it is added up. What is added is stored, given or dropped at once, and `total` is
+what is left: shifted by a digit, or 0. A word is written three stages after it is read, with MOVE and TAKE two, so that
+an instruction must follow the one that writes its word by `STORED` or `MOVED` of `sosmith.model.dataflow.program`.
 
-Serial has three pipeline stages and no multiplier block: the word is addressed in stage 1 and has been read in stage 2,
-and in stage 3 shifts and additions multiply in the accumulator itself, one clock for each bit of the second factor,
-while the pipeline waits.
+Serial has three pipeline stages and no multiplier block: the word is addressed in stage 1, in stage 2 it has been read
+and is moved, and in stage 3 shifts and additions multiply in the accumulator itself, one clock for each bit of the
+second factor, while the pipeline waits.
 
 With protection, `sosmith.hdl.check_bits` stands behind both memories, and a scrubber reads them while no sample is in
 work, one address a clock, at least one before each sample. What it corrects is written back::
@@ -38,16 +40,16 @@ work, one address a clock, at least one before each sample. What it corrects is 
       +-- counter, address of the instruction
 
 As an example, the program in `sosmith.model.dataflow.folding`, which computes ``y = floor(3 / 4 y1 + 4 x)`` with digits
-of 4 bits, for x = 7 and y1 = 28 = 12 + 16 * 1. The sample is found at edge 0; at the edges 6 to 13, pipeline stage 5
-holds the instructions 0 to 7::
+of 4 bits, for x = 7 and y1 = 28 = 12 + 16 * 1. The sample is found at edge 0; at the edges 4 to 8, pipeline stage 4
+holds the instructions 0 to 4::
 
-    edge                    6       7       8       9      10        11       12      13
-    instruction          take  multiply  drop  nothing  multiply  multiply  store  finish
-    product                      12*12                     7*4      1*12
-    total before the edge   0       0     144       9       9        37       49       3
+    edge                    4       5       6       7       8
+    instruction          take    drop  multiply  store  finish
+    product                 0   12*12    1*12     7*4       0
+    total before the edge   0       0       9      21       3
 
-The digits 1 and 3 are stored: y = 1 + 16 * 3 = 49. The program has 16 instructions, so that `m_axis_tvalid` is high at
-edge 16 + 5 = 21.
+The digits 49 mod 16 = 1 and 3 are stored: y = 1 + 16 * 3 = 49. The program has 9 instructions, so that `m_axis_tvalid`
+is high at edge 9 + 4 = 13.
 """
 
 from __future__ import annotations
@@ -66,24 +68,41 @@ from sosmith.hdl.reload import ReloadPort
 from sosmith.hdl.status import at_rail, with_fault, worn
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.graph import Op
-from sosmith.model.dataflow.program import Location, Opcode, Program
+from sosmith.model.dataflow.program import (
+    CARRIES,
+    CLEARS,
+    EARLY_WRITES,
+    FINISHES,
+    LATE_WRITES,
+    PRODUCTS,
+    Location,
+    Opcode,
+    Program,
+)
 from sosmith.model.reload.registers import ADDRESS_BITS
 
-_FOLDED_DEPTH, _SERIAL_DEPTH = 5, 3
+_FOLDED_DEPTH, _SERIAL_DEPTH = 4, 3
 """Pipeline stages from the program memory to the accumulator."""
 
 _NO_COLLISIONS = {"no_rw_check": 1}
 """Attribute of memories: no word is used that is read at the clock at which it is written.
 
-`HAZARD` keeps the program from doing so, and a bank of the program is not written while it is read. At such a clock a
-simulator reads the old word and a block RAM anything; without the attribute, Yosys adds registers and a comparator to
-make both equal.
+`STORED` and `MOVED` keep the program from doing so, and a bank of the program is not written while it is read. At such
+a clock a simulator reads the old word and a block RAM anything; without the attribute, Yosys adds registers and a
+comparator to make both equal.
 """
 
 
-def latency_cycles(program: Program, *, serial: bool) -> int:
+def latency_cycles(program: Program, *, serial: bool, protect: str = "none") -> int:
     """Clocks from the edge that finds a sample to the edge that can hand its result on; in serial, an upper bound."""
-    return program.serial_cycles + _SERIAL_DEPTH if serial else len(program.instructions) + _FOLDED_DEPTH
+    late = protect != "none"  # the first instruction is then read once there is a sample, since scrubbing uses the port
+    return late + (program.serial_cycles + _SERIAL_DEPTH if serial else len(program.instructions) + _FOLDED_DEPTH)
+
+
+def cycles_per_sample(program: Program, *, serial: bool, protect: str = "none") -> int:
+    """Clocks between samples at the highest rate; in serial, an upper bound."""
+    idle = protect != "none"  # at least one clock, for scrubbing
+    return latency_cycles(program, serial=serial, protect=protect) + idle
 
 
 _SLICES = {256: 16, 512: 8, 1024: 4, 2048: 2}
@@ -103,8 +122,8 @@ def memory_depth(program: Program, channels: int) -> int:
 class FoldedCore(wiring.Component):
     """A datapath on one multiply-accumulate unit, for any number of channels in any order.
 
-    Latency: `latency_cycles`. Throughput: one sample, of any channel, every ``latency_cycles + 1`` clocks. After a
-    reset the core first clears its memory, one word a clock. It accepts a sample once the program has read it:
+    Latency: `latency_cycles`. Throughput: one sample, of any channel, every `cycles_per_sample` clocks. After a reset
+    the core first clears its memory, one word a clock. It accepts a sample once the program has read it:
     `s_axis_tready` waits for `s_axis_tvalid`, which AXI4-Stream allows. A sample of a channel that does not exist is
     accepted and dropped.
 
@@ -165,22 +184,24 @@ class FoldedCore(wiring.Component):
         advance, clearing, start = Signal(), Signal(init=1), Signal()
         busy, dropped = Signal(), Signal()
         guard = self._guard(m, busy, clearing)
-        channel = self._channel(m, busy | clearing if guard is None else busy | clearing | guard.broken, dropped, start)
-        counter, fetching = self._control(m, (advance, clearing, start, busy), channel)
+        leaves = self.m_axis_tvalid & self.m_axis_tready
+        waits = (busy & ~leaves) | clearing if guard is None else busy | clearing | guard.broken
+        channel = self._channel(m, waits, dropped, start)
+        counter, fetching = self._control(m, (advance, clearing, start, busy), channel, early=guard is None)
         reload = self._reload(m, start, busy)
         pipeline, fetched = self._fetch(m, advance, (counter, fetching), reload, guard)
-        read = Signal(signed(self._word))
-        total = self._accumulate(m, advance, pipeline, read)
-        remembered = self._remember(m, (advance, clearing), (counter, total, read, channel), pipeline, guard)
-        ends = advance & pipeline[-2].valid & ~pipeline[-3].valid
-        limits = self._hand_out(m, (advance, start, ends), (total, read, channel), pipeline, guard)
+        read, added = Signal(signed(self._word)), Signal(signed(self.program.accumulator_bits))
+        moved = self._accumulate(m, advance, pipeline, (read, added))
+        remembered = self._remember(m, (advance, clearing), (counter, added, read, moved, channel), pipeline, guard)
+        ends = advance & pipeline[-1].valid & ~pipeline[-2].valid
+        limits = self._hand_out(m, (advance, start, ends), (added, channel), pipeline, guard)
         taken = Signal()
         if guard is None:
             last_digit = pipeline[-1].is_for(sum(location.digits for location in self.program.inputs) - 1)
             m.d.sync += taken.eq(advance & pipeline[-1].valid & pipeline[-1].has(Opcode.TAKE) & last_digit)
         else:
             m.d.sync += taken.eq(ends)
-            self._restart(m, guard, (clearing, channel, total))
+            self._restart(m, guard, (clearing, channel))
             self._report(m, guard, reload, [fetched, remembered, limits])
         m.d.comb += self.s_axis_tready.eq(taken | dropped)
         return m
@@ -194,11 +215,11 @@ class FoldedCore(wiring.Component):
         m.d.comb += guard.idle.eq(~busy & ~clearing)
         return guard
 
-    def _restart(self, m: Module, guard: FaultGuard, cleared: tuple[Signal, Signal, Signal]) -> None:
-        """Clear what a damaged program or word may have left: the words as after a reset, and the accumulator."""
-        clearing, channel, total = cleared
+    def _restart(self, m: Module, guard: FaultGuard, cleared: tuple[Signal, Signal]) -> None:
+        """Clear what a damaged program or word may have left: the words, as after a reset."""
+        clearing, channel = cleared
         with m.If(guard.restart):
-            m.d.sync += [clearing.eq(1), channel.eq(0), total.eq(0)]
+            m.d.sync += [clearing.eq(1), channel.eq(0)]
 
     def _report(
         self, m: Module, guard: FaultGuard, reload: tuple[ReloadPort, Signal] | None, found: list[tuple[Value, Value]]
@@ -234,9 +255,12 @@ class FoldedCore(wiring.Component):
         return channel
 
     def _control(
-        self, m: Module, control: tuple[Signal, Signal, Signal, Signal], channel: Signal
+        self, m: Module, control: tuple[Signal, Signal, Signal, Signal], channel: Signal, *, early: bool
     ) -> tuple[Signal, Signal]:
         """Count through all words after a reset, to clear them, and through the program for each sample.
+
+        Return the address of an instruction, and whether it is read for a sample. If that is to be `early`, the first
+        one is read at the clock that finds the sample.
 
         While words are cleared, the channel follows the upper bits of the counter a clock late, so that word 0 of a
         channel is cleared after its others.
@@ -244,22 +268,22 @@ class FoldedCore(wiring.Component):
         advance, clearing, start, busy = control
         count, bits = len(self.program.instructions), address_bits(self.program)
         counter, fetching = Signal(max((count - 1).bit_length(), bits + len(channel))), Signal()
+        fetches = Signal()
+        m.d.comb += fetches.eq(fetching | start if early else fetching)
         is_last = channel == self.channels - 1
         with m.If(clearing):
             m.d.sync += [counter.eq(counter + 1), channel.eq(counter[bits:])]
             with m.If(self._is_one(counter) if self.channels == 1 else is_last & ~counter[:bits].any()):
                 m.d.sync += [clearing.eq(0), counter.eq(0)]
-        with m.Elif(start):
-            m.d.sync += fetching.eq(1)
-        with m.Elif(fetching & advance):
-            m.d.sync += counter.eq(counter + 1)
+        with m.Elif(fetches & advance):
+            m.d.sync += [counter.eq(counter + 1), fetching.eq(1)]
             with m.If(counter == count - 1):
                 m.d.sync += [fetching.eq(0), counter.eq(0)]
         with m.If(start):
-            m.d.sync += busy.eq(1)
-        with m.If(self.m_axis_tvalid & self.m_axis_tready):
+            m.d.sync += [busy.eq(1), fetching.eq(1)]
+        with m.Elif(self.m_axis_tvalid & self.m_axis_tready):
             m.d.sync += busy.eq(0)
-        return counter, fetching
+        return counter, fetches
 
     def _is_one(self, address: Value) -> Value:
         """Whether an address is that of the word that always holds 1, the last one of a channel."""
@@ -274,10 +298,14 @@ class FoldedCore(wiring.Component):
             depth, bits=bits, design=self.fingerprint, protected=self.protect != "none"
         )
         forward_slave(m, self, port)
-        bank = Signal(reset_less=True)
+        kept, bank = Signal(reset_less=True), Signal()
         with m.If(start):
-            m.d.sync += bank.eq(port.bank)
-        m.d.comb += [port.may_swap.eq(1), port.shadow_free.eq(~busy | (bank == port.bank))]
+            m.d.sync += kept.eq(port.bank)
+        m.d.comb += [
+            bank.eq(Mux(start, port.bank, kept)),
+            port.may_swap.eq(1),
+            port.shadow_free.eq(~busy | (kept == port.bank)),
+        ]
         return port, bank
 
     def _fetch(
@@ -372,54 +400,62 @@ class FoldedCore(wiring.Component):
                 enable, address, data = port.write_enable, loaded, check.written(port.write_data)
         m.d.comb += [write.addr.eq(address), write.data.eq(data), write.en.eq(enable)]
 
-    def _accumulate(self, m: Module, advance: Signal, pipeline: list[PipelinedInstruction], read: Signal) -> Signal:
-        """Multiply in the last pipeline stage but one, add up in the last; return the accumulator."""
+    def _accumulate(
+        self, m: Module, advance: Signal, pipeline: list[PipelinedInstruction], values: tuple[Signal, Signal]
+    ) -> Value:
+        """Multiply in the last pipeline stage but one, add up in the last; return the word that MOVE and TAKE write."""
         *_, present, last = pipeline
-        operand = Signal(signed(self._word), reset_less=True)
+        read, added = values
         factor = Signal(signed(self._word))
         total = Signal(signed(self.program.accumulator_bits))
-        m.d.comb += factor.eq(Mux(present.has(Opcode.PRODUCT), operand, present.constant))
-        with m.If(advance & self._reading(pipeline).has(Opcode.OPERAND)):
-            m.d.sync += operand.eq(read)
-        multiplies = last.valid & (last.has(Opcode.MULTIPLY) | last.has(Opcode.PRODUCT))
-        if self.serial:
-            self._multiply_serially(m, total, (read, factor), (advance, multiplies))
-        else:
-            # Nothing else reads this register, so that it can be the one inside the multiplier block.
-            data = Signal(signed(self._word), reset_less=True)
-            product = Signal(signed(2 * self._word), reset_less=True)
-            m.d.comb += advance.eq(1)
-            m.d.sync += [data.eq(read), product.eq(data * factor)]
-            with m.If(multiplies):
-                m.d.sync += total.eq(total + product)
-        with m.If(advance & last.valid & (last.has(Opcode.STORE) | last.has(Opcode.DROP))):
-            m.d.sync += total.eq(total >> self.program.digit_bits)
-        with m.If(advance & last.valid & (last.has(Opcode.FINISH) | last.has(Opcode.JUDGE))):
+        m.d.comb += factor.eq(present.constant)
+        if self.fingerprint is not None or any(i.opcode is Opcode.OPERAND for i in self.program.instructions):
+            operand = Signal(signed(self._word), reset_less=True)
+            with m.If(present.has(*PRODUCTS)):
+                m.d.comb += factor.eq(operand)
+            with m.If(advance & self._reading(pipeline).has(Opcode.OPERAND)):
+                m.d.sync += operand.eq(read)
+        m.d.sync += total.eq(Mux(advance & last.has(*CARRIES), added >> self.program.digit_bits, added))
+        with m.If(~last.valid | (advance & last.has(*CLEARS))):
             m.d.sync += total.eq(0)
-        return total
+        if self.serial:
+            self._multiply_serially(m, (total, added), (read, factor), advance, last)
+            return Mux(present.has(Opcode.TAKE), self._input_digit(present), read)
+        # Nothing else reads this register, so that it can be the one inside the multiplier block.
+        data = Signal(signed(self._word), reset_less=True)
+        product = Signal(signed(2 * self._word), reset_less=True)
+        moved = Signal(self._word, reset_less=True)
+        reading = self._reading(pipeline)
+        m.d.comb += [advance.eq(1), added.eq(total + product)]
+        m.d.sync += [
+            data.eq(read),
+            product.eq(data * factor),
+            moved.eq(Mux(reading.has(Opcode.TAKE), self._input_digit(reading), read)),
+        ]
+        return moved
 
     def _remember(
         self,
         m: Module,
         control: tuple[Signal, Signal],
-        values: tuple[Signal, Signal, Signal, Signal],
+        values: tuple[Signal, Signal, Signal, Value, Signal],
         pipeline: list[PipelinedInstruction],
         guard: FaultGuard | None,
     ) -> tuple[Value, Value]:
-        """Read the words at the instructions' addresses, and write those that they store.
+        """Read the words at the instructions' addresses, and write those that they store or move.
 
         Return whether a wrong bit was corrected at this clock, and whether one was found that could not be.
         """
-        (advance, clearing), (counter, total, read, channel) = control, values
-        first, last = pipeline[0 if self.serial else 1], pipeline[-1]
-        take = last.has(Opcode.TAKE)
-        top = total[self._word - 1] & last.has(Opcode.FINISH)
-        digit = Mux(take, self._input_digit(last), Cat(total[: self._word - 1], top))
-        stores = take | last.has(Opcode.STORE) | last.has(Opcode.FINISH)
+        (advance, clearing), (counter, added, read, moved, channel) = control, values
+        first, present, last = pipeline[0], pipeline[-2], pipeline[-1]
+        moves = present.valid & present.has(*EARLY_WRITES)
+        stores = last.valid & last.has(*LATE_WRITES)
+        digit = Cat(added[: self._word - 1], added[self._word - 1] & last.has(*FINISHES))
         address: Value = Cat(first.address, channel)
-        target: Value = Mux(clearing, counter[: address_bits(self.program)], last.address)
-        where, what = Cat(target, channel), Mux(clearing, self._is_one(counter), digit)
-        enable = clearing | (advance & last.valid & stores)
+        target: Value = Mux(moves, present.target, last.target)
+        where = Cat(Mux(clearing, counter[: address_bits(self.program)], target), channel)
+        what = Mux(clearing, self._is_one(counter), Mux(moves, moved, digit))
+        enable = clearing | (advance & (moves | stores))
         check = CheckBits(self._word, self.protect)
         looks: Value = advance & self._reading(pipeline).valid
         if guard is not None:
@@ -478,20 +514,21 @@ class FoldedCore(wiring.Component):
         self,
         m: Module,
         control: tuple[Signal, Signal, Value],
-        values: tuple[Signal, Signal, Signal],
+        values: tuple[Signal, Signal],
         pipeline: list[PipelinedInstruction],
         guard: FaultGuard | None,
     ) -> tuple[Value, Value]:
-        """Collect the digits of the result and its status; the last instruction gives the last digit.
+        """Collect the parts of the result and its status; the last instruction gives the last part.
 
         Return whether a wrong bit in the limits of wear was corrected, and whether one was found that could not be.
         """
-        (advance, start, ends), (total, read, channel) = control, values
-        last, reading = pipeline[-1], self._reading(pipeline)
-        given = [Signal(self._word, name=f"given{k}", reset_less=True) for k in range(self.program.output.digits)]
-        for k, digit in enumerate(given):
-            with m.If(advance & reading.valid & reading.has(Opcode.GIVE) & reading.is_for(k)):
-                m.d.sync += digit.eq(read)
+        (advance, start, ends), (added, channel) = control, values
+        last, parts = pipeline[-1], self.program.output.parts
+        widths = [self.program.digit_bits] * (parts - 1) + [self._last_part_bits]
+        given = [Signal(width, name=f"given{k}", reset_less=True) for k, width in enumerate(widths)]
+        for k, part in enumerate(given):
+            with m.If(advance & last.valid & last.has(Opcode.GIVE) & (last.gives(k) if parts > 1 else Const(1))):
+                m.d.sync += part.eq(added)
         with m.If(ends):
             m.d.sync += self.m_axis_tvalid.eq(1)
         with m.If(self.m_axis_tvalid & self.m_axis_tready):
@@ -500,7 +537,7 @@ class FoldedCore(wiring.Component):
         with m.If(start):
             m.d.sync += [rail.eq(at_rail(self.datapath.inputs, self.s_axis_tdata)), outside.eq(0)]
         if self.fingerprint is not None or any(i.opcode is Opcode.JUDGE for i in self.program.instructions):
-            with m.If(advance & last.valid & last.has(Opcode.JUDGE) & total[-1]):
+            with m.If(advance & last.valid & last.has(Opcode.JUDGE) & added[-1]):
                 m.d.sync += outside.eq(1)
         code, saturated = self._limited(given)
         # Without protection the limits are read again and again; with it just once, so that an upset changes no flag
@@ -515,21 +552,28 @@ class FoldedCore(wiring.Component):
         return leaves & wear.corrected, leaves & wear.failed
 
     def _multiply_serially(
-        self, m: Module, total: Signal, factors: tuple[Value, Value], control: tuple[Signal, Value]
+        self,
+        m: Module,
+        sums: tuple[Signal, Signal],
+        factors: tuple[Value, Value],
+        advance: Signal,
+        last: PipelinedInstruction,
     ) -> None:
         """Add a product to `total`, one clock for each bit of the second factor, the lowest first, until none is left.
 
         What is left of a negative factor ends as -1, which takes one subtraction. The first factor is shifted up at
         each clock.
         """
-        word = self.program.digit_bits + 1
-        advance, multiplies = control
-        shifted = Signal(signed(2 * word), reset_less=True)
-        left = Signal(signed(word), reset_less=True)
+        total, added = sums
+        shifted = Signal(signed(2 * self._word), reset_less=True)
+        left = Signal(signed(self._word), reset_less=True)
         done = Signal()
-        m.d.comb += [done.eq((left == -1) | ~left[1:].any()), advance.eq(~multiplies | done)]
-        with m.If(multiplies & left[0]):
-            m.d.sync += total.eq(Mux(left == -1, total - shifted, total + shifted))
+        multiple = Mux(left[0], shifted, 0)
+        m.d.comb += [
+            done.eq((left == -1) | ~left[1:].any()),
+            advance.eq(~last.valid | done),
+            added.eq(Mux(left == -1, total - multiple, total + multiple)),
+        ]
         m.d.sync += [shifted.eq(shifted << 1), left.eq(left >> 1)]
         with m.If(advance):
             m.d.sync += [shifted.eq(factors[0]), left.eq(factors[1])]
@@ -555,19 +599,35 @@ class FoldedCore(wiring.Component):
         low = [Cat(whole[bits * k : bits * (k + 1)], Const(0, 1)) for k in range(location.digits - 1)]
         return [*low, whole[bits * (location.digits - 1) : bits * location.digits + 1]]
 
+    @property
+    def _result_bits(self) -> int:
+        """Width of the result before it is limited, as far as it counts."""
+        graph, output = self.datapath.stages[-1].graph, self.datapath.output
+        last = graph.nodes[graph.outputs[0]]
+        if last.op is not Op.CLAMP:
+            return output.bits + (not output.signed)
+        node = graph.nodes[last.operands[0]]
+        if self.fingerprint is None:
+            return node.width + (not node.signed)
+        # A program loaded later may have other ranges.
+        return self.program.digit_bits * (self.program.output.parts - 1) + self.program.accumulator_bits
+
+    @property
+    def _last_part_bits(self) -> int:
+        """Width of the last part of the result: all of the accumulator that counts."""
+        rest = self._result_bits - self.program.digit_bits * (self.program.output.parts - 1)
+        return max(1, min(rest, self.program.accumulator_bits))
+
     def _limited(self, given: list[Signal]) -> tuple[Value, Value]:
-        """Return the output code from its digits, limited to the port's range, and whether it had to be limited."""
-        bits, output = self.program.digit_bits, self.datapath.output
-        value = Cat(*(digit[:bits] for digit in given), given[-1][-1]).as_signed()
+        """Return the output code from its parts, limited to the port's range, and whether it had to be limited."""
+        output = self.datapath.output
+        value = Cat(*given)[: self._result_bits].as_signed()
         graph = self.datapath.stages[-1].graph
         last = graph.nodes[graph.outputs[0]]
         below: Value = Const(0, 1)
         above: Value = Const(0, 1)
         code: Value = value
         if last.op is Op.CLAMP:
-            if self.fingerprint is None:  # a program loaded later may have other ranges
-                node = graph.nodes[last.operands[0]]
-                value = value[: node.width + (not node.signed)].as_signed()
             below, above = limits(last, value)
             code = Mux(below, Const(last.low), Mux(above, Const(last.high), value))
         cut = code[: output.bits]

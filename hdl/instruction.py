@@ -2,20 +2,20 @@
 
 ::
 
-     n-1           a+4   a+3        4   3      0
-    +-----------------+--------------+--------+
-    |    constant     |   address    | opcode |     n = 4 + a + digit_bits + 1
-    +-----------------+--------------+--------+
-        signed,         a bits: a word     `sosmith.model.dataflow.program.Opcode`
-      digit_bits + 1    of one channel
+     n-1         2a+4   2a+3   a+4  a+3     4  3      0
+    +-----------------+------------+----------+--------+
+    |    constant     |   target   | address  | opcode |     n = 4 + 2a + digit_bits + 1
+    +-----------------+------------+----------+--------+
+        signed,       a bits each: words of     `sosmith.model.dataflow.program.Opcode`
+      digit_bits + 1  one channel
 
-With digits of 15 bits and 64 words for each channel, an instruction has 26 bits. `Opcode` is an `IntEnum` of Python, as
+With digits of 15 bits and 64 words for each channel, an instruction has 32 bits. `Opcode` is an `IntEnum` of Python, as
 `sosmith.model` does without Amaranth, which derives the width of the field from it.
 """
 
 from __future__ import annotations
 
-from amaranth.hdl import Value, signed
+from amaranth.hdl import Cat, Value, signed
 from amaranth.lib import data
 
 from sosmith.model.dataflow.program import Instruction, Opcode, Program
@@ -32,7 +32,12 @@ def address_bits(program: Program) -> int:
 def instruction_layout(program: Program) -> data.StructLayout:
     """Layout of an instruction, as wide as the words and digits of `program` need."""
     return data.StructLayout(
-        {"opcode": Opcode, "address": address_bits(program), "constant": signed(program.digit_bits + 1)}
+        {
+            "opcode": Opcode,
+            "address": address_bits(program),
+            "target": address_bits(program),
+            "constant": signed(program.digit_bits + 1),
+        }
     )
 
 
@@ -67,14 +72,22 @@ class PipelinedInstruction:
         self.valid = valid
         fields = data.View(instruction_layout(program), code)
         self.address: Value = fields.address
+        self.target: Value = fields.target
         self.constant: Value = fields.constant
         self._opcode: Value = fields.opcode
 
-    def has(self, opcode: Opcode) -> Value:
-        """Whether its opcode is `opcode`."""
-        return self._opcode == opcode
+    def has(self, *opcodes: Opcode) -> Value:
+        """Whether its opcode is one of `opcodes`."""
+        return Cat(self._opcode == opcode for opcode in sorted(opcodes)).any()
 
     def is_for(self, digit: int) -> Value:
-        """Whether its constant is the number `digit`, as that of TAKE and GIVE."""
-        number = self.constant[:_NUMBER_BITS]
-        return number == digit if digit else ~number.any()  # Verilator warns of a comparison with 0
+        """Whether its constant is the number `digit`, as that of TAKE."""
+        return _is(self.constant[:_NUMBER_BITS], digit)
+
+    def gives(self, part: int) -> Value:
+        """Whether its target is the number `part`, as that of GIVE."""
+        return _is(self.target, part)
+
+
+def _is(number: Value, wanted: int) -> Value:
+    return number == wanted if wanted else ~number.any()  # Verilator warns of a comparison with 0

@@ -90,7 +90,7 @@ def _section(section: SectionFacts) -> dict[str, Any]:
 
 
 def _schedule(program: Program | None) -> dict[str, Any] | None:
-    """Program of the folded and serial architectures; each instruction as opcode, address and constant."""
+    """Program of the folded and serial architectures; each instruction as opcode, address, constant and target."""
     if program is None:
         return None
     return {
@@ -99,8 +99,8 @@ def _schedule(program: Program | None) -> dict[str, Any] | None:
         "states": program.states,
         "words": program.words,
         "places": [
-            {"name": p.name, "address": p.address, "digits": p.digits, "frac": p.frac, "state": p.is_state}
-            for p in sorted(program.locations, key=lambda location: location.address)
+            {"name": p.name, "addresses": list(p.addresses), "frac": p.frac, "state": p.is_state}
+            for p in program.locations
         ],
-        "instructions": [[opcode.mnemonic, address, constant] for opcode, address, constant in program.instructions],
+        "instructions": [[opcode.mnemonic, *fields] for opcode, *fields in program.instructions],
     }

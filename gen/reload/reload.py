@@ -301,7 +301,7 @@ def _fitted(hardware: CoreDesign, datapath: Datapath, what: str) -> Program | No
         raise ShortfallError(f"the {what} must fit the hardware: {error}") from None
     spec, architecture = hardware.spec, hardware.architecture
     budget = Budget(clock=spec.hardware.clock, sample_rate=spec.sample_rate, channels=architecture.channels)
-    needed = folded.latency_cycles(made, serial=architecture.name == "serial") + 1
+    needed = folded.cycles_per_sample(made, serial=architecture.name == "serial", protect=architecture.protect)
     if needed > budget.cycles:
         raise ShortfallError(f"the {what} must take at most {budget.cycles:,} clocks a sample, not {needed:,}")
     return made

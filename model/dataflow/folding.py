@@ -8,14 +8,15 @@
     | floor, ..        |   | what is cut or  |   | stored digits |   | by digit, by    |   | DROP or STORE |
     |                  |   | multiplied      |   | and a constant|   | their weight    |   | .. FINISH     |
     +------------------+   +-----------------+   +---------------+   +-----------------+   +---------------+
+                                                                                   sosmith.model.dataflow.scheduling
 
 - A value is stored if it is a port or a state, or if it is cut, delayed or multiplied as a whole. It gets just enough
   fraction bits to bring a quantizer's cut between two of its digits: ``floor(v)`` is then the upper digits of v, and
   what it drops the lower ones, at no cost.
-- A sum is computed column by column, the lowest first. When a column is complete, its low digit is stored and the rest
-  is carried on by a shift. To drop the digit instead is the floor that the datapath asks for, so nothing is
-  approximate.
-- Values that are not needed at the same time share words (`sosmith.model.dataflow.word_reuse`).
+- A sum is computed column by column, the lowest first. The last product of a column ends it: its low digit is stored
+  and the rest is carried on by a shift. To drop the digit instead is the floor that the datapath asks for, so nothing
+  is approximate.
+- A state that holds nothing but the floor of another state is not kept again.
 
 The program is made from the graphs alone and computes the same codes.
 
@@ -33,33 +34,28 @@ As an example, ``y(n) = floor(3 / 4 y(n-1) + 4 x(n))`` with digits of 4 bits. x 
 >>> ports = [Port.from_range(name, bits, Fraction(-1), Fraction(1), signed=True) for name, bits in (("x", 4), ("y", 8))]
 >>> datapath = Datapath(name="example", inputs=(ports[0],), output=ports[1], stages=(section,))
 >>> made = program(datapath, digit_bits=4)
->>> [(at.name, at.address, at.digits) for at in made.locations]
-[('section.y1', 0, 2), ('section.x', 2, 1), ('section.y', 2, 2)]
+>>> [(at.name, at.addresses) for at in made.locations]
+[('section.y1', (0, 1)), ('section.x', (2,)), ('section.y', (0, 1))]
 
 3 / 4 is 12 / 16: the products of y1 begin one column below y, which is dropped. 4 is 64 / 16, whose digits are 0 and 4:
-the product of x begins in the column of y's low digit. x is dead once it has been multiplied, so y takes its word:
+the product of x begins in the column of y's low digit. Nothing needs a digit of y1 any more when one of y is stored,
+which takes its word and becomes the next y1:
 
->>> for number, (opcode, address, constant) in enumerate(made.instructions):
-...     print(f"{number:2}  {opcode.mnemonic:8} {address}  {constant:2}")
- 0  take     2   0
- 1  multiply 0  12
- 2  drop     0   0
- 3  nothing  0   0
- 4  multiply 2   4
- 5  multiply 1  12
- 6  store    2   0
- 7  finish   3   0
- 8  nothing  0   0
- 9  nothing  0   0
-10  multiply 2   1
-11  store    0   0
-12  multiply 3   1
-13  finish   1   0
-14  give     2   0
-15  give     3   1
+>>> for number, (opcode, address, constant, target) in enumerate(made.instructions):
+...     print(f"{number}  {opcode.mnemonic:8} {address}  {constant:2}  {target}")
+0  take     3   0  2
+1  drop     0  12  0
+2  multiply 1  12  0
+3  store    2   4  0
+4  finish   3   0  1
+5  multiply 3   0  0
+6  multiply 3   0  0
+7  give     0   1  0
+8  give     1   1  1
 
-The instructions 10 to 13 copy y to its state; a NOTHING keeps one that reads a word far enough from the one that stores
-it. Three samples, by the program and by the graph:
+The instructions 5 and 6 add nothing: they keep 7 far enough from 3, which stores the word that it reads.
+
+Three samples, by the program and by the graph:
 
 >>> words = made.reset()
 >>> [made.step([code], words, [0]).code for code in (7, 7, -8)]
@@ -77,15 +73,24 @@ from typing import NamedTuple
 
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.graph import Node, Op
-from sosmith.model.dataflow.program import HAZARD, Instruction, Location, Opcode, Program, digits_of
-from sosmith.model.dataflow.word_reuse import LiveRange, WordBlock, packed
+from sosmith.model.dataflow.program import (
+    CARRIES,
+    CLEARS,
+    PRODUCTS,
+    Location,
+    Opcode,
+    Program,
+    Result,
+    digits_of,
+)
+from sosmith.model.dataflow.scheduling import ONE, Column, Digit, Product, Scheduler, Sum
 
 
 class FoldingError(ValueError):
     """The datapath cannot be computed by one multiply-accumulate unit."""
 
 
-def program(datapath: Datapath, digit_bits: int, *, like: Program | None = None) -> Program:
+def program(datapath: Datapath, digit_bits: int, *, spare_words: int = 0, like: Program | None = None) -> Program:
     """Fold a datapath.
 
     Parameters
@@ -94,6 +99,8 @@ def program(datapath: Datapath, digit_bits: int, *, like: Program | None = None)
         What is to be computed.
     digit_bits : int
         Bits of a digit: one less than those of a factor of the multiplier.
+    spare_words : int
+        Words of memory beyond those that it needs.
     like : Program or None
         A program that the new one must be able to take over from at any sample, in the same hardware and with its
         states: a location gets at least as many digits as the one of the same name.
@@ -105,7 +112,9 @@ def program(datapath: Datapath, digit_bits: int, *, like: Program | None = None)
     """
     kept = {} if like is None else {location.name: location.digits for location in like.locations}
     least = 0 if like is None else like.words
-    made = _Folding(_flattened(datapath), digit_bits, kept, datapath.calibrated).program(least)
+    flat = _flattened(datapath)
+    _share_delays(flat.nodes)
+    made = _Folding(flat, digit_bits, kept, datapath.calibrated).program(least, spare_words)
     if like is None:
         return made
     _check_can_take_over(made, like)
@@ -124,7 +133,7 @@ def _check_can_take_over(made: Program, like: Program) -> None:
         ("digit_bits", made.digit_bits, like.digit_bits),
         ("its states", _states(made), _states(like)),
         ("digits and fraction bits of its inputs", _forms(made.inputs), _forms(like.inputs)),
-        ("digits and fraction bits of its output", _forms([made.output]), _forms([like.output])),
+        ("fraction bits and parts of its output", made.output[1:], like.output[1:]),
     ):
         if new != old:
             raise FoldingError(f"to take over, {what} must be {old}, not {new}")
@@ -136,8 +145,8 @@ def _check_can_take_over(made: Program, like: Program) -> None:
             raise FoldingError(f"to take over, {what} must be at most {old}, not {new}")
 
 
-def _states(made: Program) -> list[tuple[str, int, int, int]]:
-    return [(at.name, at.address, at.digits, at.frac) for at in made.locations if at.is_state]
+def _states(made: Program) -> list[tuple[str, tuple[int, ...], int]]:
+    return [(at.name, at.addresses, at.frac) for at in made.locations if at.is_state]
 
 
 def _forms(locations: Sequence[Location]) -> list[tuple[int, int]]:
@@ -179,6 +188,36 @@ def _flattened(datapath: Datapath) -> _Flat:
     return _Flat(nodes, inputs, output)
 
 
+def _share_delays(nodes: list[Node]) -> None:
+    """Let a delay of what another delay holds anyway read that one, instead of keeping it once more.
+
+    A section keeps y(n-1) with all its fraction bits, and the next one x(n-1), which is the floor of that.
+    """
+    changed = True
+    while changed:
+        changed = False
+        kept: dict[int, int] = {}
+        for index, node in enumerate(nodes):
+            if node.op is Op.DELAY:
+                kept.setdefault(node.operands[0], index)
+        for index, node in enumerate(nodes):
+            if node.op is not Op.DELAY:
+                continue
+            source = node.operands[0]
+            of = nodes[source]
+            if kept[source] != index:
+                nodes[index] = replace(node, op=Op.BOUND, operands=(kept[source],))
+                for other, user in enumerate(nodes):
+                    moved = tuple(kept[source] if i == index else i for i in user.operands)
+                    nodes[other] = replace(user, operands=moved)
+            elif of.op is Op.FLOOR and of.operands[0] in kept:
+                nodes[index] = replace(node, op=Op.FLOOR, operands=(kept[of.operands[0]],))
+            else:
+                continue
+            changed = True
+            break
+
+
 class _Term(NamedTuple):
     """Digits of a stored value: `length` of them from `first` on; times the stored value `other`, unless that is -1."""
 
@@ -188,12 +227,19 @@ class _Term(NamedTuple):
     other: int = -1
 
 
+class _Form(NamedTuple):
+    """How a value is stored: number of digits, and fraction bits of the code that they make."""
+
+    digits: int
+    frac: int
+
+
 _Sum = dict[_Term, Fraction]
 """Multiples of stored digits, each read as a number with the fraction bits of its lowest digit."""
 
 
 class _Folding:
-    """Decides which values to store, where, and in which order to compute them."""
+    """Decides which values to store, and makes the sums that compute them."""
 
     def __init__(
         self, flat: _Flat, digit_bits: int, kept: Mapping[str, int], calibrated: Sequence[tuple[int, int]]
@@ -201,7 +247,6 @@ class _Folding:
         self._nodes, self._inputs, self._output = flat
         self._calibrated = calibrated
         self._bits = digit_bits
-        self._kept = kept
         last = self._nodes[self._output]
         if last.op is Op.CLAMP:  # done on the way out
             self._nodes.remove(last)
@@ -212,90 +257,68 @@ class _Folding:
             self._stored |= apart
             self._fracs = self._find_fracs()
         self._sums: dict[int, tuple[_Sum, Fraction]] = {}
-        self._locations: dict[int, Location] = {}
-        self._instructions: list[Instruction] = []
-        self._schedule: list[tuple[str, int, int]] = []
-        self._one = 0
+        self._forms = {index: self._form(index, kept) for index in sorted(self._stored)}
 
-    def program(self, least_words: int) -> Program:
-        """Make the program for a memory of at least `least_words` words.
+    def _form(self, index: int, kept: Mapping[str, int]) -> _Form:
+        node, frac = self._nodes[index], self._fracs[index]
+        count = self._digits(_shifted(node.low, frac - node.frac), _shifted(node.high, frac - node.frac))
+        return _Form(max(count, kept.get(self._name(index), 0)), frac)
 
-        At first every value has words of its own, and the word that always holds 1 follows the states.
-        """
-        address = states = 0
-        for index in sorted(self._stored, key=lambda i: self._nodes[i].op is not Op.DELAY):
-            node = self._nodes[index]
-            if node.op is not Op.DELAY and address == states:
-                address += 1  # the word that always holds 1
-            count = self._digits(
-                node.low << (self._fracs[index] - node.frac), node.high << (self._fracs[index] - node.frac)
+    def _name(self, index: int) -> str:
+        return self._nodes[index].name or f"value{index}"
+
+    def program(self, least_words: int, spare_words: int) -> Program:
+        """Make the program for a memory of at least `least_words` words, and with some that are not used."""
+        states: dict[Digit, int] = {}
+        for index in self._delays():
+            states |= {Digit(index, k): len(states) + k for k in range(self._forms[index].digits)}
+        copied, copies = set(), dict[Digit, list[Digit]]()
+        for index in self._delays():
+            for source, digit in self._copied(index):
+                copies.setdefault(source, []).append(digit)
+                copied.add(index)
+        computed = {
+            i: Sum(self._name(i), i, self._columns(self._sum(i), self._forms[i], i))
+            for i in sorted(self._stored)
+            if i not in copied and i not in self._inputs
+        }
+        judged = [*self._judged()]
+        result = self._result(computed, copies)
+        made = Scheduler(states, copies, [*judged, *computed.values(), result])
+        made.take(Digit(index, k) for index in self._inputs for k in range(self._forms[index].digits))
+        for one in judged:
+            made.compute(one)
+        made.note("range")
+        self._schedule(made, computed)
+        made.finish(result)
+        words = max(1 << (made.words + spare_words).bit_length(), least_words)
+        where = {digit: address % words for digit, address in made.where.items()}  # that of ONE was -1
+        locations = {
+            index: Location(
+                self._name(index),
+                tuple(where[Digit(index, k)] for k in range(form.digits)),
+                form.frac,
+                self._nodes[index].op is Op.DELAY,
             )
-            state, name = node.op is Op.DELAY, node.name or f"value{index}"
-            count = max(count, self._kept.get(name, 0))
-            self._locations[index] = Location(name, address, count, self._fracs[index], state)
-            address += count
-            states += count * state
-        self._one = states
-        self._emit_all()
-        accumulator_bits = self._accumulator_bits()
-        words = self._share_words(states, least_words)
+            for index, form in sorted(self._forms.items(), key=lambda item: self._nodes[item[0]].op is not Op.DELAY)
+            if Digit(index, 0) in where
+        }
         return Program(
             digit_bits=self._bits,
-            instructions=tuple(self._instructions),
-            locations=tuple(self._locations.values()),
-            inputs=tuple(self._locations[i] for i in self._inputs),
-            output=self._locations[self._output],
-            states=states,
+            instructions=tuple(i._replace(address=i.address % words) for i in made.instructions),
+            locations=tuple(locations.values()),
+            inputs=tuple(locations[i] for i in self._inputs),
+            output=Result(
+                result.name, self._fracs[self._output], sum(column.end is Opcode.GIVE for column in result.columns)
+            ),
+            states=len(states),
             words=words,
-            schedule=tuple(self._schedule),
-            accumulator_bits=accumulator_bits,
+            schedule=tuple(made.schedule),
+            accumulator_bits=self._accumulator_bits(made),
         )
 
-    def _emit_all(self) -> None:
-        locations = [self._locations[index] for index in self._inputs]
-        for k, digit in enumerate(location.address + k for location in locations for k in range(location.digits)):
-            self._emit(Opcode.TAKE, digit, k)
-        self._scheduled("input")
-        for index, ends in zip(self._inputs, self._calibrated, strict=True):
-            self._judge(index, *ends)
-        self._scheduled("range")
-        for index in self._in_order():
-            self._evaluate(self._locations[index], *self._sum(index))
-            self._scheduled(self._locations[index].name)
-        output = self._locations[self._output]
-        for k in range(output.digits):
-            self._emit(Opcode.GIVE, output.address + k, k)
-        self._scheduled("output")
-
-    def _scheduled(self, name: str) -> None:
-        """Note that the instructions since the last note compute `name`."""
-        start = sum(self._schedule[-1][1:]) if self._schedule else 0
-        count = len(self._instructions) - start
-        if count:
-            self._schedule.append((name, start, count))
-
-    def _share_words(self, states: int, least: int) -> int:
-        """Let values share words where their live ranges allow it; return the number of words, a power of two."""
-        uses: dict[int, list[int]] = {}
-        for number, (opcode, address, _) in enumerate(self._instructions):
-            if opcode not in {Opcode.NOTHING, Opcode.DROP, Opcode.JUDGE}:
-                uses.setdefault(address, []).append(number)
-        values = []
-        for location in self._locations.values():
-            if not location.is_state:
-                found = sorted(number for k in range(location.digits) for number in uses.get(location.address + k, ()))
-                values.append((WordBlock(location.address, location.digits), LiveRange(found[0], found[-1])))
-        given, end = packed(values, states)
-        words = max(1 << end.bit_length(), least)
-        moved = {self._one: words - 1} | {
-            block.address + k: address + k for block, address in given.items() for k in range(block.words)
-        }
-        self._instructions = [i._replace(address=moved.get(i.address, i.address)) for i in self._instructions]
-        self._locations = {
-            index: replace(location, address=moved.get(location.address, location.address))
-            for index, location in self._locations.items()
-        }
-        return words
+    def _delays(self) -> list[int]:
+        return [index for index, node in enumerate(self._nodes) if node.op is Op.DELAY]
 
     # What is stored.
 
@@ -332,11 +355,8 @@ class _Folding:
 
     def _find_fracs(self) -> dict[int, int]:
         """Return the fraction bits of each stored code: at least its node's, with its first cut between two digits."""
-        group = {index: index for index in self._stored}
-        for index in self._stored:
-            node = self._nodes[index]
-            if node.op is Op.DELAY:
-                group[index] = self._first_source(index)
+        stored = self._stored
+        group = {i: self._first_source(i) if self._nodes[i].op is Op.DELAY else i for i in stored}
         cuts: dict[int, int] = {}
         for node in self._nodes:
             if node.op in {Op.FLOOR, Op.FRACTION}:
@@ -353,9 +373,12 @@ class _Folding:
         return fracs
 
     def _first_source(self, index: int) -> int:
-        """Follow a chain of delays to what it begins with."""
+        """Follow a chain of delays to what it begins with; for the lower digits of a stored value, to that."""
         while self._nodes[index].op is Op.DELAY:
             index = self._nodes[index].operands[0]
+        node = self._nodes[index]
+        if node.op is Op.FRACTION and node.operands[0] in self._stored:
+            return self._first_source(node.operands[0])
         return index
 
     def _digits(self, low: int, high: int) -> int:
@@ -369,8 +392,8 @@ class _Folding:
 
     def _value(self, index: int) -> tuple[_Sum, Fraction]:
         """Return a node as a sum of stored digits and a constant."""
-        if index in self._locations:
-            return {_Term(index, 0, self._locations[index].digits): Fraction(1)}, Fraction(0)
+        if index in self._stored:
+            return {_Term(index, 0, self._forms[index].digits): Fraction(1)}, Fraction(0)
         if index not in self._sums:
             self._sums[index] = self._definition(index)
         return self._sums[index]
@@ -407,129 +430,162 @@ class _Folding:
                 _, factor = self._value(one)
                 total, constant = self._value(other)
                 return {term: weight * factor for term, weight in total.items()}, constant * factor
-        first, second = self._locations[a], b
-        return {_Term(a, 0, first.digits, second): Fraction(1)}, Fraction(0)
+        return {_Term(a, 0, self._forms[a].digits, b): Fraction(1)}, Fraction(0)
 
     def _cut(self, node: Node) -> tuple[_Sum, Fraction]:
         """Return the upper or the lower digits of a stored value."""
         root = node.operands[0]
-        if root not in self._locations:
+        if root not in self._stored:
             raise FoldingError(f"{node.name!r} must cut a stored value to be folded")
-        location = self._locations[root]
+        form = self._forms[root]
         kept = node.parameter if node.op is Op.FRACTION else node.frac
-        lower, rest = divmod(location.frac - kept, self._bits)
+        lower, rest = divmod(form.frac - kept, self._bits)
         if rest:
             raise FoldingError(f"{node.name!r} must cut its value where another quantizer does to be folded")
         if node.op is Op.FRACTION:
             return ({_Term(root, 0, lower): Fraction(1)} if lower else {}), Fraction(0)
-        if lower >= location.digits:
+        if lower >= form.digits:
             raise FoldingError(f"{node.name!r} must leave a digit to be folded")
-        return {_Term(root, lower, location.digits - lower): Fraction(1)}, Fraction(0)
+        return {_Term(root, lower, form.digits - lower): Fraction(1)}, Fraction(0)
 
     # How they are computed.
-
-    def _judge(self, index: int, low: int, high: int) -> None:
-        """Compare an input with each end of its calibrated range that is not an end of its codes, by a subtraction."""
-        node, location = self._nodes[index], self._locations[index]
-        ends = [(low, 1)] * (low > node.low) + [(high, -1)] * (high < node.high)
-        for end, sign in ends:
-            for k, digit in enumerate(digits_of(end << (location.frac - node.frac), location.digits, self._bits)):
-                self._emit(Opcode.MULTIPLY, location.address + k, sign)
-                self._emit(Opcode.MULTIPLY, self._one, -sign * digit)
-                self._emit(*((Opcode.JUDGE,) if k == location.digits - 1 else (Opcode.DROP,)))
 
     def _sum(self, index: int) -> tuple[_Sum, Fraction]:
         """Return a stored value in terms of other stored values."""
         node = self._nodes[index]
         return self._value(node.operands[0]) if node.op in {Op.FLOOR, Op.DELAY} else self._definition(index)
 
-    def _in_order(self) -> Iterator[int]:
-        """Yield values in the order of the datapath, and each state as soon as nothing needs its old value any more.
+    def _copied(self, index: int) -> list[tuple[Digit, Digit]]:
+        """Return the digits that a state takes over, each with its own; none if they are not just those of a value."""
+        (total, constant), form = self._sum(index), self._forms[index]
+        if constant or len(total) != 1:
+            return []
+        ((term, weight),) = total.items()
+        frac = self._forms[term.value].frac - self._bits * term.first
+        if term.other >= 0 or weight != 1 or (term.length, frac) != form:
+            return []
+        return [(Digit(term.value, term.first + k), Digit(index, k)) for k in range(form.digits)]
 
-        The sooner that is, the shorter the live range of the value that the state is copied from.
+    def _judged(self) -> Iterator[Sum]:
+        """Compare an input with each end of its calibrated range that is not an end of its codes, by a subtraction."""
+        for index, (low, high) in zip(self._inputs, self._calibrated, strict=True):
+            node, form = self._nodes[index], self._forms[index]
+            for end, sign in [(low, 1)] * (low > node.low) + [(high, -1)] * (high < node.high):
+                columns = []
+                for k, digit in enumerate(digits_of(end << (form.frac - node.frac), form.digits, self._bits)):
+                    products = [Product(Digit(index, k), sign)] + [Product(ONE, -sign * digit)] * (digit != 0)
+                    columns.append(Column(tuple(products), Opcode.JUDGE if k == form.digits - 1 else Opcode.DROP))
+                yield Sum("range", -1, tuple(columns))
+
+    def _result(self, computed: dict[int, Sum], copies: Mapping[Digit, object]) -> Sum:
+        """Return the sum that hands the result out, instead of one that stores it if nothing else needs it."""
+        own = computed.get(self._output)
+        needed = {digit.value for digit in copies}.union(
+            *(one.sources for i, one in computed.items() if own is not one)
+        )
+        late = {i for i in computed if self._nodes[i].op is Op.DELAY}  # written before the result is computed
+        if own is None or self._output in needed or own.sources & late:
+            digits = range(self._forms[self._output].digits)
+            products = [(Product(Digit(self._output, k), 1),) for k in digits]
+            columns = [Column(product, Opcode.GIVE, part=k) for k, product in enumerate(products)]
+        else:
+            del computed[self._output]
+            form = self._forms[self._output]._replace(digits=0)
+            columns = [*self._columns(self._sum(self._output), form, -1)]
+        return Sum(self._name(self._output), -1, tuple(columns))
+
+    def _schedule(self, made: Scheduler, computed: Mapping[int, Sum]) -> None:
+        """Compute values in the order of the datapath; while the next one would have to wait, another one if it can.
+
+        Raises
+        ------
+        FoldingError
+            If there is no order in which each state is read before it is written.
         """
-        read = {
-            i: {value for term in self._sum(i)[0] for value in (term.value, term.other)}
-            for i in self._stored
-            if self._nodes[i].op is not Op.INPUT
-        }
-        values = [i for i in sorted(read) if self._nodes[i].op is not Op.DELAY]
-        delays = [i for i in sorted(read) if self._nodes[i].op is Op.DELAY]
-        while values or delays:
-            waiting = set(values)
+        left = dict(computed)
+        while left:
+            needed = {i for i in left if self._nodes[i].op is not Op.DELAY}
             free = [
-                d
-                for d in delays
-                if not read[d] & waiting and not any(d in read[i] for i in (*values, *delays) if i != d)
+                i
+                for i, one in left.items()
+                if not one.sources & (needed - {i}) and (i in needed or made.is_unused(one))
             ]
-            if free:
-                delays.remove(free[0])
-                yield free[0]
-            else:
-                yield values.pop(0)
+            if not free:
+                raise FoldingError(f"{next(iter(left.values())).name!r} must not be needed after it is written")
+            if made.stalls(left[free[0]]):
+                free.sort(key=lambda i: made.stalls(left[i]))
+            one = left.pop(free[0])
+            made.compute(one)
+            made.note(one.name)
 
-    def _evaluate(self, location: Location, total: _Sum, constant: Fraction) -> None:
-        """Emit the columns of a sum, the lowest first; drop those below the lowest digit of `location`."""
+    def _columns(self, of: tuple[_Sum, Fraction], form: _Form, value: int) -> tuple[Column, ...]:
+        """Return the columns of a sum, the lowest first: those below its lowest digit are dropped, others are stored.
+
+        If the value is -1, they are handed out, the last of them with all that is carried on from it.
+        """
+        total, constant = of
         terms: list[tuple[_Term, int, Fraction]] = []
         for term, weight in total.items():
-            stored = self._locations[term.value]
-            frac = stored.frac - self._bits * term.first
+            frac = self._forms[term.value].frac - self._bits * term.first
             if term.other >= 0:
-                frac += self._locations[term.other].frac
+                frac += self._forms[term.other].frac
             terms.append((term, frac, weight))
         exact = max([frac + _fraction_bits(weight) for _, frac, weight in terms] + [_fraction_bits(constant)])
-        below = max(0, -(-(exact - location.frac) // self._bits))
-        unit = Fraction(2) ** (location.frac + self._bits * below)
-        columns: list[list[Instruction]] = [[] for _ in range(below + location.digits)]
-        for term, frac, weight in terms:
-            factor = weight * unit / Fraction(2) ** frac
-            for instructions, column in self._products(term, int(factor)):
-                self._add_to_column(instructions, column, columns)
-        for column, digit in enumerate(self._constant_digits(int(constant * unit))):
-            self._add_to_column([Instruction(Opcode.MULTIPLY, self._one, digit)], column, columns)
-        for column, instructions in enumerate(columns):
-            for instruction in instructions:
-                self._emit(*instruction)
-            if column < below:
-                self._emit(Opcode.DROP)
-            elif column < len(columns) - 1:
-                self._emit(Opcode.STORE, location.address + column - below)
+        below = max(0, -(-(exact - form.frac) // self._bits))
+        unit = Fraction(2) ** (form.frac + self._bits * below)
+        products = [
+            placed
+            for term, frac, weight in terms
+            for placed in self._products(term, int(weight * unit / Fraction(2) ** frac))
+        ]
+        products += [
+            (Product(ONE, digit), column)
+            for column, digit in enumerate(self._constant_digits(int(constant * unit)))
+            if digit
+        ]
+        count = form.digits if value >= 0 else max([column + 1 - below for _, column in products] + [1])
+        columns: list[list[Product]] = [[] for _ in range(below + count)]
+        for product, column in products:
+            self._add_to_column(product, column, columns)
+        made = []
+        for number, found in enumerate(columns):
+            k = number - below
+            if k < 0:
+                made.append(Column(tuple(found), Opcode.DROP))
+            elif value < 0:
+                made.append(Column(tuple(found), Opcode.GIVE, part=k))
             else:
-                self._emit(Opcode.FINISH, location.address + column - below)
+                made.append(Column(tuple(found), Opcode.STORE if k < count - 1 else Opcode.FINISH, Digit(value, k)))
+        return tuple(made)
 
-    def _add_to_column(self, instructions: list[Instruction], column: int, columns: list[list[Instruction]]) -> None:
-        """Add instructions to a column.
+    def _add_to_column(self, product: Product, column: int, columns: list[list[Product]]) -> None:
+        """Add a product to a column.
 
-        The value is known to fit its location, and FINISH keeps ``digit_bits + 1`` bits of the top column. So of a
+        The value is known to fit its digits, and FINISH keeps ``digit_bits + 1`` bits of the top column. So of a
         product one column above that, only the lowest bit counts, and nothing of those farther up.
         """
         if column < len(columns):
-            columns[column] += instructions
+            columns[column].append(product)
         elif column == len(columns):
-            (instruction,) = instructions
-            if instruction.opcode is not Opcode.MULTIPLY:
+            if product.other is not None:
                 raise FoldingError("a product of two values must end below its sum's top digit to be folded")
-            if instruction.constant % 2:
-                columns[-1].append(instruction._replace(constant=-1 << self._bits))
+            if product.constant % 2:
+                columns[-1].append(product._replace(constant=-1 << self._bits))
 
-    def _products(self, term: _Term, factor: int) -> Iterator[tuple[list[Instruction], int]]:
-        """Yield the instructions of a term times a constant, product by product, and the column of each."""
-        start = self._locations[term.value].address + term.first
+    def _products(self, term: _Term, factor: int) -> Iterator[tuple[Product, int]]:
+        """Yield the products of a term times a constant, and the column of each."""
         if term.other < 0:
             for j, digit in enumerate(self._constant_digits(factor)):
-                if not digit:
-                    continue
-                for i in range(term.length):
-                    yield [Instruction(Opcode.MULTIPLY, start + i, digit)], i + j
+                for i in range(term.length if digit else 0):
+                    yield Product(Digit(term.value, term.first + i), digit), i + j
             return
         shift = factor.bit_length() - 1
         if factor != 1 << shift or shift % self._bits:
             raise FoldingError("a product of two values must fall on a digit to be folded")
-        other = self._locations[term.other]
         for i in range(term.length):
-            for j in range(other.digits):
-                pair = [Instruction(Opcode.OPERAND, start + i), Instruction(Opcode.PRODUCT, other.address + j)]
-                yield pair, i + j + shift // self._bits
+            for j in range(self._forms[term.other].digits):
+                one, other = Digit(term.value, term.first + i), Digit(term.other, j)
+                yield Product(one, other=other), i + j + shift // self._bits
 
     def _constant_digits(self, value: int) -> list[int]:
         """Return the digits of a constant: just one if it fits, otherwise balanced about zero."""
@@ -544,43 +600,34 @@ class _Folding:
             value = (value - digit) >> self._bits
         return digits
 
-    def _emit(self, opcode: Opcode, address: int = 0, constant: int = 0) -> None:
-        """Append an instruction, and before it NOTHING until it is far enough from the one that stores its word."""
-        if opcode in {Opcode.MULTIPLY, Opcode.OPERAND, Opcode.PRODUCT, Opcode.GIVE}:
-            for distance, earlier in enumerate(reversed(self._instructions[-HAZARD + 1 :]), start=1):
-                if earlier.opcode in {Opcode.TAKE, Opcode.STORE, Opcode.FINISH} and earlier.address == address:
-                    self._instructions += [Instruction(Opcode.NOTHING)] * (HAZARD - distance)
-                    break
-        self._instructions.append(Instruction(opcode, address, constant))
-
-    def _accumulator_bits(self) -> int:
+    def _accumulator_bits(self, made: Scheduler) -> int:
         """Return the width, by interval arithmetic with any values of the digits; at least that of a word."""
-        base = 1 << self._bits
-        tops = {p.address + p.digits - 1: self._top_range(i, p) for i, p in self._locations.items()}
-        tops[self._one] = (1, 1)
         low = high = least = most = 0
         operand = (0, 0)
-        for opcode, address, constant in self._instructions:
-            word = tops.get(address, (0, base - 1))
+        for (opcode, _, constant, _), digit in zip(made.instructions, made.reads, strict=True):
+            word = self._range(digit)
+            factors = operand if opcode in PRODUCTS else (constant, constant)
+            ends = [a * b for a in word for b in factors]
+            low, high = low + min(ends), high + max(ends)
             if opcode is Opcode.OPERAND:
                 operand = word
-            elif opcode in {Opcode.MULTIPLY, Opcode.PRODUCT}:
-                factors = (constant, constant) if opcode is Opcode.MULTIPLY else operand
-                ends = [a * b for a in word for b in factors]
-                low, high = low + min(ends), high + max(ends)
-            elif opcode in {Opcode.STORE, Opcode.DROP}:
+            if opcode is not Opcode.TAKE:
+                least, most = min(least, low), max(most, high)
+            if opcode in CARRIES:
                 low, high = low >> self._bits, high >> self._bits
-            elif opcode in {Opcode.FINISH, Opcode.JUDGE}:
+            elif opcode in CLEARS:
                 low = high = 0
-            least, most = min(least, low), max(most, high)
         return max((-least - 1).bit_length(), most.bit_length(), self._bits) + 1
 
-    def _top_range(self, index: int, location: Location) -> tuple[int, int]:
-        """Return the range of a value's top digit."""
-        node = self._nodes[index]
-        shift = location.frac - node.frac - self._bits * (location.digits - 1)
-        low, high = (_shifted(end, shift) for end in (node.low, node.high))
-        return low, high
+    def _range(self, digit: Digit) -> tuple[int, int]:
+        """Return the range of a digit."""
+        if digit == ONE:
+            return 1, 1
+        node, form = self._nodes[digit.value], self._forms[digit.value]
+        if digit.number < form.digits - 1:
+            return 0, (1 << self._bits) - 1
+        shift = form.frac - node.frac - self._bits * digit.number
+        return _shifted(node.low, shift), _shifted(node.high, shift)
 
 
 def _shifted(code: int, shift: int) -> int:

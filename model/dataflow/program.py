@@ -7,7 +7,7 @@ with ``digit_bits = 2``, -7 is the digits 1, -2 (lowest first), since -7 = 1 + (
 ::
 
     words of one channel         registers               instruction
-      0 .. states-1    states      acc   accumulator       opcode | address | constant
+      0 .. states-1    states      acc   accumulator       opcode | address | target | constant
       states ..        values      t     operand
       words-1          always 1
 
@@ -21,29 +21,27 @@ from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import NamedTuple
 
-HAZARD = 4
-"""Least number of instructions from one that stores a word to one that reads it.
-
-The folded core writes words three pipeline stages after it reads them (`sosmith.hdl.folded`).
-"""
-
 
 class Opcode(IntEnum):
     """Operation of an instruction, and its code in hardware.
 
-    ``m`` is the memory word at the instruction's address, ``acc`` the accumulator, ``t`` the operand register.
+    ``m`` is the memory word at the instruction's address, ``target`` the one that it writes, ``acc`` the accumulator,
+    ``t`` the operand register. Every instruction but PRODUCT and its kind begins with ``acc += m * constant``.
     """
 
-    NOTHING = 0
-    TAKE = 1  # m = digit number `constant` of the input sample
-    MULTIPLY = 2  # acc += m * constant
-    OPERAND = 3  # t = m
-    PRODUCT = 4  # acc += m * t
-    STORE = 5  # m = low digit of acc; acc >>= digit_bits
-    DROP = 6  # acc >>= digit_bits
-    FINISH = 7  # m = low digit_bits + 1 bits of acc, signed; acc = 0
-    GIVE = 8  # digit number `constant` of the output sample = m
-    JUDGE = 9  # if acc < 0, the input is outside the calibrated range; acc = 0
+    MULTIPLY = 0  # no more
+    STORE = 1  # target = low digit of acc; acc >>= digit_bits
+    DROP = 2  # acc >>= digit_bits
+    FINISH = 3  # target = low digit_bits + 1 bits of acc, signed; acc = 0
+    GIVE = 4  # part number `target` of the result = acc, of all but the last its low digit; acc >>= digit_bits
+    JUDGE = 5  # if acc < 0, the input is outside the calibrated range; acc = 0
+    MOVE = 6  # target = m
+    OPERAND = 7  # t = m
+    PRODUCT = 8  # acc += m * t
+    PRODUCT_STORE = 9  # .. and what STORE does
+    PRODUCT_DROP = 10
+    PRODUCT_FINISH = 11
+    TAKE = 12  # target = digit number `constant` of the input sample; acc = 0
 
     @property
     def mnemonic(self) -> str:
@@ -51,12 +49,41 @@ class Opcode(IntEnum):
         return self.name.lower()
 
 
+PRODUCTS = frozenset({Opcode.PRODUCT, Opcode.PRODUCT_STORE, Opcode.PRODUCT_DROP, Opcode.PRODUCT_FINISH})
+"""Opcodes that multiply by the operand register."""
+
+STORES = frozenset({Opcode.STORE, Opcode.PRODUCT_STORE})
+"""Opcodes that store a digit, and go on with what is left."""
+
+FINISHES = frozenset({Opcode.FINISH, Opcode.PRODUCT_FINISH})
+"""Opcodes that store the top digit."""
+
+CARRIES = frozenset({*STORES, Opcode.DROP, Opcode.PRODUCT_DROP, Opcode.GIVE})
+"""Opcodes that end a column: they carry what is above its digit to the next one."""
+
+CLEARS = frozenset({*FINISHES, Opcode.JUDGE, Opcode.TAKE})
+"""Opcodes after which the accumulator is 0."""
+
+EARLY_WRITES = frozenset({Opcode.MOVE, Opcode.TAKE})
+"""Opcodes that write their word at the clock of the instruction before; they must not follow one of `LATE_WRITES`."""
+
+LATE_WRITES = frozenset({*STORES, *FINISHES})
+"""Opcodes that write their word from the end of the pipeline."""
+
+STORED = 4
+"""Least number of instructions from one of `LATE_WRITES` to one that reads its word."""
+
+MOVED = 3
+"""Least number of instructions from one of `EARLY_WRITES` to one that reads its word."""
+
+
 class Instruction(NamedTuple):
     """One step of a program."""
 
     opcode: Opcode
-    address: int = 0
+    address: int
     constant: int = 0
+    target: int = 0
 
 
 class Sample(NamedTuple):
@@ -74,10 +101,8 @@ class Location:
     ----------
     name : str
         Name of the value.
-    address : int
-        Address of its lowest digit within the words of one channel.
-    digits : int
-        Number of digits.
+    addresses : tuple of int
+        Addresses of its digits within the words of one channel, the lowest digit first.
     frac : int
         Fraction bits of the stored code.
     is_state : bool
@@ -85,10 +110,22 @@ class Location:
     """
 
     name: str
-    address: int
-    digits: int
+    addresses: tuple[int, ...]
     frac: int
     is_state: bool
+
+    @property
+    def digits(self) -> int:
+        """Number of digits."""
+        return len(self.addresses)
+
+
+class Result(NamedTuple):
+    """The result before it is limited to the output's range: name, fraction bits, and number of parts (GIVE)."""
+
+    name: str
+    frac: int
+    parts: int
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,13 +137,13 @@ class Program:
     digit_bits : int
         Bits of a digit; the multiplier is signed and has ``digit_bits + 1`` bits.
     instructions : tuple of Instruction
-        Run once for each sample of each channel.
+        Run once for each sample of each channel; the last one is a GIVE.
     locations : tuple of Location
-        All stored values.
+        All stored values. Those that are also kept in a state may share its words.
     inputs : tuple of Location
         Those of the input ports, in port order; TAKE fills them.
-    output : Location
-        The result before it is limited to the output's range; GIVE reads it.
+    output : Result
+        The result; GIVE hands it out.
     states : int
         Words of each channel that are kept from one sample to the next: the addresses from 0 on.
     words : int
@@ -121,7 +158,7 @@ class Program:
     instructions: tuple[Instruction, ...]
     locations: tuple[Location, ...]
     inputs: tuple[Location, ...]
-    output: Location
+    output: Result
     states: int
     words: int
     schedule: tuple[tuple[str, int, int], ...]
@@ -133,20 +170,23 @@ class Program:
         return self.words - 1
 
     @property
+    def nothing(self) -> Instruction:
+        """An instruction that changes nothing."""
+        return Instruction(Opcode.MULTIPLY, self.one)
+
+    @property
     def serial_cycles(self) -> int:
         """Clocks of all instructions, at most, if a multiplication takes one for each bit of its second factor."""
         return sum(map(self._serial_cycles, self.instructions))
 
     def _serial_cycles(self, instruction: Instruction) -> int:
-        if instruction.opcode is Opcode.PRODUCT:
+        if instruction.opcode in PRODUCTS:
             return self.digit_bits + 1
-        if instruction.opcode is not Opcode.MULTIPLY:
-            return 1
         value = instruction.constant
-        return value.bit_length() if value > 0 else (-value - 1).bit_length() + 1
+        return max(value.bit_length(), 1) if value >= 0 else (-value - 1).bit_length() + 1
 
     def padded(self, count: int) -> Program:
-        """Return the program with NOTHING put before it, so that it has `count` instructions.
+        """Return the program with instructions that change nothing put before it, so that it has `count` of them.
 
         Raises
         ------
@@ -159,7 +199,7 @@ class Program:
         waiting = [("waiting", 0, missing)] if missing else []
         return replace(
             self,
-            instructions=(*[Instruction(Opcode.NOTHING)] * missing, *self.instructions),
+            instructions=(*[self.nothing] * missing, *self.instructions),
             schedule=(*waiting, *((name, start + missing, count) for name, start, count in self.schedule)),
         )
 
@@ -198,27 +238,28 @@ class Program:
         code = 0
         outside = False
         acc = operand = 0
-        for opcode, address, constant in self.instructions:
-            if opcode is Opcode.TAKE:
-                words[address] = supply[constant]
-            elif opcode is Opcode.MULTIPLY:
-                acc += words[address] * constant
-            elif opcode is Opcode.OPERAND:
-                operand = words[address]
-            elif opcode is Opcode.PRODUCT:
-                acc += words[address] * operand
-            elif opcode is Opcode.STORE:
-                words[address], acc = acc % base, acc >> self.digit_bits
-            elif opcode is Opcode.DROP:
-                acc >>= self.digit_bits
-            elif opcode is Opcode.FINISH:
-                words[address], acc = (acc + base) % (2 * base) - base, 0
-            elif opcode is Opcode.GIVE:
-                code += words[address] << (self.digit_bits * constant)
-            elif opcode is Opcode.JUDGE:
-                outside, acc = outside or acc < 0, 0
-            if not (-limit <= acc < limit and -base <= words[address] < base):
+        for opcode, address, constant, target in self.instructions:
+            word = words[address]
+            acc += word * (operand if opcode in PRODUCTS else constant)
+            if opcode is not Opcode.TAKE and not -limit <= acc < limit:
                 raise OverflowError(f"the accumulator must stay within {self.accumulator_bits} bits, not {acc}")
+            if opcode is Opcode.TAKE:
+                words[target] = supply[constant]
+            elif opcode is Opcode.OPERAND:
+                operand = word
+            elif opcode is Opcode.MOVE:
+                words[target] = word
+            elif opcode in STORES:
+                words[target] = acc % base
+            elif opcode in FINISHES:
+                words[target] = (acc + base) % (2 * base) - base
+            elif opcode is Opcode.GIVE:
+                code += (acc if target == self.output.parts - 1 else acc % base) << (self.digit_bits * target)
+            elif opcode is Opcode.JUDGE:
+                outside = outside or acc < 0
+            acc = 0 if opcode in CLEARS else acc >> self.digit_bits if opcode in CARRIES else acc
+            if not -base <= words[target] < base:
+                raise OverflowError(f"a word must hold {self.digit_bits + 1} bits, not {words[target]}")
         return Sample(code, outside)
 
 

@@ -9,11 +9,12 @@ in place of numbers (`sosmith.gen.verifier.program.normal_form`)::
                       |    (program_states)                   ^
     core.sv ----> program ------------------------------------+
 
-1. At the start of a sample, the words of a state hold the digits of its DELAY node, and the last word holds 1.
+1. At the start of a sample, the words of a state hold the digits of its DELAY node, and the last word holds 1. A DELAY
+   node that no words hold is the floor of another one.
 2. Each value that the program stores must be that of a node: the same form, up to multiples of what the top digit
    drops. The certificate's range of that node then says that it fits its digits.
 3. At the end, the result must be the output of the graph before it is limited, and the words of each state must hold
-   the digits of what its DELAY node takes over.
+   the digits of what its DELAY node takes over. What a node takes over that is a floor must be that floor.
 
 By induction over the samples, the states are then those of the graph at every sample. The accumulator adds modulo its
 width; the proof shows that it fits whenever its upper bits are used. The ranges are those of the certificate, which
@@ -32,20 +33,21 @@ from typing import NamedTuple
 from sosmith.gen.verifier.certificate_file import Certificate
 from sosmith.gen.verifier.graph import RejectedError, require
 from sosmith.gen.verifier.program.fault import Contribution, Group, fault
-from sosmith.gen.verifier.program.graph_forms import Graph, joined
+from sosmith.gen.verifier.program.graph_forms import Graph, floored, joined
 from sosmith.gen.verifier.program.logic import Bit
 from sosmith.gen.verifier.program.normal_form import ONE, Form, Forms, constant, plus, scaled, times, valuation
 from sosmith.gen.verifier.program.run import one_bit_away, samples
 from sosmith.gen.verifier.program.states import find_states
 from sosmith.gen.verifier.program.text import NUMBER_BITS, Instruction, ProgramText, read_program
 
-HAZARD = 4
-"""Least number of instructions from one that stores a word to one that reads it: so deep is the pipeline."""
+STORED, MOVED = 4, 3
+"""Least number of instructions from one that writes a word to one that reads it: so deep is the pipeline.
+
+MOVE and TAKE write one pipeline stage before STORE and FINISH.
+"""
 
 _SAMPLES = 32
 """Samples for which a program is run on numbers, to find where it is wrong."""
-
-_READS = frozenset({"multiply", "operand", "product", "give"})
 
 
 @dataclass(frozen=True)
@@ -112,31 +114,36 @@ def check_program(
 
 
 def _check_order(program: ProgramText) -> None:
-    """Check what does not depend on values: TAKE comes first, digits lie next to each other, words are read in time."""
+    """Check what does not depend on values: TAKE comes first, words are read in time, the result comes last."""
     digits, taken = len(program.digits), 0
-    stored: dict[int, int] = {}
-    before: int | None = None
-    for number, (opcode, address, value) in enumerate(program.instructions):
+    readable: dict[int, tuple[int, int]] = {}
+    for number, instruction in enumerate(program.instructions):
+        opcode, address, value, target = instruction
         named = program.named(number)
-        if taken < digits and opcode != "nothing":
+        if taken < digits and opcode != "multiply":
             wanted = opcode == "take" and value % (1 << NUMBER_BITS) == taken
             require(wanted, f"{named} must take digit {taken} of the sample, which must be taken first")
             taken += 1
         else:
             require(opcode != "take", f"{named} must not take a digit of a sample that has been accepted")
-        if opcode in {"store", "finish"} and before is not None:
-            after = program.instructions[before].address + 1
-            require(address == after, f"{named} must store at address {after}, next to {program.named(before)}")
-        if opcode in {"store", "finish", "judge"}:
-            before = number if opcode == "store" else None
-        if opcode in _READS and address in stored:
-            apart = number - stored[address]
+        if instruction.reads and address in readable:
+            stored, distance = readable[address]
             require(
-                apart >= HAZARD,
-                f"{named} must read its word {HAZARD} or more instructions after it is stored, not {apart}",
+                number >= stored + distance,
+                f"{named} must read its word {distance} or more instructions after it is stored, not {number - stored}",
             )
-        if opcode in {"take", "store", "finish"}:
-            stored[address] = number
+        if instruction.is_early and number:
+            before = program.instructions[number - 1]
+            require(
+                not before.writes or before.is_early,
+                f"{named} must not write at the same clock as {program.named(number - 1)}",
+            )
+        if instruction.writes:
+            readable[target] = number, MOVED if instruction.is_early else STORED
+    last = len(program.instructions) - 1
+    end = program.instructions[last]
+    is_end = end.opcode == "give" and program.part(end.target) == len(program.results) - 1
+    require(is_end, f"{program.named(last)} must give the last part of the result")
 
 
 def _located(wrong: _Run, certificate: Certificate) -> RejectedError | None:
@@ -170,13 +177,13 @@ class _Word(NamedTuple):
 
 @dataclass
 class _Accumulator:
-    """``floor(total / 2**shift)``, in low..high; `columns` are the digits split off since it was 0."""
+    """``floor(total / 2**shift)``, in low..high; `begun` once a digit was split off that was not dropped."""
 
     total: Form = field(default_factory=dict)
     shift: int = 0
     low: int = 0
     high: int = 0
-    stored: list[int] = field(default_factory=list)
+    begun: bool = False
 
 
 class _Run:
@@ -186,14 +193,14 @@ class _Run:
         self.program, self.graph, self._certificate = program, graph, certificate
         self._bits = program.digit_bits
         self._forms = Forms()
-        self._of = graph.values(self._forms)
+        self.states, self._floors = find_states(program, graph, certificate)
+        self._of = graph.values(self._forms, self._floors)
         base = 1 << self._bits
         self._words = [
             _Word(self._forms.variable(("word", address), -base, base - 1), -base, base - 1)
             for address in range(program.words)
         ]
         self._words[-1] = _Word(constant(1), 1, 1)
-        self.states = find_states(program, graph, certificate)
         for state in self.states:
             low, high = graph.nodes[state.node].limits
             digits = self._digits(self._state(state.node, state.node, state.shift), state.digits)
@@ -205,7 +212,7 @@ class _Run:
         self._acc = _Accumulator()
         self._group = Group()
         self._operand = _Word(self._forms.variable("operand", -base, base - 1), -base, base - 1)
-        self._given: dict[int, tuple[_Word, int]] = {}
+        self._given: dict[int, tuple[Form, int]] = {}
         self._writers: dict[int, int] = {}
         self.values = 0
         self.judges: dict[int, int] = {}
@@ -255,25 +262,26 @@ class _Run:
     # Instructions.
 
     def _step(self, number: int, instruction: Instruction) -> None:
-        opcode, address, value = instruction
-        if opcode == "take":
-            self._take(number, address, value)
-        elif opcode == "multiply":
-            self._add(self._words[address], constant(value), (value, value))
-        elif opcode == "operand":
-            self._operand = self._words[address]
-        elif opcode == "product":
-            other = self._operand
-            self._add(self._words[address], other.form, (other.low, other.high))
-        elif opcode in {"store", "drop"}:
-            self._column(number, instruction)
-        elif opcode == "finish":
-            self._finish(number, address)
-        elif opcode == "judge":
+        _, address, value, target = instruction
+        word, end = self._words[address], instruction.end
+        if end == "take":
+            self._take(number, target, value)
+            return
+        if instruction.multiplies_words:
+            self._add(word, self._operand.form, (self._operand.low, self._operand.high))
+        elif value:
+            self._add(word, constant(value), (value, value))
+        if end == "operand":
+            self._operand = word
+        elif end == "move":
+            self._store(number, target, word)
+        elif end in {"store", "drop", "give"}:
+            self._column(number, end, target)
+        elif end == "finish":
+            self._finish(number, target)
+        elif end == "judge":
             self._judge(number)
-        elif opcode == "give":
-            self._give(number, address, value)
-        if opcode not in {"finish", "judge"}:
+        if end not in {"finish", "judge"}:
             self._group.instructions.append(number)
 
     def _take(self, number: int, address: int, value: int) -> None:
@@ -281,6 +289,7 @@ class _Run:
         low, high = self._forms.extent(form)
         base = 1 << self._bits
         self._store(number, address, _Word(form, max(int(low), -base), min(int(high), base - 1)))
+        self._acc = _Accumulator()
 
     def _taken(self, number: int, bits: Sequence[Bit]) -> Form:
         """Return a digit of an input as a form: zeros, then bits of its code in order, then zeros or its sign."""
@@ -333,15 +342,20 @@ class _Run:
             f"accumulator, not one in {acc.low}..{acc.high}",
         )
 
-    def _column(self, number: int, instruction: Instruction) -> None:
-        """Split the lowest digit off the accumulator, and store it unless it is dropped."""
+    def _column(self, number: int, end: str, target: int) -> None:
+        """Split the lowest digit off the accumulator: it is stored, given or dropped."""
         acc = self._acc
         self._fits(number)
-        if instruction.opcode == "store":
+        if end != "drop":
             self._begin()
             low, high = (self._forms.floor(scaled(acc.total, -acc.shift - k)) for k in (0, self._bits))
-            form = plus(low, high, -(1 << self._bits))
-            self._store_next(number, instruction.address, self._word(form, None, 0, 0))
+            part = self.program.part(target)
+            if end == "store":
+                self._store_next(number, target, self._word(plus(low, high, -(1 << self._bits)), None, 0, 0))
+            elif part == len(self.program.results) - 1:
+                self._given[part] = low, number
+            elif part is not None:
+                self._given[part] = plus(low, high, -(1 << self._bits)), number
         acc.shift += self._bits
         acc.low, acc.high = acc.low >> self._bits, acc.high >> self._bits
         self._group.ends.append(number)
@@ -349,11 +363,10 @@ class _Run:
     def _begin(self) -> None:
         """Take what is left after all digits that were dropped as the value that is stored from now on."""
         acc = self._acc
-        if not acc.stored:
-            acc.total, acc.shift = self._forms.floor(scaled(acc.total, -acc.shift)), 0
+        if not acc.begun:
+            acc.total, acc.shift, acc.begun = self._forms.floor(scaled(acc.total, -acc.shift)), 0, True
 
     def _store_next(self, number: int, address: int, word: _Word) -> None:
-        self._acc.stored.append(number)
         self._store(number, address, word)
 
     def _finish(self, number: int, address: int) -> None:
@@ -404,7 +417,7 @@ class _Run:
             code = scaled(self._of[node], self._frac(node))
             (monomial,) = code
             factor = total.get(monomial, 0)
-            if not factor or total.keys() - {monomial, ONE} or self._acc.stored:
+            if not factor or total.keys() - {monomial, ONE} or self._acc.begun:
                 continue
             low, high = self.judged[index]
             limit = Fraction(-free) / factor
@@ -417,20 +430,10 @@ class _Run:
             return
         require(False, f"{self.program.named(number)} must compare an input with a limit, not another value")
 
-    def _give(self, number: int, address: int, value: int) -> None:
-        digit = value % (1 << NUMBER_BITS)
-        if digit < self.program.results:
-            self._given[digit] = self._words[address], number
-
     # The end of the sample.
 
     def _finish_sample(self) -> None:
         """Check the result and the states once all instructions have run."""
-        last = len(self.program.instructions) - 1
-        require(
-            not self._group.contributions and not self._group.ends,
-            f"{self.program.named(last)} must be the end of a program that leaves 0 in the accumulator",
-        )
         self._check_result()
         for state in self.states:
             entry = self.graph.nodes[state.node].entry
@@ -440,6 +443,11 @@ class _Run:
                     state.address + k, digit, f"digit {k} of what {self.graph.nodes[state.node].label} takes over"
                 )
         self._check_word(self.program.words - 1, constant(1), "1")
+        for node, of in self._floors.items():
+            (source,), (larger,) = (self.graph.nodes[n].entry.operands for n in (node, of))
+            wanted = floored(self._of[larger], self._frac(node), self._forms)
+            label, other = self.graph.nodes[node].label, self.graph.nodes[of].label
+            require(self._of[source] == wanted, f"the program must keep {label}, which is not the floor of {other}")
 
     def _check_word(self, address: int, wanted: Form, what: str) -> None:
         word = self._words[address]
@@ -451,13 +459,17 @@ class _Run:
         require(False, f"{who} must leave {what} in word {address}, not another value")
 
     def _check_result(self) -> None:
-        wanted = self._of[self.graph.output]
-        count = self.program.results
-        label = self.graph.nodes[self.graph.output].label
-        for k in range(count):
-            require(k in self._given, f"the program must give digit {k} of its result, {label}")
-        for k, digit in enumerate(self._digits(wanted, count)):
-            word, number = self._given[k]
-            require(
-                word.form == digit, f"{self.program.named(number)} must give digit {k} of {label}, not another value"
-            )
+        node = self.graph.output
+        label = self.graph.nodes[node].label
+        wanted = scaled(self._of[node], self._frac(node))
+        parts = self.program.results
+        bits = self._bits * (len(parts) - 1) + parts[-1]
+        low, high = self.graph.nodes[node].entry.low, self.graph.nodes[node].entry.high
+        require(
+            -1 << (bits - 1) <= low and high < 1 << (bits - 1),
+            f"the result must have room for {label}, in {low}..{high}, not {bits} bits",
+        )
+        for k, digit in enumerate(self._digits(wanted, len(parts))):
+            require(k in self._given, f"the program must give part {k} of its result, {label}")
+            form, number = self._given[k]
+            require(form == digit, f"{self.program.named(number)} must give part {k} of {label}, not another value")

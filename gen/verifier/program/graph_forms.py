@@ -6,13 +6,16 @@ The stages are joined, the inputs of each being the outputs of the one before. A
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from types import MappingProxyType
 
 from sosmith.gen.verifier.certificate_file import Certificate, NodeEntry, Operation
 from sosmith.gen.verifier.graph import label, require
 from sosmith.gen.verifier.program.normal_form import Form, Forms, constant, plus, scaled, times
+
+NO_FLOORS: Mapping[int, int] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
@@ -58,13 +61,23 @@ class Graph:
     delays: tuple[int, ...]
     output: int
 
-    def values(self, forms: Forms) -> list[Form]:
-        """Return the value of each node as a form of the variables ``("node", index)``: inputs and delays."""
+    def values(self, forms: Forms, floors: Mapping[int, int] = NO_FLOORS) -> list[Form]:
+        """Return the value of each node as a form of the variables ``("node", index)``: inputs and delays.
+
+        A delay in `floors` has no variable: it is the floor of another one, to its own fraction bits.
+        """
+
+        def variable(index: int) -> Form:
+            entry = self.nodes[index].entry
+            if index in floors:
+                return floored(variable(floors[index]), entry.frac, forms)
+            return scaled(forms.variable(("node", index), entry.low, entry.high), -entry.frac)
+
         values: list[Form] = []
         for index, node in enumerate(self.nodes):
             entry = node.entry
             if entry.op in {Operation.INPUT, Operation.DELAY}:
-                values.append(scaled(forms.variable(("node", index), entry.low, entry.high), -entry.frac))
+                values.append(variable(index))
             else:
                 values.append(_value(entry, [values[i] for i in entry.operands], forms))
         return values
@@ -126,10 +139,12 @@ def joined(certificate: Certificate) -> Graph:
     return Graph(tuple(nodes), tuple(inputs), delays, output)
 
 
-def _value(entry: NodeEntry, operands: Sequence[Form], forms: Forms) -> Form:
-    def cut(form: Form, kept: int) -> Form:
-        return scaled(forms.floor(scaled(form, kept)), -kept)
+def floored(form: Form, kept: int, forms: Forms) -> Form:
+    """Return the floor of a form to `kept` fraction bits."""
+    return scaled(forms.floor(scaled(form, kept)), -kept)
 
+
+def _value(entry: NodeEntry, operands: Sequence[Form], forms: Forms) -> Form:
     if entry.op is Operation.CONSTANT:
         return constant(entry.parameter * Fraction(2) ** -entry.frac)
     if entry.op in {Operation.ADD, Operation.SUBTRACT}:
@@ -143,9 +158,9 @@ def _value(entry: NodeEntry, operands: Sequence[Form], forms: Forms) -> Form:
     if entry.op is Operation.SCALE:
         return times(of, constant(entry.parameter * Fraction(2) ** -entry.parameter_frac))
     if entry.op is Operation.FLOOR:
-        return cut(of, entry.frac)
+        return floored(of, entry.frac, forms)
     if entry.op is Operation.FRACTION:
-        return plus(of, cut(of, entry.parameter), -1)
+        return plus(of, floored(of, entry.parameter, forms), -1)
     return of  # BOUND
 
 

@@ -10,8 +10,9 @@ Sums, products and multiples stay forms. A floor has a form of its own once ever
 
     floor(5/2 x + 3/2 y - 1) = 2 x + y - 1 + floor(1/2 x + 1/2 y)
 
-so that what is left within a floor has coefficients in [0, 1). A floor that is constant over the ranges of its atoms is
-that constant. Everything holds over the integers, of any size.
+so that what is left within a floor has coefficients in [0, 1). Of a floor within a floor only the outer one is left,
+``floor((m + floor(r)) / n) = floor((m + r) / n)`` with integers m and n. A floor that is constant over the ranges of
+its atoms is that constant. Everything holds over the integers, of any size.
 
 >>> forms = Forms()
 >>> x = forms.variable("x", 0, 255)
@@ -25,6 +26,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Mapping
 from fractions import Fraction
+from math import lcm
 
 Monomial = tuple[int, ...]
 """Numbers of its atoms, in rising order."""
@@ -77,6 +79,7 @@ class Forms:
     def __init__(self) -> None:
         self._numbers: dict[Hashable, int] = {}
         self._ranges: list[tuple[int, int]] = []
+        self._within: dict[int, Form] = {}
 
     def variable(self, name: Hashable, low: int, high: int) -> Form:
         """Return the integer variable `name`, which lies in low..high."""
@@ -92,10 +95,29 @@ class Forms:
                 whole[monomial] = below
             if coefficient != below:
                 rest[monomial] = coefficient - below
+        nested = self._nested(rest)
+        if nested is not None:
+            return plus(whole, self.floor(nested))
         low, high = (end.__floor__() for end in self.extent(rest))
         if low == high:
             return plus(whole, constant(low))
-        return plus(whole, self._atom(("floor", frozenset(rest.items())), low, high))
+        atom = self._atom(("floor", frozenset(rest.items())), low, high)
+        ((number,),) = atom
+        self._within[number] = rest
+        return plus(whole, atom)
+
+    def _nested(self, rest: Form) -> Form | None:
+        """Return ``(m + r) / n`` for ``(m + floor(r)) / n``; None if there is not just one such floor."""
+        n = lcm(*(Fraction(coefficient).denominator for coefficient in rest.values()))
+        found = [
+            monomial
+            for monomial, coefficient in rest.items()
+            if len(monomial) == 1 and monomial[0] in self._within and coefficient == Fraction(1, n)
+        ]
+        if len(found) != 1 or n == 1:
+            return None
+        ((atom,),) = found
+        return plus(plus(rest, {(atom,): Fraction(-1, n)}), self._within[atom], Fraction(1, n))
 
     def extent(self, form: Form) -> tuple[int | Fraction, int | Fraction]:
         """Return limits of a form: those of its monomials, added up."""

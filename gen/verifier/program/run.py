@@ -68,7 +68,7 @@ class Machine:
         for variant, (number, code) in enumerate(self.changes):
             changed.setdefault(number, []).append((variant, code))
         digits = self._digits(codes)
-        state = np.zeros((2 + program.results, count), np.int64)
+        state = np.zeros((2 + len(program.results), count), np.int64)
         for number, instruction in enumerate(program.instructions):
             others = changed.get(number, ())
             which = [variant for variant, _ in others]
@@ -79,11 +79,9 @@ class Machine:
                 for at, (_, code) in enumerate(others):
                     self._execute(program.decoded(code), words[:, at : at + 1], own[:, at : at + 1], digits)
                 self.words[:, which], state[:, which] = words, own
-        bits = program.digit_bits
-        *low, top = state[2:]
-        total: _Integers = top << (bits * len(low))
-        for k, digit in enumerate(low):
-            total = total + ((digit & ((1 << bits) - 1)) << (bits * k))
+        total = np.zeros(count, np.int64)
+        for k, part in enumerate(state[2:]):
+            total += part << (program.digit_bits * k)
         return total
 
     def _digits(self, codes: Sequence[int]) -> list[int]:
@@ -101,28 +99,32 @@ class Machine:
 
     def _execute(self, instruction: Instruction, words: _Integers, state: _Integers, digits: Sequence[int]) -> None:
         """Run an instruction; rows of `state` are accumulator, operand, and the digits given."""
-        opcode, address, constant = instruction
-        bits, (acc, operand, *given) = self._program.digit_bits, state
-        if opcode == "take":
-            words[address] = digits[min(constant % (1 << NUMBER_BITS), len(digits) - 1)]
-        elif opcode == "multiply":
-            acc += words[address] * constant
-        elif opcode == "operand":
-            operand[:] = words[address]
-        elif opcode == "product":
-            acc += words[address] * operand
-        elif opcode == "store":
-            words[address] = acc & ((1 << bits) - 1)
+        _, address, constant, target = instruction
+        program, end, (acc, operand, *given) = self._program, instruction.end, state
+        bits, word = program.digit_bits, words[address].copy()
+        acc += word * (operand if instruction.multiplies_words else constant)
+        if end == "take":
+            words[target] = digits[min(constant % (1 << NUMBER_BITS), len(digits) - 1)]
+        elif end == "operand":
+            operand[:] = word
+        elif end == "move":
+            words[target] = word
+        elif end == "store":
+            words[target] = acc & ((1 << bits) - 1)
+        elif end == "finish":
+            words[target] = _signed(acc, bits + 1)
+        elif end == "give" and (part := program.part(target)) is not None:
+            last = part == len(given) - 1
+            given[part][:] = _signed(acc, program.results[part]) if last else acc & ((1 << bits) - 1)
+        if end in {"store", "drop", "give"}:
             acc >>= bits
-        elif opcode == "drop":
-            acc >>= bits
-        elif opcode == "finish":
-            words[address] = ((acc + (1 << bits)) & ((2 << bits) - 1)) - (1 << bits)
+        elif end in {"finish", "judge", "take"}:
             acc[:] = 0
-        elif opcode == "judge":
-            acc[:] = 0
-        elif opcode == "give" and constant % (1 << NUMBER_BITS) < len(given):
-            given[constant % (1 << NUMBER_BITS)][:] = words[address]
+
+
+def _signed(value: _Integers, bits: int) -> _Integers:
+    """Return the lowest bits of a value as a signed number."""
+    return ((value + (1 << (bits - 1))) & ((1 << bits) - 1)) - (1 << (bits - 1))
 
 
 def one_bit_away(

@@ -1,16 +1,16 @@
 """Finds which words of a program hold which states of a graph, by running both on the same samples.
 
-A value is written digit by digit: STORE .. STORE FINISH, at addresses that follow each other. The words that are read
-before they are written are states, and the instructions that write a state last say which words belong together. Which
-state it is, and with how many additional fraction bits, is then read off the numbers of a run: at every sample, the
-words hold the state times the same power of two.
+Which state is in which words, and with how many additional fraction bits, is read off the numbers of a run: at every
+sample, the words hold the state times the same power of two. States come first in the memory. A state that no words
+hold is the floor of another one: a program keeps y(n-1) of a section with all its fraction bits, and reads x(n-1) of
+the next section there.
 
 This is a guess, which the checker proves: see `sosmith.gen.verifier.program.check`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -20,7 +20,7 @@ from sosmith.gen.verifier.program.run import Machine, samples
 from sosmith.gen.verifier.program.text import ProgramText
 
 _SAMPLES = 32
-_READS = frozenset({"multiply", "operand", "product", "give"})
+_MOST_DIGITS = 8
 
 
 @dataclass(frozen=True)
@@ -43,63 +43,69 @@ class State:
     shift: int
 
 
-def find_states(program: ProgramText, graph: Graph, certificate: Certificate) -> list[State]:
-    """Guess where a program keeps the states of a graph; in the order of the addresses."""
-    blocks = _blocks(program)
-    held: dict[tuple[int, int], list[int]] = {block: [] for block in blocks}
+def find_states(program: ProgramText, graph: Graph, certificate: Certificate) -> tuple[list[State], dict[int, int]]:
+    """Guess where a program keeps the states of a graph.
+
+    Returns
+    -------
+    list of State, dict of int to int
+        States in words, in the order of their addresses; and each state that is the floor of one of them.
+    """
+    words: list[list[int]] = []
     states = dict.fromkeys(graph.delays, 0)
     series: dict[int, list[int]] = {node: [] for node in graph.delays}
     machine = Machine(program, certificate)
     for codes in samples(certificate, _SAMPLES):
-        words: list[int] = machine.words[:, 0].tolist()
-        for (address, count), past in held.items():
-            past.append(sum(words[address + k] << (program.digit_bits * k) for k in range(count)))
+        words.append(machine.words[:, 0].tolist())
         for node, past in series.items():
             past.append(states[node])
         graph.step(codes, states)
         machine.step(codes)
-    return _matched(held, series)
-
-
-def _blocks(program: ProgramText) -> list[tuple[int, int]]:
-    """Return address and number of words of what is kept from one sample to the next."""
-    written: set[int] = set()
-    kept: set[int] = set()
-    values: dict[int, tuple[int, int]] = {}
-    first = count = 0
-    for opcode, address, _ in program.instructions:
-        if opcode in _READS and address not in written:
-            kept.add(address)
-        if opcode in {"take", "store", "finish"}:
-            written.add(address)
-        if opcode in {"store", "finish"}:
-            first, count = (first, count + 1) if count else (address, 1)
-        if opcode == "finish" and first + count <= program.words:
-            values |= dict.fromkeys(range(first, first + count), (first, count))
-        if opcode in {"finish", "judge"}:
-            count = 0
-    return sorted({values[address] for address in kept if address in values})
-
-
-def _matched(held: dict[tuple[int, int], list[int]], series: dict[int, list[int]]) -> list[State]:
-    """Match words with states: first where all samples agree, then what is left in order, for the message to come."""
-    left = dict(series)
     found: list[State] = []
-    apart: list[tuple[int, int]] = []
-    for block, past in held.items():
-        for node, codes in left.items():
-            shift = _shift(past, codes)
-            if shift is not None:
-                found.append(State(node, *block, shift))
-                del left[node]
+    floors: dict[int, int] = {}
+    address = 0
+    while True:
+        held = {state.node for state in found}
+        floors = _floors(graph, series, held)
+        left = [node for node in series if node not in held and node not in floors]
+        tried = (_matched(program, graph, words, address, node, series[node]) for node in left)
+        state = next((state for state in tried if state is not None), None)
+        if state is None:
+            break
+        found.append(state)
+        address += state.digits
+    free = sorted({*range(program.words - 1)} - {s.address + k for s in found for k in range(s.digits)})
+    found += [State(node, at, 1, 0) for node, at in zip(left, free, strict=False)]
+    return sorted(found, key=lambda state: state.address), floors
+
+
+def _matched(
+    program: ProgramText, graph: Graph, words: Sequence[Sequence[int]], address: int, node: int, codes: list[int]
+) -> State | None:
+    """Match a state with as many words, from an address on, as its range needs."""
+    bits, entry = program.digit_bits, graph.nodes[node].entry
+    for count in range(1, min(_MOST_DIGITS, program.words - 1 - address) + 1):
+        past = [sum(row[address + k] << (bits * k) for k in range(count)) for row in words]
+        shift = _shift(past, codes)
+        if (
+            shift is not None
+            and -1 << (bits * count) <= entry.low << shift
+            and entry.high << shift < 1 << (bits * count)
+        ):
+            return State(node, address, count, shift)
+    return None
+
+
+def _floors(graph: Graph, series: Mapping[int, list[int]], held: set[int]) -> dict[int, int]:
+    """Find the states that are the floor of one of those in words, at every sample."""
+    floors = {}
+    for node in series.keys() - held:
+        for other in sorted(held):
+            shift = graph.nodes[other].entry.frac - graph.nodes[node].entry.frac
+            if shift >= 0 and all(b >> shift == a for a, b in zip(series[node], series[other], strict=True)):
+                floors[node] = other
                 break
-        else:
-            apart.append(block)
-    for block, (node, codes) in zip(apart, left.items(), strict=False):
-        past = held[block]
-        shift = min(range(40), key=lambda shift: sum(abs(a - (b << shift)) for a, b in zip(past, codes, strict=True)))
-        found.append(State(node, *block, shift))
-    return sorted(found, key=lambda state: state.address)
+    return floors
 
 
 def _shift(past: Sequence[int], codes: Sequence[int]) -> int | None:

@@ -2,14 +2,14 @@ r"""Reads the program of a folded or serial core from its SystemVerilog.
 
 ::
 
-    reg [n-1:0] \program [count-1:0];  instruction    n-1          a+4   a+3        4   3      0
-    reg [..] words0 [depth-1:0];       word, cut into +-----------------+--------------+--------+
-    reg [..] words8 [depth-1:0];       slices         |    constant     |   address    | opcode |
-    reg [..] total;                    accumulator    +-----------------+--------------+--------+
-    reg [..] given0, given1, ..        result          signed, as wide    a bits        see OPCODES
+    reg [n-1:0] \program [count-1:0];  instruction    n-1       2a+4   2a+3   a+4   a+3     4   3      0
+    reg [..] words0 [depth-1:0];       word, cut into +--------------+------------+-----------+--------+
+    reg [..] words8 [depth-1:0];       slices         |   constant   |   target   |  address  | opcode |
+    reg [..] total;                    accumulator    +--------------+------------+-----------+--------+
+    reg [..] given0, given1, ..        result          signed, as wide  a bits       a bits    see OPCODES
                                                        as a word
 
-A word has ``digit_bits + 1`` bits, the sum of the slices' widths; a is what is left of an instruction. A channel has
+A word has ``digit_bits + 1`` bits, the sum of the slices' widths; 2a is what is left of an instruction. A channel has
 ``2**a`` words. What a TAKE stores is found by evaluating the logic before the words' write port for its instruction,
 with the bits of `s_axis_tdata` as unknowns.
 """
@@ -17,7 +17,7 @@ with the bits of `s_axis_tdata` as unknowns.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import takewhile
@@ -26,7 +26,21 @@ from typing import NamedTuple
 from sosmith.gen.verifier.graph import require
 from sosmith.gen.verifier.program.logic import Bit, Logic
 
-OPCODES = ("nothing", "take", "multiply", "operand", "product", "store", "drop", "finish", "give", "judge")
+OPCODES = (
+    "multiply",
+    "store",
+    "drop",
+    "finish",
+    "give",
+    "judge",
+    "move",
+    "operand",
+    "product",
+    "product_store",
+    "product_drop",
+    "product_finish",
+    "take",
+)
 """Opcodes by their codes."""
 
 _OPCODE_BITS = 4
@@ -40,9 +54,37 @@ class Instruction(NamedTuple):
     opcode: str
     address: int
     constant: int
+    target: int
+
+    @property
+    def end(self) -> str:
+        """What it does after its multiplication, as an opcode."""
+        return self.opcode.removeprefix("product_")
+
+    @property
+    def reads(self) -> bool:
+        """Whether its word counts: not if it is multiplied by 0."""
+        return self.opcode != "take" and (
+            self.constant != 0 or self.multiplies_words or self.opcode in {"move", "operand"}
+        )
+
+    @property
+    def writes(self) -> bool:
+        """Whether it writes a word."""
+        return self.end in {"store", "finish", "move", "take"}
+
+    @property
+    def is_early(self) -> bool:
+        """Whether it writes at the clock of the instruction before."""
+        return self.opcode in {"move", "take"}
+
+    @property
+    def multiplies_words(self) -> bool:
+        """Whether it multiplies by the operand register."""
+        return self.opcode.startswith("product")
 
     def __str__(self) -> str:
-        return f"{self.opcode}, address {self.address}, constant {self.constant}"
+        return f"{self.opcode}, address {self.address}, constant {self.constant}, target {self.target}"
 
 
 @dataclass(frozen=True)
@@ -61,8 +103,8 @@ class ProgramText:
         Words of a channel, and number of channels.
     accumulator_bits : int
         Width of the accumulator.
-    results : int
-        Number of digits of the result.
+    results : tuple of int
+        Width of each part of the result, the lowest first.
     digits : tuple of list of Bit
         What TAKE stores for each digit number: the bits of the word, the lowest first. Higher numbers are as the last.
     """
@@ -73,7 +115,7 @@ class ProgramText:
     words: int
     channels: int
     accumulator_bits: int
-    results: int
+    results: tuple[int, ...]
     digits: tuple[list[Bit], ...]
 
     @cached_property
@@ -82,15 +124,23 @@ class ProgramText:
         return tuple(map(self.decoded, self.codes))
 
     def decoded(self, code: int) -> Instruction:
-        """Decode an instruction; an opcode that does not exist does nothing."""
+        """Decode an instruction; an opcode that does not exist multiplies."""
         opcode = code % (1 << _OPCODE_BITS)
-        address = code >> _OPCODE_BITS & (self.words - 1)
+        bits = self.words.bit_length() - 1
+        address, target = (code >> start & (self.words - 1) for start in (_OPCODE_BITS, _OPCODE_BITS + bits))
         value = code >> (self.code_bits - self.digit_bits - 1)
         return Instruction(
             OPCODES[opcode] if opcode < len(OPCODES) else OPCODES[0],
             address,
             value - (value >> self.digit_bits << (self.digit_bits + 1)),
+            target,
         )
+
+    def part(self, target: int) -> int | None:
+        """Return the part of the result that GIVE writes; None if there is no such part."""
+        if len(self.results) == 1:
+            return 0
+        return target if target < len(self.results) else None
 
     def named(self, number: int) -> str:
         """Name of an instruction, for messages."""
@@ -114,11 +164,11 @@ def read_program(text: str) -> ProgramText:
     widths = {name.lstrip("\\"): width for name, width in widths.items()}
     require(bool(slices) and "total" in widths, "the core must have words and an accumulator beside its program")
     word_bits = sum(width for _, _, width in slices)
-    address_bits = code_bits - _OPCODE_BITS - word_bits
+    address_bits, odd = divmod(code_bits - _OPCODE_BITS - word_bits, 2)
     depth, words = len(slices[0][1]), 1 << max(address_bits, 0)
     require(
-        address_bits > 0 and depth % words == 0 and all(len(held) == depth for _, held, _ in slices),
-        f"an instruction must have an opcode, an address and a constant as wide as a word, not {code_bits} bits "
+        address_bits > 0 and not odd and depth % words == 0 and all(len(held) == depth for _, held, _ in slices),
+        f"an instruction must have an opcode, two addresses and a constant as wide as a word, not {code_bits} bits "
         f"for {depth} words of {word_bits} bits",
     )
     for address in range(depth):
@@ -135,8 +185,8 @@ def read_program(text: str) -> ProgramText:
         words=words,
         channels=depth // words,
         accumulator_bits=widths["total"],
-        results=sum(re.fullmatch(r"given\d+", name) is not None for name in widths),
-        digits=_digits(text, widths, slices, _OPCODE_BITS + address_bits),
+        results=tuple(widths[name] for name in sorted(widths, key=_number_of) if re.fullmatch(r"given\d+", name)),
+        digits=_digits(text, widths, word_bits, _OPCODE_BITS + 2 * address_bits),
     )
 
 
@@ -171,25 +221,41 @@ def _number(token: str) -> int:
     return int(found[1], 16) if found[1] else int(found[2] or found[3], 10 if found[2] else 2)
 
 
-def _digits(
-    text: str, registers: Mapping[str, int], slices: Sequence[tuple[int, list[int], int]], shift: int
-) -> tuple[list[Bit], ...]:
-    """Return what a TAKE of each number stores.
+def _number_of(name: str) -> tuple[int, str]:
+    """Sort the registers of a family, whose names end in their numbers."""
+    return int(re.sub(r"\D", "", name) or 0), name
 
-    A register of one bit is 0: while words are cleared, one of them is 1.
+
+def _digits(text: str, registers: Mapping[str, int], word_bits: int, shift: int) -> tuple[list[Bit], ...]:
+    """Return what a TAKE of each number stores, directly or through the register `moved`.
+
+    A register of one bit is 0, unless it says that there is an instruction: while words are cleared, one of them is 1.
     """
     logic = Logic(text)
-    writes = [re.findall(rf"^ *words{low}\[.*?\] <= (.*);$", text, re.MULTILINE) for low, _, _ in slices]
-    require(all(len(write) == 1 for write in writes), "the words must have one write port")
+    slices = [int(low) for low in re.findall(r"^ *words(\d+)\[.*?\] <= ", text, re.MULTILINE)]
+    require(len(set(slices)) == len(slices), "the words must have one write port")
+    writes = [_written(text, rf"words{low}\[.*?\]") for low in sorted(slices)]
+    moved = _written(text, "moved") if "moved" in registers else ""
 
     def stored(number: int) -> list[Bit]:
         code = OPCODES.index("take") | number << shift
-        bound = {name: [0] for name, width in registers.items() if width == 1} | {
+        bound = {
+            name: [int(re.fullmatch(r"valid\d+", name) is not None)] for name, width in registers.items() if width == 1
+        }
+        bound |= {
             name: [code >> i & 1 for i in range(width)]
             for name, width in registers.items()
             if re.fullmatch(r"instruction\d+", name)
         }
-        return [bit for (write,) in writes for bit in logic.value(write, bound)]
+        bits = [bit for write in writes for bit in logic.value(write, bound)]
+        return logic.value(moved, bound) if moved and bits == [("moved", i) for i in range(word_bits)] else bits
 
     last = stored((1 << NUMBER_BITS) - 1)
     return (*takewhile(lambda digit: digit != last, map(stored, range(1 << NUMBER_BITS))), last)
+
+
+def _written(text: str, register: str) -> str:
+    """Return the expression that is written to a register or a memory, without its condition."""
+    found = re.findall(rf"^ *(?:if \(.*\) )?{register} <= (.*);$", text, re.MULTILINE)
+    require(len(found) == 1, f"there must be one place where {register} is written, not {len(found)}")
+    return str(found[0])

@@ -133,7 +133,7 @@ def _print_schedule(console: Console, program: Program | None) -> None:
         f"Schedule: {len(program.instructions)} instructions for each sample of each channel",
         ["from", "clocks", "value", "words"],
     )
-    words = {at.name: f"{at.address}..{at.address + at.digits - 1}" for at in program.locations}
+    words = {at.name: ", ".join(map(str, at.addresses)) for at in program.locations}
     for name, start, count in program.schedule:
         table.add_row(str(start), str(count), escape(name), words.get(name, ""))
     console.print(table)
