@@ -2,27 +2,27 @@
 
 The unit is a pipeline that holds an instruction in each of its stages. Folded, with words of w = digit_bits + 1 bits::
 
-    stage 1               2                3                   4
+    stage 1           2                 3                4                   5
 
-    +---------+ address +-------+  w
-    | program |-------->| words |--+--> [data] ------------+
-    | memory  |         |       |  |                       v   2w
-    +---------+         |       |  |                       * -----> [product] --> + ---> added --+--> [total]
-      ^     |     +---->|       |  |                       ^                      ^              |       |
-      |     |     |     +-------+  +--> [operand] -------->+ PRODUCT              +--------------|-------+
-    counter |     |                |       w               |                                     |  accumulator_bits
-            |     |                |                       |                                     |
-            +-----|----------------|--- constant --------->+ else                                |
-                  |                |       w                                                     |
-                  +--- [moved] <---+ MOVE; TAKE: digit of s_axis_tdata                           |
-                  |                                                                              |
-                  +--- low digit (STORE), signed low digit (FINISH), w <-------------------------+
-                       [given0], .. (GIVE) ---> m_axis_tdata <-----------------------------------+
+    +---------+         address +-------+  w
+    | program |->[ ]--+-------->| words |--+--> [data] ------------+
+    | memory  |       |         |       |  |                       v   2w
+    +---------+       |         |       |  |                       * -----> [product] --> + ---> added --+--> [total]
+      ^               |    +--->|       |  |                       ^                      ^              |       |
+      |               |    |    +-------+  +--> [operand] -+-> [factor]                   +--------------|-------+
+    counter           |    |               |      PRODUCT  |       w                    accumulator_bits |
+                      +----|---------------|--- constant --+ else                                        |
+                      |    |               |       w                                                     |
+                      +--- [moved] <-------+ MOVE; TAKE: digit of s_axis_tdata                           |
+                           |                                                                             |
+                           +--- low digit (STORE), signed low digit (FINISH), w <------------------------+
+                                [given0], .. (GIVE) ---> m_axis_tdata <----------------------------------+
 
-An instruction in pipeline stage 1 has been read from the program memory and addresses the words, in 2 its word has been
-read, in 3 it is multiplied, and in 4 it is added up. What is added is stored, given or dropped at once, and `total` is
-what is left: shifted by a digit, or 0. A word is written three stages after it is read, with MOVE and TAKE two, so that
-an instruction must follow the one that writes its word by `STORED` or `MOVED` of `sosmith.model.dataflow.program`.
+An instruction in pipeline stage 1 has been read from the program memory, in 2 it addresses the words, in 3 its word has
+been read, in 4 it is multiplied, and in 5 it is added up. What is added is stored, given or dropped at once, and
+`total` is what is left: shifted by a digit, or 0. A word is written three stages after it is read, with MOVE and TAKE
+two, so that an instruction must follow the one that writes its word by `STORED` or `MOVED` of
+`sosmith.model.dataflow.program`.
 
 Serial has three pipeline stages and no multiplier block: the word is addressed in stage 1, in stage 2 it has been read
 and is moved, and in stage 3 shifts and additions multiply in the accumulator itself, one clock for each bit of the
@@ -40,16 +40,16 @@ work, one address a clock, at least one before each sample. What it corrects is 
       +-- counter, address of the instruction
 
 As an example, the program in `sosmith.model.dataflow.folding`, which computes ``y = floor(3 / 4 y1 + 4 x)`` with digits
-of 4 bits, for x = 7 and y1 = 28 = 12 + 16 * 1. The sample is found at edge 0; at the edges 4 to 8, pipeline stage 4
+of 4 bits, for x = 7 and y1 = 28 = 12 + 16 * 1. The sample is found at edge 0; at the edges 5 to 9, pipeline stage 5
 holds the instructions 0 to 4::
 
-    edge                    4       5       6       7       8
+    edge                    5       6       7       8       9
     instruction          take    drop  multiply  store  finish
     product                 0   12*12    1*12     7*4       0
     total before the edge   0       0       9      21       3
 
 The digits 49 mod 16 = 1 and 3 are stored: y = 1 + 16 * 3 = 49. The program has 9 instructions, so that `m_axis_tvalid`
-is high at edge 9 + 4 = 13.
+is high at edge 9 + 5 = 14.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ from sosmith.model.dataflow.program import (
 )
 from sosmith.model.reload.registers import ADDRESS_BITS
 
-_FOLDED_DEPTH, _SERIAL_DEPTH = 4, 3
+_FOLDED_DEPTH, _SERIAL_DEPTH = 5, 3
 """Pipeline stages from the program memory to the accumulator."""
 
 _NO_COLLISIONS = {"no_rw_check": 1}
@@ -197,8 +197,9 @@ class FoldedCore(wiring.Component):
         limits = self._hand_out(m, (advance, start, ends), (added, channel), pipeline, guard)
         taken = Signal()
         if guard is None:
-            last_digit = pipeline[-1].is_for(sum(location.digits for location in self.program.inputs) - 1)
-            m.d.sync += taken.eq(advance & pipeline[-1].valid & pipeline[-1].has(Opcode.TAKE) & last_digit)
+            reading = self._reading(pipeline)
+            last_digit = reading.is_for(sum(location.digits for location in self.program.inputs) - 1)
+            m.d.sync += taken.eq(advance & reading.valid & reading.has(Opcode.TAKE) & last_digit)
         else:
             m.d.sync += taken.eq(ends)
             self._restart(m, guard, (clearing, channel))
@@ -404,35 +405,57 @@ class FoldedCore(wiring.Component):
         self, m: Module, advance: Signal, pipeline: list[PipelinedInstruction], values: tuple[Signal, Signal]
     ) -> Value:
         """Multiply in the last pipeline stage but one, add up in the last; return the word that MOVE and TAKE write."""
-        *_, present, last = pipeline
+        reading, last = self._reading(pipeline), pipeline[-1]
         read, added = values
-        factor = Signal(signed(self._word))
-        total = Signal(signed(self.program.accumulator_bits))
-        m.d.comb += factor.eq(present.constant)
+        chosen = Signal(signed(self._word))
+        total = self._total(m, added, advance, last)
+        m.d.comb += chosen.eq(reading.constant)
         if self.fingerprint is not None or any(i.opcode is Opcode.OPERAND for i in self.program.instructions):
             operand = Signal(signed(self._word), reset_less=True)
-            with m.If(present.has(*PRODUCTS)):
-                m.d.comb += factor.eq(operand)
-            with m.If(advance & self._reading(pipeline).has(Opcode.OPERAND)):
+            with m.If(reading.has(*PRODUCTS)):
+                m.d.comb += chosen.eq(operand)
+            with m.If(advance & reading.has(Opcode.OPERAND)):
                 m.d.sync += operand.eq(read)
-        m.d.sync += total.eq(Mux(advance & last.has(*CARRIES), added >> self.program.digit_bits, added))
-        with m.If(~last.valid | (advance & last.has(*CLEARS))):
-            m.d.sync += total.eq(0)
         if self.serial:
-            self._multiply_serially(m, (total, added), (read, factor), advance, last)
-            return Mux(present.has(Opcode.TAKE), self._input_digit(present), read)
-        # Nothing else reads this register, so that it can be the one inside the multiplier block.
-        data = Signal(signed(self._word), reset_less=True)
+            self._multiply_serially(m, (total, added), (read, chosen), (advance, last.valid))
+            return self._moved(reading, read)
+        # Nothing else reads these registers, so that they can be those inside the multiplier block.
+        data, factor = (Signal(signed(self._word), name=name, reset_less=True) for name in ("data", "factor"))
         product = Signal(signed(2 * self._word), reset_less=True)
-        moved = Signal(self._word, reset_less=True)
-        reading = self._reading(pipeline)
+        moved = Signal(self._word)  # 0 from a reset on, when words are cleared
         m.d.comb += [advance.eq(1), added.eq(total + product)]
         m.d.sync += [
             data.eq(read),
+            factor.eq(chosen),
             product.eq(data * factor),
-            moved.eq(Mux(reading.has(Opcode.TAKE), self._input_digit(reading), read)),
+            moved.eq(self._moved(reading, read)),
         ]
         return moved
+
+    def _moved(self, instruction: PipelinedInstruction, read: Value) -> Value:
+        """Return the word that MOVE and TAKE write, and 0 for all others."""
+        word = Mux(instruction.has(Opcode.TAKE), self._input_digit(instruction), read)
+        return Mux(instruction.valid & instruction.has(*EARLY_WRITES), word, 0)
+
+    def _total(self, m: Module, added: Signal, advance: Signal, last: PipelinedInstruction) -> Value:
+        """Return what is left of the sum before the last instruction.
+
+        Its upper bits are kept as they were added up, and shifted by a digit a clock later: they are the last that the
+        carry chain reaches, and the sign would have far to go from there. Its lower bits are shifted at once, since
+        the carry chain begins with them.
+        """
+        bits = self.program.digit_bits
+        split = (bits + 1) // 2
+        low = Signal(split, name="total_low")
+        high = Signal(signed(len(added) - split), name="total_high")
+        carries, carried = Signal(), Signal(reset_less=True)
+        m.d.comb += carries.eq(advance & last.has(*CARRIES))
+        m.d.sync += [low.eq(Mux(carries, added >> bits, added)), high.eq(added >> split), carried.eq(carries)]
+        with m.If(~last.valid | (advance & last.has(*CLEARS))):
+            m.d.sync += [low.eq(0), high.eq(0)]
+        total = Signal(signed(len(added)))
+        m.d.comb += total.eq(Cat(low, Mux(carried, high >> bits, high)))
+        return total
 
     def _remember(
         self,
@@ -447,14 +470,17 @@ class FoldedCore(wiring.Component):
         Return whether a wrong bit was corrected at this clock, and whether one was found that could not be.
         """
         (advance, clearing), (counter, added, read, moved, channel) = control, values
-        first, present, last = pipeline[0], pipeline[-2], pipeline[-1]
+        addressing, present, last = pipeline[-3 if self.serial else -4], pipeline[-2], pipeline[-1]
         moves = present.valid & present.has(*EARLY_WRITES)
         stores = last.valid & last.has(*LATE_WRITES)
-        digit = Cat(added[: self._word - 1], added[self._word - 1] & last.has(*FINISHES))
-        address: Value = Cat(first.address, channel)
+        finishes = last.valid & last.has(*FINISHES)
+        address: Value = Cat(addressing.address, channel)
         target: Value = Mux(moves, present.target, last.target)
         where = Cat(Mux(clearing, counter[: address_bits(self.program)], target), channel)
-        what = Mux(clearing, self._is_one(counter), Mux(moves, moved, digit))
+        sign = self._word - 1
+        # One LUT4 for each bit, since the sum is late: nothing is moved while something is stored.
+        what = Cat(Mux(stores, added[:sign], moved[:sign]), Mux(finishes, added[sign], moved[sign]))
+        what = what | (clearing & self._is_one(counter))
         enable = clearing | (advance & (moves | stores))
         check = CheckBits(self._word, self.protect)
         looks: Value = advance & self._reading(pipeline).valid
@@ -554,24 +580,23 @@ class FoldedCore(wiring.Component):
     def _multiply_serially(
         self,
         m: Module,
-        sums: tuple[Signal, Signal],
+        sums: tuple[Value, Signal],
         factors: tuple[Value, Value],
-        advance: Signal,
-        last: PipelinedInstruction,
+        control: tuple[Signal, Value],
     ) -> None:
         """Add a product to `total`, one clock for each bit of the second factor, the lowest first, until none is left.
 
         What is left of a negative factor ends as -1, which takes one subtraction. The first factor is shifted up at
         each clock.
         """
-        total, added = sums
+        (total, added), (advance, multiplies) = sums, control
         shifted = Signal(signed(2 * self._word), reset_less=True)
         left = Signal(signed(self._word), reset_less=True)
         done = Signal()
         multiple = Mux(left[0], shifted, 0)
         m.d.comb += [
             done.eq((left == -1) | ~left[1:].any()),
-            advance.eq(~last.valid | done),
+            advance.eq(~multiplies | done),
             added.eq(Mux(left == -1, total - multiple, total + multiple)),
         ]
         m.d.sync += [shifted.eq(shifted << 1), left.eq(left >> 1)]

@@ -76,8 +76,8 @@ def test_a_sample_in_work_keeps_its_bank(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [
-        ("port.shadow_free.eq(~busy | (bank == port.bank))", "port.shadow_free.eq(1)"),
-        ("bank.eq(port.bank)", "bank.eq(~port.bank)"),
+        ("port.shadow_free.eq(~busy | (kept == port.bank))", "port.shadow_free.eq(1)"),
+        ("kept.eq(port.bank)", "kept.eq(~port.bank)"),
     ],
 )
 def test_a_core_that_mixes_banks_is_found_out(right: str, wrong: str, tmp_path: Path) -> None:

@@ -21,7 +21,7 @@ class SerialMultiplier(Component):
     """
 
     def __init__(self, module: ModuleType, digit_bits: int) -> None:
-        self.module, self.digit_bits = module, digit_bits
+        self.module = module
         self.word, self.total_bits = digit_bits + 1, 2 * digit_bits + 8
         super().__init__(
             {
@@ -40,9 +40,11 @@ class SerialMultiplier(Component):
         m = Module()
         with m.If(self.advance):
             m.d.sync += self.multiplies.eq(self.starts)
-        unit = SimpleNamespace(program=SimpleNamespace(digit_bits=self.digit_bits))
-        control = (self.advance, self.multiplies)
-        self.module.FoldedCore._multiply_serially(unit, m, self.total, (self.data, self.factor), control)
+        added = Signal(self.total.shape())
+        unit, control = SimpleNamespace(_word=self.word), (self.advance, self.multiplies)
+        self.module.FoldedCore._multiply_serially(unit, m, (self.total, added), (self.data, self.factor), control)
+        with m.If(self.multiplies):
+            m.d.sync += self.total.eq(added)
         with m.If(self.advance & self.clears):
             m.d.sync += self.total.eq(0)
         return m
@@ -122,7 +124,7 @@ def test_a_short_serial_multiplier_multiplies(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [
-        ("Mux(left == -1, total - shifted, total + shifted)", "total + shifted"),  # no subtraction
+        ("Mux(left == -1, total - multiple, total + multiple)", "total + multiple"),  # no subtraction
         ("(left == -1) | ~left[1:].any()", "~left[1:].any()"),  # no end for a negative factor
         ("(left == -1) | ~left[1:].any()", "(left == -1) | ~left[2:].any()"),  # an end too early
         ("shifted.eq(shifted << 1)", "shifted.eq(shifted)"),

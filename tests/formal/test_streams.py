@@ -233,7 +233,7 @@ def test_a_broken_core_is_found_out(right: str, wrong: str, tmp_path: Path) -> N
     [
         ("self.s_axis_tready.eq(taken | dropped)", "self.s_axis_tready.eq(1)"),  # taken while at work
         ("busy.eq(1)", "busy.eq(0)"),  # the next one begun before the result is taken
-        ("pipeline[-2].valid & ~pipeline[-3].valid", "pipeline[-2].valid"),  # handed out before it is complete
+        ("pipeline[-1].valid & ~pipeline[-2].valid", "pipeline[-1].valid"),  # handed out before it is complete
     ],
 )
 def test_a_broken_folded_core_is_found_out(right: str, wrong: str, serial: bool, tmp_path: Path) -> None:
@@ -244,7 +244,7 @@ def test_a_broken_folded_core_is_found_out(right: str, wrong: str, serial: bool,
 def test_a_latency_that_is_too_short_is_found_out(make: Callable[[], StreamRules], tmp_path: Path) -> None:
     rules = make()
     assert rules.patience is not None
-    rules.patience = rules.patience - 1 if make is core_rules else rules.patience // 2
+    rules.patience = rules.patience - 1 if make is core_rules else rules.patience // 3
     assert prove(rules, tmp_path) == "FAIL"
 
 

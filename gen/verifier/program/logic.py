@@ -192,11 +192,17 @@ def _not(bits: Sequence[Bit]) -> list[Bit]:
 
 
 def _any(bits: Sequence[Bit]) -> list[Bit]:
-    return [1 if 1 in bits else 0 if all(bit == 0 for bit in bits) else bits[0] if len(bits) == 1 else None]
+    return [1 if 1 in bits else _common(bits, 0)]
 
 
 def _all(bits: Sequence[Bit]) -> list[Bit]:
-    return [0 if 0 in bits else 1 if all(bit == 1 for bit in bits) else bits[0] if len(bits) == 1 else None]
+    return [0 if 0 in bits else _common(bits, 1)]
+
+
+def _common(bits: Sequence[Bit], neutral: int) -> Bit:
+    """Return the one bit that there is besides those that change nothing; unknown if there are several."""
+    others = {*bits} - {neutral}
+    return neutral if not others else others.pop() if len(others) == 1 else None
 
 
 def _bitwise(of: Callable[[Sequence[Bit]], list[Bit]]) -> Callable[[Sequence[Bit], Sequence[Bit]], list[Bit]]:
@@ -216,5 +222,5 @@ def _equal(a: Sequence[Bit], b: Sequence[Bit]) -> list[Bit]:
     return _all(same)
 
 
-_UNARY = {"~": _not, "|": _any, "&": _all}
+_UNARY = {"~": _not, "!": lambda bits: _not(_any(bits)), "|": _any, "&": _all}
 _BINARY = {"|": _bitwise(_any), "&": _bitwise(_all), "==": _equal}

@@ -5,7 +5,7 @@ r"""Reads the program of a folded or serial core from its SystemVerilog.
     reg [n-1:0] \program [count-1:0];  instruction    n-1       2a+4   2a+3   a+4   a+3     4   3      0
     reg [..] words0 [depth-1:0];       word, cut into +--------------+------------+-----------+--------+
     reg [..] words8 [depth-1:0];       slices         |   constant   |   target   |  address  | opcode |
-    reg [..] total;                    accumulator    +--------------+------------+-----------+--------+
+    reg [..] total_low, total_high;    accumulator    +--------------+------------+-----------+--------+
     reg [..] given0, given1, ..        result          signed, as wide  a bits       a bits    see OPCODES
                                                        as a word
 
@@ -17,7 +17,7 @@ with the bits of `s_axis_tdata` as unknowns.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import takewhile
@@ -162,7 +162,8 @@ def read_program(text: str) -> ProgramText:
     slices = sorted((int(name[5:]), *memory) for name, memory in memories.items() if re.fullmatch(r"words\d+", name))
     widths = {name: int(top or 0) + 1 for top, name in _REGISTER.findall(text)}
     widths = {name.lstrip("\\"): width for name, width in widths.items()}
-    require(bool(slices) and "total" in widths, "the core must have words and an accumulator beside its program")
+    accumulator = [widths[name] for name in ("total_low", "total_high") if name in widths]
+    require(bool(slices) and len(accumulator) == 2, "the core must have words and an accumulator beside its program")
     word_bits = sum(width for _, _, width in slices)
     address_bits, odd = divmod(code_bits - _OPCODE_BITS - word_bits, 2)
     depth, words = len(slices[0][1]), 1 << max(address_bits, 0)
@@ -184,7 +185,7 @@ def read_program(text: str) -> ProgramText:
         digit_bits=word_bits - 1,
         words=words,
         channels=depth // words,
-        accumulator_bits=widths["total"],
+        accumulator_bits=sum(accumulator),
         results=tuple(widths[name] for name in sorted(widths, key=_number_of) if re.fullmatch(r"given\d+", name)),
         digits=_digits(text, widths, word_bits, _OPCODE_BITS + 2 * address_bits),
     )
@@ -235,27 +236,43 @@ def _digits(text: str, registers: Mapping[str, int], word_bits: int, shift: int)
     slices = [int(low) for low in re.findall(r"^ *words(\d+)\[.*?\] <= ", text, re.MULTILINE)]
     require(len(set(slices)) == len(slices), "the words must have one write port")
     writes = [_written(text, rf"words{low}\[.*?\]") for low in sorted(slices)]
-    moved = _written(text, "moved") if "moved" in registers else ""
+    moved = _written(text, "moved") if "moved" in registers else None
 
     def stored(number: int) -> list[Bit]:
         code = OPCODES.index("take") | number << shift
         bound = {
             name: [int(re.fullmatch(r"valid\d+", name) is not None)] for name, width in registers.items() if width == 1
         }
+        bound["aresetn"] = [1]
         bound |= {
             name: [code >> i & 1 for i in range(width)]
             for name, width in registers.items()
             if re.fullmatch(r"instruction\d+", name)
         }
-        bits = [bit for write in writes for bit in logic.value(write, bound)]
-        return logic.value(moved, bound) if moved and bits == [("moved", i) for i in range(word_bits)] else bits
+        bits = [bit for write in writes for bit in write.bits(logic, bound)]
+        through = bits == [("moved", i) for i in range(word_bits)]
+        return moved.bits(logic, bound) if moved and through else bits
 
     last = stored((1 << NUMBER_BITS) - 1)
     return (*takewhile(lambda digit: digit != last, map(stored, range(1 << NUMBER_BITS))), last)
 
 
-def _written(text: str, register: str) -> str:
-    """Return the expression that is written to a register or a memory, without its condition."""
-    found = re.findall(rf"^ *(?:if \(.*\) )?{register} <= (.*);$", text, re.MULTILINE)
+class _Write(NamedTuple):
+    """What is written to a register or a memory: `value`, or with an `else`, `otherwise` unless `condition` holds."""
+
+    condition: str
+    value: str
+    otherwise: str
+
+    def bits(self, logic: Logic, bound: Mapping[str, Sequence[Bit]]) -> list[Bit]:
+        """Return the bits of it, with the given bits for some of the signals."""
+        is_other = self.otherwise and logic.value(self.condition, bound) == [0]
+        return logic.value(self.otherwise if is_other else self.value, bound)
+
+
+def _written(text: str, register: str) -> _Write:
+    """Return what is written to a register or a memory; the condition of a write without an `else` does not count."""
+    write = rf"^ *(?:if \((.*)\) )?{register} <= (.*);(?:\n *else {register} <= (.*);)?$"
+    found = re.findall(write, text, re.MULTILINE)
     require(len(found) == 1, f"there must be one place where {register} is written, not {len(found)}")
-    return str(found[0])
+    return _Write(*found[0])

@@ -300,7 +300,7 @@ def test_a_calibration_brings_its_range_along(tmp_path: Path) -> None:
     made = set_for(hardware, wanted)
     assert made.quantized.datapath.calibrated == ((13107, 52429), (0, 51200))
     assert made.program is not None
-    assert sum(opcode is Opcode.JUDGE for opcode, _, _ in made.program.instructions) == 3
+    assert sum(instruction.opcode is Opcode.JUDGE for instruction in made.program.instructions) == 3
     assert check_swap(hardware, own_set(hardware), made).samples > 0
 
 
