@@ -22,8 +22,7 @@ from sosmith.model.errors import ShortfallError
 from sosmith.model.reload.constants import with_room
 
 DIGIT_BITS = 15
-"""Width of a digit: signed 16-bit products fit one multiplier block of an iCE40 UltraPlus or an ECP5."""
-
+"""Width of a digit without a board: factors of 16 bits, a sign included, suit every multiplier block that is known."""
 
 SPARE_ACCUMULATOR_BITS = 2
 """Additional bits, beyond the needs of its own program, in hardware that can load other programs."""
@@ -52,6 +51,9 @@ class Architecture:
         Whether constants can be loaded at run time.
     protect : str
         One of `sosmith.model.dataflow.protection.PROTECTIONS`.
+    digit_bits : int
+        Width of a digit of the program, one bit less than a factor of the multiplier; less if an instruction must fit
+        a register to be loadable.
     """
 
     name: str
@@ -59,6 +61,7 @@ class Architecture:
     channels: int = 1
     reload: bool = False
     protect: str = "none"
+    digit_bits: int = DIGIT_BITS
 
     @cached_property
     def program(self) -> Program | None:
@@ -72,8 +75,8 @@ class Architecture:
         if self.name == "parallel":
             return None
         try:
-            made = program(self.datapath, DIGIT_BITS, spare_words=SPARE_WORDS * self.reload)
-            for digit_bits in range(DIGIT_BITS - 1, 0, -1):
+            made = program(self.datapath, self.digit_bits, spare_words=SPARE_WORDS * self.reload)
+            for digit_bits in range(self.digit_bits - 1, 0, -1):
                 if not self.reload or instruction_bits(made) <= BITS:  # one register holds an instruction
                     break
                 made = program(self.datapath, digit_bits, spare_words=SPARE_WORDS)
@@ -104,7 +107,8 @@ class Architecture:
         shape = (self.name, self.channels, self.datapath.inputs, self.datapath.output, stages)
         sizes = "None"
         if made is not None:
-            sizes = f"({made.locations}, {made.words}, {made.accumulator_bits}, {len(made.instructions)})"
+            count = len(made.instructions)
+            sizes = f"({made.digit_bits}, {made.locations}, {made.words}, {made.accumulator_bits}, {count})"
         # An unprotected core keeps the number that it had before there were protected ones.
         guarded = "" if self.protect == "none" else f", {self.protect!r}"
         return zlib.crc32(f"({shape!r}, {sizes}{guarded})".encode())
@@ -218,15 +222,23 @@ def candidates(wanted: str, board: Board | None) -> tuple[str, ...]:
     return ("folded", "parallel") if board is None or board.device.multipliers else ("serial", "folded", "parallel")
 
 
-def fitting(name: str, budget: Budget, datapath: Datapath) -> Architecture:
-    """Return the architecture `name` of `datapath`.
+def digit_bits_on(board: Board | None, name: str) -> int:
+    """Width of a digit in the architecture `name`: as wide as the multiplier block of the board takes it."""
+    if board is None or name != "folded" or not board.device.factor_bits:
+        return DIGIT_BITS
+    return board.device.factor_bits - 1
+
+
+def fitting(name: str, budget: Budget, datapath: Datapath, board: Board | None = None) -> Architecture:
+    """Return the architecture `name` of `datapath`, for a board if there is one.
 
     Raises
     ------
     ShortfallError
         If the datapath cannot be folded, or the architecture does not keep up.
     """
-    architecture = Architecture(name, datapath, budget.channels, budget.reload, budget.protect)
+    digit_bits = digit_bits_on(board, name)
+    architecture = Architecture(name, datapath, budget.channels, budget.reload, budget.protect, digit_bits)
     budget.check(architecture)
     return architecture
 

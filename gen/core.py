@@ -88,7 +88,8 @@ def design_core(
         Choose fraction bits and coefficients for this realization, then use `realization` with these widths; the
         error may then exceed the limit in the specification.
     board : Board or None
-        Target board; the automatic choice of an architecture considers its multipliers.
+        Target board; the automatic choice of an architecture considers its multipliers, and the folded architecture
+        has digits as wide as they take.
     progress : callable
         Called with the name of each step.
 
@@ -147,7 +148,7 @@ def design_core(
         """Architecture with the calibrated range, which costs a program instructions, and the limits of wear."""
         codes = () if fitted is None else calibrated_codes(datapath.inputs, fitted)
         wear = () if spec.wear is None else spec.wear.codes(spec.output)
-        return fitting(name, budget, replace(datapath, calibrated=codes, wear=wear))
+        return fitting(name, budget, replace(datapath, calibrated=codes, wear=wear), board)
 
     hardware = spec.hardware
     budget = Budget(

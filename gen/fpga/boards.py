@@ -32,7 +32,9 @@ class Device:
     logic_cells : int
         Number of LUT4, each with a flip-flop.
     multiplier : str or None
-        Cell type of the multiplier block, None if there is none: SB_MAC16 multiplies 16 x 16 bits, MULT18X18D 18 x 18.
+        Cell type of the multiplier block, SB_MAC16 or MULT18X18D; None if there is none.
+    factor_bits : int
+        Width of its factors, which may be signed; 0 if there is none.
     multipliers : int
         Number of multiplier blocks.
     block_ram : str
@@ -47,6 +49,7 @@ class Device:
     placer: str
     logic_cells: int
     multiplier: str | None
+    factor_bits: int
     multipliers: int
     block_ram: str
     block_rams: int
@@ -116,6 +119,7 @@ _UP5K = Device(
     placer="--up5k",
     logic_cells=5280,
     multiplier="SB_MAC16",
+    factor_bits=16,
     multipliers=8,
     block_ram="SB_RAM40_4K",
     block_rams=30,
@@ -127,6 +131,7 @@ _HX8K = Device(
     placer="--hx8k",
     logic_cells=7680,
     multiplier=None,
+    factor_bits=0,
     multipliers=0,
     block_ram="SB_RAM40_4K",
     block_rams=32,
@@ -139,6 +144,7 @@ _ECP5_25 = Device(
     placer="--25k",
     logic_cells=24288,
     multiplier="MULT18X18D",
+    factor_bits=18,
     multipliers=28,
     block_ram="DP16KD",
     block_rams=56,
@@ -156,6 +162,7 @@ _GW1NR_9C = Device(
     placer="GW1NR-LV9QN88PC6/I5",
     logic_cells=8640,
     multiplier=None,
+    factor_bits=0,
     multipliers=0,
     block_ram="SDPB",
     block_rams=26,

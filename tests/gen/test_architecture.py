@@ -15,6 +15,7 @@ from sosmith.gen.fpga.boards import find_board
 from sosmith.gen.output.core_facts import core_facts
 from sosmith.gen.output.manifest import manifest
 from sosmith.gen.specification.specification import load
+from sosmith.hdl.instruction import instruction_bits
 from sosmith.model.errors import ShortfallError
 
 
@@ -29,7 +30,7 @@ def test_one_unit_for_all(architecture: str) -> None:
     made = design_in(architecture)
     program = made.architecture.program
     assert program is not None
-    clocks = len(program.instructions) + 4 if architecture == "folded" else program.serial_cycles + 3
+    clocks = len(program.instructions) + 5 if architecture == "folded" else program.serial_cycles + 3
     tree = manifest(core_facts(made))
     assert tree["architecture"] == architecture
     assert tree["latency_cycles"] == clocks
@@ -59,6 +60,7 @@ def test_the_smallest_that_keeps_up_is_taken() -> None:
     [
         ("icestick", "serial", "icestick, whose iCE40 HX1K has no multipliers"),
         ("icebreaker", "folded", "icebreaker, whose iCE40 UP5K has 8 multipliers"),
+        ("ulx3s_25f", "folded", "ulx3s_25f, whose ECP5 LFE5U-25F has 28 multipliers"),
     ],
 )
 def test_the_board_s_multipliers_count(board: str, architecture: str, there: str) -> None:
@@ -67,6 +69,35 @@ def test_the_board_s_multipliers_count(board: str, architecture: str, there: str
     assert made.reasons["architecture"] == (
         f"{architecture}: the smallest that keeps up on {there}; takes {needed:,} of 120,000 clocks a sample"
     )
+
+
+@pytest.mark.parametrize(
+    ("architecture", "board", "digit_bits"),
+    [
+        ("folded", None, 15),
+        ("folded", "icebreaker", 15),
+        ("folded", "ulx3s_25f", 17),
+        ("folded", "tang_nano_9k", 15),
+        ("serial", "ulx3s_25f", 15),
+    ],
+)
+def test_digits_are_as_wide_as_the_multipliers_of_the_board(
+    architecture: str, board: str | None, digit_bits: int
+) -> None:
+    budget = Budget(clock=Fraction(10**8), sample_rate=Fraction(48_000))
+    made = fitting(architecture, budget, limiter(), None if board is None else find_board(board))
+    assert made.program is not None
+    assert made.program.digit_bits == digit_bits
+
+
+def test_an_instruction_that_can_be_loaded_fits_a_register() -> None:
+    datapath = example_design("flange_wear_locomotive.toml", realization="df1_ef2").datapath
+    made = Architecture("folded", datapath, reload=True, digit_bits=17).program
+    assert made is not None
+    assert (made.digit_bits, instruction_bits(made)) == (15, 32)
+    fixed = Architecture("folded", datapath, digit_bits=17).program
+    assert fixed is not None
+    assert (fixed.digit_bits, instruction_bits(fixed)) == (17, 34)
 
 
 def test_what_folding_cannot_keep_up_with_is_parallel() -> None:
@@ -91,7 +122,7 @@ def test_a_clock_that_nothing_keeps_up_with_is_refused() -> None:
         design_core(replace(spec, channels=60_000))
 
 
-@pytest.mark.parametrize(("architecture", "clock"), [("folded", 8_000_000), ("serial", 30_000_000)])
+@pytest.mark.parametrize(("architecture", "clock"), [("folded", 4_000_000), ("serial", 24_000_000)])
 def test_an_architecture_that_cannot_keep_up_says_what_it_could_do(architecture: str, clock: int) -> None:
     with pytest.raises(
         ShortfallError,
@@ -134,8 +165,13 @@ def test_a_realization_that_cannot_be_folded_is_refused() -> None:
 
 
 @pytest.mark.parametrize(
-    ("architecture", "expected"), [("parallel", 2141111839), ("folded", 2248281888), ("serial", 3874547459)]
+    ("architecture", "expected"), [("parallel", 2141111839), ("folded", 3170416528), ("serial", 2376647297)]
 )
 def test_cores_in_the_field_keep_their_fingerprint(architecture: str, expected: int) -> None:
     """A core compares this number with that of a set: it must not follow the names in this code."""
     assert Architecture(architecture, limiter(), reload=True).fingerprint == expected
+
+
+def test_digits_of_another_width_make_another_core() -> None:
+    found = {Architecture("folded", limiter(), reload=True, digit_bits=bits).fingerprint for bits in (14, 15, 17)}
+    assert len(found) == 3
