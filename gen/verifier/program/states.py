@@ -10,7 +10,7 @@ This is a guess, which the checker proves: see `sosmith.gen.verifier.program.che
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -21,6 +21,8 @@ from sosmith.gen.verifier.program.text import ProgramText
 
 _SAMPLES = 32
 _MOST_DIGITS = 8
+_NEARBY = Fraction(1, 16)
+"""Share of a state's largest value in the samples that a match may be away from it."""
 
 
 @dataclass(frozen=True)
@@ -70,6 +72,7 @@ def find_states(program: ProgramText, graph: Graph, certificate: Certificate) ->
         left = [node for node in series if node not in held and node not in floors]
         tried = (_matched(program, graph, words, address, node, series[node]) for node in left)
         state = next((state for state in tried if state is not None), None)
+        state = state or _nearest(program, graph, words, address, {node: series[node] for node in left})
         if state is None:
             break
         found.append(state)
@@ -83,17 +86,47 @@ def _matched(
     program: ProgramText, graph: Graph, words: Sequence[Sequence[int]], address: int, node: int, codes: list[int]
 ) -> State | None:
     """Match a state with as many words, from an address on, as its range needs."""
-    bits, entry = program.digit_bits, graph.nodes[node].entry
-    for count in range(1, min(_MOST_DIGITS, program.words - 1 - address) + 1):
-        past = [sum(row[address + k] << (bits * k) for k in range(count)) for row in words]
+    for count, past in _numbers(program, words, address):
         shift = _shift(past, codes)
-        if (
-            shift is not None
-            and -1 << (bits * count) <= entry.low << shift
-            and entry.high << shift < 1 << (bits * count)
-        ):
+        if shift is not None and _fits(program, graph, State(node, address, count, shift)):
             return State(node, address, count, shift)
     return None
+
+
+def _nearest(
+    program: ProgramText,
+    graph: Graph,
+    words: Sequence[Sequence[int]],
+    address: int,
+    series: Mapping[int, Sequence[int]],
+) -> State | None:
+    """Match the state that is nearest to what words hold, from an address on; None if there is none nearby.
+
+    A program that is wrong in a recursion by so little that its results are right is then rejected for what is wrong.
+    """
+    found: list[tuple[Fraction, State]] = []
+    for count, past in _numbers(program, words, address):
+        for node, codes in series.items():
+            size = max(map(abs, codes), default=0)
+            for shift in range(program.digit_bits * count if size else 0):
+                state = State(node, address, count, shift)
+                if _fits(program, graph, state):
+                    apart = max(abs(a - (b << shift)) for a, b in zip(past, codes, strict=True))
+                    found.append((Fraction(apart, size << shift), state))
+    share, state = min(found, key=lambda pair: pair[0], default=(_NEARBY, State(-1, 0, 0, 0)))
+    return state if share < _NEARBY else None
+
+
+def _numbers(program: ProgramText, words: Sequence[Sequence[int]], address: int) -> Iterator[tuple[int, list[int]]]:
+    """Yield what the words hold from an address on, for each number of digits: that number, and a number a sample."""
+    for count in range(1, min(_MOST_DIGITS, program.words - 1 - address) + 1):
+        yield count, [sum(row[address + k] << (program.digit_bits * k) for k in range(count)) for row in words]
+
+
+def _fits(program: ProgramText, graph: Graph, state: State) -> bool:
+    """Whether the digits of a state are enough for its range."""
+    entry, limit = graph.nodes[state.node].entry, 1 << (program.digit_bits * state.digits)
+    return -limit <= entry.low << state.shift and entry.high << state.shift < limit
 
 
 def _floors(graph: Graph, series: Mapping[int, list[int]], held: set[int]) -> dict[int, int]:

@@ -298,7 +298,7 @@ def test_a_hundred_edits() -> None:
     assert found["accepted"] + found["rejected"] == 100
     assert found["rejected"] > 30
     assert found["rejected for another instruction"] == 0
-    assert found["accepted: unused field"] > 20
+    assert found["accepted: unused field"] > 5
 
 
 @pytest.mark.slow
