@@ -164,6 +164,18 @@ def test_a_realization_that_cannot_be_folded_is_refused() -> None:
         fitting("folded", Budget(clock=Fraction(10**8), sample_rate=Fraction(48_000)), datapath)
 
 
+def test_what_the_instructions_are_there_for() -> None:
+    program = design_in("folded").architecture.program
+    assert program is not None
+    products = [i for i in program.instructions if i.constant and i.address != program.one]
+    powers = sum(abs(i.constant).bit_count() == 1 for i in products)
+    text = " ".join((EXAMPLES.parent / "docs" / "hardware.md").read_text(encoding="utf-8").split())
+    assert (
+        f"Of the {len(program.instructions)} instructions of audio_lowpass, {powers} multiply a word by a power of two "
+        f"and {len(products) - powers} by another constant"
+    ) in text
+
+
 @pytest.mark.parametrize(
     ("architecture", "expected"), [("parallel", 2141111839), ("folded", 3170416528), ("serial", 2376647297)]
 )
