@@ -25,7 +25,9 @@ BITS = 176
 
 _ERROR_BITS = 136  # an inverse is within 2**-136
 _BITS_PER_POLE = 24  # a pole at 1 - 2**-24 would ring beyond the longest response
-_LONGEST = 1 << 21  # samples
+LONGEST = 1 << 21
+"""Samples of the longest inverse."""
+
 _BLOCK = 256  # samples between checks of whether a response has decayed
 
 
@@ -71,17 +73,17 @@ def is_stable(denominator: fmpq_poly) -> bool:
     return bool(p)
 
 
-def inverse(denominator: fmpq_poly) -> Inverse:
+def inverse(denominator: fmpq_poly, longest: int = LONGEST) -> Inverse:
     """Invert a polynomial with the constant term 1 and coefficients in binary fractions.
 
     Raises
     ------
     UndecidedError
-        If the inverse does not decay within about two million samples, or a coefficient is not a binary fraction.
+        If the inverse does not decay within about `longest` samples, or a coefficient is not a binary fraction.
     """
     shift = _fraction_bits(denominator)
     bits = _ERROR_BITS + 64 + _BITS_PER_POLE * denominator.degree()
-    samples = fmpz_poly(_divided([int(c) for c in denominator.numer().coeffs()], shift, bits))
+    samples = fmpz_poly(_divided([int(c) for c in denominator.numer().coeffs()], shift, bits, longest))
     one = 1 << (shift + bits)
     residual = Fraction(int(sum(map(abs, (denominator.numer() * samples - one).coeffs()))), one)
     norm = Fraction(int(sum(map(abs, samples.coeffs()))), 1 << bits)
@@ -91,7 +93,7 @@ def inverse(denominator: fmpq_poly) -> Inverse:
     return Inverse(samples, bits, error)
 
 
-def _divided(numerators: list[int], shift: int, bits: int) -> list[int]:
+def _divided(numerators: list[int], shift: int, bits: int, longest: int) -> list[int]:
     """Divide 1 by a polynomial until the remainder is small enough; the proof does not depend on its accuracy."""
     weights = [-value for value in numerators[1:]]
     size = 1 + (sum(map(abs, weights)) >> shift)
@@ -100,8 +102,8 @@ def _divided(numerators: list[int], shift: int, bits: int) -> list[int]:
     line[:1] = result[: len(line)]
     norm = 1 << bits
     while max(map(abs, line), default=0) * len(line) * size * norm >> (2 * bits - _ERROR_BITS - 2):
-        if len(result) > _LONGEST:
-            raise UndecidedError(f"a response does not die away within {_LONGEST} samples")
+        if len(result) > longest:
+            raise UndecidedError(f"a response does not die away within {longest} samples")
         block = list(islice(_recursion(weights, shift, line), _BLOCK))
         norm += sum(map(abs, block))
         result += block

@@ -4,9 +4,10 @@
 2. The polynomial and the output rounding are followed symbolically (`sosmith.gen.verifier.polynomial`).
 3. The sections' transfer functions are computed as determinants, and the Schur-Cohn recursion decides stability. A
    section may have several inputs and outputs; the cascade has one of each.
-4. Impulse responses are enclosed by approximate inverses (`sosmith.gen.verifier.l1_response`). Every range that a
-   BOUND states must contain the proven range, and every claimed figure must equal the proven one, to the last unit of
-   the certificate's grid.
+4. Sums over impulse responses are enclosed by their exact residuals: sums of magnitudes by responses in pieces
+   (`sosmith.gen.verifier.piecewise`), short ones and running sums by approximate inverses
+   (`sosmith.gen.verifier.l1_response`). Every range that a BOUND states must contain the proven range, and every
+   claimed figure must equal the proven one, to the last unit of the certificate's grid.
 
 The ranges hold by induction. Unbounded integers obey the linear model exactly, with the quantizers' errors as further
 inputs. The limits from the linear model therefore hold at every sample, and signals with these ranges never overflow.
@@ -17,20 +18,25 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from itertools import accumulate, zip_longest
-from math import lcm
+from math import lcm, prod
 
 from flint import fmpq, fmpq_poly
 
 from sosmith.gen.verifier.certificate_file import Certificate, Operation, StageEntry, on_grid
 from sosmith.gen.verifier.graph import RejectedError, Transfer, check_graph, inputs_of, label, require
-from sosmith.gen.verifier.l1_response import BITS, Inverse, Response, UndecidedError, inverse, is_stable, response
+from sosmith.gen.verifier.l1_response import BITS, Inverse, UndecidedError, fraction, inverse, is_stable, response
+from sosmith.gen.verifier.piecewise import Pieces
 from sosmith.gen.verifier.polynomial import output_error, polynomial_error
 
 Progress = Callable[[str, int, int], None]
 """Callback for progress, called with the name of the step, the number of units done, and their total."""
 
 _ROLES = ("polynomial", "section", "output")
+
+_SHORT = 1 << 10
+"""Samples of an inverse that is faster than pieces."""
 
 
 @dataclass(frozen=True)
@@ -206,8 +212,8 @@ class _Drive:
     high: Fraction
 
 
-_Driven = tuple[Response, Fraction, Fraction]
-"""A response and the range of what drives it."""
+_Driven = tuple[fmpq_poly, Fraction, Fraction]
+"""Numerator of a response, and the range of what drives it."""
 
 
 class _Cascade:
@@ -215,7 +221,7 @@ class _Cascade:
 
     def __init__(self, certificate: Certificate, sections: Sequence[StageEntry], progress: Progress) -> None:
         self._models = [Transfer(section) for section in sections]
-        self._inverses: dict[tuple[int, int], Inverse] = {}
+        self._over: dict[str, _Denominator] = {}
         shape = (len(inputs_of(sections[0])), len(sections[-1].outputs))
         require(shape == (1, 1), f"the sections must have one input and one output in all, not {shape}")
         for section, model in zip(sections, self._models, strict=True):
@@ -223,7 +229,9 @@ class _Cascade:
         self._compare_gains(certificate)
         entry = self._models[0].sources[self._models[0].inputs[0]]
         exact = self._ideal(certificate)
-        self.peak_gain = on_grid(exact.gain)
+        ideal = self._over_all(exact[1])
+        gain = ideal.norm(exact[0])
+        self.peak_gain = on_grid(gain)
         self.ranges = 0
         drives = [_Drive(0, [fmpq_poly([1])], *entry)]
         for index, model in enumerate(self._models):
@@ -235,13 +243,17 @@ class _Cascade:
                     self.ranges += 1
             drives = self._at(index, model.stage.outputs, arrived)
         progress("sections", len(self._models), len(self._models))
-        made, *errors = (self._driven(drive, len(self._models) - 1) for drive in drives)
-        self.rounding = on_grid(_magnitude(errors))
-        deviation = _magnitude([(_difference(made[0], exact), *entry)])
+        last = len(self._models) - 1
+        made, *errors = (self._driven(drive, last) for drive in drives)
+        over = self._up_to(last)
+        self.rounding = on_grid(_magnitude(over, errors))
+        difference = made[0] * ideal.polynomial - exact[0] * over.polynomial
+        both = self._over_all(over.polynomial * ideal.polynomial)
+        deviation = _magnitude(both, [(difference, *entry)])
         self.coefficients = on_grid(deviation)
         # Both figures are rounded up: what that adds is room for another ideal filter.
         self.margin = min(
-            self.peak_gain - exact.gain,
+            self.peak_gain - gain,
             (self.coefficients - deviation) / max(Fraction(1), *(abs(end) for end in entry)),
         )
 
@@ -253,17 +265,18 @@ class _Cascade:
             f"gains must be given of {', '.join(names) or 'nothing'}, "
             f"not {', '.join(claim.section for claim in claims) or 'nothing'}",
         )
-        for index, (claim, model) in enumerate(zip(claims, self._models, strict=True)):
-            over = self._inverse(index, index)
+        for claim, model in zip(claims, self._models, strict=True):
+            over = self._over_all(model.denominator)
             gains = [
-                sum((response(model.numerator(entry, output), over).gain for entry in model.inputs), Fraction(0))
+                sum((over.norm(model.numerator(entry, output)) for entry in model.inputs), Fraction(0))
                 for output in model.stage.outputs
             ]
             _compare(f"peak_gain of {claim.section}", claim.peak_gain, on_grid(max(gains)))
-            recursion = response(fmpq_poly([1]), over)
-            _compare(f"recursion_gain of {claim.section}", claim.recursion_gain, on_grid(recursion.gain))
+            recursion = over.norm(fmpq_poly([1]))
+            _compare(f"recursion_gain of {claim.section}", claim.recursion_gain, on_grid(recursion))
 
-    def _ideal(self, certificate: Certificate) -> Response:
+    def _ideal(self, certificate: Certificate) -> tuple[fmpq_poly, fmpq_poly]:
+        """Numerator and denominator of the ideal filter."""
         numerator = denominator = fmpq_poly([1])
         for index, section in enumerate(certificate.ideal.sections):
             b, a = (
@@ -273,16 +286,15 @@ class _Cascade:
             require(section.denominator[0] == 1, f"the denominator of ideal section {index} must begin with 1")
             require(is_stable(a), f"ideal section {index} must have its poles inside the unit circle")
             numerator, denominator = numerator * b, denominator * a
-        return response(numerator, inverse(denominator))
+        return numerator, denominator
 
-    def _inverse(self, first: int, last: int) -> Inverse:
-        """Inverse of the denominators of the sections from `first` to `last`."""
-        if (first, last) not in self._inverses:
-            denominator = fmpq_poly([1])
-            for model in self._models[first : last + 1]:
-                denominator *= model.denominator
-            self._inverses[first, last] = inverse(denominator)
-        return self._inverses[first, last]
+    def _over_all(self, denominator: fmpq_poly) -> _Denominator:
+        """Return what is known over a denominator; the same for the same one."""
+        return self._over.setdefault(str(denominator.coeffs()), _Denominator(denominator))
+
+    def _up_to(self, last: int) -> _Denominator:
+        """Return what is known over the denominators of all sections up to `last`."""
+        return self._over_all(prod((m.denominator for m in self._models[: last + 1]), start=fmpq_poly([1])))
 
     def _at(self, index: int, nodes: Sequence[int], arrived: Sequence[_Drive]) -> list[_Drive]:
         """Everything that drives the given nodes: drives from earlier sections, then the section's own sources."""
@@ -298,15 +310,18 @@ class _Cascade:
         ]
 
     def _driven(self, drive: _Drive, last: int) -> _Driven:
+        """Response to a drive over the denominators of all sections up to `last`."""
         (numerator,) = drive.numerators
-        return response(numerator, self._inverse(drive.first, last)), drive.low, drive.high
+        before = prod((model.denominator for model in self._models[: drive.first]), start=fmpq_poly([1]))
+        return numerator * before, drive.low, drive.high
 
     def _check_bound(self, index: int, node: int, arrived: Sequence[_Drive]) -> None:
         stage = self._models[index].stage
         bound = stage.nodes[node]
         of = stage.nodes[bound.operands[0]]
         low, high = (
-            end * 2**bound.frac for end in _extremes([self._driven(d, index) for d in self._at(index, [node], arrived)])
+            end * 2**bound.frac
+            for end in _extremes(self._up_to(index), [self._driven(d, index) for d in self._at(index, [node], arrived)])
         )
         require(
             bound.low <= max(low, of.low) and min(high, of.high) <= bound.high,
@@ -321,25 +336,79 @@ def _combined(numerators: Sequence[fmpq_poly], way: Sequence[fmpq_poly]) -> fmpq
     return total
 
 
-def _difference(a: Response, b: Response) -> Response:
-    samples = [x - y for x, y in zip_longest(a.samples, b.samples, fillvalue=0)]
-    return Response(samples, a.error + b.error)
+class _Denominator:
+    """Sums over responses with one denominator, each computed when it is needed first."""
+
+    def __init__(self, polynomial: fmpq_poly) -> None:
+        self.polynomial = polynomial
+
+    @cached_property
+    def _norm(self) -> Callable[[fmpq_poly], Fraction]:
+        """How to find sums of magnitudes: by an approximate inverse if it is short, else in pieces."""
+        try:
+            over = inverse(self.polynomial, _SHORT)
+        except UndecidedError:
+            return Pieces(self.polynomial).norm
+        return lambda numerator: response(numerator, over).gain
+
+    @cached_property
+    def inverse(self) -> Inverse:
+        """Approximate inverse."""
+        return inverse(self.polynomial)
+
+    def norm(self, numerator: fmpq_poly) -> Fraction:
+        """Upper bound of the sum of magnitudes."""
+        return self._norm(numerator)
+
+    def total(self, numerator: fmpq_poly) -> Fraction:
+        """Sum of all samples, exact."""
+        return fraction(numerator(1) / self.polynomial(1))
 
 
-def _magnitude(driven: Sequence[_Driven]) -> Fraction:
-    low, high = _extremes(driven)
+def _magnitude(over: _Denominator, driven: Sequence[_Driven]) -> Fraction:
+    low, high = _extremes(over, driven)
     return max(-low, high)
 
 
-def _extremes(driven: Sequence[_Driven]) -> tuple[Fraction, Fraction]:
-    """Limits, over all times n, of the sum over all drives of ``sum over k <= n of h_k u(n - k)``."""
+def _extremes(over: _Denominator, driven: Sequence[_Driven]) -> tuple[Fraction, Fraction]:
+    """Limits, over all times n, of the sum over all drives of ``sum over k <= n of h_k u(n - k)``.
+
+    If every range contains zero, each term with the worst u is on one side of it, and the limits are those of the whole
+    sums: with ``u = c + v`` and ``|v| <= r``, c times the sum of all samples, and r times the sum of magnitudes.
+    """
+    summed = _summed_up(driven)
+    if any(low > 0 or high < 0 for _, low, high in summed):
+        return _running_extremes(over, summed)
+    centre = reach = Fraction(0)
+    for numerator, low, high in summed:
+        centre += (low + high) / 2 * over.total(numerator)
+        reach += (high - low) / 2 * over.norm(numerator)
+    return centre - reach, centre + reach
+
+
+def _summed_up(driven: Sequence[_Driven]) -> list[_Driven]:
+    """Replace drives with equal numerators, but for a factor, by one with the sum of their ranges."""
+    ranges: dict[tuple[str, ...], _Driven] = {}
+    for numerator, *ends in driven:
+        if numerator and any(ends):
+            leading = numerator.leading_coefficient()
+            key = tuple(map(str, (numerator / leading).coeffs()))
+            first, *before = ranges.get(key, (numerator, Fraction(0), Fraction(0)))
+            low, high = sorted(fraction(leading / first.leading_coefficient()) * end for end in ends)
+            ranges[key] = first, before[0] + low, before[1] + high
+    return list(ranges.values())
+
+
+def _running_extremes(over: _Denominator, driven: Sequence[_Driven]) -> tuple[Fraction, Fraction]:
+    """Limits as above, from the sums up to every sample."""
     scale = lcm(*(end.denominator for _, *ends in driven for end in ends))
     tops: list[int] = []
     bottoms: list[int] = []
     slack = Fraction(0)
-    for reached, *ends in driven:
+    for numerator, *ends in driven:
         low, high = (int(end * scale) for end in ends)
         if low or high:
+            reached = response(numerator, over.inverse)
             up, down = (low, high), (high, low)
             tops = _added(tops, [value * up[value > 0] for value in reached.samples])
             bottoms = _added(bottoms, [value * down[value > 0] for value in reached.samples])

@@ -1,0 +1,273 @@
+"""The sum of a response's magnitudes from a response in pieces, whose exact residual proves it.
+
+Sequences whose absolute values have a finite sum form an algebra under convolution with that sum, ``|.|``, as its norm
+(`sosmith.gen.verifier.l1_response`). For the response of N/D, let h be any sequence and ``E = N - D h``. Then
+
+    |N/D - h| <= |1/D| |E|,    |1/D| <= |u| / (1 - |1 - D u|) for any u with |1 - D u| < 1.
+
+Here h is built from pieces of B samples. A piece is a fixed linear form of d numbers, which follow from those of the
+piece before::
+
+    h[q + j B + i] = sum over m of P[i, m] x[j, m],    x[j + 1] = T x[j]
+
+However P and T were found, they are binary fractions, and these sequences are exact. Within a piece, E is the form
+``D * P`` of x; where a piece begins, it is that of the piece before, carried on, plus D times the step between the two.
+So ``|E|`` is at most the size of these forms, which integers give, times the sum of all ``max |x[j]|``, plus the
+residual of the first samples. No poles are located, no error of a recursion is estimated, and the bound exists only if
+the response decays.
+
+Signs are taken from sums of products of integers so short that doubles hold them exactly; what is left out is bounded,
+and where it matters, the sign comes from the long integers.
+"""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+from operator import mul
+from typing import cast
+
+import numpy as np
+import numpy.typing as npt
+from flint import acb, arb, arb_mat, ctx, fmpq_poly, fmpz_mat, fmpz_poly
+
+from sosmith.gen.verifier.l1_response import UndecidedError
+
+Floats = npt.NDArray[np.float64]
+Integers = npt.NDArray[np.object_]
+
+_ACCURACY = 112  # bits behind the binary point to which a sum is found
+_MARGIN = 48  # bits for the sizes of forms and sums
+_LONGEST = 1 << 24  # samples
+_LARGEST_PIECE = 512  # samples
+_SPREAD = 1 / 24  # of the time in which a response decays to 2**-40: where the numbers x of a piece are samples
+_GROUPS, _NEIGHBOURS = 64, 4  # of samples among which these are chosen
+_ROUNDED = 0.51  # bound on what rounding to an integer in doubles changes
+
+
+class Pieces:
+    """Responses over one denominator, whose constant term is 1 and whose coefficients are binary fractions.
+
+    Raises
+    ------
+    UndecidedError
+        If the responses do not decay, or not within 16 million samples, or a coefficient is not a binary fraction.
+    """
+
+    def __init__(self, denominator: fmpq_poly) -> None:
+        scale = int(denominator.denom())
+        if scale & (scale - 1):
+            raise UndecidedError("a coefficient is no binary fraction")
+        self._shift = scale.bit_length() - 1
+        self._under = [int(c) for c in denominator.numer().coeffs()]
+        self._order = len(self._under) - 1
+        self._inverse = Fraction(1)
+        self._found: dict[tuple[str, ...], Fraction] = {}
+        if self._order:
+            self._build()
+            total, residual = self._sequence(fmpq_poly([1]))
+            if residual >= 1:
+                raise UndecidedError("the inverse of a denominator could not be enclosed")
+            self._inverse = total / (1 - residual)
+
+    def norm(self, numerator: fmpq_poly) -> Fraction:
+        """Upper bound of the sum of magnitudes ``|N/D|``, hardly above it."""
+        key = tuple(map(str, numerator.coeffs()))
+        if key not in self._found:
+            total, residual = self._sequence(numerator)
+            self._found[key] = total + self._inverse * residual
+        return self._found[key]
+
+    # The forms.
+
+    def _build(self) -> None:
+        radii = self._radii()
+        if max(radii) >= 1:
+            raise UndecidedError("the responses of a denominator do not decay")
+        grows = math.ceil(-sum(math.log2(1 - radius) for radius in radii))
+        decay = -math.log2(max(*radii, 2.0**-40))
+        length = (_ACCURACY + 2 * self._order) / decay + 4 * self._order + 16
+        if length > _LONGEST:
+            raise UndecidedError(f"a response does not die away within {_LONGEST} samples")
+        self._grown = 2 * (sum(map(abs, self._under)) >> self._shift).bit_length()
+        self._bits = _ACCURACY + _MARGIN + grows + self._grown
+        pieces = max(0, math.ceil(math.log2(length / _LARGEST_PIECE)))
+        self._piece = max(math.ceil(length / (1 << pieces)), 2 * self._order)
+        window = max(math.ceil(40 * _SPREAD / decay), self._piece)
+        fine = self._bits + 2 * grows + 64
+        while True:
+            self._find_forms(window, fine)
+            if self._check_forms():
+                break
+            if fine > 8 * self._bits:
+                raise UndecidedError("the responses of a denominator could not be enclosed")
+            fine += fine // 2
+        self._find_powers()
+
+    def _radii(self) -> list[float]:
+        """Approximate magnitudes of the poles: a hint to lengths and precisions, which nothing proven depends on."""
+        roots = cast("list[tuple[acb, int]]", fmpz_poly(self._under).complex_roots())
+        return [1 / abs(complex(root)) for root, count in roots for _ in range(count)]
+
+    def _impulse_up_to(self, length: int) -> list[int]:
+        """Approximate samples of 1/D in units of ``2**-fine``."""
+        made = self._impulse
+        drop = max(0, self._shift - 2 * self._fine)
+        weights, shift = [-value >> drop for value in self._under[1:]], self._shift - drop
+        while len(made) < length:
+            made.append(sum(map(mul, weights, made[: -len(weights) - 1 : -1])) >> shift)
+        return made
+
+    def _find_forms(self, window: int, fine: int) -> None:
+        """Choose the samples that x stands for, by elimination, and find P and T from those of 1/D."""
+        d, size = self._order, self._piece
+        self._fine, self._impulse = fine, [1 << fine]
+        response = [*([0] * d), *self._impulse_up_to(window + size + d)]
+
+        def row(at: int) -> list[int]:
+            return response[at + d : at : -1]
+
+        step = max(1, window // _GROUPS)
+        near = {*range(min(window, _GROUPS)), *(at + k for at in range(0, window, step) for k in range(_NEIGHBOURS))}
+        places = sorted(near)
+        matrix = np.array([row(at) for at in places], dtype=object)
+        self._places: list[int] = []
+        for column in range(d):
+            pivot = int(np.argmax(np.abs(matrix[:, column])))
+            factors = (matrix[:, column] << fine) // (matrix[pivot, column] or 1)
+            matrix[:, column:] -= (factors[:, None] * matrix[pivot, column:]) >> fine
+            matrix[pivot] = 0
+            self._places.append(places[pivot])
+        wanted = [*range(size + d), *(size + at for at in self._places)]
+        with ctx.workprec(2 * fine):
+            try:
+                inverse = arb_mat([list(map(arb, row(at))) for at in self._places]).mid().inv().mid()
+            except ZeroDivisionError:
+                inverse = arb_mat(d, d)
+            scaled = arb_mat([list(map(arb, row(at))) for at in wanted]) * inverse * arb(2) ** self._bits
+            forms = np.array([_integer(value) for value in scaled.entries()], dtype=object).reshape(-1, d)
+        self._forms, self._step = forms[: size + d], forms[size + d :]
+
+    def _check_forms(self) -> bool:
+        """Find by how much the forms fail to solve the recursion, exactly; whether that is little enough."""
+        d, size, forms = self._order, self._piece, self._forms
+        inside = sum(value * forms[d - k : size + d - k] for k, value in enumerate(self._under))
+        between = forms[:d] @ self._step - (forms[size:] << self._bits)
+        norm = Fraction(sum(map(abs, self._under)), 1 << self._shift)
+        self._residual = Fraction(int(np.abs(inside).sum()), 1 << self._shift + self._bits)
+        self._residual += norm * Fraction(int(np.abs(between).sum()), 1 << 2 * self._bits)
+        return self._residual < Fraction(1 << _MARGIN // 2 + self._grown, 1 << self._bits)
+
+    def _find_powers(self) -> None:
+        """Find powers of T up to one that is so small that the pieces behind it hardly count."""
+        d, bits = self._order, self._bits
+        self._powers: list[Integers] = []
+        self._norms: list[Fraction] = []
+        with ctx.workprec(3 * bits):
+            power = arb_mat(d, d, [arb(value) * arb(2) ** -bits for value in self._step.ravel().tolist()])
+            while True:
+                rows = power.tolist()
+                upper = [sum(map(abs, row), arb(0)).upper() for row in rows]
+                self._norms.append(max(_fraction(value) for value in upper))
+                entries = power.entries()
+                if not all(value.rad() * arb(2) ** bits < 1 for value in entries):
+                    raise UndecidedError("the responses of a denominator could not be enclosed")
+                integers = [_integer(value * arb(2) ** bits) for value in entries]
+                self._powers.append(np.array(integers, dtype=object).reshape(d, d))
+                if self._norms[-1] < Fraction(1, 1 << _ACCURACY):
+                    break
+                if self._piece << len(self._powers) > _LONGEST:
+                    raise UndecidedError(f"a response does not die away within {_LONGEST} samples")
+                power = power * power
+        self._count = 1 << len(self._powers) - 1
+        whole = self._forms[: self._piece]
+        self._weight = Fraction(int(np.abs(whole).sum()), 1 << bits)
+        largest = max(1.0, float(np.abs(whole).max()) * 2.0**-bits)
+        self._short = (52 - math.ceil(math.log2(2 * d * largest))) // 2
+        self._small = np.rint(whole.astype(np.float64) * 2.0 ** (self._short - bits))
+        self._limb = 52 - self._piece.bit_length()
+        self._limbs = _limbs(whole, self._limb)
+
+    # The sequences.
+
+    def _sequence(self, numerator: fmpq_poly) -> tuple[Fraction, Fraction]:
+        """Upper bounds of ``|h|`` and of the residual ``|N - D h|`` for a sequence h."""
+        taps = [int(value) for value in numerator.numer().coeffs()]
+        scale = int(numerator.denom())
+        if not self._order:
+            return Fraction(sum(map(abs, taps)), scale), Fraction(0)
+        d, bits = self._order, self._bits
+        start = max(0, len(taps) - d)
+        places = [*range(start), *(start + at for at in self._places)]
+        impulse = self._impulse_up_to(max(places) + 1)
+        under = scale << self._fine - bits
+        values = [sum(n * impulse[at - k] for k, n in enumerate(taps[: at + 1])) // under for at in places]
+        head, first = values[:start], np.array(values[start:], dtype=object)
+        numbers, error = self._numbers(first)
+        sizes = Fraction(float(np.abs(numbers.astype(np.float64) * 2.0**-bits).max(axis=0).sum()) * (1 + 2.0**-30))
+        sizes = (sizes + Fraction(len(numbers[0]) * error, 1 << bits)) / (1 - self._norms[-1])
+        residual = self._first_residual(taps, scale, head, first) + self._residual * sizes
+        total = Fraction(self._magnitudes(numbers) + (sum(map(abs, head)) << bits), 1 << 2 * bits)
+        total += self._weight * (Fraction(self._count * error, 1 << bits) + self._norms[-1] * sizes)
+        return total, residual
+
+    def _first_residual(self, taps: list[int], scale: int, head: list[int], first: Integers) -> Fraction:
+        """Sum of the magnitudes of ``N - D h`` before piece 0 carries on by itself."""
+        bits = 2 * self._bits
+        samples = [*(value << self._bits for value in head), *(self._forms[: self._order] @ first).tolist()]
+        total = Fraction(0)
+        for n in range(len(samples)):
+            made = sum(value * samples[n - k] for k, value in enumerate(self._under[: n + 1]))
+            wanted = Fraction(taps[n] if n < len(taps) else 0, scale)
+            total += abs(wanted - Fraction(made, 1 << self._shift + bits))
+        return total
+
+    def _numbers(self, first: Integers) -> tuple[Integers, int]:
+        """Return x of all pieces, shape (order, pieces), in units of ``2**-bits``, and a bound on the error of each."""
+        d, bits = self._order, self._bits
+        numbers, error = first.reshape(d, 1), 0
+        for power, norm in zip(self._powers[:-1], self._norms, strict=False):
+            factor = fmpz_mat(d, d, power.ravel().tolist())
+            made = factor * fmpz_mat(d, numbers.shape[1], numbers.ravel().tolist())
+            more = np.array([int(value) >> bits for value in made.entries()], dtype=object).reshape(numbers.shape)
+            # The power is within two units, and the product is rounded down.
+            largest = int(np.abs(numbers).sum(axis=0).max()) + d * error
+            error = max(error, math.ceil(norm * error) + (2 * largest >> bits) + 2)
+            numbers = np.concatenate([numbers, more], axis=1)
+        return numbers, error
+
+    def _magnitudes(self, numbers: Integers) -> int:
+        """Sum of ``|P x|`` over all pieces, exact, in units of ``2**-(2 bits)``."""
+        d = self._order
+        values = numbers.astype(np.float64) * 2.0**-self._bits
+        _, exponents = np.frexp(np.abs(values).max(axis=0))
+        small = np.rint(np.ldexp(values, self._short - exponents))
+        sums = self._small @ small
+        left_out = _ROUNDED * (np.abs(self._small).sum(axis=1)[:, None] + np.abs(small).sum(axis=0)) + d
+        signs = np.where(sums < 0, -1.0, 1.0)
+        rows, columns = np.nonzero(np.abs(sums) <= left_out)
+        exact = (self._forms[rows] * numbers[:, columns].T).sum(axis=1)
+        signs[rows, columns] = np.where(exact < 0, -1.0, 1.0)
+        parts = (self._limbs @ signs).reshape(-1, d, numbers.shape[1]).astype(np.int64).astype(object)
+        return int(sum(((part << self._limb * k) * numbers).sum() for k, part in enumerate(parts)))
+
+
+def _integer(value: arb) -> int:
+    """Round a narrow ball to an integer within two of all that it encloses."""
+    mantissa, exponent = (int(part) for part in value.mid().man_exp())
+    return mantissa << exponent if exponent >= 0 else mantissa >> -exponent
+
+
+def _fraction(value: arb) -> Fraction:
+    mantissa, exponent = (int(part) for part in value.man_exp())
+    return mantissa * Fraction(2) ** exponent
+
+
+def _limbs(forms: Integers, bits: int) -> Floats:
+    """Cut forms, shape (piece, order), into limbs of `bits` bits, lowest first, shape (limbs * order, piece)."""
+    longest = max(abs(value).bit_length() for value in forms.ravel().tolist())
+    parts, rest = [], forms.T
+    while longest > bits:
+        parts.append(rest & ((1 << bits) - 1))
+        rest, longest = rest >> bits, longest - bits
+    return np.concatenate([*parts, rest]).astype(np.float64)
