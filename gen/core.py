@@ -13,7 +13,7 @@ from sosmith.gen.realizations.registry import REALIZATIONS
 from sosmith.gen.specification.choices import CORES, ERROR_FEEDBACK
 from sosmith.gen.specification.specification import Specification
 from sosmith.gen.word_lengths.other_realization import with_realization
-from sosmith.gen.word_lengths.quantize import Plan, plan, prove
+from sosmith.gen.word_lengths.quantize import Plan, least_area, plan, prove
 from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.gen.word_lengths.selection import Accept, Selection
 from sosmith.model.calibration.fit import Fit, fit, read_measurements
@@ -126,7 +126,10 @@ def design_core(
             realization=name,
         )
 
-    selection = Selection(plan_of, progress)
+    def floor_of(name: str) -> float:
+        return 0 if ideal is None else least_area(ideal, name)
+
+    selection = Selection(plan_of, floor_of, progress)
     given: tuple[Quantized, str] | None = None
     if ideal is None:
         given = prove(plan_of(next(iter(REALIZATIONS)))), "none: a calibration has no filter sections"

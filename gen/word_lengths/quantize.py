@@ -17,9 +17,10 @@ from functools import cached_property
 from sosmith.gen.filter.design import Filter
 from sosmith.gen.proof.cascade_proof import CascadeProof, ideal_gain
 from sosmith.gen.realizations.registry import REALIZATIONS, Section
+from sosmith.gen.realizations.section_format import SectionFormat, unknown_range
 from sosmith.gen.word_lengths.bit_limits import MAX_BITS
-from sosmith.gen.word_lengths.cascade import cascade, unquantized
-from sosmith.gen.word_lengths.cost import cost_of, cost_of_graphs
+from sosmith.gen.word_lengths.cascade import cascade, parts_of, stages_of, unquantized
+from sosmith.gen.word_lengths.cost import LUTS_OF_A_BLOCK, cost_of, cost_of_graphs
 from sosmith.gen.word_lengths.equal_shares import equally_shared
 from sosmith.gen.word_lengths.input_stage import InputStage, input_stages, needs_scaling
 from sosmith.gen.word_lengths.ordering import best_order
@@ -27,6 +28,7 @@ from sosmith.gen.word_lengths.output_stage import output_stage
 from sosmith.gen.word_lengths.quantized import Quantized, assembled
 from sosmith.gen.word_lengths.search import Choice, Search
 from sosmith.model.calibration.polynomial import Polynomial
+from sosmith.model.dataflow.graph import Op
 from sosmith.model.errors import ShortfallError
 from sosmith.model.port import Port
 
@@ -236,6 +238,25 @@ def _assembled(
         sections=sections,
         proof=proof,
     )
+
+
+def least_area(ideal: Filter, realization: str) -> float:
+    """Bound the area of a realization from below: each of its products takes a multiplier block.
+
+    Products by powers of two take none. Those that rounding to few bits makes powers of two are counted all the same.
+
+    Raises
+    ------
+    ShortfallError
+        If the filter has no such realization.
+    """
+    parts = parts_of(ideal, realization)
+    formats = [SectionFormat(coefficient_bits=_BITS_TO_ORDER)] * len(parts)
+    try:
+        stages = stages_of(ideal, realization, formats, unknown_range(0))
+    except ShortfallError:
+        return 0  # cannot be built with so few bits
+    return LUTS_OF_A_BLOCK * sum(node.op is Op.SCALE for stage in stages for node in stage.graph.nodes)
 
 
 def gain_of(ideal: Filter) -> Fraction:

@@ -104,6 +104,7 @@ class Search:
         self._ends = x.low * 2.0**-x.frac, x.high * 2.0**-x.frac
         self._estimates = _estimates(rows, realization, self._ends)
         self._base: _Base | None = None
+        self._ranges: dict[tuple[object, ...], dict[str, tuple[int, int]]] = {}
         self._known: dict[tuple[object, ...], tuple[float, Range, dict[str, int]]] = {}
 
     def start(self, share: float, most: int) -> Choice | None:
@@ -152,11 +153,11 @@ class Search:
             self._base = _Base(choice.formats, deviation, max(map(abs, _limits(deviation, self._ends))))
             best: tuple[float, Choice, float, float] | None = None
             for candidate in self._steps(choice):
-                saved = area - self.area(candidate)
-                if saved <= 0:
-                    continue
                 after = self.error(candidate)
                 if after > allowed:
+                    continue
+                saved = area - self.area(candidate)
+                if saved <= 0:
                     continue
                 merit = saved / max(after - error, 1e-6 * allowed)
                 if best is None or merit > best[0]:
@@ -256,13 +257,8 @@ class Search:
         return self._known[key]
 
     def _built(self, k: int, x: Range, form: SectionFormat) -> tuple[float, Range, dict[str, int]]:
-        form = replace(form, x=unknown_range(x.frac))
         name = f"section{k}"
-        ranges = {}
-        for node in self._build(self._rows[k], form, name).graph.nodes:
-            if node.name in self._estimates[k].limits:
-                low, high = self._estimates[k].limits_of(node.name, form.fracs)
-                ranges[node.name] = math.floor(low * 2.0**node.frac), math.ceil(high * 2.0**node.frac)
+        ranges = self._ranges_of(k, x.frac, form, name)
         section = self._build(self._rows[k], replace(form, ranges=ranges, x=x), name)
         graph = section.graph
         output = graph.nodes[graph.outputs[0]]
@@ -273,6 +269,18 @@ class Search:
             if node.width > MULTIPLIER_BITS
         }
         return area_of(graph), output.range, fits
+
+    def _ranges_of(self, k: int, frac: int, form: SectionFormat, name: str) -> dict[str, tuple[int, int]]:
+        """Estimated codes of the nodes of section k, which do not depend on the range of its input."""
+        key = (k, frac, tuple(form.coefficients.items()), tuple(form.fracs.items()))
+        if key not in self._ranges:
+            ranges = {}
+            for node in self._build(self._rows[k], replace(form, x=unknown_range(frac)), name).graph.nodes:
+                if node.name in self._estimates[k].limits:
+                    low, high = self._estimates[k].limits_of(node.name, form.fracs)
+                    ranges[node.name] = math.floor(low * 2.0**node.frac), math.ceil(high * 2.0**node.frac)
+            self._ranges[key] = ranges
+        return self._ranges[key]
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from sosmith.gen.realizations.registry import BEST_KEPT, REALIZATIONS
 from sosmith.gen.word_lengths.cost import LUTS_OF_A_BLOCK, cost_of
@@ -13,6 +13,9 @@ from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.errors import ShortfallError
 
 Progress = Callable[[str], None]
+Best = tuple[float, Quantized]
+"""A proven design and its area."""
+
 Accept = Callable[[Datapath], object]
 """Raises ShortfallError, with the reason, if a datapath does not suit the hardware."""
 
@@ -27,12 +30,15 @@ class Selection:
     ----------
     plan_of : callable
         Plans a realization, given its name; may raise ShortfallError.
+    floor_of : callable
+        Bounds the area of a realization from below without planning it; may raise ShortfallError.
     progress : callable
         Called with the name of each step.
     """
 
-    def __init__(self, plan_of: Callable[[str], Plan], progress: Progress) -> None:
+    def __init__(self, plan_of: Callable[[str], Plan], floor_of: Callable[[str], float], progress: Progress) -> None:
         self._plan_of = plan_of
+        self._floor_of = floor_of
         self._progress = progress
         self._plans: dict[str, Plan] = {}
         self._trimmed: set[str] = set()
@@ -56,25 +62,57 @@ class Selection:
     def cheapest(self, accept: Accept) -> tuple[Quantized, str]:
         """Return the proven realization with the smallest estimated area that `accept` permits, and the reason.
 
-        Plans that are not much larger than the smallest are trimmed. They are proven in the order of their planned
-        areas until no remaining plan promises to be smaller.
+        Realizations are planned in the order of their least possible areas, those that are no cascades last, until no
+        remaining one can be smaller. Plans that are not much larger than the smallest are trimmed. They are proven in
+        the order of their planned areas until no remaining plan promises to be smaller.
 
         Raises
         ------
         ShortfallError
             If none meets the specification; gives the reason of `BEST_KEPT`, by name if the reasons differ.
         """
+        failures: dict[str, str] = {}
+        floors = self._floors(failures)
+        best: Best | None = None
+        while promising := self._promising(floors, math.inf if best is None else best[0], failures):
+            best = self._smallest(promising, best, accept, failures)
+        if best is None:
+            with_best = "" if len(set(failures.values())) == 1 else f"with {BEST_KEPT}, "
+            raise ShortfallError(
+                f"none of the {len(failures)} realizations meets the specification: {with_best}{failures[BEST_KEPT]}"
+            )
+        return best[1], self._reason(best, {*failures}, [*floors])
+
+    def _floors(self, failures: dict[str, str]) -> dict[str, float]:
+        """Least areas of all realizations, in the order of planning."""
+        floors = {}
         for name in REALIZATIONS:
-            self._plan(name)
-        failures = dict(self._failures)
-        least = math.inf
-        for name in sorted(self._plans, key=self._area):
-            if self._area(name) <= _HOPELESS * least:
-                self._trim(name)
-                least = min(least, self._area(name))
-        order = sorted((name for name in self._plans if name not in failures), key=self._area)
-        best: tuple[float, Quantized] | None = None
-        for name in order:
+            try:
+                floors[name] = self._floor_of(name)
+            except ShortfallError as error:
+                failures[name] = str(error)
+        return dict(sorted(floors.items(), key=lambda item: (not REALIZATIONS[item[0]].cascade, item[1])))
+
+    def _promising(self, floors: dict[str, float], least: float, failures: dict[str, str]) -> list[str]:
+        """Plan and trim those that may be smaller than `least`, and take them from `floors`."""
+        names: list[str] = []
+        while new := _next(floors, least):
+            for name in new:
+                del floors[name]
+                self._plan(name)
+                if name in self._plans:
+                    names.append(name)
+                else:
+                    failures[name] = self._failures[name]
+            for name in sorted((name for name in new if name in self._plans), key=self._area):
+                if self._area(name) <= _HOPELESS * least:
+                    self._trim(name)
+                    least = min(least, self._area(name))
+        return names
+
+    def _smallest(self, names: list[str], best: Best | None, accept: Accept, failures: dict[str, str]) -> Best | None:
+        """Prove those that promise to be smaller than the best one so far."""
+        for name in sorted(names, key=self._area):
             if best is not None and self._area(name) >= best[0]:
                 break
             try:
@@ -86,23 +124,22 @@ class Selection:
             found = cost_of(quantized.datapath).area
             if best is None or found < best[0]:
                 best = found, quantized
-        if best is None:
-            with_best = "" if len(set(failures.values())) == 1 else f"with {BEST_KEPT}, "
-            raise ShortfallError(
-                f"none of the {len(failures)} realizations meets the specification: {with_best}{failures[BEST_KEPT]}"
-            )
-        return best[1], self._reason(best, order, {*failures})
+        return best
 
-    def _reason(self, best: tuple[float, Quantized], order: list[str], failures: set[str]) -> str:
+    def _reason(self, best: Best, failures: set[str], dropped: list[str]) -> str:
         area, quantized = best
-        short = {*failures, *(name for name in order if self._area(name) == math.inf)}
-        left = [name for name in order if name not in {quantized.realization, *short}]
-        why = f"the smallest estimated area of {len(left) + 1}" if left else "the only one proven"
+        short = {*failures, *(name for name in self._plans if self._area(name) == math.inf)}
+        left = sorted((n for n in self._plans if n not in {quantized.realization, *short}), key=self._area)
+        count = 1 + len(left) + len(dropped)
+        why = f"the smallest estimated area of {count}" if count > 1 else "the only one proven"
         reason = (
             f"{quantized.realization}: {why}, {round(area):,} LUT4 with a multiplier block counted as {LUTS_OF_A_BLOCK}"
         )
         others = [
             ", ".join(f"{name} {round(self._known_area(name)):,}" for name in left),
+            f"more in multiplier blocks alone: {', '.join(name for name in REALIZATIONS if name in dropped)}"
+            if dropped
+            else "",
             _falling_short([name for name in REALIZATIONS if name in short]),
         ]
         rest = "; ".join(other for other in others if other)
@@ -141,6 +178,12 @@ class Selection:
                 self._failures[name] = str(error)
                 raise
         return self._proven[name]
+
+
+def _next(floors: Mapping[str, float], least: float) -> list[str]:
+    """Names of the first least area that is below `least`, none if there is none."""
+    names = [name for name, floor in floors.items() if floor < least]
+    return [name for name in names if REALIZATIONS[name].cascade and floors[name] == floors[names[0]]] or names[:1]
 
 
 def _falling_short(names: list[str]) -> str:

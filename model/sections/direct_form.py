@@ -77,10 +77,10 @@ class Product:
         if not (any(self.x) or any(self.y)):
             raise ValueError(f"taps of {self.name} must not all be zero")
 
-    @property
+    @cached_property
     def value(self) -> Fraction:
         """Exact value of the coefficient, without the shift."""
-        return self.coefficient * Fraction(2) ** -self.frac
+        return Fraction(self.coefficient << max(-self.frac, 0), 1 << max(self.frac, 0))
 
     @property
     def operand(self) -> str:
@@ -135,8 +135,9 @@ class DirectForm1:
         """Exact (b0, b1, b2) of the integer coefficients."""
         b = [Fraction(0)] * 3
         for product in self.products:
-            for k in range(3):
-                b[k] += product.value * product.x[k] / 2**product.shift
+            for k, tap in enumerate(product.x):
+                if tap:
+                    b[k] += product.value * tap / 2**product.shift
         return b[0], b[1], b[2]
 
     @cached_property
@@ -144,8 +145,9 @@ class DirectForm1:
         """Exact (a1, a2) of the integer coefficients."""
         a = [Fraction(self.integer_part[0]), Fraction(self.integer_part[1])]
         for product in self.products:
-            for k in range(2):
-                a[k] -= product.value * product.y[k] / 2**product.shift
+            for k, tap in enumerate(product.y):
+                if tap:
+                    a[k] -= product.value * tap / 2**product.shift
         return a[0], a[1]
 
     @property

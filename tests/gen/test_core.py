@@ -39,13 +39,49 @@ def test_the_cheapest_is_taken_and_the_rest_are_told(spec: Specification) -> Non
     assert areas[best] == min(areas.values())
     found = re.fullmatch(
         rf"{best}: the smallest estimated area of {len(areas)}, {round(areas[best]):,} LUT4 with a multiplier block "
-        r"counted as 864 \((.*)\)",
+        r"counted as 864 \((.*); more in multiplier blocks alone: (.*)\)",
         made.reasons["realization"],
     )
     assert found
     others = {name: int(area.replace(",", "")) for name, area in (entry.split() for entry in found[1].split(", "))}
-    assert others.keys() == areas.keys() - {best}
     assert list(others.values()) == sorted(others.values())
+    assert {*others, *found[2].split(", "), best} == areas.keys()
+
+
+@pytest.mark.parametrize(
+    ("order", "cutoff", "bits"),
+    [
+        (1, (12_000,), 4),  # nothing but powers of two
+        (2, (4800,), 16),
+        pytest.param(2, (2400, 4800), 12, marks=pytest.mark.slow),
+        pytest.param(4, (480,), 16, marks=pytest.mark.slow),
+        pytest.param(7, (124,), 16, marks=pytest.mark.slow),
+    ],
+)
+def test_what_is_dropped_could_not_win(
+    order: int, cutoff: tuple[int, ...], bits: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    audio = load(EXAMPLES / "audio_lowpass.toml")
+    kind = "lowpass" if len(cutoff) == 1 else "bandpass"
+    output = replace(audio.output, bits=bits, lsb=Fraction(2, 1 << bits))
+    asked = replace(audio.filter, order=order, kind=kind, cutoff=tuple(map(Fraction, cutoff)))
+    spec = replace(audio, inputs=(replace(audio.inputs[0], bits=bits, lsb=output.lsb),), output=output)
+    spec = replace(spec, max_error=output.lsb, filter=asked)
+    made = design_core(spec)
+    assert "more in multiplier blocks alone" in made.reasons["realization"]
+    monkeypatch.setattr(core, "least_area", lambda ideal, name: 0)
+    every = design_core(spec)
+    assert "more in multiplier blocks alone" not in every.reasons["realization"]
+    assert made.quantized.realization == every.quantized.realization
+    assert made.datapath == every.datapath
+
+
+def test_what_was_dropped_is_planned_if_nothing_else_suits(
+    spec: Specification, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    few = {"df1", "df1_ef1", "df1_ef2", "lattice_wdf"}
+    fail(monkeypatch, dict.fromkeys(few, "it must fit, and does not"))
+    assert design_core(spec).quantized.realization in REALIZATIONS.keys() - few
 
 
 def test_those_that_fall_short_are_told(spec: Specification) -> None:
@@ -54,6 +90,7 @@ def test_those_that_fall_short_are_told(spec: Specification) -> None:
 
 def test_the_only_one_that_is_left(spec: Specification, monkeypatch: pytest.MonkeyPatch) -> None:
     fail(monkeypatch, {name: "it must fit, and does not" for name in REALIZATIONS if name != "delta"})
+    monkeypatch.setattr(core, "least_area", lambda ideal, name: 0)
     others = [name for name in REALIZATIONS if name != "delta"]
     reason = design_core(spec).reasons["realization"]
     assert re.fullmatch(
