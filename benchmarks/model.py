@@ -9,25 +9,19 @@ of its recorded speed beside scipy, or is slower than scipy.
 
 from __future__ import annotations
 
-import argparse
-import json
-import sys
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
-from pathlib import Path
+from dataclasses import dataclass
 
 import numpy as np
-from benchmarks.speed_page import renew
+from benchmarks.speed_page import ROOT, Benchmark
 from scipy import signal
 
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.specification.specification import load
 from sosmith.model.arrays import Codes, Values
 
-ROOT = Path(__file__).resolve().parent.parent
 EXAMPLES = ROOT / "examples"
-RECORD = ROOT / "benchmarks" / "model.json"
 CORES = (
     ("audio_lowpass", "filter"),
     ("flange_wear_bench", "filter"),
@@ -137,11 +131,6 @@ samples a second of processor time, over all channels; the fastest of several ru
 """
 
 
-def recorded() -> list[Rates]:
-    """Read the recorded rates."""
-    return [Rates(**row) for row in json.loads(RECORD.read_text(encoding="utf-8"))]
-
-
 def losses(old: list[Rates], new: list[Rates]) -> list[str]:
     """Say which models have lost speed beside scipy, or are slower."""
     faults = []
@@ -153,23 +142,7 @@ def losses(old: list[Rates], new: list[Rates]) -> list[str]:
     return faults
 
 
-def main() -> None:
-    """Measure and write, or check."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--repeats", type=int, default=10, help="runs, of which the fastest counts")
-    parser.add_argument("--check", action="store_true", help="fail if the model has become slower")
-    parser.add_argument("--document", action="store_true", help="only write the document from the record")
-    options = parser.parse_args()
-    rows = recorded() if options.document else measure(options.repeats)
-    print(table(rows), end="")
-    if options.check:
-        if faults := losses(recorded(), rows):
-            sys.exit("\n".join(faults))
-        return
-    if not options.document:
-        RECORD.write_text(json.dumps([asdict(row) for row in rows], indent=2) + "\n", encoding="utf-8")
-    renew("model", section(rows))
-
+BENCHMARK = Benchmark(name="model", row=Rates, measure=measure, section=section, tables=table, losses=losses)
 
 if __name__ == "__main__":
-    main()
+    BENCHMARK.main(__doc__, repeats=10)

@@ -10,20 +10,17 @@ if a build takes longer than it may.
 
 from __future__ import annotations
 
-import argparse
-import json
 import resource
 import secrets
 import subprocess
-import sys
 import tempfile
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from benchmarks.speed_page import renew
+from benchmarks.speed_page import ROOT, Benchmark
 
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.output.core_facts import InterfaceFacts, core_facts
@@ -37,8 +34,6 @@ from sosmith.sim.simulators import find_simulator
 from sosmith.sim.stream_packing import pack, random_order
 from sosmith.sim.verilated_model import Builder, Model
 
-ROOT = Path(__file__).resolve().parent.parent
-RECORD = ROOT / "benchmarks" / "simulation.json"
 EXAMPLE = "flange_wear_locomotive"
 SAMPLES = {"parallel": (1_000_000, 20_000), "folded": (60_000, 1_500)}
 """Samples in the compiled loop and the bare one, and in Python."""
@@ -228,6 +223,11 @@ def build_table(rows: list[Speeds]) -> str:
     return "\n".join(lines) + "\n"
 
 
+def tables(rows: list[Speeds]) -> str:
+    """Return both tables."""
+    return f"{table(rows)}\n{build_table(rows)}"
+
+
 def section(rows: list[Speeds]) -> str:
     """Return the section of the document."""
     return f"""
@@ -251,11 +251,6 @@ time:
 """
 
 
-def recorded() -> list[Speeds]:
-    """Read the recorded figures."""
-    return [Speeds(**row) for row in json.loads(RECORD.read_text(encoding="utf-8"))]
-
-
 def losses(old: list[Speeds], new: list[Speeds]) -> list[str]:
     """Say which cores have lost speed beside the bare loop, and which take too long to build."""
     faults = [
@@ -271,23 +266,7 @@ def losses(old: list[Speeds], new: list[Speeds]) -> list[str]:
     ]
 
 
-def main() -> None:
-    """Measure and write, or check."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--repeats", type=int, default=5, help="runs, of which the fastest counts")
-    parser.add_argument("--check", action="store_true", help="fail if the bench has become slower")
-    parser.add_argument("--document", action="store_true", help="only write the document from the record")
-    options = parser.parse_args()
-    rows = recorded() if options.document else measure(options.repeats)
-    print(table(rows), build_table(rows), sep="\n", end="")
-    if options.check:
-        if faults := losses(recorded(), rows):
-            sys.exit("\n".join(faults))
-        return
-    if not options.document:
-        RECORD.write_text(json.dumps([asdict(row) for row in rows], indent=2) + "\n", encoding="utf-8")
-    renew("simulation", section(rows))
-
+BENCHMARK = Benchmark(name="simulation", row=Speeds, measure=measure, section=section, tables=tables, losses=losses)
 
 if __name__ == "__main__":
-    main()
+    BENCHMARK.main(__doc__, repeats=5)

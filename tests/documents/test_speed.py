@@ -3,24 +3,25 @@
 from dataclasses import replace
 
 import pytest
-from benchmarks import model, simulation, speed_page
+from benchmarks import design, model, simulation, speed_page
 
 
 def test_the_document_shows_the_recorded_figures() -> None:
-    assert speed_page.shown("simulation") == simulation.section(simulation.recorded())
-    assert speed_page.shown("model") == model.section(model.recorded())
+    assert speed_page.shown("simulation") == simulation.section(simulation.BENCHMARK.recorded())
+    assert speed_page.shown("model") == model.section(model.BENCHMARK.recorded())
+    assert speed_page.shown("design") == design.section(design.BENCHMARK.recorded())
     with pytest.raises(ValueError, match=r"speed\.md must have a section none$"):
         speed_page.shown("none")
 
 
 def test_both_architectures_are_recorded_with_long_runs_at_the_speed_that_is_asked() -> None:
-    rows = {row.architecture: row for row in simulation.recorded()}
+    rows = {row.architecture: row for row in simulation.BENCHMARK.recorded()}
     assert {name: row.samples for name, row in rows.items()} == {"parallel": 1_000_000, "folded": 60_000}
     assert all(row.ratio > 0.8 and row.build < simulation.BUILD for row in rows.values())
 
 
 def test_one_and_twelve_channels_are_recorded_faster_than_scipy() -> None:
-    rows = model.recorded()
+    rows = model.BENCHMARK.recorded()
     assert {(row.example, row.core, row.channels) for row in rows} == {
         (*core, channels) for core in model.CORES for channels in (1, 12)
     }
@@ -28,7 +29,7 @@ def test_one_and_twelve_channels_are_recorded_faster_than_scipy() -> None:
 
 
 def test_a_bench_that_has_become_slower_is_named() -> None:
-    old = [replace(row, bare=100.0, bench=90.0, build=2.0) for row in simulation.recorded()]
+    old = [replace(row, bare=100.0, bench=90.0, build=2.0) for row in simulation.BENCHMARK.recorded()]
     assert simulation.losses(old, [replace(row, bare=200.0, bench=154.0) for row in old]) == []
     slower = [replace(old[0], build=4.1), replace(old[1], bare=200.0, bench=152.0)]
     assert simulation.losses(old, slower) == [
@@ -38,7 +39,7 @@ def test_a_bench_that_has_become_slower_is_named() -> None:
 
 
 def test_a_model_that_has_become_slower_is_named() -> None:
-    old = [replace(row, model=200.0, scipy=100.0) for row in model.recorded()]
+    old = [replace(row, model=200.0, scipy=100.0) for row in model.BENCHMARK.recorded()]
     assert model.losses(old, [replace(row, model=152.0) for row in old]) == []
     slower = [replace(old[0], model=148.0), *old[1:]]
     name = "audio_lowpass, filter, 1 channels"
@@ -46,3 +47,23 @@ def test_a_model_that_has_become_slower_is_named() -> None:
     below = [replace(each, model=99.0) for each in old]
     old = [replace(each, model=105.0) for each in old]
     assert f"{name}: the model must reach 1.00 of scipy's speed, not 0.99" in model.losses(old, below)
+
+
+def test_all_designs_are_recorded() -> None:
+    rows = design.BENCHMARK.recorded()
+    assert [(row.kind, row.order, row.cutoff) for row in rows] == design.CASES
+    assert {*design.GOALS} <= {*design.CASES}
+
+
+def test_a_design_that_has_become_slower_is_named() -> None:
+    old = [replace(row, design=1.0, verification=0.5, recursion=0.1) for row in design.BENCHMARK.recorded()]
+    assert design.losses(old, [replace(row, design=2.6, recursion=0.2) for row in old]) == []
+    slower = [replace(old[0], design=1.4), replace(old[1], verification=1.5), *old[2:]]
+    assert design.losses(old, slower) == [
+        "lowpass, order 2, 0.0001: the design must reach 0.075 of the recursion's speed, not 0.071",
+        "lowpass, order 2, 0.001: verification must take less than the design's 1.00 s, not 1.50 s",
+    ]
+    slow = [replace(row, design=9.0, recursion=0.9) for row in old]
+    assert design.losses(old, slow) == [
+        "bandpass, order 6, 0.0026, 0.0052: the design must take less than 8 s, not 9.0 s"
+    ]
