@@ -1,3 +1,4 @@
+# amaranth: UnusedElaboratable=no
 """The output buffer's contract, and where fields lie on the bus."""
 
 import random
@@ -5,9 +6,10 @@ from fractions import Fraction
 from typing import Any
 
 import pytest
+from amaranth.hdl import Const, Shape
 from amaranth.sim import Simulator
 
-from sosmith.hdl.axi_stream import StreamBuffer, fields, width
+from sosmith.hdl.axi_stream import StreamBuffer, extended, fields, width
 from sosmith.model.port import Port
 
 
@@ -65,3 +67,14 @@ def test_fields_are_whole_bytes_with_the_first_lowest() -> None:
     ]
     assert [(field.offset, field.padded) for field in fields(ports)] == [(0, 16), (16, 16), (32, 24)]
     assert width(ports) == 56
+
+
+def test_the_members_of_the_buffer_have_the_width_of_what_they_say() -> None:
+    widths = {name: Shape.cast(member.shape).width for name, member in StreamBuffer(8).signature.members.items()}
+    assert widths == {name: 8 if name.endswith(("data", "next")) else 1 for name in widths}
+
+
+@pytest.mark.parametrize(("code", "signed", "word"), [(-3, True, 0xFD), (3, True, 0x03), (5, False, 0x05)])
+def test_a_code_is_extended_by_its_sign(code: int, signed: bool, word: int) -> None:
+    made = Const.cast(extended(Const(code, Shape(3, signed=signed)), 8))
+    assert made.value & 0xFF == word

@@ -1,11 +1,20 @@
-"""The schedule of a recursion that several channels take turns in."""
+"""A recursion that several channels take turns in: its schedule, its states, and what goes through it."""
 
+import random
 from itertools import pairwise
+from typing import Any
 
 import pytest
+from amaranth.hdl import Module, Signal, Value
+from amaranth.sim import Simulator
+from tests.formal.small import leaky, limiter
 from tests.gen.designs import example_design
+from tests.hdl.core_bench import Pace, run_core
 
-from sosmith.hdl.interleaved import schedule
+from sosmith.gen.architecture import Architecture
+from sosmith.hdl import interleaved
+from sosmith.hdl.check_bits import CheckBits, Read
+from sosmith.hdl.interleaved import InterleavedStage, schedule
 from sosmith.model.dataflow.graph import Graph, Op
 
 REALIZATIONS = ("df1_ef2", "df2t", "delta", "state_space", "normal", "lattice_wdf")
@@ -39,3 +48,54 @@ def test_more_channels_make_a_deeper_pipeline() -> None:
     depths = [schedule(section, channels).depth for channels in (2, 3, 8)]
     assert all(few <= more for few, more in pairwise(depths))
     assert depths[0] < depths[-1]
+
+
+@pytest.mark.parametrize("channels", [3, 17])
+def test_every_channel_has_a_state_of_its_own(channels: int) -> None:
+    """In memories of LUTs and of blocks, which are read a clock later."""
+    chance = random.Random(1)
+    samples = [(chance.randrange(channels), [chance.randint(-2, 1)]) for _ in range(5 * channels)]
+    before = [0] * channels
+    expected = []
+    for channel, (code,) in samples:
+        expected.append((channel, min(max(code + before[channel], -2), 1)))
+        before[channel] = code
+    found = run_core(Architecture("parallel", limiter(), channels), samples, Pace())
+    assert [(beat.channel, beat.code) for beat in found] == expected
+
+
+class Findings(CheckBits):
+    """Check bits that find wrong what a test says."""
+
+    failed: Signal
+
+    def read(self, m: Module, word: Value, name: str) -> Read:
+        """Take a word apart."""
+        return super().read(m, word, name)._replace(failed=self.failed)
+
+
+def test_what_is_found_wrong_goes_with_what_has_read_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A fault from before the stage, too; and a scrub leaves the stage as a sample does."""
+    section = leaky().stages[0]
+    monkeypatch.setattr(Findings, "failed", Signal(), raising=False)
+    monkeypatch.setattr(interleaved, "CheckBits", Findings)
+    dut: Any = InterleavedStage(section, 3, protect="detect")
+    depth = dut.schedule.depth
+    reads = next(dut.schedule.pipeline_stages[delay] for delay in section.graph.delays)
+    seen: list[tuple[int, int]] = []
+
+    async def bench(ctx: Any) -> None:
+        ctx.set(dut.advance, 1)
+        for clock in range(4 * depth):
+            ctx.set(dut.i_scrub, clock == 0)
+            ctx.set(dut.i_fault, clock == depth)
+            ctx.set(Findings.failed, clock == 2 * depth + reads)
+            seen.append((ctx.get(dut.o_scrub), ctx.get(dut.o_fault)))
+            await ctx.tick()
+
+    simulator = Simulator(dut)
+    simulator.add_clock(1e-6)
+    simulator.add_testbench(bench)
+    simulator.run()
+    assert [clock for clock, (scrub, _) in enumerate(seen) if scrub] == [depth]
+    assert [clock for clock, (_, fault) in enumerate(seen) if fault] == [2 * depth, 3 * depth]

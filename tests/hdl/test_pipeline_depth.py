@@ -1,6 +1,7 @@
 """The number of pipeline stages of a datapath stage."""
 
 import pytest
+from tests.formal.small import resonator
 from tests.gen.designs import example_design
 
 from sosmith.hdl.stage import pipeline_depth
@@ -23,3 +24,7 @@ def test_the_stages_of_the_audio_low_pass(realization: str, depths: list[int]) -
 def test_each_step_of_a_polynomial_takes_one_pipeline_stage() -> None:
     datapath = example_design("flange_wear_bench.toml", core="calibration").datapath
     assert {pipeline_depth(stage.graph) for stage in datapath.stages} == {1}
+
+
+def test_what_depends_on_the_older_state_alone_is_computed_before_the_rest() -> None:
+    assert pipeline_depth(resonator().stages[0].graph) == 3
