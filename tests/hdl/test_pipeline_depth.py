@@ -4,7 +4,7 @@ import pytest
 from tests.formal.small import resonator
 from tests.gen.designs import example_design
 
-from sosmith.hdl.stage import pipeline_depth
+from sosmith.hdl.stage import pipeline_depth, pipeline_stages
 
 
 @pytest.mark.parametrize(
@@ -26,5 +26,8 @@ def test_each_step_of_a_polynomial_takes_one_pipeline_stage() -> None:
     assert {pipeline_depth(stage.graph) for stage in datapath.stages} == {1}
 
 
-def test_what_depends_on_the_older_state_alone_is_computed_before_the_rest() -> None:
+def test_what_depends_on_older_states_alone_is_computed_before_the_rest() -> None:
     assert pipeline_depth(resonator().stages[0].graph) == 3
+    graph = example_design("audio_lowpass.toml", realization="df1_ef2").datapath.stages[1].graph
+    stages = {node.name: stage for node, stage in zip(graph.nodes, pipeline_stages(graph), strict=True)}
+    assert [stages[name] for name in ("product_A1", "product_A2")] == [2, 1]

@@ -266,6 +266,8 @@ async def a_reset_ends_a_load_and_keeps_what_is_active(bench: Bench) -> None:
     words = bench.words()
     await bench.load(6, words)
     await bench.bus.idle(2)
+    await bench.reset()
+    assert await bench.bus.read(CRC.address) == (crc_of(6, words), OKAY)
     await bench.bus.write(VERSION.address, 7)
     await bench.reset()
     assert await bench.status() == {"LOADING": 0, "PENDING": 0, "BANK": 1, "OUTCOME": Outcome.NONE}
