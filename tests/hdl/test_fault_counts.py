@@ -3,9 +3,12 @@
 
 from typing import Any
 
+from amaranth.hdl import Shape
 from tests.hdl.axi_lite_bench import OKAY, SLVERR
 from tests.hdl.test_reload import Bench, benched, crc_of
 
+from sosmith.hdl.reload import ReloadPort
+from sosmith.hdl.serial_crc import SerialCrc
 from sosmith.model.reload.registers import CRC, DATA, FAULTS, VERSION
 
 
@@ -98,3 +101,11 @@ def test_a_write_in_the_middle_of_a_load_does_not_disturb_it() -> None:
 
 def test_an_unprotected_core_has_no_such_register() -> None:
     benched(there_is_none)
+
+
+def test_the_members_of_the_port_and_its_checksum_have_the_width_of_what_they_say() -> None:
+    widths = {"write_address": 2, "write_data": 32}
+    for made in (ReloadPort(3, protected=True), SerialCrc()):
+        for name, member in made.signature.members.items():
+            if not name.startswith("s_axil_"):
+                assert Shape.cast(member.shape).width == widths.get(name, 1)

@@ -10,11 +10,16 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from amaranth.hdl import ResetInserter, Signal
+from amaranth.hdl import ClockDomain, ClockSignal, Module, ResetInserter, Signal
+from amaranth.sim import Simulator
+from tests.gen.verifier.parallel.cores import small_design
+from tests.gen.verifier.small_specifications import PLAIN
 from tests.hdl.axi_lite_bench import OKAY, SLVERR, Bus, run
 
-from sosmith.hdl import reload
+from sosmith.hdl import core, reload
+from sosmith.hdl.constant_banks import ConstantBanks
 from sosmith.hdl.reload import ReloadPort
+from sosmith.model.dataflow.status import Flag
 from sosmith.model.reload.registers import (
     ADDRESS_BITS,
     CRC,
@@ -529,3 +534,40 @@ def test_latency_is_as_stated() -> None:
 def test_impossible_sizes_are_refused(options: dict[str, int], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         ReloadPort(**options)
+
+
+@pytest.mark.parametrize("wrong", [1, 2])
+def test_a_core_loads_the_idle_bank_and_flags_what_the_wrong_one_gives(
+    wrong: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Bit 0 stands for the bank in use at first, bit 1 for the other."""
+
+    class Banks(ConstantBanks):
+        """Banks with wrong bits."""
+
+        def elaborate(self, platform: object) -> Module:
+            """Build them."""
+            m = super().elaborate(platform)
+            m.d.comb += self.wrong.eq(wrong)
+            return m
+
+    monkeypatch.setattr(core, "ConstantBanks", Banks)
+    dut: Any = core.Core(small_design(PLAIN, "df1_ef1").datapath, 1, 1, protect="detect")
+    m = Module()
+    m.domains.bench = ClockDomain()
+    m.submodules.core = dut
+    m.d.comb += [dut.aclk.eq(ClockSignal("bench")), dut.aresetn.eq(1), dut.m_axis_tready.eq(1)]
+
+    async def testbench(ctx: Any) -> None:
+        for name, value in {"awaddr": VERSION.address, "awvalid": 1, "wvalid": 1, "wstrb": 15}.items():
+            ctx.set(getattr(dut, f"s_axil_{name}"), value)
+        (response,) = await ctx.tick("bench").sample(dut.s_axil_bresp).until(dut.s_axil_bvalid)
+        assert response == OKAY
+        ctx.set(dut.s_axis_tvalid, 1)
+        (status,) = await ctx.tick("bench").sample(dut.m_axis_tuser).until(dut.m_axis_tvalid)
+        assert status >> Flag.FAULT == (wrong == 1)
+
+    simulator = Simulator(m)
+    simulator.add_clock(1e-6, domain="bench")
+    simulator.add_testbench(testbench)
+    simulator.run()
