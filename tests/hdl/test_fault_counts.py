@@ -4,9 +4,12 @@
 from typing import Any
 
 from amaranth.hdl import Shape
+from tests.formal.small import leaky
 from tests.hdl.axi_lite_bench import OKAY, SLVERR
 from tests.hdl.test_reload import Bench, benched, crc_of
 
+from sosmith.hdl.axi_lite import SerialSlave
+from sosmith.hdl.interleaved import InterleavedStage
 from sosmith.hdl.reload import ReloadPort
 from sosmith.hdl.serial_crc import SerialCrc
 from sosmith.model.reload.registers import CRC, DATA, FAULTS, VERSION
@@ -103,9 +106,11 @@ def test_an_unprotected_core_has_no_such_register() -> None:
     benched(there_is_none)
 
 
-def test_the_members_of_the_port_and_its_checksum_have_the_width_of_what_they_say() -> None:
-    widths = {"write_address": 2, "write_data": 32}
-    for made in (ReloadPort(3, protected=True), SerialCrc()):
+def test_members_have_the_width_of_what_they_say() -> None:
+    widths = {"write_address": 2, "write_data": 32, "o_index": 4, "o_word": 32, "o_count": 5}
+    widths |= {"i0": 2, "o0": 3, "i_channel": 2, "o_channel": 2, "clear_channel": 2, "uses": 2}
+    stage = InterleavedStage(leaky().stages[0], 3, protect="detect")
+    for made in (ReloadPort(3, protected=True), SerialCrc(), SerialSlave(6), stage):
         for name, member in made.signature.members.items():
             if not name.startswith("s_axil_"):
-                assert Shape.cast(member.shape).width == widths.get(name, 1)
+                assert Shape.cast(member.shape).width == widths.get(name, 1), name

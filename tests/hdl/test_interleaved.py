@@ -15,7 +15,7 @@ from sosmith.gen.architecture import Architecture
 from sosmith.hdl import interleaved
 from sosmith.hdl.check_bits import CheckBits, Read
 from sosmith.hdl.interleaved import InterleavedStage, schedule
-from sosmith.model.dataflow.graph import Graph, Op
+from sosmith.model.dataflow.graph import Graph, GraphBuilder, Op
 
 REALIZATIONS = ("df1_ef2", "df2t", "delta", "state_space", "normal", "lattice_wdf")
 
@@ -99,3 +99,13 @@ def test_what_is_found_wrong_goes_with_what_has_read_it(monkeypatch: pytest.Monk
     simulator.run()
     assert [clock for clock, (scrub, _) in enumerate(seen) if scrub] == [depth]
     assert [clock for clock, (_, fault) in enumerate(seen) if fault] == [2 * depth, 3 * depth]
+
+
+def test_the_sign_of_a_coefficient_counts_among_its_bits() -> None:
+    """With 19 bits it takes more than a block; the longer clock of its loop leaves time for additions elsewhere."""
+    g = GraphBuilder()
+    x, y1 = g.input("x", 0, -2, 1), g.delay("y1", 0, -8, 7)
+    ahead = g.scale(g.add(g.scale(x, (1 << 17) + 1, 17), x), (1 << 17) + 1, 17)
+    y = g.bound(g.floor(g.add(ahead, g.scale(y1, -(1 << 17), 18)), 0), -8, 7)
+    g.connect(y1, y)
+    assert schedule(g.build([y]), 2).depth == 2

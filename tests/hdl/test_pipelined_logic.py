@@ -35,7 +35,7 @@ def values(inputs: list[Signal], output: Callable[[], Value], given: list[tuple[
 
 @pytest.mark.parametrize("signed", [False, True])
 @pytest.mark.parametrize("bits", [3, 4, 6])
-@pytest.mark.parametrize(("low", "high"), [(-4, 3), (-3, 3), (-4, 2), (0, 3), (1, 3), (2, 3), (-1, 0)])
+@pytest.mark.parametrize(("low", "high"), [(-4, 3), (-5, 3), (-3, 3), (-4, 2), (0, 3), (1, 3), (2, 3), (-1, 0)])
 def test_limits_are_those_of_the_range(low: int, high: int, bits: int, signed: bool) -> None:
     operand = Signal(Shape(bits, signed=signed))
     codes = range(-(1 << bits - 1), 1 << bits - 1) if signed else range(1 << bits)

@@ -6,6 +6,7 @@ import sys
 import types
 import zlib
 from collections.abc import Awaitable, Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,7 @@ from sosmith.model.reload.registers import (
     CRC,
     DATA,
     DESIGN,
+    FAULTS,
     ID,
     LAYOUT,
     MAGIC,
@@ -552,7 +554,7 @@ def test_a_core_loads_the_idle_bank_and_flags_what_the_wrong_one_gives(
             return m
 
     monkeypatch.setattr(core, "ConstantBanks", Banks)
-    dut: Any = core.Core(small_design(PLAIN, "df1_ef1").datapath, 1, 1, protect="detect")
+    dut: Any = core.Core(replace(small_design(PLAIN, "df1_ef1").datapath, wear=((10, 20),)), 1, 1, protect="detect")
     m = Module()
     m.domains.bench = ClockDomain()
     m.submodules.core = dut
@@ -566,6 +568,11 @@ def test_a_core_loads_the_idle_bank_and_flags_what_the_wrong_one_gives(
         ctx.set(dut.s_axis_tvalid, 1)
         (status,) = await ctx.tick("bench").sample(dut.m_axis_tuser).until(dut.m_axis_tvalid)
         assert status >> Flag.FAULT == (wrong == 1)
+        for name, value in {"awvalid": 0, "bready": 1, "araddr": FAULTS.address, "arvalid": 1}.items():
+            ctx.set(getattr(dut, f"s_axil_{name}"), value)
+        (faults,) = await ctx.tick("bench").sample(dut.s_axil_rdata).until(dut.s_axil_rvalid)
+        assert FAULTS.field("CORRECTED").of(faults) == 0
+        assert (FAULTS.field("UNCORRECTED").of(faults) > 0) == (wrong == 1)
 
     simulator = Simulator(m)
     simulator.add_clock(1e-6, domain="bench")
