@@ -3,6 +3,7 @@
 ::
 
     host <--> pseudo-terminal <--> [damage] <--> board_main.cpp: bits on rx, tx <--> top of the board <--> core
+                                                                                     (or the gates of both)
 """
 
 from __future__ import annotations
@@ -18,10 +19,13 @@ from fractions import Fraction
 from pathlib import Path
 
 from sosmith.gen.core import CoreDesign
+from sosmith.gen.fpga.boards import Board
+from sosmith.gen.fpga.synthesis import synthesize
 from sosmith.gen.output.board_top import board_verilog, top_name
 from sosmith.model.errors import SpecificationError, ToolError
 from sosmith.model.link.protocol import MAX_BODY, WINDOWS
 from sosmith.model.text_files import write_files
+from sosmith.sim.gate_level import with_cell_models
 from sosmith.sim.simulators import find_simulator
 from sosmith.sim.verilated_model import LIBRARY_SECONDS, Builder
 
@@ -86,6 +90,7 @@ def build(
     *,
     clock: Fraction | None = None,
     baud: int = 1_000_000,
+    gates: Board | None = None,
     progress: Callable[[str], None] = lambda step: None,
 ) -> Netlist:
     """Build the board's top of a design in Verilator.
@@ -100,6 +105,8 @@ def build(
         Clock of the board in Hz; None for that of the specification.
     baud : int
         Bits per second on the line.
+    gates : Board or None
+        Simulate what Yosys makes of the top for this board, in the cells of its FPGA, instead of the SystemVerilog.
     progress : callable
         Called with the name of each step.
 
@@ -117,6 +124,10 @@ def build(
     place = folder.resolve()
     if len(str(place).split()) > 1:
         raise SpecificationError(f"the output folder must have no blanks in its path for Verilator, not {place}")
+    if gates is not None:
+        progress("synthesis")
+        # In hardware, flip-flops start as configured: this is all the reset that the top gets on some boards.
+        source = with_cell_models(synthesize(source, top, gates, folder / "gates"), scrambled=False)
     tool = find_simulator("verilator", place / "bin")
     program = place / top
     with (place / "build.log").open("w", encoding="utf-8") as log:

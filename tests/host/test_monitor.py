@@ -1,6 +1,7 @@
 """Watching a board: samples as they are due, and sessions that go on after the board was unplugged."""
 
 from collections.abc import Callable, Iterator
+from itertools import groupby
 from pathlib import Path
 
 import numpy as np
@@ -82,12 +83,17 @@ def test_after_a_loss_it_goes_on_with_the_next_sample_from_reset() -> None:
     assert next(event for event in events if isinstance(event, Lost)).reason.endswith("not: unplugged")
     assert clock.slept.count(RETRY) == 2
     assert lines[0].closed
-    for session in (1, 2):
-        parts = [event for event in received(events) if event.session == session]
+    _sessions_are_those_of_the_model(received(events))
+    assert sum(len(event.results.codes) for event in received(events)) == len(CODES)
+
+
+def _sessions_are_those_of_the_model(events: list[Received]) -> None:
+    """Each session starts from reset, with the sample after the last one whose result came."""
+    for _, session in groupby(events, lambda event: event.session):
+        parts = list(session)
         codes = CODES[parts[0].first : parts[-1].first + len(parts[-1].results.codes)]
         expected = filter_design().core.datapath.compute(codes[:, 0])
         assert np.array_equal(np.concatenate([part.results.codes for part in parts]), expected)
-    assert sum(len(event.results.codes) for event in received(events)) == len(CODES)
 
 
 def test_without_a_board_at_first_there_is_an_error() -> None:
@@ -122,7 +128,8 @@ def _until_the_end(events: Iterator[Event], unplug: Callable[[], None]) -> None:
             unplug()
 
 
-def test_a_port_that_is_unplugged_and_comes_back(tmp_path: Path) -> None:
+@pytest.mark.parametrize("times", [3, pytest.param(50, marks=pytest.mark.slow)])
+def test_a_port_that_is_unplugged_and_comes_back(times: int, tmp_path: Path) -> None:
     device, link = plain_device(), tmp_path / "port"
     plug = plugged(device, link)
     port = plug.__enter__()
@@ -131,13 +138,14 @@ def test_a_port_that_is_unplugged_and_comes_back(tmp_path: Path) -> None:
     losses = 0
     for event in events:
         told.append(event)
-        if isinstance(event, Received) and losses < 3:
+        if isinstance(event, Received) and losses < times:
             plug.__exit__(None, None, None)
             losses += 1
         elif isinstance(event, Lost):
             plug = plugged(device, link)
             plug.__enter__()
     plug.__exit__(None, None, None)
-    assert [type(event) for event in told].count(Lost) == 3
+    assert [type(event) for event in told].count(Lost) == times
     assert sum(len(event.results.codes) for event in received(told)) == len(CODES)
-    assert received(told)[-1].session == 4
+    assert received(told)[-1].session == times + 1
+    _sessions_are_those_of_the_model(received(told))

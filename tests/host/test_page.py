@@ -146,7 +146,9 @@ def test_the_page_in_a_browser(live: tuple[Readings, LivePage], tmp_path: Path) 
         for width in (375, 1200):
             tab.window(width, 800)
             assert tab.value("document.documentElement.scrollWidth - innerWidth") <= 0
+        tab.value("document.querySelector('#channels input').focus()")
         page.close()
         tab.until("document.getElementById('state').textContent === '1 alarm, the monitor has ended'")
+        assert tab.value("document.activeElement.type") == "checkbox"  # what has the focus keeps it
         assert tab.said == []
         assert tab.asked == [page.address, page.address.replace("http", "ws") + "live"]

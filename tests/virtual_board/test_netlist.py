@@ -6,17 +6,20 @@ import socket
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.gen.designs import example_design
+from tests.gen.designs import EXAMPLES
 from tests.host.lines import ScriptedLine
 from tests.interface.small import filter_design, instrument_design
 
 import sosmith
-from sosmith.gen.core import CoreDesign
+from sosmith.gen.core import CoreDesign, design_core
+from sosmith.gen.fpga.boards import find_board
+from sosmith.gen.specification.specification import load
 from sosmith.gen.stimuli import traces_for
 from sosmith.host.board import Board
 from sosmith.host.identity_check import check_files
@@ -160,16 +163,44 @@ def test_arbitrary_bytes_do_not_wedge_the_board(place: Path) -> None:
     ours.close()
 
 
+def locomotive(channels: int) -> CoreDesign:
+    """Design the instrument of the locomotive for a number of wheels."""
+    return design_core(replace(load(EXAMPLES / "flange_wear_locomotive.toml"), channels=channels))
+
+
 @pytest.mark.slow
-def test_the_locomotive_over_the_port(place: Path) -> None:
-    design = example_design("flange_wear_locomotive.toml")
+@pytest.mark.parametrize("channels", [1, 12])
+def test_the_locomotive_over_the_port(channels: int, place: Path) -> None:
+    design = locomotive(channels)
     traces = traces_for(design, "wear_ramp", seed=1, seconds=10_000 / float(design.spec.sample_rate))
     codes = np.stack([trace.codes for trace in traces], axis=1)
-    with running(netlist_of(design, place, 12)) as port, Board(port) as board:
+    folder = place / f"locomotive_{channels}"
+    with running(build(design, folder, clock=Fraction(12_000_000))) as port, Board(port) as board:
         results = board.run_codes(codes)
-    assert results.codes.shape == (10_000, 12)
+        faults, counters = board.faults, board.counters()
+    assert codes.shape == (10_000, channels, 2)
+    shown = codes[:, 0] if channels == 1 else codes
+    assert np.array_equal(results.codes, design.datapath.compute(shown))
+    assert np.array_equal(results.status, design.datapath.compute_status(shown))
+    assert (faults["damaged"], set(counters.values())) == (0, {0})
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("channels", "target"), [(1, "icebreaker"), (12, "icebreaker"), (1, "icestick")])
+def test_the_gates_of_the_whole_board(channels: int, target: str, place: Path) -> None:
+    """What Yosys makes of UART, protocol and core together, in the cells of the FPGA."""
+    design = locomotive(channels)
+    codes = codes_for(design, 300 // channels)
+    folder = place / f"gates_{channels}_{target}"
+    netlist = build(design, folder, clock=Fraction(12_000_000), gates=find_board(target))
+    assert "SB_DFF" in (folder / "gates" / "gates.v").read_text(encoding="utf-8")
+    with running(netlist) as port, Board(port) as board:
+        about, results = board.identity, board.run_codes(codes)
+        faults, counters = board.faults, board.counters()
+    assert (about.name, about.channels) == ("flange_wear_locomotive", channels)
     assert np.array_equal(results.codes, design.datapath.compute(codes))
     assert np.array_equal(results.status, design.datapath.compute_status(codes))
+    assert (faults["damaged"], set(counters.values())) == (0, {0})
 
 
 @pytest.mark.slow

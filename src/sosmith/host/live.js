@@ -22,6 +22,12 @@ function drawn(name, attributes, text = "") {
   return made;
 }
 
+// What stays the same is left alone: a screen reader would say it again.
+function say(id, text) {
+  const place = byId(id);
+  if (place.textContent !== text) place.textContent = text;
+}
+
 const spaced = (flag) => flag.replaceAll("_", " ");
 const fixed = (value, digits) => (value === null ? "–" : value.toFixed(digits).replace("-", "−"));
 const signed = (value, digits) => (value !== null && value > 0 ? "+" : "") + fixed(value, digits);
@@ -54,13 +60,11 @@ function verdict(picture, broken) {
   box.className = `verdict ${lost ? "wait" : count ? "fail" : "pass"}`;
   const alarms = count ? `${count.toLocaleString("en")} alarm${count > 1 ? "s" : ""}` : "No alarm";
   const states = { connected: "connected", lost: "board lost, waiting for it", ended: "the monitor has ended" };
-  byId("state").textContent = broken ? "No connection to the monitor" : `${alarms}, ${states[picture.state]}`;
+  say("state", broken ? "No connection to the monitor" : `${alarms}, ${states[picture.state]}`);
   const last = picture && picture.newest[0];
-  byId("detail").textContent = broken
-    ? "Trying again."
-    : last
-      ? `Newest: ${spaced(last[0])} of channel ${last[1]} at ${clock(last[2])}, ${withUnit(fixed(last[3], facts.digits), facts.unit)}.`
-      : "Values are as the board returns them.";
+  const newestAlarm = () =>
+    `Newest: ${spaced(last[0])} of channel ${last[1]} at ${clock(last[2])}, ${withUnit(fixed(last[3], facts.digits), facts.unit)}.`;
+  say("detail", broken ? "Trying again." : last ? newestAlarm() : "Values are as the board returns them.");
   document.title = `${count ? `(${count}) ` : ""}${facts.name}, live`;
 }
 
@@ -125,7 +129,9 @@ function channels(picture) {
     if (facts.initial) cells.push(fixed(wear, 3));
     cells.push(signed(rate, 3));
     const made = cells.map((text) => element("td", text, { class: "number" }));
-    body.rows[k].replaceChildren(body.rows[k].cells[0], ...made, badges(flags));
+    const row = body.rows[k];
+    while (row.cells.length > 1) row.deleteCell(-1); // the first one stays, as it may have the focus
+    row.append(...made, badges(flags));
   });
 }
 
