@@ -44,7 +44,7 @@ BY_CI = {"./run demo", "./run test"}
 """Lines that other tests and the set-up on a fresh machine stand for."""
 NEEDS_SIMULATION = ("./run simulate ", "./run compare ")
 """Beginnings of the lines that only the longer test carries out."""
-NEEDS_A_BOARD = re.compile(r"\./run (board|monitor|stream) .*|\./run simulate .* --port .*")
+NEEDS_A_BOARD = re.compile(r"\./run (board|monitor|stream) .*|\./run simulate .* --port .*|\./run build .* --program")
 """Lines that run until they are interrupted, or whose port is only known then; the tests of these commands run them."""
 
 _FIELDS = re.compile(r"(?<=<!-- fields -->\n).*?(?=<!-- end of fields -->)", re.DOTALL)

@@ -1,0 +1,157 @@
+"""Builds bitstreams of the examples and records what they take of each board: `python -m benchmarks.boards`.
+
+What was built goes to benchmarks/boards.json as it comes, and into the tables of docs/boards.md; what is there already
+is left out. `--again` builds everything anew. `--page` builds nothing: it only writes the tables again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import tempfile
+import tomllib
+from collections.abc import Sequence
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import sosmith
+from sosmith.gen.fpga.boards import BOARDS, BUILDABLE, RATE
+from sosmith.hdl.bus.link import LEDS
+
+ROOT = Path(__file__).resolve().parent.parent
+RECORD = ROOT / "benchmarks" / "boards.json"
+DOCUMENT = ROOT / "docs" / "boards.md"
+DESIGNS = (
+    ("flange_wear_locomotive", 1),
+    ("flange_wear_locomotive", 12),
+    ("flange_wear_bench", 1),
+    ("audio_lowpass", 1),
+)
+"""Examples and their numbers of channels."""
+
+MEASURED = ("icebreaker", "icestick", "ice40_hx8k_b_evn", "ulx3s_25f", "tang_nano_9k")
+"""Boards to build for; the other ones have FPGAs of the same families, which are as large or larger."""
+
+_CELLS = {
+    "ice40": ("ICESTORM_LC", "ICESTORM_DSP", "ICESTORM_RAM"),
+    "ecp5": ("TRELLIS_COMB", "MULT18X18D", "DP16KD"),
+    "gowin": ("LUT4", None, "BSRAM"),
+}
+"""Kinds of logic, multipliers and block RAM in the placer's words, by family."""
+
+PARTS = {
+    name: re.compile(rf"(?<=<!-- {name} -->\n).*?(?=<!-- end of {name} -->)", re.DOTALL) for name in ("boards", "built")
+}
+
+
+def built(example: str, channels: int, board: str) -> dict[str, Any]:
+    """Build a bitstream; return what is recorded of it."""
+    told = {"example": example, "channels": channels, "board": board}
+    spec = tomllib.loads((ROOT / "examples" / f"{example}.toml").read_text(encoding="utf-8"))
+    with tempfile.TemporaryDirectory() as folder:
+        try:
+            made = sosmith.design({**spec, "channels": channels}, board=board).build(board, folder=folder)
+        except sosmith.ShortfallError as error:
+            return {**told, "shortfall": str(error)}
+    summary = made.summary
+    kept = ("architecture", "clock_hz", "line_rate_baud", "samples_per_second", "clocks", "passed", "tools", "design")
+    used = {kind: cells for kind, cells in summary["utilisation"].items() if cells["used"]}
+    return {**told, **{key: summary[key] for key in kept}, "utilisation": used, "rate": spec["sample_rate"]}
+
+
+def board_table() -> str:
+    """Return the boards and their pins, as the platforms know them, in Markdown."""
+    rows = [
+        "| board | `--board` | FPGA | clock, MHz | rx, tx of the serial line | LEDs | highest rate, Mbaud | loader |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    for name in BUILDABLE:
+        board = BOARDS[name]
+        assert board.platform is not None
+        module, _, kind = board.platform.partition(":")
+        resources = {(one.name, one.number): one for one in getattr(import_module(module), kind).resources}
+        line = {part.name: part.ios[0].names[0] for part in resources["uart", 0].ios if hasattr(part, "ios")}
+        leds = [resources["led", k].ios[0].names[0] for k in range(LEDS) if ("led", k) in resources]
+        cells = (
+            board.title,
+            f"`{name}`",
+            board.device.title,
+            f"{board.clock / 1e6:g}",
+            f"{line['rx']}, {line['tx']}",
+            ", ".join(leds),
+            f"{board.clock / 4e6:g}",
+            f"`openFPGALoader -b {board.loader}`",
+        )
+        rows.append(f"| {' | '.join(cells)} |")
+    return "\n".join(rows) + "\n"
+
+
+def built_table(record: Sequence[dict[str, Any]]) -> str:
+    """Return what the designs take of the boards, in Markdown."""
+    rows = [
+        "| example | channels | board | architecture | logic | multipliers | block RAM | fmax, MHz | of which needed | samples/s a channel | of which needed |",  # noqa: E501
+        "|---|---|---|---|---|---|---|---|---|---|---|",
+    ]
+    for row in record:
+        board = BOARDS[row["board"]]
+        head = (row["example"], str(row["channels"]), board.title)
+        if "shortfall" in row:
+            rows.append(
+                f"| {' | '.join(head)} | does not fit: {row['shortfall'].partition(', but: ')[2]} | | | | | | | |"
+            )
+            continue
+        cells = [_share(row["utilisation"].get(kind)) for kind in _CELLS[board.device.family]]
+        slowest = min(row["clocks"], key=lambda clock: clock["achieved_mhz"] / clock["wanted_mhz"])
+        timing = (f"{slowest['achieved_mhz']:.1f}", f"{slowest['wanted_mhz']:g}")
+        rates = (f"{row['samples_per_second']:,.0f}", f"{row['rate']:,.0f}")
+        rows.append(f"| {' | '.join((*head, row['architecture'], *cells, *timing, *rates))} |")
+    tools = sorted({f"{name} {version}" for row in record for name, version in row.get("tools", {}).items()})
+    return "\n".join(rows) + f"\n\nTools: {', '.join(tools)}. Line rate: {RATE:,} baud.\n"
+
+
+def _share(cells: dict[str, int] | None) -> str:
+    return "0" if cells is None else f"{cells['used']:,} of {cells['available']:,}"
+
+
+def read() -> list[dict[str, Any]]:
+    """Read the record, in the order of the tables."""
+    rows = json.loads(RECORD.read_text(encoding="utf-8")) if RECORD.exists() else []
+    order = {
+        (*made, board): k for k, (made, board) in enumerate((made, board) for made in DESIGNS for board in MEASURED)
+    }
+    return sorted(rows, key=lambda row: order[row["example"], row["channels"], row["board"]])
+
+
+def write(rows: Sequence[dict[str, Any]]) -> None:
+    """Write the record."""
+    RECORD.write_text("".join(["[\n", ",\n".join(json.dumps(row) for row in rows), "\n]\n"]), encoding="utf-8")
+
+
+def renew() -> None:
+    """Write the tables of the document."""
+    text = DOCUMENT.read_text(encoding="utf-8")
+    text = PARTS["boards"].sub(lambda _: board_table(), text)
+    DOCUMENT.write_text(PARTS["built"].sub(lambda _: built_table(read()), text), encoding="utf-8")
+
+
+def main() -> None:
+    """Build what is asked for."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--again", action="store_true", help="build everything anew")
+    parser.add_argument("--page", action="store_true", help="build nothing")
+    asked = parser.parse_args()
+    rows = [] if asked.again else read()
+    there = {(row["example"], row["channels"], row["board"]) for row in rows}
+    for example, channels in () if asked.page else DESIGNS:
+        for board in MEASURED:
+            if (example, channels, board) not in there:
+                print(f"{example}, {channels} channels, {board}", flush=True)
+                rows.append(built(example, channels, board))
+                write(rows)
+    renew()
+
+
+if __name__ == "__main__":
+    main()

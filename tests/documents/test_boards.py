@@ -1,0 +1,35 @@
+"""The page of the boards: its tables are those of the platforms and of the record; the examples fit where they must."""
+
+from benchmarks import boards
+
+from sosmith.gen.fpga.boards import BOARDS
+
+RECORD = boards.read()
+
+
+def test_the_tables_are_up_to_date() -> None:
+    text = boards.DOCUMENT.read_text(encoding="utf-8")
+    assert boards.PARTS["boards"].findall(text) == [boards.board_table()]
+    assert boards.PARTS["built"].findall(text) == [boards.built_table(RECORD)]
+
+
+def test_every_build_that_is_listed_is_recorded_once() -> None:
+    recorded = [(row["example"], row["channels"], row["board"]) for row in RECORD]
+    assert recorded == [(*design, board) for design in boards.DESIGNS for board in boards.MEASURED]
+
+
+def test_each_example_closes_timing_on_four_boards_of_three_families() -> None:
+    for example, channels in boards.DESIGNS:
+        closed = [
+            row["board"]
+            for row in RECORD
+            if (row["example"], row["channels"]) == (example, channels) and row.get("passed")
+        ]
+        assert len(closed) >= 4
+        assert len({BOARDS[board].device.family for board in closed}) == 3
+
+
+def test_twelve_channels_fit_the_up5k_and_one_the_hx1k() -> None:
+    passed = {(row["example"], row["channels"], row["board"]) for row in RECORD if row.get("passed")}
+    assert ("flange_wear_locomotive", 12, "icebreaker") in passed
+    assert ("flange_wear_locomotive", 1, "icestick") in passed
