@@ -146,22 +146,22 @@ def test_only_what_has_changed_is_synthesized_again(monkeypatch: pytest.MonkeyPa
     """One core, recorded once as it is, once from another text with fewer cells."""
     core, cells = cost.CORES[0], {"LUT4": 110, "TRELLIS_FF": 50}
     area = {"luts": 100, "all_luts": 100, "flip_flops": 50, "multipliers": 0, "rams": 0}
-    entry = {"source": cost.mark("text"), "targets": {"ecp5": {"area": area}}}
+    entry = {"targets": {"ecp5": {"source": cost.mark("text"), "area": area}}}
     record = tmp_path / "cost.json"
     record.write_text(json.dumps({"tools": ["yosys"], "cores": {core.key: entry}}), encoding="utf-8")
     monkeypatch.setattr(cost, "RECORD", record)
     monkeypatch.setattr(cost, "document", lambda _: {})
     monkeypatch.setattr(cost, "version", lambda _: "yosys")
     monkeypatch.setattr(cost, "synthesize", lambda *_: cells)
-    monkeypatch.setattr(cost, "verilog", lambda _: "text")
+    monkeypatch.setattr(cost, "verilog", lambda *_: "text")
     assert cost.check() == []
     grown = [
         f"{core.label} on ECP5 LFE5U-25F, speed 6: {figure} must be at most 105, 5 % above the recorded 100, not 110"
         for figure in ("luts", "all_luts")
     ]
-    monkeypatch.setattr(cost, "verilog", lambda _: "another text")
+    monkeypatch.setattr(cost, "verilog", lambda *_: "another text")
     assert cost.check() == grown
-    monkeypatch.setattr(cost, "verilog", lambda _: "text")
+    monkeypatch.setattr(cost, "verilog", lambda *_: "text")
     monkeypatch.setattr(cost, "version", lambda _: "a newer yosys")
     assert cost.check() == grown
 
