@@ -1,6 +1,7 @@
 """Sums of magnitudes from responses in pieces, against approximate inverses; and what must not pass."""
 
 from fractions import Fraction
+from math import prod
 
 import pytest
 from flint import fmpq, fmpq_poly
@@ -16,6 +17,7 @@ DENOMINATORS = {
     "a pair": SLOW,
     "the same pair three times": SLOW**3,
     "every other sample is zero": fmpq_poly([1, 0, fmpq(31, 32)]),
+    "twelve pairs close to each other": prod(fmpq_poly([1, fmpq(-499, 256), fmpq(975 + k, 1024)]) for k in range(12)),
     "slow and fast": SLOW * fmpq_poly([1, fmpq(-1, 16)]),
 }
 NUMERATORS = (
