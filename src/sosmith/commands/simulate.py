@@ -36,7 +36,8 @@ if TYPE_CHECKING:
 
 
 DEMO_SECONDS = 15
-"""About how long the demo takes on two cores, without Verilator's library."""
+"""About how long the demo takes without Verilator's library, rounded up: `python -m benchmarks.start_up` measures both
+the first and the second one."""
 
 
 class _Share(click.FloatRange):
