@@ -158,6 +158,14 @@ def test_the_same_section_twice() -> None:
     proven(plain(with_rows(ideal, ideal.rows * 3)))
 
 
+def test_a_pole_of_high_order_is_enclosed() -> None:
+    """Each time that it occurs, its size takes further bits."""
+    made = inverse(fmpq_poly([1, fmpq(-127, 128)]) ** 8)
+    assert made.error <= Fraction(1, 2**136)
+    exact = Fraction(128**8)
+    assert abs(sum(map(int, made.samples.coeffs())) - exact * 2**made.bits) <= made.error * 2**made.bits
+
+
 def test_a_polynomial_of_higher_order() -> None:
     design = example_design(BENCH, core="calibration")
     polynomial = Polynomial.from_numbers([["0.5", "-0.01", "0.0002"], ["0.3", "0.001"], ["0.02"], ["0.003", "0.00001"]])

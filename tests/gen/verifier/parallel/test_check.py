@@ -162,6 +162,11 @@ BREAKS = {
         "assign take2 = advance & valid2;\n  assign take2 = advance;",
         r"every bit of section\d\.take2 must be driven once, not twice",
     ),
+    "a source": (
+        r"\.i_valid\(s_axis_tvalid\)",
+        ".i_valid(1'h1)",
+        r"what section0\.valid1 takes over must be one register, not logic of 0 signals",
+    ),
     "a loop": (
         r"assign take2 = advance & valid2;",
         "assign take2 = take2 & valid2;",
