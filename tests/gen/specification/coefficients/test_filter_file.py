@@ -134,6 +134,25 @@ def test_signs_are_certain_where_poles_are_complex(kind: str, tmp_path: Path) ->
         assert isinstance(content, TransferFunction)
 
 
+@pytest.mark.parametrize("name", ["pyfda.sos", "pyfda.cmsis", "pyfda.npz", "pyfda.json"])
+def test_a_file_that_pyfda_wrote_has_the_response_that_pyfda_states(name: str) -> None:
+    folder = Path(__file__).with_name("files")
+    content = read_filter_file(folder / name)
+    assert isinstance(content, StatedSections)
+    found = settled(content)
+    assert found.certain
+    assert found.signs == ("negated" if name == "pyfda.cmsis" else "scipy")
+    stated = json.loads((folder / "pyfda.json").read_text())
+    b, a = stated["ba"]
+    frequencies = np.linspace(0, np.pi, 200)
+    _, response = scipy.signal.freqz_sos(np.array([[float(v) for v in row] for row in found.rows]), frequencies)
+    # pyfda multiplies b and a out in doubles
+    np.testing.assert_allclose(response, scipy.signal.freqz(b, a, frequencies)[1], rtol=0, atol=1e-9)
+    loss = -20 * np.log10(np.abs(response))
+    assert loss[frequencies <= 2 * np.pi * stated["F_PB"]].max() < -20 * np.log10(1 - stated["A_PB"]) + 1e-9
+    assert loss[frequencies >= 2 * np.pi * stated["F_SB"]].min() > -20 * np.log10(stated["A_SB"]) - 1e-9
+
+
 def test_numbers_of_a_text_stay_what_they_are(tmp_path: Path) -> None:
     content = read(tmp_path, "f.csv", "0.1,0.2,0.1,1,-0.3000000000000000000001,0.2\n")
     assert isinstance(content, StatedSections)
