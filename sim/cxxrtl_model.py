@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from sosmith.gen.fpga.yosys import run_yosys, share_folder, yosys_version
-from sosmith.gen.output.header import without_comments
+from sosmith.gen.output.comments import without_comments
 from sosmith.sim.build_cache import BuildCache, cache_folder, key_of
 
 USE = "simulation in CXXRTL"

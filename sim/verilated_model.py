@@ -20,7 +20,7 @@ from typing import IO
 
 import cocotb_tools.config
 
-from sosmith.gen.output.header import without_comments
+from sosmith.gen.output.comments import without_comments
 from sosmith.sim.build_cache import BuildCache, cache_folder, key_of
 
 LIBRARY_SECONDS = 20

@@ -15,7 +15,7 @@ from sosmith.gen.core import CoreDesign
 from sosmith.gen.fpga.bitstream import SEED, Bitstream, build, fingerprint
 from sosmith.gen.fpga.boards import RATE, Board
 from sosmith.gen.output.board_top import board_verilog, top_name
-from sosmith.gen.output.verilog import to_rtlil, to_verilog
+from sosmith.gen.output.verilog import core_verilog
 from sosmith.gen.version import __version__
 from sosmith.model.text_files import to_json, write_contents
 
@@ -187,5 +187,5 @@ def board_cost(
 def _texts(design: CoreDesign, board: Board, rate: int, progress: Callable[[str], None]) -> tuple[str, str]:
     """Return the SystemVerilog of the core, and of the board's top."""
     progress("SystemVerilog")
-    core = to_verilog(to_rtlil(design.architecture.component(), design.datapath.name))
+    core = core_verilog(design)
     return core, board_verilog(design, clock=Fraction(board.clock), rate=rate, core=core)

@@ -7,7 +7,7 @@ from fractions import Fraction
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.fpga.boards import RATE
 from sosmith.gen.output.identity import identity
-from sosmith.gen.output.verilog import to_rtlil, to_verilog
+from sosmith.gen.output.verilog import core_verilog, to_rtlil, to_verilog
 from sosmith.hdl.boards.board_top import BoardTop
 from sosmith.hdl.bus.command_engine import MAX_CHANNELS, MAX_SAMPLE_BYTES
 from sosmith.hdl.bus.uart import MIN_CLOCKS
@@ -51,7 +51,7 @@ def board_top(design: CoreDesign, *, clock: Fraction, rate: int = RATE, core: st
     sample_bytes = sum(port.bytes for port in design.datapath.inputs)
     if sample_bytes > MAX_SAMPLE_BYTES:
         raise SpecificationError(f"a sample must have at most {MAX_SAMPLE_BYTES} bytes over a link, not {sample_bytes}")
-    text = core or to_verilog(to_rtlil(design.architecture.component(), design.datapath.name))
+    text = core or core_verilog(design)
     memory = identity(design, text, baud=rate, clock=float(clock)).memory
     return BoardTop(design.architecture.component(), memory, ratio=clock / rate, channels=design.spec.channels)
 

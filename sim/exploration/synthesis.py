@@ -11,8 +11,8 @@ from typing import Any
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.fpga.boards import Board
 from sosmith.gen.fpga.synthesis import Netlist, synthesize
+from sosmith.gen.output.comments import without_comments
 from sosmith.gen.output.generate import generate
-from sosmith.gen.output.header import without_comments
 from sosmith.gen.report.provenance import hardware_cost
 from sosmith.sim.build_cache import BuildCache, cache_folder, key_of
 

@@ -83,7 +83,9 @@ _COMMANDS = {
         "stream", "stream_command", "Send the samples of TRACE.csv to the board at PORT, and write its results."
     ),
     "monitor": _Command(
-        "monitor", "monitor_command", "Watch the board at PORT: live values, wear, rate and flags in the terminal."
+        "monitor",
+        "monitor_command",
+        "Watch the board at PORT: live values, wear, rate and flags in the terminal, or in a browser.",
     ),
     "compare": _Command("compare", "compare_command", "Compare accuracy reports side by side."),
     "explore": _Command(

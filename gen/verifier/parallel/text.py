@@ -7,6 +7,7 @@ The subset is what the generator writes, and each construct means what IEEE 1800
       assign target = expression;
       always_ff @(posedge clock) if (..) register <= expression; else ..
       initial begin name[0] = 4'h0; .. end
+      initial begin : label integer i; for (i = 0; i < 8; i = i + 1) name[i] = 4'h0; .. end
       MODULE instance (.port(expression), ..);
     endmodule
 
@@ -149,6 +150,7 @@ _TOKEN = re.compile(
     re.VERBOSE | re.DOTALL,
 )
 _NUMBER = re.compile(r"(\d+)'(?:h([0-9a-f]+)|d(\d+)|b([01]+))")
+_MAX_WORDS = 1 << 24
 _BINARY = ("+", "-", "*", "&", "|", "^", "==", "!=", "<", ">", "<=", ">=")
 _UNARY = ("~", "!", "&", "|")
 
@@ -234,8 +236,15 @@ class _Reader:
             module.clocked.append((clock, self._statements()))
         elif tokens.take("initial"):
             tokens.expect("begin")
+            if tokens.take(":"):
+                tokens.name()
+                for token in ("integer", "i", ";"):
+                    tokens.expect(token)
             while not tokens.take("end"):
-                self._word()
+                if tokens.take("for"):
+                    self._words()
+                else:
+                    self._word()
         else:
             self._instance()
 
@@ -268,6 +277,30 @@ class _Reader:
         self._tokens.expect(":")
         self._tokens.expect("0")
         self._tokens.expect("]")
+
+    def _words(self) -> None:
+        tokens = self._tokens
+
+        def expect(*words: str) -> None:
+            for token in words:
+                tokens.expect(token)
+
+        expect("(", "i", "=")
+        first = tokens.integer()
+        expect(";", "i", "<")
+        end = tokens.integer()
+        expect(";", "i", "=", "i", "+")
+        require(tokens.integer() == 1, "a loop over words must go in steps of 1")
+        expect(")")
+        name = tokens.name()
+        expect("[", "i", "]", "=")
+        value = self._number().value
+        expect(";")
+        require(end - first <= _MAX_WORDS, f"a loop must be over at most {_MAX_WORDS} words, not {end - first}")
+        held = self._module.held.setdefault(name, {})
+        for address in range(first, end):
+            require(address not in held, f"word {address} of {name} must be given once, not twice")
+            held[address] = value
 
     def _word(self) -> None:
         tokens = self._tokens

@@ -17,7 +17,7 @@ with the bits of `s_axis_tdata` as unknowns.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import takewhile
@@ -193,16 +193,31 @@ def read_program(text: str) -> ProgramText:
 
 _MEMORY = re.compile(r"^ *reg (?:\[(\d+):0\] )?(\S+) *\[(\d+):0\];$", re.MULTILINE)
 _HELD = re.compile(r"^ *(\S+?) *\[(\d+)\] = (\d+'\w+);$", re.MULTILINE)
+_LOOP = re.compile(r"^ *for \(i = (\d+); i < (\d+); i = i \+ 1\) (\S+?) *\[i\] = (\d+'\w+);$", re.MULTILINE)
 _REGISTER = re.compile(r"^ *(?:output )?reg (?:\[(\d+):0\] )?(\S+) *(?:=.*)?;$", re.MULTILINE)
+
+
+_MAX_WORDS = 1 << 24
+
+
+def _words(text: str) -> Iterator[tuple[int, int, str, int]]:
+    """Yield the first address, the one behind the last, the memory and the value of words that are given together."""
+    for name, address, value in _HELD.findall(text):
+        yield int(address), int(address) + 1, name, _number(value)
+    for first, end, name, value in _LOOP.findall(text):
+        count = int(end) - int(first)
+        require(count <= _MAX_WORDS, f"a loop must be over at most {_MAX_WORDS} words, not {count}")
+        yield int(first), int(end), name, _number(value)
 
 
 def _memories(text: str) -> dict[str, tuple[list[int], int]]:
     """Return the contents and the width of each memory."""
     contents: dict[str, dict[int, int]] = {}
-    for name, address, value in _HELD.findall(text):
+    for first, end, name, value in _words(text):
         held = contents.setdefault(name.lstrip("\\"), {})
-        require(int(address) not in held, f"word {address} of {name} must be given once, not twice")
-        held[int(address)] = _number(value)
+        for address in range(first, end):
+            require(address not in held, f"word {address} of {name} must be given once, not twice")
+            held[address] = value
     found = {}
     for top, name, last in _MEMORY.findall(text):
         plain, depth, width = name.lstrip("\\"), int(last) + 1, int(top or 0) + 1

@@ -9,9 +9,10 @@ import pytest
 from tests.gen.designs import example_design, parallel_design
 
 from sosmith.gen.core import CoreDesign
+from sosmith.gen.output.comments import without_comments
 from sosmith.gen.output.core_facts import core_facts
 from sosmith.gen.output.generate import generated
-from sosmith.gen.output.header import with_comments, without_comments
+from sosmith.gen.output.header import with_comments
 from sosmith.gen.output.verilog import to_rtlil, to_verilog
 
 CASES = ["flange_wear_bench.toml", "audio_lowpass.toml"]

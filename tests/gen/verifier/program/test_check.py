@@ -163,7 +163,9 @@ def test_an_opcode_that_does_not_exist() -> None:
 
 def test_a_word_that_is_not_cleared() -> None:
     core = small(PLAIN)
-    text = re.sub(r"words0\[2\] = 16'h0000;", "words0[2] = 16'h0005;", core.text)
+    first = "".join(f"    words0[{address}] = 16'h{value:04x};\n" for address, value in enumerate((0, 0, 5)))
+    text, count = re.subn(r"( {4}for \(i = )0(; i < \d+; i = i \+ 1\) words0\[i\] = )", rf"{first}\g<1>3\2", core.text)
+    assert count == 1
     with pytest.raises(RejectedError, match=r"^word 2 must hold 0 before the first sample, not 5$"):
         core.check(text)
 

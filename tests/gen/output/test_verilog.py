@@ -1,0 +1,73 @@
+"""The SystemVerilog text: equal words of a memory as a loop, read back as the same words."""
+
+import re
+
+import pytest
+from amaranth.hdl import Elaboratable, Module, unsigned
+from amaranth.lib.memory import Memory
+from amaranth.lib.wiring import Component, In, Out
+
+from sosmith.gen.output.verilog import to_rtlil, to_verilog
+from sosmith.gen.verifier.graph import RejectedError
+from sosmith.gen.verifier.parallel.text import read_modules
+from sosmith.gen.verifier.program.text import _memories
+
+WORDS = [3] * 2 + [7] * 20 + [1] + [0] * 30 + [2] * 7
+"""Runs of every kind: short ones, long ones, a single word."""
+
+
+class Table(Component):
+    """A memory that is read."""
+
+    address: In(6)
+    word: Out(unsigned(4))
+
+    def elaborate(self, platform: object) -> Elaboratable:
+        m = Module()
+        m.submodules.table = table = Memory(shape=4, depth=len(WORDS), init=WORDS)
+        port = table.read_port()
+        m.d.comb += [port.addr.eq(self.address), self.word.eq(port.data)]
+        return m
+
+
+@pytest.fixture(scope="module")
+def text() -> str:
+    return to_verilog(to_rtlil(Table(), "top"))
+
+
+def test_long_runs_are_loops(text: str) -> None:
+    assert len(re.findall(r"^ +for ", text, re.MULTILINE)) == 2
+    assert len(re.findall(r"^ +\S+ ?\[\d+\] = ", text, re.MULTILINE)) == 2 + 1 + 7
+
+
+def test_both_readers_find_the_same_words(text: str) -> None:
+    ((found, bits),) = _memories(text).values()
+    assert (found, bits) == (WORDS, 4)
+    (held,) = (module.held for module in read_modules(text).values() if module.held)
+    assert [words[address] for words in held.values() for address in sorted(words)] == WORDS
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "message"),
+    [
+        ("for (i = 2; i < 22;", "for (i = 2; i < 23;", r"word 22 of \S+ must be given once, not twice"),
+        (
+            "for (i = 2; i < 22;",
+            "for (i = 2; i < 99999999;",
+            "a loop must be over at most 16777216 words, not 99999997",
+        ),
+    ],
+)
+def test_a_wrong_loop_is_rejected(right: str, wrong: str, message: str, text: str) -> None:
+    assert right in text
+    for read in (_memories, read_modules):
+        with pytest.raises(RejectedError, match=f"^{message}$"):
+            read(text.replace(right, wrong))
+
+
+def test_a_loop_in_other_steps_is_no_loop_to_either(text: str) -> None:
+    other = text.replace("i = i + 1", "i = i + 2")
+    with pytest.raises(RejectedError, match=r"^a loop over words must go in steps of 1$"):
+        read_modules(other)
+    with pytest.raises(RejectedError, match=r"^all 60 words of \w+ must be given, not 10$"):
+        _memories(other)
