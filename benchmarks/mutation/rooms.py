@@ -84,6 +84,7 @@ ROOMS = {
             "tests/gen/verifier/specified",
             "tests/gen/verifier/test_certificate.py",
             "tests/gen/verifier/test_generated_files.py",
+            "tests/gen/verifier/test_piecewise.py",
         ),
         without=(
             f"{_CERTIFICATE}test_examples_in_every_realization[audio",

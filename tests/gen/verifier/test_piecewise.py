@@ -62,9 +62,18 @@ def test_responses_that_do_not_decay_are_refused(denominator: list[fmpq]) -> Non
         Pieces(fmpq_poly(denominator))
 
 
-def test_a_response_too_long_is_refused() -> None:
+@pytest.mark.parametrize("distance", [18, 24])
+def test_a_response_too_long_is_refused(distance: int) -> None:
     with pytest.raises(UndecidedError, match=r"^a response does not die away within 16777216 samples$"):
-        Pieces(fmpq_poly([1, -1 + fmpq(1, 2**24)]))
+        Pieces(fmpq_poly([1, -1 + fmpq(1, 2**distance)]))
+
+
+def test_a_response_of_the_longest_length_is_summed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In 32 pieces of 512 samples, which are as many as there may be."""
+    monkeypatch.setattr(piecewise, "_LONGEST", 1 << 14)
+    pole = fmpq(round(2 ** (40 - 114 / ((1 << 14) - 30))), 2**40)
+    exact = 1 / (1 - Fraction(int(pole.p), int(pole.q)))
+    assert exact <= Pieces(fmpq_poly([1, -pole])).norm(fmpq_poly([1])) < exact + Fraction(1, 2**80)
 
 
 def test_a_coefficient_that_is_no_binary_fraction_is_refused() -> None:
