@@ -160,7 +160,7 @@ def refused(outcome: Outcome, message: str, status: int = 2) -> None:
 # Help and usage.
 
 NEEDED = {
-    "init": ("[FILE]", "flange_wear.toml", "--force"),
+    "init": ("[FILE]", "flange_wear.toml", "--example NAME", "--list", "--force"),
     "import": ("FILE", "--sample-rate", "--signs", "--range", "signs of a1 and a2"),
     "design": ("SPEC", "--core", "--realization", "--widths-of", "--plot", "--json"),
     "generate": ("SPEC", "SystemVerilog", "-o, --output", "build/<name>"),
@@ -534,6 +534,14 @@ def test_init_writes_the_example_and_keeps_what_is_there(sosmith: Command) -> No
     assert Path("new/my.toml").read_text(encoding="utf-8") == "mine"
     assert sosmith("init", "new/my.toml", "--force").status == 0
     assert Path("new/my.toml").read_text(encoding="utf-8") == example()
+
+
+def test_init_writes_any_example(sosmith: Command) -> None:
+    assert "\nrecipes/notch " in sosmith("init", "--list").stdout
+    outcome = sosmith("init", "--example", "recipes/equalizer")
+    assert outcome.messages == ["sosmith: wrote equalizer.toml and equalizer.txt; next: sosmith design equalizer.toml"]
+    assert sosmith("init", "--example", "scenarios", "days").messages[0].endswith(" files to days")
+    assert Path("days/specifications/flange_wear_tread_braking.toml").exists()
 
 
 def test_design_as_tables_and_as_json(sosmith: Command) -> None:

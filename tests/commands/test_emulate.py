@@ -77,7 +77,7 @@ def test_measurements_that_the_store_takes(folder: Path) -> None:
 def test_the_list_tells_about_files(folder: Path) -> None:
     listed = run("emulate", "spec.toml")
     assert "bench_43_50" in listed.stdout
-    assert "a scenario file can be given instead of a name: see examples/scenarios/" in listed.stderr
+    assert "a scenario file can be given instead of a name: sosmith init --list names examples" in listed.stderr
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from os.path import commonpath
 from pathlib import Path
 
 import click
@@ -9,26 +10,46 @@ import click
 from sosmith.commands.options import BOARD, CORE, REALIZATION, SPEC, WIDTHS_OF, default_folder
 from sosmith.gen.fpga.boards import BUILDABLE
 from sosmith.gen.picture import format_of
+from sosmith.gen.specification.examples import DEFAULT, contents, titles
 from sosmith.model.errors import SpecificationError
-from sosmith.model.text_files import write_files
+from sosmith.model.text_files import write_contents
 from sosmith.terminal import JSON_OPTION, note, output_option, print_json, show_progress
 
 
 @click.command()
-@click.argument("file", type=click.Path(path_type=Path), default=Path("flange_wear.toml"))
+@click.argument("file", required=False, type=click.Path(path_type=Path))
+@click.option(
+    "--example", "named", metavar="NAME", default=DEFAULT, show_default=True, help="Which example; --list names them."
+)
+@click.option("--list", "listed", is_flag=True, help="List the examples, and write nothing.")
 @click.option("--force", is_flag=True, help="Overwrite an existing file.")
-def init(file: Path, force: bool) -> None:
+def init(file: Path | None, named: str, listed: bool, force: bool) -> None:
     """Write a commented example specification to FILE (default: flange_wear.toml).
+
+    With --example, the files of that example: a specification with the files that it names, or a folder. The folder
+    "all" has everything that the documentation calls examples/.
 
     \b
         sosmith init my.toml
+        sosmith init --list
+        sosmith init --example recipes/equalizer
     """
-    if file.exists() and not force:
-        raise SpecificationError(f"{file}: the file must not exist yet; use --force to overwrite it")
-    from sosmith.gen.specification.specification import example
-
-    write_files(file.parent, {file.name: example()})
-    note(f"wrote {file}; next: sosmith design {file}")
+    if listed:
+        names = titles()
+        width = max(map(len, names))
+        for name, title in names.items():
+            click.echo(f"{name.ljust(width)}  {title}")
+        return
+    files = contents(named, file)
+    if not force:
+        for path in files:
+            if path.exists():
+                raise SpecificationError(f"{path}: the file must not exist yet; use --force to overwrite it")
+    for folder in dict.fromkeys(path.parent for path in files):
+        write_contents(folder, {path.name: files[path] for path in files if path.parent == folder})
+    written = " and ".join(map(str, files)) if len(files) < 3 else f"{len(files)} files to {commonpath(files)}"
+    first = next(iter(files))
+    note(f"wrote {written}" + (f"; next: sosmith design {first}" if b"\n[filter]" in files[first] else ""))
 
 
 @click.command("design")

@@ -255,7 +255,7 @@ def emulate_command(
         from sosmith.commands.tables.scenarios import print_scenarios
 
         print_scenarios(asked.name, {name: SUMMARIES[name].description for name in fitting(kind)})
-        note("a scenario file can be given instead of a name: see examples/scenarios/ and docs/sensors.md")
+        note("a scenario file can be given instead of a name: sosmith init --list names examples")
         return
     if scenario not in fitting(kind) and not _is_scenario_file(scenario):
         known = fitting(kind)
