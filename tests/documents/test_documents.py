@@ -2,7 +2,7 @@
 
 Run as a script, it renews what is generated in them: the output in the README, the file table of the
 architecture, the register map, the protocol, the fields of the streams, the commands and the schema of the calibration,
-the vehicle and its parameters, and the page of the Python interface.
+the vehicle and its parameters, and the pages of the commands and of the Python interface.
 """
 
 import contextlib
@@ -15,6 +15,7 @@ from pathlib import Path
 import click
 import pytest
 from click.testing import CliRunner
+from tests.documents import commands_page
 from tests.documents.protocol_page import with_parts
 from tests.documents.python_page import first_example, page
 from tests.gen.designs import example_design
@@ -35,6 +36,7 @@ CALIBRATION = ROOT / "docs" / "calibration.md"
 PRINTING = [CALIBRATION, *(ROOT / "docs" / f"{name}.md" for name in ("spectrum", "wear", "vehicle", "sensors"))]
 """Documents whose shell blocks stand above what they print."""
 PYTHON = ROOT / "docs" / "python.md"
+COMMANDS = ROOT / "docs" / "commands.md"
 HARDWARE = ROOT / "docs" / "hardware.md"
 PROTOCOL = ROOT / "docs" / "protocol.md"
 REGISTERS = ROOT / "docs" / "registers.md"
@@ -213,6 +215,10 @@ def test_the_python_page_is_up_to_date() -> None:
     assert PYTHON.read_text(encoding="utf-8") == page()
 
 
+def test_the_page_of_the_commands_is_what_they_say() -> None:
+    assert COMMANDS.read_text(encoding="utf-8") == commands_page.page()
+
+
 def test_the_readme_shows_the_first_example_of_the_python_page() -> None:
     (shown,) = re.findall(r"```python\n(.*?)```", README.read_text(encoding="utf-8"), flags=re.DOTALL)
     lines = [line for line in shown.splitlines() if line]
@@ -262,6 +268,7 @@ if __name__ == "__main__":
             document.write_text(with_output(text, Path(scratch)), encoding="utf-8")
     ARCHITECTURE.write_text(with_house(ARCHITECTURE.read_text(encoding="utf-8")), encoding="utf-8")
     PYTHON.write_text(page(), encoding="utf-8")
+    COMMANDS.write_text(commands_page.page(), encoding="utf-8")
     renew(HARDWARE, _FIELDS, field_table())
     renew(REGISTERS, _REGISTERS, markdown())
     PROTOCOL.write_text(with_parts(PROTOCOL.read_text(encoding="utf-8")), encoding="utf-8")

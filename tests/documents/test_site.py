@@ -1,0 +1,77 @@
+"""The site of the documentation: it builds without a warning, and its pages take nothing from elsewhere."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+from tests.documents.test_documents import ROOT
+
+_STYLE = re.compile(r"""url\(\s*["']?([^"')]+)|@import\s+["']([^"']+)""")
+_LOADING = {"script": "src", "img": "src", "source": "src", "iframe": "src", "object": "data", "link": "href"}
+"""What makes a browser load something, by element; links that a reader follows do not."""
+
+
+class Loaded(HTMLParser):
+    """Collects the addresses that a page loads."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.addresses: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        given = dict(attrs)
+        if given.get("rel") != "canonical":
+            self.addresses += [address for address in [given.get(_LOADING.get(tag, ""))] if address]
+
+
+def loaded(path: Path) -> list[str]:
+    """Addresses that a page or a style sheet makes a browser load."""
+    text = path.read_text(encoding="utf-8")
+    if path.suffix == ".css":
+        return ["".join(found) for found in _STYLE.findall(text)]
+    page = Loaded()
+    page.feed(text)
+    return page.addresses
+
+
+def missing(site: Path) -> list[str]:
+    """Addresses in `site` that are not files of it, with the file that asks for them."""
+    files = [path for path in sorted(site.rglob("*")) if path.suffix in {".html", ".css"} and path.name != "404.html"]
+    return [
+        f"{path.relative_to(site)}: {address}"
+        for path in files
+        for address in loaded(path)
+        if not address.startswith("data:") and not (path.parent / re.split("[?#]", address)[0]).is_file()
+    ]
+
+
+def test_what_a_page_takes_from_elsewhere_is_found(tmp_path: Path) -> None:
+    (tmp_path / "a.html").write_text(
+        '<link rel="stylesheet" href="own.css?1"><script src="https://x.org/a.js"></script>'
+        '<img src="//x.org/a.png"><a href="https://x.org">'
+    )
+    (tmp_path / "own.css").write_text("@import 'https://x.org/b.css'; @font-face { src: url(https://x.org/c.woff) }")
+    assert missing(tmp_path) == [
+        "a.html: https://x.org/a.js",
+        "a.html: //x.org/a.png",
+        "own.css: https://x.org/b.css",
+        "own.css: https://x.org/c.woff",
+    ]
+
+
+@pytest.mark.slow
+def test_the_site_builds_strictly_and_stands_alone(tmp_path: Path) -> None:
+    pytest.importorskip("mkdocs", reason="mkdocs is missing: pip install 'sosmith[docs]'")
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(tmp_path / "site")]
+    result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert result.returncode == 0, result.stderr
+    assert "WARNING" not in result.stderr
+    pages = {path.relative_to(ROOT / "docs").with_suffix("").as_posix() for path in (ROOT / "docs").rglob("*.md")}
+    built = {path.relative_to(tmp_path / "site").with_suffix("").as_posix() for path in tmp_path.rglob("*.html")}
+    assert pages - {"recipes/README"} | {"index", "changelog", "recipes/index"} <= built
+    assert missing(tmp_path / "site") == []
