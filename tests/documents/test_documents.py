@@ -136,9 +136,10 @@ def test_every_line_works_or_is_understood(folder: Path) -> None:
     for line in lines:
         if line.startswith(NEEDS_SIMULATION) or NEEDS_A_BOARD.fullmatch(line):
             name, *arguments = shlex.split(line)[1:]
-            command = cli.get_command(click.Context(cli), name)
+            above = click.Context(cli, **cli.context_settings)  # a command keeps the help option of its first call
+            command = cli.get_command(above, name)
             assert command is not None
-            command.make_context(name, arguments)
+            command.make_context(name, arguments, parent=above)
         else:
             run(line, folder)
 
