@@ -55,14 +55,19 @@ def _numpy(path: Path, suffix: str) -> Content:
     what = f"a NumPy file {suffix}"
     try:
         # Objects could run code when they are read; a filter needs none.
-        with path.open("rb") as file:
+        with path.open("rb") as file, warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # about headers of Python 2
             loaded = np.load(file, allow_pickle=False)
             if isinstance(loaded, np.ndarray):
                 return of_rows(path, _matrix(path, loaded), kind=what)
             name = next((name for name in _WAYS if name in loaded.files), None)
             if name is None:
                 raise SpecificationError(f"{path}: arrays must have one named {', '.join(_WAYS)}, not {loaded.files}")
+            if sum(part.file_size for part in loaded.zip.infolist()) > MAX_BYTES:
+                raise SpecificationError(f"{path}: arrays must be at most {MAX_BYTES} bytes unpacked, not longer")
             array = loaded[name]
+            if not isinstance(array, np.ndarray):
+                raise SpecificationError(f"{path}: {name} must be an array, not other bytes")
     except (ValueError, EOFError, KeyError, TypeError, SyntaxError, NotImplementedError, MemoryError) as error:
         raise SpecificationError(f"{path}: the filter must be {what} of numbers, not: {_first_line(error)}") from None
     except Exception as error:  # zipfile and zlib have errors of their own for damaged archives

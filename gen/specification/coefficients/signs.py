@@ -15,6 +15,9 @@ from sosmith.gen.specification.coefficients.content import Row, Signs, StatedSec
 from sosmith.model.errors import SpecificationError
 
 _OTHER: dict[Signs, Signs] = {"scipy": "negated", "negated": "scipy"}
+_LARGEST = 10**30
+"""Largest magnitude of a coefficient, far beyond what hardware could have."""
+
 _WORDS: dict[Signs, str] = {"scipy": "scipy's signs of a1 and a2", "negated": "the signs of a1 and a2 negated"}
 
 
@@ -54,7 +57,8 @@ def settled(stated: StatedSections, asked: Signs | None = None) -> SettledSectio
     Raises
     ------
     SpecificationError
-        If a0 or a whole numerator is 0, the number of scale values fits no rule, or no allowed convention is stable.
+        If a0 or a whole numerator is 0, a coefficient is beyond 1e30, the number of scale values fits no rule, or no
+        allowed convention is stable.
 
     Examples
     --------
@@ -64,6 +68,9 @@ def settled(stated: StatedSections, asked: Signs | None = None) -> SettledSectio
     ('negated', [-1.8, 0.9])
     """
     normal = _scaled([_normalized(k, row) for k, row in enumerate(stated.rows)], stated.gains)
+    for k, row in enumerate(normal):
+        if max(map(abs, row)) > _LARGEST:
+            raise SpecificationError(f"section {k} must have coefficients within 1e30 for a0 = 1, not beyond")
     choices: dict[Signs, tuple[Row, ...]] = {"scipy": normal, "negated": tuple(map(_negated, normal))}
     stable: list[Signs] = [signs for signs, rows in choices.items() if all(map(_is_stable, rows))]
     if asked is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from decimal import Context, Decimal
 from fractions import Fraction
@@ -98,6 +99,8 @@ class Coefficients:
             found = settled(StatedSections(format=content.format, rows=exact), "scipy")
         except SpecificationError as error:
             raise SpecificationError(f"{source}: {error}") from None
+        except (OverflowError, ZeroDivisionError):  # responses beyond doubles
+            raise SpecificationError(f"{source}: the filter must have numbers within reason, not beyond") from None
         return cls(
             found.rows,
             (
@@ -136,12 +139,19 @@ class Coefficients:
 
     @property
     def gains(self) -> tuple[float, float]:
-        """Gain at 0 Hz and at half the sample rate, with sign."""
+        """Gain at 0 Hz and at half the sample rate, with sign; infinite if beyond doubles."""
         at_zero, at_half = Fraction(1), Fraction(1)
         for b0, b1, b2, _, a1, a2 in self.rows:
             at_zero *= (b0 + b1 + b2) / (1 + a1 + a2)
             at_half *= (b0 - b1 + b2) / (1 - a1 + a2)
-        return float(at_zero), float(at_half)
+        return _double(at_zero), _double(at_half)
+
+
+def _double(value: Fraction) -> float:
+    try:
+        return float(value)
+    except OverflowError:
+        return math.copysign(math.inf, value)
 
 
 def _decimal(value: Fraction) -> Decimal:

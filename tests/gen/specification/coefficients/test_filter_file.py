@@ -2,6 +2,7 @@
 
 import io
 import json
+import zipfile
 from fractions import Fraction
 from pathlib import Path
 
@@ -15,6 +16,8 @@ from sosmith.gen.filter.factoring import factored
 from sosmith.gen.specification.coefficients.content import Content, StatedSections, TransferFunction, ZerosAndPoles
 from sosmith.gen.specification.coefficients.filter_file import read_filter_file
 from sosmith.gen.specification.coefficients.signs import sentence, settled
+from sosmith.gen.verifier.graph import RejectedError
+from sosmith.gen.verifier.specified.sections_file import sections_in
 from sosmith.model.errors import SpecificationError
 
 SOS: npt.NDArray[np.float64] = scipy.signal.ellip(4, 0.5, 40, [0.1, 0.3], "bandpass", output="sos")
@@ -48,6 +51,14 @@ def biquads() -> str:
 def saved(**arrays: npt.ArrayLike) -> bytes:
     file = io.BytesIO()
     np.savez(file, **{name: np.asarray(array) for name, array in arrays.items()})
+    return file.getvalue()
+
+
+def packed(content: bytes) -> bytes:
+    """Put bytes where the array sos would be."""
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("sos.npy", content)
     return file.getvalue()
 
 
@@ -228,6 +239,8 @@ def test_a_convention_that_is_asked_for_has_to_be_stable(tmp_path: Path) -> None
         ("f.npy", npy([[np.inf, 0, 0, 1, 0, 0]]), "the filter must have finite numbers, not nan or infinite ones"),
         ("f.npz", saved(other=SOS), "arrays must have one named sos, zpk, ba, not ['other']"),
         ("f.npz", b"PK\x03\x04 and no more", "the filter must be a NumPy file .npz"),
+        ("f.npz", packed(b"no array"), "sos must be an array, not other bytes"),
+        ("f.npz", packed(bytes(5 << 20)), "arrays must be at most 4194304 bytes unpacked, not longer"),
         ("f.mat", b"MATLAB 5.0 MAT-file", "the filter must be a MAT file, not a damaged one or another kind"),
         ("f.mat", mat(x=SOS), "variables must have SOS, with or without G, not only x"),
         ("f.json", "{", "the filter must be JSON, not something else"),
@@ -240,6 +253,32 @@ def test_what_is_no_filter_is_refused_with_its_reason(
     with pytest.raises(SpecificationError) as refused:
         read(tmp_path, name, content)
     assert str(refused.value).startswith(f"{tmp_path / name}: {message}")
+
+
+@pytest.mark.parametrize("text", ["1,0,0,1,1e300,0\n", "1,0,0,1e-200,1e200,0\n", "1e31,0,0,1,0,0\n"])
+def test_coefficients_beyond_reason_are_refused(text: str, tmp_path: Path) -> None:
+    stated = read(tmp_path, "f.csv", text)
+    assert isinstance(stated, StatedSections)
+    with pytest.raises(SpecificationError, match="section 0 must have coefficients within 1e30 for a0 = 1, not beyond"):
+        settled(stated)
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("f.npy", b""),
+        ("f.npy", npy([])),
+        ("f.npy", npy([1, 2])[:-1]),
+        ("f.npy", saved(sos=SOS)),
+        ("f.mat", mat(sos=SOS)[:200]),
+        ("f.txt", b"1 0 0 1 0 1e-999999999"),
+        ("f.txt", "1 0 0 1 0 0".encode("utf-16")),
+    ],
+)
+def test_the_verifier_refuses_files_that_it_cannot_read(name: str, content: bytes, tmp_path: Path) -> None:
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(RejectedError, match=r"filter\.sos_file must be a file of sections that can be read, not: \w"):
+        sections_in(tmp_path / name)
 
 
 def test_an_analog_prototype_is_transformed_as_scipy_does(tmp_path: Path) -> None:
