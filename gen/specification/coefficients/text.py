@@ -28,6 +28,7 @@ MAX_BYTES = 1 << 20
 """Largest size of a text file in bytes."""
 
 _MAX_EXPONENT = 400
+_NEAR = Fraction(1, 10**9)
 _ENTRY = re.compile(r"\s*([ab]\d)\s*=\s*([^\s,;]+)\s*[,;]?\s*", re.IGNORECASE)
 _HEADER = re.compile(r"biquad\s*\d+\s*,?", re.IGNORECASE)
 _KEYS = ("b0", "b1", "b2", "a1", "a2")
@@ -124,7 +125,7 @@ def of_rows(path: Path, rows: Sequence[_Numbers], *, kind: str) -> Content:
         If the shape fits none.
     """
     width = len(rows[0])
-    if len(rows) == 2 and width > 1 and rows[1][0] == 1 and not (width == 6 and rows[0][3] == rows[1][3] == 1):
+    if len(rows) == 2 and width > 1 and rows[1][0] == 1 and not (width in (5, 6) and _are_sections(*rows)):
         return TransferFunction(format=f"{kind} of b and a", numerator=rows[0], denominator=rows[1])
     if width == 6:
         return StatedSections(format=f"{kind} of b0, b1, b2, a0, a1, a2", rows=tuple(rows))
@@ -139,15 +140,37 @@ def of_rows(path: Path, rows: Sequence[_Numbers], *, kind: str) -> Content:
     )
 
 
+def _are_sections(first: _Numbers, second: _Numbers) -> bool:
+    """Tell two sections, the second with b0 = 1 as scipy scales it, from b and a of the fourth or fifth order.
+
+    The zeros of most sections are on the unit circle or at 0: b2 is 1, -1 or 0, which a coefficient of `a` is not by
+    chance. As a denominator, the numbers of other sections are unstable as a rule.
+    """
+    near = min(abs(abs(second[2]) - size) for size in (0, 1)) < _NEAR
+    beside_one = len(second) == 6 and first[3] == second[3] == 1
+    return beside_one or (len(second) == 5 and near) or not _is_stable(second)
+
+
+def _is_stable(polynomial: _Numbers) -> bool:
+    """Whether all roots of a polynomial in 1/z are inside the unit circle, by the recursion of Schur and Cohn."""
+    while len(polynomial) > 1:
+        ratio = polynomial[-1] / polynomial[0]
+        if abs(ratio) >= 1:
+            return False
+        polynomial = tuple(a - ratio * b for a, b in zip(polynomial, polynomial[::-1], strict=True))[:-1]
+    return True
+
+
 def _with_a0(rows: Sequence[_Numbers]) -> tuple[Row, ...]:
     return tuple((*row[:3], Fraction(1), *row[3:]) for row in rows)
 
 
 def _cells(lines: Sequence[str]) -> Iterator[tuple[int, list[str]]]:
     """Yield the number and the cells of every line that has any; comments begin with # or %."""
-    separator = next((mark for mark in ";\t," if any(mark in line for line in lines)), None)
-    for at, raw in enumerate(lines, 1):
-        line = re.split("[#%]", raw, maxsplit=1)[0].strip().strip(separator or " ")
+    plain = [re.split("[#%]", line, maxsplit=1)[0].strip() for line in lines]
+    separator = next((mark for mark in ";\t," if any(mark in line for line in plain)), None)
+    for at, text in enumerate(plain, 1):
+        line = text.strip(separator or " ")
         if line:
             yield at, [cell.strip() for cell in line.split(separator)]
 

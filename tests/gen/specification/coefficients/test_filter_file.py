@@ -255,6 +255,18 @@ def test_what_is_no_filter_is_refused_with_its_reason(
     assert str(refused.value).startswith(f"{tmp_path / name}: {message}")
 
 
+@pytest.mark.parametrize("kind", ["lowpass", "highpass"])
+@pytest.mark.parametrize("cutoff", [0.02, 0.1, 0.4, 0.8, 0.93])
+def test_two_sections_of_five_columns_are_no_transfer_function(kind: str, cutoff: float, tmp_path: Path) -> None:
+    sos = scipy.signal.cheby1(4, 1, cutoff, kind, output="sos")
+    assert sos[1, 0] == 1
+    sections = [[*row[:3], -row[4], -row[5]] for row in sos]
+    stated = read(tmp_path, "f.csv", f"# b0; b1; b2; a1; a2\n{lines(sections, ',')}")
+    assert rows_of(stated) == pytest.approx(sos, abs=0)
+    polynomials = read(tmp_path, "f.csv", lines(scipy.signal.cheby1(4, 1, cutoff, kind), ","))
+    assert isinstance(polynomials, TransferFunction)
+
+
 @pytest.mark.parametrize("text", ["1,0,0,1,1e300,0\n", "1,0,0,1e-200,1e200,0\n", "1e31,0,0,1,0,0\n"])
 def test_coefficients_beyond_reason_are_refused(text: str, tmp_path: Path) -> None:
     stated = read(tmp_path, "f.csv", text)
