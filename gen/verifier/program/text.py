@@ -155,6 +155,11 @@ def read_program(text: str) -> ProgramText:
     RejectedError
         If the text has no program, one that can be loaded at run time, or one that cannot be decoded.
     """
+    text = _COMMENT.sub("", text)
+    require(
+        _HIDING.search(text) is None,
+        "the text must have no comments over lines and no directives, which can hide words",
+    )
     require("s_axil_" not in text, "the program must be fixed to be checked, not loadable at run time")
     memories = _memories(text)
     require("program" in memories, "the core must be folded or serial to have a program, not parallel")
@@ -191,6 +196,8 @@ def read_program(text: str) -> ProgramText:
     )
 
 
+_COMMENT = re.compile(r"^ *(?://.*|/\*(?:(?!\*/).)*\*/)$", re.MULTILINE)  # that ends on its line
+_HIDING = re.compile(r"/\*|`")
 _MEMORY = re.compile(r"^ *reg (?:\[(\d+):0\] )?(\S+) *\[(\d+):0\];$", re.MULTILINE)
 _HELD = re.compile(r"^ *(\S+?) *\[(\d+)\] = (\d+'\w+);$", re.MULTILINE)
 _LOOP = re.compile(r"^ *for \(i = (\d+); i < (\d+); i = i \+ 1\) (\S+?) *\[i\] = (\d+'\w+);$", re.MULTILINE)

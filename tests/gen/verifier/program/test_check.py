@@ -170,6 +170,18 @@ def test_a_word_that_is_not_cleared() -> None:
         core.check(text)
 
 
+@pytest.mark.parametrize(("begin", "end"), [("/*", "*/"), ("`ifdef NEVER", "`endif")])
+def test_words_that_are_hidden_do_not_count(begin: str, end: str) -> None:
+    """The hardware would have what follows, which is spaced in another way; the words that are right are hidden."""
+    core = small(PLAIN)
+    right = "words0[2] = 16'h0000;"
+    assert right in core.text
+    hidden = core.text.replace(right, f"words0[2]  =  16'h0005;\n{begin}\n{right}\n{end}\n")
+    with pytest.raises(RejectedError, match=r"^the text must have no comments over lines and no directives"):
+        core.check(hidden)
+    assert core.check(f"// `sosmith verify` repeats it.\n// /*\n{core.text}") == core.check()
+
+
 def test_other_limits_of_the_calibration() -> None:
     core = small(INSTRUMENT)
     sentence = r"^the program must judge voltage by the codes 5\.\.4000, not 0\.\.4095$"
