@@ -67,11 +67,15 @@ class _Input(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class _Base:
-    """Reference formats, which others differ from in a few coefficients, and their deviation and error."""
+    """Reference formats, which others differ from in a few coefficients, and their deviation and error.
+
+    `errors` holds those of the others that are known, by the sections and coefficients in which they differ.
+    """
 
     formats: tuple[SectionFormat, ...]
     deviation: Array
     error: float
+    errors: dict[tuple[object, ...], float]
 
 
 class Search:
@@ -149,8 +153,7 @@ class Search:
         """
         choice, error, area = start, self.error(start), self.area(start)
         while error <= allowed:
-            deviation = self._deviation(choice, None)
-            self._base = _Base(choice.formats, deviation, max(map(abs, _limits(deviation, self._ends))))
+            self._base = self._based(choice.formats)
             best: tuple[float, Choice, float, float] | None = None
             for candidate in self._steps(choice):
                 after = self.error(candidate)
@@ -208,16 +211,33 @@ class Search:
     def coefficient_error(self, choice: Choice) -> float:
         """Estimated error of the coefficients in output LSBs."""
         base = self._base
-        if base is not None and all(
-            a.coefficients is b.coefficients for a, b in zip(choice.formats, base.formats, strict=True)
-        ):
+        if base is None:
+            return _largest(self._deviation(choice.formats, None), self._ends)
+        changed = tuple(
+            (k, *form.coefficients.items())
+            for k, (form, before) in enumerate(zip(choice.formats, base.formats, strict=True))
+            if form.coefficients is not before.coefficients
+        )
+        if not changed:
             return base.error
-        return max(map(abs, _limits(self._deviation(choice, base), self._ends)))
+        if changed not in base.errors:
+            base.errors[changed] = _largest(self._deviation(choice.formats, base), self._ends)
+        return base.errors[changed]
 
-    def _deviation(self, choice: Choice, base: _Base | None) -> Array:
+    def _based(self, formats: tuple[SectionFormat, ...]) -> _Base:
+        """Take formats as the reference; what is known of others stays so if only quantizers have changed."""
+        base = self._base
+        if base is not None and all(
+            form.coefficients is before.coefficients for form, before in zip(formats, base.formats, strict=True)
+        ):
+            return replace(base, formats=formats)
+        deviation = self._deviation(formats, None)
+        return _Base(formats, deviation, _largest(deviation, self._ends), {})
+
+    def _deviation(self, formats: Sequence[SectionFormat], base: _Base | None) -> Array:
         """Deviation of the impulse response due to the coefficients, updated from that of `base`."""
         response = np.zeros(1) if base is None else base.deviation
-        for k, (estimate, form) in enumerate(zip(self._estimates, choice.formats, strict=True)):
+        for k, (estimate, form) in enumerate(zip(self._estimates, formats, strict=True)):
             before = None if base is None else base.formats[k].coefficients
             for name, (integer, frac) in form.coefficients.items():
                 start = estimate.ideal[name]
@@ -435,3 +455,14 @@ def _limits(response: Array, ends: tuple[float, float]) -> tuple[float, float]:
     low, high = response * ends[0], response * ends[1]
     bottom, top = np.minimum(low, high).cumsum().min(), np.maximum(low, high).cumsum().max()
     return min(float(bottom), 0.0), max(float(top), 0.0)
+
+
+def _largest(response: Array, ends: tuple[float, float]) -> float:
+    """Largest magnitude of a response to inputs that stay within `ends` from reset on."""
+    low, high = ends
+    if low > 0 or high < 0:
+        return max(map(abs, _limits(response, ends)))
+    # With zero between its ends, the worst input never brings the output back: whole sums are enough.
+    magnitudes, total = float(np.abs(response).sum()), float(response.sum())
+    above, below = (magnitudes + total) / 2, (magnitudes - total) / 2
+    return max(above * high - below * low, below * high - above * low)

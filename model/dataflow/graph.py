@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from fractions import Fraction
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 
 class Op(Enum):
@@ -35,6 +35,8 @@ class Op(Enum):
     CLAMP = "clamp"  # limits to low..high
     BOUND = "bound"  # states that the value stays in low..high; no logic
     DELAY = "delay"  # the operand at the sample before; 0 at reset
+
+    __hash__ = object.__hash__  # members are compared by identity, and looked up for every node
 
 
 class Range(NamedTuple):
@@ -306,12 +308,20 @@ class GraphBuilder:
         self._nodes.append(node)
         return Wire(len(self._nodes) - 1)
 
-    def _derived(self, op: Op, *operands: Wire, **fields: Any) -> Wire:
-        """Append a node whose fraction bits and range follow from its operands; `fields` are its other attributes."""
-        known = {"frac": 0, "low": 0, "high": 0} | fields
-        node = Node(op, tuple(wire.index for wire in operands), **known)
-        frac, low, high = range_of(node, [self[wire].range for wire in operands])
-        return self._append(replace(node, frac=frac, low=low, high=high))
+    def _derived(
+        self,
+        op: Op,
+        *operands: Wire,
+        stated: tuple[int, int, int] = (0, 0, 0),
+        parameter: int = 0,
+        parameter_frac: int = 0,
+        name: str = "",
+    ) -> Wire:
+        """Append a node whose fraction bits and range follow from its operands, and from those `stated`."""
+        indices = tuple([wire.index for wire in operands])
+        others = parameter, parameter_frac, name
+        derived = range_of(Node(op, indices, *stated, *others), [self._nodes[index].range for index in indices])
+        return self._append(Node(op, indices, *derived, *others))
 
     def input(self, name: str, frac: int, low: int, high: int) -> Wire:
         """Add an input port whose code is in `low`..`high`."""
@@ -405,7 +415,7 @@ class GraphBuilder:
         shift = self[a].frac - frac
         if shift < 0:
             return self.add(a, self.constant(0, frac), name)
-        return self.named(a, name) if shift == 0 else self._derived(Op.FLOOR, a, frac=frac, name=name)
+        return self.named(a, name) if shift == 0 else self._derived(Op.FLOOR, a, stated=(frac, 0, 0), name=name)
 
     def fraction(self, a: Wire, frac: int, name: str = "") -> Wire:
         """Return what `floor` to `frac` fraction bits drops, exactly: at least 0 and below ``2**-frac``."""
@@ -417,7 +427,7 @@ class GraphBuilder:
         """Round towards zero to `frac` fraction bits; exact if `a` has no more."""
         if self[a].frac <= frac:
             return self.floor(a, frac, name)
-        return self._derived(Op.TRUNCATE, a, frac=frac, name=name)
+        return self._derived(Op.TRUNCATE, a, stated=(frac, 0, 0), name=name)
 
     def round(self, a: Wire, frac: int, name: str = "") -> Wire:
         """Round to nearest, ties upward; exact if `a` has no more than `frac` fraction bits."""
@@ -427,11 +437,11 @@ class GraphBuilder:
 
     def clamp(self, a: Wire, low: int, high: int, name: str = "") -> Wire:
         """Limit the code to `low`..`high`."""
-        return self._derived(Op.CLAMP, a, low=low, high=high, name=name)
+        return self._derived(Op.CLAMP, a, stated=(0, low, high), name=name)
 
     def bound(self, a: Wire, low: int, high: int, name: str = "") -> Wire:
         """State that the code stays in `low`..`high`, known from a peak gain, and narrow its range to that."""
-        return self._derived(Op.BOUND, a, low=low, high=high, name=name)
+        return self._derived(Op.BOUND, a, stated=(0, low, high), name=name)
 
     def build(self, outputs: Sequence[Wire]) -> Graph:
         """Freeze the graph.
