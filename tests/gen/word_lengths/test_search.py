@@ -7,6 +7,7 @@ from dataclasses import replace
 from fractions import Fraction
 from functools import cache
 
+import numpy as np
 import pytest
 from tests.gen.designs import ALL, example_design
 from tests.gen.word_lengths.test_quantize import OUT, SIGNED, butterworth
@@ -20,7 +21,7 @@ from sosmith.gen.word_lengths import quantize as quantize_module
 from sosmith.gen.word_lengths.cost import cost_of, cost_of_graphs
 from sosmith.gen.word_lengths.quantize import Plan, plan, prove
 from sosmith.gen.word_lengths.quantized import Quantized
-from sosmith.gen.word_lengths.search import Choice, Search
+from sosmith.gen.word_lengths.search import Choice, Search, _largest
 from sosmith.model.dataflow.graph import Range
 from sosmith.model.sections.direct_form import DirectForm1, Product
 
@@ -109,6 +110,16 @@ def test_what_is_estimated_is_what_is_proven(name: str, realization: str) -> Non
     # Of few bits dropped, the largest error is less than a unit; the estimate takes a unit.
     assert 0.999 < rounding / float(made.budget["filter rounding"]) < 1.08
     assert trimmed.area == pytest.approx(cost_of(made.datapath).area, rel=1e-3)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("ends", [(-1.0, 1.0), (0.0, 1.0), (-1.0, 0.25), (0.25, 1.0), (-1.0, -0.5)])
+def test_the_largest_error_is_that_of_the_worst_input(ends: tuple[float, float], sign: int) -> None:
+    """Against the sums up to every sample, each driven by the end that is worse."""
+    response = sign * np.array([0.5, -0.125, -2.0, 0.75, 0.25, 0.5])
+    driven = np.outer(ends, response)
+    tops, bottoms = driven.max(axis=0).cumsum(), driven.min(axis=0).cumsum()
+    assert _largest(response, ends) == max(0, *tops, *-bottoms)
 
 
 @pytest.mark.parametrize("realization", ["df1", "df1_ef1", "df1_ef2"])
