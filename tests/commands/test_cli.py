@@ -161,7 +161,7 @@ def refused(outcome: Outcome, message: str, status: int = 2) -> None:
 
 NEEDED = {
     "init": ("[FILE]", "flange_wear.toml", "--example NAME", "--list", "--force"),
-    "import": ("FILE", "--sample-rate", "--signs", "--range", "signs of a1 and a2"),
+    "import": ("FILE", "--sample-rate", "--signs", "--range", "disagree on the signs"),
     "design": ("SPEC", "--core", "--realization", "--widths-of", "--plot", "--json"),
     "generate": ("SPEC", "SystemVerilog", "-o, --output", "build/<name>"),
     "package": (
@@ -750,7 +750,7 @@ def test_reports_side_by_side(sosmith: Command) -> None:
     assert (table.status, table.messages) == (0, [])
     assert "What differs" in table.stdout
     words = " ".join(table.stdout.split())
-    assert re.search(r"All 2 cost the same, \d+ instructions; df1 has the smallest error limit", words)
+    assert re.search(r"df1_ef2 is the cheapest of all 2: \d+ instructions; .* The smallest limit is df1's, ", words)
     compared = sosmith("compare", "df1", "df1_ef2", "--json", "-o", "pages/both.html")
     assert compared.messages == ["sosmith: wrote pages/both.html"]
     tree = json.loads(compared.stdout)

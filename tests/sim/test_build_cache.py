@@ -166,7 +166,7 @@ def test_the_folder_is_the_users_cache(tmp_path: Path, monkeypatch: pytest.Monke
 
 def test_a_core_built_elsewhere_is_not_built_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """In the user's own cache, for the sake of the library; the text of the core is new to it."""
-    text = f"// {tmp_path} {os.getpid()}\n{SOUND}"
+    text = f"/* {tmp_path} {os.getpid()} */\n{SOUND}"
     tool = find_simulator("verilator", tmp_path / "bin")
     for name, each in {"one": text, "two": text, "other": text.replace("16'sd3", "16'sd4")}.items():
         (tmp_path / name).mkdir()

@@ -14,7 +14,7 @@ from tests.interface.small import filter_design
 import sosmith
 from sosmith.gen.output.board_top import board_top, board_verilog, top_name
 from sosmith.gen.output.identity import identity
-from sosmith.gen.output.verilog import to_rtlil, to_verilog
+from sosmith.gen.output.verilog import core_verilog
 from sosmith.hdl.bus.command_engine import WINDOW, CommandEngine, Face
 from sosmith.model.errors import SpecificationError
 from sosmith.model.link.device import Device
@@ -44,7 +44,7 @@ class Both:
     def __init__(self, line: Line, design: sosmith.Design) -> None:
         self.line = line
         core = design.core
-        text = to_verilog(to_rtlil(core.architecture.component(), core.datapath.name))
+        text = core_verilog(core)
         self.design = core
         made = identity(core, text, baud=RATE, clock=float(CLOCK))
         self.model = Device(made, IntegerCore(core.datapath, core.spec.channels), window=WINDOW)
