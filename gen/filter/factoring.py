@@ -28,6 +28,9 @@ _GRID = 256
 
 _MAX_ORDER = 20
 
+_FASTEST = 100
+"""Largest pole in rad/s that can be sampled, for each Hz: its residue has died away, and takes digits to find."""
+
 
 @dataclass(frozen=True)
 class Factored:
@@ -198,6 +201,10 @@ def _sampled(content: ZerosAndPoles, sample_rate: Fraction) -> Factored:
         raise SpecificationError(
             "poles of a prototype with impulse_invariant must be simple, at most one of them real, and zeros not at 0, "
             "not others"
+        )
+    if any(max(abs(real), abs(imaginary)) > _FASTEST * sample_rate for real, imaginary in content.poles):
+        raise SpecificationError(
+            f"poles of a prototype with impulse_invariant must be within {_FASTEST} times the sample rate, not beyond"
         )
     # `impulse_invariant` takes poles in units of a cutoff; this one is a quarter of the sample rate.
     unit = ball(sample_rate) * arb.pi() / 2

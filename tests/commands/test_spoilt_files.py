@@ -15,8 +15,10 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
+import numpy as np
 import openpyxl
 import pytest
+import scipy.io
 from tests.commands.spoilt_files import Spoil, spoilt, spoilt_store, spoilt_workbook
 from tests.commands.test_cli import FILTER, INSTRUMENT
 from tests.gen.report.test_comparison import report
@@ -31,6 +33,7 @@ from sosmith.sim import simulation
 DEMO = f'{INSTRUMENT}realization = "df1"\n'
 FITTED = re.sub(r"coefficients = .*", 'data = "measured.csv"', DEMO)
 WORN = f"{DEMO}\n[wear]\ninitial = 1.5\nwarning = 7.0\nlimit = 9.0\nsensor_range = 10.5\n"
+SECTIONS = [[0.25, 0.5, 0.25, 1.0, -0.9, 0.5], [0.5, 0.5, 0.0, 1.0, -0.2, 0.0]]
 RELOADED = f"{FILTER}\n[hardware]\nrealization = 'df1'\nreload = true\n"
 
 
@@ -74,6 +77,18 @@ SUBJECTS = (
         ),
         40,
         spoilt_store,
+    ),
+    *(
+        Subject(file, (f"import {file} --sample-rate 100",), 30, how)
+        for file, how in (
+            ("sections.csv", spoilt),
+            ("sections.npy", spoilt),
+            ("sections.npz", spoilt_workbook),
+            ("sections.mat", spoilt),
+            ("sections.json", spoilt),
+            ("biquads.txt", spoilt),
+            ("prototype.toml", spoilt),
+        )
     ),
     Subject("trace.csv", ("spectrum trace.csv", "simulate demo.toml --trace trace.csv"), 16),
     Subject("ride.csv", ("spectrum ride.csv",), 10),
@@ -147,10 +162,17 @@ def write_valid_files(folder: Path) -> None:
         .replace("run_out = { value = 200.0", "run_out = { value = 0.0"),
         "report.json": json.dumps(report(), indent=1),
         "other.json": json.dumps(report(name="other")),
+        "sections.csv": "\n".join(",".join(map(str, row)) for row in SECTIONS),
+        "sections.json": json.dumps({"sos": SECTIONS}),
+        "biquads.txt": "biquad1,\nb0=0.25,\nb1=0.5,\nb2=0.25,\na1=0.2,\na2=-0.2\n",
+        "prototype.toml": "poles = [[-15.0, 22.0], [-15.0, -22.0], -30.0]\ngain = 4.5\nprewarp = 3.0\n",
         "ride.csv": "\n".join(("time_s,value_mm,truth", *_ride())),
         "record.csv": "\n".join((ROOT / "examples/wear/wheel.csv").read_text(encoding="utf-8").splitlines()[:40]),
         "measured.csv": (ROOT / "examples/measurements/march.csv").read_text(encoding="utf-8"),
     }
+    np.save(folder / "sections.npy", SECTIONS)
+    np.savez(folder / "sections.npz", sos=SECTIONS)
+    scipy.io.savemat(folder / "sections.mat", {"SOS": SECTIONS, "G": [[0.5]]})
     for name, text in texts.items():
         (folder / name).write_text(text, encoding="utf-8")
     book = openpyxl.Workbook()

@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import json
 import math
+import struct
 import warnings
+import zlib
 from collections.abc import Mapping
 from decimal import Decimal
 from fractions import Fraction
@@ -17,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from sosmith.gen.specification.coefficients.content import Complex, Content, StatedSections, ZerosAndPoles
+from sosmith.gen.specification.coefficients.mat_file import matrices
 from sosmith.gen.specification.coefficients.text import of_rows
 from sosmith.model.errors import SpecificationError
 from sosmith.model.tables.toml_file import read_text
@@ -80,20 +83,13 @@ def _numpy(path: Path, suffix: str) -> Content:
 
 
 def _matlab(path: Path) -> Content:
-    from scipy.io import loadmat  # noqa: PLC0415 - slow to load
-
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            held = {name: value for name, value in loadmat(path).items() if not name.startswith("__")}
+        held = matrices(path.read_bytes(), MAX_BYTES)
     except NotImplementedError:
         raise SpecificationError(
             f"{path}: the filter must be a MAT file up to version 7, not 7.3: save with -v7"
         ) from None
-    except OSError:
-        raise
-    except Exception:
-        # Whatever a damaged file makes of the reader: there is no list of its errors.
+    except (ValueError, KeyError, IndexError, StopIteration, struct.error, zlib.error):
         raise SpecificationError(f"{path}: the filter must be a MAT file, not a damaged one or another kind") from None
     names = {name.lower(): name for name in held}
     if "sos" in names:
@@ -169,4 +165,5 @@ def exact_complex(value: complex) -> Complex:
 
 
 def _first_line(error: Exception) -> str:
-    return str(error).splitlines()[0][:100] if str(error) else type(error).__name__
+    lines = str(error).split("\n")
+    return " ".join(lines[0][:100].split()) or type(error).__name__

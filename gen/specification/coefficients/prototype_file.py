@@ -24,7 +24,7 @@ from sosmith.model.tables.toml_file import read_toml
 _MAX_BYTES = 1 << 16
 _KEYS = ("zeros", "poles", "gain", "method", "prewarp")
 _METHODS = ("bilinear", "impulse_invariant")
-_MAX_EXPONENT = 400
+_MAX_EXPONENT = 30
 
 
 def read_prototype(path: Path) -> ZerosAndPoles:
@@ -79,6 +79,7 @@ def _place(path: Path, where: str, value: Any) -> Complex:
 def _number(path: Path, where: str, value: Any) -> Fraction:
     if isinstance(value, bool) or not isinstance(value, int | Decimal):
         raise SpecificationError(f"{path}: {where} must be a number, not {value!r}")
-    if isinstance(value, Decimal) and (not value.is_finite() or (value and abs(value.adjusted()) > _MAX_EXPONENT)):
+    exact = value if isinstance(value, Decimal) else Decimal(value)
+    if not exact.is_finite() or (exact and abs(exact.adjusted()) > _MAX_EXPONENT):
         raise SpecificationError(f"{path}: {where} must be a finite number within reason, not {value}")
     return Fraction(value)

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from sosmith.gen.verifier.graph import RejectedError
+from sosmith.gen.verifier.specified.mat_matrices import doubles_in
 
 _MAX_BYTES = 1 << 22
 _MAX_EXPONENT = 400
@@ -68,13 +69,9 @@ def _content(path: Path) -> tuple[_Rows, list[Fraction]]:
             warnings.simplefilter("ignore")
             return _rows(numpy.lib.format.read_array(file, allow_pickle=False)), []
     if suffix == ".mat":
-        from scipy.io import loadmat  # noqa: PLC0415
-
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            held = {name.lower(): value for name, value in loadmat(path).items()}
+        held = doubles_in(path.read_bytes(), _MAX_BYTES)
         scale = held.get("g", held.get("scalevalues"))
-        return _rows(held["sos"]), [] if scale is None else list(chain.from_iterable(_rows(scale)))
+        return held["sos"], list(chain.from_iterable(scale or []))
     text = path.read_text(encoding="utf-8-sig")
     lines = [re.split("[#%]", line)[0].strip(" \t,;") for line in text.splitlines()]
     cells = [re.split(r"[\s,;]+", line) for line in lines if line]

@@ -5,6 +5,7 @@ import json
 import zipfile
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +16,7 @@ import scipy.signal
 from sosmith.gen.filter.factoring import factored
 from sosmith.gen.specification.coefficients.content import Content, StatedSections, TransferFunction, ZerosAndPoles
 from sosmith.gen.specification.coefficients.filter_file import read_filter_file
+from sosmith.gen.specification.coefficients.mat_file import matrices
 from sosmith.gen.specification.coefficients.signs import sentence, settled
 from sosmith.gen.verifier.graph import RejectedError
 from sosmith.gen.verifier.specified.sections_file import sections_in
@@ -52,6 +54,11 @@ def saved(**arrays: npt.ArrayLike) -> bytes:
     file = io.BytesIO()
     np.savez(file, **{name: np.asarray(array) for name, array in arrays.items()})
     return file.getvalue()
+
+
+def shifted(content: bytes) -> bytes:
+    """Leave out a byte of the header: what follows is read as other types and sizes."""
+    return content[:40] + content[41:]
 
 
 def packed(content: bytes) -> bytes:
@@ -241,8 +248,11 @@ def test_a_convention_that_is_asked_for_has_to_be_stable(tmp_path: Path) -> None
         ("f.npz", b"PK\x03\x04 and no more", "the filter must be a NumPy file .npz"),
         ("f.npz", packed(b"no array"), "sos must be an array, not other bytes"),
         ("f.npz", packed(bytes(5 << 20)), "arrays must be at most 4194304 bytes unpacked, not longer"),
+        ("f.mat", shifted(mat(SOS=SOS)), "the filter must be a MAT file, not a damaged one or another kind"),
         ("f.mat", b"MATLAB 5.0 MAT-file", "the filter must be a MAT file, not a damaged one or another kind"),
         ("f.mat", mat(x=SOS), "variables must have SOS, with or without G, not only x"),
+        ("f.toml", "poles = [-1e31]\ngain = 1\n", "poles[0] must be a finite number within reason, not -1E+31"),
+        ("f.toml", f"poles = [-{10**40}]\ngain = 1\n", "poles[0] must be a finite number within reason, not -1000"),
         ("f.json", "{", "the filter must be JSON, not something else"),
         ("f.json", '{"sos": [["1"]]}', "sos must have rows of numbers, not "),
     ],
@@ -283,6 +293,7 @@ def test_coefficients_beyond_reason_are_refused(text: str, tmp_path: Path) -> No
         ("f.npy", npy([1, 2])[:-1]),
         ("f.npy", saved(sos=SOS)),
         ("f.mat", mat(sos=SOS)[:200]),
+        ("f.mat", mat(other=SOS)),
         ("f.txt", b"1 0 0 1 0 1e-999999999"),
         ("f.txt", "1 0 0 1 0 0".encode("utf-16")),
     ],
@@ -291,6 +302,39 @@ def test_the_verifier_refuses_files_that_it_cannot_read(name: str, content: byte
     (tmp_path / name).write_bytes(content)
     with pytest.raises(RejectedError, match=r"filter\.sos_file must be a file of sections that can be read, not: \w"):
         sections_in(tmp_path / name)
+
+
+@pytest.mark.parametrize("keys", [{}, {"do_compression": True}, {"format": "4"}])
+def test_matrices_of_mat_files_are_those_of_scipy(keys: dict[str, Any]) -> None:
+    stated: dict[str, Any] = {"sos": SOS, "name_of_more": np.arange(7, dtype="i2"), "z": np.array([1j])}
+    if not keys.get("format"):
+        stated |= {"text": "four", "cell": np.array([1, "a"], dtype=object), "few": np.ones((2, 1), dtype="f4")}
+    file = io.BytesIO()
+    scipy.io.savemat(file, stated, **keys)
+    found = matrices(file.getvalue(), 1 << 20)
+    file.seek(0)
+    expected = {name: value for name, value in scipy.io.loadmat(file).items() if not name.startswith("__")}
+    assert list(found) == list(expected)
+    for name, array in found.items():
+        if name in {"z", "text", "cell"}:
+            assert array.dtype == object
+        else:
+            np.testing.assert_array_equal(array, expected[name])
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("f.mat", mat(SOS=SOS, G=[[2.0]], more="text")),
+        ("f.mat", mat(sos=[[2.0, 1.0, 0.0, 2.0, -1.0, 0.0]], x="text")),
+        ("f.npy", npy(SOS)),
+        ("f.csv", "\ufeffb0,b1,b2,a0,a1,a2\r\n" + lines(SOS, ",").replace("\n", "\r\n")),
+    ],
+)
+def test_the_verifier_reads_the_same_rows(name: str, content: str | bytes, tmp_path: Path) -> None:
+    stated = read(tmp_path, name, content)
+    assert isinstance(stated, StatedSections)
+    assert sections_in(tmp_path / name) == settled(stated).rows
 
 
 def test_an_analog_prototype_is_transformed_as_scipy_does(tmp_path: Path) -> None:
