@@ -174,9 +174,10 @@ def test_a_word_that_is_not_cleared() -> None:
 def test_words_that_are_hidden_do_not_count(begin: str, end: str) -> None:
     """The hardware would have what follows, which is spaced in another way; the words that are right are hidden."""
     core = small(PLAIN)
-    right = "words0[2] = 16'h0000;"
+    words = dict(re.findall(r"\\program \[([23])\] = (\S+);", core.text))
+    right, wrong = rf"\program [2] = {words['2']};", rf"\program [2]  =  {words['3']};"
     assert right in core.text
-    hidden = core.text.replace(right, f"words0[2]  =  16'h0005;\n{begin}\n{right}\n{end}\n")
+    hidden = core.text.replace(right, f"{wrong}\n{begin}\n{right}\n{end}\n")
     with pytest.raises(RejectedError, match=r"^the text must have no comments over lines and no directives"):
         core.check(hidden)
     assert core.check(f"// `sosmith verify` repeats it.\n// /*\n{core.text}") == core.check()
