@@ -24,6 +24,7 @@ from __future__ import annotations
 
 import math
 from fractions import Fraction
+from functools import reduce
 from operator import mul
 from typing import cast
 
@@ -249,7 +250,8 @@ class Pieces:
         exact = (self._forms[rows] * numbers[:, columns].T).sum(axis=1)
         signs[rows, columns] = np.where(exact < 0, -1.0, 1.0)
         parts = (self._limbs @ signs).reshape(-1, d, numbers.shape[1]).astype(np.int64).astype(object)
-        return int(sum(((part << self._limb * k) * numbers).sum() for k, part in enumerate(parts)))
+        added = reduce(lambda high, low: (high << self._limb) + low, reversed(parts))
+        return int((added * numbers).sum())
 
 
 def _integer(value: arb) -> int:
