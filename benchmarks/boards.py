@@ -91,7 +91,8 @@ def board_table() -> str:
 def built_table(record: Sequence[dict[str, Any]]) -> str:
     """Return what the designs take of the boards, in Markdown."""
     rows = [
-        "| example | channels | board | architecture | logic | multipliers | block RAM | fmax, MHz | of which needed | samples/s a channel | of which needed |",  # noqa: E501
+        "| example | channels | board | architecture | logic | multipliers | block RAM | fmax, MHz | of which needed "
+        "| samples/s a channel | of which needed |",
         "|---|---|---|---|---|---|---|---|---|---|---|",
     ]
     for row in record:

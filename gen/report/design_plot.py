@@ -15,13 +15,11 @@ from sosmith.gen.filter.response import (
     group_delay,
     magnitude_db,
     passband_level_db,
-    passbands,
-    stopbands,
 )
 from sosmith.gen.picture import picture
 from sosmith.gen.quantity import scale
 from sosmith.gen.report.filter_facts import filter_facts
-from sosmith.gen.report.plots import frequency_axis
+from sosmith.gen.report.plots import forbidden_areas, frequency_axis
 from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.model.port import Port
 
@@ -61,13 +59,7 @@ def _paint_gain(axes: Axes, facts: FilterFacts) -> None:
     frequency = frequency_grid(facts)
     level = passband_level_db(facts)
     axes.set_ylim(level - max(_DEPTH, (facts.stopband_loss or 0) + 30), level + 8)
-    bottom, top = axes.get_ylim()
-    forbidden = []
-    if facts.passband_edge and facts.passband_loss is not None:
-        forbidden += [(band, level - facts.passband_loss, bottom) for band in passbands(facts)]
-    if facts.stopband_edge and facts.stopband_loss is not None:
-        forbidden += [(band, level - facts.stopband_loss, top) for band in stopbands(facts)]
-    for (low, high), border, end in forbidden:
+    for (low, high), border, end in forbidden_areas(axes, facts, level):
         axes.fill_between([max(low, float(frequency[0])), high], border, end, facecolor=_RED, alpha=0.15, lw=0)
     for sos, label, line in _both(facts):
         axes.plot(frequency, magnitude_db(sos, frequency, facts.sample_rate), label=label, **line)

@@ -20,6 +20,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
 
 from sosmith.gen.filter.response import (
+    Band,
     FilterFacts,
     frequency_grid,
     group_delay,
@@ -353,15 +354,20 @@ def frequency_axis(axes: Axes, frequency: Array) -> None:
     axes.xaxis.set_major_formatter(FuncFormatter(lambda v, _: quantity(v, "Hz", 1)))
 
 
+def forbidden_areas(axes: Axes, facts: FilterFacts, level: float) -> list[tuple[Band, float, float]]:
+    """Return what the specification forbids inside the axis limits: bands in Hz, each between two gains in dB."""
+    bottom, top = axes.get_ylim()
+    areas: list[tuple[Band, float, float]] = []
+    if facts.passband_edge and facts.passband_loss is not None:
+        areas += [(band, level - facts.passband_loss, bottom) for band in passbands(facts)]
+    if facts.stopband_edge and facts.stopband_loss is not None:
+        areas += [(band, level - facts.stopband_loss, top) for band in stopbands(facts)]
+    return areas
+
+
 def _paint_mask(axes: Axes, facts: FilterFacts, level: float, start: float) -> None:
     """Shade what the specification forbids, inside the axis limits set before."""
-    bottom, top = axes.get_ylim()
-    forbidden = []
-    if facts.passband_edge and facts.passband_loss is not None:
-        forbidden += [(band, level - facts.passband_loss, bottom) for band in passbands(facts)]
-    if facts.stopband_edge and facts.stopband_loss is not None:
-        forbidden += [(band, level - facts.stopband_loss, top) for band in stopbands(facts)]
-    for (low, high), border, end in forbidden:
+    for (low, high), border, end in forbidden_areas(axes, facts, level):
         ends = [max(low, start), high]
         axes.fill_between(ends, border, end, facecolor=COLOUR["limit"], alpha=0.16, lw=0)
         axes.plot(ends, [border, border], color=COLOUR["limit"], lw=1.2)

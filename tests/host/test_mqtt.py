@@ -11,7 +11,6 @@ import threading
 import time
 from itertools import groupby
 from pathlib import Path
-from typing import Any
 
 import pytest
 from tests.commands.invocation import Invocation
@@ -169,7 +168,10 @@ def test_no_alarm_is_lost_while_the_broker_restarts(tmp_path: Path, monkeypatch:
         raised = [line for line in result.stderr.splitlines() if "alarm: " in line]
         assert len(raised) == 150
         assert "is gone; waiting for it" in result.stderr
-        numbers: Any = lambda: [json.loads(text)["number"] for text in reader.texts("depot/alarm")]  # noqa: E731
+
+        def numbers() -> list[int]:
+            return [json.loads(text)["number"] for text in reader.texts("depot/alarm")]
+
         reader.until(lambda: 150 in numbers())
     # What was not acknowledged in time came again; without the copies, all are there, and in order.
     assert list(dict.fromkeys(numbers())) == list(range(1, 151))
