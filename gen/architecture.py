@@ -11,6 +11,7 @@ from functools import cached_property
 from amaranth.lib.wiring import Component
 
 from sosmith.gen.fpga.boards import Board
+from sosmith.gen.word_lengths.objective import SMALL_AREA, Objective, ShortProgram, unsuitable
 from sosmith.hdl import core, folded
 from sosmith.hdl.axi_lite import BITS
 from sosmith.hdl.instruction import instruction_bits
@@ -81,9 +82,7 @@ class Architecture:
                     break
                 made = program(self.datapath, digit_bits, spare_words=SPARE_WORDS)
         except FoldingError as error:
-            raise ShortfallError(
-                f"the realization must suit the {self.name} architecture: {error}; parallel takes every realization"
-            ) from None
+            raise ShortfallError(unsuitable(self.name, error)) from None
         if not self.reload:
             return made
         roomy = replace(made, accumulator_bits=made.accumulator_bits + SPARE_ACCUMULATOR_BITS)
@@ -227,6 +226,11 @@ def digit_bits_on(board: Board | None, name: str) -> int:
     if board is None or name != "folded" or not board.device.factor_bits:
         return DIGIT_BITS
     return board.device.factor_bits - 1
+
+
+def objective_of(name: str, board: Board | None) -> Objective:
+    """Return what word lengths and a realization are chosen for in the architecture `name`."""
+    return SMALL_AREA if name == "parallel" else ShortProgram(name, digit_bits_on(board, name))
 
 
 def fitting(name: str, budget: Budget, datapath: Datapath, board: Board | None = None) -> Architecture:

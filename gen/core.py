@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache, partial
 
-from sosmith.gen.architecture import Architecture, Budget, candidates, fitting, reason_for
+from sosmith.gen.architecture import Architecture, Budget, candidates, fitting, objective_of, reason_for
 from sosmith.gen.filter.design import Filter, design
 from sosmith.gen.fpga.boards import Board
 from sosmith.gen.realizations.registry import REALIZATIONS
 from sosmith.gen.specification.choices import CORES, ERROR_FEEDBACK
 from sosmith.gen.specification.specification import Specification
 from sosmith.gen.word_lengths.other_realization import with_realization
-from sosmith.gen.word_lengths.quantize import Plan, least_area, plan, prove
+from sosmith.gen.word_lengths.quantize import Plan, least_size, plan, prove
 from sosmith.gen.word_lengths.quantized import Quantized
-from sosmith.gen.word_lengths.selection import Accept, Selection
+from sosmith.gen.word_lengths.selection import Selection
 from sosmith.model.calibration.fit import Fit, fit, read_measurements
 from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.dataflow.datapath import Datapath
@@ -114,6 +114,7 @@ def design_core(
     progress("filter design")
     ideal = filter_of(spec) if kind != "calibration" else None
 
+    @cache  # for all architectures that are tried
     def plan_of(name: str) -> Plan:
         progress(f"word lengths, {name}" if ideal is not None else "word lengths")
         return plan(
@@ -126,26 +127,28 @@ def design_core(
             realization=name,
         )
 
-    def floor_of(name: str) -> float:
-        return 0 if ideal is None else least_area(ideal, name)
-
-    selection = Selection(plan_of, floor_of, progress)
-    given: tuple[Quantized, str] | None = None
-    if ideal is None:
-        given = prove(plan_of(next(iter(REALIZATIONS)))), "none: a calibration has no filter sections"
-    elif widths_of is not None:
-        if wanted not in ERROR_FEEDBACK:
-            raise SpecificationError(
-                f"the realization at the widths of {widths_of} must be {', '.join(ERROR_FEEDBACK)}, not {wanted}"
-            )
-        quantized = with_realization(selection.proven(widths_of), wanted)
-        given = quantized, f"{wanted} at the word lengths chosen for {widths_of}, as asked"
-    elif wanted != AUTO:
+    def select(architecture: str) -> tuple[Quantized, str]:
+        """Choose the realization and its word lengths for an architecture."""
+        if ideal is None:
+            return prove(plan_of(next(iter(REALIZATIONS)))), "none: a calibration has no filter sections"
+        objective = objective_of(architecture, board)
+        selection = Selection(
+            lambda name: plan_of(name).under(objective),
+            lambda name: least_size(ideal, name, objective),
+            objective,
+            progress,
+        )
+        if widths_of is not None:
+            if wanted not in ERROR_FEEDBACK:
+                raise SpecificationError(
+                    f"the realization at the widths of {widths_of} must be {', '.join(ERROR_FEEDBACK)}, not {wanted}"
+                )
+            quantized = with_realization(selection.proven(widths_of), wanted)
+            return quantized, f"{wanted} at the word lengths chosen for {widths_of}, as asked"
+        if wanted == AUTO:
+            return selection.cheapest(partial(in_hardware, architecture))
         source = "on the command line" if realization is not None else "in the specification"
-        given = selection.proven(wanted), f"{wanted}: asked for {source}"
-
-    def select(accept: Accept) -> tuple[Quantized, str]:
-        return selection.cheapest(accept) if given is None else given
+        return selection.proven(wanted), f"{wanted}: asked for {source}"
 
     def in_hardware(name: str, datapath: Datapath) -> Architecture:
         """Architecture with the calibrated range, which costs a program instructions, and the limits of wear."""
@@ -165,7 +168,7 @@ def design_core(
     refused = ""
     for name in names:
         try:
-            quantized, reason = select(partial(in_hardware, name))
+            quantized, reason = select(name)
             architecture = in_hardware(name, quantized.datapath)
             break
         except ShortfallError as error:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from sosmith.gen.word_lengths.bit_limits import MAX_BITS
-from sosmith.gen.word_lengths.cost import area_of
 from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.dataflow.datapath import Stage
 from sosmith.model.dataflow.graph import Range
@@ -39,11 +38,6 @@ class InputStage:
     stages: tuple[Stage, ...]
     output: Range
     error: Fraction
-
-    @property
-    def area(self) -> int:
-        """Estimated area."""
-        return sum(area_of(stage.graph) for stage in self.stages)
 
 
 def needs_scaling(port: Port, output: Port) -> bool:

@@ -1,9 +1,9 @@
 """From a specification to a frozen datapath: formats are chosen with estimates, then proven.
 
 All errors inside are in output LSBs. `max_error` minus the half LSB of the output rounding is at first divided equally
-among calibration, filter coefficients and filter rounding. Formats are then trimmed to the smallest estimated area,
-whichever part of the error that increases (`sosmith.gen.word_lengths.search`). For the result, the parts of the bound
-and the ranges of all nodes are proven.
+among calibration, filter coefficients and filter rounding. Formats are then trimmed to the smallest size, as the
+architecture counts it (`sosmith.gen.word_lengths.objective`), whichever part of the error that increases
+(`sosmith.gen.word_lengths.search`). For the result, the parts of the bound and the ranges of all nodes are proven.
 """
 
 from __future__ import annotations
@@ -20,15 +20,14 @@ from sosmith.gen.realizations.registry import REALIZATIONS, Section
 from sosmith.gen.realizations.section_format import SectionFormat, unknown_range
 from sosmith.gen.word_lengths.bit_limits import MAX_BITS
 from sosmith.gen.word_lengths.cascade import cascade, parts_of, stages_of, unquantized
-from sosmith.gen.word_lengths.cost import LUTS_OF_A_BLOCK, cost_of, cost_of_graphs
 from sosmith.gen.word_lengths.equal_shares import equally_shared
 from sosmith.gen.word_lengths.input_stage import InputStage, input_stages, needs_scaling
+from sosmith.gen.word_lengths.objective import SMALL_AREA, Objective
 from sosmith.gen.word_lengths.ordering import best_order
 from sosmith.gen.word_lengths.output_stage import output_stage
 from sosmith.gen.word_lengths.quantized import Quantized, assembled
 from sosmith.gen.word_lengths.search import Choice, Search
 from sosmith.model.calibration.polynomial import Polynomial
-from sosmith.model.dataflow.graph import Op
 from sosmith.model.errors import ShortfallError
 from sosmith.model.port import Port
 
@@ -57,6 +56,8 @@ class Plan:
         The search that chooses the formats; None without a filter.
     start : Choice or None
         Formats that keep to `share`; None if the estimates found none.
+    objective : Objective
+        The size that formats are trimmed for.
     made : Quantized or None
         The proven design, for a realization without estimates.
     """
@@ -73,6 +74,7 @@ class Plan:
     input_stages: tuple[InputStage, ...]
     search: Search | None
     start: Choice | None
+    objective: Objective = SMALL_AREA
     made: Quantized | None = None
 
     @property
@@ -81,14 +83,19 @@ class Plan:
         return self.max_error / self.output.lsb - Fraction(1, 2)
 
     @cached_property
-    def area(self) -> float:
-        """Estimated area, infinite where there is no estimate."""
+    def size(self) -> float:
+        """Estimated size, infinite where there is no estimate."""
         if self.made is not None:
-            return cost_of(self.made.datapath).area
+            return self.objective.of_datapath(self.made.datapath)
         if self.search is None or self.start is None:
             return math.inf
         last, _ = output_stage(self.search.output(self.start), self.output)
-        return self.search.area(self.start) + cost_of_graphs([last.graph]).area
+        return self.search.size(self.start) + self.objective.of_graph(last.graph)
+
+    def under(self, objective: Objective) -> Plan:
+        """Return the same plan, to be trimmed for another objective."""
+        search = None if self.search is None else self.search.under(objective)
+        return replace(self, search=search, objective=objective)
 
     def trimmed(self) -> Plan:
         """Return a copy with formats trimmed until no step saves any more."""
@@ -240,15 +247,13 @@ def _assembled(
     )
 
 
-def least_area(ideal: Filter, realization: str) -> float:
-    """Bound the area of a realization from below: each of its products takes a multiplier block.
-
-    Products by powers of two take none. Those that rounding to few bits makes powers of two are counted all the same.
+def least_size(ideal: Filter, realization: str, objective: Objective) -> float:
+    """Bound the size of a realization from below, without planning it.
 
     Raises
     ------
     ShortfallError
-        If the filter has no such realization.
+        If the filter has no such realization, or the realization does not suit the objective.
     """
     parts = parts_of(ideal, realization)
     formats = [SectionFormat(coefficient_bits=_BITS_TO_ORDER)] * len(parts)
@@ -256,7 +261,7 @@ def least_area(ideal: Filter, realization: str) -> float:
         stages = stages_of(ideal, realization, formats, unknown_range(0))
     except ShortfallError:
         return 0  # cannot be built with so few bits
-    return LUTS_OF_A_BLOCK * sum(node.op is Op.SCALE for stage in stages for node in stage.graph.nodes)
+    return objective.least([stage.graph for stage in stages])
 
 
 def gain_of(ideal: Filter) -> Fraction:

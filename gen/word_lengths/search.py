@@ -1,6 +1,6 @@
 """Trims the formats of a cascade, by greedy descent: fraction bits of every quantizer, bits of every coefficient.
 
-The start keeps to the error allowed. Each step is the one that saves the most estimated area for the error it costs;
+The start keeps to the error allowed. Each step is the one that saves the most estimated size for the error it costs;
 the search ends when no further step fits. A step drops bits of one quantizer, of the calibration or of one
 coefficient, which may become either neighbour of its ideal value; or it starts to quantize a product's operand so that
 it fits one hardware multiplier.
@@ -12,6 +12,7 @@ is proven afterwards.
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -29,8 +30,9 @@ from sosmith.gen.realizations.coefficients import lowest_terms, round_significan
 from sosmith.gen.realizations.registry import REALIZATIONS, Section
 from sosmith.gen.realizations.section_format import SectionFormat, unknown_range
 from sosmith.gen.word_lengths.bit_limits import MIN_BITS
-from sosmith.gen.word_lengths.cost import MULTIPLIER_BITS, area_of
+from sosmith.gen.word_lengths.cost import MULTIPLIER_BITS
 from sosmith.gen.word_lengths.input_stage import InputStage
+from sosmith.gen.word_lengths.objective import SMALL_AREA, Objective
 from sosmith.model.dataflow.graph import Range
 from sosmith.model.errors import ShortfallError
 
@@ -46,7 +48,7 @@ _LOST = 2.0**-16
 """Share of a response's sum of magnitudes that may be lost when samples with different signs are added up."""
 
 _STEPS = (1, 2, 3)
-"""Bits that one step may drop: several, because a shorter fraction may save area only once it is the shortest one."""
+"""Bits that one step may drop: several, as a shorter fraction may save something only once it is the shortest one."""
 
 
 @dataclass(frozen=True)
@@ -58,11 +60,11 @@ class Choice:
 
 
 class _Input(NamedTuple):
-    """Output range of an input stage, its error at the filter's output in LSBs, and its area."""
+    """Output range of an input stage, its error at the filter's output in LSBs, and its estimated size."""
 
     x: Range
     error: float
-    area: float
+    size: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,6 +93,8 @@ class Search:
         Possible input stages, each a little coarser than the previous one.
     gain : Fraction
         Gain of the filter, by which their errors are multiplied.
+    objective : Objective
+        The size to be saved.
 
     Raises
     ------
@@ -99,17 +103,43 @@ class Search:
     """
 
     def __init__(
-        self, rows: Sequence[Sequence[float]], realization: str, input_stages: Sequence[InputStage], gain: Fraction
+        self,
+        rows: Sequence[Sequence[float]],
+        realization: str,
+        input_stages: Sequence[InputStage],
+        gain: Fraction,
+        objective: Objective = SMALL_AREA,
     ) -> None:
         self._build = REALIZATIONS[realization].build
         self._rows = rows
-        self._inputs = [_Input(s.output, float(s.error * gain), s.area) for s in input_stages]
+        self._input_stages = input_stages
+        self._gain = gain
+        self._objective = objective
+        self._inputs = self._sized_inputs()
         x = self._inputs[0].x
         self._ends = x.low * 2.0**-x.frac, x.high * 2.0**-x.frac
         self._estimates = _estimates(rows, realization, self._ends)
         self._base: _Base | None = None
         self._ranges: dict[tuple[object, ...], dict[str, tuple[int, int]]] = {}
         self._known: dict[tuple[object, ...], tuple[float, Range, dict[str, int]]] = {}
+
+    def under(self, objective: Objective) -> Search:
+        """Return the same search for another objective."""
+        if objective == self._objective:
+            return self
+        other = copy.copy(self)
+        other._objective = objective
+        other._inputs = other._sized_inputs()
+        other._known = {}
+        return other
+
+    def _sized_inputs(self) -> list[_Input]:
+        return [
+            _Input(
+                s.output, float(s.error * self._gain), sum(self._objective.of_graph(part.graph) for part in s.stages)
+            )
+            for s in self._input_stages
+        ]
 
     def start(self, share: float, most: int) -> Choice | None:
         """Find formats whose coefficients and whose quantizers each keep their error within `share` output LSBs.
@@ -151,7 +181,7 @@ class Search:
         allowed : float
             Allowed sum of the errors of input stage, coefficients and rounding, in output LSBs.
         """
-        choice, error, area = start, self.error(start), self.area(start)
+        choice, error, size = start, self.error(start), self.size(start)
         while error <= allowed:
             self._base = self._based(choice.formats)
             best: tuple[float, Choice, float, float] | None = None
@@ -159,15 +189,15 @@ class Search:
                 after = self.error(candidate)
                 if after > allowed:
                     continue
-                saved = area - self.area(candidate)
+                saved = size - self.size(candidate)
                 if saved <= 0:
                     continue
                 merit = saved / max(after - error, 1e-6 * allowed)
                 if best is None or merit > best[0]:
-                    best = merit, candidate, after, area - saved
+                    best = merit, candidate, after, size - saved
             if best is None:
                 break
-            _, choice, error, area = best
+            _, choice, error, size = best
         return choice
 
     def _steps(self, choice: Choice) -> Iterator[Choice]:
@@ -249,11 +279,11 @@ class Search:
         return response
 
     def _is_stable(self, choice: Choice) -> bool:
-        return self.area(choice) < math.inf
+        return self.size(choice) < math.inf
 
-    def area(self, choice: Choice) -> float:
-        """Estimated area of the input stage and the sections, infinite if rounded coefficients are unstable."""
-        return self._inputs[choice.input_stage].area + sum(area for area, _ in self._built_sections(choice))
+    def size(self, choice: Choice) -> float:
+        """Estimated size of the input stage and the sections, infinite if rounded coefficients are unstable."""
+        return self._inputs[choice.input_stage].size + sum(size for size, _ in self._built_sections(choice))
 
     def output(self, choice: Choice) -> Range:
         """Return the estimated output range of the last section."""
@@ -263,11 +293,11 @@ class Search:
     def _built_sections(self, choice: Choice) -> Iterator[tuple[float, Range]]:
         passed = self._inputs[choice.input_stage].x
         for k, form in enumerate(choice.formats):
-            area, passed, _ = self._section(k, passed, form)
-            yield area, passed
+            size, passed, _ = self._section(k, passed, form)
+            yield size, passed
 
     def _section(self, k: int, x: Range, form: SectionFormat) -> tuple[float, Range, dict[str, int]]:
-        """Area and output of section k, and the fraction bits with which each long operand would fit a multiplier."""
+        """Size and output of section k, and the fraction bits with which each long operand would fit a multiplier."""
         key = (k, x, tuple(form.coefficients.items()), tuple(form.fracs.items()))
         if key not in self._known:
             try:
@@ -288,7 +318,7 @@ class Search:
             for name, node in operands.items()
             if node.width > MULTIPLIER_BITS
         }
-        return area_of(graph), output.range, fits
+        return self._objective.of_graph(graph), output.range, fits
 
     def _ranges_of(self, k: int, frac: int, form: SectionFormat, name: str) -> dict[str, tuple[int, int]]:
         """Estimated codes of the nodes of section k, which do not depend on the range of its input."""

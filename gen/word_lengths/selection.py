@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 
 from sosmith.gen.realizations.registry import BEST_KEPT, REALIZATIONS
-from sosmith.gen.word_lengths.cost import LUTS_OF_A_BLOCK, cost_of
+from sosmith.gen.word_lengths.objective import Objective
 from sosmith.gen.word_lengths.quantize import Plan, prove
 from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.model.dataflow.datapath import Datapath
@@ -14,13 +14,10 @@ from sosmith.model.errors import ShortfallError
 
 Progress = Callable[[str], None]
 Best = tuple[float, Quantized]
-"""A proven design and its area."""
+"""A proven design and its size."""
 
 Accept = Callable[[Datapath], object]
 """Raises ShortfallError, with the reason, if a datapath does not suit the hardware."""
-
-_HOPELESS = 2.5
-"""Ratio to the smallest area beyond which a plan is not trimmed: trimming saved less than half in every design seen."""
 
 
 class Selection:
@@ -31,14 +28,23 @@ class Selection:
     plan_of : callable
         Plans a realization, given its name; may raise ShortfallError.
     floor_of : callable
-        Bounds the area of a realization from below without planning it; may raise ShortfallError.
+        Bounds the size of a realization from below without planning it; may raise ShortfallError.
+    objective : Objective
+        The size to be made small.
     progress : callable
         Called with the name of each step.
     """
 
-    def __init__(self, plan_of: Callable[[str], Plan], floor_of: Callable[[str], float], progress: Progress) -> None:
+    def __init__(
+        self,
+        plan_of: Callable[[str], Plan],
+        floor_of: Callable[[str], float],
+        objective: Objective,
+        progress: Progress,
+    ) -> None:
         self._plan_of = plan_of
         self._floor_of = floor_of
+        self._objective = objective
         self._progress = progress
         self._plans: dict[str, Plan] = {}
         self._trimmed: set[str] = set()
@@ -51,8 +57,9 @@ class Selection:
         Raises
         ------
         ShortfallError
-            If it cannot meet the specification.
+            If it cannot meet the specification, or does not suit the objective.
         """
+        self._floor_of(name)
         self._plan(name)
         if name in self._failures:
             raise ShortfallError(self._failures[name])
@@ -60,11 +67,11 @@ class Selection:
         return self._prove(name)
 
     def cheapest(self, accept: Accept) -> tuple[Quantized, str]:
-        """Return the proven realization with the smallest estimated area that `accept` permits, and the reason.
+        """Return the proven realization of the smallest size that `accept` permits, and the reason.
 
-        Realizations are planned in the order of their least possible areas, those that are no cascades last, until no
+        Realizations are planned in the order of their least possible sizes, those that are no cascades last, until no
         remaining one can be smaller. Plans that are not much larger than the smallest are trimmed. They are proven in
-        the order of their planned areas until no remaining plan promises to be smaller.
+        the order of their planned sizes until no remaining plan promises to be smaller.
 
         Raises
         ------
@@ -73,6 +80,7 @@ class Selection:
         """
         failures: dict[str, str] = {}
         floors = self._floors(failures)
+        unsuited = {*failures}
         best: Best | None = None
         while promising := self._promising(floors, math.inf if best is None else best[0], failures):
             best = self._smallest(promising, best, accept, failures)
@@ -81,10 +89,10 @@ class Selection:
             raise ShortfallError(
                 f"none of the {len(failures)} realizations meets the specification: {with_best}{failures[BEST_KEPT]}"
             )
-        return best[1], self._reason(best, {*failures}, [*floors])
+        return best[1], self._reason(best[1], {*failures} - unsuited, unsuited, [*floors])
 
     def _floors(self, failures: dict[str, str]) -> dict[str, float]:
-        """Least areas of all realizations, in the order of planning."""
+        """Least sizes of all realizations, in the order of planning."""
         floors = {}
         for name in REALIZATIONS:
             try:
@@ -104,16 +112,16 @@ class Selection:
                     names.append(name)
                 else:
                     failures[name] = self._failures[name]
-            for name in sorted((name for name in new if name in self._plans), key=self._area):
-                if self._area(name) <= _HOPELESS * least:
+            for name in sorted((name for name in new if name in self._plans), key=self._size):
+                if self._size(name) <= self._objective.hopeless * least:
                     self._trim(name)
-                    least = min(least, self._area(name))
+                    least = min(least, self._size(name))
         return names
 
     def _smallest(self, names: list[str], best: Best | None, accept: Accept, failures: dict[str, str]) -> Best | None:
         """Prove those that promise to be smaller than the best one so far."""
-        for name in sorted(names, key=self._area):
-            if best is not None and self._area(name) >= best[0]:
+        for name in sorted(names, key=self._size):
+            if best is not None and self._size(name) >= best[0]:
                 break
             try:
                 quantized = self._prove(name)
@@ -121,36 +129,35 @@ class Selection:
             except ShortfallError as error:
                 failures[name] = str(error)
                 continue
-            found = cost_of(quantized.datapath).area
+            found = self._objective.of_datapath(quantized.datapath)
             if best is None or found < best[0]:
                 best = found, quantized
         return best
 
-    def _reason(self, best: Best, failures: set[str], dropped: list[str]) -> str:
-        area, quantized = best
-        short = {*failures, *(name for name in self._plans if self._area(name) == math.inf)}
-        left = sorted((n for n in self._plans if n not in {quantized.realization, *short}), key=self._area)
+    def _reason(self, quantized: Quantized, failures: set[str], unsuited: set[str], dropped: list[str]) -> str:
+        short = {*failures, *(name for name in self._plans if self._size(name) == math.inf)}
+        left = sorted((n for n in self._plans if n not in {quantized.realization, *short}), key=self._size)
         count = 1 + len(left) + len(dropped)
-        why = f"the smallest estimated area of {count}" if count > 1 else "the only one proven"
-        reason = (
-            f"{quantized.realization}: {why}, {round(area):,} LUT4 with a multiplier block counted as {LUTS_OF_A_BLOCK}"
-        )
+        why = f"{self._objective.best} of {count}" if count > 1 else "the only one proven"
+        reason = f"{quantized.realization}: {why}, {self._objective.told(quantized.datapath)}"
         others = [
-            ", ".join(f"{name} {round(self._known_area(name)):,}" for name in left),
-            f"more in multiplier blocks alone: {', '.join(name for name in REALIZATIONS if name in dropped)}"
+            ", ".join(f"{name} {round(self._known_size(name)):,}" for name in left),
+            f"{self._objective.beyond}: {', '.join(name for name in REALIZATIONS if name in dropped)}"
             if dropped
             else "",
+            f"not for this: {', '.join(name for name in REALIZATIONS if name in unsuited)}" if unsuited else "",
             _falling_short([name for name in REALIZATIONS if name in short]),
         ]
         rest = "; ".join(other for other in others if other)
         return f"{reason} ({rest})" if rest else reason
 
-    def _area(self, name: str) -> float:
-        return self._plans[name].area
+    def _size(self, name: str) -> float:
+        return self._plans[name].size
 
-    def _known_area(self, name: str) -> float:
-        """Area as proven, if it was: a proof may have needed longer words than were planned."""
-        return cost_of(self._proven[name].datapath).area if name in self._proven else self._area(name)
+    def _known_size(self, name: str) -> float:
+        """Size as proven, if it was: a proof may have needed longer words than were planned."""
+        proven = self._proven.get(name)
+        return self._size(name) if proven is None else self._objective.of_datapath(proven.datapath)
 
     def _plan(self, name: str) -> None:
         if name in self._plans or name in self._failures:
@@ -181,7 +188,7 @@ class Selection:
 
 
 def _next(floors: Mapping[str, float], least: float) -> list[str]:
-    """Names of the first least area that is below `least`, none if there is none."""
+    """Names of the first least size that is below `least`, none if there is none."""
     names = [name for name, floor in floors.items() if floor < least]
     return [name for name in names if REALIZATIONS[name].cascade and floors[name] == floors[names[0]]] or names[:1]
 

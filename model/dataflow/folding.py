@@ -72,7 +72,7 @@ from fractions import Fraction
 from typing import NamedTuple
 
 from sosmith.model.dataflow.datapath import Datapath
-from sosmith.model.dataflow.graph import Node, Op
+from sosmith.model.dataflow.graph import Graph, Node, Op
 from sosmith.model.dataflow.program import (
     CARRIES,
     CLEARS,
@@ -119,6 +119,25 @@ def program(datapath: Datapath, digit_bits: int, *, spare_words: int = 0, like: 
         return made
     _check_can_take_over(made, like)
     return replace(made, accumulator_bits=like.accumulator_bits)
+
+
+def columns_of(graph: Graph, digit_bits: int) -> list[Column]:
+    """Return the columns that compute one stage's values, for an estimate of what it adds to a program.
+
+    A program has an instruction for each product, and one for each column without products; besides those that take
+    samples, move operands or states, and wait. An output that is the floor of a value costs nothing.
+
+    Raises
+    ------
+    FoldingError
+        If the stage has an operation that cannot be folded.
+    """
+    nodes = list(graph.nodes)
+    _share_delays(nodes)
+    output = graph.outputs[0]
+    if nodes[output].op is Op.FLOOR:
+        (output,) = nodes[output].operands
+    return _Folding(_Flat(nodes, list(graph.inputs), output), digit_bits, {}, ()).columns()
 
 
 def _check_can_take_over(made: Program, like: Program) -> None:
@@ -272,16 +291,11 @@ class _Folding:
         states: dict[Digit, int] = {}
         for index in self._delays():
             states |= {Digit(index, k): len(states) + k for k in range(self._forms[index].digits)}
-        copied, copies = set(), dict[Digit, list[Digit]]()
+        copies = dict[Digit, list[Digit]]()
         for index in self._delays():
             for source, digit in self._copied(index):
                 copies.setdefault(source, []).append(digit)
-                copied.add(index)
-        computed = {
-            i: Sum(self._name(i), i, self._columns(self._sum(i), self._forms[i], i))
-            for i in sorted(self._stored)
-            if i not in copied and i not in self._inputs
-        }
+        computed = self._computed()
         judged = [*self._judged()]
         result = self._result(computed, copies)
         made = Scheduler(states, copies, [*judged, *computed.values(), result])
@@ -316,6 +330,19 @@ class _Folding:
             schedule=tuple(made.schedule),
             accumulator_bits=self._accumulator_bits(made),
         )
+
+    def columns(self) -> list[Column]:
+        """Return the columns of all values."""
+        return [column for one in self._computed().values() for column in one.columns]
+
+    def _computed(self) -> dict[int, Sum]:
+        """Return the sums of all stored values but inputs, and states that take over a value as it is."""
+        copied = {index for index in self._delays() if self._copied(index)}
+        return {
+            i: Sum(self._name(i), i, self._columns(self._sum(i), self._forms[i], i))
+            for i in sorted(self._stored)
+            if i not in copied and i not in self._inputs
+        }
 
     def _delays(self) -> list[int]:
         return [index for index, node in enumerate(self._nodes) if node.op is Op.DELAY]

@@ -182,8 +182,7 @@ class Program:
     def _serial_cycles(self, instruction: Instruction) -> int:
         if instruction.opcode in PRODUCTS:
             return self.digit_bits + 1
-        value = instruction.constant
-        return max(value.bit_length(), 1) if value >= 0 else (-value - 1).bit_length() + 1
+        return serial_clocks(instruction.constant)
 
     def padded(self, count: int) -> Program:
         """Return the program with instructions that change nothing put before it, so that it has `count` of them.
@@ -261,6 +260,11 @@ class Program:
             if not -base <= words[target] < base:
                 raise OverflowError(f"a word must hold {self.digit_bits + 1} bits, not {words[target]}")
         return Sample(code, outside)
+
+
+def serial_clocks(factor: int) -> int:
+    """Clocks of a multiplication by a constant that takes one for each bit of the factor."""
+    return max(factor.bit_length(), 1) if factor >= 0 else (-factor - 1).bit_length() + 1
 
 
 def digits_of(code: int, count: int, digit_bits: int) -> list[int]:

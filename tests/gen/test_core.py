@@ -9,7 +9,7 @@ import pytest
 from tests.gen.designs import EXAMPLES
 
 from sosmith.gen import core
-from sosmith.gen.core import design_core
+from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.realizations.registry import REALIZATIONS
 from sosmith.gen.specification.specification import Specification, load
 from sosmith.gen.word_lengths.cost import cost_of
@@ -19,12 +19,16 @@ from sosmith.model.errors import ShortfallError
 
 @pytest.fixture(name="spec")
 def low_pass() -> Specification:
-    """Third-order low-pass at a thousandth of the sample rate, 8 bits out."""
-    audio = load(EXAMPLES / "audio_lowpass.toml")
+    """Third-order low-pass at a thousandth of the sample rate, 8 bits out, in the parallel architecture."""
+    audio = in_architecture("parallel", load(EXAMPLES / "audio_lowpass.toml"))
     output = replace(audio.output, bits=8, lsb=audio.output.lsb * 256)
     return replace(
         audio, output=output, max_error=output.lsb, filter=replace(audio.filter, order=3, cutoff=(Fraction(48),))
     )
+
+
+def in_architecture(name: str, spec: Specification) -> Specification:
+    return replace(spec, hardware=replace(spec.hardware, architecture=name))
 
 
 def within(spec: Specification, beyond_half: Fraction) -> Specification:
@@ -61,7 +65,7 @@ def test_the_cheapest_is_taken_and_the_rest_are_told(spec: Specification) -> Non
 def test_what_is_dropped_could_not_win(
     order: int, cutoff: tuple[int, ...], bits: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    audio = load(EXAMPLES / "audio_lowpass.toml")
+    audio = in_architecture("parallel", load(EXAMPLES / "audio_lowpass.toml"))
     kind = "lowpass" if len(cutoff) == 1 else "bandpass"
     output = replace(audio.output, bits=bits, lsb=Fraction(2, 1 << bits))
     asked = replace(audio.filter, order=order, kind=kind, cutoff=tuple(map(Fraction, cutoff)))
@@ -69,11 +73,45 @@ def test_what_is_dropped_could_not_win(
     spec = replace(spec, max_error=output.lsb, filter=asked)
     made = design_core(spec)
     assert "more in multiplier blocks alone" in made.reasons["realization"]
-    monkeypatch.setattr(core, "least_area", lambda ideal, name: 0)
+    monkeypatch.setattr(core, "least_size", lambda ideal, name, objective: 0)
     every = design_core(spec)
     assert "more in multiplier blocks alone" not in every.reasons["realization"]
     assert made.quantized.realization == every.quantized.realization
     assert made.datapath == every.datapath
+
+
+@pytest.mark.parametrize("architecture", ["folded", "serial"])
+def test_programs_have_an_objective_of_their_own(spec: Specification, architecture: str) -> None:
+    asked = in_architecture(architecture, spec)
+    made = design_core(asked)
+
+    def length(of: CoreDesign) -> tuple[int, int, int]:
+        program = of.architecture.program
+        assert program is not None
+        clocks = program.serial_cycles if architecture == "serial" else len(program.instructions)
+        return clocks, program.words, program.accumulator_bits
+
+    foldable = [name for name in REALIZATIONS if name not in {"normal", "lattice_wdf"}]
+    lengths = {name: length(design_core(asked, realization=name)) for name in foldable}
+    assert length(made) == min(lengths.values())
+    clocks, words, bits = length(made)
+    counted = f"the fewest clocks of multiplication of 6, at most {clocks}"
+    if architecture == "folded":
+        counted = f"the shortest program of 6, {clocks} instructions"
+    start = f"{made.quantized.realization}: {counted}, {words} words of memory, an accumulator of {bits} bits (df"
+    assert made.reasons["realization"].startswith(start)
+    assert made.reasons["realization"].endswith("; not for this: normal, lattice_wdf)")
+    # The word lengths of the smallest parallel core make a longer program.
+    small = design_core(spec, realization=made.quantized.realization)
+    assert length(replace(made, architecture=replace(made.architecture, datapath=small.datapath))) > length(made)
+
+
+def test_each_architecture_tried_is_designed_for_itself(spec: Specification) -> None:
+    fast = replace(spec, sample_rate=spec.hardware.clock, filter=replace(spec.filter, cutoff=(Fraction(48_000),)))
+    tried = design_core(in_architecture("auto", fast))
+    assert tried.architecture.name == "parallel"
+    assert tried.datapath == design_core(fast).datapath
+    assert tried.reasons["realization"] == design_core(fast).reasons["realization"]
 
 
 def test_what_was_dropped_is_planned_if_nothing_else_suits(
@@ -90,7 +128,7 @@ def test_those_that_fall_short_are_told(spec: Specification) -> None:
 
 def test_the_only_one_that_is_left(spec: Specification, monkeypatch: pytest.MonkeyPatch) -> None:
     fail(monkeypatch, {name: "it must fit, and does not" for name in REALIZATIONS if name != "delta"})
-    monkeypatch.setattr(core, "least_area", lambda ideal, name: 0)
+    monkeypatch.setattr(core, "least_size", lambda ideal, name, objective: 0)
     others = [name for name in REALIZATIONS if name != "delta"]
     reason = design_core(spec).reasons["realization"]
     assert re.fullmatch(

@@ -109,7 +109,7 @@ def test_what_is_estimated_is_what_is_proven(name: str, realization: str) -> Non
     assert coefficients == pytest.approx(float(made.budget["filter coefficients"]), rel=1e-3)
     # Of few bits dropped, the largest error is less than a unit; the estimate takes a unit.
     assert 0.999 < rounding / float(made.budget["filter rounding"]) < 1.08
-    assert trimmed.area == pytest.approx(cost_of(made.datapath).area, rel=1e-3)
+    assert trimmed.size == pytest.approx(cost_of(made.datapath).area, rel=1e-3)
 
 
 @pytest.mark.parametrize("sign", [1, -1])
@@ -132,7 +132,7 @@ def test_bits_dropped_from_an_operand_of_inputs_alone_are_not_free(realization: 
     assert all(estimate.gains["taps_b0"] > 0 for estimate in search._estimates if "taps_b0" in estimate.optional)
     proven = float(made.budget["filter rounding"] + made.budget["filter coefficients"])
     assert 0.999 < search.error(choice) / proven < 1.08
-    assert trimmed.area == pytest.approx(cost_of(made.datapath).area, rel=1e-3)
+    assert trimmed.size == pytest.approx(cost_of(made.datapath).area, rel=1e-3)
 
 
 @pytest.mark.parametrize("realization", CASCADES)
@@ -167,7 +167,7 @@ def test_there_is_no_start_beyond_the_most_bits() -> None:
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_trimming_saves(name: str, realization: str) -> None:
     before, (after, _) = example_plan(name, realization), trimmed_and_proven(name, realization)
-    assert after.area < before.area
+    assert after.size < before.size
     search, choice = search_of(after)
     assert search.error(choice) <= float(after.allowed)
 
@@ -197,9 +197,9 @@ def test_no_further_step_both_fits_and_saves(kind: str, order: int, cutoff: floa
     trimmed = filter_plan(kind, order, cutoff, realization).trimmed()
     search, choice = search_of(trimmed)
     assert prove(trimmed).bound <= 1
-    area, allowed = search.area(choice), float(trimmed.allowed)
+    area, allowed = search.size(choice), float(trimmed.allowed)
     assert [
-        what for what, other in shorter(trimmed) if search.error(other) <= allowed and search.area(other) < area
+        what for what, other in shorter(trimmed) if search.error(other) <= allowed and search.size(other) < area
     ] == []
 
 
@@ -208,9 +208,9 @@ def test_no_further_step_is_left_where_a_calibration_comes_first(name: str) -> N
     trimmed, made = trimmed_and_proven(name, "df1_ef2")
     search, choice = search_of(trimmed)
     assert made.bound * trimmed.output.lsb <= trimmed.max_error
-    area, allowed = search.area(choice), float(trimmed.allowed)
+    area, allowed = search.size(choice), float(trimmed.allowed)
     assert [
-        what for what, other in shorter(trimmed) if search.error(other) <= allowed and search.area(other) < area
+        what for what, other in shorter(trimmed) if search.error(other) <= allowed and search.size(other) < area
     ] == []
 
 
@@ -390,7 +390,7 @@ def test_without_a_start_there_is_no_area_but_still_a_proof(
 ) -> None:
     monkeypatch.setattr(Search, "start", lambda *_: None)
     planned = filter_plan("lowpass", 3, 0.02, "df1_ef2")
-    assert planned.area == float("inf")
+    assert planned.size == float("inf")
     assert planned.trimmed() is planned
     assert prove(planned).bound <= 1
     assert fallbacks == [planned]

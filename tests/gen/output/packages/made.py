@@ -1,6 +1,7 @@
 """Packages of small cores, each made once, and the tools that take them."""
 
 import os
+import re
 import subprocess
 from functools import cache
 from pathlib import Path
@@ -49,3 +50,14 @@ def called(*command: str | Path, at: Path, simulator: str = "icarus") -> subproc
     for key in ("OBJCACHE", "CCACHE_DIR"):
         kept |= {key: os.environ[key]} if key in os.environ else {}
     return subprocess.run(command, cwd=at, env=kept, capture_output=True, text=True, check=False)
+
+
+def spoil(path: Path, constant: str) -> int:
+    """Add one unit to the first coefficient after `constant` in a file; return the number of coefficients found."""
+    text = path.read_text(encoding="utf-8")
+    found = list(re.finditer(constant, text))
+    first = found[0]
+    base = 16 if first[1] == "h" else 10
+    changed = f"{int(first[2], base) + 1:{'x' if base == 16 else 'd'}}"
+    path.write_text(text[: first.start(2)] + changed + text[first.end(2) :], encoding="utf-8")
+    return len(found)

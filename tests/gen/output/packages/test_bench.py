@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.gen.output.packages.made import SPECIFICATIONS, called, design_of, unpacked
+from tests.gen.output.packages.made import SPECIFICATIONS, called, design_of, spoil, unpacked
 
 from sosmith.gen.output.packages.stimuli import bench_stimuli
 from sosmith.gen.stimuli import bench_of
@@ -13,17 +13,6 @@ from sosmith.model.scenarios.worst_case_inputs import sign_matched
 
 PASS = re.compile(r"^PASS: (\d+) samples, 0 mismatches$", re.MULTILINE)
 FAIL = re.compile(r"^FAIL: .*\b[1-9]\d* mismatches", re.MULTILINE)
-
-
-def spoil(path: Path, constant: str) -> int:
-    """Add one unit to the first coefficient after `constant` in a file; return the number of coefficients found."""
-    text = path.read_text(encoding="utf-8")
-    found = list(re.finditer(constant, text))
-    first = found[0]
-    base = 16 if first[1] == "h" else 10
-    changed = f"{int(first[2], base) + 1:{'x' if base == 16 else 'd'}}"
-    path.write_text(text[: first.start(2)] + changed + text[first.end(2) :], encoding="utf-8")
-    return len(found)
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,177 @@
+"""What word lengths and realizations are chosen for: a small area, or a short program, by the architecture."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Protocol
+
+from sosmith.gen.word_lengths.cost import LUTS_OF_A_BLOCK, area_of, cost_of
+from sosmith.model.dataflow.datapath import Datapath
+from sosmith.model.dataflow.folding import FoldingError, columns_of, program
+from sosmith.model.dataflow.graph import Graph, Op
+from sosmith.model.dataflow.program import serial_clocks
+from sosmith.model.dataflow.scheduling import Column
+from sosmith.model.errors import ShortfallError
+
+_AREAS_OF_AN_INSTRUCTION = 4096
+"""Estimated area of the parallel core, in LUT4, that weighs as much as one instruction while word lengths are trimmed.
+
+Far more than one instruction is worth: it decides between steps that save no instruction yet. Shorter words lead to
+those that do. Without it, the program of flange_wear_locomotive has 136 instructions instead of 128.
+"""
+
+_WORDS, _ACCUMULATOR_BITS = Fraction(1, 1 << 16), Fraction(1, 1 << 24)
+"""Weights of a word of memory and a bit of the accumulator: they decide between programs of the same length."""
+
+
+class Objective(Protocol):
+    """The size that a design should have as little of."""
+
+    @property
+    def best(self) -> str:
+        """What the smallest design has, for a sentence."""
+
+    @property
+    def beyond(self) -> str:
+        """What is said of realizations that `least` excludes."""
+
+    @property
+    def hopeless(self) -> float:
+        """Ratio to the smallest size beyond which a plan is not trimmed."""
+
+    def of_graph(self, graph: Graph) -> float:
+        """Estimate what one stage adds to the size; infinite if it does not suit."""
+
+    def of_datapath(self, datapath: Datapath) -> float:
+        """Return the size of a whole design; infinite if it does not suit."""
+
+    def least(self, graphs: Sequence[Graph]) -> float:
+        """Bound the size from below for any word lengths, given stages with other ones.
+
+        Raises
+        ------
+        ShortfallError
+            If the stages cannot suit with any.
+        """
+
+    def told(self, datapath: Datapath) -> str:
+        """Return the size of a design in words."""
+
+
+@dataclass(frozen=True)
+class SmallArea:
+    """Estimated area of the parallel architecture: LUT4 on an ECP5, see `sosmith.gen.word_lengths.cost`."""
+
+    best = "the smallest estimated area"
+    beyond = "more in multiplier blocks alone"
+    hopeless = 2.5  # trimming saved less than half in every design seen
+
+    def of_graph(self, graph: Graph) -> float:
+        """Return the area of the graph's operators, in LUT4."""
+        return area_of(graph)
+
+    def of_datapath(self, datapath: Datapath) -> float:
+        """Return the area of all operators, in LUT4."""
+        return cost_of(datapath).area
+
+    def least(self, graphs: Sequence[Graph]) -> float:
+        """Return the area of a multiplier block for each product.
+
+        Products by powers of two take none. Those that rounding to few bits makes powers of two are counted all the
+        same.
+        """
+        return LUTS_OF_A_BLOCK * sum(node.op is Op.SCALE for graph in graphs for node in graph.nodes)
+
+    def told(self, datapath: Datapath) -> str:
+        """Return the area in words."""
+        return f"{cost_of(datapath).area:,} LUT4 with a multiplier block counted as {LUTS_OF_A_BLOCK}"
+
+
+SMALL_AREA = SmallArea()
+"""For the parallel architecture."""
+
+
+@dataclass(frozen=True)
+class ShortProgram:
+    """Length of the program of the folded and serial architectures, then its memory, then its accumulator.
+
+    Attributes
+    ----------
+    architecture : str
+        "folded" or "serial". In folded, an instruction takes one clock; in serial, one for each bit of its factor.
+    digit_bits : int
+        Width of a digit.
+    """
+
+    architecture: str
+    digit_bits: int
+
+    beyond = "longer even with one digit for each value"
+    hopeless = 1.5  # trimming saved less than a fifth in every design seen
+
+    @property
+    def best(self) -> str:
+        """What the smallest design has, for a sentence."""
+        return "the fewest clocks of multiplication" if self._serial else "the shortest program"
+
+    @property
+    def _serial(self) -> bool:
+        return self.architecture == "serial"
+
+    def of_graph(self, graph: Graph) -> float:
+        """Count the clocks of the graph's products, each with a little of its area; infinite if it cannot be folded."""
+        try:
+            columns = columns_of(graph, self.digit_bits)
+        except FoldingError:
+            return math.inf
+        return sum(map(self._clocks, columns)) + area_of(graph) / _AREAS_OF_AN_INSTRUCTION
+
+    def of_datapath(self, datapath: Datapath) -> float:
+        """Return the clocks of all instructions, with memory and accumulator as fractions of a clock.
+
+        Infinite if it cannot be folded.
+        """
+        try:
+            made = program(datapath, self.digit_bits)
+        except FoldingError:
+            return math.inf
+        clocks = made.serial_cycles if self._serial else len(made.instructions)
+        return float(clocks + made.words * _WORDS + made.accumulator_bits * _ACCUMULATOR_BITS)
+
+    def least(self, graphs: Sequence[Graph]) -> float:
+        """Count the products of values with one digit each.
+
+        Raises
+        ------
+        ShortfallError
+            If a stage cannot be folded.
+        """
+        try:
+            columns = [column for graph in graphs for column in columns_of(graph, digit_bits=256)]
+        except FoldingError as error:
+            raise ShortfallError(unsuitable(self.architecture, error)) from None
+        return sum(len(column.products) for column in columns)
+
+    def told(self, datapath: Datapath) -> str:
+        """Return the length of the program, its memory and its accumulator in words."""
+        made = program(datapath, self.digit_bits)
+        length = f"at most {made.serial_cycles:,}" if self._serial else f"{len(made.instructions):,} instructions"
+        return f"{length}, {made.words:,} words of memory, an accumulator of {made.accumulator_bits} bits"
+
+    def _clocks(self, column: Column) -> int:
+        """Clocks of a column's instructions; one without products still takes one, which ends it."""
+        if not self._serial:
+            return max(1, len(column.products))
+        clocks = [
+            self.digit_bits + 1 if product.other is not None else serial_clocks(product.constant)
+            for product in column.products
+        ]
+        return sum(clocks) or 1
+
+
+def unsuitable(architecture: str, error: FoldingError) -> str:
+    """Return the sentence for a datapath that cannot be folded."""
+    return f"the realization must suit the {architecture} architecture: {error}; parallel takes every realization"

@@ -1,0 +1,84 @@
+"""What designs are made small for: the estimates of the search against whole designs."""
+
+import math
+import re
+
+import pytest
+from tests.gen.designs import ALL, example_design, parallel_design
+
+from sosmith.gen.architecture import objective_of
+from sosmith.gen.fpga.boards import find_board
+from sosmith.gen.word_lengths.objective import SMALL_AREA, Objective, ShortProgram
+from sosmith.model.dataflow.datapath import Datapath
+from sosmith.model.dataflow.graph import GraphBuilder
+from sosmith.model.dataflow.program import serial_clocks
+from sosmith.model.errors import ShortfallError
+
+OBJECTIVES = [SMALL_AREA, ShortProgram("folded", 15), ShortProgram("folded", 17), ShortProgram("serial", 15)]
+
+
+def estimated(objective: Objective, datapath: Datapath) -> float:
+    return sum(objective.of_graph(stage.graph) for stage in datapath.stages)
+
+
+@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize("objective", OBJECTIVES, ids=str)
+def test_estimates_are_near_and_nothing_is_below_the_least(objective: Objective, name: str) -> None:
+    datapath = example_design(name).datapath
+    size = objective.of_datapath(datapath)
+    assert estimated(objective, datapath) == pytest.approx(size, rel=0.12)
+    assert 0 < objective.least([stage.graph for stage in datapath.stages]) < size
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_each_objective_is_met_best_by_what_was_made_for_it(name: str) -> None:
+    parallel, folded = parallel_design(name).datapath, example_design(name).datapath
+    short = ShortProgram("folded", 15)
+    assert SMALL_AREA.of_datapath(parallel) < SMALL_AREA.of_datapath(folded)
+    assert short.of_datapath(folded) < short.of_datapath(parallel)
+
+
+def test_memory_and_accumulator_decide_between_programs_of_the_same_length() -> None:
+    design = example_design("audio_lowpass.toml")
+    program = design.architecture.program
+    assert program is not None
+    size = ShortProgram("folded", 15).of_datapath(design.datapath)
+    length = len(program.instructions)
+    assert size == length + program.words / 2**16 + program.accumulator_bits / 2**24
+    assert program.words / 2**16 > 64 / 2**24  # a word outweighs any accumulator
+    assert size < length + 1
+
+
+def test_what_cannot_be_folded() -> None:
+    g = GraphBuilder()
+    x = g.input("x", frac=3, low=-8, high=7)
+    graph = g.build([g.floor(g.truncate(x, 1, "cut"), 0, "y")])
+    objective = ShortProgram("serial", 15)
+    assert objective.of_graph(graph) == math.inf
+    sentence = (
+        "the realization must suit the serial architecture: the datapath must not truncate inside to be folded; "
+        "parallel takes every realization"
+    )
+    with pytest.raises(ShortfallError, match=f"^{re.escape(sentence)}$"):
+        objective.least([graph])
+    assert objective.of_datapath(parallel_design("audio_lowpass.toml", realization="lattice_wdf").datapath) == math.inf
+
+
+@pytest.mark.parametrize(
+    ("factor", "clocks"), [(0, 1), (1, 1), (2, 2), (3, 2), (4, 3), (-1, 1), (-2, 2), (-3, 3), (-4, 3), (-5, 4)]
+)
+def test_clocks_of_a_serial_multiplication(factor: int, clocks: int) -> None:
+    assert serial_clocks(factor) == clocks
+
+
+@pytest.mark.parametrize(
+    ("architecture", "board", "objective"),
+    [
+        ("parallel", "ulx3s_85f", SMALL_AREA),
+        ("folded", None, ShortProgram("folded", 15)),
+        ("folded", "ulx3s_85f", ShortProgram("folded", 17)),
+        ("serial", "ulx3s_85f", ShortProgram("serial", 15)),
+    ],
+)
+def test_the_objective_is_that_of_the_architecture(architecture: str, board: str | None, objective: Objective) -> None:
+    assert objective_of(architecture, None if board is None else find_board(board)) == objective
