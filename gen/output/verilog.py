@@ -29,6 +29,14 @@ attrmap -modattr -remove generator -remove top -remove src -remove amaranth.hier
 write_verilog -sv -norename
 """
 
+_MODULE = re.compile(r"^module .*?^endmodule$", re.MULTILINE | re.DOTALL)
+_ESCAPED = re.compile(r"\\([A-Za-z0-9_$.:]*\$[A-Za-z0-9_$.:]*) ")
+"""Names with ``$``, which need a backslash before and a space behind: Yosys makes them up for what has no name,
+Amaranth for a second signal of the same name."""
+
+_MADE_UP = re.compile(r"\$(?:.*:)?(?P<kind>[A-Za-z_]*)\$?(?P<number>\d+)(?:_Y)?")
+_KINDS = {"": "n", "procmux": "choice", "make_patterns_logic": "enable", "combine_resets": "resets", "Not": "inverse"}
+
 _INITIAL = re.compile(r"  initial begin\n(?P<words>(?: {4}(?P<name>\S+ ?)\[\d+\] = \S+;\n)+)  end\n")
 _WORD = re.compile(r"\[(\d+)\] = (\S+);")
 _LOOP = 8
@@ -43,7 +51,18 @@ def to_rtlil(core: Component, name: str) -> str:
 
 
 def to_verilog(rtlil_text: str) -> str:
-    """SystemVerilog text of an RTLIL text, converted by the Yosys that comes with Amaranth.
+    """SystemVerilog text of an RTLIL text, with names that need no escape.
+
+    Raises
+    ------
+    ToolError
+        If Yosys fails.
+    """
+    return _MODULE.sub(_with_plain_names, converted(rtlil_text))
+
+
+def converted(rtlil_text: str) -> str:
+    """SystemVerilog text as the Yosys that comes with Amaranth names its signals.
 
     Raises
     ------
@@ -66,6 +85,22 @@ def core_verilog(design: CoreDesign) -> str:
     """SystemVerilog text of a design's core, as `sosmith.gen.output.generate.generate` writes it."""
     text = to_verilog(to_rtlil(design.architecture.component(), design.datapath.name))
     return with_comments(text, design, core_facts(design))
+
+
+def _with_plain_names(module: re.Match[str]) -> str:
+    """Give the signals of a module names that need no escape, each one of its own."""
+    text = module[0]
+    taken = set(re.findall(r"\w+", text))
+    names: dict[str, str] = {}
+    for escaped in dict.fromkeys(_ESCAPED.findall(text)):
+        made_up = _MADE_UP.fullmatch(escaped)
+        kind = made_up and _KINDS.get(made_up["kind"], made_up["kind"])
+        name = f"{kind}{made_up['number']}" if made_up else re.sub(r"\W+", "_", escaped).strip("_")
+        while name in taken:
+            name += "_"
+        taken.add(name)
+        names[escaped] = name
+    return _ESCAPED.sub(lambda found: names[found[1]], text)
 
 
 def _with_loops(block: re.Match[str]) -> str:

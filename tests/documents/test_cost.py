@@ -153,15 +153,15 @@ def test_only_what_has_changed_is_synthesized_again(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(cost, "document", lambda _: {})
     monkeypatch.setattr(cost, "version", lambda _: "yosys")
     monkeypatch.setattr(cost, "synthesize", lambda *_: cells)
-    monkeypatch.setattr(cost, "verilog", lambda *_: "text")
+    monkeypatch.setattr(cost, "source", lambda *_: cost.mark("text"))
     assert cost.check() == []
     grown = [
         f"{core.label} on ECP5 LFE5U-25F, speed 6: {figure} must be at most 105, 5 % above the recorded 100, not 110"
         for figure in ("luts", "all_luts")
     ]
-    monkeypatch.setattr(cost, "verilog", lambda *_: "another text")
+    monkeypatch.setattr(cost, "source", lambda *_: cost.mark("another text"))
     assert cost.check() == grown
-    monkeypatch.setattr(cost, "verilog", lambda *_: "text")
+    monkeypatch.setattr(cost, "source", lambda *_: cost.mark("text"))
     monkeypatch.setattr(cost, "version", lambda _: "a newer yosys")
     assert cost.check() == grown
 

@@ -137,8 +137,8 @@ def test_what_the_instructions_of_the_folded_core_are_for() -> None:
     powers = sum(constant.bit_count() == 1 for constant in constants)
     text = " ".join((ROOT / "docs" / "hardware.md").read_text(encoding="utf-8").split())
     assert (
-        f"Of the {len(program.instructions)} instructions of audio_lowpass, {powers} multiply a word by a power of two and "
-        f"{len(constants) - powers} by another constant:"
+        f"Of the {len(program.instructions)} instructions of audio_lowpass, {powers} multiply a word by a power of two "
+        f"and {len(constants) - powers} by another constant:"
     ) in text
 
 

@@ -1,13 +1,15 @@
 """The SystemVerilog text: equal words of a memory as a loop, read back as the same words."""
 
 import re
+from dataclasses import replace
 
 import pytest
 from amaranth.hdl import Elaboratable, Module, unsigned
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import Component, In, Out
+from tests.gen.designs import parallel_design
 
-from sosmith.gen.output.verilog import to_rtlil, to_verilog
+from sosmith.gen.output.verilog import _MODULE, _with_plain_names, converted, to_rtlil, to_verilog
 from sosmith.gen.verifier.graph import RejectedError
 from sosmith.gen.verifier.parallel.text import read_modules
 from sosmith.gen.verifier.program.text import _memories
@@ -33,6 +35,31 @@ class Table(Component):
 @pytest.fixture(scope="module")
 def text() -> str:
     return to_verilog(to_rtlil(Table(), "top"))
+
+
+@pytest.mark.parametrize("channels", [1, 3])
+@pytest.mark.parametrize("architecture", ["parallel", "folded"])
+def test_names_need_no_escape_and_stay_apart(architecture: str, channels: int) -> None:
+    design = replace(parallel_design("audio_lowpass.toml").architecture, name=architecture, channels=channels)
+    escaped = converted(to_rtlil(design.component(), "top"))
+    plain = to_verilog(to_rtlil(design.component(), "top"))
+    assert "$" in "".join(re.findall(r"\\\S+", escaped))
+    assert {*re.findall(r"\\\S+", plain)} <= {"\\program"}  # a word of the language
+    for before, after in zip(escaped.split("endmodule"), plain.split("endmodule"), strict=True):
+        declared = [
+            re.findall(r"^  (?:wire|reg) (?:\[\d+:0\] )?([^ ;]+)", text, re.MULTILINE) for text in (before, after)
+        ]
+        assert len({*declared[0]}) == len({*declared[1]})
+
+
+def test_a_made_up_name_gives_way() -> None:
+    text = "module top(a);\n  wire \\$1 ;\n  wire n1;\n  wire \\n$1 ;\n  assign \\$1  = n1 & \\n$1 [0];\nendmodule"
+    assert _MODULE.sub(_with_plain_names, text).splitlines()[1:-1] == [
+        "  wire n1_;",
+        "  wire n1;",
+        "  wire n_1;",
+        "  assign n1_ = n1 & n_1[0];",
+    ]
 
 
 def test_long_runs_are_loops(text: str) -> None:

@@ -127,7 +127,7 @@ BREAKS = {
         rf"output_stage\.code_register must be {NODE}output_stage, not another value",
     ),
     "a queue": (
-        r"(\$procmux\S+ +)= full \? 1'h1 : i_valid",
+        r"(choice\d+ +)= full \? 1'h1 : i_valid",
         r"\1= full ? 1'h0 : i_valid",
         r"output_buffer\.o_valid must be 1 after a clock with .*",
     ),
@@ -177,7 +177,7 @@ BREAKS = {
 
 CHANNEL_BREAKS = {
     "an address in time": (
-        r"(assign \\write__addr\$\d+ +=.* : )channel3;",
+        r"(assign write__addr_\d+ +=.* : )channel3;",
         r"\1clear_channel;",
         rf"section0\.\w+_memory must hold {NODE}section0 and be written for the channel of the sample",
     ),
@@ -187,24 +187,24 @@ CHANNEL_BREAKS = {
         "s_axis_tready must be 0 just while nothing fits",
     ),
     "an address for a reason of its own": (
-        r"(assign \\write__addr\$\d+ +=) clear \?",
+        r"(assign write__addr_\d+ +=) clear \?",
         r"\1 valid1 ?",
         rf"section0\.\w+_memory must hold {NODE}section0, and section0\.valid1 must not count for what is written",
     ),
     "an address": (
-        r"(_\d_ <= x1_memory\[\\port\S+ )\[1:0\]",
+        r"(_\d_ <= x1_memory\[port_\w+)\[1:0\]",
         r"\1[2:1]",
         rf"section0\.x1_memory must hold {NODE}section0 and be read for the channel of the sample, not for another one",
     ),
     "a word": (
-        r"(assign \\write__data\$\d+ += clear \? \d+'h0+)0 :",
+        r"(assign write__data_\d+ += clear \? \d+'h0+)0 :",
         r"\g<1>1 :",
         rf"section0\.\w+_memory must hold {NODE}section0 and be cleared to 0",
     ),
     "too few words": (
         r"(clear_channel == 2'h)2;",
         r"\g<1>1;",
-        r"\$signal must be 1 after a clock with aresetn = 1, \$signal = 1, clear_channel = 1",
+        "signal_ must be 1 after a clock with aresetn = 1, signal_ = 1, clear_channel = 1",
     ),
     "a channel": (
         r"s_axis_tdest < 2'h3",
