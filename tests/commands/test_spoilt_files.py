@@ -34,6 +34,7 @@ DEMO = f'{INSTRUMENT}realization = "df1"\n'
 FITTED = re.sub(r"coefficients = .*", 'data = "measured.csv"', DEMO)
 WORN = f"{DEMO}\n[wear]\ninitial = 1.5\nwarning = 7.0\nlimit = 9.0\nsensor_range = 10.5\n"
 SECTIONS = [[0.25, 0.5, 0.25, 1.0, -0.9, 0.5], [0.5, 0.5, 0.0, 1.0, -0.2, 0.0]]
+DF1 = f"{FILTER}\n[hardware]\nrealization = 'df1'\n"
 RELOADED = f"{FILTER}\n[hardware]\nrealization = 'df1'\nreload = true\n"
 
 
@@ -89,6 +90,10 @@ SUBJECTS = (
             ("biquads.txt", spoilt),
             ("prototype.toml", spoilt),
         )
+    ),
+    *(
+        Subject(f"filed.{kind}", (f"design {kind}.toml", f"verify {kind}.certificate.json --spec {kind}.toml"), 8)
+        for kind in ("npy", "csv", "mat")
     ),
     Subject("trace.csv", ("spectrum trace.csv", "simulate demo.toml --trace trace.csv"), 16),
     Subject("ride.csv", ("spectrum ride.csv",), 10),
@@ -170,11 +175,16 @@ def write_valid_files(folder: Path) -> None:
         "record.csv": "\n".join((ROOT / "examples/wear/wheel.csv").read_text(encoding="utf-8").splitlines()[:40]),
         "measured.csv": (ROOT / "examples/measurements/march.csv").read_text(encoding="utf-8"),
     }
+    for kind in ("npy", "csv", "mat"):
+        table = f'[filter]\nsos_file = "filed.{kind}"\n\n[output]'
+        texts[f"{kind}.toml"] = re.sub(r"\[filter\].*\[output\]", table, DF1, flags=re.DOTALL).replace("plain", kind)
     np.save(folder / "sections.npy", SECTIONS)
     np.savez(folder / "sections.npz", sos=SECTIONS)
     scipy.io.savemat(folder / "sections.mat", {"SOS": SECTIONS, "G": [[0.5]]})
     for name, text in texts.items():
         (folder / name).write_text(text, encoding="utf-8")
+    for kind in ("npy", "csv", "mat"):
+        shutil.copy(folder / f"sections.{kind}", folder / f"filed.{kind}")
     book = openpyxl.Workbook()
     book.active.append(["clearance_mm", "voltage_V", "temperature_C", "date"])
     for k in range(1, 13):
@@ -184,6 +194,7 @@ def write_valid_files(folder: Path) -> None:
         "emulate demo.toml wear_ramp --seconds 2 -o trace.csv",
         "generate plain.toml --realization df1 -o .",
         "calibrate add measured.csv --store kept.db --date 2024-03-01",
+        *(f"generate {kind}.toml -o ." for kind in ("npy", "csv", "mat")),
     ):
         assert carried_out(command).status == 0, command
 

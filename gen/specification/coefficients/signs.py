@@ -57,8 +57,8 @@ def settled(stated: StatedSections, asked: Signs | None = None) -> SettledSectio
     Raises
     ------
     SpecificationError
-        If a0 or a whole numerator is 0, a coefficient is beyond 1e30, the number of scale values fits no rule, or no
-        allowed convention is stable.
+        If a0 or a whole numerator is 0, a numerator is below 1e-30, a coefficient beyond 1e30, the number of scale
+        values fits no rule, or no allowed convention is stable.
 
     Examples
     --------
@@ -71,6 +71,8 @@ def settled(stated: StatedSections, asked: Signs | None = None) -> SettledSectio
     for k, row in enumerate(normal):
         if max(map(abs, row)) > _LARGEST:
             raise SpecificationError(f"section {k} must have coefficients within 1e30 for a0 = 1, not beyond")
+        if max(map(abs, row[:3])) * _LARGEST < 1:
+            raise SpecificationError(f"section {k} must have a b of at least 1e-30 for a0 = 1, not all below")
     choices: dict[Signs, tuple[Row, ...]] = {"scipy": normal, "negated": tuple(map(_negated, normal))}
     stable: list[Signs] = [signs for signs, rows in choices.items() if all(map(_is_stable, rows))]
     if asked is not None:

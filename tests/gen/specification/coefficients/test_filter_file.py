@@ -285,6 +285,15 @@ def test_coefficients_beyond_reason_are_refused(text: str, tmp_path: Path) -> No
         settled(stated)
 
 
+@pytest.mark.parametrize("text", ["1e-31,1e-40,0,1,0,0\n", "1,0,0,1e31,0,0\n"])
+def test_a_numerator_that_is_next_to_nothing_is_refused(text: str, tmp_path: Path) -> None:
+    stated = read(tmp_path, "f.csv", text)
+    assert isinstance(stated, StatedSections)
+    sentence = "section 0 must have a b of at least 1e-30 for a0 = 1, not all below"
+    with pytest.raises(SpecificationError, match=f"^{sentence}$"):
+        settled(stated)
+
+
 @pytest.mark.parametrize(
     ("name", "content"),
     [
