@@ -19,6 +19,7 @@ from typing import Any
 import sosmith
 from sosmith.gen.fpga.boards import BOARDS, BUILDABLE, RATE
 from sosmith.hdl.bus.link import LEDS
+from sosmith.model.sensors.spi_converter import CONVERTERS, ReadingFault
 
 ROOT = Path(__file__).resolve().parent.parent
 RECORD = ROOT / "benchmarks" / "boards.json"
@@ -42,7 +43,8 @@ _CELLS = {
 """Kinds of logic, multipliers and block RAM in the placer's words, by family."""
 
 PARTS = {
-    name: re.compile(rf"(?<=<!-- {name} -->\n).*?(?=<!-- end of {name} -->)", re.DOTALL) for name in ("boards", "built")
+    name: re.compile(rf"(?<=<!-- {name} -->\n).*?(?=<!-- end of {name} -->)", re.DOTALL)
+    for name in ("boards", "headers", "converters", "faults", "built")
 }
 
 
@@ -86,6 +88,42 @@ def board_table() -> str:
         )
         rows.append(f"| {' | '.join(cells)} |")
     return "\n".join(rows) + "\n"
+
+
+def converter_table() -> str:
+    """Return the converters, in Markdown."""
+    rows = [
+        "| converter | `device` | reading | channels each | SCK, MHz, at most | from 5 V on | clocks of a frame |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for name, converter in CONVERTERS.items():
+        kind = f"{converter.width} bits" + (", signed" if converter.signed else "")
+        cells = (
+            converter.title,
+            f"`{name}`",
+            kind if converter.step is None else f"{kind}, {float(converter.step):g} degC",
+            str(converter.inputs),
+            f"{float(converter.timing.clock) / 1e6:g}",
+            f"{float(converter.fast.clock) / 1e6:g}",
+            str(converter.bits),
+        )
+        rows.append(f"| {' | '.join(cells)} |")
+    return "\n".join(rows) + "\n"
+
+
+def header_table() -> str:
+    """Return the pins for converters on each board, in Markdown."""
+    rows = ["| board | SCK | MOSI | MISO | chip selects |", "|---|---|---|---|---|"]
+    for board in BOARDS.values():
+        if board.header:
+            sck, mosi, miso, *selects = board.header
+            rows.append(f"| {board.title} | {sck} | {mosi} | {miso} | {', '.join(selects)} |")
+    return "\n".join(rows) + "\n"
+
+
+def fault_list() -> str:
+    """Return what a reading may be wrong with, in Markdown."""
+    return "".join(f"- {fault.meaning};\n" for fault in ReadingFault).removesuffix(";\n") + ".\n"
 
 
 def built_table(record: Sequence[dict[str, Any]]) -> str:
@@ -133,7 +171,9 @@ def write(rows: Sequence[dict[str, Any]]) -> None:
 def renew() -> None:
     """Write the tables of the document."""
     text = DOCUMENT.read_text(encoding="utf-8")
-    text = PARTS["boards"].sub(lambda _: board_table(), text)
+    made = {"boards": board_table, "headers": header_table, "converters": converter_table, "faults": fault_list}
+    for name, table in made.items():
+        text = PARTS[name].sub(lambda _, table=table: table(), text)
     DOCUMENT.write_text(PARTS["built"].sub(lambda _: built_table(read()), text), encoding="utf-8")
 
 

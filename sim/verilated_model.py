@@ -121,15 +121,17 @@ class Builder:
         with self._cache.entry("model", key, lambda entry: self._make(model, control, flags, entry / "model")) as entry:
             shutil.copy(entry / "model", target)
 
-    def build_program(self, source: Path, top: str, main: Path, target: Path) -> None:
+    def build_program(self, source: Path, top: str, main: Path, header: Path, target: Path) -> None:
         """Write an executable to `target` whose main program, in C++, runs the module `top` of `source` as ``Vtop``.
+
+        The main program includes `header`.
 
         Raises
         ------
         subprocess.CalledProcessError
             If a tool fails; it has said why.
         """
-        texts = [path.read_text(encoding="utf-8") for path in (source, main)]
+        texts = [path.read_text(encoding="utf-8") for path in (source, main, header)]
         key = key_of(self._tools, _flags(waves=False), _ARGUMENTS, top, texts)
 
         def make(entry: Path) -> None:
@@ -137,7 +139,7 @@ class Builder:
             command = ["verilator", "-cc", "-Mdir", str(objects), "--prefix", "Vtop", "--top-module", top]
             self._run([*command, *_ARGUMENTS, str(source)], objects)
             sources = [*sorted(objects.glob("Vtop*.cpp")), main]
-            compiled = self._compile(sources, [*_flags(waves=False), f"-I{objects}"], objects)
+            compiled = self._compile(sources, [*_flags(waves=False), f"-I{objects}", f"-I{header.parent}"], objects)
             names = _library(waves=False)
             library_key = self._library_key(names, _flags(waves=False))
             with self._cache.entry(

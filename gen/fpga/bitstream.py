@@ -12,11 +12,12 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from amaranth.build import Attrs, Pins, Resource, Subsignal
 from amaranth.build.run import BuildPlan
 
-from sosmith.gen.fpga.boards import Board
+from sosmith.gen.fpga.boards import Board, check_selects
 from sosmith.gen.fpga.tools import EXTRA, Tool, find_tool
-from sosmith.hdl.boards.on_platform import OnPlatform
+from sosmith.hdl.boards.on_platform import SPI, OnPlatform
 from sosmith.model.errors import ShortfallError, ToolError
 
 SEED = 1
@@ -31,6 +32,13 @@ _PROGRAMS = {
     "gowin": ("yosys", "nextpnr-himbaechel-gowin", "gowin_pack"),
 }
 """What makes a bitstream, by family."""
+
+_PIN_ATTRIBUTES: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
+    "ice40": ({"IO_STANDARD": "SB_LVCMOS"}, {"PULLUP": 1}),
+    "ecp5": ({"IO_TYPE": "LVCMOS33"}, {"PULLMODE": "UP"}),
+    "gowin": ({"IO_TYPE": "LVCMOS33"}, {"PULL_MODE": "UP"}),
+}
+"""Attributes of a pin of 3.3 V, by family, and those of its pull-up."""
 
 _STEPS = {"yosys": "synthesis", "icepack": "packing", "ecppack": "packing", "gowin_pack": "packing"}
 _LOG = "build.log"
@@ -124,7 +132,14 @@ def fingerprint(verilog: str, board: Board) -> str:
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()
 
 
-def build(verilog: str, top: str, board: Board, progress: Callable[[str], None] = lambda step: None) -> Bitstream:
+def build(
+    verilog: str,
+    top: str,
+    board: Board,
+    progress: Callable[[str], None] = lambda step: None,
+    *,
+    selects: int = 0,
+) -> Bitstream:
     """Make a bitstream; takes some tens of seconds, and a minute more on the very first call.
 
     Two calls with the same programs give the same bytes.
@@ -139,16 +154,20 @@ def build(verilog: str, top: str, board: Board, progress: Callable[[str], None] 
         The board.
     progress : callable
         Called with the name of each step.
+    selects : int
+        Chip selects of its converters; 0 without converters.
 
     Raises
     ------
     ToolError
         If a program is missing or fails.
+    SpecificationError
+        If the board has too few pins for the converters.
     ShortfallError
         If the design has more cells than the FPGA, or cannot be placed for another reason.
     """
     name = f"{top}_{board.name}"
-    plan = _plan(verilog, top, name, board)
+    plan = _plan(verilog, top, name, board, selects)
     commands = [_translated(command) for command in json.loads(_text(plan, f"build_{name}.json"))["commands"]]
     tools = {command[0]: find_tool(command[0]) for command in commands}
     with TemporaryDirectory(prefix="sosmith-") as scratch:
@@ -180,9 +199,10 @@ def build(verilog: str, top: str, board: Board, progress: Callable[[str], None] 
         )
 
 
-def _plan(verilog: str, top: str, name: str, board: Board) -> BuildPlan:
+def _plan(verilog: str, top: str, name: str, board: Board, selects: int) -> BuildPlan:
     """Files and commands for a board, from its Amaranth platform."""
     assert board.platform is not None
+    check_selects(board, selects)
     module, _, kind = board.platform.partition(":")
     try:
         platform = getattr(import_module(module), kind)()
@@ -193,7 +213,25 @@ def _plan(verilog: str, top: str, name: str, board: Board) -> BuildPlan:
     _, _, options = board.device.synthesis.partition(" ")
     wishes = f"--seed {SEED} --freq {board.clock / 1e6:g} --timing-allow-fail --report report.json"
     platform.add_file(f"{top}.sv", verilog)
-    return platform.prepare(OnPlatform(top), name, emit_src=False, synth_opts=options, nextpnr_opts=wishes)
+    if selects:
+        platform.add_resources([_converters(board, selects)])
+    return platform.prepare(
+        OnPlatform(top, converters=selects > 0), name, emit_src=False, synth_opts=options, nextpnr_opts=wishes
+    )
+
+
+def _converters(board: Board, selects: int) -> Resource:
+    """Return the pins of the converters; that of MISO has a pull-up."""
+    sck, mosi, miso, *cs_n = board.header
+    plain, pulled_up = _PIN_ATTRIBUTES[board.device.family]
+    return Resource(
+        SPI,
+        0,
+        Subsignal("sck", Pins(sck, dir="o"), Attrs(**plain)),
+        Subsignal("mosi", Pins(mosi, dir="o"), Attrs(**plain)),
+        Subsignal("miso", Pins(miso, dir="i"), Attrs(**plain, **pulled_up)),
+        Subsignal("cs_n", Pins(" ".join(cs_n[:selects]), dir="o"), Attrs(**plain)),
+    )
 
 
 def _text(plan: BuildPlan, file: str) -> str:

@@ -99,6 +99,8 @@ class Board:
         Class that knows its pins, as ``module:name``; None for a board that no bitstream is made for.
     loader : str or None
         Its name in openFPGALoader.
+    header : tuple of str
+        Pins of its headers for the SPI of converters: SCK, MOSI, MISO, then the chip selects.
     """
 
     name: str
@@ -109,6 +111,22 @@ class Board:
     clock: int
     platform: str | None = None
     loader: str | None = None
+    header: tuple[str, ...] = ()
+
+
+_BUS_PINS = 3
+
+
+def check_selects(board: Board, selects: int) -> None:
+    """Check that a board has pins for so many chip selects.
+
+    Raises
+    ------
+    SpecificationError
+        If it has fewer.
+    """
+    if selects > (there := max(len(board.header) - _BUS_PINS, 0)):
+        raise SpecificationError(f"converters must be at most {there} on the {board.title}, not {selects}")
 
 
 # Numbers of cells are those that nextpnr 0.11.1 reports for an empty design.
@@ -176,6 +194,11 @@ _GW2AR_18C = replace(
     block_rams=46,
 )
 
+
+def _pins(names: str) -> tuple[str, ...]:
+    return tuple(names.split())
+
+
 _ULX3S = Board(
     name="ulx3s_25f",
     title="ULX3S 25F",
@@ -185,6 +208,8 @@ _ULX3S = Board(
     clock=25_000_000,
     platform="amaranth_boards.ulx3s:ULX3S_25F_Platform",
     loader="ulx3s",
+    # GP0 and GN0 to GP9 and GN9
+    header=_pins("B11 C11 A10 A11 A9 B10 B9 C10 A7 A8 C8 B8 C6 C7 A6 B6 A4 A5 A2 B1"),
 )
 
 
@@ -205,6 +230,8 @@ _ALL = (
         clock=12_000_000,
         platform="amaranth_boards.icebreaker:ICEBreakerPlatform",
         loader="ice40_generic",
+        # PMOD1A as an SPI, chip selects 1 and 7 to 10; PMOD1B; PMOD2
+        header=_pins("45 2 47 4 3 48 46 44 43 38 34 31 42 36 32 28 27 25 21 19 26 23 20 18"),
     ),
     Board(name="upduino", title="UPduino 3", device=_UP5K, package="sg48", speed="", clock=12_000_000),
     Board(
@@ -216,6 +243,8 @@ _ALL = (
         clock=12_000_000,
         platform="amaranth_boards.ice40_hx8k_b_evn:ICE40HX8KBEVNPlatform",
         loader="ice40_generic",
+        # J2, from its first pins on
+        header=_pins("R15 P16 P15 N16 M15 M16 L16 K15 K16 K14 J14 G14 F14 J15 H14 H16 G15 G16 F15 F16 E14"),
     ),
     Board(
         name="icestick",
@@ -226,12 +255,14 @@ _ALL = (
         clock=12_000_000,
         platform="amaranth_boards.icestick:ICEStickPlatform",
         loader="ice40_generic",
+        # the Pmod J2 as an SPI, chip selects 1 and 7 to 10; J1; J3
+        header=_pins("81 79 80 78 87 88 90 91 112 113 114 115 116 117 118 119 62 61 60 56 48 47 45 44"),
     ),
     _ulx3s("12f", _ECP5_12),
     _ULX3S,
     _ulx3s("45f", _ECP5_45),
     _ulx3s("85f", _ECP5_85),
-    replace(_ULX3S, name="colorlight_i5", title="Colorlight i5", platform=None, loader=None),
+    replace(_ULX3S, name="colorlight_i5", title="Colorlight i5", platform=None, loader=None, header=()),
     Board(
         name="orangecrab_25f",
         title="OrangeCrab 25F",
@@ -257,6 +288,7 @@ _ALL = (
         clock=27_000_000,
         platform="amaranth_boards.tang_nano_9k:TangNano9kPlatform",
         loader="tangnano9k",
+        header=_pins("25 26 27 28 29 30 33 34 40 35 41 42"),
     ),
     Board(
         name="tang_nano_20k",
@@ -267,6 +299,7 @@ _ALL = (
         clock=27_000_000,
         platform="sosmith.gen.fpga.tang_nano_20k:TangNano20kPlatform",
         loader="tangnano20k",
+        header=_pins("73 74 75 85 77 27 28 25 26 29 30 31"),
     ),
 )
 

@@ -14,7 +14,7 @@ from typing import Any
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.fpga.bitstream import SEED, Bitstream, build, fingerprint
 from sosmith.gen.fpga.boards import RATE, Board
-from sosmith.gen.output.board_top import board_verilog, top_name
+from sosmith.gen.output.board_top import board_verilog, selects_of, top_name
 from sosmith.gen.output.verilog import core_verilog
 from sosmith.gen.version import __version__
 from sosmith.model.text_files import to_json, write_contents
@@ -84,6 +84,7 @@ class BoardBuild:
             "channels": self.design.spec.channels,
             "clock_hz": self.board.clock,
             "line_rate_baud": self.rate,
+            "converters": [each.reading.converter.title for each in self.design.spec.converters],
             "samples_per_second": self.samples_per_second,
             "passed": made.met,
             "bitstream": None
@@ -148,7 +149,7 @@ def build_board(
         If the design does not fit the link.
     """
     core, verilog = _texts(design, board, rate, progress)
-    made = build(verilog, top_name(design), board, progress)
+    made = build(verilog, top_name(design), board, progress, selects=selects_of(design, board))
     return BoardBuild(design, rate, verilog, core, made)
 
 
@@ -178,7 +179,8 @@ def board_cost(
     if cache is not None and (cache / name).exists():
         found: dict[str, Any] = json.loads((cache / name).read_text(encoding="utf-8"))
         return found
-    made = BoardBuild(design, RATE, verilog, core, build(verilog, top_name(design), board, progress)).summary
+    bitstream = build(verilog, top_name(design), board, progress, selects=selects_of(design, board))
+    made = BoardBuild(design, RATE, verilog, core, bitstream).summary
     if cache is not None:
         write_contents(cache, {name: to_json(made).encode()})
     return made

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from typing import Literal
 
 from sosmith.gen.core import CoreDesign
-from sosmith.gen.fpga.boards import RATE
+from sosmith.gen.fpga.boards import RATE, Board
 from sosmith.gen.output.identity import identity
 from sosmith.gen.output.verilog import core_verilog, to_rtlil, to_verilog
 from sosmith.hdl.boards.board_top import BoardTop
-from sosmith.hdl.bus.command_engine import MAX_CHANNELS, MAX_SAMPLE_BYTES
+from sosmith.hdl.bus.command_engine import MAX_CHANNELS, MAX_READINGS, MAX_SAMPLE_BYTES
 from sosmith.hdl.bus.uart import MIN_CLOCKS
 from sosmith.model.errors import SpecificationError
+from sosmith.model.sensors.spi_schedule import Schedule
 
 
 def top_name(design: CoreDesign) -> str:
@@ -37,7 +39,7 @@ def board_top(design: CoreDesign, *, clock: Fraction, rate: int = RATE, core: st
     ------
     SpecificationError
         If the line rate is too high for the clock, the core has too many channels or a sample too many bytes for the
-        link, or names are too long for the identity.
+        link, names are too long for the identity, or converters too slow for the sample rate.
     ToolError
         If Yosys fails.
     """
@@ -51,9 +53,57 @@ def board_top(design: CoreDesign, *, clock: Fraction, rate: int = RATE, core: st
     sample_bytes = sum(port.bytes for port in design.datapath.inputs)
     if sample_bytes > MAX_SAMPLE_BYTES:
         raise SpecificationError(f"a sample must have at most {MAX_SAMPLE_BYTES} bytes over a link, not {sample_bytes}")
+    schedule = schedule_of(design, clock) if design.spec.converters else None
     text = core or core_verilog(design)
-    memory = identity(design, text, baud=rate, clock=float(clock)).memory
-    return BoardTop(design.architecture.component(), memory, ratio=clock / rate, channels=design.spec.channels)
+    source: Literal["link", "converter"] = "link" if schedule is None else "converter"
+    memory = identity(design, text, baud=rate, clock=float(clock), source=source).memory
+    return BoardTop(
+        design.architecture.component(),
+        memory,
+        ratio=clock / rate,
+        channels=design.spec.channels,
+        schedule=schedule,
+    )
+
+
+def schedule_of(design: CoreDesign, clock: Fraction) -> Schedule:
+    """Return when the board of a design with converters reads which of them.
+
+    Parameters
+    ----------
+    design : CoreDesign
+        The core.
+    clock : Fraction
+        Clock of the board in Hz.
+
+    Raises
+    ------
+    SpecificationError
+        If the core has other inputs than the converters, more of them than a message of the link holds, or the
+        converters are too slow.
+    """
+    spec, ports = design.spec, design.datapath.inputs
+    if ports != tuple(each.reading.port for each in spec.converters):
+        found = " and ".join(port.name for port in ports)
+        wanted = " and ".join(each.reading.port.name for each in spec.converters)
+        raise SpecificationError(f"the core must have the inputs {wanted} of the converters, not {found}")
+    if spec.channels * len(ports) > MAX_READINGS:
+        raise SpecificationError(
+            f"inputs of all channels must be at most {MAX_READINGS} with converters, not {spec.channels * len(ports):,}"
+        )
+    return Schedule.of(
+        tuple(each.reading for each in spec.converters),
+        tuple(each.timing for each in spec.converters),
+        channels=spec.channels,
+        clock=clock,
+        sample_rate=spec.sample_rate,
+        latency=max(design.architecture.latency_cycles, design.architecture.cycles_per_sample),
+    )
+
+
+def selects_of(design: CoreDesign, board: Board) -> int:
+    """Return how many chip selects the converters of a design have on a board; 0 without converters."""
+    return sum(schedule_of(design, Fraction(board.clock)).selects) if design.spec.converters else 0
 
 
 def board_verilog(design: CoreDesign, *, clock: Fraction, rate: int = RATE, core: str | None = None) -> str:

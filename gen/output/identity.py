@@ -9,7 +9,7 @@ from sosmith.gen.core import CoreDesign
 from sosmith.gen.output.core_facts import interface_facts
 from sosmith.gen.reload.register_writes import bank_size
 from sosmith.gen.version import __version__
-from sosmith.model.link.identity import Identity, Quantity, Reload
+from sosmith.model.link.identity import CONVERTER_FLAGS, Identity, Quantity, Reload
 from sosmith.model.link.protocol import VERSION, samples_per_message
 from sosmith.model.port import Port
 
@@ -49,7 +49,7 @@ def identity(
         samples=1,
         inputs=tuple(_quantity(port) for port in datapath.inputs),
         output=_quantity(datapath.output),
-        flags=dict(interface_facts(design).outputs.flags),
+        flags=dict(interface_facts(design).outputs.flags) | ({} if source == "link" else CONVERTER_FLAGS),
         reload=None if fingerprint is None else Reload(design=fingerprint, words=words),
     )
     return made.model_copy(update={"samples": samples_per_message(made.sample_bytes, made.result_bytes)})

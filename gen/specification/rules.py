@@ -12,6 +12,7 @@ from fractions import Fraction
 from sosmith.gen.specification.choices import CALIBRATION_INPUTS, FAMILIES, KINDS
 from sosmith.gen.specification.schema import MAX_ORDER, Document, FilterTable, InputTable
 from sosmith.gen.specification.values import UnfitError, identifier, key_text, listed, literal, one_of
+from sosmith.model.sensors.spi_converter import CONVERTERS
 
 MARGIN = Fraction(1, 10**6)
 """Minimum distance of a band edge from 0 and from half the sample rate, as a fraction of the sample rate.
@@ -45,6 +46,7 @@ def check(document: Document) -> None:
     _check_filter(document.filter, document.sample_rate)
     _check_output(document)
     _check_wear(document)
+    _check_converters(document)
     if document.hardware.clock < document.sample_rate:
         raise UnfitError(
             f"at least the sample_rate ({literal(document.sample_rate)} Hz)",
@@ -67,6 +69,21 @@ def _check_inputs(document: Document) -> None:
             where = f"input.{key_text(name)}"
             raise UnfitError(f"named by {unfit.expected}", unfit.found, where=where) from None
         _check_range(table, f"input.{name}")
+
+
+def _check_converters(document: Document) -> None:
+    tables = document.converter
+    if tables and set(tables) != set(document.input):
+        expected = f"a table for each of the inputs {listed(list(document.input))}, or none"
+        raise UnfitError(expected, ", ".join(map(literal, tables)), where="converter")
+    for name, table in tables.items():
+        where, converter = f"converter.{key_text(name)}", CONVERTERS[table.device]
+        if converter.step is None and table.range is None:
+            expected = f"the values of the input at the readings 0 and {2**converter.width}, [low, high]"
+            raise UnfitError(expected, "missing", where=f"{where}.range")
+        for key in ("range", "supply") if converter.step is not None else ():
+            if (found := getattr(table, key)) is not None:
+                raise UnfitError(f"left out for {table.device}", literal(found), where=f"{where}.{key}")
 
 
 def _check_range(table: InputTable, where: str) -> None:

@@ -28,6 +28,7 @@ from sosmith.gen.specification.values import (
     list_of,
     literal,
     number,
+    one_of,
     one_or_more,
     positive,
     rising_pair,
@@ -35,6 +36,7 @@ from sosmith.gen.specification.values import (
     whole,
 )
 from sosmith.model.dataflow.protection import PROTECTIONS
+from sosmith.model.sensors.spi_converter import CONVERTERS, SUPPLIES
 from sosmith.model.suggestion import did_you_mean
 
 MAX_ORDER = 20
@@ -124,6 +126,14 @@ class WearTable(Table):
     sensor_range: Annotated[Fraction | None, PlainValidator(number)] = None
 
 
+class ConverterTable(Table):
+    """``[converter.NAME]``: the converter that a board reads an input from."""
+
+    device: Annotated[str, PlainValidator(choice(tuple(CONVERTERS)))] = Field(description=one_of(tuple(CONVERTERS)))
+    range: Annotated[tuple[Fraction, Fraction] | None, PlainValidator(rising_pair)] = None
+    supply: Annotated[Fraction | None, PlainValidator(between(*SUPPLIES, "V"))] = None
+
+
 class HardwareTable(Table):
     """``[hardware]``: how the datapath is built."""
 
@@ -145,6 +155,7 @@ class Document(Table):
     filter: FilterTable = Field(description="a table [filter]")
     output: OutputTable = Field(description="a table [output]")
     wear: WearTable | None = Field(default=None, description="a table [wear]")
+    converter: dict[str, ConverterTable] = Field(default={}, description="a table [converter.NAME] per input")
     hardware: HardwareTable = Field(default=HardwareTable(), description="a table [hardware]")
 
 
@@ -216,9 +227,11 @@ def _table_at(path: tuple[str, ...]) -> type[Table]:
     match path:
         case ():
             return Document
-        case ("input",):
+        case ("input" | "converter",):
             return Table
         case ("input", _):
             return InputTable
+        case ("converter", _):
+            return ConverterTable
         case _:
             return _TABLES[path[0]]

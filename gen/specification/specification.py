@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sosmith.gen.specification.choices import CALIBRATION_INPUTS
+from sosmith.gen.specification.converters import ConverterSpec, converters
 from sosmith.gen.specification.toml_text import toml_text
 from sosmith.gen.specification.values import UnfitError
 from sosmith.gen.specification.wear_limits import WearSpec
@@ -143,6 +144,8 @@ class Specification:
         Wear limits, for the wear flags.
     hardware : HardwareSpec
         The hardware.
+    converters : tuple of ConverterSpec
+        What a board reads each input from; empty if samples come over the link.
     """
 
     path: Path
@@ -158,6 +161,7 @@ class Specification:
     max_error: Fraction
     wear: WearSpec | None
     hardware: HardwareSpec
+    converters: tuple[ConverterSpec, ...] = ()
 
 
 def load(path: Path) -> Specification:
@@ -202,9 +206,9 @@ def from_tree(tree: dict[str, Any], path: Path) -> Specification:
     try:
         document = parse(tree)
         check(document)
+        return _specification(path, tree, document)
     except UnfitError as unfit:
         raise SpecificationError(f"{path}: {unfit}") from None
-    return _specification(path, tree, document)
 
 
 def example() -> str:
@@ -217,6 +221,10 @@ def _specification(path: Path, tree: dict[str, Any], document: Document) -> Spec
     calibrated = document.calibration is not None
     output_port = _port("clearance" if calibrated else "y", output, output.unit)
     hardware, wear = document.hardware, document.wear
+    inputs = tuple(
+        _port(name, document.input[name], _UNITS[name] if calibrated else output.unit)
+        for name in (CALIBRATION_INPUTS if calibrated else document.input)
+    )
     return Specification(
         path=path,
         source={key: _to_json(value) for key, value in tree.items()},
@@ -224,10 +232,7 @@ def _specification(path: Path, tree: dict[str, Any], document: Document) -> Spec
         name=document.name,
         sample_rate=document.sample_rate,
         channels=document.channels,
-        inputs=tuple(
-            _port(name, document.input[name], _UNITS[name] if calibrated else output.unit)
-            for name in (CALIBRATION_INPUTS if calibrated else document.input)
-        ),
+        inputs=inputs,
         calibration=_calibration(path, document),
         filter=_filter(path, document.filter),
         output=output_port,
@@ -242,6 +247,7 @@ def _specification(path: Path, tree: dict[str, Any], document: Document) -> Spec
             reload=hardware.reload,
             protect=hardware.protect,
         ),
+        converters=converters(inputs, document.converter),
     )
 
 

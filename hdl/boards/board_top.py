@@ -1,4 +1,4 @@
-"""The top of every board: a core, fed over a serial line.
+"""The top of every board: a core, fed over a serial line or from converters.
 
 ::
 
@@ -10,11 +10,24 @@
                     ^                                       ^ aclk
     clk, rst -------+---------------------------------------+
 
-One clock for all. Latency: that of the link, `sosmith.hdl.bus.link`, and of the core.
+With converters, a front-end feeds the core, and the link fetches what it keeps::
+
+                 +------+  o_result, ..   +-----------+  s_axis_*, aresetn   +------+
+    rx --------->|      |<----------------| FrontEnd  |--------------------->|      |
+    tx <---------| link |---------------->|           |<---------------------| core |
+    leds 3 <-----|      |  i_take, ..     +-----------+       m_axis_*       |      |
+                 |      |                    ^    |                          |      |
+                 |      |------------------- | -- | ----- s_axil_* --------->|      |
+                 +------+                 miso    +--> sck, mosi, cs_n n     +------+
+
+One clock for all. Latency: that of the link, `sosmith.hdl.bus.link`, of the front-end,
+`sosmith.hdl.converters.front_end`, and of the core.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
 from fractions import Fraction
 
 from amaranth.hdl import Module
@@ -23,6 +36,8 @@ from amaranth.lib.wiring import In, Out
 
 from sosmith.hdl.bus.command_engine import Face, core_side
 from sosmith.hdl.bus.link import LEDS, Link
+from sosmith.hdl.converters.front_end import FrontEnd
+from sosmith.model.sensors.spi_schedule import Schedule
 
 
 class BoardTop(wiring.Component):
@@ -38,6 +53,8 @@ class BoardTop(wiring.Component):
         Clocks per bit of the line, at least `sosmith.hdl.bus.uart.MIN_CLOCKS`.
     channels : int
         Channels of the core, 1 to 256.
+    schedule : Schedule or None
+        When the front-end reads which converter; None for a core that is fed over the link.
 
     Members
     -------
@@ -45,7 +62,7 @@ class BoardTop(wiring.Component):
         Clock, rising edge.
     rst : In(1)
         Reset of the core, synchronous, active high. It may be tied to 0: registers have initial values, and the first
-        request resets the core.
+        request resets the core, or the front-end does at the beginning.
     rx : In(1)
         Line from the host, 8N1; asynchronous.
     tx : Out(1)
@@ -53,17 +70,31 @@ class BoardTop(wiring.Component):
     leds : Out(3)
         High for a LED that is lit. 0: changes with each request that is carried out. 1: a byte or a frame was
         damaged, since the last session began. 2: the last result has a flag `wear_critical` or `fault`.
+    sck, mosi, miso, cs_n : Out(1), Out(1), In(1), Out(n)
+        With converters, their SPI, with a chip select for each.
     """
 
-    def __init__(self, core: wiring.Component, memory: bytes, *, ratio: Fraction, channels: int = 1) -> None:
-        self.core, self.memory, self.ratio = core, memory, ratio
+    def __init__(
+        self,
+        core: wiring.Component,
+        memory: bytes,
+        *,
+        ratio: Fraction,
+        channels: int = 1,
+        schedule: Schedule | None = None,
+    ) -> None:
+        self.core, self.memory, self.ratio, self.schedule = core, memory, ratio, schedule
         self.face = Face(
             sample_bytes=len(core.s_axis_tdata) // 8,
             result_bytes=len(core.m_axis_tdata) // 8,
             channels=channels,
             address_bits=len(core.s_axil_awaddr) if hasattr(core, "s_axil_awaddr") else 0,
+            readings=0 if schedule is None else channels * len(schedule.readings),
         )
-        super().__init__({"clk": In(1), "rst": In(1), "rx": In(1), "tx": Out(1), "leds": Out(LEDS)})
+        members: dict[str, In | Out] = {"clk": In(1), "rst": In(1), "rx": In(1), "tx": Out(1), "leds": Out(LEDS)}
+        if schedule is not None:
+            members |= {"sck": Out(1), "mosi": Out(1), "miso": In(1), "cs_n": Out(sum(schedule.selects))}
+        super().__init__(members)
 
     def elaborate(self, platform: object) -> Module:
         """Connect the link and the core."""
@@ -77,10 +108,30 @@ class BoardTop(wiring.Component):
             self.tx.eq(link.tx),
             self.leds.eq(link.leds),
             core.aclk.eq(self.clk),
-            core.aresetn.eq(link.aresetn),
         ]
-        for name, member in core_side(self.face).items():
-            if hasattr(core, name):  # a core of one channel has no tdest
-                inner, outer = getattr(core, name), getattr(link, name)
-                m.d.comb += outer.eq(inner) if member.flow is In else inner.eq(outer)
+        self.join(m, core, link, core_side(self.face))
+        if self.schedule is None:
+            m.d.comb += core.aresetn.eq(link.aresetn)
+            return m
+        m.submodules.front_end = front = FrontEnd(self.schedule, result_bytes=self.face.result_bytes)
+        m.d.comb += [
+            front.clk.eq(self.clk),
+            front.rst.eq(self.rst),
+            core.aresetn.eq(front.aresetn),
+            self.sck.eq(front.sck),
+            self.mosi.eq(front.mosi),
+            front.miso.eq(self.miso),
+            self.cs_n.eq(front.cs_n),
+        ]
+        self.join(m, front, link, core_side(self.face))
+        self.join(m, core, front, core_side(replace(self.face, readings=0, address_bits=0)))
         return m
+
+    def join(
+        self, m: Module, inner: wiring.Component, outer: wiring.Component, members: Mapping[str, In | Out]
+    ) -> None:
+        """Connect those of the members of `outer` that `inner` has: a core of one channel has no tdest."""
+        for name, member in members.items():
+            if hasattr(inner, name):
+                to, of = getattr(inner, name), getattr(outer, name)
+                m.d.comb += of.eq(to) if member.flow is In else to.eq(of)

@@ -8,6 +8,8 @@
     uart 0: rx --------------------> rx
             tx <-------------------- tx
     led 0, 1, .. <------------------ leds 3
+    spi 0: sck, mosi, cs_n n <------ sck, mosi, cs_n n    with converters
+           miso -------------------> miso
 
 No latency: wires only. The platform inverts what its board inverts, and makes the reset; on an ECP5 it makes none, as
 all registers start with their initial values.
@@ -16,10 +18,13 @@ all registers start with their initial values.
 from __future__ import annotations
 
 from amaranth.build import Platform, ResourceError
-from amaranth.hdl import ClockSignal, Elaboratable, Instance, Module, ResetSignal, Signal
+from amaranth.hdl import ClockSignal, Elaboratable, Instance, Module, ResetSignal, Signal, Value
 from amaranth.lib import io
 
 from sosmith.hdl.bus.link import LEDS
+
+SPI = "converters"
+"""Name of the resource with the pins of the converters."""
 
 
 class OnPlatform(Elaboratable):
@@ -29,10 +34,12 @@ class OnPlatform(Elaboratable):
     ----------
     top : str
         Name of a module with the ports of `sosmith.hdl.boards.board_top.BoardTop`, which the platform has as a file.
+    converters : bool
+        Whether it has an SPI; the platform then has the resource `SPI`, with a pin for each chip select.
     """
 
-    def __init__(self, top: str) -> None:
-        self.top = top
+    def __init__(self, top: str, *, converters: bool = False) -> None:
+        self.top, self.converters = top, converters
 
     def elaborate(self, platform: Platform) -> Module:
         """Request the resources."""
@@ -41,8 +48,22 @@ class OnPlatform(Elaboratable):
         m.submodules.rx = rx = io.Buffer("i", uart.rx)
         m.submodules.tx = tx = io.Buffer("o", uart.tx)
         leds = Signal(LEDS)
+        bus: dict[str, Value] = {}
+        if self.converters:
+            pins = platform.request(SPI, 0, dir="-")
+            for name in ("sck", "mosi", "cs_n"):
+                m.submodules[name] = outward = io.Buffer("o", getattr(pins, name))
+                bus[f"o_{name}"] = outward.o
+            m.submodules.miso = inward = io.Buffer("i", pins.miso)
+            bus["i_miso"] = inward.i
         m.submodules.board = Instance(
-            self.top, i_clk=ClockSignal(), i_rst=ResetSignal(allow_reset_less=True), i_rx=rx.i, o_tx=tx.o, o_leds=leds
+            self.top,
+            i_clk=ClockSignal(),
+            i_rst=ResetSignal(allow_reset_less=True),
+            i_rx=rx.i,
+            o_tx=tx.o,
+            o_leds=leds,
+            **bus,
         )
         for number, led in enumerate(leds):
             try:

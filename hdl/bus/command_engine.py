@@ -13,7 +13,7 @@
                  +---> [word] >> 8, as wide as the widest of sample, result and register
                           |      ^
                           v      |
-             s_axis_tdata, s_axil_*  m_axis_tdata and m_axis_tuser, s_axil_rdata
+             s_axis_tdata, s_axil_*  m_axis_tdata and m_axis_tuser, or o_result of a front-end; s_axil_rdata
 
     idle -> length -> check, tail -> verdict -> kind -> number -> type, sequence -> body -> .. -> status, crc -> stop
       ^                                 |                  |                                                      |
@@ -49,6 +49,7 @@ from sosmith.model.link.protocol import (
     Type,
     samples_per_message,
 )
+from sosmith.model.sensors.spi_converter import ReadingFault
 
 WINDOW = 2
 """Requests that may be without a response: one for each buffer of the receiver and of the sender."""
@@ -59,6 +60,9 @@ MAX_CHANNELS = 256
 
 MAX_SAMPLE_BYTES = MAX_BODY - 1
 """A sample and its channel fit a message."""
+
+MAX_READINGS = MAX_BODY - 1
+"""A byte for each fits a message."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,18 +77,23 @@ class Face:
         Number of channels, 1 to 256.
     address_bits : int
         Address lines of ``s_axil_*``; 0 without registers.
+    readings : int
+        Inputs of all channels that a front-end reads from converters; 0 for a core that is fed over the link.
     """
 
     sample_bytes: int
     result_bytes: int
     channels: int = 1
     address_bits: int = 0
+    readings: int = 0
 
     def __post_init__(self) -> None:
         if not 1 <= self.channels <= MAX_CHANNELS:
             raise ValueError(f"channels must be 1 to {MAX_CHANNELS}, not {self.channels}")
         if not 1 <= self.sample_bytes <= MAX_SAMPLE_BYTES:
             raise ValueError(f"sample_bytes must be 1 to {MAX_SAMPLE_BYTES}, not {self.sample_bytes}")
+        if not 0 <= self.readings <= MAX_READINGS:
+            raise ValueError(f"readings must be 0 to {MAX_READINGS}, not {self.readings}")
 
     @property
     def response_bytes(self) -> int:
@@ -97,26 +106,53 @@ class Face:
         return samples_per_message(self.sample_bytes, self.response_bytes)
 
     @property
+    def polled(self) -> int:
+        """How many results fit the answer to a ``POLL``, behind their channel."""
+        return (MAX_BODY - 2) // self.response_bytes
+
+    @property
     def word_bytes(self) -> int:
         """Bytes of the widest of a sample, a result with its flags, and a register."""
         return max(self.sample_bytes, self.response_bytes, WORD_BYTES if self.address_bits else 0)
 
 
 def core_side(face: Face) -> dict[str, In | Out]:
-    """Return the members that face a core, from the other side: streams without ``m_axis_tdest``, and registers."""
-    members: dict[str, In | Out] = {
-        "s_axis_tdata": Out(8 * face.sample_bytes),
-        "s_axis_tdest": Out(8),
-        "s_axis_tvalid": Out(1),
-        "s_axis_tready": In(1),
-        "m_axis_tdata": In(8 * face.result_bytes),
-        "m_axis_tuser": In(STATUS_BITS),
-        "m_axis_tvalid": In(1),
-        "m_axis_tready": Out(1),
-    }
+    """Return the members that face a core, from the other side: streams without ``m_axis_tdest``, and registers.
+
+    With converters, those of `sosmith.hdl.converters.front_end.FrontEnd` that face the link stand for the streams.
+    """
+    members: dict[str, In | Out] = (
+        _results(face)
+        if face.readings
+        else {
+            "s_axis_tdata": Out(8 * face.sample_bytes),
+            "s_axis_tdest": Out(8),
+            "s_axis_tvalid": Out(1),
+            "s_axis_tready": In(1),
+            "m_axis_tdata": In(8 * face.result_bytes),
+            "m_axis_tuser": In(STATUS_BITS),
+            "m_axis_tvalid": In(1),
+            "m_axis_tready": Out(1),
+        }
+    )
     if face.address_bits:
-        members |= {name: member.flip() for name, member in slave_members(face.address_bits).items()}
+        members = members | {name: member.flip() for name, member in slave_members(face.address_bits).items()}
     return members
+
+
+def _results(face: Face) -> dict[str, In | Out]:
+    return {
+        "o_result": In(8 * face.response_bytes),
+        "o_channel": In(8),
+        "o_there": In(1),
+        "o_settled": In(1),
+        "o_missed": In(1),
+        "i_take": Out(1),
+        "i_index": Out(8),
+        "o_reading": In(len(ReadingFault)),
+        "o_new": In(1),
+        "o_status": In(STATUS_BITS),
+    }
 
 
 class CommandEngine(wiring.Component):
@@ -148,7 +184,8 @@ class CommandEngine(wiring.Component):
     o_accepted : Out(1)
         High for one clock for each request that is carried out.
     s_axis_*, m_axis_*, s_axil_*
-        The core's faces, seen from the other side; ``tdest`` has 8 bits, and ``m_axis_tdest`` is not needed.
+        The core's faces, seen from the other side; ``tdest`` has 8 bits, and ``m_axis_tdest`` is not needed. With
+        converters, what a `sosmith.hdl.converters.front_end.FrontEnd` has for the link stands for the streams.
     """
 
     def __init__(self, face: Face, memory: bytes) -> None:
@@ -191,11 +228,20 @@ class CommandEngine(wiring.Component):
             machine.judge()
             machine.begin()
             machine.tell()
-            machine.load()
-            machine.feed()
+            if self.face.readings:
+                machine.poll()
+            if self.face.address_bits or not self.face.readings:
+                machine.load()
+            if not self.face.readings:
+                machine.feed()
+            machine.give()
             if self.face.address_bits:
                 machine.access()
             machine.end_of_response()
+        if self.face.readings:
+            m.d.comb += self.o_events[Counter.MISSED].eq(self.o_missed)
+            with m.If(self.o_missed):
+                m.d.sync += machine.gap.eq(1)
         return m
 
 
@@ -206,10 +252,12 @@ class _Machine:
         self.m, self.engine, self.unit, self.face, self.identity = m, engine, unit, engine.face, identity
         self.address, self.ahead = Signal(8), Signal(8)  # in the message; what it is in the next clock
         self.end = Signal(8)  # where the CRC of the message begins
-        self.count = Signal(range(BLOCK_BYTES))
+        self.count = Signal(range(max(BLOCK_BYTES, engine.face.readings)))
         self.word = Signal(8 * engine.face.word_bytes, reset_less=True)
-        self.kind, self.unknown, self.status = Signal(3), Signal(), Signal(3)
+        known = Type.CONVERTERS if engine.face.readings else Type.COUNTERS
+        self.kind, self.unknown, self.status = Signal(range(known + 1)), Signal(), Signal(3)
         self.expected, self.retained = Signal(8), Signal(2)  # the next number; responses that can be sent again
+        self.gap = Signal()  # a result was given up since the channel of the first one was told
         self.target = Signal(8)  # channel, address of a register, or block of the identity
         m.d.sync += self.address.eq(self.ahead)
         m.d.comb += [
@@ -219,10 +267,15 @@ class _Machine:
             engine.o_write.eq(unit.o_write),
             engine.o_slot.eq(engine.i_data[0]),
             engine.o_count.eq(self.count),
-            identity.addr.eq(Cat(self.count, self.target)),
-            engine.s_axis_tdata.eq(self.word[-8 * self.face.sample_bytes :]),
-            engine.s_axis_tdest.eq(self.target if self.face.channels > 1 else 0),
+            identity.addr.eq(Cat(self.count[: (BLOCK_BYTES - 1).bit_length()], self.target)),
         ]
+        if self.face.readings:
+            m.d.comb += engine.i_index.eq(self.count)
+        else:
+            m.d.comb += [
+                engine.s_axis_tdata.eq(self.word[-8 * self.face.sample_bytes :]),
+                engine.s_axis_tdest.eq(self.target if self.face.channels > 1 else 0),
+            ]
         if self.face.address_bits:
             m.d.comb += [
                 engine.s_axil_awaddr.eq(self.target),
@@ -294,7 +347,7 @@ class _Machine:
         """Look at type and sequence number: a new request, one to be answered again, or neither."""
         m, engine = self.m, self.engine
         with m.State("kind"):
-            m.d.sync += [self.kind.eq(engine.i_data), self.unknown.eq(engine.i_data[3:].any())]
+            m.d.sync += [self.kind.eq(engine.i_data), self.unknown.eq(engine.i_data[len(self.kind) :].any())]
             self.go(1)
             m.next = "number"
         with m.State("number"):
@@ -354,10 +407,11 @@ class _Machine:
         longest = HEAD_BYTES + 1 + self.face.samples * self.face.sample_bytes
         if longest < HEAD_BYTES + MAX_BODY:
             few = few & (self.end <= longest)
+        fed = {Type.POLL: (none, "poll"), Type.CONVERTERS: (none, "reading")}
         known = {
             Type.OPEN: (none, "version"),
             Type.IDENTITY: (one, "fetch"),
-            Type.SAMPLES: (few, "load"),
+            **(fed if self.face.readings else {Type.SAMPLES: (few, "load")}),
             Type.COUNTERS: (none, "counters"),
         }
         if self.face.address_bits:
@@ -401,13 +455,36 @@ class _Machine:
                 m.d.sync += self.word.eq(Cat(self.word[8:], engine.i_data))
                 self.go(self.address + 1)
                 with m.If(self.counted(last)):
-                    m.next = "feed"
+                    m.next = "write address" if self.face.readings else "feed"
                     if self.face.address_bits:
                         with m.If(writes):
                             m.next = "write address"
 
+    def poll(self) -> None:
+        """Fetch the oldest results of a front-end, or the faults of its readings."""
+        m, engine = self.m, self.engine
+        fetched = Signal(range(self.face.polled + 1))
+        with m.State("poll"):
+            self.put(engine.o_channel)
+            m.d.sync += [fetched.eq(0), self.gap.eq(0)]
+            m.next = "more"
+        with m.State("more"), m.If(engine.o_settled):
+            with m.If(~engine.o_there | self.gap | (fetched == self.face.polled)):
+                self.answer(Status.OK)
+            with m.Else():
+                m.d.comb += engine.i_take.eq(1)
+                m.d.sync += [self.word.eq(engine.o_result), fetched.eq(fetched + 1)]
+                m.next = "give"
+        with m.State("reading"):  # its faults are there at the next clock
+            m.next = "faults"
+        with m.State("faults"):
+            self.put(engine.o_reading)
+            m.next = "reading"
+            with m.If(self.counted(self.face.readings - 1)):
+                self.answer(Status.OK)
+
     def feed(self) -> None:
-        """Give the core a sample, and wait for its result; append that, or the word of a register."""
+        """Give the core a sample, and wait for its result."""
         m, engine = self.m, self.engine
         with m.State("feed"):
             m.d.comb += engine.s_axis_tvalid.eq(1)
@@ -420,6 +497,10 @@ class _Machine:
                 if self.face.channels > 1:
                     m.d.sync += self.target.eq(Mux(self.target == self.face.channels - 1, 0, self.target + 1))
                 m.next = "give"
+
+    def give(self) -> None:
+        """Append a result, or the word of a register."""
+        m = self.m
         reads = self.kind == Type.READ
         last: Value | int = self.face.response_bytes - 1
         if self.face.address_bits:
@@ -428,7 +509,7 @@ class _Machine:
             self.put(self.word[:8])
             m.d.sync += self.word.eq(self.word[8:])
             with m.If(self.counted(last)):
-                m.next = "load"
+                m.next = "more" if self.face.readings else "load"
                 if self.face.address_bits:
                     with m.If(reads):
                         m.next = "status"

@@ -11,7 +11,7 @@
                                                           |
                o_error, o_malformed, o_overrun ---> FaultCounters
                                                           |
-    leds <--- [activity], [damaged], [alarm] <------------+--- m_axis_tuser
+    leds <--- [activity], [damaged], [alarm] <------------+--- m_axis_tuser, or o_status of a front-end
 
 Latency, from the end of a request to the begin of its response: 9 clocks for each byte of both, and that of the core
 for each sample.
@@ -58,7 +58,7 @@ class Link(wiring.Component):
     aresetn : Out(1)
         Reset of the core, active low.
     s_axis_*, m_axis_*, s_axil_*
-        The core's faces, as those of a `CommandEngine`.
+        The core's faces, or those of a front-end, as those of a `CommandEngine`.
     """
 
     def __init__(self, face: Face, memory: bytes, *, ratio: Fraction) -> None:
@@ -120,7 +120,8 @@ class Link(wiring.Component):
             m.d.sync += damaged.eq(0)
         with m.Elif(of_line.any() | engine.o_events[Counter.CRC]):
             m.d.sync += damaged.eq(1)
-        with m.If(self.m_axis_tvalid):
-            m.d.sync += alarm.eq(Cat(self.m_axis_tuser[flag] for flag in _ALARMS).any())
+        new, status = (self.o_new, self.o_status) if self.face.readings else (self.m_axis_tvalid, self.m_axis_tuser)
+        with m.If(new):
+            m.d.sync += alarm.eq(Cat(status[flag] for flag in _ALARMS).any())
         m.d.comb += self.leds.eq(Cat(activity, damaged, alarm))
         return m

@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from sosmith.model.dataflow.status import Flag
 from sosmith.model.errors import LinkError, SpecificationError
 from sosmith.model.link.protocol import BLOCK_BYTES, MAX_IDENTITY, samples_per_message
 from sosmith.model.port import Port
@@ -19,6 +20,10 @@ Rate = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Quantity = tuple[Name, Annotated[int, Field(ge=2, le=32)], bool, Number, Rate, Name]
 """Name, bits, signed, zero, LSB and unit of a port."""
+
+
+CONVERTER_FLAGS = {Flag.FAULT.name.lower(): int(Flag.FAULT)}
+"""Bits of the flags that a board with converters has beside those of its core."""
 
 
 class Reload(BaseModel):

@@ -53,6 +53,7 @@ class Type(IntEnum):
     READ = 5
     WRITE = 6
     COUNTERS = 7
+    CONVERTERS = 8
 
 
 class Status(IntEnum):
@@ -163,6 +164,12 @@ LAYOUTS = {
         "nothing",
         f"{len(Counter)} bytes",
         "Gives the counters of faults; they are not set back.",
+    ),
+    Type.CONVERTERS: Layout(
+        "nothing",
+        "a byte for each input of each channel",
+        "Gives what was wrong with the last reading of each converter, those of channel 0 first. Unknown to a device "
+        "without converters.",
     ),
 }
 """The requests, in the order of their numbers."""

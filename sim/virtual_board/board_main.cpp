@@ -1,13 +1,15 @@
 // Runs the top of a board, with a file descriptor at the other end of its serial line.
 //
-//   board FD CLOCKS_PER_BIT CLOCKS_PER_SECOND QUIET [WAIT]
+//   board FD CLOCKS_PER_BIT CLOCKS_PER_SECOND QUIET WAIT [VALUES]
 //
 // What arrives at FD is sent to `rx`, 8 data bits, no parity, one stop bit; what `tx` sends is written to FD. At most
 // CLOCKS_PER_SECOND clocks are simulated in a second, or as many as can be if it is 0. After QUIET clocks without
-// a bit on the line, the clock stops until a byte arrives. With WAIT, the clock also stops behind every frame from the
+// a bit on the line, the clock stops until a byte arrives. With a QUIET of 0 it begins with the first byte, and does not
+// stop: the board measures by itself, with converters that give what is in the file VALUES. With WAIT, the clock also stops behind every frame from the
 // board, for that many milliseconds or until a byte arrives, so that the host seems to answer at once. Ends when the
 // other side of FD is closed, and prints the number of clocks, of bytes that were sent to the board, and of bytes from it.
 #include "Vtop.h"
+#include "pins.h"
 #include "verilated.h"
 
 #include <cerrno>
@@ -132,15 +134,16 @@ private:
 }  // namespace
 
 int main(int argc, char** argv) {
-    if (argc < 5) {
-        std::fprintf(stderr, "usage: board FD CLOCKS_PER_BIT CLOCKS_PER_SECOND QUIET [WAIT]\n");
+    Converters converters;
+    if (argc < 6 || (argc > 6 && !converters.load(argv[6]))) {
+        std::fprintf(stderr, "usage: board FD CLOCKS_PER_BIT CLOCKS_PER_SECOND QUIET WAIT [VALUES]\n");
         return 2;
     }
     const int fd = std::atoi(argv[1]);
     const double per_bit = std::atof(argv[2]);
     const double per_second = std::atof(argv[3]);
     const uint64_t quiet = std::strtoull(argv[4], nullptr, 10);
-    const int wait = argc > 5 ? std::atoi(argv[5]) : 0;
+    const int wait = std::atoi(argv[5]);
     fcntl(fd, F_SETFL, fcntl(fd, F_GETFL) | O_NONBLOCK);
 
     VerilatedContext context;
@@ -151,6 +154,10 @@ int main(int argc, char** argv) {
     board->rx = 1;
     const uint64_t turn = uint64_t(kBits * per_bit);  // a byte
     uint64_t clocks = 0, silent = 0, paced = 0;
+    if (quiet == 0) {
+        pollfd byte{fd, POLLIN, 0};
+        poll(&byte, 1, -1);
+    }
     double started = now();
     while (!sender.closed()) {
         if (clocks % turn == 0) {
@@ -162,6 +169,7 @@ int main(int argc, char** argv) {
         board->eval();
         board->clk = 1;
         board->eval();
+        exchange(converters, *board, 0);
         const bool answered = receiver.take(board->tx);
         ++clocks;
         if (answered && wait > 0 && !sender.waiting()) {
@@ -170,7 +178,7 @@ int main(int argc, char** argv) {
             sender.refill();
         }
         silent = sender.busy() || receiver.busy() ? 0 : silent + 1;
-        if (silent > quiet) {
+        if (quiet > 0 && silent > quiet) {
             pollfd waiting{fd, POLLIN, 0};
             poll(&waiting, 1, -1);
             if (!(waiting.revents & POLLIN)) break;

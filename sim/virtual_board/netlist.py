@@ -4,6 +4,8 @@
 
     host <--> pseudo-terminal <--> [damage] <--> board_main.cpp: bits on rx, tx <--> top of the board <--> core
                                                                                      (or the gates of both)
+                                                                                     |
+                                                                 pins.h: converters -+
 """
 
 from __future__ import annotations
@@ -21,15 +23,20 @@ from pathlib import Path
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.fpga.boards import Board
 from sosmith.gen.fpga.synthesis import synthesize
-from sosmith.gen.output.board_top import board_verilog, top_name
+from sosmith.gen.output.board_top import board_verilog, schedule_of, top_name
+from sosmith.model.arrays import Codes
 from sosmith.model.errors import SpecificationError, ToolError
 from sosmith.model.link.protocol import MAX_BODY, WINDOWS
+from sosmith.model.sensors.spi_schedule import Schedule
 from sosmith.model.text_files import write_files
+from sosmith.sim.converters import values
+from sosmith.sim.converters.values import MAX_SELECTS, values_text
 from sosmith.sim.gate_level import with_cell_models
 from sosmith.sim.simulators import find_simulator
 from sosmith.sim.verilated_model import LIBRARY_SECONDS, Builder
 
 _MAIN = Path(__file__).with_name("board_main.cpp")
+_PINS = Path(values.__file__).with_name("pins.h")
 _ROOM = 1 << 12
 _TURN = 0.1  # seconds
 
@@ -49,16 +56,21 @@ class Netlist:
     baud : int
         Bits per second on the line.
     quiet : int
-        Clocks without a bit on the line after which the board has nothing left to do.
+        Clocks without a bit on the line after which the board has nothing left to do; 0 if it measures by itself.
+    schedule : Schedule or None
+        When it reads which converter; None for a board that is fed over the link.
     """
 
     program: Path
     clock: Fraction
     baud: int
     quiet: int
+    schedule: Schedule | None = None
 
     @contextmanager
-    def at(self, end: int, *, speed: float = 0.0, wait: int = 0) -> Iterator[subprocess.Popen[str]]:
+    def at(
+        self, end: int, *, speed: float = 0.0, wait: int = 0, codes: Codes | None = None
+    ) -> Iterator[subprocess.Popen[str]]:
         """Run the board with a file descriptor at the other end of its line, until the context ends.
 
         When the other side of the file descriptor is closed, the process prints how many clocks it simulated, and how
@@ -72,9 +84,15 @@ class Netlist:
             1 for real time, 2 for twice as fast; 0 for as fast as it can.
         wait : int
             Milliseconds for which the board's time stands still behind each of its frames, unless a byte arrives.
+        codes : ndarray of int, shape (samples, channels, inputs), or None
+            What the converters of the board measure from its first sample on, as codes of the inputs; the end stays.
+            None for a board without converters, or one whose converters are not there.
         """
         arguments = (end, float(self.clock / self.baud), float(self.clock) * speed, self.quiet, wait)
         command = [str(self.program), *map(str, arguments)]
+        if codes is not None and self.schedule is not None:
+            (file,) = write_files(self.program.parent, {"values.txt": values_text(self.schedule, codes)})
+            command.append(str(file))
         with subprocess.Popen(
             command, pass_fds=[end], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, text=True
         ) as process:
@@ -113,12 +131,18 @@ def build(
     Raises
     ------
     SpecificationError
-        If the line is too fast for the clock, the folder has a blank in its path, or cannot be written.
+        If the line is too fast for the clock, converters are too slow or too many, the folder has a blank in its path,
+        or cannot be written.
     ToolError
         If a tool is missing or fails.
     """
     rate = design.spec.hardware.clock if clock is None else clock
     top = top_name(design)
+    schedule = schedule_of(design, rate) if design.spec.converters else None
+    if schedule is not None and sum(schedule.selects) > MAX_SELECTS:
+        raise SpecificationError(
+            f"a virtual board must have at most {MAX_SELECTS} converters, not {sum(schedule.selects)}"
+        )
     progress("SystemVerilog of the board")
     (source,) = write_files(folder, {f"{top}.sv": board_verilog(design, clock=rate, rate=baud)})
     place = folder.resolve()
@@ -136,12 +160,12 @@ def build(
             time = "" if builder.has_library(waves=False) else f", which takes about {LIBRARY_SECONDS} s the first time"
             progress(f"building with {tool.name}{time}")
             (place / "build").mkdir(exist_ok=True)
-            builder.build_program(source.resolve(), top, _MAIN, program)
+            builder.build_program(source.resolve(), top, _MAIN, _PINS, program)
         except subprocess.CalledProcessError as error:
             raise ToolError(f"{Path(error.cmd[0]).name} must build the board, not fail: see {log.name}") from None
     # No request keeps the board busier than one whose samples fill a message.
     quiet = max(WINDOWS) * MAX_BODY * (design.architecture.cycles_per_sample + 100)
-    return Netlist(program, rate, baud, quiet)
+    return Netlist(program, rate, baud, quiet if schedule is None else 0, schedule)
 
 
 def forward(end: int, board: socket.socket, damage: Damage, goes_on: Callable[[], bool]) -> None:

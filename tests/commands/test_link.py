@@ -176,4 +176,5 @@ def test_monitor_checks_the_board(ramp: Path) -> None:
 
 
 def test_monitor_needs_samples() -> None:
-    MONITOR.refused("--trace must be given: the board takes its samples over the link", "/dev/ttyUSB1")
+    with plugged(model_of(instrument_design().core)) as port:
+        MONITOR.refused("--trace must be given: the board takes its samples over the link", port)

@@ -11,6 +11,7 @@ from sosmith.model.link.frames import Message
 from sosmith.model.link.identity import Identity
 from sosmith.model.link.integer_core import IntegerCore
 from sosmith.model.link.protocol import LAYOUTS, Counter, Status, Type, samples_per_message
+from sosmith.model.sensors.spi_converter import ReadingFault
 
 _PART = re.compile(r"<!-- (?P<what>[a-z]+) -->\n.*?<!-- end of (?P=what) -->", re.DOTALL)
 _BITS = 10
@@ -25,6 +26,7 @@ def with_parts(text: str) -> str:
         "statuses": _statuses,
         "identity": _identity,
         "counters": _counters,
+        "readings": _readings,
         "session": _session,
         "throughput": _throughput,
     }
@@ -48,6 +50,11 @@ def _hex(data: bytes) -> str:
 def _frame() -> str:
     message = Message(Type.SAMPLES, 5, bytes([0, 0x12, 0x00, 0x34]))
     return "    message      " + _hex(message.checked) + "\n    on the line  " + _hex(message.frame) + "\n"
+
+
+def _readings() -> str:
+    rows = [f"| {fault.value} | `{fault.name}` | {fault.meaning} |\n" for fault in ReadingFault]
+    return "| bit | fault | |\n|---|---|---|\n" + "".join(rows)
 
 
 def _requests() -> str:

@@ -10,6 +10,9 @@ RECORD = boards.read()
 def test_the_tables_are_up_to_date() -> None:
     text = boards.DOCUMENT.read_text(encoding="utf-8")
     assert boards.PARTS["boards"].findall(text) == [boards.board_table()]
+    assert boards.PARTS["headers"].findall(text) == [boards.header_table()]
+    assert boards.PARTS["converters"].findall(text) == [boards.converter_table()]
+    assert boards.PARTS["faults"].findall(text) == [boards.fault_list()]
     assert boards.PARTS["built"].findall(text) == [boards.built_table(RECORD)]
 
 

@@ -5,13 +5,17 @@ from __future__ import annotations
 import socket
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from sosmith.commands.options import BAUD, CORE, REALIZATION, SEED, SPEC, default_folder
 from sosmith.model.errors import SpecificationError, ToolError
 from sosmith.terminal import note, output_option, show_progress
+
+if TYPE_CHECKING:
+    from sosmith.gen.core import CoreDesign
+    from sosmith.model.arrays import Codes
 
 
 class _Speed(click.ParamType[float]):
@@ -46,7 +50,15 @@ class _Speed(click.ParamType[float]):
 )
 @BAUD
 @click.option(
-    "--speed", type=_Speed(), default="max", show_default=True, metavar="FACTOR|max", help="Factor of real time."
+    "--trace",
+    metavar="FILE|SCENARIO",
+    help="What the converters of SPEC measure, as for `sosmith simulate`.  [default: the default scenario]",
+)
+@click.option(
+    "--speed",
+    type=_Speed(),
+    metavar="FACTOR|max",
+    help="Factor of real time.  [default: 1 with converters, max without]",
 )
 @click.option(
     "--fault",
@@ -70,7 +82,8 @@ def board_command(
     realization: str | None,
     clock: float | None,
     baud: int,
-    speed: float,
+    trace: str | None,
+    speed: float | None,
     fault: float | None,
     fault_kinds: str,
     seed: int,
@@ -82,8 +95,12 @@ def board_command(
     a host cannot tell the difference. It runs until it is interrupted. `sosmith stream`, `monitor`, `reload --port` and
     `simulate --port` take its path as a port.
 
+    With [converter.NAME] tables in SPEC, models of these converters are at the pins of the board, and give what is in
+    --trace, from the moment on at which a host opens the port; the last value stays.
+
     \b
         sosmith board my.toml --virtual
+        sosmith board my.toml --virtual --trace wear_ramp
         sosmith board my.toml --virtual --speed 1 --fault 1000
     """
     if not virtual:
@@ -95,6 +112,11 @@ def board_command(
     asked = Specification.load(spec)
     damage = None if fault is None else LineDamage(fault, seed, tuple(fault_kinds.split(",")))
     rate = asked.checked.hardware.clock if clock is None else Fraction(clock)
+    measures = bool(asked.checked.converters)
+    if trace is not None and not measures:
+        raise SpecificationError("--trace must come with [converter.NAME] tables in SPEC, or be given to `monitor`")
+    if model and measures:
+        raise SpecificationError("--model must be left out for a board with converters")
     with show_progress() as step:
         from sosmith.interface.design import design
 
@@ -109,6 +131,7 @@ def board_command(
         else:
             from sosmith.sim.virtual_board.netlist import build
 
+            codes = _measured(made, trace, seed) if measures else None
             netlist = build(made, folder, clock=rate, baud=baud, progress=step)
     with Terminal() as terminal:
         click.echo(terminal.path)
@@ -122,10 +145,22 @@ def board_command(
 
         note(f"{asked.name} is at {terminal.path}; Ctrl-C ends it")
         ours, theirs = socket.socketpair()
-        with ours, theirs, netlist.at(terminal.end if damage is None else theirs.fileno(), speed=speed) as process:
+        pace = speed if speed is not None else 1.0 if measures else 0.0
+        end = terminal.end if damage is None else theirs.fileno()
+        with ours, theirs, netlist.at(end, speed=pace, codes=codes) as process:
             if damage is None:
                 process.wait()
             else:
                 theirs.close()
                 forward(terminal.end, ours, damage, lambda: process.poll() is None)
         raise ToolError(f"the simulation of the board must go on, not end with status {process.returncode}")
+
+
+def _measured(design: CoreDesign, trace: str | None, seed: int) -> Codes:
+    """Return what the converters measure, as codes of the inputs: shape (samples, channels, inputs)."""
+    import numpy as np
+
+    from sosmith.gen.stimuli import default_scenario, traces_for
+
+    traces = traces_for(design, trace or default_scenario(design), seed=seed)
+    return np.stack([each.codes for each in traces], axis=1)

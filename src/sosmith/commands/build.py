@@ -48,7 +48,8 @@ def build_command(
     Writes the bitstream, build.json with utilisation and timing, build.log, and the files of `sosmith generate`. Exits
     with 1 if the design does not fit or timing does not close, and names the path that does not. Programs are
     those of the system or, where these are missing or too old, the ones of `pip install 'sosmith[boards]'`. The same
-    programs give the same bitstream.
+    programs give the same bitstream. With [converter.NAME] tables in SPEC, the board reads its inputs from these
+    converters, instead of over the link.
 
     \b
         sosmith build my.toml --board icebreaker

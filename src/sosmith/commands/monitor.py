@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from sosmith.host.mqtt import Broker, Publisher
     from sosmith.host.readings import Readings
     from sosmith.host.recording import Recording
+    from sosmith.model.arrays import Codes
     from sosmith.model.link.identity import Identity
 
 REFRESHES = 8
@@ -32,7 +33,10 @@ REFRESHES = 8
 @click.command("monitor")
 @click.argument("port")
 @click.option(
-    "--trace", type=click.Path(path_type=Path), metavar="TRACE.csv", help="Samples to feed, as for `sosmith stream`."
+    "--trace",
+    type=click.Path(path_type=Path),
+    metavar="TRACE.csv",
+    help="Samples to feed, as for `sosmith stream`; for a board without converters.",
 )
 @click.option(
     "--speed", type=click.FloatRange(min=0), default=1.0, show_default=True, help="Factor of real time; 0: at once."
@@ -83,9 +87,10 @@ def monitor_command(
 ) -> None:
     """Watch the board at PORT: live values, wear, rate and flags in the terminal, or in a browser.
 
-    The samples of --trace are fed at the board's sample rate. The board must have the core whose manifest and
-    certificate are in --files. After it was unplugged, it is waited for; its filter then starts from reset, and the
-    recording has the next session. Every alarm is told once, when its flag rises. Exits with 1 if there was one.
+    The samples of --trace are fed at the board's sample rate; a board with converters measures by itself. The board
+    must have the core whose manifest and certificate are in --files. After it was unplugged, it is waited for; its
+    filter then starts from reset, and the recording has the next session. Every alarm is told once, when its flag
+    rises. Exits with 1 if there was one.
 
     The recording has the columns utc, time_s, session, channel if there are several, the result with its unit, its code
     and its status. Ctrl-C and even a kill leave every row that was received.
@@ -100,10 +105,7 @@ def monitor_command(
     from sosmith.host.alarms import ALARMS
     from sosmith.host.board import Board
     from sosmith.host.monitor import watch
-    from sosmith.host.trace_samples import samples_for
 
-    if trace is None:
-        raise SpecificationError("--trace must be given: the board takes its samples over the link")
     broker = None
     if mqtt is not None:
         from sosmith.host.mqtt import Broker, paho
@@ -115,13 +117,22 @@ def monitor_command(
         shown = stack.enter_context(_Monitor(asked))
         for event in watch(
             lambda: Board(port, baud=baud),
-            lambda identity: samples_for(identity, trace),
+            lambda identity: _samples(identity, trace),
             check=shown.check,
             speed=speed,
         ):
             shown.take(event)
     if shown.raised:
         sys.exit(1)
+
+
+def _samples(identity: Identity, trace: Path | None) -> Codes:
+    """Return the samples for a board that is fed."""
+    from sosmith.host.trace_samples import samples_for
+
+    if trace is None:
+        raise SpecificationError("--trace must be given: the board takes its samples over the link")
+    return samples_for(identity, trace)
 
 
 @dataclass(frozen=True)

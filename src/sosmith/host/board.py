@@ -17,6 +17,7 @@ from sosmith.model.errors import LinkError, SpecificationError
 from sosmith.model.link.identity import Identity
 from sosmith.model.link.packing import bytes_of, codes_of
 from sosmith.model.link.protocol import BLOCK_BYTES, MAX_IDENTITY, MAX_WORDS, WORD_BYTES, Counter, Type
+from sosmith.model.sensors.spi_converter import ReadingFault
 
 if TYPE_CHECKING:
     from sosmith.host.loading import Loaded
@@ -275,6 +276,23 @@ class Board:
         return body[0], Results(
             values=self._identity.output_port.decode(codes), codes=codes, status=rows[:, -1].copy(), flags=flags
         )
+
+    def readings(self) -> dict[tuple[int, str], tuple[str, ...]]:
+        """Read what was wrong with the last reading of each converter: by channel and name of the input.
+
+        Names of faults are those of `sosmith.model.sensors.spi_converter.ReadingFault` in small letters; none for a
+        good reading.
+        """
+        body = self._session.request(Type.CONVERTERS)
+        names = [port.name for port in self._identity.input_ports]
+        if len(body) != self._identity.channels * len(names):
+            raise LinkError(f"the board must tell of {self._identity.channels * len(names)} readings, not {len(body)}")
+        return {
+            (n // len(names), names[n % len(names)]): tuple(
+                fault.name.lower() for fault in ReadingFault if byte >> fault & 1
+            )
+            for n, byte in enumerate(body)
+        }
 
     def read_register(self, address: int) -> int:
         """Read the register at a byte address of the core; docs/registers.md lists them.

@@ -10,7 +10,7 @@ from typing import Any
 
 from sosmith.gen.verifier.certificate_file import read_certificate
 from sosmith.model.errors import ShortfallError, SpecificationError
-from sosmith.model.link.identity import Identity
+from sosmith.model.link.identity import CONVERTER_FLAGS, Identity
 
 
 def check_design(identity: Identity, verilog: str) -> None:
@@ -42,6 +42,7 @@ def check_files(identity: Identity, folder: Path) -> dict[str, Any]:
         raise SpecificationError(f"{folder}: the certificate must be one that lists {source}, not without it")
     _check(identity, "design", files[source][:12], identity.design[:12])
     _check(identity, "name", certificate.name, identity.name)
+    added = CONVERTER_FLAGS if identity.source == "converter" else {}
     try:
         streams = manifest["streams"]
         facts: dict[str, tuple[Any, Any]] = {
@@ -49,7 +50,7 @@ def check_files(identity: Identity, folder: Path) -> dict[str, Any]:
             "channels": (manifest["channels"], identity.channels),
             "inputs": (_quantities(streams["s_axis"]), [list(quantity) for quantity in identity.inputs]),
             "output": (_quantities(streams["m_axis"]), [list(identity.output)]),
-            "flags": (streams["m_axis"]["tuser"]["flags"], identity.flags),
+            "flags": (streams["m_axis"]["tuser"]["flags"] | added, identity.flags),
         }
     except (KeyError, TypeError) as error:
         raise SpecificationError(f"{folder}: the manifest must have its keys, not be without {error}") from None

@@ -1,4 +1,4 @@
-"""Watches a board: feeds it a trace in real time, and goes on when it was unplugged and plugged in again."""
+"""Watches a board: feeds it a trace in real time, or fetches what it measures; goes on when it was unplugged."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Protocol
+
+import numpy as np
 
 from sosmith.host.board import Board, Results
 from sosmith.model.arrays import Codes
@@ -36,7 +38,7 @@ class Clock(Protocol):
 
 @dataclass(frozen=True)
 class Connected:
-    """A session with a board has begun; its core starts from reset.
+    """A session with a board has begun; a core that is fed over the link starts from reset.
 
     Attributes
     ----------
@@ -93,17 +95,17 @@ def watch(
     speed: float = 1.0,
     clock: Clock = time,
 ) -> Iterator[Event]:
-    """Feed a board until the samples end; tell what happens.
+    """Feed a board until the samples end, or fetch what it measures for ever; tell what happens.
 
     A sample whose result did not arrive before the board was lost is sent again in the next session, whose filter
-    starts from reset.
+    starts from reset. A board with converters is not fed; its samples are numbered as they arrive.
 
     Parameters
     ----------
     connect : callable
         Opens the board.
     codes_for : callable
-        Returns the samples for a board, shape (samples, channels, inputs); called once.
+        Returns the samples for a board, shape (samples, channels, inputs); called once, for one that is fed.
     check : callable
         Called with the identity at the beginning of each session; may raise.
     speed : float
@@ -130,18 +132,54 @@ def watch(
             continue
         with board:
             check(board.identity)
-            codes = codes_for(board.identity) if codes is None else codes
+            if board.identity.source == "link" and codes is None:
+                codes = codes_for(board.identity)
             session += 1
             yield Connected(board.identity, session)
             rate = board.identity.sample_rate * speed
             try:
-                for first, results in _fed(board, codes, sent, rate, clock):
+                batches = _measured(board, sent, clock) if codes is None else _fed(board, codes, sent, rate, clock)
+                for first, results in batches:
                     sent = first + len(results.codes)
                     yield Received(session, first, results)
             except LinkError as error:
                 yield Lost(str(error))
             else:
                 return
+
+
+def _measured(board: Board, start: int, clock: Clock) -> Iterator[tuple[int, Results]]:
+    """Fetch results, and give those of samples of which all channels are there; number them from `start` on."""
+    channels, taken = board.identity.channels, start
+    codes: list[int] = []
+    status: list[int] = []
+    while True:
+        found = board.poll()
+        if found is None:
+            clock.sleep(TURN)
+            continue
+        channel, results = found
+        if channel != len(codes) % channels:  # some were overwritten: begin with the next whole sample
+            codes, status = [], []
+            skipped = -channel % channels
+        else:
+            skipped = 0
+        codes += results.codes[skipped:].tolist()
+        status += results.status[skipped:].tolist()
+        whole = len(codes) // channels * channels
+        if whole:
+            shape = (-1,) if channels == 1 else (-1, channels)
+            shaped = np.array(codes[:whole], np.int64).reshape(shape)
+            yield (
+                taken,
+                Results(
+                    values=board.identity.output_port.decode(shaped),
+                    codes=shaped,
+                    status=np.array(status[:whole], np.uint8).reshape(shape),
+                    flags=results.flags,
+                ),
+            )
+            codes, status, taken = codes[whole:], status[whole:], taken + whole // channels
 
 
 def _fed(board: Board, codes: Codes, start: int, rate: float, clock: Clock) -> Iterator[tuple[int, Results]]:

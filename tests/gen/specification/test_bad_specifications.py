@@ -54,12 +54,14 @@ FILTER = BASE[BASE.index("[filter]") : BASE.index("[output]")]
 CAL = BASE[BASE.index("[calibration]") : BASE.index("[filter]")]
 TEMP = BASE[BASE.index("[input.temperature]") : BASE.index("[calibration]")]
 KO = f"{KIND}\n{OC}"
+ADC = "\n[converter.voltage]\ndevice = 'mcp3204'\nrange = {}"
+THERMOCOUPLE = "\n[converter.temperature]\ndevice = 'max31855'"
 EDGES = "passband_edge = {}\nstopband_edge = {}\npassband_loss = {}\nstopband_loss = {}"
 
 # Phrases that stand in several sentences.
 TABLES = (
-    "one of the keys name, sample_rate, channels, input, calibration, filter, output, wear, hardware, not an unknown"
-    " one"
+    "one of the keys name, sample_rate, channels, input, calibration, filter, output, wear, converter, hardware, not an"
+    " unknown one"
 )
 FILTER_KEYS = (
     "one of the keys family, kind, method, order, cutoff, passband_edge, stopband_edge, passband_loss,"
@@ -787,6 +789,72 @@ BAD = [
         "hardware.clock must be at least the sample_rate (100 Hz), not 99",
     ),
     ("clock zero", CLOCK, "clock = 0", "hardware.clock must be a positive number of Hz, not 0"),
+    (
+        "converter of one input only",
+        CLOCK,
+        CLOCK + ADC.format("[0, 10]"),
+        "converter must be a table for each of the inputs voltage and temperature, or none, not 'voltage'",
+    ),
+    (
+        "unknown converter",
+        CLOCK,
+        CLOCK + ADC.format("[0, 10]").replace("mcp3204", "mcp3208") + THERMOCOUPLE,
+        "converter.voltage.device must be one of mcp3202, mcp3204, max31855, not 'mcp3208' (did you mean mcp3204?)",
+    ),
+    (
+        "converter without a range",
+        CLOCK,
+        CLOCK + "\n[converter.voltage]\ndevice = 'mcp3202'" + THERMOCOUPLE,
+        "converter.voltage.range must be the values of the input at the readings 0 and 4096, [low, high], not missing",
+    ),
+    (
+        "thermocouple converter with a range",
+        CLOCK,
+        CLOCK + ADC.format("[0, 10]") + THERMOCOUPLE + "\nrange = [0, 100]",
+        "converter.temperature.range must be left out for max31855, not [0, 100]",
+    ),
+    (
+        "thermocouple converter with a supply",
+        CLOCK,
+        CLOCK + ADC.format("[0, 10]") + THERMOCOUPLE + "\nsupply = 3.3",
+        "converter.temperature.supply must be left out for max31855, not 3.3",
+    ),
+    (
+        "supply that no converter stands",
+        CLOCK,
+        CLOCK + ADC.format("[0, 10]") + "\nsupply = 12" + THERMOCOUPLE,
+        "converter.voltage.supply must be a number of V from 2.7 to 5.5, not 12",
+    ),
+    (
+        "unknown key of a converter",
+        CLOCK,
+        CLOCK + ADC.format("[0, 10]") + "\nchannel = 1" + THERMOCOUPLE,
+        "converter.voltage.channel must be one of the keys device, range, supply, not an unknown one",
+    ),
+    (
+        "converter without a device",
+        CLOCK,
+        CLOCK + "\n[converter.voltage]\nrange = [0, 10]" + THERMOCOUPLE,
+        "converter.voltage.device must be one of mcp3202, mcp3204, max31855, not missing",
+    ),
+    (
+        "steps between codes",
+        CLOCK,
+        CLOCK + ADC.format("[0, 3.3]") + THERMOCOUPLE,
+        "converter.voltage must be one that has steps of a whole number of LSB of voltage, not of 5.28",
+    ),
+    (
+        "zero between codes",
+        CLOCK,
+        CLOCK + ADC.format("[-0.0001, 9.9999]") + THERMOCOUPLE,
+        "converter.voltage must be one that has its reading 0 at a code of voltage, not at -0.65536",
+    ),
+    (
+        "far larger range",
+        CLOCK,
+        CLOCK + ADC.format("[0, 1e15]") + THERMOCOUPLE,
+        "converter.voltage must be one that has a range of the size of that of voltage, not a far larger one",
+    ),
     (
         "wear without its limit",
         UNIT,
