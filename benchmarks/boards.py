@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import sosmith
-from sosmith.gen.fpga.boards import BOARDS, BUILDABLE, RATE
+from sosmith.gen.fpga.boards import BOARDS, BUILDABLE, PROJECTS, RATE
 from sosmith.hdl.bus.link import LEDS
 from sosmith.model.sensors.spi_converter import CONVERTERS, ReadingFault
 
@@ -69,7 +69,7 @@ def board_table() -> str:
         "| board | `--board` | FPGA | clock, MHz | rx, tx of the serial line | LEDs | highest rate, Mbaud | loader |",
         "|---|---|---|---|---|---|---|---|",
     ]
-    for name in BUILDABLE:
+    for name in (*BUILDABLE, *PROJECTS):
         board = BOARDS[name]
         assert board.platform is not None
         module, _, kind = board.platform.partition(":")
@@ -84,7 +84,7 @@ def board_table() -> str:
             f"{line['rx']}, {line['tx']}",
             ", ".join(leds),
             f"{board.clock / 4e6:g}",
-            f"`openFPGALoader -b {board.loader}`",
+            f"`openFPGALoader -b {board.loader}`" if board.loader else "Vivado",
         )
         rows.append(f"| {' | '.join(cells)} |")
     return "\n".join(rows) + "\n"

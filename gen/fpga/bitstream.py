@@ -7,21 +7,15 @@ import json
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from importlib import import_module, metadata
+from importlib import metadata
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from amaranth.build import Attrs, Pins, Resource, Subsignal
-from amaranth.build.run import BuildPlan
-
-from sosmith.gen.fpga.boards import Board, check_selects
-from sosmith.gen.fpga.tools import EXTRA, Tool, find_tool
-from sosmith.hdl.boards.on_platform import SPI, OnPlatform
+from sosmith.gen.fpga.boards import Board
+from sosmith.gen.fpga.platform_plan import SEED, board_plan, text_of
+from sosmith.gen.fpga.tools import Tool, find_tool
 from sosmith.model.errors import ShortfallError, ToolError
-
-SEED = 1
-"""Seed of the placer: the same input gives the same bitstream."""
 
 _SUFFIX = {"ice40": "bin", "ecp5": "bit", "gowin": "fs"}
 """Suffix of a bitstream's file, by family."""
@@ -32,13 +26,6 @@ _PROGRAMS = {
     "gowin": ("yosys", "nextpnr-himbaechel-gowin", "gowin_pack"),
 }
 """What makes a bitstream, by family."""
-
-_PIN_ATTRIBUTES: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
-    "ice40": ({"IO_STANDARD": "SB_LVCMOS"}, {"PULLUP": 1}),
-    "ecp5": ({"IO_TYPE": "LVCMOS33"}, {"PULLMODE": "UP"}),
-    "gowin": ({"IO_TYPE": "LVCMOS33"}, {"PULL_MODE": "UP"}),
-}
-"""Attributes of a pin of 3.3 V, by family, and those of its pull-up."""
 
 _STEPS = {"yosys": "synthesis", "icepack": "packing", "ecppack": "packing", "gowin_pack": "packing"}
 _LOG = "build.log"
@@ -167,13 +154,13 @@ def build(
         If the design has more cells than the FPGA, or cannot be placed for another reason.
     """
     name = f"{top}_{board.name}"
-    plan = _plan(verilog, top, name, board, selects)
-    commands = [_translated(command) for command in json.loads(_text(plan, f"build_{name}.json"))["commands"]]
+    plan = board_plan(verilog, top, name, board, selects)
+    commands = [_translated(command) for command in json.loads(text_of(plan, f"build_{name}.json"))["commands"]]
     tools = {command[0]: find_tool(command[0]) for command in commands}
     with TemporaryDirectory(prefix="sosmith-") as scratch:
         place = Path(scratch)
         for file in plan.files:
-            (place / file).write_bytes(_text(plan, file).encode())
+            (place / file).write_bytes(text_of(plan, file).encode())
         for command in commands:
             progress(_STEPS.get(command[0], "placement and routing"))
             _carry_out(tools[command[0]], command[1:], place, board)
@@ -197,46 +184,6 @@ def build(
             versions={tool.name: tool.version for tool in tools.values()},
             log=_read(place / _LOG),
         )
-
-
-def _plan(verilog: str, top: str, name: str, board: Board, selects: int) -> BuildPlan:
-    """Files and commands for a board, from its Amaranth platform."""
-    assert board.platform is not None
-    check_selects(board, selects)
-    module, _, kind = board.platform.partition(":")
-    try:
-        platform = getattr(import_module(module), kind)()
-    except ModuleNotFoundError:
-        raise ToolError(
-            f"amaranth-boards is needed to build for a board, and was not found: pip install 'sosmith[{EXTRA}]'"
-        ) from None
-    _, _, options = board.device.synthesis.partition(" ")
-    wishes = f"--seed {SEED} --freq {board.clock / 1e6:g} --timing-allow-fail --report report.json"
-    platform.add_file(f"{top}.sv", verilog)
-    if selects:
-        platform.add_resources([_converters(board, selects)])
-    return platform.prepare(
-        OnPlatform(top, converters=selects > 0), name, emit_src=False, synth_opts=options, nextpnr_opts=wishes
-    )
-
-
-def _converters(board: Board, selects: int) -> Resource:
-    """Return the pins of the converters; that of MISO has a pull-up."""
-    sck, mosi, miso, *cs_n = board.header
-    plain, pulled_up = _PIN_ATTRIBUTES[board.device.family]
-    return Resource(
-        SPI,
-        0,
-        Subsignal("sck", Pins(sck, dir="o"), Attrs(**plain)),
-        Subsignal("mosi", Pins(mosi, dir="o"), Attrs(**plain)),
-        Subsignal("miso", Pins(miso, dir="i"), Attrs(**plain, **pulled_up)),
-        Subsignal("cs_n", Pins(" ".join(cs_n[:selects]), dir="o"), Attrs(**plain)),
-    )
-
-
-def _text(plan: BuildPlan, file: str) -> str:
-    content = plan.files[file]
-    return content if isinstance(content, str) else content.decode()
 
 
 def _translated(command: Sequence[str]) -> list[str]:

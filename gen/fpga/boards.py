@@ -22,15 +22,15 @@ class Device:
     Attributes
     ----------
     family : str
-        ``"ice40"``, ``"ecp5"`` or ``"gowin"``: the name of the cell library.
+        ``"ice40"``, ``"ecp5"``, ``"gowin"`` or ``"xilinx"``: the name of the cell library.
     title : str
         Name for display.
     synthesis : str
         Yosys command that maps a design onto its cells.
     placer : str
-        Option of nextpnr that selects it.
+        Option of nextpnr that selects it; "" if no open flow is run for it.
     logic_cells : int
-        Number of LUT4, each with a flip-flop.
+        Number of LUT4, each with a flip-flop; of LUT6 in a Xilinx FPGA.
     multiplier : str or None
         Cell type of the multiplier block, SB_MAC16 or MULT18X18D; None if there is none.
     factor_bits : int
@@ -195,6 +195,22 @@ _GW2AR_18C = replace(
 )
 
 
+# Numbers of cells are those of Xilinx DS180, 7 Series FPGAs Overview: LUT6, DSP48E1, RAMB36E1.
+_XC7A35T = Device(
+    family="xilinx",
+    title="Artix-7 XC7A35T",
+    synthesis="synth_xilinx -family xc7",
+    placer="",
+    logic_cells=20800,
+    multiplier="DSP48E1",
+    factor_bits=18,
+    multipliers=90,
+    block_ram="RAMB36E1",
+    block_rams=50,
+)
+_XC7S25 = replace(_XC7A35T, title="Spartan-7 XC7S25", logic_cells=14600, multipliers=80, block_rams=45)
+
+
 def _pins(names: str) -> tuple[str, ...]:
     return tuple(names.split())
 
@@ -301,13 +317,41 @@ _ALL = (
         loader="tangnano20k",
         header=_pins("73 74 75 85 77 27 28 25 26 29 30 31"),
     ),
+    Board(
+        name="arty_a7",
+        title="Arty A7-35T",
+        device=_XC7A35T,
+        package="csg324",
+        speed="1L",
+        clock=100_000_000,
+        platform="amaranth_boards.arty_a7:ArtyA7_35Platform",
+        # the Pmod JA as an SPI, chip selects 1 and 7 to 10; JB; JC
+        header=_pins("D12 B11 A11 G13 D13 B18 A18 K16 E15 E16 D15 C15 J17 J18 K15 J15 U12 V12 V10 V11 U14 V14 T13 U13"),
+    ),
+    Board(
+        name="cmod_s7",
+        title="CMOD S7",
+        device=_XC7S25,
+        package="csga225",
+        speed="1",
+        clock=12_000_000,
+        platform="amaranth_boards.cmod_s7:CmodS7_Platform",
+        # the Pmod as an SPI, chip selects 1 and 7 to 10; pins 1 to 9
+        header=_pins("F3 H2 H4 J2 H3 H1 G1 F4 L1 M4 M3 N2 M2 P3 N3 P1 N1"),
+    ),
 )
 
 BOARDS = {board.name: board for board in _ALL}
 """Boards by name."""
 
-BUILDABLE = tuple(name for name, board in BOARDS.items() if board.platform is not None)
+BUILDABLE = tuple(name for name, board in BOARDS.items() if board.platform is not None and board.device.placer)
 """Names of the boards that bitstreams are made for."""
+
+PROJECTS = tuple(name for name, board in BOARDS.items() if board.device.family == "xilinx")
+"""Names of the boards for which project files are written, and no flow is run."""
+
+SYNTHESIZED = tuple(name for name in BOARDS if name not in PROJECTS)
+"""Names of the boards whose cells are counted after synthesis."""
 
 MODELLED = tuple(name for name, board in BOARDS.items() if board.device.family in {"ice40", "ecp5"})
 """Names of the boards whose netlists can be simulated: there are models of all cells."""

@@ -12,8 +12,9 @@ from pathlib import Path
 from typing import Any
 
 from sosmith.gen.core import CoreDesign
-from sosmith.gen.fpga.bitstream import SEED, Bitstream, build, fingerprint
+from sosmith.gen.fpga.bitstream import Bitstream, build, fingerprint
 from sosmith.gen.fpga.boards import RATE, Board
+from sosmith.gen.fpga.platform_plan import SEED
 from sosmith.gen.output.board_top import board_verilog, selects_of, top_name
 from sosmith.gen.output.verilog import core_verilog
 from sosmith.gen.version import __version__
@@ -64,28 +65,11 @@ class BoardBuild:
             f"{clock.achieved:.2f} MHz: the path takes {sum(step.delay for step in path):.2f} ns: {steps}"
         )
 
-    @property
-    def samples_per_second(self) -> float:
-        """Samples of each channel in a second that the core can take at the board's clock, but for the line."""
-        return self.board.clock / (self.design.architecture.cycles_per_sample * self.design.spec.channels)
-
     @cached_property
     def summary(self) -> dict[str, Any]:
         """The facts about it as a tree of JSON values: the content of ``build.json``."""
         made = self.bitstream
-        return {
-            "name": self.design.datapath.name,
-            "sosmith_version": __version__,
-            "board": self.board.name,
-            "title": self.board.title,
-            "device": self.board.device.title,
-            "design": hashlib.sha256(self.core_verilog.encode()).hexdigest(),
-            "architecture": self.design.architecture.name,
-            "channels": self.design.spec.channels,
-            "clock_hz": self.board.clock,
-            "line_rate_baud": self.rate,
-            "converters": [each.reading.converter.title for each in self.design.spec.converters],
-            "samples_per_second": self.samples_per_second,
+        return build_facts(self.design, self.board, self.rate, self.core_verilog) | {
             "passed": made.met,
             "bitstream": None
             if not made.met
@@ -127,6 +111,37 @@ class BoardBuild:
         return write_contents(folder, contents)
 
 
+def build_facts(design: CoreDesign, board: Board, rate: int, core: str) -> dict[str, Any]:
+    """Return what of ``build.json`` is known before anything is built.
+
+    Parameters
+    ----------
+    design : CoreDesign
+        The design.
+    board : Board
+        The board.
+    rate : int
+        Line rate in baud.
+    core : str
+        The core's SystemVerilog.
+    """
+    return {
+        "name": design.datapath.name,
+        "sosmith_version": __version__,
+        "board": board.name,
+        "title": board.title,
+        "device": board.device.title,
+        "design": hashlib.sha256(core.encode()).hexdigest(),
+        "architecture": design.architecture.name,
+        "channels": design.spec.channels,
+        "clock_hz": board.clock,
+        "line_rate_baud": rate,
+        "converters": [each.reading.converter.title for each in design.spec.converters],
+        # what the core can take at the board's clock, but for the line
+        "samples_per_second": board.clock / (design.architecture.cycles_per_sample * design.spec.channels),
+    }
+
+
 def build_board(
     design: CoreDesign,
     board: Board,
@@ -148,7 +163,7 @@ def build_board(
     SpecificationError
         If the design does not fit the link.
     """
-    core, verilog = _texts(design, board, rate, progress)
+    core, verilog = texts(design, board, rate, progress)
     made = build(verilog, top_name(design), board, progress, selects=selects_of(design, board))
     return BoardBuild(design, rate, verilog, core, made)
 
@@ -174,7 +189,7 @@ def board_cost(
     SpecificationError, ShortfallError, ToolError
         As `build_board`.
     """
-    core, verilog = _texts(design, board, RATE, progress)
+    core, verilog = texts(design, board, RATE, progress)
     name = f"{fingerprint(verilog, board)}.json"
     if cache is not None and (cache / name).exists():
         found: dict[str, Any] = json.loads((cache / name).read_text(encoding="utf-8"))
@@ -186,7 +201,7 @@ def board_cost(
     return made
 
 
-def _texts(design: CoreDesign, board: Board, rate: int, progress: Callable[[str], None]) -> tuple[str, str]:
+def texts(design: CoreDesign, board: Board, rate: int, progress: Callable[[str], None]) -> tuple[str, str]:
     """Return the SystemVerilog of the core, and of the board's top."""
     progress("SystemVerilog")
     core = core_verilog(design)

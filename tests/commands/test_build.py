@@ -8,7 +8,7 @@ from tests.commands.invocation import Invocation
 from tests.gen.fpga.test_bitstream import REPORT, Stub
 
 from sosmith.gen.fpga import bitstream
-from sosmith.gen.fpga.boards import BUILDABLE
+from sosmith.gen.fpga.boards import BUILDABLE, PROJECTS
 from sosmith.model.errors import ShortfallError
 
 BUILD = Invocation("build")
@@ -92,7 +92,7 @@ def test_a_design_that_does_not_fit_is_told_with_what_it_lacks(programs: dict[st
 
 
 def test_what_is_no_board_for_a_bitstream_is_refused(programs: dict[str, str]) -> None:
-    known = ", ".join(BUILDABLE)
+    known = ", ".join((*BUILDABLE, *PROJECTS))
     for name, hint in (("icebraker", " (did you mean icebreaker?)"), ("upduino", "")):
         BUILD.refused(f"the board must be one of {known}, not {name}{hint}", "plain.toml", "--board", name)
 
@@ -117,3 +117,16 @@ def test_a_design_for_a_board_shows_what_it_takes_there_and_builds_it_once(
     told = json.loads(design.good("plain.toml", "--board", "icestick", "--json").stdout)["board"]
     assert told["utilisation"] == {"ICESTORM_LC": {"used": 7, "available": 1280}}
     assert told["bitstream"]["file"] == "plain_board_icestick.bin"
+
+
+def test_a_project_for_a_vendors_tools_says_that_nothing_was_built(programs: dict[str, str]) -> None:
+    result = BUILD.good("plain.toml", "--board", "cmod_s7")
+    assert "plain on CMOD S7" in result.stdout
+    assert "not known: Vivado was not run" in result.stdout
+    assert result.stderr.endswith(
+        "sosmith: no flow was run and no bitstream written; in that folder, "
+        "vivado -mode batch -source plain_board_cmod_s7.tcl makes one\n"
+    )
+    assert {path.suffix for path in Path("build/plain").glob("plain_board*")} == {".sv", ".v", ".xdc", ".tcl"}
+    message = "--program must be left out for cmod_s7: no bitstream is made for it"
+    BUILD.refused(message, "plain.toml", "--board", "cmod_s7", "--program")

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import Any
 
 import click
 
 from sosmith.commands.options import CORE, REALIZATION, SPEC, default_folder
-from sosmith.gen.fpga.boards import BUILDABLE, find_board
+from sosmith.gen.fpga.boards import BUILDABLE, PROJECTS, find_board
+from sosmith.model.errors import SpecificationError
 from sosmith.terminal import JSON_OPTION, note, output_option, print_json, show_progress
 
 
@@ -20,8 +22,8 @@ from sosmith.terminal import JSON_OPTION, note, output_option, print_json, show_
     "--board",
     required=True,
     metavar="BOARD",
-    callback=lambda ctx, parameter, name: find_board(name, BUILDABLE).name,
-    help=f"Target board: {', '.join(BUILDABLE)}.",
+    callback=lambda ctx, parameter, name: find_board(name, (*BUILDABLE, *PROJECTS)).name,
+    help=f"Target board: {', '.join(BUILDABLE)}; project files only: {', '.join(PROJECTS)}.",
 )
 @click.option(
     "--baud",
@@ -51,12 +53,17 @@ def build_command(
     programs give the same bitstream. With [converter.NAME] tables in SPEC, the board reads its inputs from these
     converters, instead of over the link.
 
+    For a board with a Xilinx FPGA it writes the files of a Vivado project: Verilog, constraints (XDC), the script
+    (Tcl), and build.json. No flow is run for it and no bitstream written, so that neither fit nor timing is known.
+
     \b
         sosmith build my.toml --board icebreaker
         sosmith build my.toml --board ulx3s_25f --baud 3000000 --program
     """
     from sosmith.interface.specification import Specification
 
+    if program and board in PROJECTS:
+        raise SpecificationError(f"--program must be left out for {board}: no bitstream is made for it")
     asked = Specification.load(spec)
     folder = output or default_folder(asked.name)
     with show_progress() as step:
@@ -64,6 +71,9 @@ def build_command(
 
         made = design(asked, core=core, realization=realization, board=board, progress=step)
         made.generate(folder, step)
+        if board in PROJECTS:
+            _told(made.project(board, folder=folder, rate=baud, progress=step), folder, as_json=as_json)
+            return
         built = made.build(board, folder=folder, rate=baud, progress=step)
         if program and built.passed:
             step("programming")
@@ -81,3 +91,17 @@ def build_command(
         note(f"error: {built.shortfall}")
         sys.exit(1)
     note(f"bitstream: {built.bitstream}")
+
+
+def _told(summary: dict[str, Any], folder: Path, *, as_json: bool) -> None:
+    """Print what a project is, and that nothing was built."""
+    project = summary["project"]
+    if as_json:
+        print_json(summary)
+    else:
+        from sosmith.commands.tables.build import print_build
+
+        print_build(summary)
+    files = ", ".join(project["files"])
+    note(f"project for {project['tool']} in {folder}: {files}")
+    note(f"no flow was run and no bitstream written; in that folder, {project['command']} makes one")

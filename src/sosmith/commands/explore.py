@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from sosmith.commands.options import CORE, SEED, SPEC, OneOf
-from sosmith.gen.fpga.boards import BOARDS, find_board
+from sosmith.gen.fpga.boards import SYNTHESIZED, find_board
 from sosmith.model.errors import SpecificationError
 from sosmith.terminal import JSON_OPTION, note, output_option, print_json, reader_may_leave, show_progress
 
@@ -26,9 +26,9 @@ from sosmith.terminal import JSON_OPTION, note, output_option, print_json, reade
 @click.option(
     "--board",
     metavar="BOARD",
-    callback=lambda ctx, parameter, name: None if name is None else find_board(name).name,
+    callback=lambda ctx, parameter, name: None if name is None else find_board(name, SYNTHESIZED).name,
     help="Count the cost after synthesis for the FPGA of this board, which takes seconds for each design: "
-    f"{', '.join(BOARDS)}.  [default: an estimate]",
+    f"{', '.join(SYNTHESIZED)}.  [default: an estimate]",
 )
 @click.option(
     "--samples",

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.filter.response import complex_response
-from sosmith.gen.fpga.boards import BUILDABLE, MODELLED, RATE, find_board
+from sosmith.gen.fpga.boards import BUILDABLE, MODELLED, PROJECTS, RATE, find_board
 from sosmith.gen.output.certificate import about, certificate
 from sosmith.gen.output.core_facts import CoreFacts, core_facts
 from sosmith.gen.output.generate import generate
@@ -407,6 +407,48 @@ class Design:
         place = Path("build") / self.core.spec.name if folder is None else Path(fspath(folder))
         made = build_board(self.core, target, rate=rate, progress=lambda step: progress(step, 0, 0))
         return Build.written(made, place)
+
+    def project(
+        self,
+        board: str,
+        *,
+        folder: str | PathLike[str] | None = None,
+        rate: int = RATE,
+        progress: Progress = lambda step, done, total: None,
+    ) -> dict[str, Any]:
+        """Write a project for the vendor's tools of a board, with the core behind the serial link; none of them is run.
+
+        Parameters
+        ----------
+        board : str
+            Name of the board: ``"arty_a7"`` or ``"cmod_s7"``.
+        folder : path
+            Folder for the files, ``build/<name>`` by default.
+        rate : int
+            Rate of the serial line in baud, at most a fourth of the board's clock.
+        progress : callable
+            Called with the name of each step, 0 and 0.
+
+        Returns
+        -------
+        dict
+            The content of ``build.json``, whose ``project`` names the files and the command that makes a bitstream of
+            them; ``bitstream`` is None.
+
+        Raises
+        ------
+        SpecificationError
+            If there is no such board, the line rate is too high, or the folder cannot be written.
+        ToolError
+            If amaranth-boards is missing, or the disk is full.
+        """
+        from sosmith.gen.output.board_project import board_project
+
+        target = find_board(board, PROJECTS)
+        place = Path("build") / self.core.spec.name if folder is None else Path(fspath(folder))
+        made = board_project(self.core, target, rate=rate, progress=lambda step: progress(step, 0, 0))
+        made.write(place)
+        return made.summary
 
     def cost_on(self, board: str, progress: Progress = lambda step, done, total: None) -> dict[str, Any]:
         """Return what the design takes of a board's FPGA, with the serial link: the content of ``build.json``.

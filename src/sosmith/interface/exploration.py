@@ -9,7 +9,7 @@ from os import PathLike, fspath
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sosmith.gen.fpga.boards import find_board
+from sosmith.gen.fpga.boards import SYNTHESIZED, find_board
 from sosmith.gen.quantity import quantity
 from sosmith.gen.specification.exact_values import exact
 from sosmith.interface.certificate import Progress
@@ -167,7 +167,7 @@ def explore(
         core=core,
         samples=samples,
         seed=seed,
-        board=None if board is None else find_board(board).name,
+        board=None if board is None else find_board(board, SYNTHESIZED).name,
         progress=progress,
     )
     if simulate:

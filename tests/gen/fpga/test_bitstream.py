@@ -14,7 +14,7 @@ from tests.interface.small import filter_design
 import sosmith
 from sosmith.gen.fpga import bitstream, tools
 from sosmith.gen.fpga.bitstream import Clock, Step, build
-from sosmith.gen.fpga.boards import BOARDS, BUILDABLE, find_board
+from sosmith.gen.fpga.boards import BOARDS, BUILDABLE, PROJECTS, find_board
 from sosmith.gen.fpga.tools import Tool, find_tool
 from sosmith.gen.output.board_top import board_verilog, top_name
 from sosmith.model.errors import ShortfallError, SpecificationError, ToolError
@@ -191,7 +191,8 @@ def test_a_board_without_a_platform_is_refused() -> None:
     message = f"the board must be one of {', '.join(BUILDABLE)}, not colorlight_i5"
     with pytest.raises(SpecificationError, match=f"^{re.escape(message)}$"):
         filter_design().build("colorlight_i5")
-    assert {"upduino", "colorlight_i5", "orangecrab_25f", "ecp5_evn"} == BOARDS.keys() - set(BUILDABLE)
+    rest = {"upduino", "colorlight_i5", "orangecrab_25f", "ecp5_evn"}
+    assert rest == BOARDS.keys() - set(BUILDABLE) - set(PROJECTS)
 
 
 def test_a_program_of_the_system_is_taken_if_it_is_new_enough(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

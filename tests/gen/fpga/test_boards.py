@@ -11,7 +11,7 @@ from sosmith.model.errors import SpecificationError
 def test_boards_are_found_by_name() -> None:
     assert all(find_board(name).name == name for name in BOARDS)
     families = {board.device.family for board in BOARDS.values()}
-    assert families == {"ice40", "ecp5", "gowin"}
+    assert families == {"ice40", "ecp5", "gowin", "xilinx"}
 
 
 def test_hyphens_and_capitals_do_not_matter() -> None:
@@ -27,10 +27,10 @@ def test_a_name_that_is_nearly_right_is_suggested() -> None:
 def test_an_unknown_board_is_refused_with_those_that_exist() -> None:
     message = (
         "the board must be one of icebreaker, upduino, ice40_hx8k_b_evn, icestick, ulx3s_12f, ulx3s_25f, ulx3s_45f, "
-        "ulx3s_85f, colorlight_i5, orangecrab_25f, ecp5_evn, tang_nano_9k, tang_nano_20k, not arty"
+        "ulx3s_85f, colorlight_i5, orangecrab_25f, ecp5_evn, tang_nano_9k, tang_nano_20k, arty_a7, cmod_s7, not kc705"
     )
     with pytest.raises(SpecificationError, match=f"^{re.escape(message)}$"):
-        find_board("arty")
+        find_board("kc705")
 
 
 def test_what_a_device_lacks_is_told() -> None:
