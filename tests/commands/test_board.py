@@ -5,6 +5,8 @@ from __future__ import annotations
 import signal
 import subprocess
 import sys
+import time
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +15,12 @@ from tests.commands.invocation import Invocation
 from tests.commands.test_cli import FILTER
 
 import sosmith
+from sosmith.gen.output.board_top import schedule_of
+from sosmith.gen.stimuli import traces_for
+from sosmith.sim.converters.values import fed_codes
 
 BOARD = Invocation("board")
+CONVERTED = FILTER + "[converter.x]\ndevice = 'mcp3202'\nrange = [-1.0, 1.0]\n"
 SMALL = FILTER + '[hardware]\nrealization = "df1_ef1"\narchitecture = "parallel"\n'
 
 
@@ -64,6 +70,46 @@ def test_what_is_refused() -> None:
     result = BOARD.run("spec.toml", "--virtual", "--speed", "0")
     assert result.exit_code == 2
     assert "'0' is neither max nor a factor of real time, such as 1" in result.stderr
+
+
+def test_converters_and_traces_go_together(tmp_path: Path) -> None:
+    spec = tmp_path / "spec.toml"
+    spec.write_text(FILTER, encoding="utf-8")
+    expected = "--trace must come with [converter.NAME] tables in SPEC, or be given to `monitor`"
+    BOARD.refused(expected, str(spec), "--virtual", "--trace", "sweep")
+    spec.write_text(CONVERTED, encoding="utf-8")
+    BOARD.refused("--model must be left out for a board with converters", str(spec), "--virtual", "--model")
+
+
+@pytest.mark.slow
+def test_a_board_measures_a_trace_by_itself(tmp_path: Path) -> None:
+    (tmp_path / "spec.toml").write_text(CONVERTED, encoding="utf-8")
+    command = ["env", "--default-signal=INT", sys.executable, "-m", "sosmith.cli", "board", "spec.toml", "--virtual"]
+    command += ["--trace", "sweep", "--clock", "4e6", "--speed", "0.05"]
+    with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        path = process.stdout.readline().strip()
+        try:
+            monitor = [sys.executable, "-m", "sosmith.cli", "monitor", path, "-o", "record.csv"]
+            with subprocess.Popen(monitor, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as watching:
+                deadline = time.monotonic() + 120
+                while time.monotonic() < deadline and len(record(tmp_path)) < 60:
+                    time.sleep(0.2)
+                watching.send_signal(signal.SIGINT)
+        finally:
+            process.send_signal(signal.SIGINT)
+    design = sosmith.design(tmp_path / "spec.toml")
+    (trace,) = traces_for(design.core, "sweep", seed=1)
+    fed = fed_codes(schedule_of(design.core, Fraction(4_000_000)), trace.codes[:, np.newaxis])[:, 0]
+    codes = design.core.datapath.compute(fed[:60])
+    assert record(tmp_path)[:60] == codes.tolist()
+
+
+def record(folder: Path) -> list[int]:
+    """Read the codes that a monitor has recorded so far."""
+    file = folder / "record.csv"
+    rows = file.read_text().splitlines()[1:] if file.exists() else []
+    return [int(row.split(",")[4]) for row in rows if row.count(",") == 5]
 
 
 def test_kinds_of_damage_that_do_not_exist(tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from sosmith.gen.core import CoreDesign
 from sosmith.gen.stimuli import traces_for
 from sosmith.host.board import Board
 from sosmith.host.identity_check import check_files
-from sosmith.host.monitor import Connected, Received, watch
+from sosmith.host.monitor import Changed, Connected, Received, watch
 from sosmith.model.arrays import Codes
 from sosmith.model.dataflow.status import Flag
 from sosmith.model.errors import SpecificationError
@@ -124,6 +124,9 @@ def test_without_converters_every_result_is_flagged(made: sosmith.Design, netlis
     with running(netlist, None) as board:
         found, status = fetched(board, 30)
         readings = board.readings()
+        events = watch(lambda: board, lambda identity: pytest.fail("it must not be fed"), clock=Restless())
+        told = next(event for event in events if isinstance(event, Changed))
+    assert told.readings == readings
     assert found == made.core.datapath.compute(np.zeros((10, 3, 2), np.int64)).reshape(-1).tolist()
     assert all(each >> Flag.FAULT & 1 for each in status)
     assert readings == {

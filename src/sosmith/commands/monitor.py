@@ -187,7 +187,7 @@ class _Monitor:
 
     def take(self, event: Event) -> None:
         """Show, record and judge what happened."""
-        from sosmith.host.monitor import Connected, Lost, Received
+        from sosmith.host.monitor import Changed, Connected, Lost, Received
 
         if isinstance(event, Connected):
             if self._readings is None:
@@ -200,6 +200,10 @@ class _Monitor:
             self._show("lost")
         elif isinstance(event, Received):
             self._received(event)
+        elif isinstance(event, Changed):
+            for (channel, name), faults in event.readings.items():
+                wrong = ", ".join(faults).replace("_", " ") or "good again"
+                note(f"the converter of {name}, channel {channel}: {wrong}")
 
     def _begin(self, identity: Identity) -> None:
         from sosmith.host.alarms import Alarms, Hook

@@ -12,13 +12,16 @@ import numpy as np
 from sosmith.host.board import Board, Results
 from sosmith.model.arrays import Codes
 from sosmith.model.errors import LinkError, ToolError
-from sosmith.model.link.identity import Identity
+from sosmith.model.link.identity import CONVERTER_FLAGS, Identity
 
 RETRY = 0.5
 """Seconds between two attempts to find a board that was unplugged."""
 
 TURN = 0.05
 """Seconds between two batches of samples, at least."""
+
+(FAULT,) = CONVERTER_FLAGS
+"""The flag of a result whose sample has a held code."""
 
 MAX_BATCH = 2000
 """Most samples of a channel in a batch."""
@@ -84,7 +87,20 @@ class Lost:
     reason: str
 
 
-Event = Connected | Received | Lost
+@dataclass(frozen=True)
+class Changed:
+    """Readings of converters have gone bad, or are good again.
+
+    Attributes
+    ----------
+    readings : dict
+        What is wrong with each reading that was or is bad, by channel and input, as `Board.readings` has it.
+    """
+
+    readings: dict[tuple[int, str], tuple[str, ...]]
+
+
+Event = Connected | Received | Changed | Lost
 
 
 def watch(
@@ -121,6 +137,7 @@ def watch(
         If `check` finds another board than expected.
     """
     codes: Codes | None = None
+    bad: dict[tuple[int, str], tuple[str, ...]] = {}
     session = sent = 0
     while True:
         try:
@@ -142,6 +159,11 @@ def watch(
                 for first, results in batches:
                     sent = first + len(results.codes)
                     yield Received(session, first, results)
+                    if codes is None and (bad or results.flag(FAULT).any()):
+                        now = {place: faults for place, faults in board.readings().items() if faults}
+                        if now != bad:
+                            yield Changed({place: now.get(place, ()) for place in sorted({*bad, *now})})
+                        bad = now
             except LinkError as error:
                 yield Lost(str(error))
             else:
