@@ -109,6 +109,19 @@ def quantity(value: float | None, unit: str, digits: int = 3) -> str:
     return f"{plain_number(value * factor, digits)}{joint}{symbol}".rstrip()
 
 
+def in_own_unit(value: float, unit: str) -> str:
+    """Value in `unit` itself, as its readers think of it, unless it would be mostly zeros.
+
+    Examples
+    --------
+    >>> in_own_unit(0.0939, "mm"), in_own_unit(0.00012, "mm")
+    ('0.0939 mm', '120 nm')
+    """
+    if value and not 1e-3 <= abs(value) < 1e6:
+        return quantity(value, unit)
+    return f"{plain_number(value)} {unit_symbol(unit)}".rstrip()
+
+
 def decibels(value: float | None) -> str:
     """Level in dB: two decimals, three significant digits below 1 dB, a power of ten below 0.01 dB.
 

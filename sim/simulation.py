@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import fcntl
+import hashlib
 import os
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
 
@@ -57,6 +59,7 @@ def simulate(
     gates: Board | None = None,
     vectors: Path | None = None,
     hardware: Hardware | None = None,
+    date: str | None = None,
     progress: Progress = lambda step, done, total: None,
 ) -> Evidence:
     """Generate the core into `directory`, run `traces` through it, and compare it with model and golden chain.
@@ -81,7 +84,7 @@ def simulate(
         for stale in ("report.json", "report.html"):  # of a run of another core, in case this run fails
             (directory / stale).unlink(missing_ok=True)
         facts = core_facts(design)
-        generate(design, directory, lambda step: progress(f"generating {step}", 0, 0), facts=facts)
+        made = generate(design, directory, lambda step: progress(f"generating {step}", 0, 0), facts=facts)
         source, build_dir, netlist = directory / f"{design.datapath.name}.sv", directory / "simulation", None
         codes = np.stack([trace.codes for trace in traces], axis=1)
         if hardware is not None:
@@ -117,7 +120,11 @@ def simulate(
         taken = Vectors(stimuli=codes, responses=result.codes[:, :, 0], status=result.status)
         write_contents(vectors.parent, vector_files(vectors, taken, facts.interface, design.spec.sample_rate))
     progress("comparing", 0, 0)
-    return _evidence(design, facts, traces, result, netlist, seed=seed, wall_seconds=time.monotonic() - started)
+    return replace(
+        _evidence(design, facts, traces, result, netlist, seed=seed, wall_seconds=time.monotonic() - started),
+        files={path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in made},
+        date=date,
+    )
 
 
 @contextmanager
@@ -199,6 +206,7 @@ def _evidence(
         filter=filter_facts(quantized),
         alternatives=_alternatives(quantized, codes, golden),
         provenance=provenance_of(design, traces, netlist),
+        specification=design.spec.path.name,
     )
     return evidence.of_channel(0) if len(traces) == 1 else evidence
 

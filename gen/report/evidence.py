@@ -105,6 +105,14 @@ class Evidence:
         Other realizations at the same word lengths, possibly none.
     provenance : Provenance or None
         What the run is told by; None if unknown.
+    specification : str
+        Name of the specification's file, ``""`` if unknown.
+    files : Mapping of str to str
+        SHA-256 of each generated file by its name, the certificate among them.
+    date : str or None
+        Date of the run as the user gave it; None if none was given, so that two runs are the same.
+    starts_settled : bool
+        Whether the filter starts from the state that the first sample would have led to; if not, from zero.
     """
 
     name: str
@@ -147,6 +155,10 @@ class Evidence:
     gates: Netlist | None = None
     alternatives: Sequence[Alternative] = ()
     provenance: Provenance | None = None
+    specification: str = ""
+    files: Mapping[str, str] = field(default_factory=dict)
+    date: str | None = None
+    starts_settled: bool = False
 
     def __post_init__(self) -> None:
         for name in ("lsb", "bound", "max_error"):

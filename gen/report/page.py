@@ -10,13 +10,16 @@ from dataclasses import dataclass
 from typing import Any
 
 from sosmith.gen.filter.response import FilterFacts
+from sosmith.gen.filter.step_response import SETTLED, StepResponse
 from sosmith.gen.fpga.synthesis import Netlist
-from sosmith.gen.quantity import count, decibels, duration, plain_number, quantity, scale, unit_symbol
+from sosmith.gen.quantity import count, decibels, duration, plain_number, scale, unit_symbol
 from sosmith.gen.report import plots
+from sosmith.gen.report.behaviour import behaviour
 from sosmith.gen.report.evidence import Evidence
+from sosmith.gen.report.step_plot import step_figure
+from sosmith.gen.report.tiles import ErrorUnit, Summary, amount, tile_rows
+from sosmith.gen.version import __version__
 from sosmith.model.templates import render
-
-Summary = Mapping[str, Any]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,120 +65,44 @@ class Table:
     code: Collection[int] = ()
 
 
-@dataclass(frozen=True)
-class Tile:
-    """A headline figure: its name, its value, lines below it, and the share of its limit if it has one."""
-
-    name: str
-    value: str
-    asides: Sequence[str]
-    share: float | None = None
-
-
-def amount(value: float | None, unit: str) -> str:
-    """Return a quantity that is not broken across lines."""
-    return quantity(value, unit).replace(" ", "\u00a0")
-
-
-def _percent(value: float) -> str:
-    return f"{value:.3f}\u00a0%".replace("-", "−")
-
-
-def _lsb(steps: float) -> str:
-    return f"{plain_number(steps)} LSB"
-
-
-def _error_tile(evidence: Evidence, summary: Summary) -> Tile:
-    error = summary["error"]
-    share = error["max_abs"] / evidence.bound
-    limit = f"{100 * share:.0f} % of the limit {amount(evidence.bound, evidence.unit)}"
-    aside = f"{_lsb(error['max_lsb'])} · {limit}"
-    return Tile("Largest error", amount(error["max_abs"], evidence.unit), [aside], share)
-
-
-def _accuracy_tile(summary: Summary) -> Tile | None:
-    """Tile of the paper's accuracy; where no truth is known, of the filter's."""
-    accuracy = summary["accuracy_percent"]
-    if accuracy["hardware"] is not None:
-        apart = amount(abs(accuracy["hardware"] - accuracy["golden"]), "")
-        asides = [f"exact calculation {_percent(accuracy['golden'])}, {apart} points apart"]
-        if accuracy["unfiltered"] is not None:
-            asides.append(f"without the filter {_percent(accuracy['unfiltered'])}")
-        return Tile("Accuracy against the true value", _percent(accuracy["hardware"]), asides)
-    deviation = summary["frequency_response"]["max_deviation_db_passband"]
-    if deviation is None:
-        return None
-    return Tile("Change of the gain in the passband", decibels(deviation), ["by rounding the coefficients"])
-
-
-def _tiles(evidence: Evidence, summary: Summary) -> list[Tile]:
-    error = summary["error"]
-    compared = "bit for bit" if summary["bit_exact"] else f"of {count(evidence.samples, 'sample')}"
-    if evidence.channels > 1:
-        compared += f", {count(evidence.channels, 'channel')}"
-    gate_by_gate = "" if evidence.gates is None else ", gate by gate"
-    tiles = [
-        _error_tile(evidence, summary),
-        Tile(
-            "Typical error (RMS)",
-            amount(error["rms"], evidence.unit),
-            [f"{_lsb(error['rms'] / evidence.lsb)} · mean {amount(error['mean'], evidence.unit)}"],
-        ),
-        _accuracy_tile(summary),
-        Tile(
-            "Samples equal to the integer model",
-            f"all {evidence.samples:,}" if summary["bit_exact"] else f"all but {evidence.mismatches:,}",
-            [compared],
-        ),
-        Tile(
-            "Signal to error",
-            decibels(summary["sqnr_db"]) if error["rms"] else "no error at all",
-            [f"one LSB is {amount(evidence.lsb, evidence.unit)}"],
-        ),
-        Tile(
-            "Simulation",
-            f"{amount(evidence.cycles_per_second, '')} cycles/s",
-            [
-                f"{count(evidence.cycles, 'clock cycle')} in {duration(evidence.wall_seconds)} "
-                f"with {evidence.simulator}{gate_by_gate}"
-            ],
-        ),
-    ]
-    return [tile for tile in tiles if tile is not None]
-
-
 def _reasons(evidence: Evidence, summary: Summary) -> list[str]:
     """Sentences of the verdict."""
     if not summary["passed"]:
         return list(summary["shortfalls"])
-    error, bound = (quantity(value, evidence.unit) for value in (summary["error"]["max_abs"], evidence.bound))
+    unit = ErrorUnit.of(evidence)
+    error, bound = (unit.amount(value) for value in (summary["error"]["max_abs"], evidence.bound))
     ran = "hardware" if evidence.gates is None else f"netlist for the {evidence.gates.board.title}"
     return [
         f"The simulated {ran} agrees with its integer model bit for bit, and stays within {error} "
-        f"of the exact calculation; the limit is {bound}."
+        f"of the exact calculation; the {'proven' if evidence.proven else 'estimated'} limit is {bound}."
     ]
 
 
-def _trace_figure(evidence: Evidence) -> Figure:
+def _trace_figure(evidence: Evidence, transient: int) -> Figure:
     legend = [("golden", "broad", "exact calculation"), ("hardware", "dashed", "hardware")]
     if evidence.truth is not None:
         legend.append(("truth", "broad", "true value"))
     if evidence.unfiltered is not None:
         legend.append(("unfiltered", "", "without the filter"))
+    if transient:
+        legend.append(("muted", "area", "settling from the start at zero"))
     caption = (
         "The hardware, in blue, should lie on the orange line of the exact calculation "
         "(double precision, unrounded coefficients, the same input codes)."
     )
     if evidence.truth is not None and evidence.filter is not None:
-        caption += " Their distance from the true value is the noise the filter lets through, and its delay."
+        caption += (
+            " Below, hardware minus true value: the noise that the filter lets through, and its delay. "
+            "Rounding has next to no part in it."
+        )
     if evidence.shown_channel is not None:
         caption += (
             f" All pictures show channel {evidence.shown_channel:,}, the one of {evidence.channels:,} "
             "with the largest error; the figures above are of all channels."
         )
     return Figure(
-        drawing=plots.trace_figure(evidence, plots.WIDE),
-        narrow=plots.trace_figure(evidence, plots.NARROW),
+        drawing=plots.trace_figure(evidence, transient, plots.WIDE),
+        narrow=plots.trace_figure(evidence, transient, plots.NARROW),
         caption=caption,
         legend=legend,
     )
@@ -195,18 +122,21 @@ def _close_up_figure(evidence: Evidence) -> Figure:
 
 def _error_figure(evidence: Evidence) -> Figure:
     inside, outside = plots.error_limits(evidence)
+    unit = ErrorUnit.of(evidence)
     legend = [("hardware", "", "hardware minus exact calculation")]
     legend += [
         (
             limit.role,
             "dashed" if limit.dashes == "--" else "dotted",
-            f"{limit.words} ±{quantity(limit.value, evidence.unit)}",
+            f"{limit.words} ±{unit.amount(limit.value)}",
         )
         for limit in inside
     ]
     caption = "The curve must stay between the limits."
+    if len(evidence.error) > plots.WIDE // 2:
+        caption = "Smallest and largest error of each stretch of time; both must stay between the limits."
     if outside:
-        names = " and ".join(f"{limit.words} ±{amount(limit.value, evidence.unit)}" for limit in outside)
+        names = " and ".join(f"{limit.words} ±{unit.amount(limit.value)}" for limit in outside)
         caption += f" Too far out to draw: {names}."
     if evidence.first_mismatch is not None:
         caption += (
@@ -244,36 +174,46 @@ def _alternatives_figure(evidence: Evidence) -> Figure:
 def _alternatives_table(evidence: Evidence, summary: Summary) -> Table:
     found = [(f"{evidence.realization} (this design)", summary["error"]["max_abs"], summary["error"]["rms"])]
     found += [(other.name, other.max_abs, other.rms) for other in evidence.rivals]
+    unit = ErrorUnit.of(evidence)
     rows = [
-        (name, amount(largest, evidence.unit), plain_number(largest / evidence.lsb), amount(rms, evidence.unit))
+        (name, unit.number(largest), plain_number(largest / evidence.lsb), unit.number(rms))
         for name, largest, rms in found
     ]
-    return Table(head=("realization", "largest error", "in LSB", "RMS"), rows=rows, numbers=(1, 2, 3))
+    head = ("realization", unit.titled("largest error"), "in LSB", unit.titled("RMS"))
+    return Table(head=head, rows=rows, numbers=(1, 2, 3))
 
 
 def _budget_table(evidence: Evidence) -> Table:
     parts = [(name.replace("_", " "), value) for name, value in evidence.bound_parts.items()]
     parts += [("limit", evidence.bound), ("allowed by the specification", evidence.max_error)]
-    rows = [(name, amount(value, evidence.unit), _lsb(value / evidence.lsb)) for name, value in parts]
-    return Table(head=("contribution", "at most", ""), rows=rows, numbers=(1, 2))
+    unit = ErrorUnit.of(evidence)
+    rows = [(name, unit.number(value), plain_number(value / evidence.lsb)) for name, value in parts]
+    return Table(head=("contribution", unit.titled("at most"), "in LSB"), rows=rows, numbers=(1, 2))
 
 
 def _limit_cycles_table(evidence: Evidence) -> Table:
     """Tell what each section's rounding can sustain by itself, at the section's own output."""
-    rows = []
+    rows, unit = [], ErrorUnit.of(evidence)
     for found in evidence.limit_cycles:
         weights = [f"{float(weight):.4g}" for weight in found.lyapunov or ()]
         rows.append(
             (
                 found.section,
-                "none, proven" if found.none else amount(found.largest, evidence.unit),
-                "" if found.none else _lsb(found.largest / evidence.lsb),
-                amount(found.dead_band, evidence.unit) if found.dead_band else "none",
-                _lsb(found.dead_band / evidence.lsb) if found.dead_band else "",
+                "0, comes to rest" if found.none else unit.number(found.largest),
+                "0" if found.none else plain_number(found.largest / evidence.lsb),
+                unit.number(found.dead_band),
+                plain_number(found.dead_band / evidence.lsb),
                 ", ".join(weights) or "not needed",
             )
         )
-    head = ("section", "without input, at most", "", "dead band", "", "Lyapunov weights")
+    head = (
+        "section",
+        unit.titled("without input, at most"),
+        "in LSB",
+        unit.titled("dead band"),
+        "in LSB",
+        "Lyapunov weights",
+    )
     return Table(head=head, rows=rows, numbers=range(1, 6))
 
 
@@ -328,6 +268,22 @@ def _filter_figures(facts: FilterFacts) -> dict[str, Figure]:
     }
 
 
+def _step_figure(step: StepResponse) -> Figure:
+    legend = [
+        ("hardware", "", "integer coefficients"),
+        ("truth", "area", f"within {100 * SETTLED:g} % of the end"),
+        ("limit", "dashed", f"settled after {amount(step.samples_to(SETTLED) / step.sample_rate, 's')}"),
+    ]
+    if step.overshoot:
+        legend.append(("asked", "dot", f"overshoot {plain_number(100 * step.overshoot)} %"))
+    return Figure(
+        title="Step response",
+        drawing=step_figure(step),
+        caption="How the output follows a sudden change, from rest.",
+        legend=legend,
+    )
+
+
 def _coefficient_table(evidence: Evidence) -> Table:
     rows = []
     for section in evidence.sections:
@@ -360,6 +316,30 @@ def _netlist_in_words(netlist: Netlist) -> str:
     return f"the netlist for the {netlist.board.title}, {netlist.board.device.title}: {cells}"
 
 
+def _evidence_tables(evidence: Evidence) -> tuple[Table, Table]:
+    """List with their SHA-256 what the run is told by, and what else was made or derived for it."""
+    told, derived = [], []
+    known = evidence.provenance
+    if known is not None:
+        told.append(("specification", evidence.specification or "given as values", known.specification_sha256))
+        derived = [
+            ("exact calculation", "inputs, polynomial, ideal sections, output", known.reference_sha256),
+            ("datapath", "integer model", known.datapath_sha256),
+        ]
+    certificate = [name for name in evidence.files if name.endswith(".certificate.json")]
+    told += [("certificate", name, evidence.files[name]) for name in certificate]
+    told += [] if known is None else [("trace", evidence.scenario, known.trace_sha256)]
+    others = [name for name in evidence.files if name not in certificate]
+    derived += [("" if k else "generated files", name, evidence.files[name]) for k, name in enumerate(others)]
+    head = ("", "", "SHA-256")
+    return Table(head=head, rows=told, code=(2,)), Table(head=head, rows=derived, code=(2,))
+
+
+def _evidence_facts(evidence: Evidence) -> list[tuple[str, str]]:
+    tools = [(name, version) for name, version in evidence.tools.items()]
+    return [("date", evidence.date or "not given"), ("sosmith", __version__), *tools, ("seed", str(evidence.seed))]
+
+
 def _run_facts(evidence: Evidence) -> list[tuple[str, str]]:
     span = float(evidence.time[-1] - evidence.time[0])
     return [
@@ -376,20 +356,21 @@ def _run_facts(evidence: Evidence) -> list[tuple[str, str]]:
         ),
         ("simulator", evidence.simulator),
         *([] if evidence.gates is None else [("what ran", _netlist_in_words(evidence.gates))]),
-        ("seed", str(evidence.seed)),
-        *evidence.tools.items(),
     ]
 
 
 def render_page(evidence: Evidence, summary: Summary) -> str:
     """Whole report page; `summary` is what `sosmith.gen.report.report.summarise` makes of `evidence`."""
     shown = evidence.of_channel(evidence.worst_channel)
+    found = behaviour(evidence)
+    told_by, derived = _evidence_tables(shown)
     parts: dict[str, Any] = {}
     if shown.rivals:
         parts["alternatives"] = _alternatives_figure(shown)
         parts["alternatives_table"] = _alternatives_table(shown, summary)
     if shown.filter is not None:
         parts |= _filter_figures(shown.filter)
+        parts["step"] = None if found.step is None else _step_figure(found.step)
         parts["response"] = _response_table(shown.filter, summary["frequency_response"])
     return render(
         "sosmith.gen.report",
@@ -397,8 +378,11 @@ def render_page(evidence: Evidence, summary: Summary) -> str:
         evidence=shown,
         summary=summary,
         reasons=_reasons(evidence, summary),
-        tiles=_tiles(evidence, summary),
-        trace=_trace_figure(shown),
+        rows=tile_rows(evidence, summary, found),
+        told_by=told_by,
+        derived=derived,
+        told_facts=_evidence_facts(shown),
+        trace=_trace_figure(shown, found.transient),
         close_up=_close_up_figure(shown),
         error=_error_figure(shown),
         histogram=_histogram_figure(shown),

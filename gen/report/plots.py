@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import itertools
+import math
 import re
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
@@ -16,8 +17,9 @@ import matplotlib as mpl
 import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
+from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullFormatter
 
 from sosmith.gen.filter.response import (
     Band,
@@ -160,12 +162,17 @@ def time_axis(axes: Axes, time: Array) -> tuple[float, str]:
     return factor, unit
 
 
-def trace_figure(evidence: Evidence, width: int) -> str:
-    """Output against time: true value, unfiltered, exact calculation, hardware."""
+def trace_figure(evidence: Evidence, transient: int, width: int) -> str:
+    """Output against time: true value, unfiltered, exact calculation, hardware; below it hardware minus true value.
+
+    The first `transient` samples are shaded; they do not set the scale of the lower panel.
+    """
+    compared = evidence.truth is not None
 
     def paint(figure: Figure) -> None:
-        axes = figure.subplots()
-        factor, _ = time_axis(axes, evidence.time)
+        panels = figure.subplots(1 + compared, 1, sharex=True, squeeze=False, height_ratios=(2, 1)[: 1 + compared])
+        axes, lowest = panels[0, 0], panels[-1, 0]
+        factor, _ = time_axis(lowest, evidence.time)
         traces = (evidence.unfiltered, evidence.truth, evidence.golden, evidence.hardware)
         shown = [values for values in traces if values is not None]
         scaling, unit = scale(max(float(np.max(np.abs(v))) for v in shown), evidence.unit)
@@ -183,8 +190,44 @@ def trace_figure(evidence: Evidence, width: int) -> str:
                 axes.plot(thin_time * factor, thin_values * scaling, color=COLOUR[role], zorder=order, **line)
         axes.set_ylim(*_range_of(np.concatenate(shown) * scaling, margin=0.06))
         axes.set_ylabel(f"output in {unit}" if unit else "output")
+        if evidence.truth is not None:
+            _paint_true_error(lowest, evidence, transient, factor, width)
+        for panel in panels[:, 0]:
+            _shade_transient(panel, evidence, transient, factor)
 
-    return draw("trace", "Output against time", width, 310, paint)
+    return draw("trace", "Output against time", width, 440 if compared else 310, paint)
+
+
+def _paint_true_error(axes: Axes, evidence: Evidence, transient: int, factor: float, width: int) -> None:
+    assert evidence.truth is not None  # the caller has seen it
+    error = evidence.hardware - evidence.truth
+    settled = error[transient:] if transient < len(error) else error
+    scaling, unit = scale(float(np.max(np.abs(settled))) or evidence.lsb, evidence.unit)
+    time, low, high = stretches(evidence.time, error * scaling, width)
+    axes.fill_between(time * factor, low, high, color=COLOUR["hardware"], lw=0.8)
+    axes.axhline(0, color=COLOUR["truth"], lw=1.2)
+    axes.set_ylim(*_range_of(np.append(settled, 0.0) * scaling, margin=0.08))
+    axes.set_ylabel(f"minus true\nvalue in {unit}" if unit else "minus true\nvalue")
+    axes.yaxis.set_major_locator(MaxNLocator(4))
+
+
+def _shade_transient(axes: Axes, evidence: Evidence, transient: int, factor: float) -> None:
+    if transient:
+        last = min(transient, len(evidence.time) - 1)
+        ends = (float(evidence.time[0]) * factor, float(evidence.time[last]) * factor)
+        axes.axvspan(*ends, facecolor=COLOUR["muted"], alpha=0.14, lw=0)
+
+
+def stretches(time: Array, values: Array, columns: int) -> tuple[Array, Array, Array]:
+    """Smallest and largest value of each of at most `columns` stretches of a trace, at the middle of each.
+
+    A short trace comes as it is, with its values twice.
+    """
+    if len(values) <= 2 * columns:
+        return time, values, values
+    edges = np.linspace(0, len(values), columns + 1).astype(int)
+    low, high = np.minimum.reduceat(values, edges[:-1]), np.maximum.reduceat(values, edges[:-1])
+    return (time[edges[:-1]] + time[edges[1:] - 1]) / 2, low, high
 
 
 def _fills_area(values: Array, width: int) -> bool:
@@ -258,8 +301,13 @@ def error_figure(evidence: Evidence, width: int) -> str:
         inside, _outside = error_limits(evidence)
         top = 1.25 * max([_error_peak(evidence), *(limit.value for limit in inside)])
         scaling, unit = scale(top, evidence.unit)
-        thin_time, thin_error = envelope(evidence.time, evidence.error, width)
-        axes.plot(thin_time * factor, thin_error * scaling, color=COLOUR["hardware"], lw=0.9)
+        time, low, high = stretches(evidence.time, evidence.error * scaling, width // 4)
+        if low is high:
+            axes.plot(time * factor, low, color=COLOUR["hardware"], lw=0.9)
+        else:
+            axes.fill_between(time * factor, low, high, color=COLOUR["hardware"], alpha=0.3, lw=0)
+            for edge in (low, high):
+                axes.plot(time * factor, edge, color=COLOUR["hardware"], lw=1.1)
         axes.set_ylim(-top * scaling, top * scaling)
         for limit in inside:
             for value in (-limit.value, limit.value):
@@ -323,9 +371,7 @@ def ranking_figure(
         axes.set_yticks(range(len(rows)), [clip(name, width // 20) for name, _value, _role in rows])
         axes.grid(visible=False, axis="y")
         axes.tick_params(axis="y", length=0)
-        axes.xaxis.set_major_locator(LogLocator(numticks=5))
-        axes.xaxis.set_minor_locator(NullLocator())
-        axes.xaxis.set_major_formatter(FuncFormatter(lambda v, _: quantity(v, unit, 1)))
+        decades(axes.xaxis, low, high, unit, width // 75)
         axes.set_xlabel("largest error")
 
     return draw("ranking", "Largest errors beside each other", width, 80 + 40 * len(rows), paint)
@@ -349,9 +395,32 @@ def frequency_axis(axes: Axes, frequency: Array) -> None:
     """Make the lower axis logarithmic, over all of `frequency`, in Hz."""
     axes.set_xscale("log")
     axes.set_xlim(float(frequency[0]), float(frequency[-1]))
-    axes.xaxis.set_major_locator(LogLocator(numticks=6))
-    axes.xaxis.set_minor_locator(NullLocator())
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda v, _: quantity(v, "Hz", 1)))
+    decades(axes.xaxis, float(frequency[0]), float(frequency[-1]), "Hz", 6)
+
+
+def decades(axis: Axis, low: float, high: float, unit: str, labels: int) -> None:
+    """Set the ticks of a logarithmic axis from `low` to `high`: one at every decade at least, `labels` with words.
+
+    Less than two decades have ticks at 1, 2 and 5, less than half a one at all digits, the shortest spans even ones.
+    Up to four decades have small ones at 2 to 9 between.
+    """
+    span = math.log10(high / low)
+    subs = (1.0,) if span >= 2 else (1.0, 2.0, 5.0) if span > 0.5 else tuple(map(float, range(1, 10)))
+    ends = math.floor(math.log10(low)), math.ceil(math.log10(high))
+    places = [sub * 10.0**k for k in range(ends[0], ends[1] + 1) for sub in subs]
+    places = [place for place in places if low * 0.999 <= place <= high * 1.001]
+    if len(places) < 2:
+        axis.set_major_locator(MaxNLocator(min(labels, 4)))
+        axis.set_minor_locator(FixedLocator([]))
+        axis.set_major_formatter(FuncFormatter(lambda v, _: quantity(v, unit)))
+        return
+    step = math.ceil(len(places) / labels)
+    axis.set_major_locator(FixedLocator(places))
+    small = [m * 10.0**k for k in range(*ends) for m in range(2, 10)] if span < 4 else []
+    axis.set_minor_locator(FixedLocator([place for place in small if place not in places]))
+    axis.set_minor_formatter(NullFormatter())
+    named = places[::step]
+    axis.set_major_formatter(FuncFormatter(lambda v, _: quantity(v, unit, 1) if v in named else ""))
 
 
 def forbidden_areas(axes: Axes, facts: FilterFacts, level: float) -> list[tuple[Band, float, float]]:

@@ -11,6 +11,7 @@ from typing import Any
 from sosmith.gen.filter.response import MASK_TOLERANCE_DB, FilterFacts, ResponseMeasures, measure_response
 from sosmith.gen.output.manifest import limit_cycle_entry
 from sosmith.gen.quantity import plain_number, quantity
+from sosmith.gen.report.behaviour import behaviour, behaviour_entry
 from sosmith.gen.report.curves import error_over_time, error_spectrum, filter_curve
 from sosmith.gen.report.evidence import Evidence
 from sosmith.gen.report.page import render_page
@@ -109,8 +110,12 @@ def summarise(evidence: Evidence) -> dict[str, Any]:
         The keys of the contract, and: ``core``, ``scenario``, ``realization``, ``architecture``, ``gates`` (name of
         the board whose netlist ran, None if the SystemVerilog itself did), ``lsb``, ``range``, ``max_error``,
         ``error.{max_lsb,mean,proven,parts}``, ``first_mismatch``, ``latency_cycles``, ``cycles_per_sample`` (of
-        this run, waiting included), ``alternatives``, ``limit_cycles``, ``tools``, ``sosmith_version``,
-        ``shortfalls`` (why it did not pass), ``notes``, ``provenance.{specification,specification_sha256,
+        this run, waiting included), ``alternatives``, ``limit_cycles``, ``tools``, ``sosmith_version``, ``date`` (as
+        given by the user, else None), ``files`` (SHA-256 of each generated file), ``true_error.{max_abs,rms,mean,
+        readings}`` (hardware against the true value at the readings), ``delay.{seconds,frequency}`` (group delay, and
+        where it is taken), ``settling.{seconds,half_lsb_seconds,overshoot_percent}`` (after a step, to 1 %, and to half
+        an LSB over the whole range), ``shortfalls`` (why it did not pass), ``notes``,
+        ``provenance.{specification,specification_sha256,
         reference_sha256,trace_sha256,datapath_sha256,cycles_per_sample,cost}`` (see
         `sosmith.gen.report.provenance.Provenance`) and ``curves.{error,spectrum,filter}`` (see
         `sosmith.gen.report.curves`). Lengths are in samples or cycles, errors in
@@ -150,6 +155,7 @@ def summarise(evidence: Evidence) -> dict[str, Any]:
             "parts": dict(evidence.bound_parts),
             "unit": evidence.unit,
         },
+        **behaviour_entry(behaviour(evidence)),
         "max_error": evidence.max_error,
         "lsb": evidence.lsb,
         "range": [evidence.low, evidence.high],
@@ -165,6 +171,8 @@ def summarise(evidence: Evidence) -> dict[str, Any]:
         "cycles_per_second": evidence.cycles_per_second,
         "wall_seconds": evidence.wall_seconds,
         "sosmith_version": __version__,
+        "date": evidence.date,
+        "files": dict(evidence.files),
         "tools": dict(evidence.tools),
         "provenance": None if evidence.provenance is None else _entry(evidence.provenance),
         "curves": {

@@ -7,11 +7,10 @@ from typing import Any, NamedTuple
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
-from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from sosmith.gen.quantity import decibels, quantity
 from sosmith.gen.report.page import Figure
-from sosmith.gen.report.plots import COLOUR, NARROW, SERIES, WIDE, draw
+from sosmith.gen.report.plots import COLOUR, NARROW, SERIES, WIDE, decades, draw
 from sosmith.model.templates import render
 from sosmith.sim.exploration.evaluation import Point
 from sosmith.sim.exploration.front import cost_kind
@@ -147,12 +146,8 @@ def _paint(
     axes.set_yscale("log")
     values = [float(point["cost"]["value"]) for point in points]
     bounds = [float(point["error"]["bound"]) for point in points]
-    for axis, low, high in ((axes.xaxis, min(values), max(values)), (axes.yaxis, min(bounds), max(bounds))):
-        wide = high > 30 * low
-        axis.set_major_locator(LogLocator(subs=(1.0,) if wide else (1.0, 2.0, 5.0), numticks=8))
-        axis.set_minor_locator(NullLocator())
     axes.set_xlim(max(min(values), 0.5) / 1.25, max(values) * 1.25)
     axes.set_ylim(min(bounds) / 1.25, max(bounds) * 1.25)
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:,.0f}"))
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda v, _: quantity(v, unit, 2)))
+    decades(axes.xaxis, *axes.get_xlim(), "", 8)
+    decades(axes.yaxis, *axes.get_ylim(), unit, 8)
     axes.set_ylabel("proven error bound")

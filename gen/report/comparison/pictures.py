@@ -10,14 +10,14 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
-from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
+from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from sosmith.gen.filter.response import magnitude_db
-from sosmith.gen.quantity import quantity, scale
+from sosmith.gen.quantity import scale
 from sosmith.gen.report.comparison.choice import Choice, cost_unit, hardware_cost
 from sosmith.gen.report.comparison.report_file import Report, fact
 from sosmith.gen.report.page import Figure
-from sosmith.gen.report.plots import COLOUR, NARROW, SERIES, WIDE, clip, draw, frequency_axis
+from sosmith.gen.report.plots import COLOUR, NARROW, SERIES, WIDE, clip, decades, draw, frequency_axis
 from sosmith.model.arithmetic.elementary import geometric
 
 Array = npt.NDArray[np.float64]
@@ -99,9 +99,7 @@ def _error_axis(axes: Axes, low: float, high: float, unit: str) -> None:
         return
     axes.set_xscale("log")
     axes.set_xlim(low / 1.6, high * 1.6)
-    axes.xaxis.set_major_locator(LogLocator(numticks=4))
-    axes.xaxis.set_minor_locator(NullLocator())
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda v, _: quantity(v, unit, 1)))
+    decades(axes.xaxis, low / 1.6, high * 1.6, unit, 4)
     axes.set_xlabel("largest error, and its limit (logarithmic)")
 
 
@@ -154,9 +152,7 @@ def spectrum_figure(reports: Sequence[Report], names: Sequence[str]) -> Figure |
         for k, (frequency, density) in enumerate(lines):
             axes.plot(frequency, np.maximum(density, np.min(known[k])), lw=1.5, **_line(k))
         axes.set_yscale("log")
-        axes.yaxis.set_major_locator(LogLocator(numticks=6))
-        axes.yaxis.set_minor_locator(NullLocator())
-        axes.yaxis.set_major_formatter(FuncFormatter(lambda v, _: quantity(v, unit, 1)))
+        decades(axes.yaxis, *axes.get_ylim(), unit, 6)
         axes.set_ylabel("error per √Hz")
         axes.set_xlabel("frequency")
         ends = np.array([min(f[0] for f, _ in lines), max(f[-1] for f, _ in lines)])

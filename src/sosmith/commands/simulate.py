@@ -125,6 +125,11 @@ def _empty_cache(ctx: click.Context, param: click.Parameter, wanted: bool) -> No
 )
 @SECONDS
 @SEED
+@click.option(
+    "--date",
+    metavar="YYYY-MM-DD",
+    help="Date of the run, for the report; without it the report has none, and two runs write the same.",
+)
 @JSON_OPTION
 @output_option("Folder for the files.  [default: build/<name>]")
 def simulate_command(
@@ -144,6 +149,7 @@ def simulate_command(
     vectors: Path | None,
     seconds: float | None,
     seed: int,
+    date: str | None,
     as_json: bool,
     output: Path | None,
 ) -> None:
@@ -174,6 +180,10 @@ def simulate_command(
         from sosmith.gen.output.vectors import check_format
 
         check_format(vectors)
+    if date is not None:
+        from sosmith.model.calibration.measurement_files import parse_date
+
+        parse_date(date)
     if port is not None and (gates is not None or waves):
         raise SpecificationError("--port must come without --gates and --waves, which need a simulator")
     netlist_for = None if gates is None else find_board(gates, MODELLED).name
@@ -206,6 +216,7 @@ def simulate_command(
             baud=baud,
             waves=waves,
             vectors=vectors,
+            date=date,
         )
     _finish(report, as_json=as_json)
 

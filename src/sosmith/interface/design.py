@@ -29,6 +29,7 @@ from sosmith.interface.inputs import codes_of, encoded, traces_of
 from sosmith.interface.notebook import table_html
 from sosmith.interface.quantity import Quantity
 from sosmith.interface.specification import Specification, specification_of
+from sosmith.model.calibration.measurement_files import parse_date
 from sosmith.model.errors import SpecificationError
 from sosmith.model.reference.golden import calibrated, filtered
 
@@ -482,6 +483,7 @@ class Design:
         waves: bool = False,
         vectors: str | PathLike[str] | None = None,
         seed: int = 1,
+        date: str | None = None,
         progress: Progress = lambda step, done, total: None,
     ) -> Report:
         """Simulate the generated hardware, and compare every sample with the integer model and the exact result.
@@ -512,6 +514,9 @@ class Design:
             File for the input and output codes of all samples: .csv, .npz, .vcd, or .hex for ``$readmemh``.
         seed : int
             Random seed for noise and handshakes.
+        date : str
+            Date of the run as ``YYYY-MM-DD``, for the report; without it the report has none, and two runs write the
+            same report but for the speed.
 
         Returns
         -------
@@ -540,6 +545,8 @@ class Design:
                 raise SpecificationError(f"{name} must be from 0 to 0.99, not {share}")
         if vectors is not None:
             check_format(Path(fspath(vectors)))
+        if date is not None:
+            parse_date(date)
         board = None if gates is None else find_board(gates, MODELLED)
         place = Path("build") / self.core.spec.name if folder is None else Path(fspath(folder))
         progress("trace", 0, 0)
@@ -563,6 +570,7 @@ class Design:
                 gates=board,
                 hardware=hardware,
                 vectors=None if vectors is None else Path(fspath(vectors)),
+                date=date,
                 progress=progress,
             )
         progress("writing the report", 0, 0)

@@ -19,7 +19,7 @@ import pytest
 from scipy import signal
 
 from sosmith.gen import quantity
-from sosmith.gen.filter import response
+from sosmith.gen.filter import response, step_response
 from sosmith.gen.filter.response import FilterFacts
 from sosmith.gen.fpga.boards import find_board
 from sosmith.gen.fpga.synthesis import Netlist
@@ -673,8 +673,8 @@ def test_page_shows_what_rounding_keeps_up() -> None:
     words = " ".join(Page(page_of(evidence())).words).replace("\u00a0", " ")
     start = words.index("What rounding can keep up by itself")
     rows = " ".join(words[start:].split())
-    assert "section 0 30.0 nm 0.123 LSB none not needed" in rows
-    assert "section 1 none, proven 61.0 nm 0.250 LSB 1, 0.3333" in rows
+    assert "section 0 30.0 0.123 0 0 not needed" in rows
+    assert "section 1 0, comes to rest 0 61.0 0.250 1, 0.3333" in rows
     assert "What rounding can keep up by itself" not in page_of(plain())
 
 
@@ -710,7 +710,7 @@ def test_a_handful_of_samples_makes_a_page(length: int) -> None:
 def test_a_limit_far_outside_is_named_instead_of_drawn() -> None:
     run = evidence(bound=0.5, max_error=1.0)
     assert plots.error_limits(run)[0] == []
-    assert "Too far out to draw: limit ±500\u00a0µm and allowed by the specification ±1.00\u00a0mm." in page_of(run)
+    assert "Too far out to draw: limit ±500\u00a0µm and allowed by the specification ±1,000\u00a0µm." in page_of(run)
 
 
 def test_thinning_keeps_peaks() -> None:
@@ -804,7 +804,7 @@ def test_filter_facts_refuse(changes: dict[str, Any], message: str) -> None:
 # numbers for people
 
 
-@pytest.mark.parametrize("module", [quantity, response])
+@pytest.mark.parametrize("module", [quantity, response, step_response])
 def test_examples_in_docstrings(module: Any) -> None:
     results = doctest.testmod(module)
     assert results.attempted > 0

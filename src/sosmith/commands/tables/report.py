@@ -2,42 +2,66 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 from rich.markup import escape
 
 from sosmith.commands.tables.console import TableConsole, new_table
+from sosmith.gen.quantity import count, duration, in_own_unit, plain_number, quantity
 
 
 def print_summary(summary: dict[str, Any]) -> None:
-    """Print verdict, errors and speed; `summary` is the content of ``report.json``."""
-    unit = escape(f" {summary['error']['unit']}".rstrip())
+    """Print verdict, the measurement, the arithmetic and the speed; `summary` is the content of ``report.json``."""
+    unit = summary["error"]["unit"]
     verdict = "[bold green]passed[/]" if summary["passed"] else "[bold red]fell short[/]"
     table = new_table(f"{summary['name']}: {verdict}", ["", ""])
-    exact = (
-        "yes, all"
-        if summary["bit_exact"]
-        else f"no: {summary['mismatches']} differ, the first at {summary['first_mismatch']}"
-    )
-    table.add_row("hardware equals integer model", f"{exact} of {summary['samples']} samples")
-    error = summary["error"]
-    table.add_row(
-        "largest error against golden",
-        f"{error['max_abs']:.4g}{unit} = {error['max_lsb']:.3f} LSB (bound {error['bound']:.4g}{unit})",
-    )
-    if summary["sqnr_db"] is not None:
-        table.add_row("signal to quantization noise", f"{summary['sqnr_db']:.1f} dB")
-    accuracy = summary["accuracy_percent"]
-    if accuracy["hardware"] is not None:
-        measured = ", ".join(f"{chain} {percent:.4f} %" for chain, percent in accuracy.items())
-        table.add_row("accuracy by the paper's measure", measured)
-    for other in summary["alternatives"]:
-        table.add_row(f"  {other['name']} at the same widths", f"largest error {other['max_abs']:.4g}{unit}")
+    for name, words in (*_measurement(summary, unit), *_arithmetic(summary, unit)):
+        table.add_row(name, escape(words))
     for reason in summary["shortfalls"]:
         table.add_row("[red]short[/]", escape(reason))
-    gates = "" if summary["gates"] is None else f", the netlist for {summary['gates']}"
-    speed = (
-        f"{summary['simulator']}{gates}, {summary['cycles']} clocks at {summary['cycles_per_second']:.3g} per second"
-    )
-    table.add_row("simulated in", speed)
+    table.add_row("simulated by", escape(_speed(summary)))
     TableConsole().print(table)
+
+
+def _measurement(summary: dict[str, Any], unit: str) -> Iterator[tuple[str, str]]:
+    error, accuracy = summary["true_error"], summary["accuracy_percent"]
+    if error is not None:
+        words = f"at most {in_own_unit(error['max_abs'], unit)}, RMS {in_own_unit(error['rms'], unit)}"
+        yield "error against the true value", f"{words}, over {count(error['readings'], 'reading')}"
+    if accuracy["hardware"] is not None:
+        without = accuracy["unfiltered"]
+        beside = "" if without is None else f"; {without:.2f} % without the filter"
+        yield "accuracy, the paper's measure", f"{accuracy['hardware']:.2f} %{beside}"
+    delay, settling = summary["delay"], summary["settling"]
+    if delay is not None:
+        where = "" if delay["frequency"] == 0 else f" at {quantity(delay['frequency'], 'Hz')}"
+        yield "delay of the filter", f"{quantity(delay['seconds'], 's')}{where}"
+    if settling is not None:
+        over = settling["overshoot_percent"]
+        beyond = "" if over is None else f"; overshoot {plain_number(over)} %"
+        yield "settling time to 1 %", f"{quantity(settling['seconds'], 's')}{beyond}"
+
+
+def _arithmetic(summary: dict[str, Any], unit: str) -> Iterator[tuple[str, str]]:
+    error, samples = summary["error"], count(summary["samples"], "sample")
+    exact = (
+        f"yes, all of {samples}"
+        if summary["bit_exact"]
+        else f"no: {summary['mismatches']:,} differ, the first at {summary['first_mismatch']:,}, of {samples}"
+    )
+    yield "hardware equals integer model", exact
+    largest = f"at most {quantity(error['max_abs'], unit)} = {plain_number(error['max_lsb'])} LSB"
+    limit = f"{'proven' if error['proven'] else 'estimated'} limit {quantity(error['bound'], unit)}"
+    yield "error of the arithmetic", f"{largest}; {limit}"
+    if summary["sqnr_db"] is not None:
+        yield "signal to error", f"{summary['sqnr_db']:.1f} dB"
+    for other in summary["alternatives"]:
+        yield f"  {other['name']} at the same widths", f"at most {quantity(other['max_abs'], unit)}"
+
+
+def _speed(summary: dict[str, Any]) -> str:
+    gates = "" if summary["gates"] is None else f", the netlist for {summary['gates']}"
+    clocks = f"{summary['simulator']}{gates}: {count(summary['cycles'], 'clock')}"
+    speed = summary["cycles_per_second"]
+    return f"{clocks} in {duration(summary['cycles'] / speed)}" if speed else clocks

@@ -1,0 +1,124 @@
+"""What a run says about the core as an instrument: error against the true value, delay, settling time."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from sosmith.gen.filter.response import FilterFacts, group_delay, passbands
+from sosmith.gen.filter.step_response import SETTLED, StepResponse, step_response
+from sosmith.gen.report.evidence import Evidence
+from sosmith.model.reference.accuracy import ErrorStatistics, error_statistics
+
+
+@dataclass(frozen=True, kw_only=True)
+class Behaviour:
+    """Figures of the core and of its filter with integer coefficients.
+
+    Attributes
+    ----------
+    true_error : ErrorStatistics or None
+        Hardware minus true value at the readings, in the output's unit; None where no true value is known.
+    readings : int
+        Samples that this counts.
+    delay, delay_hz : float or None
+        Group delay in s, and the frequency in Hz at which it is taken: zero, or the middle of the passband where
+        constants do not pass; None without a filter.
+    step : StepResponse or None
+        None without a filter, or if it is too slow.
+    settling : float or None
+        Time in s after a step until the output stays within `SETTLED` of it.
+    settling_to_lsb : float or None
+        Time in s after a step over the whole range of the output until the output stays within half an LSB.
+    transient : int
+        Samples at the beginning of this run in which the output differs by more than half an LSB from what it would be
+        without the start from zero.
+    """
+
+    true_error: ErrorStatistics | None
+    readings: int
+    delay: float | None
+    delay_hz: float | None
+    step: StepResponse | None
+    settling: float | None
+    settling_to_lsb: float | None
+    transient: int
+
+
+def behaviour(evidence: Evidence) -> Behaviour:
+    """Measure a run and its filter; of several channels, all count for the error against the true value."""
+    error = true_error(evidence)
+    facts, span = evidence.filter, evidence.high - evidence.low
+    step = None if facts is None else _step(facts, evidence.lsb, span)
+    delay = None if facts is None else _delay(facts)
+    return Behaviour(
+        true_error=None if error is None else error_statistics(error),
+        readings=0 if error is None else error.size,
+        delay=None if delay is None else delay[0],
+        delay_hz=None if delay is None else delay[1],
+        step=step,
+        settling=None if step is None else step.samples_to(SETTLED) / step.sample_rate,
+        settling_to_lsb=None if step is None else step.samples_to(evidence.lsb / 2 / span) / step.sample_rate,
+        transient=_transient(evidence, step),
+    )
+
+
+def true_error(evidence: Evidence) -> Any:
+    """Hardware minus true value at the readings, shape (readings,); None if there are none."""
+    if evidence.truth is None:
+        return None
+    error = evidence.hardware - evidence.truth
+    counted = error.ravel() if evidence.reading is None else error[evidence.reading]
+    return counted if counted.size else None
+
+
+def behaviour_entry(found: Behaviour) -> dict[str, Any]:
+    """Return the entries of `report.json`; lengths of time in s."""
+    error, step = found.true_error, found.step
+    return {
+        "true_error": None
+        if error is None
+        else {"max_abs": error.max_abs, "rms": error.rms, "mean": error.mean, "readings": found.readings},
+        "delay": None if found.delay is None else {"seconds": found.delay, "frequency": found.delay_hz},
+        "settling": None
+        if step is None
+        else {
+            "seconds": found.settling,
+            "half_lsb_seconds": found.settling_to_lsb,
+            "overshoot_percent": None if step.overshoot is None else 100 * step.overshoot,
+        },
+    }
+
+
+def _step(facts: FilterFacts, lsb: float, span: float) -> StepResponse | None:
+    return _cached_step(facts.quantized_sos.tobytes(), facts.sample_rate, lsb / 2 / span)
+
+
+@lru_cache(maxsize=8)
+def _cached_step(sections: bytes, sample_rate: float, precision: float) -> StepResponse | None:
+    return step_response(np.frombuffer(sections).reshape(-1, 6), sample_rate, precision)
+
+
+def _delay(facts: FilterFacts) -> tuple[float, float] | None:
+    frequency = 0.0
+    bands = passbands(facts)
+    if facts.kind == "bandpass" and bands:
+        frequency = math.sqrt(bands[0][0] * bands[0][1])
+    elif facts.kind == "highpass" and bands:
+        frequency = sum(bands[0]) / 2
+    (delay,) = group_delay(facts.quantized_sos, np.array([frequency]), facts.sample_rate).tolist()
+    return (delay, frequency) if math.isfinite(delay) else None
+
+
+def _transient(evidence: Evidence, step: StepResponse | None) -> int:
+    """Count the samples until a step from zero to the first value has settled, at most the run's length."""
+    if step is None or evidence.starts_settled:
+        return 0
+    first = evidence.golden[0] if evidence.unfiltered is None else evidence.unfiltered[0]
+    size = float(np.max(np.abs(first))) * step.scale
+    samples = step.samples_to(evidence.lsb / 2 / size) if size > evidence.lsb / 2 else 0
+    return min(samples, len(evidence.time))
