@@ -175,6 +175,7 @@ def _evidence(
         lsb=float(output.lsb),
         low=float(low),
         high=float(high),
+        zero=float(output.zero),
         bound=facts.error_bound,
         bound_parts=facts.error_parts,
         proven=True,

@@ -111,6 +111,8 @@ class Evidence:
         SHA-256 of each generated file by its name, the certificate among them.
     date : str or None
         Date of the run as the user gave it; None if none was given, so that two runs are the same.
+    zero : float or None
+        Value of the output's code 0; None if it is `low`.
     starts_settled : bool
         Whether the filter starts from the state that the first sample would have led to; if not, from zero.
     """
@@ -158,6 +160,7 @@ class Evidence:
     specification: str = ""
     files: Mapping[str, str] = field(default_factory=dict)
     date: str | None = None
+    zero: float | None = None
     starts_settled: bool = False
 
     def __post_init__(self) -> None:

@@ -1,4 +1,4 @@
-"""The report as one HTML page that stands alone: no script, no font, no picture from elsewhere.
+"""The report as one HTML page that stands alone: nothing from elsewhere, and all but the zoom without its script.
 
 This module says what stands on the page, as plain text; the templates make markup of it, and escape it.
 """
@@ -16,6 +16,7 @@ from sosmith.gen.quantity import count, decibels, duration, plain_number, scale,
 from sosmith.gen.report import plots
 from sosmith.gen.report.behaviour import behaviour
 from sosmith.gen.report.evidence import Evidence
+from sosmith.gen.report.samples import MAX_POINTS, viewer_data
 from sosmith.gen.report.step_plot import step_figure
 from sosmith.gen.report.tiles import ErrorUnit, Summary, amount, tile_rows
 from sosmith.gen.version import __version__
@@ -117,6 +118,21 @@ def _close_up_figure(evidence: Evidence) -> Figure:
         caption=f"{count(near.stop - near.start, 'sample')} of the same curves; the dotted line marks the largest "
         f"error. The output moves in steps of {amount(evidence.lsb, evidence.unit)}.",
         legend=[("golden", "broad", "exact calculation"), ("hardware", "dot", "hardware")],
+    )
+
+
+def _looks(evidence: Evidence) -> Figure:
+    """Legend and caption of the viewer, which has no drawing of its own."""
+    known = [("golden", "broad", "exact calculation", True), ("hardware", "", "hardware", True)]
+    known.append(("truth", "broad", "true value", evidence.truth is not None))
+    known.append(("unfiltered", "", "without the filter", evidence.unfiltered is not None))
+    stride = -(-len(evidence.time) // MAX_POINTS)
+    thinned = "" if stride == 1 else f" Of each {stride} samples, the one with the largest error is held here."
+    return Figure(
+        drawing="",
+        caption="Point at a sample to read it out; drag over a part to zoom into it, double-click for all. Keys: "
+        f"arrows, plus and minus, 0 for all, Home for the largest error.{thinned}",
+        legend=[(role, shape, words) for role, shape, words, shown in known if shown],
     )
 
 
@@ -384,6 +400,8 @@ def render_page(evidence: Evidence, summary: Summary) -> str:
         told_facts=_evidence_facts(shown),
         trace=_trace_figure(shown, found.transient),
         close_up=_close_up_figure(shown),
+        looks=_looks(shown),
+        samples=viewer_data(shown, found.transient),
         error=_error_figure(shown),
         histogram=_histogram_figure(shown),
         budget=_budget_table(shown),

@@ -1,0 +1,62 @@
+"""The samples in the page: packed without loss of codes, thinned to those with the largest errors."""
+
+from __future__ import annotations
+
+import base64
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.gen.report.test_report import LSB, evidence, plain
+
+from sosmith.gen.report.samples import MAX_POINTS, packed, viewer_data
+
+
+def unpacked(entry: dict[str, Any]) -> np.ndarray[Any, np.dtype[np.float64]]:
+    integers = np.frombuffer(base64.b64decode(entry["data"]), dtype=f"<u{entry['bytes']}")
+    return np.asarray(entry["low"] + entry["step"] * integers, dtype=np.float64)
+
+
+@pytest.mark.parametrize("values", [[3.0], [-32768.0, 32767.0], [-8388608.0, 0.0, 8388607.0], [7.0, 7.0]])
+def test_whole_numbers_come_back(values: list[float]) -> None:
+    entry = packed(np.array(values), exact=True)
+    assert unpacked(entry).tolist() == values
+    assert entry["bytes"] == (4 if max(values) > 32767 else 2)
+
+
+def test_other_numbers_come_back_to_a_part_of_their_span() -> None:
+    values = np.random.default_rng(1).standard_normal(1000)
+    assert unpacked(packed(values)) == pytest.approx(values, abs=np.ptp(values) / 65535 / 1.999)
+    assert unpacked(packed(np.full(3, 0.1))).tolist() == [0.1] * 3
+
+
+def test_a_short_run_is_held_whole() -> None:
+    run = evidence()
+    data = viewer_data(run, 12)
+    assert json.loads(json.dumps(data, allow_nan=False)) == data
+    codes = unpacked(data["code"])
+    assert (data["zero"] + data["lsb"] * codes).tolist() == run.hardware.tolist()
+    assert unpacked(data["index"]).tolist() == list(range(3000))
+    assert (data["stride"], data["samples"], data["transient"]) == (1, 3000, 12)
+    assert data["start"] + data["step"] * 2999 == pytest.approx(run.time[-1])
+    assert viewer_data(plain(), 0)["truth"] is None
+
+
+def test_codes_of_an_output_around_zero() -> None:
+    """Code 0 is not the lowest one of a signed output."""
+    values = np.array([-2.0, 0.0, 1.0]) * LSB
+    run = plain(time=np.arange(3.0), golden=values, hardware=values, low=-8.0, high=8.0 - LSB, zero=0.0)
+    assert unpacked(viewer_data(run, 0)["code"]).tolist() == [-2.0, 0.0, 1.0]
+
+
+def test_a_long_run_keeps_the_largest_error_of_each_stretch() -> None:
+    samples = 3 * MAX_POINTS - 1
+    error = np.random.default_rng(2).uniform(-1, 1, samples) * LSB
+    run = plain(time=np.arange(float(samples)), golden=-error, hardware=np.zeros(samples))
+    data = viewer_data(run, 0)
+    index = unpacked(data["index"]).astype(int)
+    assert (data["stride"], len(index)) == (3, MAX_POINTS)
+    for k in (0, 1, 7777, MAX_POINTS - 1):
+        assert index[k] == 3 * k + int(np.argmax(np.abs(error[3 * k : 3 * k + 3])))
+    assert unpacked(data["error"]) == pytest.approx(error[index], abs=2 * LSB / 65535)
