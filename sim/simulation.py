@@ -24,6 +24,7 @@ from sosmith.gen.output.vectors import Vectors, vector_files
 from sosmith.gen.report.evidence import Alternative, Evidence
 from sosmith.gen.report.filter_facts import filter_facts
 from sosmith.gen.report.provenance import provenance_of
+from sosmith.gen.report.recursion import recursion_of
 from sosmith.gen.specification.choices import ERROR_FEEDBACK
 from sosmith.gen.word_lengths.other_realization import with_realization
 from sosmith.gen.word_lengths.quantized import Quantized
@@ -203,6 +204,7 @@ def _evidence(
         why=" ".join(f"{reason}." for reason in facts.reasons.values()),
         formats=facts.formats,
         sections=facts.sections,
+        recursions=tuple(recursion_of(section.name, section.graph) for section in quantized.sections),
         limit_cycles=facts.limit_cycles,
         filter=filter_facts(quantized),
         alternatives=_alternatives(quantized, codes, golden),

@@ -14,6 +14,7 @@ from sosmith.gen.filter.response import FilterFacts
 from sosmith.gen.fpga.synthesis import Netlist
 from sosmith.gen.output.core_facts import LimitCycleFacts, NodeFormat, SectionFacts
 from sosmith.gen.report.provenance import Provenance
+from sosmith.gen.report.recursion import Recursion
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
@@ -95,6 +96,8 @@ class Evidence:
         Number formats along the datapath.
     sections : sequence of SectionFacts
         The filter's sections.
+    recursions : sequence of Recursion
+        What each section computes, possibly none.
     limit_cycles : sequence of LimitCycleFacts
         One for each section, in `unit`.
     shown_channel : int or None
@@ -151,6 +154,7 @@ class Evidence:
     unfiltered: Array | None = None
     formats: Sequence[NodeFormat] = ()
     sections: Sequence[SectionFacts] = ()
+    recursions: Sequence[Recursion] = ()
     limit_cycles: Sequence[LimitCycleFacts] = ()
     shown_channel: int | None = None
     filter: FilterFacts | None = None

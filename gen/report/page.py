@@ -15,7 +15,9 @@ from sosmith.gen.fpga.synthesis import Netlist
 from sosmith.gen.quantity import count, decibels, duration, plain_number, scale, unit_symbol
 from sosmith.gen.report import plots
 from sosmith.gen.report.behaviour import behaviour
+from sosmith.gen.report.diagram import diagram
 from sosmith.gen.report.evidence import Evidence
+from sosmith.gen.report.recursion import Recursion
 from sosmith.gen.report.samples import MAX_POINTS, viewer_data
 from sosmith.gen.report.step_plot import step_figure
 from sosmith.gen.report.tiles import ErrorUnit, Summary, amount, tile_rows
@@ -300,6 +302,25 @@ def _step_figure(step: StepResponse) -> Figure:
     )
 
 
+@dataclass(frozen=True)
+class Realized:
+    """A section as it is realized: its block diagram, its equations and its coefficients, in lines."""
+
+    section: str
+    diagram: str
+    equations: Sequence[str]
+    coefficients: Sequence[str]
+
+
+def _realized(recursion: Recursion) -> Realized:
+    return Realized(
+        section=recursion.section,
+        diagram=diagram(recursion),
+        equations=[equation.words for equation in recursion.equations],
+        coefficients=[f"{each.name} = {each.words}" for each in recursion.coefficients],
+    )
+
+
 def _coefficient_table(evidence: Evidence) -> Table:
     rows = []
     for section in evidence.sections:
@@ -406,6 +427,7 @@ def render_page(evidence: Evidence, summary: Summary) -> str:
         histogram=_histogram_figure(shown),
         budget=_budget_table(shown),
         limit_cycles=_limit_cycles_table(shown),
+        realized=[_realized(recursion) for recursion in shown.recursions],
         coefficients=_coefficient_table(shown),
         formats=_format_table(shown),
         facts=_run_facts(shown),

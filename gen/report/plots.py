@@ -186,7 +186,7 @@ def trace_figure(evidence: Evidence, transient: int, width: int) -> str:
         )
         for order, (values, role, line) in enumerate(layers, start=2):
             if values is not None:
-                thin_time, thin_values = envelope(evidence.time, values, width)
+                thin_time, thin_values = envelope(evidence.time, values, width // 2)
                 axes.plot(thin_time * factor, thin_values * scaling, color=COLOUR[role], zorder=order, **line)
         axes.set_ylim(*_range_of(np.concatenate(shown) * scaling, margin=0.06))
         axes.set_ylabel(f"output in {unit}" if unit else "output")
