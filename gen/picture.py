@@ -12,10 +12,14 @@ from typing import TYPE_CHECKING, Any
 from sosmith.model.errors import SpecificationError
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 FORMATS = ("svg", "png")
 """What a picture can be written as."""
+
+BLUE, RED, GREEN, AMBER, PURPLE, SKY, GREY = "#0066a6", "#c94f00", "#009e73", "#e69f00", "#a23b78", "#2aa1d8", "#67645e"
+"""The colours of the report on a light page, which are told apart with every kind of colour vision."""
 
 _STYLE: dict[Any, Any] = {  # as typed, rc_context wants the names of its parameters one by one
     "svg.fonttype": "none",
@@ -82,6 +86,17 @@ def picture(
         figure.savefig(stream, format=file_format, metadata={"Date": None} if file_format == "svg" else {})
     content = stream.getvalue()
     return settled(content.decode("utf-8")).encode("utf-8") if file_format == "svg" else content
+
+
+def legend_beside(axes: Axes) -> None:
+    """Put the legend to the right of the data, where it covers none."""
+    axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0, frameon=False, fontsize=8)
+
+
+def legend_below(axes: Axes, offset: float = 0.2) -> None:
+    """Put the legend below the panel by a part of its height, in rows; for long names, and panels that are narrow."""
+    place = (0.5, -offset)
+    axes.legend(loc="upper center", bbox_to_anchor=place, ncols=3, borderaxespad=0.0, frameon=False, fontsize=8)
 
 
 def settled(svg: str, prefix: str = "") -> str:

@@ -7,9 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 
-from sosmith.gen.picture import picture
+from sosmith.gen.picture import BLUE, GREY, RED, legend_below, picture
 from sosmith.model.calibration.fit_quality import HIGH_LEVERAGE
 from sosmith.model.calibration.measurement_store import Version
 from sosmith.model.calibration.self_updating import Calibration
@@ -17,7 +16,8 @@ from sosmith.model.calibration.self_updating import Calibration
 MESH = 25
 """Voltages, and temperatures, at which the interval of a reading is drawn."""
 
-_BLUE, _RED, _GREY = "#2563a8", "#b4432f", "#8a8a8a"
+_DATES = 6
+"""Versions, at most, whose dates stand on the axis of the history."""
 
 
 def calibration_plot(made: Calibration, versions: Sequence[Version], file_format: str) -> bytes:
@@ -56,7 +56,7 @@ def _draw_coverage(figure: Figure, axes: Axes, made: Calibration) -> None:
     )
     corners = made.quality.region.corners
     outline = np.array([*corners, corners[0]])
-    axes.plot(outline[:, 0], outline[:, 1], color=_GREY, lw=1.0)
+    axes.plot(outline[:, 0], outline[:, 1], color=GREY, lw=1.0)
     _, voltages, temperatures = made.ranges
     axes.set(xlim=voltages, ylim=temperatures, xlabel="voltage (V)", ylabel="temperature (°C)")
     axes.set_title(f"Coverage: {100 * made.coverage:.1f} % of the sensor's range", loc="left")
@@ -65,13 +65,13 @@ def _draw_coverage(figure: Figure, axes: Axes, made: Calibration) -> None:
 
 def _draw_residuals(axes: Axes, made: Calibration) -> None:
     clearance = [one.reading.values[0] for one in made.stored]
-    axes.plot(clearance, made.quality.residual, ".", color=_BLUE, ms=4)
+    axes.plot(clearance, made.quality.residual, ".", color=BLUE, ms=4)
     weighted = [k for k, weight in enumerate(made.fit.weights) if weight < 1]
     if weighted:
         off = [clearance[k] for k in weighted]
-        axes.plot(off, made.quality.residual[weighted], "o", mfc="none", color=_RED, label="weighted down")
-        axes.legend()
-    axes.axhline(0, color=_GREY, lw=0.8)
+        axes.plot(off, made.quality.residual[weighted], "o", mfc="none", color=RED, label="weighted down")
+        legend_below(axes)
+    axes.axhline(0, color=GREY, lw=0.8)
     axes.set(xlabel="clearance (mm)", ylabel="measured minus fitted (mm)")
     axes.set_title(f"Residuals: {made.version.rms:.3g} mm rms", loc="left")
 
@@ -89,8 +89,8 @@ def _draw_intervals(figure: Figure, axes: Axes, made: Calibration) -> None:
 
 def _draw_over_voltage(axes: Axes, made: Calibration) -> None:
     voltage = np.array([one.reading.values[1] for one in made.stored])
-    axes.plot(voltage, made.quality.residual, ".", color=_BLUE, ms=4)
-    axes.axhline(0, color=_GREY, lw=0.8)
+    axes.plot(voltage, made.quality.residual, ".", color=BLUE, ms=4)
+    axes.axhline(0, color=GREY, lw=0.8)
     axes.set(xlabel="voltage (V)", ylabel="measured minus fitted (mm)")
     lack = made.quality.uncertainty.lack
     verdict = f"a curve of {lack.missed:.2g} mm rms" if lack.structured else "no structure"
@@ -98,12 +98,12 @@ def _draw_over_voltage(axes: Axes, made: Calibration) -> None:
 
 
 def _draw_leverage(axes: Axes, made: Calibration) -> None:
-    axes.plot(made.quality.leverage, made.quality.residual, ".", color=_BLUE, ms=4)
+    axes.plot(made.quality.leverage, made.quality.residual, ".", color=BLUE, ms=4)
     limit = HIGH_LEVERAGE * float(made.quality.leverage.mean())
-    axes.axvline(limit, color=_RED, lw=0.8, label=f"{HIGH_LEVERAGE:g} times the mean")
-    axes.legend()
+    axes.axvline(limit, color=RED, lw=0.8, label=f"{HIGH_LEVERAGE:g} times the mean")
+    legend_below(axes)
     axes.set(xlabel="leverage", ylabel="residual (mm)")
-    axes.set_title("Leverage: how much a measurement determines its own fit", loc="left")
+    axes.set_title("Leverage of each measurement on its own fit", loc="left")
 
 
 def _draw_history(axes: Axes, versions: Sequence[Version]) -> None:
@@ -113,10 +113,11 @@ def _draw_history(axes: Axes, versions: Sequence[Version]) -> None:
         "drift from the version before": [version.drift for version in versions],
     }
     numbers = [version.number for version in versions]
-    for (label, values), colour in zip(curves.items(), (_GREY, _BLUE, _RED), strict=True):
+    for (label, values), colour in zip(curves.items(), (GREY, BLUE, RED), strict=True):
         axes.plot(numbers, np.array(values, dtype=np.float64), "o-", color=colour, label=label)
-    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    shown = versions[:: -(-len(versions) // _DATES)]
+    axes.set_xticks([version.number for version in shown], [f"{version.number}\n{version.date}" for version in shown])
     axes.set_ylim(bottom=0)
-    axes.set(xlabel="version", ylabel="mm")
-    axes.legend()
+    axes.set(xlabel="version and its date", ylabel="mm")
+    legend_below(axes, 0.28)
     axes.set_title("History", loc="left")

@@ -8,13 +8,12 @@ from matplotlib.figure import Figure
 
 from sosmith.gen.instrument.amplitude_spectrum import Array, amplitude_spectrum
 from sosmith.gen.instrument.vehicle_report import TRACKS, VehicleRun
-from sosmith.gen.picture import picture
+from sosmith.gen.picture import BLUE, GREEN, GREY, RED, legend_below, picture
 
 SMALLEST = 1e-6
 """Smallest amplitude drawn, in mm: a nanometre."""
 
-_COLOURS = ("#2563a8", "#b4432f", "#3f7f4f")
-_GREY = "#8a8a8a"
+_COLOURS = (BLUE, RED, GREEN)
 
 
 def vehicle_plot(made: VehicleRun, file_format: str) -> bytes:
@@ -36,15 +35,15 @@ def vehicle_plot(made: VehicleRun, file_format: str) -> bytes:
         room = 1e3 * made.parameters.sensor.flange_clearance
         _draw(axes[0, 0], made, 1e3 * motion.wheelset_lateral, "lateral (mm)", "Wheelsets, lateral, to the left")
         for side in (-room, room):
-            axes[0, 0].axhline(side, color=_GREY, lw=0.8, ls="--")
-        axes[0, 0].text(made.motion.distance[-1], -room, "flange ", ha="right", va="top", color=_GREY)
+            axes[0, 0].axhline(side, color=GREY, lw=0.8, ls="--")
+        axes[0, 0].text(made.motion.distance[-1], -room, "flange ", ha="right", va="top", color=GREY)
         yaw = 1e3 * motion.wheelset_yaw_to_frame
         _draw(axes[0, 1], made, yaw, "yaw (mrad)", "Wheelsets, yaw in their frames")
         _draw(axes[1, 0], made, motion.clearance_mm, "change (mm)", "Clearance at the right wheels' sensors")
         _draw_vertical(axes[1, 1], made)
         _draw_spectra(axes[2, 0], made, 1e3 * motion.wheelset_lateral, "Spectrum of the lateral motion")
         _draw_spectra(axes[2, 1], made, motion.clearance_mm, "Spectrum of the clearance")
-        axes[0, 0].legend(loc="upper right", ncols=2)
+        figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=6, frameon=False)
 
     style = {"path.simplify": True, "path.simplify_threshold": 0.3, "text.parse_math": True}  # powers of ten
     return picture("vehicle", (11, 10), paint, file_format, style=style)
@@ -69,10 +68,10 @@ def _draw_vertical(axes: Axes, made: VehicleRun) -> None:
         "frame 1": motion.frame_vertical[:, 0],
         "body": motion.body_vertical,
     }
-    for (name, values), colour in zip(lines.items(), (_GREY, *_COLOURS[:2]), strict=True):
+    for (name, values), colour in zip(lines.items(), (GREY, *_COLOURS[:2]), strict=True):
         axes.plot(motion.distance, 1e3 * values, color=colour, lw=1.0, label=name)
     _mark_track(axes, made)
-    axes.legend(loc="upper right")
+    legend_below(axes)
     axes.set(xlabel="distance of the first wheelset (m)", ylabel="upward (mm)")
     axes.set_title("Vertical", loc="left")
 
@@ -94,6 +93,6 @@ def _draw_spectra(axes: Axes, made: VehicleRun, values: Array, title: str) -> No
         axes.loglog(frequency[1:], np.maximum(amplitude[1:, k], SMALLEST), color=_COLOURS[k], lw=0.8)
     for mode in made.lateral_modes:
         if mode.frequency > 0 and mode.damping < 0.4:
-            axes.axvline(mode.frequency, color=_GREY, lw=0.6, ls=":")
+            axes.axvline(mode.frequency, color=GREY, lw=0.6, ls=":")
     axes.set(xlabel="frequency (Hz)", ylabel="amplitude (mm)", ylim=(SMALLEST, None))
     axes.set_title(f"{title}, wheelsets 1 to 3", loc="left")

@@ -8,16 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator
 
 from sosmith.gen.filter.response import magnitude_db
-from sosmith.gen.picture import picture
+from sosmith.gen.picture import AMBER, BLUE, GREEN, PURPLE, RED, SKY, legend_below, picture
 from sosmith.gen.spectrum.proposal import Proposal
 from sosmith.gen.spectrum.spectra import Array, Spectrum
 from sosmith.model.arithmetic.elementary import geometric
 
-_COLOURS = ("#2563a8", "#b4432f", "#2f8f4e", "#8a5fb0", "#c08a1e", "#4a9aa8")
-_RED, _GREY = "#b4432f", "#8a8a8a"
+_COLOURS = (BLUE, RED, GREEN, PURPLE, AMBER, SKY)
 _PLAIN = FuncFormatter(lambda value, _: f"{value:g}")
 _DECADES = 8.0
 """Decades of density that are drawn below the highest; rounding errors are lower."""
@@ -68,6 +67,7 @@ def spectrum_plot(curves: Sequence[Curve], proposal: Proposal | None, file_forma
         if proposal is not None:
             _draw_response(all_axes[-1], proposal, lowest, highest)
         all_axes[-1].set(xscale="log", xlim=(lowest, highest), xlabel="frequency (Hz)")
+        all_axes[-1].xaxis.set_major_locator(LogLocator(numticks=99))
         all_axes[-1].xaxis.set_major_formatter(_PLAIN)
 
     return picture("spectrum", (9, 1 + 3 * panels), paint, file_format, style={"lines.linewidth": 1.1})
@@ -84,17 +84,17 @@ def _draw_density(axes: Axes, curves: Sequence[Curve], unit: str) -> None:
         axes.plot(frequency, np.sqrt(density), color=colour, label=curve.name)
         low, high = (np.sqrt(density * factor) for factor in (found.lower, found.upper))
         axes.fill_between(frequency, low, high, color=colour, alpha=0.15, lw=0)
-    # Room above the curves for the legend.
-    ends = (float(np.sqrt(floor)), float(np.sqrt(top)) * 10 ** (0.5 + 0.25 * len(curves)) if top > 0 else 1.0)
+    ends = (float(np.sqrt(floor)), float(np.sqrt(top)) * 10**0.5 if top > 0 else 1.0)
     axes.set(xscale="log", yscale="log", ylim=ends, ylabel=f"{unit or 'value'}/√Hz")
+    axes.yaxis.set_major_locator(LogLocator(numticks=99))
     axes.yaxis.set_major_formatter(_PLAIN)
     axes.set_title("Spectral density, with its confidence interval", loc="left")
-    axes.legend(loc="upper right", fontsize=8)
+    legend_below(axes, 0.06)
 
 
 def _shade(axes: Axes, proposal: Proposal, lowest: float, highest: float) -> None:
     axes.axvspan(lowest, proposal["passband_edge"], color=_COLOURS[2], alpha=0.08, lw=0)
-    axes.axvspan(proposal["stopband_edge"], highest, color=_RED, alpha=0.08, lw=0)
+    axes.axvspan(proposal["stopband_edge"], highest, color=RED, alpha=0.08, lw=0)
 
 
 def _draw_response(axes: Axes, proposal: Proposal, lowest: float, highest: float) -> None:
@@ -106,8 +106,8 @@ def _draw_response(axes: Axes, proposal: Proposal, lowest: float, highest: float
         ((lowest, proposal["passband_edge"]), -proposal["passband_loss"], bottom),
         ((proposal["stopband_edge"], highest), -proposal["stopband_loss"], 3.0),
     ):
-        axes.fill_between(ends, border, end, facecolor=_RED, alpha=0.16, lw=0)
-        axes.plot(ends, [border, border], color=_RED, lw=1.0)
+        axes.fill_between(ends, border, end, facecolor=RED, alpha=0.16, lw=0)
+        axes.plot(ends, [border, border], color=RED, lw=1.0)
     axes.set(ylim=(bottom, 3.0), ylabel="gain (dB)")
     title = f"Filter of order {made.order}, delay {proposal.delay:.3g} s; the mask forbids what is red"
     axes.set_title(title, loc="left")

@@ -96,7 +96,7 @@ def wear_command(
             from sosmith.gen.instrument.wear_plot import wear_plot
 
             step("drawing")
-            drawn = wear_plot(record.time, record.clearance, report, file_format)
+            drawn = wear_plot(record.time, record.clearance, report, file_format, dated=record.dated)
     if as_json:
         print_json(_json(record, report))
     else:
