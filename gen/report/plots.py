@@ -105,6 +105,7 @@ def _embed(svg: str, title: str, width: int, height: int) -> str:
     body = re.sub(r'<g id="[^"]*">', "<g>", body)
     body = re.sub(r"<!--.*?-->\s*", "", body)
     body = body.replace("xlink:href", "href")
+    body = body.replace(' target="_blank"', "")  # a point leads to a place in the same page
     # before its release 3.11 matplotlib wrote size and family as one property
     body = re.sub(r"font: ([\d.]+px) [^;\"]*", r"font: \1 var(--sans)", body)
     body = re.sub(r"font-family: [^;\"]*", "font-family: var(--sans)", body)

@@ -54,6 +54,19 @@ class Tab:
         """Go to a page."""
         self.call("Page.navigate", url=address)
 
+    def show(self, page: Path, width: int, *, dark: bool = False) -> None:
+        """Open a file in a window of some width; the records of what is asked for and said begin anew."""
+        self.asked.clear()
+        self.said.clear()
+        self.window(width, 900, dark=dark)
+        self.open(page.as_uri())
+        self.until(f"document.readyState === 'complete' && location.href === '{page.as_uri()}'")
+
+    def is_quiet(self, page: Path) -> bool:
+        """Tell whether a page asked for nothing but itself, said nothing, and does not stick out of the window."""
+        inside = self.value("document.documentElement.scrollWidth <= innerWidth")
+        return bool(inside) and self.asked == [page.as_uri()] and self.said == []
+
     def value(self, expression: str) -> Any:
         """Return the value of an expression in the page."""
         return self.call("Runtime.evaluate", expression=expression, returnByValue=True)["result"].get("value")

@@ -64,36 +64,21 @@ def _accuracy(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def opened(tab: Tab, page: Path, width: int, *, dark: bool = False) -> None:
-    """Open a page in a window of some width; the records of what it asks for and says begin anew."""
-    tab.asked.clear()
-    tab.said.clear()
-    tab.window(width, 900, dark=dark)
-    tab.open(page.as_uri())
-    tab.until(f"document.readyState === 'complete' && location.href === '{page.as_uri()}'")
-
-
-def quiet(tab: Tab, page: Path) -> bool:
-    """Tell whether the page asked for nothing but itself and said nothing, and nothing sticks out of the window."""
-    inside = tab.value("document.documentElement.scrollWidth <= innerWidth")
-    return bool(inside) and tab.asked == [page.as_uri()] and tab.said == []
-
-
 @pytest.mark.parametrize(("width", "dark"), [(390, False), (1200, False), (1200, True)])
 def test_comparison(tab: Tab, comparison: Path, width: int, dark: bool) -> None:
-    opened(tab, comparison, width, dark=dark)
+    tab.show(comparison, width, dark=dark)
     assert tab.value("document.querySelectorAll('svg').length") == 9
-    assert quiet(tab, comparison)
+    assert tab.is_quiet(comparison)
 
 
 @pytest.mark.parametrize(("width", "dark"), [(390, False), (1200, False), (1200, True)])
 def test_report(tab: Tab, accuracy: Path, width: int, dark: bool) -> None:
-    opened(tab, accuracy, width, dark=dark)
+    tab.show(accuracy, width, dark=dark)
     tab.until("document.querySelector('.readout').textContent !== ''")
     assert tab.value("getComputedStyle(document.querySelector('.still')).display") == "none"
     paper = tab.value("getComputedStyle(document.body).backgroundColor")
     assert (paper == "rgb(20, 22, 26)") == dark
-    assert quiet(tab, accuracy)
+    assert tab.is_quiet(accuracy)
 
 
 def test_a_report_is_below_a_megabyte(accuracy: Path) -> None:
@@ -116,7 +101,7 @@ def drawn(tab: Tab) -> str:
 
 
 def test_samples_are_read_out_and_zoomed(tab: Tab, accuracy: Path) -> None:
-    opened(tab, accuracy, 1200)
+    tab.show(accuracy, 1200)
     tab.until("document.querySelector('.readout').textContent !== ''")
     first = readout(tab)
     assert first.startswith("time 234.560 s · sample 23,456 · code 22,025 · 5.377 mm · error 400.6 nm = 1.64 LSB")
@@ -142,7 +127,7 @@ def test_samples_are_read_out_and_zoomed(tab: Tab, accuracy: Path) -> None:
     move(tab, "mouseMoved", left + 3 * width / 4, top + 50)
     move(tab, "mouseReleased", left + 3 * width / 4, top + 50)
     assert drawn(tab) not in (near, far)
-    assert quiet(tab, accuracy)
+    assert tab.is_quiet(accuracy)
 
 
 def move(tab: Tab, kind: str, x: float, y: float) -> None:
@@ -154,7 +139,7 @@ def test_on_paper_everything_is_unfolded_and_the_viewer_is_a_picture(tab: Tab, a
     """With the script and without it."""
     for scripted in (True, False):
         tab.call("Emulation.setScriptExecutionDisabled", value=not scripted)
-        opened(tab, accuracy, 1200)
+        tab.show(accuracy, 1200)
         tab.call("Emulation.setEmulatedMedia", media="print")
         folded = "[...document.querySelectorAll('details table')].every((each) => each.checkVisibility())"
         assert tab.value("document.querySelectorAll('details:not([open])').length") > 0
