@@ -39,6 +39,10 @@ class Objective(Protocol):
         """What is said of realizations that `least` excludes."""
 
     @property
+    def unsuited(self) -> str:
+        """What is said of realizations for which there is no `least`."""
+
+    @property
     def hopeless(self) -> float:
         """Ratio to the smallest size beyond which a plan is not trimmed."""
 
@@ -67,6 +71,7 @@ class SmallArea:
 
     best = "the smallest estimated area"
     beyond = "more in multiplier blocks alone"
+    unsuited = "not for this filter"
     hopeless = 2.5  # trimming saved less than half in every design seen
 
     def of_graph(self, graph: Graph) -> float:
@@ -110,6 +115,7 @@ class ShortProgram:
     digit_bits: int
 
     beyond = "longer even with one digit for each value"
+    unsuited = "not to be folded"
     hopeless = 1.5  # trimming saved less than a fifth in every design seen
 
     @property

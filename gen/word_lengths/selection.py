@@ -145,7 +145,9 @@ class Selection:
             f"{self._objective.beyond}: {', '.join(name for name in REALIZATIONS if name in dropped)}"
             if dropped
             else "",
-            f"not for this: {', '.join(name for name in REALIZATIONS if name in unsuited)}" if unsuited else "",
+            f"{self._objective.unsuited}: {', '.join(name for name in REALIZATIONS if name in unsuited)}"
+            if unsuited
+            else "",
             _falling_short([name for name in REALIZATIONS if name in short]),
         ]
         rest = "; ".join(other for other in others if other)

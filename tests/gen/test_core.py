@@ -100,7 +100,7 @@ def test_programs_have_an_objective_of_their_own(spec: Specification, architectu
         counted = f"the shortest program of 6, {clocks} instructions"
     start = f"{made.quantized.realization}: {counted}, {words} words of memory, an accumulator of {bits} bits (df"
     assert made.reasons["realization"].startswith(start)
-    assert made.reasons["realization"].endswith("; not for this: normal, lattice_wdf)")
+    assert made.reasons["realization"].endswith("; not to be folded: normal, lattice_wdf)")
     # The word lengths of the smallest parallel core make a longer program.
     small = design_core(spec, realization=made.quantized.realization)
     assert length(replace(made, architecture=replace(made.architecture, datapath=small.datapath))) > length(made)
