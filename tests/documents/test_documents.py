@@ -130,18 +130,6 @@ def test_the_output_shown_is_what_the_command_prints(folder: Path) -> None:
     assert shown == worked_example(folder)
 
 
-def test_what_the_instructions_of_the_folded_core_are_for() -> None:
-    program = example_design("audio_lowpass.toml").architecture.program
-    assert program is not None
-    constants = [abs(instruction.constant) for instruction in program.instructions if instruction.constant]
-    powers = sum(constant.bit_count() == 1 for constant in constants)
-    text = " ".join((ROOT / "docs" / "hardware.md").read_text(encoding="utf-8").split())
-    assert (
-        f"Of the {len(program.instructions)} instructions of audio_lowpass, {powers} multiply a word by a power of two "
-        f"and {len(constants) - powers} by another constant:"
-    ) in text
-
-
 def test_every_line_works_or_is_understood(folder: Path) -> None:
     lines = [line for line in shell_lines() if line not in BY_CI]
     assert len(lines) > 5

@@ -122,7 +122,7 @@ def test_a_clock_that_nothing_keeps_up_with_is_refused() -> None:
         design_core(replace(spec, channels=60_000))
 
 
-@pytest.mark.parametrize(("architecture", "clock"), [("folded", 4_000_000), ("serial", 24_000_000)])
+@pytest.mark.parametrize(("architecture", "clock"), [("folded", 3_000_000), ("serial", 12_000_000)])
 def test_an_architecture_that_cannot_keep_up_says_what_it_could_do(architecture: str, clock: int) -> None:
     with pytest.raises(
         ShortfallError,
@@ -165,7 +165,7 @@ def test_a_realization_that_cannot_be_folded_is_refused() -> None:
 
 
 def test_what_the_instructions_are_there_for() -> None:
-    program = design_in("folded").architecture.program
+    program = example_design("audio_lowpass.toml").architecture.program
     assert program is not None
     products = [i for i in program.instructions if i.constant and i.address != program.one]
     powers = sum(abs(i.constant).bit_count() == 1 for i in products)
