@@ -9,13 +9,10 @@ from dataclasses import dataclass
 from itertools import groupby
 from os import PathLike, fspath
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 from sosmith.model.errors import LinkError, RefusedError, ShortfallError, SpecificationError
 from sosmith.model.reload.registers import CRC, DESIGN, ID, LAYOUT, MAGIC, STATUS, VERSION, Outcome
-
-if TYPE_CHECKING:
-    from sosmith.host.board import Board
 
 PATIENCE = 2.0
 """Seconds to wait for the gap between two samples in which a set becomes active."""
@@ -43,6 +40,16 @@ class Loaded:
     words: int
 
 
+class Registers(Protocol):
+    """What a set is loaded through: the registers of a board."""
+
+    def read_register(self, address: int) -> int:
+        """Return the word at a byte address."""
+
+    def write_register(self, address: int, *words: int) -> None:
+        """Write words to the same byte address, one after another."""
+
+
 def read_set(source: str | PathLike[str] | Mapping[str, Any]) -> Mapping[str, Any]:
     """Read what `sosmith reload` has written.
 
@@ -65,7 +72,7 @@ def read_set(source: str | PathLike[str] | Mapping[str, Any]) -> Mapping[str, An
     return tree
 
 
-def load(board: Board, proven: Mapping[str, Any]) -> Loaded:
+def load(board: Registers, proven: Mapping[str, Any]) -> Loaded:
     """Load a set that `sosmith reload` has proven; parameters and errors as for `Board.load`."""
     _match("ID", MAGIC, board.read_register(ID.address))
     _match("DESIGN", proven["design"], board.read_register(DESIGN.address))
