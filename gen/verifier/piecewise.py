@@ -25,14 +25,15 @@ from __future__ import annotations
 import math
 from fractions import Fraction
 from functools import reduce
+from itertools import dropwhile
 from operator import mul
 from typing import cast
 
 import numpy as np
 import numpy.typing as npt
-from flint import acb, arb, arb_mat, ctx, fmpq_poly, fmpz_mat, fmpz_poly
+from flint import acb, arb, arb_mat, ctx, fmpq, fmpq_poly, fmpz, fmpz_mat, fmpz_poly
 
-from sosmith.gen.verifier.l1_response import UndecidedError
+from sosmith.gen.verifier.l1_response import UndecidedError, fraction
 
 Floats = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.object_]
@@ -63,7 +64,7 @@ class Pieces:
         self._under = [int(c) for c in denominator.numer().coeffs()]
         self._order = len(self._under) - 1
         self._inverse = Fraction(1)
-        self._found: dict[tuple[str, ...], Fraction] = {}
+        self._found: dict[tuple[str, ...], tuple[fmpq, Fraction]] = {}
         if self._order:
             self._build()
             total, residual = self._sequence(fmpq_poly([1]))
@@ -72,12 +73,31 @@ class Pieces:
             self._inverse = total / (1 - residual)
 
     def norm(self, numerator: fmpq_poly) -> Fraction:
-        """Upper bound of the sum of magnitudes ``|N/D|``, hardly above it."""
-        key = tuple(map(str, numerator.coeffs()))
+        """Upper bound of the sum of magnitudes ``|N/D|``, hardly above it.
+
+        Of numerators that are each other's multiples or delays, it is computed once.
+        """
+        coefficients = numerator.coeffs()
+        if not coefficients:
+            return Fraction(0)
+        leading = coefficients[-1]
+        key = tuple(str(value / leading) for value in dropwhile(lambda value: not value, coefficients))
         if key not in self._found:
             total, residual = self._sequence(numerator)
-            self._found[key] = total + self._inverse * residual
-        return self._found[key]
+            self._found[key] = leading, total + self._inverse * residual
+        first, found = self._found[key]
+        return abs(fraction(leading / first)) * found
+
+    def excess(self, numerator: fmpq_poly, rising: fmpq_poly) -> Fraction:
+        """Upper bound, over all n, of ``|f[n]|`` minus the sum of all ``|r[k]|`` with k > n; 0 if there is none.
+
+        f and r are the responses of `numerator` and `rising`. Magnitudes are known to about 20 bits.
+        """
+        (_, most, off), (least, _, rising_off) = map(self._samples, (numerator, rising))
+        count = max(len(most), len(least)) + 1
+        most, least = (np.pad(values, (0, count - len(values))) for values in (most, least))
+        behind = np.cumsum(least[:0:-1])[::-1] * (1 - 2.0**-20)  # more than the rounding of these sums
+        return Fraction(max(0.0, float((most[:-1] - behind).max()))) + off + rising_off
 
     # The forms.
 
@@ -95,6 +115,7 @@ class Pieces:
         pieces = max(0, math.ceil(math.log2(length / _LARGEST_PIECE)))
         self._piece = max(math.ceil(length / (1 << pieces)), 2 * self._order)
         window = max(math.ceil(40 * _SPREAD / decay), self._piece)
+        self._wanted = Fraction(1 << _MARGIN // 2 + self._grown, 1 << self._bits)
         fine = self._bits + 2 * grows + 64
         while True:
             self._find_forms(window, fine)
@@ -103,6 +124,7 @@ class Pieces:
             if fine > 8 * self._bits:
                 raise UndecidedError("the responses of a denominator could not be enclosed")
             fine += fine // 2
+            self._bits += _MARGIN // 2  # large forms, as of poles close to each other, make more of their last bits
         self._find_powers()
 
     def _radii(self) -> list[float]:
@@ -157,12 +179,12 @@ class Pieces:
         norm = Fraction(sum(map(abs, self._under)), 1 << self._shift)
         self._residual = Fraction(int(np.abs(inside).sum()), 1 << self._shift + self._bits)
         self._residual += norm * Fraction(int(np.abs(between).sum()), 1 << 2 * self._bits)
-        return self._residual < Fraction(1 << _MARGIN // 2 + self._grown, 1 << self._bits)
+        return self._residual < self._wanted
 
     def _find_powers(self) -> None:
-        """Find powers of T up to one that is so small that the pieces behind it hardly count."""
+        """Find powers of T, and the norms of these and of one that is so small that what is behind hardly counts."""
         d, bits = self._order, self._bits
-        self._powers: list[Integers] = []
+        self._powers: list[fmpz_mat] = []
         self._norms: list[Fraction] = []
         with ctx.workprec(3 * bits):
             power = arb_mat(d, d, [arb(value) * arb(2) ** -bits for value in self._step.ravel().tolist()])
@@ -173,14 +195,13 @@ class Pieces:
                 entries = power.entries()
                 if not all(value.rad() * arb(2) ** bits < 1 for value in entries):
                     raise UndecidedError("the responses of a denominator could not be enclosed")
-                integers = [_integer(value * arb(2) ** bits) for value in entries]
-                self._powers.append(np.array(integers, dtype=object).reshape(d, d))
                 if self._norms[-1] < Fraction(1, 1 << _ACCURACY):
                     break
-                if self._piece << len(self._powers) > _LONGEST:
+                if self._piece << len(self._norms) > _LONGEST:
                     raise UndecidedError(f"a response does not die away within {_LONGEST} samples")
+                self._powers.append(fmpz_mat(d, d, [_integer(value * arb(2) ** bits) for value in entries]))
                 power = power * power
-        self._count = 1 << len(self._powers) - 1
+        self._count = 1 << len(self._powers)
         whole = self._forms[: self._piece]
         self._weight = Fraction(int(np.abs(whole).sum()), 1 << bits)
         largest = max(1.0, float(np.abs(whole).max()) * 2.0**-bits)
@@ -193,10 +214,19 @@ class Pieces:
 
     def _sequence(self, numerator: fmpq_poly) -> tuple[Fraction, Fraction]:
         """Upper bounds of ``|h|`` and of the residual ``|N - D h|`` for a sequence h."""
-        taps = [int(value) for value in numerator.numer().coeffs()]
-        scale = int(numerator.denom())
         if not self._order:
+            taps, scale = _taps(numerator)
             return Fraction(sum(map(abs, taps)), scale), Fraction(0)
+        head, numbers, left_out, residual = self._pieces(numerator)
+        total = Fraction(self._magnitudes(numbers) + (sum(map(abs, head)) << self._bits), 1 << 2 * self._bits)
+        return total + left_out, residual
+
+    def _pieces(self, numerator: fmpq_poly) -> tuple[list[int], Integers, Fraction, Fraction]:
+        """Find a sequence h: its first samples and the numbers x of its pieces, both in units of ``2**-bits``.
+
+        Return as well by how much all magnitudes together may differ from those of h, and the residual ``|N - D h|``.
+        """
+        taps, scale = _taps(numerator)
         d, bits = self._order, self._bits
         start = max(0, len(taps) - d)
         places = [*range(start), *(start + at for at in self._places)]
@@ -208,9 +238,21 @@ class Pieces:
         sizes = Fraction(float(np.abs(numbers.astype(np.float64) * 2.0**-bits).max(axis=0).sum()) * (1 + 2.0**-30))
         sizes = (sizes + Fraction(len(numbers[0]) * error, 1 << bits)) / (1 - self._norms[-1])
         residual = self._first_residual(taps, scale, head, first) + self._residual * sizes
-        total = Fraction(self._magnitudes(numbers) + (sum(map(abs, head)) << bits), 1 << 2 * bits)
-        total += self._weight * (Fraction(self._count * error, 1 << bits) + self._norms[-1] * sizes)
-        return total, residual
+        left_out = self._weight * (Fraction(self._count * error, 1 << bits) + self._norms[-1] * sizes)
+        return head, numbers, left_out, residual
+
+    def _samples(self, numerator: fmpq_poly) -> tuple[Floats, Floats, Fraction]:
+        """Return bounds of the magnitudes of a response's samples, and by how much they all together may be off."""
+        head, numbers, left_out, residual = self._pieces(numerator)
+        sums, doubts, exponents = self._short_sums(numbers)
+        units = np.ldexp(1.0, exponents - 2 * self._short)
+        pieces = [((np.abs(sums) + sign * doubts) * units).T.ravel() for sign in (-1, 1)]
+        first = np.abs(np.array(head, dtype=object).astype(np.float64)) * 2.0**-self._bits
+        least, most = (
+            np.concatenate([first * (1 + sign * 2.0**-50), values])
+            for sign, values in zip((-1, 1), pieces, strict=True)
+        )
+        return np.maximum(least, 0.0), most, left_out + self._inverse * residual
 
     def _first_residual(self, taps: list[int], scale: int, head: list[int], first: Integers) -> Fraction:
         """Sum of the magnitudes of ``N - D h`` before piece 0 carries on by itself."""
@@ -226,32 +268,43 @@ class Pieces:
     def _numbers(self, first: Integers) -> tuple[Integers, int]:
         """Return x of all pieces, shape (order, pieces), in units of ``2**-bits``, and a bound on the error of each."""
         d, bits = self._order, self._bits
-        numbers, error = first.reshape(d, 1), 0
-        for power, norm in zip(self._powers[:-1], self._norms, strict=False):
-            factor = fmpz_mat(d, d, power.ravel().tolist())
-            made = factor * fmpz_mat(d, numbers.shape[1], numbers.ravel().tolist())
-            more = np.array([int(value) >> bits for value in made.entries()], dtype=object).reshape(numbers.shape)
+        rows, error = [[fmpz(value)] for value in first.tolist()], 0
+        largest = max(map(abs, first.tolist()))
+        for power, norm in zip(self._powers, self._norms, strict=False):
+            made = [value >> bits for value in (power * fmpz_mat(rows)).entries()]
             # The power is within two units, and the product is rounded down.
-            largest = int(np.abs(numbers).sum(axis=0).max()) + d * error
-            error = max(error, math.ceil(norm * error) + (2 * largest >> bits) + 2)
-            numbers = np.concatenate([numbers, more], axis=1)
-        return numbers, error
+            error = max(error, math.ceil(norm * error) + (2 * d * (largest + error) >> bits) + 2)
+            largest = max(largest, int(max(map(abs, made))))
+            count = len(rows[0])
+            rows = [row + made[k * count : (k + 1) * count] for k, row in enumerate(rows)]
+        return np.array([list(map(int, row)) for row in rows], dtype=object), error
 
     def _magnitudes(self, numbers: Integers) -> int:
         """Sum of ``|P x|`` over all pieces, exact, in units of ``2**-(2 bits)``."""
-        d = self._order
-        values = numbers.astype(np.float64) * 2.0**-self._bits
-        _, exponents = np.frexp(np.abs(values).max(axis=0))
-        small = np.rint(np.ldexp(values, self._short - exponents))
-        sums = self._small @ small
-        left_out = _ROUNDED * (np.abs(self._small).sum(axis=1)[:, None] + np.abs(small).sum(axis=0)) + d
+        sums, doubts, _ = self._short_sums(numbers)
         signs = np.where(sums < 0, -1.0, 1.0)
-        rows, columns = np.nonzero(np.abs(sums) <= left_out)
+        rows, columns = np.nonzero(np.abs(sums) <= doubts)
         exact = (self._forms[rows] * numbers[:, columns].T).sum(axis=1)
         signs[rows, columns] = np.where(exact < 0, -1.0, 1.0)
-        parts = (self._limbs @ signs).reshape(-1, d, numbers.shape[1]).astype(np.int64).astype(object)
+        parts = (self._limbs @ signs).reshape(-1, self._order, numbers.shape[1]).astype(np.int64).astype(object)
         added = reduce(lambda high, low: (high << self._limb) + low, reversed(parts))
         return int((added * numbers).sum())
+
+    def _short_sums(self, numbers: Integers) -> tuple[Floats, Floats, npt.NDArray[np.int32]]:
+        """Return P x of all pieces from shortened integers, by how much it may be off, and the pieces' exponents.
+
+        Both are in units of ``2**(exponent - 2 short)``, and are exact in doubles.
+        """
+        values = numbers.astype(np.float64) * 2.0**-self._bits
+        _, exponents = np.frexp(np.maximum(np.abs(values).max(axis=0), 2.0**-self._bits))
+        small = np.rint(np.ldexp(values, self._short - exponents))
+        doubts = _ROUNDED * (np.abs(self._small).sum(axis=1)[:, None] + np.abs(small).sum(axis=0)) + self._order
+        return self._small @ small, doubts, exponents
+
+
+def _taps(numerator: fmpq_poly) -> tuple[list[int], int]:
+    """Return the coefficients of a numerator as integers, and what they are to be divided by."""
+    return [int(value) for value in numerator.numer().coeffs()], int(numerator.denom())
 
 
 def _integer(value: arb) -> int:

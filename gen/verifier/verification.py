@@ -38,6 +38,9 @@ _ROLES = ("polynomial", "section", "output")
 _SHORT = 1 << 10
 """Samples of an inverse that is faster than pieces."""
 
+_NEGLIGIBLE = Fraction(1, 1 << 64)
+"""Share of a limit that may be added to it instead of summing up to every sample."""
+
 
 @dataclass(frozen=True)
 class Verdict:
@@ -279,10 +282,7 @@ class _Cascade:
         """Numerator and denominator of the ideal filter."""
         numerator = denominator = fmpq_poly([1])
         for index, section in enumerate(certificate.ideal.sections):
-            b, a = (
-                fmpq_poly([fmpq(c.numerator, c.denominator) for c in p])
-                for p in (section.numerator, section.denominator)
-            )
+            b, a = (fmpq_poly(list(map(_rational, p))) for p in (section.numerator, section.denominator))
             require(section.denominator[0] == 1, f"the denominator of ideal section {index} must begin with 1")
             require(is_stable(a), f"ideal section {index} must have its poles inside the unit circle")
             numerator, denominator = numerator * b, denominator * a
@@ -343,26 +343,34 @@ class _Denominator:
         self.polynomial = polynomial
 
     @cached_property
-    def _norm(self) -> Callable[[fmpq_poly], Fraction]:
-        """How to find sums of magnitudes: by an approximate inverse if it is short, else in pieces."""
+    def _short(self) -> Inverse | None:
+        """Approximate inverse, if it is short."""
         try:
-            over = inverse(self.polynomial, _SHORT)
+            return inverse(self.polynomial, _SHORT)
         except UndecidedError:
-            return Pieces(self.polynomial).norm
-        return lambda numerator: response(numerator, over).gain
+            return None
+
+    @cached_property
+    def pieces(self) -> Pieces | None:
+        """Responses in pieces, if they are long."""
+        return Pieces(self.polynomial) if self._short is None else None
 
     @cached_property
     def inverse(self) -> Inverse:
-        """Approximate inverse."""
-        return inverse(self.polynomial)
+        """Approximate inverse, however long."""
+        return inverse(self.polynomial) if self._short is None else self._short
 
     def norm(self, numerator: fmpq_poly) -> Fraction:
         """Upper bound of the sum of magnitudes."""
-        return self._norm(numerator)
+        return response(numerator, self.inverse).gain if self.pieces is None else self.pieces.norm(numerator)
 
     def total(self, numerator: fmpq_poly) -> Fraction:
         """Sum of all samples, exact."""
         return fraction(numerator(1) / self.polynomial(1))
+
+
+def _rational(value: Fraction) -> fmpq:
+    return fmpq(value.numerator, value.denominator)
 
 
 def _magnitude(over: _Denominator, driven: Sequence[_Driven]) -> Fraction:
@@ -374,16 +382,38 @@ def _extremes(over: _Denominator, driven: Sequence[_Driven]) -> tuple[Fraction, 
     """Limits, over all times n, of the sum over all drives of ``sum over k <= n of h_k u(n - k)``.
 
     If every range contains zero, each term with the worst u is on one side of it, and the limits are those of the whole
-    sums: with ``u = c + v`` and ``|v| <= r``, c times the sum of all samples, and r times the sum of magnitudes.
+    sums: with ``u = c + v`` and ``|v| <= r``, c times the sum of all samples, and r times the sum of magnitudes. If one
+    does not, sums up to some n may be beyond these, by what `_overshoot` bounds.
     """
     summed = _summed_up(driven)
-    if any(low > 0 or high < 0 for _, low, high in summed):
-        return _running_extremes(over, summed)
     centre = reach = Fraction(0)
     for numerator, low, high in summed:
         centre += (low + high) / 2 * over.total(numerator)
         reach += (high - low) / 2 * over.norm(numerator)
-    return centre - reach, centre + reach
+    apart = [(numerator, low, high) for numerator, low, high in summed if low > 0 or high < 0]
+    if not apart:
+        return centre - reach, centre + reach
+    more = _overshoot(over, apart, summed)
+    if more is None or more > reach * _NEGLIGIBLE:
+        return _running_extremes(over, summed)
+    return centre - reach - more, centre + reach + more
+
+
+def _overshoot(over: _Denominator, apart: Sequence[_Driven], driven: Sequence[_Driven]) -> Fraction | None:
+    """Bound on how far sums up to some n leave the limits of the whole sums; None if responses are short.
+
+    What is still to come after n, with the worst u, is the sum over all drives and k > n of ``c h_k + r |h_k|``. It is
+    negative at most by the magnitude of the sum of ``c h_k`` for the drives `apart`, whose ranges do not contain zero.
+    Of the others no term is negative, and those of one alone are at least the smaller end of its range times ``|h_k|``.
+    """
+    others = [(numerator, min(-low, high)) for numerator, low, high in driven if low < 0 < high]
+    if over.pieces is None or not others:
+        return None
+    steady = sum((numerator * _rational((low + high) / 2) for numerator, low, high in apart), fmpq_poly([0]))
+    whole = over.polynomial * (steady(1) / over.polynomial(1))
+    falling = (whole - steady) / fmpq_poly([1, -1])
+    rising, least = max(others, key=lambda one: one[1] * over.norm(one[0]))
+    return over.pieces.excess(falling, rising * _rational(least))
 
 
 def _summed_up(driven: Sequence[_Driven]) -> list[_Driven]:

@@ -1,13 +1,14 @@
 """Sums of magnitudes from responses in pieces, against approximate inverses; and what must not pass."""
 
 from fractions import Fraction
+from itertools import accumulate, zip_longest
 from math import prod
 
 import pytest
 from flint import fmpq, fmpq_poly
 
-from sosmith.gen.verifier import piecewise
-from sosmith.gen.verifier.l1_response import UndecidedError, inverse, response
+from sosmith.gen.verifier import piecewise, verification
+from sosmith.gen.verifier.l1_response import BITS, UndecidedError, inverse, response
 from sosmith.gen.verifier.piecewise import Pieces
 
 SLOW = fmpq_poly([1, fmpq(-63, 32), fmpq(497, 512)])
@@ -38,6 +39,17 @@ def test_sums_agree_with_an_approximate_inverse(name: str) -> None:
         assert other.gain - 2 * other.error <= found < other.gain + max(other.gain, 1) / 2**80
 
 
+def test_multiples_and_delays_have_the_multiple_of_one_sum(monkeypatch: pytest.MonkeyPatch) -> None:
+    made, over = Pieces(SLOW), inverse(SLOW)
+    first = made.norm(NUMERATORS[1])
+    monkeypatch.setattr(made, "_sequence", None)
+    for factor in (fmpq_poly([fmpq(-3, 4)]), fmpq_poly([0, 0, 5]), fmpq_poly([0, fmpq(1, 2**20)])):
+        found, exact = made.norm(NUMERATORS[1] * factor), response(NUMERATORS[1] * factor, over)
+        assert found == first * abs(Fraction(str(factor.leading_coefficient())))
+        assert exact.gain - 2 * exact.error <= found < exact.gain + Fraction(1, 2**80)
+    assert made.norm(fmpq_poly([0])) == 0
+
+
 @pytest.mark.parametrize("part", ["_forms", "_step"])
 def test_forms_that_do_not_solve_the_recursion_are_not_taken(part: str) -> None:
     """The residual is exact: one weight that is off in its last but a few bits is seen, and counted."""
@@ -48,6 +60,14 @@ def test_forms_that_do_not_solve_the_recursion_are_not_taken(part: str) -> None:
     assert made._residual > before + Fraction(1 << 99, 1 << made._bits)
     made._found.clear()
     assert made.norm(fmpq_poly([1, -1])) > sum_before + Fraction(1, 1 << made._bits - 99)
+
+
+def test_forms_whose_last_bits_count_get_more_of_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As the large ones of many poles close to each other; here the bits that are asked for beyond these are few."""
+    denominator = DENOMINATORS["the same pair three times"]
+    before = Pieces(denominator).norm(fmpq_poly([1]))
+    monkeypatch.setattr(piecewise, "_MARGIN", 4)
+    assert abs(Pieces(denominator).norm(fmpq_poly([1])) - before) < before / 2**80
 
 
 def test_signs_close_to_zero_come_from_the_long_integers(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -79,3 +99,59 @@ def test_a_response_of_the_longest_length_is_summed(monkeypatch: pytest.MonkeyPa
 def test_a_coefficient_that_is_no_binary_fraction_is_refused() -> None:
     with pytest.raises(UndecidedError, match=r"^a coefficient is no binary fraction$"):
         Pieces(fmpq_poly([1, fmpq(-1, 3)]))
+
+
+@pytest.mark.parametrize("name", ["one pole", "a pair", "the same pair three times", "slow and fast"])
+def test_what_one_response_exceeds_the_rest_of_another(name: str) -> None:
+    made, over = Pieces(DENOMINATORS[name]), inverse(DENOMINATORS[name])
+    falling, rising = NUMERATORS[2], NUMERATORS[1]
+    f = [abs(value) for value in response(falling, over).samples]
+    signs = set()
+    for share in (fmpq(1, 8), fmpq(1), fmpq(1000)):
+        r = [abs(value) for value in response(rising * share, over).samples]
+        whole = sum(r)
+        rest = [whole - before for before in accumulate(r)]
+        exact = Fraction(max(0, *(a - b for a, b in zip_longest(f, rest, fillvalue=0))), 1 << BITS)
+        found = made.excess(falling, rising * share)
+        assert exact - Fraction(1, 1 << 80) <= found <= exact + Fraction(max(f) + whole, 1 << BITS + 16)
+        signs.add(found > Fraction(1, 1 << 60))
+    assert signs == {False, True}
+
+
+def test_a_response_that_has_ended_exceeds_nothing() -> None:
+    """Its numbers are 0 from some piece on, and then have no magnitude that a doubt could be a share of."""
+    made = Pieces(DENOMINATORS["slow and fast"])
+    assert made.excess(SLOW, fmpq_poly([1000])) < Fraction(1, 1 << 80)
+
+
+LONG = fmpq_poly([1, fmpq(-2045, 1024), fmpq(1023 * 1023, 1 << 20)])
+"""Poles at an angle of about 0.04, which decay by a thousandth a sample."""
+
+
+@pytest.mark.parametrize(
+    ("constant", "low", "summed_up"),
+    [
+        (fmpq(1, 1 << 20), -3, False),
+        (fmpq(-1, 1 << 20), -3, False),
+        (fmpq(1000), -3, True),
+        (fmpq(1), Fraction(-1, 1 << 20), True),
+    ],
+)
+def test_limits_with_a_constant_are_those_of_the_sums_up_to_every_sample(
+    constant: fmpq, low: Fraction, summed_up: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A small one does not reach beyond what a large signal can still do; a large one overshoots."""
+    over, value = verification._Denominator(LONG), Fraction(int(constant.p), int(constant.q))
+    driven = [
+        (fmpq_poly([0, 1, 1]), Fraction(low), Fraction(5)),
+        (fmpq_poly([1, -2, 1]), Fraction(-1, 1 << 21), Fraction(0)),
+        (fmpq_poly([1]), value, value),
+    ]
+    exact = verification._running_extremes(over, driven)
+    calls = []
+    monkeypatch.setattr(verification, "_running_extremes", lambda *given: calls.append(given) or exact)
+    found = verification._extremes(over, driven)
+    assert bool(calls) == summed_up
+    assert found[0] <= exact[0] + Fraction(1, 1 << 80)
+    assert exact[1] - Fraction(1, 1 << 80) <= found[1]
+    assert all(abs(a - b) < Fraction(1, 1 << 50) for a, b in zip(found, exact, strict=True))
