@@ -9,8 +9,9 @@ from tests.interface.small import filter_design, instrument_design
 
 import sosmith
 from sosmith.host.board import Board
-from sosmith.model.link.frames import Message
-from sosmith.model.link.protocol import Counter
+from sosmith.model.link.device import Device
+from sosmith.model.link.frames import Message, Receiver
+from sosmith.model.link.protocol import Counter, Type
 from sosmith.sim.virtual_board.line_damage import LineDamage
 
 
@@ -83,6 +84,37 @@ def test_a_damaged_line_costs_time_but_no_sample(seed: int) -> None:
     assert line.device.counters[Counter.REPEATED] > 0
     assert line.device.counters[Counter.CRC] + line.device.counters[Counter.MALFORMED] > 5
     assert counters["refused"] == 0
+
+
+def test_after_a_timeout_only_the_oldest_request_is_sent_again_and_nothing_new() -> None:
+    made = filter_design()
+    line = ForgetfulLine(plain_device(), forgets=4)
+    codes = random_codes(made, 80 * 10)
+    with Board.on(line) as board:
+        opened = len(line.sent)
+        results = board.run_codes(codes)
+        assert board.faults == {"damaged": 0, "unexpected": 0, "gaps": 0, "timeouts": 4}
+    assert np.array_equal(results.codes, made.core.datapath.compute(codes)[:, 0])
+    first = line.sent[opened - 1] + 1
+    lost = first + 4
+    assert line.sent[opened:] == [*range(first, lost + 4), *range(lost, first + 10)]
+
+
+class ForgetfulLine(BadLine):
+    """A line that loses one frame with samples, after `forgets` others, and remembers the numbers of all frames."""
+
+    def __init__(self, device: Device, *, forgets: int) -> None:
+        super().__init__(device)
+        self.sent: list[int] = []
+        self._left = forgets
+
+    def write(self, data: bytes) -> None:
+        (message,) = Receiver().feed(data)
+        assert isinstance(message, Message)
+        self.sent.append(message.sequence)
+        self._left -= message.type == Type.SAMPLES
+        if self._left != -1 or message.type != Type.SAMPLES:
+            super().write(data)
 
 
 @pytest.mark.slow

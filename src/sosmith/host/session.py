@@ -85,6 +85,7 @@ class Session:
         self._pending: deque[_Pending] = deque()
         self._sequence = 0
         self._round_trip: float | None = None
+        self._drains = False  # nothing new is sent: the board may have dropped what it has not answered
         self._attempts = OPEN_ATTEMPTS
         body = self.request(Type.OPEN)
         self._attempts = MAX_ATTEMPTS
@@ -115,7 +116,8 @@ class Session:
         source = iter(requests)
         more = True
         while True:
-            while more and len(self._pending) < self.window:
+            self._drains = self._drains and bool(self._pending)
+            while more and not self._drains and len(self._pending) < self.window:
                 request = next(source, None)
                 if request is None:
                     more = False
@@ -152,8 +154,9 @@ class Session:
                 if attempt == self._attempts:
                     raise LinkLostError(f"the board must answer, not be silent after {attempt} attempts")
                 attempt, asked = attempt + 1, False
-                for pending in self._pending:
-                    self._again(pending)
+                # Not the others: copies of what is still on its way would be more than the credit.
+                self._drains = True
+                self._again(self._pending[0])
                 deadline = time.monotonic() + self._patience(attempt)
             data = self._line.read(deadline - time.monotonic())
             silent = not data
