@@ -13,6 +13,7 @@ from tests.virtual_board.test_netlist import SocketLine
 
 import sosmith
 from sosmith.gen.core import CoreDesign
+from sosmith.gen.fpga.boards import find_board
 from sosmith.gen.stimuli import traces_for
 from sosmith.host.board import Board
 from sosmith.host.identity_check import check_files
@@ -147,7 +148,7 @@ def test_results_that_nobody_fetches_are_missed_from_the_oldest_on(made: sosmith
     with running(netlist, codes) as board:
         before = board.counters()["missed"]
         fetched(board, 6)
-        for _ in range(400):  # time passes
+        for _ in range(480):  # time passes
             board.readings()
         missed = board.counters()["missed"] - before
         found = board.poll()
@@ -174,3 +175,16 @@ def test_a_monitor_numbers_whole_samples(made: sosmith.Design, netlist: Netlist)
             rows = event.results.codes
             assert rows.tolist() == expected[taken : taken + len(rows)].tolist()
             taken += len(rows)
+
+
+@pytest.mark.slow
+def test_the_gates_of_a_board_with_converters(made: sosmith.Design, place: Path) -> None:
+    """What Yosys makes of front-end, link and core together, in the cells of an iCEBreaker."""
+    codes = measured(made.core)
+    netlist = build(made.core, place / "gates", clock=Fraction(4_000_000), gates=find_board("icebreaker"))
+    assert netlist.schedule is not None
+    with running(netlist, codes) as board:
+        found, status = fetched(board, 90)
+    fed = fed_codes(netlist.schedule, codes)[:30]
+    assert found == made.core.datapath.compute(fed).reshape(-1).tolist()
+    assert status == made.core.datapath.compute_status(fed).reshape(-1).tolist()
