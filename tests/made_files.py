@@ -113,7 +113,7 @@ SPECIFICATIONS = _specifications()
 EXAMPLES = tuple(sorted(path.stem for path in (ROOT / "examples").glob("*.toml")))
 
 
-_SPEED = re.compile(r"[\d,.]+ cycles/s|(?<=clock cycles in )[^<]*(?= with)")
+_SPEED = re.compile(r"(?<=>)[\d.,]+\u00a0\w+ clock(?=<)|(?<= in )[^<]*(?=<br>the whole run)|(?<=comparing, took )[^<]*")
 """What a page tells of the duration of the simulation."""
 
 

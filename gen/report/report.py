@@ -8,42 +8,18 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from sosmith.gen.filter.response import MASK_TOLERANCE_DB, FilterFacts, ResponseMeasures, measure_response
+from sosmith.gen.filter.response import ResponseMeasures, measure_response
 from sosmith.gen.output.manifest import limit_cycle_entry
-from sosmith.gen.quantity import plain_number, quantity
+from sosmith.gen.quantity import quantity
 from sosmith.gen.report.behaviour import behaviour, behaviour_entry
 from sosmith.gen.report.curves import error_over_time, error_spectrum, filter_curve
 from sosmith.gen.report.evidence import Evidence
+from sosmith.gen.report.mask import mask_shortfalls
 from sosmith.gen.report.page import render_page
 from sosmith.gen.report.provenance import Provenance
 from sosmith.gen.version import __version__
 from sosmith.model.reference.accuracy import accuracy_percent, error_statistics, sqnr_db
 from sosmith.model.text_files import to_json, write_files
-
-
-def mask_shortfalls(facts: FilterFacts, measures: ResponseMeasures) -> list[str]:
-    """Say in one sentence each where the quantized response misses the specification's mask.
-
-    A miss of at most `MASK_TOLERANCE_DB` counts as met, for the reason given there. A filter whose largest
-    pole radius is 1 or more has no frequency response to speak of, and misses whatever the mask.
-    """
-    found = []
-    if measures.largest_pole_radius >= 1:
-        radius = plain_number(measures.largest_pole_radius, 6)
-        found.append(f"The filter with its integer coefficients is unstable: a pole lies at radius {radius}.")
-    if facts.passband_edge and facts.passband_loss is not None:
-        if measures.passband_loss_db > facts.passband_loss + MASK_TOLERANCE_DB:
-            found.append(
-                f"The passband loss is {measures.passband_loss_db:.4f} dB, "
-                f"more than the {facts.passband_loss:g} dB allowed."
-            )
-        if measures.passband_gain_db > MASK_TOLERANCE_DB:
-            found.append(f"The passband rises {measures.passband_gain_db:.4f} dB above the level of the ideal filter.")
-    attenuation = measures.stopband_attenuation_db
-    asked = facts.stopband_loss if facts.stopband_edge else None
-    if asked is not None and attenuation is not None and attenuation < asked - MASK_TOLERANCE_DB:
-        found.append(f"The stopband attenuation is {attenuation:.3f} dB, less than the {asked:g} dB asked for.")
-    return found
 
 
 def _shortfalls(evidence: Evidence, max_abs: float, measures: ResponseMeasures | None) -> list[str]:

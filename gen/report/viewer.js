@@ -67,7 +67,7 @@
   }
 
   function show(first, second) {
-    const span = Math.min(Math.max(second - first, Math.min(8, last) * 1), Math.max(last, 1));
+    const span = Math.min(Math.max(second - first, Math.min(8, last)), Math.max(last, 1));
     const middle = (first + second) / 2;
     from = Math.min(Math.max(middle - span / 2, 0), Math.max(last - span, 0));
     to = from + span;
@@ -83,7 +83,7 @@
   }
 
   function measure(value, [factor, unit]) {
-    return `${round(value * factor, 4)} ${unit}`.trim();
+    return `${round(value * factor, 4)} ${unit.startsWith("10") ? "× " : ""}${unit}`.trim();
   }
 
   function say() {

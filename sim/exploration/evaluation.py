@@ -13,8 +13,8 @@ from sosmith.gen.fpga.boards import find_board
 from sosmith.gen.quantity import quantity
 from sosmith.gen.report.comparison.choice import cost_unit, hardware_cost
 from sosmith.gen.report.filter_facts import filter_facts
+from sosmith.gen.report.mask import mask_shortfalls
 from sosmith.gen.report.provenance import provenance_of
-from sosmith.gen.report.report import mask_shortfalls
 from sosmith.gen.stimuli import default_scenario, traces_for
 from sosmith.model.errors import ShortfallError, SpecificationError
 from sosmith.model.reference.accuracy import error_statistics, sqnr_db

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import multiprocessing
 import os
 import signal
@@ -54,7 +55,13 @@ def in_processes(tasks: Sequence[Task], jobs: int) -> Generator[Point, None, Non
 
 
 def _prepare() -> None:
-    """Leave Ctrl-C to the parent, which ends its workers, and end if the parent has died."""
+    """Leave Ctrl-C to the parent, which ends its workers, and end if the parent has died.
+
+    A design makes and drops many small objects, and next to no circles of them: looking for these among all that was
+    imported took a tenth of the time.
+    """
+    gc.freeze()
+    gc.set_threshold(50_000, 20, 20)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = multiprocessing.parent_process()
     assert parent is not None

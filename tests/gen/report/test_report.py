@@ -26,8 +26,9 @@ from sosmith.gen.fpga.synthesis import Netlist
 from sosmith.gen.output.core_facts import CoefficientFacts, LimitCycleFacts, NodeFormat, SectionFacts
 from sosmith.gen.report import plots
 from sosmith.gen.report.evidence import Alternative, Evidence
+from sosmith.gen.report.mask import mask_shortfalls
 from sosmith.gen.report.page import render_page
-from sosmith.gen.report.report import mask_shortfalls, summarise, write_report
+from sosmith.gen.report.report import summarise, write_report
 
 Array = npt.NDArray[np.float64]
 
