@@ -125,6 +125,7 @@ def design_core(
             ideal=ideal,
             polynomial=polynomial,
             realization=name,
+            steady=spec.hardware.start == "steady",
         )
 
     def select(architecture: str) -> tuple[Quantized, str]:

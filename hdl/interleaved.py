@@ -175,7 +175,7 @@ def _time(graph: Graph, node: Node) -> int:
     """Delay of a node in the unit of `_ADDITION`."""
     if node.op in NO_LOGIC:
         return 0
-    if node.op in {Op.SCALE, Op.MULTIPLY}:
+    if node.op in {Op.SCALE, Op.MULTIPLY} and not graph.is_gate(node):
         operands = [(graph.nodes[i].width, graph.nodes[i].signed) for i in node.operands]
         if node.op is Op.SCALE:
             operands.append((abs(node.parameter).bit_length() + (node.parameter < 0), node.parameter < 0))

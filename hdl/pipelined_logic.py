@@ -88,8 +88,9 @@ class PipelinedLogic:
         if (index, pipeline_stage) not in self._passed:
             register = Signal(shape_of(node), name=f"{self.names[index]}_passed{pipeline_stage}", reset_less=True)
             self._passed[index, pipeline_stage] = register
+            before = self.at(index, pipeline_stage - 1)  # may make another register, which loads by its own rule
             with self._m.If(self._takes[pipeline_stage - 1]):
-                self._m.d.sync += register.eq(self.at(index, pipeline_stage - 1))
+                self._m.d.sync += register.eq(before)
         return self._passed[index, pipeline_stage]
 
     def connect(self, inputs: Sequence[Value], apart: Collection[int] = ()) -> None:
@@ -142,6 +143,9 @@ def logic(graph: Graph, node: Node, operands: list[Value], factor: Value | None 
         return a + b if node.op is Op.ADD else a - b
     if node.op is Op.SCALE:
         return operands[0] * (Const(node.parameter) if factor is None else factor)
+    if graph.is_gate(node):
+        bit, other = sorted(operands, key=len)
+        return Mux(bit, other, 0)
     if node.op is Op.MULTIPLY:
         return operands[0] * operands[1]
     if node.op is Op.FLOOR:

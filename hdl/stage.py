@@ -98,7 +98,7 @@ def _known_early(graph: Graph, stages: list[int]) -> set[int]:
     products: set[int] = set()
     for index, node in enumerate(graph.nodes):
         own = [i for i in node.operands if stages[i] == stages[index] and node.op is not Op.DELAY]
-        if node.op in {Op.SCALE, Op.MULTIPLY} or products & set(own):
+        if (node.op in {Op.SCALE, Op.MULTIPLY} and not graph.is_gate(node)) or products & set(own):
             products.add(index)
     return {
         i
@@ -213,8 +213,9 @@ class PipelinedStage(wiring.Component):
         logic.connect([getattr(self, f"i{k}") for k in range(len(graph.inputs))], apart)
         at, wires, names = logic.at, logic.wires, logic.names
         for i in graph.delays:
+            following = at(graph.nodes[i].operands[0], stages[i])  # may make a register, which loads by its own rule
             with m.If(takes[stages[i]]):
-                m.d.sync += wires[i].eq(at(graph.nodes[i].operands[0], stages[i]))
+                m.d.sync += wires[i].eq(following)
         if self.parity:
             self._check(m, logic, stages, takes)
         last = len(takes) - 1
@@ -226,12 +227,12 @@ class PipelinedStage(wiring.Component):
             else:
                 register = Signal(shape_of(graph.nodes[i]), name=f"{names[i]}_register", reset_less=True)
                 m.d.comb += output.eq(register)
+                loads = [register.eq(at(i, last))]
+                if graph.nodes[i].op is Op.CLAMP:
+                    outside = limits(graph.nodes[i], at(graph.nodes[i].operands[0], last))
+                    loads.append(self.o_saturated.eq(Cat(*outside).any()))
                 with m.If(takes[last]):
-                    m.d.sync += register.eq(at(i, last))
-                    if graph.nodes[i].op is Op.CLAMP:
-                        m.d.sync += self.o_saturated.eq(
-                            Cat(*limits(graph.nodes[i], at(graph.nodes[i].operands[0], last))).any()
-                        )
+                    m.d.sync += loads
         return m
 
     def _check(self, m: Module, logic: PipelinedLogic, stages: list[int], takes: list[Value]) -> None:

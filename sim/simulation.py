@@ -164,7 +164,7 @@ def _evidence(
     wrong = np.flatnonzero(differs.any(axis=1))
     unfiltered = np.stack([calibrated(t.codes, datapath.inputs, quantized.polynomial) for t in traces], axis=1)
     sos = None if quantized.filter is None else quantized.filter.sos
-    golden = np.stack([filtered(column, sos, output) for column in unfiltered.T], axis=1)
+    golden = np.stack([filtered(column, sos, output, steady=quantized.steady) for column in unfiltered.T], axis=1)
     trace = traces[0]
     low, high = output.decode(np.array([output.lowest, output.highest]))
     evidence = Evidence(

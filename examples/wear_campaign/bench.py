@@ -137,5 +137,5 @@ def signals(trace: Trace, made: CoreDesign) -> dict[str, Values]:
     """Return time in s and clearances in mm of a run: true, measured, and filtered."""
     bench = bench_of(made)
     raw = calibrated(trace.codes, bench.ports, made.quantized.polynomial)
-    smooth = filtered(raw, made.quantized.filter.sos, bench.output)
+    smooth = filtered(raw, made.quantized.filter.sos, bench.output, steady=made.quantized.steady)
     return {"time": trace.time, "true": trace.truth, "measured": raw, "filtered": smooth}

@@ -121,7 +121,8 @@ def judged(made: Made, trace: Trace, core: CoreDesign) -> dict[str, float]:
     bench = bench_of(core)
     V, T = (port.decode(trace.codes[:, k]) for k, port in enumerate(bench.ports))
     reading = trace.reading
-    clearance = filtered(made.polynomial(V, T), core.quantized.filter.sos, bench.output)
+    quantized = core.quantized
+    clearance = filtered(made.polynomial(V, T), quantized.filter.sos, bench.output, steady=quantized.steady)
     some = np.flatnonzero(reading)[::EVERY]
     half = made.interval(V[some], T[some])
     return {

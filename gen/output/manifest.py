@@ -26,6 +26,7 @@ def manifest(facts: CoreFacts) -> dict[str, Any]:
         "latency_cycles": interface.latency_cycles,
         "cycles_per_sample": facts.cycles_per_sample,
         "realization": facts.realization,
+        "start": facts.start,
         "architecture": facts.architecture,
         "schedule": _schedule(facts.program),
         "reload": None if facts.reload is None else _entry(facts.reload),

@@ -4,6 +4,10 @@ The impulse responses of all sources (the input, and the error of every quantize
 through exact linear models. At each node with a stated range, and at the output, they bound the value. If no node has
 overflowed at an earlier sample, none overflows at this one; by induction, the linear model always holds.
 
+Behind a stage that takes the first sample x0 off every sample (`sosmith.model.sections.start`), the input is ``x - x0``
+with x and x0 in the same range, of the width R: for each x0 it stays in a window of this width that contains 0. Limits
+are linear in the place of the window, so those of the windows [0, R] and [-R, 0] hold for all of them.
+
 Stages may have several inputs and outputs. Where the paths of one source meet, their responses are added, and the
 source counts once.
 """
@@ -51,9 +55,16 @@ class CascadeProof:
 
 
 def prove_cascade(
-    stages: Sequence[StageModel], ideal: Sequence[TransferFunction], low: Fraction, high: Fraction
+    stages: Sequence[StageModel],
+    ideal: Sequence[TransferFunction],
+    low: Fraction,
+    high: Fraction,
+    *,
+    steady: bool = False,
 ) -> CascadeProof:
     """Prove a cascade of at least one stage, with one input and one output, for inputs in [low, high] from reset on.
+
+    If `steady`, these are the ends of ``x - x0``, and low is -high.
 
     Raises
     ------
@@ -64,24 +75,39 @@ def prove_cascade(
     nodes = []
     for number, stage in enumerate(stages):
         lanes = [Lane(number, model, wires) for model in stage]
-        nodes.append({node: extent(list(lane.at(node).values())) for lane in lanes for node in lane.model.bounds})
+        nodes.append({node: _limits(lane.at(node), steady=steady) for lane in lanes for node in lane.model.bounds})
         wires = [lane.at(lane.model.output) for lane in lanes]
     (drives,) = wires
     exact = through(ideal)
     return CascadeProof(
         nodes=tuple(nodes),
-        output=extent(list(drives.values())),
+        output=_limits(drives, steady=steady),
         rounding=extent([drive for key, drive in drives.items() if key != INPUT]),
-        coefficients=extent([Drive(drives[INPUT].response.minus(exact), low, high)]),
+        coefficients=_limits({INPUT: Drive(drives[INPUT].response.minus(exact), low, high)}, steady=steady),
         gain=_gain(exact),
     )
 
 
+def _limits(drives: Drives, *, steady: bool) -> Extent:
+    """Limits of the sum of drives; if `steady`, for the input in each of its windows."""
+    if not steady or INPUT not in drives:
+        return extent(list(drives.values()))
+    zero, through = Fraction(0), drives[INPUT]
+    windows = [Drive(through.response, zero, through.high), Drive(through.response, through.low, zero)]
+    found = [extent(list({**drives, INPUT: window}.values())) for window in windows]
+    return Extent(min(one.low for one in found), max(one.high for one in found))
+
+
 def coefficient_extent(
-    stages: Sequence[StageModel], ideal: Sequence[TransferFunction], low: Fraction, high: Fraction
+    stages: Sequence[StageModel],
+    ideal: Sequence[TransferFunction],
+    low: Fraction,
+    high: Fraction,
+    *,
+    steady: bool = False,
 ) -> Extent:
     """Limits of the output of the stages' transfer functions minus that of the ideal sections."""
-    return extent([Drive(made_response(stages).minus(through(ideal)), low, high)])
+    return _limits({INPUT: Drive(made_response(stages).minus(through(ideal)), low, high)}, steady=steady)
 
 
 def made_response(stages: Sequence[StageModel]) -> Response:

@@ -8,11 +8,14 @@ from fractions import Fraction
 from typing import cast
 
 from sosmith.gen.filter.design import Filter
+from sosmith.gen.proof.cascade_proof import made_response
+from sosmith.gen.proof.linear_model import linear_models
 from sosmith.gen.realizations.registry import REALIZATIONS, Section
 from sosmith.gen.realizations.section_format import SectionFormat, unknown_range
+from sosmith.gen.reload.first_samples import Limits, first_samples
 from sosmith.gen.word_lengths.cascade import cascade, chosen_formats, parts_of, stages_of
-from sosmith.gen.word_lengths.input_stage import InputStage, horner_error, normalised
-from sosmith.gen.word_lengths.quantize import gain_of
+from sosmith.gen.word_lengths.input_stage import InputStage, horner_error, normalised, starting_like
+from sosmith.gen.word_lengths.quantize import gain_at_zero, gain_of
 from sosmith.gen.word_lengths.quantized import Quantized, assembled
 from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.errors import ShortfallError
@@ -60,7 +63,11 @@ def with_constants(
         if ideal is not None:
             formats = _with_coefficients_of(filled, formats, made.realization)
         formats = _lifted(formats, room - finer)
-        sections, proof = cascade(filled, made.realization, formats, before.output)
+        if made.steady:
+            before = starting_like(before, gain_at_zero(filled), made.held)
+        sections, proof = cascade(filled, made.realization, formats, before.output, steady=made.steady)
+        if made.steady:
+            before = _with_any_first_sample(before, first_samples(made), sections, filled)
     datapath = made.datapath
     found = assembled(
         name=datapath.name,
@@ -75,6 +82,22 @@ def with_constants(
         proof=proof,
     )
     return replace(found, datapath=replace(found.datapath, calibrated=datapath.calibrated, wear=datapath.wear))
+
+
+def _with_any_first_sample(before: InputStage, held: Limits, sections: Sequence[Section], ideal: Filter) -> InputStage:
+    """Return an input stage with the error of the start for first samples in the range `held`.
+
+    With the difference D of the made filter and the ideal one, the coefficients' error is that of ``D (x - x0)``. It is
+    proven for x0 in the range of x; for each unit that x0 lies outside it may be larger by ``|D(1)|``.
+    """
+    assert before.start is not None
+    start = before.start
+    _, span = before.output.limits  # of the samples less a first one: as wide as the range of the samples
+    wider = held[1] - held[0] - span
+    off = made_response([linear_models(section.graph) for section in sections]).at_zero_frequency - gain_at_zero(ideal)
+    gain = Fraction(0) if start.held is None else start.held.gain * Fraction(2) ** -start.held.gain_frac
+    error = abs(gain - gain_at_zero(ideal)) * max(-held[0], held[1]) + abs(off) * max(wider, Fraction(0))
+    return replace(before, start=replace(start, error=error))
 
 
 def _input_stage(made: Quantized, polynomial: Polynomial | None) -> InputStage:

@@ -14,6 +14,7 @@ from sosmith.gen.architecture import Budget, structure
 from sosmith.gen.core import CoreDesign, calibrated_codes, filter_of, polynomial_of
 from sosmith.gen.filter.design import Filter
 from sosmith.gen.quantity import quantity
+from sosmith.gen.reload.first_samples import check_samples, first_samples, held_codes
 from sosmith.gen.reload.other_constants import with_constants
 from sosmith.gen.reload.transient import transient
 from sosmith.gen.specification.specification import Specification
@@ -26,6 +27,7 @@ from sosmith.model.dataflow.graph import Node, Op
 from sosmith.model.dataflow.program import Program
 from sosmith.model.errors import ShortfallError, SpecificationError
 from sosmith.model.reload.constants import constants, packed, values_of, with_ranges, with_room
+from sosmith.model.sections.start import StartStage
 
 ADVICE = (
     "go there in smaller steps, each after the one before has faded, or stop the samples and reset the core before "
@@ -229,10 +231,16 @@ def check_swap(hardware: CoreDesign, active: OtherSet | None, other: OtherSet) -
     if active is None or not other.quantized.sections:
         return Swap(made=other, samples=0, use=_use(hardware, other.quantized.datapath, other.program))
     old, new = active.quantized, other.quantized
-    found = transient(old, new)
-    first = new.datapath.stages.index(new.sections[0])
+    held = first_samples(hardware.quantized) if new.steady else None
+    if held is not None:
+        check_samples(old, held)
+        check_samples(new, held)
+    found = transient(old, new, held)
+    first = len(new.datapath.stages) - 1 - len(found.ranges)
     ranges: list[dict[str, tuple[int, int]]] = [{} for _ in new.datapath.stages]
     ranges[first : first + len(found.ranges)] = found.ranges
+    if held is not None:
+        ranges[first - 1] = held_codes(new, held)
     try:
         during = with_ranges(new.datapath, ranges)
         made = _fitted(hardware, during, "swap")
@@ -244,10 +252,13 @@ def check_swap(hardware: CoreDesign, active: OtherSet | None, other: OtherSet) -
 
 
 def _use(hardware: CoreDesign, during: Datapath, made: Program | None) -> Fraction:
-    """Largest share of its hardware range that a state may use, among states that are not just delayed inputs."""
+    """Largest share of its hardware range that a state of the filter may use, among those that are not just inputs."""
     shares = []
     locations = {} if made is None else {location.name: location for location in made.locations}
-    for stage, roomy in zip(during.stages, with_room(hardware.datapath).stages, strict=True):
+    own = hardware.datapath
+    for before, stage, roomy in zip(own.stages, during.stages, with_room(own).stages, strict=True):
+        if isinstance(before, StartStage):
+            continue  # a first sample may have any value
         for index in stage.graph.delays:
             node = stage.graph.nodes[index]
             if stage.graph.nodes[node.operands[0]].op in {Op.INPUT, Op.FRACTION, Op.DELAY}:

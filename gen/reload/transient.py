@@ -57,7 +57,7 @@ class Transient:
     samples: int
 
 
-def transient(active: Quantized, other: Quantized) -> Transient:
+def transient(active: Quantized, other: Quantized, held: tuple[Fraction, Fraction] | None = None) -> Transient:
     """Bound all signals when `other` takes over from `active`, at any sample and for all inputs in range.
 
     An earlier swap may have left an error of up to `RESIDUE` in every state.
@@ -66,6 +66,9 @@ def transient(active: Quantized, other: Quantized) -> Transient:
     ----------
     active, other : Quantized
         Filters in the same number of sections, with the same states.
+    held : (Fraction, Fraction) or None
+        Range of the first samples that may be held, which contains that of all samples; None for filters that start
+        from zero.
 
     Raises
     ------
@@ -73,7 +76,25 @@ def transient(active: Quantized, other: Quantized) -> Transient:
         If their states differ.
     """
     pairs = [_Pair(a, b) for a, b in zip(active.sections, other.sections, strict=True)]
-    low, high = _input_values(active, other)
+    if held is None:
+        return _transient(pairs, *_input_values(active, other))
+    # Whatever is held, the samples less that lie in a window of this width that contains 0, and limits are linear in
+    # where it lies.
+    span, zero = held[1] - held[0], Fraction(0)
+    above, below = _transient(pairs, zero, span), _transient(pairs, -span, zero)
+    ranges = tuple(
+        {name: (min(a[name][0], b[name][0]), max(a[name][1], b[name][1])) for name in a}
+        for a, b in zip(above.ranges, below.ranges, strict=True)
+    )
+    (entry,) = pairs[0].active.graph.inputs
+    node = pairs[0].active.graph.nodes[entry]
+    widest = math.ceil(span * Fraction(2) ** node.frac)
+    ranges[0][node.name] = -widest, widest
+    return Transient(ranges=ranges, samples=max(above.samples, below.samples))
+
+
+def _transient(pairs: Sequence[_Pair], low: Fraction, high: Fraction) -> Transient:
+    """Bound all signals for inputs of the first section in [low, high]."""
     wires: list[Drives] = [{INPUT: Drive(IMPULSE, low, high)}]
     fading = _Fading()
     ranges = []

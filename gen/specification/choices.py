@@ -1,4 +1,4 @@
-"""Valid names in a specification: families, kinds, methods, realizations, architectures, cores, inputs.
+"""Valid names in a specification: families, kinds, methods, realizations, starts, architectures, cores, inputs.
 
 Those of `hardware.protect` are in `sosmith.model.dataflow.protection`.
 """
@@ -7,6 +7,7 @@ FAMILIES = ("butterworth", "chebyshev1", "chebyshev2", "elliptic", "bessel")
 KINDS = ("lowpass", "highpass", "bandpass", "bandstop")
 METHODS = ("bilinear", "impulse_invariant")
 REALIZATIONS = ("auto", "df1", "df1_ef1", "df1_ef2", "df2t", "delta", "state_space", "normal", "lattice_wdf")
+STARTS = ("steady", "zero")
 ARCHITECTURES = ("auto", "parallel", "folded", "serial")
 
 CORES = ("instrument", "filter", "calibration")

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field, PlainValidator, ValidationError
 from pydantic_core import ErrorDetails
 
-from sosmith.gen.specification.choices import ARCHITECTURES, FAMILIES, KINDS, METHODS, REALIZATIONS
+from sosmith.gen.specification.choices import ARCHITECTURES, FAMILIES, KINDS, METHODS, REALIZATIONS, STARTS
 from sosmith.gen.specification.values import (
     ABOVE_ZERO,
     IDENTIFIER,
@@ -142,6 +142,7 @@ class HardwareTable(Table):
     clock: Annotated[Fraction, PlainValidator(positive("Hz"))] = Fraction(12_000_000)
     reload: Annotated[bool, PlainValidator(flag)] = False
     protect: Annotated[str, PlainValidator(choice(PROTECTIONS))] = "none"
+    start: Annotated[str, PlainValidator(choice(STARTS))] = "zero"
 
 
 class Document(Table):

@@ -102,6 +102,8 @@ class HardwareSpec:
         Whether coefficients can be loaded at run time.
     protect : str
         One of `sosmith.model.dataflow.protection.PROTECTIONS`.
+    start : str
+        "steady" if the filter starts from the steady state of its first sample, "zero" if from states of 0.
     """
 
     realization: str
@@ -109,6 +111,7 @@ class HardwareSpec:
     clock: Fraction
     reload: bool
     protect: str
+    start: str
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -246,6 +249,7 @@ def _specification(path: Path, tree: dict[str, Any], document: Document) -> Spec
             clock=hardware.clock,
             reload=hardware.reload,
             protect=hardware.protect,
+            start=hardware.start,
         ),
         converters=converters(inputs, document.converter),
     )

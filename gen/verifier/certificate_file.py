@@ -124,7 +124,7 @@ class StageEntry(_Part):
     """A stage of the datapath."""
 
     name: Text
-    role: Literal["polynomial", "section", "output"]
+    role: Literal["polynomial", "start", "section", "output"]
     nodes: Annotated[tuple[NodeEntry, ...], Field(min_length=1, max_length=10_000)]
     outputs: Annotated[tuple[Index, ...], Field(min_length=1)]
 
@@ -140,11 +140,13 @@ class IdealEntry(_Part):
     """The exact calculation that the hardware approximates.
 
     `polynomial` holds the calibration's coefficients in physical units: row i is for the first input to the power i.
-    It is None if the only input is used as it is.
+    It is None if the only input is used as it is. The sections begin with states of 0, or, if `start` is "steady", with
+    those that they would have if the first sample had been there for ever.
     """
 
     polynomial: tuple[Annotated[tuple[Rational, ...], Field(min_length=1)], ...] | None
     sections: Annotated[tuple[SectionEntry, ...], Field(max_length=64)]
+    start: Literal["steady"] | None = None
 
 
 class GainEntry(_Part):

@@ -136,10 +136,10 @@ def _affine(port: PortEntry, entry: NodeEntry, index: int, count: int) -> _Value
     return _variable(index, count).times(scale).plus(_constant(port.zero, count))
 
 
-def output_error(certificate: Certificate, stage: StageEntry) -> Fraction:
-    """Bound the error of the last stage, in output LSBs.
+def output_error(certificate: Certificate, stage: StageEntry) -> tuple[Fraction, Fraction]:
+    """Bound the error of the last stage, in output LSBs, and find the gain of its second input, 0 without one.
 
-    The stage subtracts the output's zero, rounds and limits.
+    The stage adds the second input with that gain, subtracts the output's zero, rounds and limits.
 
     Raises
     ------
@@ -151,9 +151,12 @@ def output_error(certificate: Certificate, stage: StageEntry) -> Fraction:
         node.op is not Operation.CLAMP or (node.low, node.high) == (port.lowest, port.highest),
         f"the output must be limited to {port.lowest}..{port.highest}, not {node.low}..{node.high}",
     )
-    x = _variable(0, 1)
-    made = _through(stage, [x], 1)[stage.outputs[0]]
-    difference = made.plus(x, -1).plus(_constant(port.zero / port.lsb, 1))
-    factor = difference.exact.pop((1,), Fraction(0)) + 1
+    count = len(inputs_of(stage))
+    require(count in {1, 2}, f"{stage.name} must have one or two inputs, not {count}")
+    variables = [_variable(index, count) for index in range(count)]
+    made = _through(stage, variables, count)[stage.outputs[0]]
+    difference = made.plus(variables[0], -1).plus(_constant(port.zero / port.lsb, count))
+    factor = difference.exact.pop((1, 0)[:count], Fraction(0)) + 1
     require(factor == 1, f"{stage.name} must add to its input and no more, not multiply it by {factor}")
-    return difference.size + difference.radius
+    gain = difference.exact.pop((0, 1), Fraction(0))
+    return difference.size + difference.radius, gain

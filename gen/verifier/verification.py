@@ -3,7 +3,8 @@
 1. Every graph must be well formed, and every range must follow from earlier ranges (`sosmith.gen.verifier.graph`).
 2. The polynomial and the output rounding are followed symbolically (`sosmith.gen.verifier.polynomial`).
 3. The sections' transfer functions are computed as determinants, and the Schur-Cohn recursion decides stability. A
-   section may have several inputs and outputs; the cascade has one of each.
+   section may have several inputs and outputs; the cascade has one of each. A stage that starts a filter from its
+   first sample is followed symbolically (`sosmith.gen.verifier.start`).
 4. Sums over impulse responses are enclosed by their exact residuals: sums of magnitudes by responses in pieces
    (`sosmith.gen.verifier.piecewise`), short ones and running sums by approximate inverses
    (`sosmith.gen.verifier.l1_response`). Every range that a BOUND states must contain the proven range, and every
@@ -29,11 +30,12 @@ from sosmith.gen.verifier.graph import RejectedError, Transfer, check_graph, inp
 from sosmith.gen.verifier.l1_response import BITS, Inverse, UndecidedError, fraction, inverse, is_stable, response
 from sosmith.gen.verifier.piecewise import Pieces
 from sosmith.gen.verifier.polynomial import output_error, polynomial_error
+from sosmith.gen.verifier.start import Start, check_start, section_alone
 
 Progress = Callable[[str, int, int], None]
 """Callback for progress, called with the name of the step, the number of units done, and their total."""
 
-_ROLES = ("polynomial", "section", "output")
+_ROLES = ("polynomial", "start", "section", "output")
 
 _SHORT = 1 << 10
 """Samples of an inverse that is faster than pieces."""
@@ -100,7 +102,7 @@ def _verified(certificate: Certificate, progress: Progress) -> Verdict:
     for stage in stages:
         check_graph(stage)
     _check_seams(certificate)
-    fore, sections, last = ([stage for stage in stages if stage.role == role] for role in _ROLES)
+    fore, starts, sections, last = ([stage for stage in stages if stage.role == role] for role in _ROLES)
     progress("calibration", 0, 0)
     budget: dict[str, Fraction] = {}
     if fore:
@@ -113,18 +115,26 @@ def _verified(certificate: Certificate, progress: Progress) -> Verdict:
         bool(sections) == bool(certificate.ideal.sections),
         f"the hardware's sections must stand for ideal ones, not {len(sections)} for {len(certificate.ideal.sections)}",
     )
+    start = _start(certificate, starts)
+    rounding, added = output_error(certificate, last[0])
+    require(start is not None or not added, "the output stage must add nothing where no first sample is passed to it")
     ranges, margin = 0, Fraction(0)
     if sections:
-        cascade = _Cascade(certificate, sections, progress)
+        alone = [section_alone(stage) for stage in sections] if start is not None and start.passes else sections
+        cascade = _Cascade(certificate, alone, start, progress)
         for part in budget:
             budget[part] *= cascade.peak_gain
         budget["filter coefficients"], budget["filter rounding"] = cascade.coefficients, cascade.rounding
         ranges, margin = cascade.ranges, cascade.margin
+        if start is not None:
+            error = abs(added - cascade.gain_at_zero) * start.size
+            budget["start"] = on_grid(error)
+            margin = min(margin, (budget["start"] - error) / max(Fraction(1), start.size))
         _compare("peak_gain of the filter", certificate.claims.peak_gain, cascade.peak_gain)
     else:
         _compare("peak_gain of the filter", certificate.claims.peak_gain, None)
         require(not certificate.claims.sections, "the gains of sections must not be given where there are none")
-    budget["output rounding"] = output_error(certificate, last[0])
+    budget["output rounding"] = rounding
     _compare_budget(certificate, budget)
     return Verdict(budget, sum(len(stage.nodes) for stage in stages), ranges, margin)
 
@@ -162,7 +172,7 @@ def _check_seams(certificate: Certificate) -> None:
     roles = [stage.role for stage in stages]
     require(
         roles == sorted(roles, key=_ROLES.index) and roles.count("output") == 1,
-        f"the stages must be polynomial, section and one output, in this order, not {', '.join(roles)}",
+        f"the stages must be polynomial, start, section and one output, in this order, not {', '.join(roles)}",
     )
     for port in (*certificate.inputs, certificate.output):
         require(port.lsb > 0, f"lsb of {port.name} must be positive, not {port.lsb}")
@@ -185,6 +195,16 @@ def _check_seams(certificate: Certificate) -> None:
         f"the output must be whole codes in {output.lowest}..{output.highest}, not in {node.low}..{node.high} "
         f"with {node.frac} fraction bits",
     )
+
+
+def _start(certificate: Certificate, stages: Sequence[StageEntry]) -> Start | None:
+    """Prove the stage that starts the filter from its first sample, if there is one."""
+    wanted = int(certificate.ideal.start is not None)
+    require(len(stages) == wanted, f"there must be {wanted} start stages, as the ideal filter says, not {len(stages)}")
+    if not stages:
+        return None
+    require(bool(certificate.ideal.sections), "a start must not be given where there are no sections")
+    return check_start(stages[0])
 
 
 def _check_plain_input(certificate: Certificate) -> None:
@@ -222,7 +242,9 @@ _Driven = tuple[fmpq_poly, Fraction, Fraction]
 class _Cascade:
     """The proof of a cascade of sections; its attributes are the claimed figures, rounded up to the grid."""
 
-    def __init__(self, certificate: Certificate, sections: Sequence[StageEntry], progress: Progress) -> None:
+    def __init__(
+        self, certificate: Certificate, sections: Sequence[StageEntry], start: Start | None, progress: Progress
+    ) -> None:
         self._models = [Transfer(section) for section in sections]
         self._over: dict[str, _Denominator] = {}
         shape = (len(inputs_of(sections[0])), len(sections[-1].outputs))
@@ -230,13 +252,14 @@ class _Cascade:
         for section, model in zip(sections, self._models, strict=True):
             require(is_stable(model.denominator), f"{section.name} must have its poles inside the unit circle")
         self._compare_gains(certificate)
-        entry = self._models[0].sources[self._models[0].inputs[0]]
+        self._windows = [self._models[0].sources[self._models[0].inputs[0]]] if start is None else start.windows
         exact = self._ideal(certificate)
+        self.gain_at_zero = fraction(exact[0](1) / exact[1](1))
         ideal = self._over_all(exact[1])
         gain = ideal.norm(exact[0])
         self.peak_gain = on_grid(gain)
         self.ranges = 0
-        drives = [_Drive(0, [fmpq_poly([1])], *entry)]
+        drives = [_Drive(0, [fmpq_poly([1])], *self._windows[0])]
         for index, model in enumerate(self._models):
             progress("sections", index, len(self._models))
             arrived = drives
@@ -252,13 +275,11 @@ class _Cascade:
         self.rounding = on_grid(_magnitude(over, errors))
         difference = made[0] * ideal.polynomial - exact[0] * over.polynomial
         both = self._over_all(over.polynomial * ideal.polynomial)
-        deviation = _magnitude(both, [(difference, *entry)])
+        deviation = max(_magnitude(both, [(difference, *window)]) for window in self._windows)
         self.coefficients = on_grid(deviation)
         # Both figures are rounded up: what that adds is room for another ideal filter.
-        self.margin = min(
-            self.peak_gain - gain,
-            (self.coefficients - deviation) / max(Fraction(1), *(abs(end) for end in entry)),
-        )
+        largest = max(Fraction(1), *(abs(end) for window in self._windows for end in window))
+        self.margin = min(self.peak_gain - gain, (self.coefficients - deviation) / largest)
 
     def _compare_gains(self, certificate: Certificate) -> None:
         claims = certificate.claims.sections
@@ -319,10 +340,9 @@ class _Cascade:
         stage = self._models[index].stage
         bound = stage.nodes[node]
         of = stage.nodes[bound.operands[0]]
-        low, high = (
-            end * 2**bound.frac
-            for end in _extremes(self._up_to(index), [self._driven(d, index) for d in self._at(index, [node], arrived)])
-        )
+        (through, *_), *others = (self._driven(drive, index) for drive in self._at(index, [node], arrived))
+        found = [_extremes(self._up_to(index), [(through, *window), *others]) for window in self._windows]
+        low, high = min(low for low, _ in found) * 2**bound.frac, max(high for _, high in found) * 2**bound.frac
         require(
             bound.low <= max(low, of.low) and min(high, of.high) <= bound.high,
             f"{label(stage, node)} must hold {float(low):.17g}..{float(high):.17g}, not {bound.low}..{bound.high}",

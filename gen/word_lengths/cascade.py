@@ -29,11 +29,14 @@ def unquantized(ideal: Filter, realization: str, bits: int) -> list[StageModel]:
 
 
 def cascade(
-    ideal: Filter, realization: str, formats: Sequence[SectionFormat], x: Range
+    ideal: Filter, realization: str, formats: Sequence[SectionFormat], x: Range, *, steady: bool = False
 ) -> tuple[list[Section], CascadeProof]:
-    """Build the stages for an input in `x`, prove their ranges, and build them again with these ranges."""
+    """Build the stages for an input in `x`, prove their ranges, and build them again with these ranges.
+
+    `steady` is as for `sosmith.gen.proof.cascade_proof.prove_cascade`.
+    """
     stages = stages_of(ideal, realization, formats, unknown_range(x.frac))
-    proof = prove_cascade([linear_models(s.graph) for s in stages], ideal.exact, *x.limits)
+    proof = prove_cascade([linear_models(s.graph) for s in stages], ideal.exact, *x.limits, steady=steady)
     proven = list(formats)
     for k, (stage, extents) in enumerate(zip(stages, proof.nodes, strict=True)):
         nodes = stage.graph.nodes

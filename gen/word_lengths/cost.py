@@ -63,7 +63,7 @@ class Cost:
     multiplications : tuple of Multiplication
         In the order of the datapath.
     adder_bits : int
-        Result bits of all additions and subtractions.
+        Result bits of all additions, subtractions and products with a single bit.
     register_bits : int
         State bits and pipeline registers.
     """
@@ -125,6 +125,8 @@ def cost_of_graphs(graphs: Sequence[Graph]) -> Cost:
             if node.op is Op.SCALE:
                 factor = Operand(abs(node.parameter).bit_length() + (node.parameter < 0), node.parameter < 0)
                 multiplications.append(Multiplication(_operand(nodes[node.operands[0]]), factor))
+            elif graph.is_gate(node):
+                adders += node.width
             elif node.op is Op.MULTIPLY:
                 a, b = (_operand(nodes[i]) for i in node.operands)
                 multiplications.append(Multiplication(a, b))

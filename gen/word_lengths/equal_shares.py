@@ -19,7 +19,7 @@ _Fracs = list[dict[str, int]]
 
 
 def equally_shared(
-    ideal: Filter, realization: str, x: Range, share: Fraction
+    ideal: Filter, realization: str, x: Range, share: Fraction, *, steady: bool = False
 ) -> tuple[Sequence[Section], CascadeProof]:
     """Choose formats with equal shares for coefficients and rounding, and prove the stages.
 
@@ -33,6 +33,8 @@ def equally_shared(
         Fraction bits and range of the filter's input.
     share : Fraction
         Error allowed for each part, in output LSBs.
+    steady : bool
+        As for `sosmith.gen.proof.cascade_proof.prove_cascade`.
 
     Raises
     ------
@@ -40,10 +42,10 @@ def equally_shared(
         If no formats within the limits keep to the error allowed, or the filter has no such realization.
     """
     parts_of(ideal, realization)  # raises here, with its own reason, if there is no such realization
-    bits = _coefficient_bits(ideal, realization, x, share)
+    bits = _coefficient_bits(ideal, realization, x, share, steady=steady)
     fracs = _fraction_bits(ideal, realization, bits, share)
     while True:
-        sections, proof = cascade(ideal, realization, _rounded(ideal, realization, bits, fracs), x)
+        sections, proof = cascade(ideal, realization, _rounded(ideal, realization, bits, fracs), x, steady=steady)
         if proof.rounding.magnitude <= share:
             return sections, proof
         # A quantizer's error is not centred on zero.
@@ -51,12 +53,13 @@ def equally_shared(
         fracs = _within_limits(finer, ideal, realization, share)
 
 
-def _coefficient_bits(ideal: Filter, realization: str, x: Range, share: Fraction) -> int:
+def _coefficient_bits(ideal: Filter, realization: str, x: Range, share: Fraction, *, steady: bool) -> int:
     """Fewest significant bits whose proven effect stays within `share`."""
     bits = MIN_BITS
     while bits <= MAX_BITS:
         try:
-            error = coefficient_extent(unquantized(ideal, realization, bits), ideal.exact, *x.limits).magnitude
+            models = unquantized(ideal, realization, bits)
+            error = coefficient_extent(models, ideal.exact, *x.limits, steady=steady).magnitude
         except ShortfallError:
             bits += 1  # unstable with so few bits
             continue

@@ -1,11 +1,16 @@
-"""The stage before a filter's sections: the calibration polynomial, or the scaling of the input."""
+"""The stages before a filter's sections: the calibration polynomial, or the scaling of the input, and the start.
+
+A filter that starts from its first sample takes it off before the sections, and adds it behind them with the gain at
+zero frequency (`sosmith.model.sections.start`). There that gain is rounded; what this costs is a part of the error.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
+from sosmith.gen.realizations.coefficients import lowest_terms
 from sosmith.gen.word_lengths.bit_limits import MAX_BITS
 from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.dataflow.datapath import Stage
@@ -13,12 +18,33 @@ from sosmith.model.dataflow.graph import Range
 from sosmith.model.errors import ShortfallError
 from sosmith.model.port import Port
 from sosmith.model.sections.horner import HornerPolynomial, Variable
+from sosmith.model.sections.output import Held
+from sosmith.model.sections.start import StartStage
 
 _COARSER = 4
 """How many fraction bits fewer the calibration may have than with an equal share of the budget."""
 
 
+_START_SHARE = 16
+"""Share of the error allowed for another part that the start may take at most: this part of it."""
+
 _IDENTITY = Polynomial(((Fraction(0),), (Fraction(1),)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Start:
+    """How a filter starts from its first sample.
+
+    Attributes
+    ----------
+    held : Held or None
+        What is added behind the sections; None if that is 0.
+    error : Fraction
+        Bound on the error of what is added, in output LSBs; exact.
+    """
+
+    held: Held | None
+    error: Fraction
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,11 +59,65 @@ class InputStage:
         Fraction bits and range of its output, which drives the sections.
     error : Fraction
         Bound on its error, in output LSBs; exact.
+    start : Start or None
+        What starts the filter from its first sample; None if it starts from zero.
     """
 
     stages: tuple[Stage, ...]
     output: Range
     error: Fraction
+    start: Start | None = None
+
+
+def starting(stage: InputStage, gain: Fraction, allowed: Fraction) -> InputStage:
+    """Return an input stage with which a filter starts from its first sample.
+
+    Parameters
+    ----------
+    stage : InputStage
+        Input stage of a filter that starts from zero.
+    gain : Fraction
+        Gain of the ideal filter at zero frequency.
+    allowed : Fraction
+        Error allowed for each other part, in output LSBs; the start takes a small share of it.
+    """
+    frac = 0
+    while abs(round(gain * 2**frac) - gain * 2**frac) * _size(stage.output) * _START_SHARE > allowed * 2**frac:
+        frac += 1
+    return _with_start(stage, gain, *lowest_terms(round(gain * 2**frac), frac))
+
+
+def starting_like(stage: InputStage, gain: Fraction, held: Held | None) -> InputStage:
+    """Return an input stage with which another filter starts in hardware that adds what is `held`.
+
+    Raises
+    ------
+    ShortfallError
+        If the hardware has no multiplier for the gain that the filter needs.
+    """
+    frac = 0 if held is None else held.gain_frac
+    integer = round(gain * 2**frac)
+    if (held is None) != (integer == 0) or (held is not None and held.is_plain and integer != held.gain):
+        have = 0 if held is None else held.gain * Fraction(2) ** -frac
+        raise ShortfallError(
+            f"the gain at zero frequency must be {have}, as the hardware has it, not {float(gain):.6g}"
+        )
+    return _with_start(stage, gain, integer, frac)
+
+
+def _with_start(stage: InputStage, gain: Fraction, integer: int, frac: int) -> InputStage:
+    held = Held(range=stage.output, gain=integer, gain_frac=frac) if integer else None
+    start = StartStage(x=stage.output, passes=held is not None)
+    return replace(
+        stage,
+        stages=(*stage.stages, start),
+        output=start.graph.output_ranges[0],
+        start=Start(held=held, error=abs(integer * Fraction(2) ** -frac - gain) * _size(stage.output)),
+    )
+
+
+def _size(x: Range) -> Fraction:
+    return max(map(abs, x.limits))
 
 
 def needs_scaling(port: Port, output: Port) -> bool:

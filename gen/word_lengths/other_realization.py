@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from sosmith.gen.word_lengths.cascade import cascade, chosen_formats
 from sosmith.gen.word_lengths.output_stage import output_stage
-from sosmith.gen.word_lengths.quantized import Quantized, filter_budget
+from sosmith.gen.word_lengths.quantized import Quantized, beside, filter_budget
 
 
 def with_realization(quantized: Quantized, realization: str) -> Quantized:
@@ -16,15 +16,16 @@ def with_realization(quantized: Quantized, realization: str) -> Quantized:
     """
     ideal = quantized.filter
     assert ideal is not None
-    stages = quantized.datapath.stages
-    first = next(index for index, stage in enumerate(stages) if stage in quantized.sections)
     (x,) = quantized.sections[0].graph.input_ranges
-    sections, proof = cascade(ideal, realization, chosen_formats(quantized.sections), x)
+    formats = chosen_formats(quantized.sections)
+    sections, proof = cascade(ideal, realization, formats, x, steady=quantized.steady)
     (y,) = sections[-1].graph.output_ranges
-    last, error = output_stage(y, quantized.datapath.output)
+    last, error = output_stage(y, quantized.datapath.output, quantized.held)
+    *stages, _ = quantized.datapath.stages
+    passing = beside(sections, quantized.held)
     return replace(
         quantized,
-        datapath=replace(quantized.datapath, stages=(*stages[:first], *sections, last)),
+        datapath=replace(quantized.datapath, stages=(*stages[: -len(sections)], *passing, last)),
         realization=realization,
         budget=quantized.budget | filter_budget(proof) | {"output rounding": error},
         proof=proof,

@@ -6,23 +6,25 @@ from fractions import Fraction
 
 from sosmith.model.dataflow.graph import Range
 from sosmith.model.port import Port
-from sosmith.model.sections.output import OutputStage
+from sosmith.model.sections.output import Held, OutputStage
 
 
-def output_stage(x: Range, output: Port) -> tuple[OutputStage, Fraction]:
+def output_stage(x: Range, output: Port, held: Held | None = None) -> tuple[OutputStage, Fraction]:
     """Make the last stage for a result in `x`, and bound its error in output LSBs.
 
-    The error is half an LSB if anything is rounded, plus the rounding error of the offset.
+    The error is half an LSB if anything is rounded, plus the rounding error of the offset. What is `held` is added
+    exactly, with its gain.
     """
-    frac = max(x.frac, 0)
+    frac = max(x.frac, 0 if held is None else held.range.frac + held.gain_frac, 0)
     exact = -output.zero / output.lsb * 2**frac
     offset = round(exact)
-    rounding = Fraction(1, 2) if x.frac > 0 else Fraction(0)
+    rounding = Fraction(1, 2) if frac > 0 else Fraction(0)
     stage = OutputStage(
         offset=offset,
         offset_frac=frac,
         x=x,
         low=output.lowest,
         high=output.highest,
+        held=held,
     )
     return stage, rounding + abs(exact - offset) / 2**frac

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
+from typing import cast
 
 from sosmith.gen.filter.design import Filter
 from sosmith.gen.proof.cascade_proof import CascadeProof, ideal_gain
@@ -21,7 +22,7 @@ from sosmith.gen.realizations.section_format import SectionFormat, unknown_range
 from sosmith.gen.word_lengths.bit_limits import MAX_BITS
 from sosmith.gen.word_lengths.cascade import cascade, parts_of, stages_of, unquantized
 from sosmith.gen.word_lengths.equal_shares import equally_shared
-from sosmith.gen.word_lengths.input_stage import InputStage, input_stages, needs_scaling
+from sosmith.gen.word_lengths.input_stage import InputStage, input_stages, needs_scaling, starting
 from sosmith.gen.word_lengths.objective import SMALL_AREA, Objective
 from sosmith.gen.word_lengths.ordering import best_order
 from sosmith.gen.word_lengths.output_stage import output_stage
@@ -44,7 +45,7 @@ class Plan:
 
     Attributes
     ----------
-    name, inputs, output, max_error, ideal, polynomial, realization
+    name, inputs, output, max_error, ideal, polynomial, realization, steady
         As for `plan`; the filter's sections are in the order of the cascade.
     gain : Fraction
         Worst-case peak gain of the filter, 1 without one.
@@ -69,6 +70,7 @@ class Plan:
     ideal: Filter | None
     polynomial: Polynomial | None
     realization: str
+    steady: bool
     gain: Fraction
     share: Fraction
     input_stages: tuple[InputStage, ...]
@@ -89,7 +91,9 @@ class Plan:
             return self.objective.of_datapath(self.made.datapath)
         if self.search is None or self.start is None:
             return math.inf
-        last, _ = output_stage(self.search.output(self.start), self.output)
+        before = self.input_stages[self.start.input_stage].start
+        held = None if before is None else before.held
+        last, _ = output_stage(self.search.output(self.start), self.output, held)
         return self.search.size(self.start) + self.objective.of_graph(last.graph)
 
     def under(self, objective: Objective) -> Plan:
@@ -113,6 +117,7 @@ def plan(
     ideal: Filter | None,
     polynomial: Polynomial | None,
     realization: str,
+    steady: bool = False,
 ) -> Plan:
     """Choose formats and integer coefficients that keep to equal shares of the error allowed.
 
@@ -130,6 +135,8 @@ def plan(
         Calibration polynomial in physical units; None for a filter core.
     realization : str
         A key of `REALIZATIONS`.
+    steady : bool
+        Whether a filter starts from the steady state of its first sample, and not from zero.
 
     Raises
     ------
@@ -142,10 +149,13 @@ def plan(
     share = (max_error / output.lsb - Fraction(1, 2)) / max(parts, 1)
     gain = Fraction(1) if ideal is None else gain_of(ideal)
     before = input_stages(polynomial, inputs, output, share / gain)
+    steady = steady and ideal is not None
+    if steady:
+        before = tuple(starting(stage, gain_at_zero(cast("Filter", ideal)), share) for stage in before)
     search, start = None, None
     if ideal is not None and REALIZATIONS[realization].cascade:
         ideal = _ordered(ideal, realization)
-        search = Search(ideal.rows, realization, before, gain)
+        search = Search(ideal.rows, realization, before, gain, steady=steady)
         start = search.start(float(share), MAX_BITS)
     planned = Plan(
         name=name,
@@ -155,6 +165,7 @@ def plan(
         ideal=ideal,
         polynomial=polynomial,
         realization=realization,
+        steady=steady,
         gain=gain,
         share=share,
         input_stages=before,
@@ -175,6 +186,7 @@ def quantize(
     ideal: Filter | None,
     polynomial: Polynomial | None,
     realization: str,
+    steady: bool = False,
 ) -> Quantized:
     """Choose formats and integer coefficients, and prove their error: `prove` of a trimmed `plan`."""
     return prove(
@@ -186,6 +198,7 @@ def quantize(
             ideal=ideal,
             polynomial=polynomial,
             realization=realization,
+            steady=steady,
         ).trimmed()
     )
 
@@ -212,7 +225,7 @@ def prove(planned: Plan) -> Quantized:
         for _ in range(_ATTEMPTS):
             before = planned.input_stages[choice.input_stage]
             try:
-                stages = cascade(ideal, planned.realization, choice.formats, before.output)
+                stages = cascade(ideal, planned.realization, choice.formats, before.output, steady=planned.steady)
                 made = _assembled(planned, before, *stages)
             except ShortfallError:
                 break
@@ -227,7 +240,8 @@ def prove(planned: Plan) -> Quantized:
 def _equally_shared(planned: Plan, ideal: Filter) -> Quantized:
     """Give every part of the budget an equal share, from exact figures."""
     before = planned.input_stages[0]
-    return _assembled(planned, before, *equally_shared(ideal, planned.realization, before.output, planned.share))
+    x, share = before.output, planned.share
+    return _assembled(planned, before, *equally_shared(ideal, planned.realization, x, share, steady=planned.steady))
 
 
 def _assembled(
@@ -262,6 +276,11 @@ def least_size(ideal: Filter, realization: str, objective: Objective) -> float:
     except ShortfallError:
         return 0  # cannot be built with so few bits
     return objective.least([stage.graph for stage in stages])
+
+
+def gain_at_zero(ideal: Filter) -> Fraction:
+    """Return the gain of a filter at zero frequency, exact."""
+    return math.prod((sum(b, Fraction(0)) / sum(a, Fraction(0)) for b, a in ideal.exact), start=Fraction(1))
 
 
 def gain_of(ideal: Filter) -> Fraction:

@@ -19,12 +19,16 @@ from sosmith.gen.realizations.registry import Section
 from sosmith.gen.word_lengths.input_stage import InputStage
 from sosmith.gen.word_lengths.output_stage import output_stage
 from sosmith.model.calibration.polynomial import Polynomial
-from sosmith.model.dataflow.datapath import Datapath
+from sosmith.model.dataflow.datapath import Datapath, Stage
 from sosmith.model.port import Port
 from sosmith.model.sections.horner import HornerStep
-from sosmith.model.sections.output import OutputStage
+from sosmith.model.sections.output import Held, OutputStage
+from sosmith.model.sections.start import PassingStage, StartStage
 
 Array = npt.NDArray[np.float64]
+
+START = "start"
+"""The part of the budget that is the error of what starts a filter from its first sample."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,7 +69,18 @@ class Quantized:
     @property
     def sections(self) -> tuple[Section, ...]:
         """The filter's sections, in the order of the cascade."""
-        return tuple(cast("Section", s) for s in self.datapath.stages if not isinstance(s, HornerStep | OutputStage))
+        stages = (s for s in self.datapath.stages if not isinstance(s, HornerStep | StartStage | OutputStage))
+        return tuple(cast("Section", s.section if isinstance(s, PassingStage) else s) for s in stages)
+
+    @property
+    def steady(self) -> bool:
+        """Whether the filter starts from its first sample, and not from zero."""
+        return any(isinstance(stage, StartStage) for stage in self.datapath.stages)
+
+    @property
+    def held(self) -> Held | None:
+        """The first sample as the last stage adds it; None if it does not."""
+        return cast("OutputStage", self.datapath.stages[-1]).held
 
     @cached_property
     def quantized_sos(self) -> Array:
@@ -88,12 +103,15 @@ def assembled(
 ) -> Quantized:
     """Combine stages into a datapath and add up its error budget; `gain` is that of the filter, 1 without one."""
     budget: dict[str, Fraction] = {}
-    if input_stage.stages:
+    if any(isinstance(stage, HornerStep) for stage in input_stage.stages):
         budget["calibration" if polynomial is not None else "input scaling"] = input_stage.error * gain
     if proof is not None:
         budget |= filter_budget(proof)
-    stages = (*input_stage.stages, *sections)
-    last, error = output_stage(stages[-1].graph.output_ranges[0] if stages else input_stage.output, output)
+    held = None
+    if input_stage.start is not None:
+        held, budget[START] = input_stage.start.held, input_stage.start.error
+    stages = (*input_stage.stages, *beside(sections, held))
+    last, error = output_stage(stages[-1].graph.output_ranges[0] if stages else input_stage.output, output, held)
     budget["output rounding"] = error
     return Quantized(
         datapath=Datapath(name=name, inputs=inputs, output=output, stages=(*stages, last)),
@@ -104,6 +122,11 @@ def assembled(
         input_error=input_stage.error,
         proof=proof,
     )
+
+
+def beside(sections: Sequence[Section], held: Held | None) -> Sequence[Stage]:
+    """Return the sections, with what is `held` passing beside them."""
+    return sections if held is None else [PassingStage(section=section, held=held.range) for section in sections]
 
 
 def filter_budget(proof: CascadeProof) -> dict[str, Fraction]:

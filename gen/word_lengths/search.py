@@ -38,6 +38,9 @@ from sosmith.model.errors import ShortfallError
 
 Array = npt.NDArray[np.float64]
 
+Window = tuple[float, float]
+"""Smallest and largest value of an input."""
+
 _EXACT_BITS = 50
 """Significant bits at which a coefficient counts as exact."""
 
@@ -95,6 +98,8 @@ class Search:
         Gain of the filter, by which their errors are multiplied.
     objective : Objective
         The size to be saved.
+    steady : bool
+        Whether the filter starts from its first sample, and not from zero.
 
     Raises
     ------
@@ -109,6 +114,8 @@ class Search:
         input_stages: Sequence[InputStage],
         gain: Fraction,
         objective: Objective = SMALL_AREA,
+        *,
+        steady: bool = False,
     ) -> None:
         self._build = REALIZATIONS[realization].build
         self._rows = rows
@@ -117,8 +124,9 @@ class Search:
         self._objective = objective
         self._inputs = self._sized_inputs()
         x = self._inputs[0].x
-        self._ends = x.low * 2.0**-x.frac, x.high * 2.0**-x.frac
-        self._estimates = _estimates(rows, realization, self._ends)
+        low, high = x.low * 2.0**-x.frac, x.high * 2.0**-x.frac
+        self._windows = [(0.0, high), (low, 0.0)] if steady else [(low, high)]
+        self._estimates = _estimates(rows, realization, self._windows)
         self._base: _Base | None = None
         self._ranges: dict[tuple[object, ...], dict[str, tuple[int, int]]] = {}
         self._known: dict[tuple[object, ...], tuple[float, Range, dict[str, int]]] = {}
@@ -242,7 +250,7 @@ class Search:
         """Estimated error of the coefficients in output LSBs."""
         base = self._base
         if base is None:
-            return _largest(self._deviation(choice.formats, None), self._ends)
+            return _largest(self._deviation(choice.formats, None), self._windows)
         changed = tuple(
             (k, *form.coefficients.items())
             for k, (form, before) in enumerate(zip(choice.formats, base.formats, strict=True))
@@ -251,7 +259,7 @@ class Search:
         if not changed:
             return base.error
         if changed not in base.errors:
-            base.errors[changed] = _largest(self._deviation(choice.formats, base), self._ends)
+            base.errors[changed] = _largest(self._deviation(choice.formats, base), self._windows)
         return base.errors[changed]
 
     def _based(self, formats: tuple[SectionFormat, ...]) -> _Base:
@@ -262,7 +270,7 @@ class Search:
         ):
             return replace(base, formats=formats)
         deviation = self._deviation(formats, None)
-        return _Base(formats, deviation, _largest(deviation, self._ends), {})
+        return _Base(formats, deviation, _largest(deviation, self._windows), {})
 
     def _deviation(self, formats: Sequence[SectionFormat], base: _Base | None) -> Array:
         """Deviation of the impulse response due to the coefficients, updated from that of `base`."""
@@ -368,7 +376,7 @@ class _Estimate:
         return low - spread, high + spread
 
 
-def _estimates(rows: Sequence[Sequence[float]], realization: str, ends: tuple[float, float]) -> list[_Estimate]:
+def _estimates(rows: Sequence[Sequence[float]], realization: str, windows: Sequence[Window]) -> list[_Estimate]:
     sos = np.array(rows, dtype=np.float64)
     impulse = np.zeros(estimated_length(sos))
     impulse[0] = 1.0
@@ -393,7 +401,7 @@ def _estimates(rows: Sequence[Sequence[float]], realization: str, ends: tuple[fl
                 slopes={name: _slope(row, realization, section, name, others[k]) for name in section.coefficients},
                 gains={s.name: _gain(s, model.output, poles, behind[k]) for s in quantizers},
                 limits={
-                    name: _limits(_filtered(model.sources[0].numerators[i], poles, through[k]), ends)
+                    name: _limits(_filtered(model.sources[0].numerators[i], poles, through[k]), windows)
                     for i, name in names.items()
                 },
                 spreads={name: {s.name: _gain(s, i, poles, impulse) for s in quantizers} for i, name in names.items()},
@@ -480,18 +488,21 @@ def _filtered(numerator: Sequence[Fraction | int], denominator: Sequence[float],
     return np.asarray(signal.lfilter(_floats(numerator), denominator, values), dtype=np.float64)
 
 
-def _limits(response: Array, ends: tuple[float, float]) -> tuple[float, float]:
-    """Smallest and largest value of a response to inputs that stay within `ends` from reset on."""
-    low, high = response * ends[0], response * ends[1]
-    bottom, top = np.minimum(low, high).cumsum().min(), np.maximum(low, high).cumsum().max()
-    return min(float(bottom), 0.0), max(float(top), 0.0)
+def _limits(response: Array, windows: Sequence[Window]) -> tuple[float, float]:
+    """Smallest and largest value of a response to inputs that stay within a window from reset on."""
+    smallest = largest = 0.0
+    for ends in windows:
+        low, high = response * ends[0], response * ends[1]
+        smallest = min(smallest, float(np.minimum(low, high).cumsum().min()))
+        largest = max(largest, float(np.maximum(low, high).cumsum().max()))
+    return smallest, largest
 
 
-def _largest(response: Array, ends: tuple[float, float]) -> float:
-    """Largest magnitude of a response to inputs that stay within `ends` from reset on."""
-    low, high = ends
+def _largest(response: Array, windows: Sequence[Window]) -> float:
+    """Largest magnitude of a response to inputs that stay within a window from reset on."""
+    low, high = windows[0]  # of several, all give the same
     if low > 0 or high < 0:
-        return max(map(abs, _limits(response, ends)))
+        return max(map(abs, _limits(response, windows)))
     # With zero between its ends, the worst input never brings the output back: whole sums are enough.
     magnitudes, total = float(np.abs(response).sum()), float(response.sum())
     above, below = (magnitudes + total) / 2, (magnitudes - total) / 2

@@ -144,6 +144,11 @@ class Graph:
         """Ranges of the outputs, in port order."""
         return tuple(self.nodes[i].range for i in self.outputs)
 
+    def is_gate(self, node: Node) -> bool:
+        """Whether a node is a product with a bit that is not a constant: all bits of the other operand, or none."""
+        factors = [self.nodes[i] for i in node.operands] if node.op is Op.MULTIPLY else []
+        return any(of.width == 1 and not of.signed and of.op is not Op.CONSTANT for of in factors)
+
     def reset(self) -> list[int]:
         """State after reset: one zero per delay."""
         return [0] * len(self.delays)

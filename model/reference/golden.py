@@ -28,8 +28,8 @@ def calibrated(codes: Codes, inputs: Sequence[Port], polynomial: Polynomial | No
     return physical[0] if polynomial is None else polynomial(*physical)
 
 
-def filtered(values: Values, sos: Values | None, output: Port) -> Values:
-    """Filter `values` from zero state and limit the result to the range of `output`.
+def filtered(values: Values, sos: Values | None, output: Port, *, steady: bool = False) -> Values:
+    """Filter `values` and limit the result to the range of `output`.
 
     Parameters
     ----------
@@ -39,7 +39,12 @@ def filtered(values: Values, sos: Values | None, output: Port) -> Values:
         Second-order sections of the ideal filter; None for no filter.
     output : Port
         Output port, whose range limits the result.
+    steady : bool
+        Whether the filter starts from the steady state of the first value, and not from zero.
     """
-    result = values if sos is None else np.asarray(signal.sosfilt(sos, values), dtype=np.float64)
+    first = values[0] if steady and sos is not None and len(values) else 0.0
+    result = values if sos is None else np.asarray(signal.sosfilt(sos, values - first), dtype=np.float64)
+    if sos is not None and first:
+        result = result + np.prod(sos[:, :3].sum(axis=1) / sos[:, 3:].sum(axis=1)) * first
     low, high = output.decode(np.array([output.lowest, output.highest]))
     return np.clip(result, low, high)

@@ -1,4 +1,8 @@
-"""The last stage of a datapath: from output LSBs with guard bits to the output code, limited to its range."""
+"""The last stage of a datapath: from output LSBs with guard bits to the output code, limited to its range.
+
+Behind a filter that starts from its first sample it adds what was taken off before the sections
+(`sosmith.model.sections.start`).
+"""
 
 from __future__ import annotations
 
@@ -6,6 +10,28 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from sosmith.model.dataflow.graph import Graph, GraphBuilder, Range
+
+
+@dataclass(frozen=True, kw_only=True)
+class Held:
+    """The first sample, as it arrives beside the filter's output, and the gain with which it is added there.
+
+    Attributes
+    ----------
+    range : Range
+        Its range, in output LSBs.
+    gain, gain_frac : int
+        Gain of the filter at zero frequency, in units of ``2**-gain_frac``; not 0.
+    """
+
+    range: Range
+    gain: int
+    gain_frac: int
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether the gain is 1: it takes no multiplier."""
+        return self.gain == 1 << self.gain_frac
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -20,6 +46,8 @@ class OutputStage:
         Range of the input, in output LSBs.
     low, high : int
         Range of the output code; the only saturation in a datapath.
+    held : Held or None
+        The first sample of a filter that starts from it; None if none is passed on.
     """
 
     offset: int
@@ -27,13 +55,18 @@ class OutputStage:
     x: Range
     low: int
     high: int
+    held: Held | None = None
     name: str = "output_stage"
 
     @cached_property
     def graph(self) -> Graph:
-        """The stage as a dataflow graph with the input ``x`` and the output ``code``."""
+        """The stage as a dataflow graph with the input ``x``, ``held`` if there is one, and the output ``code``."""
         g = GraphBuilder()
         x = g.input("x", *self.x)
+        if self.held is not None:
+            held = g.input("held", *self.held.range)
+            plain = self.held.is_plain
+            x = g.add(x, held if plain else g.scale(held, self.held.gain, self.held.gain_frac, "steady"), "total")
         if self.offset:
             x = g.add(x, g.constant(self.offset, self.offset_frac, "offset"))
         rounded = g.round(x, 0, "rounded")

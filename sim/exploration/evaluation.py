@@ -66,7 +66,11 @@ def _measured(design: CoreDesign, traces: tuple[Trace, ...], task: Task) -> Poin
     codes = np.stack([trace.codes for trace in traces], axis=1)
     sos = None if quantized.filter is None else quantized.filter.sos
     golden = np.stack(
-        [filtered(calibrated(t.codes, datapath.inputs, quantized.polynomial), sos, output) for t in traces], axis=1
+        [
+            filtered(calibrated(t.codes, datapath.inputs, quantized.polynomial), sos, output, steady=quantized.steady)
+            for t in traces
+        ],
+        axis=1,
     )
     error = output.decode(datapath.compute(codes)) - golden
     statistics = error_statistics(error)

@@ -19,9 +19,13 @@ from sosmith.hdl.instruction import instruction_bits
 from sosmith.model.errors import ShortfallError
 
 
-def design_in(architecture: str, example: str = "audio_lowpass.toml", *, clock: int = 100_000_000) -> CoreDesign:
+def design_in(
+    architecture: str, example: str = "audio_lowpass.toml", *, clock: int = 100_000_000, start: str = "zero"
+) -> CoreDesign:
     spec = load(EXAMPLES / example)
-    hardware = replace(spec.hardware, architecture=architecture, clock=Fraction(clock), realization="df1_ef2")
+    hardware = replace(
+        spec.hardware, architecture=architecture, clock=Fraction(clock), realization="df1_ef2", start=start
+    )
     return design_core(replace(spec, hardware=hardware))
 
 

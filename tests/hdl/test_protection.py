@@ -40,9 +40,13 @@ class Case(NamedTuple):
     @property
     def core(self) -> Architecture:
         """The core itself."""
-        made = {"leaky": leaky, "resonator": resonator, "audio": audio}[self.datapath]()
+        made = {"leaky": leaky, "resonator": resonator, "audio": audio, "steady": steady}[self.datapath]()
         named = replace(made, name="core")  # "small" is a word of Verilog
         return Architecture(self.architecture, named, self.channels, self.reload, self.protect)
+
+
+def steady() -> Datapath:
+    return design_in("folded", start="steady").datapath
 
 
 def audio() -> Datapath:
@@ -62,6 +66,10 @@ CASES = [
             for reload in (False, True)
             if (channels == 20) <= (architecture == "parallel" and not reload)
         ),
+        Case("steady", "parallel", 1, "detect"),
+        Case("steady", "parallel", 3, "correct", True),
+        Case("steady", "folded", 3, "correct"),
+        Case("steady", "serial", 1, "detect"),
     )
 ]
 
@@ -81,7 +89,7 @@ def built(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
     case: Case = request.param
     core = case.core
     ports = core.datapath.inputs
-    samples = 60 if case.datapath != "audio" else 240 if case.architecture == "parallel" else 24
+    samples = 60 if case.datapath not in {"audio", "steady"} else 240 if case.architecture == "parallel" else 24
     samples = max(3, samples // case.channels)
     rng = np.random.default_rng(1)
     codes = np.stack([rng.integers(p.lowest, p.highest + 1, (samples, case.channels)) for p in ports], axis=2)

@@ -38,18 +38,18 @@ ARCHITECTURES = ("parallel", "folded", "serial")
 
 
 @cache
-def hardware_in(architecture: str, example: str, channels: int = 1) -> CoreDesign:
+def hardware_in(architecture: str, example: str, channels: int = 1, start: str = "zero") -> CoreDesign:
     spec = load(EXAMPLES / f"{example}.toml")
     hardware = replace(
-        spec.hardware, architecture=architecture, realization="df1_ef2", clock=Fraction(10**9), reload=True
+        spec.hardware, architecture=architecture, realization="df1_ef2", clock=Fraction(10**9), reload=True, start=start
     )
     return design_core(replace(spec, filter=replace(spec.filter, order=2), channels=channels, hardware=hardware))
 
 
 @cache
-def sets_for(architecture: str, example: str) -> list[OtherSet]:
+def sets_for(architecture: str, example: str, start: str) -> list[OtherSet]:
     """Make other sets for the hardware: of filters, or of polynomials where it has one."""
-    made = hardware_in(architecture, example)
+    made = hardware_in(architecture, example, start=start)
     allowed = 4 * made.spec.max_error
     if made.quantized.polynomial is not None:
         rows = made.quantized.polynomial.coefficients
@@ -75,7 +75,7 @@ def run(
 ) -> tuple[dict[str, Any], list[int]]:
     """Simulate `count` loads, one in eight with a wrong CRC; return the outcome and which set each load has."""
     pace = random.Random(seed)
-    sets = sets_for(made.architecture.name, made.spec.name)
+    sets = sets_for(made.architecture.name, made.spec.name, made.spec.hardware.start)
     chosen = [pace.randrange(len(sets)) for _ in range(count)]
     wrong = [pace.randrange(8) == 0 for _ in range(count)]
     loads = [
@@ -139,7 +139,7 @@ def expected(made: CoreDesign, outcome: dict[str, Any], chosen: list[int]) -> li
 
 
 def _of_channel(made: CoreDesign, outcome: dict[str, Any], chosen: list[int], numbers: list[int]) -> list[int]:
-    sets = sets_for(made.architecture.name, made.spec.name)
+    sets = sets_for(made.architecture.name, made.spec.name, made.spec.hardware.start)
     swaps, before = [], 0
     for turn, number in enumerate(numbers):
         swapped = outcome["swaps"][number]
@@ -170,6 +170,21 @@ COUNTS = [
         for channels, count in ((1, 10_000), (12, 500), (20, 500))
     ),
 ]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("architecture", "example", "channels"),
+    [
+        *((name, "audio_lowpass", channels) for name in ARCHITECTURES for channels in (1, 3)),
+        ("parallel", "flange_wear_bench", 1),
+        ("folded", "flange_wear_bench", 3),
+    ],
+)
+def test_first_samples_are_held_through_reloads(architecture: str, example: str, channels: int, tmp_path: Path) -> None:
+    made = hardware_in(architecture, example, channels, "steady")
+    outcome, chosen = run(tmp_path, made, verilog(made), 40, 40)
+    assert [word for _, word in outcome["received"]] == expected(made, outcome, chosen)
 
 
 @pytest.mark.parametrize(("architecture", "example", "channels", "count"), COUNTS)

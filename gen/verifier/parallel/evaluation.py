@@ -214,6 +214,8 @@ class Evaluation:
             at = 0
             for k, part in enumerate(reversed(value.parts)):
                 word = self.word(part) if k == len(value.parts) - 1 else self._exact(part, signed=False)
+                if k > 1 and k == len(value.parts) - 1 and self._forms.limits(total)[1] >= 1 << at:
+                    self._forms.know(total, 0, (1 << at) - 1)  # of unsigned words side by side
                 total = plus(total, word, 1 << at)
                 at += self._netlist.width(part)
             return total

@@ -137,7 +137,27 @@ class Forms:
         if found is not None and found.key in self._known:
             ends = sorted(end * found.scale + found.offset for end in self._known[found.key])
             low, high = max(low, ends[0]), min(high, ends[1])
+        if self._always is not self:
+            for known_low, known_high in self._limits_by_floors(form):
+                low, high = max(low, known_low), min(high, known_high)
         return low, high
+
+    def _limits_by_floors(self, form: Form) -> Iterator[Limits]:
+        """Yield limits of ``c floor(a) + c j + k`` with an integer j from those that are known of ``a + j``."""
+        for monomial, factor in form.items():
+            if len(monomial) != 1 or not self._is_floor(monomial[0]):
+                continue
+            others = {m: Fraction(value) / factor for m, value in form.items() if m not in {monomial, ONE}}
+            if any(value.denominator != 1 for value in others.values()):
+                continue
+            inside = self._atoms[monomial[0]].inside
+            assert inside is not None
+            found = _primitive(plus(inside, others))
+            if found is not None and found.key in self._known:
+                ends = sorted(end * found.scale + found.offset for end in self._known[found.key])
+                rest = form.get(ONE, 0)
+                low, high = sorted((factor * ends[0].__floor__() + rest, factor * ends[1].__floor__() + rest))
+                yield low, high
 
     def times(self, a: Form, b: Form) -> Form:
         """Return the product; of an atom that is 0 or 1, or 0 or -1, there are no powers."""

@@ -390,12 +390,16 @@ class _Run:
         self._acc, self._group = _Accumulator(), Group()
 
     def _node(self, total: Form, top: int) -> tuple[int, int] | None:
-        """Find a node that is `total` modulo ``2**(top + 1)`` as a signed number, with some number of fraction bits."""
+        """Find a node that is `total` modulo ``2**(top + 1)`` as a signed number, with some number of fraction bits.
+
+        Of several with the same value, take the one with the narrowest range: it holds for all of them.
+        """
         modulus = 2 << top
         rest = {monomial: c for monomial, c in total.items() if c % modulus}
         if not rest:
             return None
         least = min(map(valuation, rest.values()))
+        best: tuple[Fraction, int, int] | None = None
         for node, value in enumerate(self._of):
             if not value:
                 continue
@@ -404,9 +408,11 @@ class _Run:
             low, high = self.graph.nodes[node].limits
             if not (-(1 << top) <= low * unit and high * unit < 1 << top):
                 continue
-            if all((total.get(m, 0) - value.get(m, 0) * unit) % modulus == 0 for m in total.keys() | value.keys()):
-                return node, frac
-        return None
+            if (best is None or high - low < best[0]) and all(
+                (total.get(m, 0) - value.get(m, 0) * unit) % modulus == 0 for m in total.keys() | value.keys()
+            ):
+                best = high - low, node, frac
+        return None if best is None else best[1:]
 
     def _judge(self, number: int) -> None:
         """Compare an input with a limit: negative if it is outside."""

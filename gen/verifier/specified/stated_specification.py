@@ -27,6 +27,9 @@ from sosmith.gen.verifier.specified.sections_file import sections_in
 _CALIBRATED = {"voltage": "V", "temperature": "degC"}
 """Inputs of a calibration, in the order of the ports, and their units."""
 
+_START = "zero"
+"""How a filter starts if the specification does not say."""
+
 
 @dataclass(frozen=True)
 class Agreement:
@@ -103,6 +106,9 @@ def _checked(certificate: Certificate, tree: Mapping[str, Any], margin: Fraction
         if not fitted:
             _check_polynomial(polynomial, calibration["coefficients"])
     require(bool(sections) or core == "calibration", "the filter must not be left out")
+    if sections:
+        stated = tree.get("hardware", {}).get("start", _START)
+        _equal("the start of the filter", certificate.ideal.start or "zero", stated)
     return Agreement(core, _filter_distance(certificate, tree, margin, folder) if sections else None, fitted)
 
 

@@ -272,7 +272,12 @@ class Design:
         sos = None if quantized.filter is None else quantized.filter.sos
         block = codes.reshape(len(codes), -1, codes.shape[-1])
         columns = [
-            filtered(calibrated(block[:, k], datapath.inputs, quantized.polynomial), sos, datapath.output)
+            filtered(
+                calibrated(block[:, k], datapath.inputs, quantized.polynomial),
+                sos,
+                datapath.output,
+                steady=quantized.steady,
+            )
             for k in range(block.shape[1])
         ]
         return np.stack(columns, axis=1).reshape(codes.shape[:-1])

@@ -771,6 +771,12 @@ BAD = [
         "lattice_wdf, not 'df3' (did you mean df1?)",
     ),
     (
+        "unknown start",
+        CLOCK,
+        CLOCK + '\nstart = "warm"',
+        "hardware.start must be one of steady, zero, not 'warm'",
+    ),
+    (
         "unknown architecture",
         CLOCK,
         CLOCK + '\narchitecture = "systolic"',

@@ -40,7 +40,14 @@ CONTRACT = {
         "cutoff": 0.2587803,
     },
     "output": {"bits": 16, "range": [0.0, 16.0], "unit": "mm", "max_error": 0.00025},
-    "hardware": {"realization": "auto", "architecture": "auto", "clock": 12.0e6, "reload": False, "protect": "none"},
+    "hardware": {
+        "realization": "auto",
+        "architecture": "auto",
+        "clock": 12.0e6,
+        "start": "zero",
+        "reload": False,
+        "protect": "none",
+    },
 }
 
 PLAIN = """
@@ -102,7 +109,12 @@ def test_example_is_the_contracts_and_is_read_exactly(tmp_path: Path) -> None:
         max_error=Fraction(25, 10**5),
         wear=None,
         hardware=HardwareSpec(
-            realization="auto", architecture="auto", clock=Fraction(12_000_000), reload=False, protect="none"
+            realization="auto",
+            architecture="auto",
+            clock=Fraction(12_000_000),
+            reload=False,
+            protect="none",
+            start="zero",
         ),
     )
 
@@ -151,7 +163,12 @@ def test_plain_filter_has_one_input_in_the_unit_of_the_output_and_defaults(tmp_p
     assert spec.calibration is None
     assert spec.filter.method == "bilinear"
     assert spec.hardware == HardwareSpec(
-        realization="auto", architecture="auto", clock=Fraction(12_000_000), reload=False, protect="none"
+        realization="auto",
+        architecture="auto",
+        clock=Fraction(12_000_000),
+        reload=False,
+        protect="none",
+        start="zero",
     )
 
 

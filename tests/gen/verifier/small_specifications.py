@@ -16,3 +16,5 @@ input.x = { bits = 8, signed = true, range = [-1.0, 1.0] }
 filter = { family = "butterworth", kind = "lowpass", order = 2, cutoff = 20.0 }
 output = { bits = 8, signed = true, range = [-1.0, 1.0], unit = "", max_error = "faithful" }
 """
+STEADY = PLAIN + 'hardware.start = "steady"\n'
+STEADY_INSTRUMENT = INSTRUMENT + 'hardware.start = "steady"\n'

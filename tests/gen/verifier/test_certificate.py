@@ -425,7 +425,7 @@ def lie(edit: Callable[[Any], Any]) -> Any:
         ),
         pytest.param(
             lie(lambda t: t["stages"].append(t["stages"].pop(2))),
-            "the stages must be polynomial, section and one output, in this order, "
+            "the stages must be polynomial, start, section and one output, in this order, "
             "not polynomial, polynomial, section, section, section, output, polynomial",
             id="stages out of order",
         ),
@@ -653,7 +653,7 @@ def test_what_is_no_certificate(text: str, message: str, tmp_path: Path) -> None
         (("ideal", "sections", 0, "numerator"), ["1"] * 4, "it must have no more entries than 3"),
         (("claims", "budget"), 1, "it must be an object"),
         (("stages", 0, "nodes", 0, "frac"), 10**9, "it must be at most 4096"),
-        (("stages", 0, "role"), "poem", "it must be 'polynomial', 'section' or 'output'"),
+        (("stages", 0, "role"), "poem", "it must be 'polynomial', 'start', 'section' or 'output'"),
         (("claims", "extra"), 1, "there is no such key"),
     ],
 )

@@ -44,7 +44,9 @@ def butterworth(order: int, cutoff: float, kind: str = "lowpass") -> Filter:
     )
 
 
-def plain(ideal: Filter, realization: str = "df1_ef2", inputs: Port = SIGNED, output: Port = OUT) -> Quantized:
+def plain(
+    ideal: Filter, realization: str = "df1_ef2", inputs: Port = SIGNED, output: Port = OUT, *, steady: bool = False
+) -> Quantized:
     return quantize(
         name="test",
         inputs=(inputs,),
@@ -53,6 +55,7 @@ def plain(ideal: Filter, realization: str = "df1_ef2", inputs: Port = SIGNED, ou
         ideal=ideal,
         polynomial=None,
         realization=realization,
+        steady=steady,
     )
 
 

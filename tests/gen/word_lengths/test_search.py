@@ -119,7 +119,7 @@ def test_the_largest_error_is_that_of_the_worst_input(ends: tuple[float, float],
     response = sign * np.array([0.5, -0.125, -2.0, 0.75, 0.25, 0.5])
     driven = np.outer(ends, response)
     tops, bottoms = driven.max(axis=0).cumsum(), driven.min(axis=0).cumsum()
-    assert _largest(response, ends) == max(0, *tops, *-bottoms)
+    assert _largest(response, [ends]) == max(0, *tops, *-bottoms)
 
 
 @pytest.mark.parametrize("realization", ["df1", "df1_ef1", "df1_ef2"])

@@ -20,6 +20,7 @@ from sosmith.model.calibration.fit import Fit, read_measurements
 from sosmith.model.calibration.uncertainty import of_polynomial
 from sosmith.model.dataflow.program import Program
 from sosmith.model.port import Port
+from sosmith.model.sections.start import StartStage
 
 
 def print_design(design: Design, *, details: bool = False) -> None:
@@ -119,6 +120,8 @@ _PROTECTION = {
 def _option_rows(architecture: Architecture) -> list[tuple[str, str]]:
     """Return what was asked for beside the arithmetic."""
     rows = []
+    if any(isinstance(stage, StartStage) for stage in architecture.datapath.stages):
+        rows.append(("start", "from the steady state of the first sample"))
     if architecture.reload:
         rows.append(("reload", "coefficients are loaded at run time, over AXI4-Lite"))
     if architecture.protect in _PROTECTION:
