@@ -206,6 +206,7 @@ def _evidence(
         sections=facts.sections,
         recursions=tuple(recursion_of(section.name, section.graph) for section in quantized.sections),
         limit_cycles=facts.limit_cycles,
+        settling=facts.settling,
         filter=filter_facts(quantized),
         alternatives=_alternatives(quantized, codes, golden),
         provenance=provenance_of(design, traces, netlist),

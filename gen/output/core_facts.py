@@ -12,6 +12,7 @@ from sosmith.gen.filter.impulse_invariance import Aliasing
 from sosmith.gen.proof.limit_cycles import limit_cycles, recursions
 from sosmith.gen.proof.linear_model import linear_model
 from sosmith.gen.reload.register_writes import bank_size
+from sosmith.gen.reload.transient import SETTLED, settling
 from sosmith.gen.word_lengths.cost import Cost, cost_of
 from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.hdl.axi_stream import Field, dest_width, fields
@@ -102,6 +103,25 @@ class ReloadFacts:
     words: int
     word_bits: int
     registers: tuple[str, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SettlingFacts:
+    """How long the past of a filter that starts from zero matters.
+
+    Attributes
+    ----------
+    samples : int
+        Number of samples after a reset until no other past could change the output by more than `limit`; proven.
+    seconds : float
+        The same at the sample rate.
+    limit : float
+        In the output's unit.
+    """
+
+    samples: int
+    seconds: float
+    limit: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -213,6 +233,8 @@ class CoreFacts:
         Name of the realization; None without sections.
     start : str or None
         One of `sosmith.gen.specification.choices.STARTS`; None without sections.
+    settling : SettlingFacts or None
+        Settling after a start from zero; None without sections and after any other start.
     architecture : str
         Name of the architecture.
     program : Program or None
@@ -249,6 +271,7 @@ class CoreFacts:
     wear: tuple[WearFacts, ...] | None
     realization: str | None
     start: str | None
+    settling: SettlingFacts | None
     architecture: str
     program: Program | None
     reload: ReloadFacts | None
@@ -283,6 +306,7 @@ def core_facts(design: CoreDesign) -> CoreFacts:
         wear=_wear(design),
         realization=quantized.realization if quantized.sections else None,
         start=_start(quantized),
+        settling=_settling(design),
         architecture=architecture.name,
         program=architecture.program,
         reload=_reload(design),
@@ -316,6 +340,15 @@ def _start(quantized: Quantized) -> str | None:
     if not quantized.sections:
         return None
     return "steady" if quantized.steady else "zero"
+
+
+def _settling(design: CoreDesign) -> SettlingFacts | None:
+    samples, output = settling(design.quantized), design.datapath.output
+    if not samples:
+        return None
+    return SettlingFacts(
+        samples=samples, seconds=float(samples / design.spec.sample_rate), limit=float(SETTLED * output.lsb)
+    )
 
 
 def _wear(design: CoreDesign) -> tuple[WearFacts, ...] | None:

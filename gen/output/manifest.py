@@ -27,6 +27,7 @@ def manifest(facts: CoreFacts) -> dict[str, Any]:
         "cycles_per_sample": facts.cycles_per_sample,
         "realization": facts.realization,
         "start": facts.start,
+        "settling": None if facts.settling is None else _entry(facts.settling),
         "architecture": facts.architecture,
         "schedule": _schedule(facts.program),
         "reload": None if facts.reload is None else _entry(facts.reload),

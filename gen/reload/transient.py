@@ -18,13 +18,13 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import lru_cache
 
 from sosmith.gen.proof.cascade_proof import INPUT, Drives, Key, Lane
 from sosmith.gen.proof.linear_model import LinearModel, linear_models
 from sosmith.gen.proof.peak_gain import ACCURACY, Drive, Extent, extent
 from sosmith.gen.proof.response import IMPULSE, Response, common
 from sosmith.gen.proof.sums import recursion
-from sosmith.gen.realizations.registry import Section
 from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.model.dataflow.graph import Graph, Node, Op
 from sosmith.model.errors import ShortfallError
@@ -32,6 +32,9 @@ from sosmith.model.errors import ShortfallError
 RESIDUE = Fraction(1, 256)
 """Remaining effect of the previous set on any state and on the output at which the transient counts as over, in output
 LSBs."""
+
+SETTLED = Fraction(1, 2)
+"""Effect of all that was before a start from zero on the output at which it counts as over, in output LSBs."""
 
 _GRID = 1 << 40
 """Limits of a source are rounded outward to multiples of the reciprocal of this."""
@@ -75,7 +78,7 @@ def transient(active: Quantized, other: Quantized, held: tuple[Fraction, Fractio
     ShortfallError
         If their states differ.
     """
-    pairs = [_Pair(a, b) for a, b in zip(active.sections, other.sections, strict=True)]
+    pairs = [_Pair(a.graph, b.graph, b.name) for a, b in zip(active.sections, other.sections, strict=True)]
     if held is None:
         return _transient(pairs, *_input_values(active, other))
     # Whatever is held, the samples less that lie in a window of this width that contains 0, and limits are linear in
@@ -86,8 +89,8 @@ def transient(active: Quantized, other: Quantized, held: tuple[Fraction, Fractio
         {name: (min(a[name][0], b[name][0]), max(a[name][1], b[name][1])) for name in a}
         for a, b in zip(above.ranges, below.ranges, strict=True)
     )
-    (entry,) = pairs[0].active.graph.inputs
-    node = pairs[0].active.graph.nodes[entry]
+    (entry,) = pairs[0].active.inputs
+    node = pairs[0].active.nodes[entry]
     widest = math.ceil(span * Fraction(2) ** node.frac)
     ranges[0][node.name] = -widest, widest
     return Transient(ranges=ranges, samples=max(above.samples, below.samples))
@@ -104,10 +107,35 @@ def _transient(pairs: Sequence[_Pair], low: Fraction, high: Fraction) -> Transie
         starts = {lane.model.output: extent(list(d.values())) for lane, d in zip(lanes, outputs, strict=True)}
         found = {node: extent(list(lane.at(pair.place[node]).values())) for node, lane in pair.bounds(lanes).items()}
         moved = fading.section(number, pair, starts)
-        count = len(pair.active.graph.outputs)
+        count = len(pair.active.outputs)
         wires = [_merged(drives, {INPUT}, (number, k, "rounding", 0)) for k, drives in enumerate(outputs[:count])]
         ranges.append(pair.ranges({node: _sum(found[node], moved[node]) for node in found}))
     return Transient(ranges=tuple(ranges), samples=fading.samples)
+
+
+def settling(made: Quantized) -> int:
+    """Count the samples after a start from zero until `SETTLED` bounds what any other states there would change.
+
+    So long the output may be further from that of a filter with another past, such as one that has run for ever. It is
+    0 for a filter that starts from the steady state of its first sample, and for a calibration.
+
+    Raises
+    ------
+    ShortfallError
+        If that is not proven to come to an end.
+    """
+    return 0 if made.steady or not made.sections else _settling(tuple(section.graph for section in made.sections))
+
+
+@lru_cache(maxsize=64)
+def _settling(graphs: tuple[Graph, ...]) -> int:
+    fading = _Fading(SETTLED)
+    for number, graph in enumerate(graphs):
+        pair = _Pair(graph, graph, f"section{number}")
+        none = dict.fromkeys(pair.differences.values(), Extent(Fraction(0), Fraction(0)))
+        fading.section(number, pair, none, watched=False)
+    fading.watch_outputs()
+    return fading.samples
 
 
 def _input_values(active: Quantized, other: Quantized) -> tuple[Fraction, Fraction]:
@@ -138,15 +166,15 @@ class _Pair:
         nodes. Constants are 0, since the equations in `together` already include them.
     """
 
-    def __init__(self, active: Section, other: Section) -> None:
+    def __init__(self, active: Graph, other: Graph, name: str) -> None:
         self.active, self.other = active, other
-        a, b = active.graph, other.graph
+        a, b = active, other
         before = {a.nodes[i].name: i for i in a.delays}
         forms = [
             [(graph.nodes[i].name, graph.nodes[i].frac) for i in (*graph.inputs, *graph.delays)] for graph in (a, b)
         ]
         if forms[0] != forms[1]:
-            raise ShortfallError(f"the states of {other.name} must be {forms[0]}, not {forms[1]}")
+            raise ShortfallError(f"the states of {name} must be {forms[0]}, not {forms[1]}")
         nodes = list(a.nodes)
         inputs = iter(a.inputs)
         self.place: list[int] = []
@@ -172,21 +200,21 @@ class _Pair:
         """For every BOUND node of the other set, return an output that depends on it."""
         return {
             node: next(lane for lane in lanes if self.place[node] in lane.model.bounds)
-            for node, it in enumerate(self.other.graph.nodes)
+            for node, it in enumerate(self.other.nodes)
             if it.op is Op.BOUND
         }
 
     def ranges(self, extents: Mapping[int, Extent]) -> dict[str, Codes]:
         """Ranges of codes of inputs and BOUND nodes that cover those of each set by itself and `extents`."""
         result: dict[str, Codes] = {}
-        for graph, left in ((self.active.graph, RESIDUE), (self.other.graph, Fraction(0))):
+        for graph, left in ((self.active, RESIDUE), (self.other, Fraction(0))):
             for node in graph.nodes:
                 if node.op in {Op.INPUT, Op.BOUND}:
                     more = math.ceil(left * Fraction(2) ** node.frac) if node.op is Op.BOUND else 0
                     low, high = result.get(node.name, (node.low, node.high))
                     result[node.name] = min(low, node.low - more), max(high, node.high + more)
         for index, found in extents.items():
-            node = self.other.graph.nodes[index]
+            node = self.other.nodes[index]
             unit = Fraction(2) ** node.frac
             low, high = result[node.name]
             result[node.name] = min(low, math.floor(found.low * unit)), max(high, math.ceil(found.high * unit))
@@ -197,11 +225,11 @@ class _Pair:
 
         It is 0 for a state that holds a quantization error: any such error is possible with either set.
         """
-        b = self.other.graph
+        b = self.other
         node = b.nodes[b.delays[state]]
         if b.nodes[node.operands[0]].op is Op.FRACTION:
             return Fraction(0)
-        (same,) = (n for n in self.active.graph.nodes if n.op is Op.DELAY and n.name == node.name)
+        (same,) = (n for n in self.active.nodes if n.op is Op.DELAY and n.name == node.name)
         return (max(node.high, same.high) - min(node.low, same.low)) * Fraction(2) ** -node.frac + RESIDUE
 
 
@@ -227,12 +255,15 @@ def _with_additions(graph: Graph) -> tuple[Graph, tuple[int, ...]]:
 class _Fading:
     """Propagates the difference between the two runs through the other set's sections, in order."""
 
-    def __init__(self) -> None:
+    def __init__(self, limit: Fraction = RESIDUE) -> None:
         self.samples = 0
+        self._limit = limit
         self._wires: list[Drives] = [{}]
         self._mismatches: dict[Key, Fraction] = {}
 
-    def section(self, number: int, pair: _Pair, starts: Mapping[int, Extent]) -> dict[int, Extent]:
+    def section(
+        self, number: int, pair: _Pair, starts: Mapping[int, Extent], *, watched: bool = True
+    ) -> dict[int, Extent]:
         """Bound the difference of a section's BOUND nodes from the result of its equations on the old run.
 
         Parameters
@@ -243,10 +274,12 @@ class _Fading:
             The section in both sets.
         starts : mapping of int to Extent
             Limits of the differences, by their nodes in `pair.together`.
+        watched : bool
+            Whether `samples` is until the states at the swap matter to no state and no output any more.
         """
-        states = len(pair.other.graph.delays)
+        states = len(pair.other.delays)
         additions: list[Drives] = []
-        for k in range(states + len(pair.other.graph.outputs)):
+        for k in range(states + len(pair.other.outputs)):
             key = number, k, "difference", 0
             found = starts[pair.differences[k]] if k in pair.differences else Extent(Fraction(0), Fraction(0))
             mismatch = pair.mismatch(k) if k < states else Fraction(0)
@@ -261,26 +294,33 @@ class _Fading:
             for node in lane.model.bounds:
                 drives = lane.at(node)
                 if node in pair.watched:
-                    self._watch(drives, states)
+                    if watched:
+                        self._watch(drives, states)
                 else:
                     moved[node] = extent(list(drives.values()))
         outputs = [lane.at(lane.model.output) for lane in lanes]
-        for drives in outputs:
-            self._watch(drives, states)
+        if watched:
+            for drives in outputs:
+                self._watch(drives, states)
         kept = {key for drives in outputs for key in drives if key[2] == "difference"}
         self._wires = [_merged(drives, kept, (number, k, "rounding", 0)) for k, drives in enumerate(outputs)]
         return moved
 
+    def watch_outputs(self) -> None:
+        """Increase `samples` until the states at the swap no longer matter to the last section's output."""
+        for drives in self._wires:
+            self._watch(drives, 0)
+
     def _watch(self, drives: Drives, delays: int) -> None:
         """Increase `samples` until the states at the swap no longer matter here, nor after `delays` more samples."""
         weighted = [(d.response, self._mismatches[key]) for key, d in drives.items() if key in self._mismatches]
-        self.samples = max(self.samples, _last_above(weighted) + delays + 1)
+        self.samples = max(self.samples, _last_above(weighted, self._limit) + delays + 1)
 
 
-def _last_above(weighted: Sequence[tuple[Response, Fraction]]) -> int:
-    """Last sample at which the weighted sum of absolute responses may exceed `RESIDUE`."""
+def _last_above(weighted: Sequence[tuple[Response, Fraction]], limit: Fraction) -> int:
+    """Last sample at which the weighted sum of absolute responses may exceed `limit`."""
     under = common([response for response, _ in weighted])
-    last = recursion(under, ACCURACY).last_above([(r.over(under), weight) for r, weight in weighted], RESIDUE)
+    last = recursion(under, ACCURACY).last_above([(r.over(under), weight) for r, weight in weighted], limit)
     if last is None:
         raise ShortfallError("a swap must fade in the time in which a response decays, and is not proven to")
     return last

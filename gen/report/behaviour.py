@@ -11,7 +11,7 @@ import numpy as np
 
 from sosmith.gen.filter.response import FilterFacts, group_delay, passbands
 from sosmith.gen.filter.step_response import SETTLED, StepResponse, step_response
-from sosmith.gen.report.evidence import Evidence
+from sosmith.gen.report.evidence import Evidence, Mask
 from sosmith.model.reference.accuracy import ErrorStatistics, error_statistics
 
 
@@ -35,8 +35,7 @@ class Behaviour:
     settling_to_lsb : float or None
         Time in s after a step over the whole range of the output until the output stays within half an LSB.
     transient : int
-        Samples at the beginning of this run in which the output differs by more than half an LSB from what it would be
-        without the start from zero.
+        Samples at the beginning of this run that show a start from zero.
     """
 
     true_error: ErrorStatistics | None
@@ -63,7 +62,7 @@ def behaviour(evidence: Evidence) -> Behaviour:
         step=step,
         settling=None if step is None else step.samples_to(SETTLED) / step.sample_rate,
         settling_to_lsb=None if step is None else step.samples_to(evidence.lsb / 2 / span) / step.sample_rate,
-        transient=_transient(evidence, step),
+        transient=0 if evidence.settling is None else min(evidence.settling.samples, len(evidence.time)),
     )
 
 
@@ -71,9 +70,21 @@ def true_error(evidence: Evidence) -> Any:
     """Hardware minus true value at the readings, shape (readings,); None if there are none."""
     if evidence.truth is None:
         return None
-    error = evidence.hardware - evidence.truth
-    counted = error.ravel() if evidence.reading is None else error[evidence.reading]
+    error, reading = evidence.hardware - evidence.truth, readings_of(evidence)
+    counted = error.ravel() if reading is None else error[reading]
     return counted if counted.size else None
+
+
+def readings_of(evidence: Evidence) -> Mask | None:
+    """Return which samples count against the true value; None for all.
+
+    Those that the trace marks, else all that do not show the start.
+    """
+    if evidence.reading is not None or evidence.settling is None or evidence.truth is None:
+        return evidence.reading  # readings are marked where a scenario holds them settled
+    counted = np.ones(evidence.truth.shape, dtype=np.bool_)
+    counted[: evidence.settling.samples] = False
+    return counted
 
 
 def behaviour_entry(found: Behaviour) -> dict[str, Any]:
@@ -112,13 +123,3 @@ def _delay(facts: FilterFacts) -> tuple[float, float] | None:
         frequency = sum(bands[0]) / 2
     (delay,) = group_delay(facts.quantized_sos, np.array([frequency]), facts.sample_rate).tolist()
     return (delay, frequency) if math.isfinite(delay) else None
-
-
-def _transient(evidence: Evidence, step: StepResponse | None) -> int:
-    """Count the samples until a step from zero to the first value has settled, at most the run's length."""
-    if step is None or evidence.starts_settled:
-        return 0
-    first = evidence.golden[0] if evidence.unfiltered is None else evidence.unfiltered[0]
-    size = float(np.max(np.abs(first))) * step.scale
-    samples = step.samples_to(evidence.lsb / 2 / size) if size > evidence.lsb / 2 else 0
-    return min(samples, len(evidence.time))

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from sosmith.gen.filter.response import FilterFacts
 from sosmith.gen.fpga.synthesis import Netlist
-from sosmith.gen.output.core_facts import LimitCycleFacts, NodeFormat, SectionFacts
+from sosmith.gen.output.core_facts import LimitCycleFacts, NodeFormat, SectionFacts, SettlingFacts
 from sosmith.gen.report.provenance import Provenance
 from sosmith.gen.report.recursion import Recursion
 
@@ -100,6 +100,8 @@ class Evidence:
         What each section computes, possibly none.
     limit_cycles : sequence of LimitCycleFacts
         One for each section, in `unit`.
+    settling : SettlingFacts or None
+        Samples that show the start of the filter from zero; None if it starts otherwise.
     shown_channel : int or None
         Channel that the sample arrays are of, where they are of one of several.
     filter : FilterFacts or None
@@ -116,8 +118,6 @@ class Evidence:
         Date of the run as the user gave it; None if none was given, so that two runs are the same.
     zero : float or None
         Value of the output's code 0; None if it is `low`.
-    starts_settled : bool
-        Whether the filter starts from the state that the first sample would have led to; if not, from zero.
     """
 
     name: str
@@ -156,6 +156,7 @@ class Evidence:
     sections: Sequence[SectionFacts] = ()
     recursions: Sequence[Recursion] = ()
     limit_cycles: Sequence[LimitCycleFacts] = ()
+    settling: SettlingFacts | None = None
     shown_channel: int | None = None
     filter: FilterFacts | None = None
     gates: Netlist | None = None
@@ -165,7 +166,6 @@ class Evidence:
     files: Mapping[str, str] = field(default_factory=dict)
     date: str | None = None
     zero: float | None = None
-    starts_settled: bool = False
 
     def __post_init__(self) -> None:
         for name in ("lsb", "bound", "max_error"):

@@ -12,7 +12,7 @@ from typing import Any
 from sosmith.gen.filter.response import FilterFacts
 from sosmith.gen.filter.step_response import SETTLED, StepResponse
 from sosmith.gen.fpga.synthesis import Netlist
-from sosmith.gen.quantity import count, decibels, duration, plain_number, scale, unit_symbol
+from sosmith.gen.quantity import count, decibels, duration, plain_number, quantity, scale, unit_symbol
 from sosmith.gen.report import plots
 from sosmith.gen.report.behaviour import behaviour
 from sosmith.gen.report.diagram import diagram
@@ -87,8 +87,8 @@ def _trace_figure(evidence: Evidence, transient: int) -> Figure:
         legend.append(("truth", "broad", "true value"))
     if evidence.unfiltered is not None:
         legend.append(("unfiltered", "", "without the filter"))
-    if transient:
-        legend.append(("muted", "area", "settling from the start at zero"))
+    if evidence.settling is not None:
+        legend.append(("muted", "area", f"settling from the start at zero, {quantity(evidence.settling.seconds, 's')}"))
     caption = (
         "The hardware, in blue, should lie on the orange line of the exact calculation "
         "(double precision, unrounded coefficients, the same input codes)."

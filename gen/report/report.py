@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
 from sosmith.gen.filter.response import ResponseMeasures, measure_response
 from sosmith.gen.output.manifest import limit_cycle_entry
 from sosmith.gen.quantity import quantity
-from sosmith.gen.report.behaviour import behaviour, behaviour_entry
+from sosmith.gen.report.behaviour import behaviour, behaviour_entry, readings_of
 from sosmith.gen.report.curves import error_over_time, error_spectrum, filter_curve
 from sosmith.gen.report.evidence import Evidence
 from sosmith.gen.report.mask import mask_shortfalls
@@ -66,7 +66,7 @@ def _accuracy(evidence: Evidence) -> dict[str, float | None]:
         "golden": evidence.golden,
         "hardware": evidence.hardware,
     }
-    truth, reading = evidence.truth, evidence.reading
+    truth, reading = evidence.truth, readings_of(evidence)
     if truth is None:
         return dict.fromkeys(traces)
     counted = truth if reading is None else truth[reading]
@@ -86,7 +86,9 @@ def summarise(evidence: Evidence) -> dict[str, Any]:
         The keys of the contract, and: ``core``, ``scenario``, ``realization``, ``architecture``, ``gates`` (name of
         the board whose netlist ran, None if the SystemVerilog itself did), ``lsb``, ``range``, ``max_error``,
         ``error.{max_lsb,mean,proven,parts}``, ``first_mismatch``, ``latency_cycles``, ``cycles_per_sample`` (of
-        this run, waiting included), ``alternatives``, ``limit_cycles``, ``tools``, ``sosmith_version``, ``date`` (as
+        this run, waiting included), ``start_up.{samples,seconds,limit}`` (None unless the filter starts from zero;
+        ``accuracy_percent`` and ``true_error`` leave these samples out, unless the trace marks its readings),
+        ``alternatives``, ``limit_cycles``, ``tools``, ``sosmith_version``, ``date`` (as
         given by the user, else None), ``files`` (SHA-256 of each generated file), ``true_error.{max_abs,rms,mean,
         readings}`` (hardware against the true value at the readings), ``delay.{seconds,frequency}`` (group delay, and
         where it is taken), ``settling.{seconds,half_lsb_seconds,overshoot_percent}`` (after a step, to 1 %, and to half
@@ -138,6 +140,7 @@ def summarise(evidence: Evidence) -> dict[str, Any]:
         "sqnr_db": sqnr_db(evidence.golden, evidence.error),
         "frequency_response": _response_summary(measures),
         "accuracy_percent": _accuracy(evidence),
+        "start_up": None if evidence.settling is None else asdict(evidence.settling),
         "alternatives": [
             {"name": other.name, "max_abs": other.max_abs, "rms": other.rms} for other in evidence.alternatives
         ],

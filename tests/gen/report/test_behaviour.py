@@ -16,6 +16,7 @@ from tests.gen.report.test_report import F7, LSB, Page, bandpass, evidence, fact
 from sosmith.cli import cli
 from sosmith.commands.tables.report import print_summary
 from sosmith.gen.filter.step_response import step_response
+from sosmith.gen.output.core_facts import SettlingFacts
 from sosmith.gen.report.behaviour import behaviour
 from sosmith.gen.report.evidence import Evidence
 from sosmith.gen.report.provenance import Provenance
@@ -118,14 +119,12 @@ def test_settling_is_told_to_one_percent_and_to_half_a_step_of_the_output() -> N
     assert summarise(evidence(filter=unstable))["settling"] is None
 
 
-def test_the_transient_is_as_long_as_the_first_value_is_large() -> None:
-    run = evidence(filter=facts(quantized_sos=FIRST_ORDER, ideal_sos=FIRST_ORDER))
-    assert run.unfiltered is not None
-    first = float(abs(run.unfiltered[0]))
-    assert behaviour(run).transient == math.ceil(math.log(LSB / 2 / first) / math.log(0.9) - 1)
-    assert behaviour(replace(run, starts_settled=True)).transient == 0
-    assert behaviour(plain()).transient == 0
-    short = plain(filter=facts(), time=np.arange(3.0), golden=np.ones(3), hardware=np.ones(3))
+def test_the_transient_is_the_proven_settling() -> None:
+    run = evidence(settling=SettlingFacts(samples=1250, seconds=12.5, limit=LSB / 2))
+    assert behaviour(run).transient == 1250
+    assert behaviour(evidence()).transient == 0
+    ones = np.ones(3)
+    short = plain(filter=facts(), time=np.arange(3.0), golden=ones, hardware=ones, settling=run.settling)
     assert behaviour(short).transient == 3
 
 
@@ -163,11 +162,11 @@ def test_errors_have_one_unit(words: str) -> None:
 
 
 def test_settling_is_shaded(words: str) -> None:
-    assert "settling from the start at zero" in words
     assert "settled after" in words
-    unshaded = words_of(evidence(starts_settled=True))
-    assert "settling from the start at zero" not in unshaded
-    assert "date not given" in unshaded
+    shaded = words_of(evidence(settling=SettlingFacts(samples=1250, seconds=12.5, limit=LSB / 2)))
+    assert "settling from the start at zero, 12.5 s" in shaded
+    assert "settling from the start at zero" not in words
+    assert "date not given" in shaded
 
 
 def told() -> Provenance:

@@ -23,7 +23,7 @@ from sosmith.gen.filter import response, step_response
 from sosmith.gen.filter.response import FilterFacts
 from sosmith.gen.fpga.boards import find_board
 from sosmith.gen.fpga.synthesis import Netlist
-from sosmith.gen.output.core_facts import CoefficientFacts, LimitCycleFacts, NodeFormat, SectionFacts
+from sosmith.gen.output.core_facts import CoefficientFacts, LimitCycleFacts, NodeFormat, SectionFacts, SettlingFacts
 from sosmith.gen.report import plots
 from sosmith.gen.report.evidence import Alternative, Evidence
 from sosmith.gen.report.mask import mask_shortfalls
@@ -274,8 +274,30 @@ def test_accuracy_counts_only_the_readings() -> None:
     assert summarise(run)["accuracy_percent"] == pytest.approx({"unfiltered": 80.0, "golden": 100.0, "hardware": 99.0})
 
 
+def test_accuracy_leaves_out_the_settling_of_a_start_from_zero() -> None:
+    settling = SettlingFacts(samples=2, seconds=0.5, limit=0.25)
+    ones = np.ones(4)
+    run = evidence(
+        time=np.arange(4.0), golden=ones, hardware=np.array([9.0, 9.0, 1.01, 0.99]), truth=ones,
+        unfiltered=1.2 * ones, reading=None, settling=settling,
+    )  # fmt: skip
+    summary = summarise(run)
+    assert summary["accuracy_percent"] == pytest.approx({"unfiltered": 80.0, "golden": 100.0, "hardware": 99.0})
+    assert summary["true_error"]["readings"] == 2
+    assert summary["true_error"]["max_abs"] == pytest.approx(0.01)
+    assert summary["start_up"] == {"samples": 2, "seconds": 0.5, "limit": 0.25}
+    marked = replace(run, reading=np.array([False, True, True, True]))
+    assert summarise(marked)["accuracy_percent"] != summary["accuracy_percent"]
+
+
 @pytest.mark.parametrize(
-    "changes", [{"truth": None}, {"truth": np.zeros(3000)}, {"reading": np.zeros(3000, dtype=bool)}]
+    "changes",
+    [
+        {"truth": None},
+        {"truth": np.zeros(3000)},
+        {"reading": np.zeros(3000, dtype=bool)},
+        {"reading": None, "settling": SettlingFacts(samples=3000, seconds=30.0, limit=LSB / 2)},
+    ],
 )
 def test_accuracy_is_null_where_it_has_no_meaning(changes: dict[str, Any]) -> None:
     measured = summarise(evidence(**changes))["accuracy_percent"]
