@@ -59,6 +59,9 @@ def test_nothing_leaves_its_range_whatever_is_held(example: str) -> None:
         other = with_constants(made.quantized, moved(made, "1.05"), None, room=room_of(made))
     else:
         other = with_constants(made.quantized, None, scaled(made, "1.03"), room=room_of(made))
+    for ranges in transient(own, other, first_samples(made.quantized)).ranges:
+        for low, high in (ends for name, ends in ranges.items() if name in {"x", "v"}):
+            assert -low == pytest.approx(high, rel=1e-5)  # the first sample may be at either end
     ways = [during(made, own, other), during(made, other, own)]
     rng = np.random.default_rng(1)
     for first in (0, 1):
