@@ -105,8 +105,8 @@ class Nodes:
         self.fine = bits + 2 * self.gain.bit_length() + _GUARD_BITS
         """Fraction bits of `impulse`."""
         self._wider = 1
+        self._impulse: list[int] = []
         while True:
-            self._impulse: list[int] = []
             try:
                 self._enclose()
                 break
@@ -115,7 +115,9 @@ class Nodes:
                     raise ShortfallError(
                         "the poles must not lie so close to each other that a response cannot be enclosed"
                     ) from None
-                self.fine += error.bits + (_GUARD_BITS // 2 if error.bits else 0)
+                if error.bits:
+                    self._impulse = []
+                    self.fine += error.bits + _GUARD_BITS // 2
 
     def _lengths(self, radius: Fraction) -> tuple[int, int]:
         """Estimate the length of the responses from the pole that decays most slowly, and choose that of a block."""
