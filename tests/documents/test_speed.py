@@ -3,13 +3,14 @@
 from dataclasses import replace
 
 import pytest
-from benchmarks import design, model, simulation, speed_page
+from benchmarks import design, model, random_designs, simulation, speed_page
 
 
 def test_the_document_shows_the_recorded_figures() -> None:
     assert speed_page.shown("simulation") == simulation.section(simulation.BENCHMARK.recorded())
     assert speed_page.shown("model") == model.section(model.BENCHMARK.recorded())
     assert speed_page.shown("design") == design.section(design.BENCHMARK.recorded())
+    assert speed_page.shown("random_designs") == random_designs.section(random_designs.recorded())
     with pytest.raises(ValueError, match=r"speed\.md must have a section none$"):
         speed_page.shown("none")
 
@@ -67,3 +68,15 @@ def test_a_design_that_has_become_slower_is_named() -> None:
     assert design.losses(old, slow) == [
         "bandpass, order 6, 0.0026, 0.0052: the design must take less than 8 s, not 9.0 s"
     ]
+
+
+def test_a_random_design_that_is_slow_is_named_and_gaps_are_told() -> None:
+    quick = random_designs.Design(2, "quick", "df1", 0.1, 0.4)
+    rows = [quick, replace(quick, seed=4, name="long", design=30.0), replace(quick, seed=5, name="late", design=1.0)]
+    assert [row.faults for row in rows] == [[], ["long: the design must take less than 30 s, not 30.0 s"], []]
+    late = replace(rows[2], verification=1.5)
+    assert late.faults == ["late: verification must take less than 1.00 s, not 1.50 s"]
+    text = random_designs.section([*rows[:2], late])
+    assert "| seeds up to 200 not measured yet, or stopped | 1, 3, 6 to 200 |" in text
+    assert "| slowest design | 30.0 s (long) |" in text
+    assert "| above 30 s, or verified more slowly than designed | 2 |" in text
