@@ -1,14 +1,18 @@
 """Builds bitstreams of the examples and records what they take of each board: `python -m benchmarks.boards`.
 
 What was built goes to benchmarks/boards.json as it comes, and into the tables of docs/boards.md; what is there already
-is left out. `--again` builds everything anew. `--page` builds nothing: it only writes the tables again.
+is left out. `--again` builds everything anew. `--page` builds nothing: it only writes the tables again. With `--check`,
+what is recorded is built a second time, and a bitstream that differs in one byte is a failure.
 """
 
 from __future__ import annotations
 
 import argparse
+import hashlib
 import json
+import os
 import re
+import sys
 import tempfile
 import tomllib
 from collections.abc import Sequence
@@ -52,15 +56,38 @@ def built(example: str, channels: int, board: str) -> dict[str, Any]:
     """Build a bitstream; return what is recorded of it."""
     told = {"example": example, "channels": channels, "board": board}
     spec = tomllib.loads((ROOT / "examples" / f"{example}.toml").read_text(encoding="utf-8"))
+    before = os.times()
     with tempfile.TemporaryDirectory() as folder:
         try:
             made = sosmith.design({**spec, "channels": channels}, board=board).build(board, folder=folder)
         except sosmith.ShortfallError as error:
             return {**told, "shortfall": str(error)}
+        bitstream = hashlib.sha256(made.bitstream.read_bytes()).hexdigest()
+    seconds = sum(os.times()[:4]) - sum(before[:4])
     summary = made.summary
     kept = ("architecture", "clock_hz", "line_rate_baud", "samples_per_second", "clocks", "passed", "tools", "design")
     used = {kind: cells for kind, cells in summary["utilisation"].items() if cells["used"]}
-    return {**told, **{key: summary[key] for key in kept}, "utilisation": used, "rate": spec["sample_rate"]}
+    return {
+        **told,
+        **{key: summary[key] for key in kept},
+        "utilisation": used,
+        "rate": spec["sample_rate"],
+        "bitstream_sha256": bitstream,
+        "processor_seconds": round(seconds, 1),
+    }
+
+
+def differences(rows: Sequence[dict[str, Any]]) -> list[str]:
+    """Build what is recorded a second time; return sentences on what is not as it was."""
+    found = []
+    for row in rows:
+        name = f"{row['example']}, {row['channels']} channels, {row['board']}"
+        again = built(row["example"], row["channels"], row["board"])
+        same = again.get("bitstream_sha256") == row.get("bitstream_sha256")
+        print(f"{name}: {'the same bitstream' if same else 'another bitstream'}", flush=True)
+        if not same:
+            found.append(f"{name}: the bitstream must be the one recorded, byte for byte, not another one")
+    return found
 
 
 def board_table() -> str:
@@ -130,21 +157,21 @@ def built_table(record: Sequence[dict[str, Any]]) -> str:
     """Return what the designs take of the boards, in Markdown."""
     rows = [
         "| example | channels | board | architecture | logic | multipliers | block RAM | fmax, MHz | of which needed "
-        "| samples/s a channel | of which needed |",
-        "|---|---|---|---|---|---|---|---|---|---|---|",
+        "| samples/s a channel | of which needed | to build, s of processor time |",
+        "|---|---|---|---|---|---|---|---|---|---|---|---|",
     ]
     for row in record:
         board = BOARDS[row["board"]]
         head = (row["example"], str(row["channels"]), board.title)
         if "shortfall" in row:
             rows.append(
-                f"| {' | '.join(head)} | does not fit: {row['shortfall'].partition(', but: ')[2]} | | | | | | | |"
+                f"| {' | '.join(head)} | does not fit: {row['shortfall'].partition(', but: ')[2]} | | | | | | | | |"
             )
             continue
         cells = [_share(row["utilisation"].get(kind)) for kind in _CELLS[board.device.family]]
         slowest = min(row["clocks"], key=lambda clock: clock["achieved_mhz"] / clock["wanted_mhz"])
         timing = (f"{slowest['achieved_mhz']:.1f}", f"{slowest['wanted_mhz']:g}")
-        rates = (f"{row['samples_per_second']:,.0f}", f"{row['rate']:,.0f}")
+        rates = (f"{row['samples_per_second']:,.0f}", f"{row['rate']:,.0f}", f"{row['processor_seconds']:.0f}")
         rows.append(f"| {' | '.join((*head, row['architecture'], *cells, *timing, *rates))} |")
     tools = sorted({f"{name} {version}" for row in record for name, version in row.get("tools", {}).items()})
     return "\n".join(rows) + f"\n\nTools: {', '.join(tools)}. Line rate: {RATE:,} baud.\n"
@@ -182,7 +209,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--again", action="store_true", help="build everything anew")
     parser.add_argument("--page", action="store_true", help="build nothing")
+    parser.add_argument("--check", action="store_true", help="build a second time, and compare")
     asked = parser.parse_args()
+    if asked.check:
+        sys.exit("\n".join(differences(read())) or None)
     rows = [] if asked.again else read()
     there = {(row["example"], row["channels"], row["board"]) for row in rows}
     for example, channels in () if asked.page else DESIGNS:

@@ -1,5 +1,6 @@
 """The page of the boards: its tables are those of the platforms and of the record; the examples fit where they must."""
 
+import pytest
 from benchmarks import boards
 
 from sosmith.gen.fpga.boards import BOARDS
@@ -36,3 +37,17 @@ def test_twelve_channels_fit_the_up5k_and_one_the_hx1k() -> None:
     passed = {(row["example"], row["channels"], row["board"]) for row in RECORD if row.get("passed")}
     assert ("flange_wear_locomotive", 12, "icebreaker") in passed
     assert ("flange_wear_locomotive", 1, "icestick") in passed
+
+
+def test_builds_take_less_than_three_minutes_of_two_cores_by_their_processor_time() -> None:
+    assert all(row["processor_seconds"] < 180 for row in RECORD if row.get("passed"))
+
+
+def test_another_bitstream_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    row = {"example": "audio_lowpass", "channels": 1, "board": "icestick", "bitstream_sha256": "ab"}
+    monkeypatch.setattr(boards, "built", lambda *_: row)
+    assert boards.differences([row]) == []
+    monkeypatch.setattr(boards, "built", lambda *_: {**row, "bitstream_sha256": "cd"})
+    assert boards.differences([row]) == [
+        "audio_lowpass, 1 channels, icestick: the bitstream must be the one recorded, byte for byte, not another one"
+    ]
