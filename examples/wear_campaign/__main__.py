@@ -3,7 +3,8 @@
 Emulated measurements are stored and fitted; filters are designed from spectra; hardware is generated and simulated; its
 accuracy is compared with the paper's; ways of fitting are compared. Takes about half an hour. Writes campaign.md,
 campaign.json, pictures, specifications, hardware and reports; with --document also docs/campaign.md, its pictures and
-outcome.json. With --only-methods, only the ways of fitting are compared anew, and the rest is that of outcome.json.
+outcome.json. With --only-methods, only the ways of fitting are compared anew, and the rest is that of outcome.json;
+with --without-methods, it is the other way round.
 """
 
 from __future__ import annotations
@@ -31,21 +32,24 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, help="number of seeds, at least 2, instead of that in campaign.toml")
     parser.add_argument("--simulator", choices=("verilator", "icarus"), help="instead of that in campaign.toml")
     parser.add_argument("--document", action="store_true", help="also write docs/campaign.md and its pictures")
-    parser.add_argument("--only-methods", action="store_true", help="compare only the ways of fitting anew")
+    parts = parser.add_mutually_exclusive_group()
+    parts.add_argument("--only-methods", action="store_true", help="compare only the ways of fitting anew")
+    parts.add_argument("--without-methods", action="store_true", help="do everything else anew")
     arguments = parser.parse_args()
     settings = tomllib.loads((HERE / "campaign.toml").read_text(encoding="utf-8"))
     settings |= {name: value for name, value in vars(arguments).items() if name in settings and value is not None}
     if settings["seeds"] < 2:
         parser.error(f"--seeds must be at least 2, not {settings['seeds']}")
+    earlier = json.loads((HERE / "outcome.json").read_text(encoding="utf-8"))
     with show_progress() as step:
         if arguments.only_methods:
-            earlier = json.loads((HERE / "outcome.json").read_text(encoding="utf-8"))
             filter_table = earlier["ride"]["filters"][-1]["table"]
             compared = methods_campaign(settings, filter_table, arguments.output / "methods", step)
             results, series = {"settings": settings, "methods": compared}, {}
             results |= {name: earlier[name] for name in ("bench", "ride", "week")}
         else:
-            results, series = carry_out(settings, arguments.output, step)
+            recorded = earlier["methods"] if arguments.without_methods else None
+            results, series = carry_out(settings, arguments.output, step, methods=recorded)
         step("pictures and document")
         drawn = pictures(results, series)
         text = document(results)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from examples.wear_campaign import bench, depot, hardware, methods, ride, week
+from examples.wear_campaign import bench, depot, hardware, ride, week
+from examples.wear_campaign.methods import side_by_side
 from examples.wear_campaign.spread import spread
 
 from sosmith.gen.core import CoreDesign, design_core
@@ -23,12 +24,16 @@ REALIZATION = "df1_ef2"
 """Realization of the hardware that is computed for every seed: quick to design, with the same bound."""
 
 
-def carry_out(settings: dict[str, Any], folder: Path, progress: Progress) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Carry out the whole campaign into `folder`."""
+def carry_out(
+    settings: dict[str, Any], folder: Path, progress: Progress, *, methods: list[dict[str, Any]] | None = None
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Carry out the whole campaign into `folder`; with `methods`, which do not depend on hardware, all but these."""
     on_bench, bench_series = bench_campaign(settings, folder / "bench", progress)
     on_track, ride_series = ride_campaign(settings, folder / "ride", progress)
     in_service, week_series = week_campaign(settings, on_track["filters"][-1]["table"], folder / "week", progress)
-    compared = methods_campaign(settings, on_track["filters"][-1]["table"], folder / "methods", progress)
+    compared = methods
+    if compared is None:
+        compared = methods_campaign(settings, on_track["filters"][-1]["table"], folder / "methods", progress)
     results = {
         "settings": settings,
         "methods": compared,
@@ -46,7 +51,7 @@ def methods_campaign(
     """Fit in different ways, on the bench and in the week, with different true sensors."""
     names = [*settings["bench"]["scenarios"], settings["week"]["scenario"]]
     scenarios = {name: load_scenario(SCENARIOS / f"{name}.toml") for name in names}
-    return methods.side_by_side(settings, scenarios, filter_table, folder, progress)
+    return side_by_side(settings, scenarios, filter_table, folder, progress)
 
 
 def bench_campaign(settings: dict[str, Any], folder: Path, progress: Progress) -> tuple[dict[str, Any], dict[str, Any]]:

@@ -187,7 +187,7 @@ def test_plots_are_the_same_bytes_twice(name: str, start: bytes) -> None:
     assert drawn[0] == drawn[1]
     assert drawn[0].startswith(start)
     if name == "p.svg":
-        for text in ("Coverage: ", "Residuals: ", "Leverage: ", "History", "version 2 of 2024-03-01"):
+        for text in ("Coverage: ", "Residuals: ", "Leverage of each", "History", "version 2 of 2024-03-01"):
             assert text in drawn[0].decode()
 
 

@@ -927,7 +927,7 @@ def test_demo_walks_the_whole_road(process: Start, tmp_path: Path) -> None:
     output, errors = running.communicate(timeout=HANGS)
     assert running.returncode == 0
     words = " ".join(output.split())
-    assert "yes, all of 60000 samples" in words
+    assert "yes, all of 60,000 samples" in words
     assert "flange_wear: passed" in words
     assert errors.splitlines()[-1] == f"sosmith: report: {(tmp_path / 'out' / 'report.html').as_uri()}"
     report = json.loads((tmp_path / "out" / "report.json").read_text(encoding="utf-8"))
