@@ -181,9 +181,16 @@ def synthesized(core: Core, key: str, folder: Path) -> dict[str, int]:
 
 def missing(record: Figures) -> list[str]:
     """List the cores without recorded figures, and their targets."""
-    left = {
-        core: [title(TARGETS[key]) for key in core.targets if key not in targets_in(record, core)] for core in CORES
-    }
+    return _listed(lambda core, key: key not in targets_in(record, core))
+
+
+def outdated(record: Figures) -> list[str]:
+    """List the cores whose recorded figures are those of an earlier version, and their targets."""
+    return _listed(lambda core, key: targets_in(record, core).get(key, {}).get("earlier", False))
+
+
+def _listed(asked: Callable[[Core, str], bool]) -> list[str]:
+    left = {core: [title(TARGETS[key]) for key in core.targets if asked(core, key)] for core in CORES}
     return [f"{core.label} on {'; '.join(titles)}" for core, titles in left.items() if titles]
 
 
@@ -204,23 +211,29 @@ def mark(text: str) -> str:
 
 
 def measure(processes: int) -> None:
-    """Synthesize, place and route everything not recorded; write the record after each core and target."""
+    """Synthesize, place and route everything not recorded as it is; write the record after each core and target.
+
+    What is recorded of an earlier version of a core stays, and is told as such, until it is measured again.
+    """
     record: Figures = {"tools": tools(), "seeds": list(SEEDS), "cores": {}}
     old: Figures = json.loads(RECORD.read_text(encoding="utf-8"))
     unchanged = (old["tools"], old["seeds"]) == (record["tools"], record["seeds"])
     for core in CORES:
         realization = design(core.example, core.architecture).quantized.realization
         kept = targets_in(old, core) if unchanged else {}
-        kept = {key: figures for key, figures in kept.items() if figures["source"] == source(core, key)}
+        for key, figures in kept.items():
+            figures["earlier"] = figures["source"] != source(core, key)
         record["cores"][core.key] = {"realization": realization, "targets": kept}
+    RECORD.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
     for core, key in jobs():
         targets = targets_in(record, core)
-        if key in targets:
+        if key in targets and not targets[key]["earlier"]:
             continue
         with tempfile.TemporaryDirectory() as scratch:
             cells = synthesized(core, key, Path(scratch))
             targets[key] = {
                 "source": source(core, key),
+                "earlier": False,
                 "cycles": architecture_on(core, key).cycles_per_sample,
                 "area": asdict(Area.of(cells)),
                 **placed(Path(scratch), key, cells, processes),
@@ -556,6 +569,8 @@ def document(record: Figures) -> dict[str, str]:
     left = "".join(f"- {core}.\n" for core in missing(record))
     if left:
         left = f"\nNot measured yet:\n\n{left}"
+    if earlier := "".join(f"- {core}.\n" for core in outdated(record)):
+        left += f"\nMeasured on an earlier version of the core, and not again yet:\n\n{earlier}"
     text = f"""# What the cores cost
 
 Written by `python -m benchmarks.cost` from the figures that it records in `benchmarks/cost.json`. `--check` synthesizes
