@@ -6,8 +6,10 @@ the samples at the nodes of the next block::
 
     h[j B + i] = sum over m of Phi[i, m] W[j, m],    W[j + 1] = K W[j]
 
-The weights Phi and K depend on D alone. They are enclosed in ball arithmetic: the response of 1/D is computed in
-integers, whose error a bound on the sum of its magnitudes gives, ``L1(1/D) <= prod 1/(1 - |p|)`` over the poles p. The
+The weights Phi and K depend on D alone. They are enclosed in ball arithmetic, with samples of the response of 1/D in
+integers. The first ones are computed one by one; a bound on the sum of their magnitudes gives their error,
+``L1(1/D) <= prod 1/(1 - |p|)`` over the poles p. Those far away, which only the nodes need, are reached by doubling
+the distance between samples (`sosmith.gen.proof.decimation`), so that none is computed that nothing asks for. The
 nodes are the pivots of an elimination with row pivoting (discrete Leja points: Bos, De Marchi, Sommariva and Vianello
 2010). Phi is then of the order of one, however close the poles are to each other.
 
@@ -26,6 +28,7 @@ import numpy as np
 import numpy.typing as npt
 from flint import arb, arb_mat, ctx, fmpq_poly
 
+from sosmith.gen.proof.decimation import decimated
 from sosmith.gen.proof.poles import Coefficients, pole_radii
 from sosmith.model.errors import ShortfallError
 
@@ -38,7 +41,8 @@ _LONGEST_BITS = 40  # that accuracy, relative, in bits
 _DECAY_BITS = 16  # to which responses decay beyond the accuracy wanted
 _SMALLEST_BLOCK, _LARGEST_BLOCK = 64, 512
 _WINDOWS = 12  # that the nodes are spread over, in the time in which a response decays to `_LONGEST_BITS`
-_GROUPS, _NEIGHBOURS = 64, 4  # of places among which the nodes are chosen
+_FIRST = 64  # places among which the nodes are chosen, and
+_GROUPS, _NEIGHBOURS = 32, 4  # groups of neighbours at even distances, at least; fewer than twice as many
 _SLACK_BITS = 16
 _LARGEST_GROWTH = 1 << 32  # of an error from block to block; more distant nodes make it smaller
 _DIGITS = 3  # binary digits of the number of blocks
@@ -98,14 +102,14 @@ class Nodes:
         self._most = LONGEST * self._decay // (_LONGEST_BITS + _DECAY_BITS)
         self.gain = math.ceil(math.prod((1 / (1 - radius) for radius in radii), start=Fraction(1)))
         """Bound on ``L1(1/D)``."""
-        self.spread = 2 * self.gain
+        self.spread = 2 * (1 + (1 << self.degree)) * self.gain
+        """Bound on the error of `impulse` and `around`, in units of ``2**-fine``."""
         self._length, self.block = self._lengths(max(radii, default=Fraction(0)))
         self.blocks = 0
         self.residue = Fraction(0)
-        self.fine = bits + 2 * self.gain.bit_length() + _GUARD_BITS
-        """Fraction bits of `impulse`."""
+        self.fine = bits + self.gain.bit_length() + self.spread.bit_length() + _GUARD_BITS
+        """Fraction bits of `impulse` and `around`."""
         self._wider = 1
-        self._impulse: list[int] = []
         while True:
             try:
                 self._enclose()
@@ -116,7 +120,6 @@ class Nodes:
                         "the poles must not lie so close to each other that a response cannot be enclosed"
                     ) from None
                 if error.bits:
-                    self._impulse = []
                     self.fine += error.bits + _GUARD_BITS // 2
 
     def _lengths(self, radius: Fraction) -> tuple[int, int]:
@@ -136,19 +139,53 @@ class Nodes:
             )
 
     def impulse(self, length: int) -> list[int]:
-        """Return at least `length` samples of the response of 1/D, within `spread` units of ``2**-fine``.
+        """Return at least `length` samples of the response of 1/D from its beginning, within `spread`."""
+        return self._continued([1 << self.fine], length)
+
+    def around(self, place: int, more: int) -> list[int]:
+        """Return d samples of the response of 1/D up to `place`, one of `places`, and `more` behind it.
+
+        They are within `spread`, as are those from the beginning. The first d are within two units, and what follows
+        from errors e of these alone is the response ``N/D`` with the first d coefficients of ``D e`` as N. As the
+        magnitudes of the coefficients of D have a sum of ``2**d`` at most, it stays below ``2 * 2**d L1(1/D)``.
+        """
+        if place in self._distant:
+            return self._continued(self._distant[place][::-1], self.degree + more)
+        made = [*([0] * self.degree), *self.impulse(place + more + 1)]
+        return made[place + 1 : place + 1 + self.degree + more]
+
+    def _continued(self, made: list[int], length: int) -> list[int]:
+        """Continue a response to `length` samples, in units of ``2**-fine``.
 
         Each sample is rounded down, and before it the coefficients so little that it costs less than another unit. That
         makes an error of less than two units at the input of 1/D.
         """
-        made = self._impulse or [1 << self.fine]
         shift = self.fine + self.gain.bit_length() + self.degree.bit_length()
         scale = int(self._denominator.denom())
         weights = [-((int(c) << shift) // scale) for c in self._denominator.numer().coeffs()][1:]
         while len(made) < length:
             made.append(sum(map(mul, weights, made[: -len(weights) - 1 : -1])) >> shift)
-        self._impulse = made
         return made
+
+    def _reach(self, window: int) -> dict[int, list[int]]:
+        """Find the d samples up to each place far from the beginning, the last one first, within two units."""
+        doublings = max(window // _GROUPS, 1).bit_length() - 1
+        count, width = (window - 1 >> doublings) + 1, self.degree + _NEIGHBOURS - 1
+        more = (self.degree + 2) * (doublings + 4) + _GUARD_BITS
+        while True:
+            with ctx.workprec(self.fine + more):
+                rows = decimated(self._denominator, doublings, count, width)
+                try:
+                    made = _rounded([value for row in rows for value in row], self.fine).reshape(count, width)
+                    break
+                except _CoarseError:
+                    more *= 2
+        return {
+            (k << doublings) - back: made[k, back : back + self.degree].tolist()
+            for k in range(count)
+            for back in range(_NEIGHBOURS)
+            if (k << doublings) - back >= _FIRST
+        }
 
     def _enclose(self) -> None:
         """Find the nodes, the weights and the powers, at the present precision."""
@@ -158,32 +195,32 @@ class Nodes:
         self.weights = np.zeros((size, d), dtype=object)
         self.powers: list[Integers] = []
         self.norms: list[Fraction] = []
+        self._distant: dict[int, list[int]] = {}
         if not d:
             return
         window = max(self._length * _LONGEST_BITS * self._wider // (_WINDOWS * self._decay), 2 * d, size)
-        response = [*([0] * d), *self.impulse(window + size)]
-
-        def row(at: int) -> list[int]:
-            return response[at + d : at : -1]
-
-        places = _candidates(window)
-        picked, least = _pivots(np.array([row(at) for at in places], dtype=object), self.fine)
-        short = self.bits + self.gain.bit_length() + _SLACK_BITS - least.bit_length()
+        beginning = [*([0] * d), *self.impulse(max(size, _FIRST))]
+        self._distant = self._reach(window)
+        rows = {at: beginning[at + d : at : -1] for at in range(min(window, _FIRST))} | self._distant
+        candidates = sorted(rows)
+        picked, least = _pivots(np.array([rows[at] for at in candidates], dtype=object), self.fine)
+        short = self.bits + self.spread.bit_length() + _SLACK_BITS - least.bit_length()
         if short > 0:
             raise _CoarseError(short)
-        self.places = [places[k] for k in picked]
-        with ctx.workprec(self.fine + max(map(abs, response)).bit_length()):
+        self.places = [candidates[k] for k in picked]
+        with ctx.workprec(self.fine + self.gain.bit_length()):
             radius = arb(0, self.spread)
 
-            def balls(at: int) -> list[arb]:
-                return [arb(v) + radius if v else arb(0) for v in row(at)]
+            def balls(matrix: list[list[int]]) -> arb_mat:
+                return arb_mat(len(matrix), d, [arb(value) + radius for row in matrix for value in row])
 
             try:
-                inverse = arb_mat(d, d, [ball for at in self.places for ball in balls(at)]).inv()
+                inverse = balls([rows[at] for at in self.places]).inv()
             except ZeroDivisionError:
                 raise _CoarseError(self.fine) from None
-            wanted = [*range(size), *(size + at for at in self.places)]
-            found = (arb_mat(len(wanted), d, [ball for at in wanted for ball in balls(at)]) * inverse).entries()
+            wanted = [beginning[at + d : at : -1] for at in range(size)]
+            wanted += [self.around(at, size)[: -d - 1 : -1] for at in self.places]
+            found = (balls(wanted) * inverse).entries()
             self.weights = _rounded(found[: size * d], self.bits).reshape(size, d)
             self._multiply(arb_mat(d, d, found[size * d :]))
         if self._wider < _WINDOWS and math.prod(max(norm, Fraction(1)) for norm in self.norms) > _LARGEST_GROWTH:
@@ -220,13 +257,6 @@ def polynomial(values: Sequence[Fraction]) -> fmpq_poly:
     """Convert coefficients to a polynomial of FLINT."""
     scale = math.lcm(*(value.denominator for value in values))
     return fmpq_poly([value.numerator * (scale // value.denominator) for value in values], scale)
-
-
-def _candidates(window: int) -> list[int]:
-    """Places among which the nodes are chosen: the first samples, and groups of neighbours at even distances."""
-    step = max(1, window // _GROUPS)
-    places = {*range(min(window, _GROUPS)), *(k for at in range(0, window, step) for k in range(at, at + _NEIGHBOURS))}
-    return sorted(at for at in places if at < window)
 
 
 def _pivots(matrix: Integers, bits: int) -> tuple[list[int], int]:

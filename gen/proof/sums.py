@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
 from itertools import accumulate
+from operator import mul
 
 import numpy as np
 import numpy.typing as npt
@@ -200,15 +201,14 @@ class Recursion:
         """Compute several responses at the nodes, in blocks that begin at the same sample."""
         table, bits = self._table, self._bits
         start = max(map(self._start, numerators), default=0)
-        wanted = [*range(start), *(start + at for at in table.places)]
-        impulse = table.impulse(max(wanted, default=0) + 1)
+        impulse = table.impulse(start)
+        around = [table.around(place, start)[::-1] for place in table.places]
         heads, firsts, errors = [], [], []
         for numerator in numerators:
             scale = int(numerator.denom()) << table.fine - bits
             taps = [int(value) for value in numerator.numer().coeffs()]
-            found = [sum(n * impulse[at - k] for k, n in enumerate(taps[: at + 1])) // scale for at in wanted]
-            heads.append(found[:start])
-            firsts.append(found[start:])
+            heads.append([sum(map(mul, taps, impulse[at::-1])) // scale for at in range(start)])
+            firsts.append([sum(map(mul, taps, samples)) // scale for samples in around])
             errors.append(2 + sum(map(abs, taps)) * table.spread // scale)
         count = len(firsts)
         nodes = np.array(firsts, dtype=object).reshape(count, table.degree).T.reshape(table.degree, 1, count)

@@ -87,7 +87,7 @@ def test_a_precision_that_never_suffices_is_given_up(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(nodes, "_pivots", flat)
     with pytest.raises(ShortfallError, match=r"^the poles must not lie so close to each other that a response cannot"):
         Nodes((dyadic(1, -0.5),), ACCURACY, 20_000)
-    missing = 20_000 + (2).bit_length() + 16
+    missing = 20_000 + (2 * (1 + 2) * 2).bit_length() + 16
     assert [b - a for a, b in pairwise(tried)] == [missing + 32] * 3
     assert tried[-2] <= 1 << 16 < tried[-1]
 
