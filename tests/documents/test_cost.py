@@ -133,6 +133,19 @@ def test_what_goals_are_about_is_recorded_and_what_is_not_is_told() -> None:
     assert "| audio_lowpass folded | ECP5 LFE5U-25F, speed 6 | fmax, MHz | at least 100 | - | not measured |" in text
 
 
+def test_figures_of_an_earlier_version_are_told() -> None:
+    record = json.loads(cost.RECORD.read_text(encoding="utf-8"))
+    core = cost.CORES[0]
+    (key, *_), line = (
+        cost.targets_in(record, core),
+        f"- {core.label} on {cost.title(TARGETS[cost.CORES[0].targets[0]])}",
+    )
+    for earlier in (True, False):
+        cost.targets_in(record, core)[key]["earlier"] = earlier
+        told = cost.document(record)["docs/cost.md"].partition("Measured on an earlier version of the core, and not")[2]
+        assert (line in told) is earlier
+
+
 def test_a_goal_can_be_missed() -> None:
     record = json.loads(cost.RECORD.read_text(encoding="utf-8"))
     figures = record["cores"]["flange_wear_locomotive folded 64"]["targets"]["up5k"]
