@@ -138,7 +138,9 @@ class SerialSlave(wiring.Component):
         word = Signal(BITS, reset_less=True)
         index = Signal(self.address_bits - 2, reset_less=True)
         count = Signal(range(BITS + 1))
-        writes, partial, failed = Signal(), Signal(), Signal()
+        writes = Signal()
+        partial = Signal()
+        failed = Signal()
         with m.If(idle):
             # Reads and writes take turns at being ready, so that no ready depends on a valid.
             m.d.sync += [writes.eq(~writes), partial.eq(0), count.eq(0)]

@@ -158,8 +158,10 @@ class Core(wiring.Component):
             self._stage(m, stage, NO_CONSTANTS if banks is None else banks.of_stage(k), buffer.advance)
             for k, stage in enumerate(self.datapath.stages)
         ]
-        bank, waiting = Signal(), Signal(2)
-        guard, empty = FaultGuard(max(1, channel_bits(self.channels))) if guarded else None, Signal()
+        bank = Signal()
+        waiting = Signal(2)
+        guard = FaultGuard(max(1, channel_bits(self.channels))) if guarded else None
+        empty = Signal()
         first, data = self._source(m, stages, (buffer.advance, bank, waiting), guard, empty)
         port = None
         if banks is not None:
@@ -265,17 +267,17 @@ class Core(wiring.Component):
 
         `enters` is whether a sample or a scrub is taken by the first stage at this clock.
         """
-        inside = Signal(range(self._depth + 1))
+        remaining = Signal(range(self._depth + 1))
         with m.If(enters):
-            m.d.sync += inside.eq(self._depth)
-        with m.Elif(advance & inside.any()):
-            m.d.sync += inside.eq(inside - 1)
+            m.d.sync += remaining.eq(self._depth)
+        with m.Elif(advance & remaining.any()):
+            m.d.sync += remaining.eq(remaining - 1)
         m.d.comb += guard.failed.eq(fault & advance)
         for component in stages:
             if isinstance(component, PipelinedStage):
                 m.d.comb += component.clear.eq(guard.restart)
         empty = Signal()
-        m.d.comb += empty.eq(~inside.any())
+        m.d.comb += empty.eq(~remaining.any())
         return empty
 
     @property
@@ -349,7 +351,8 @@ class Core(wiring.Component):
             return _Place(self.s_axis_tvalid & ~blocked, Const(0, 0), bank), self.s_axis_tdata
         bits = channel_bits(self.channels)
         buffer = m.submodules.input_buffer = StreamBuffer(len(self.s_axis_tdata) + bits + 1)
-        clearing, cleared = Signal(init=1), Signal(bits)
+        clearing = Signal(init=1)
+        cleared = Signal(bits)
         exists = self.s_axis_tdest < self.channels
         dest: Value = buffer.o_data[:bits]
         scrubs: Value = Const(0, 1)

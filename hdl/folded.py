@@ -181,8 +181,11 @@ class FoldedCore(wiring.Component):
         m = Module()
         m.domains.sync = ClockDomain(local=True)
         m.d.comb += [ClockSignal("sync").eq(self.aclk), ResetSignal("sync").eq(~self.aresetn)]
-        advance, clearing, start = Signal(), Signal(init=1), Signal()
-        busy, dropped = Signal(), Signal()
+        advance = Signal()
+        clearing = Signal(init=1)
+        start = Signal()
+        busy = Signal()
+        dropped = Signal()
         guard = self._guard(m, busy, clearing)
         leaves = self.m_axis_tvalid & self.m_axis_tready
         waits = (busy & ~leaves) | clearing if guard is None else busy | clearing | guard.broken
@@ -190,7 +193,8 @@ class FoldedCore(wiring.Component):
         counter, fetching = self._control(m, (advance, clearing, start, busy), channel, early=guard is None)
         reload = self._reload(m, start, busy)
         pipeline, fetched = self._fetch(m, advance, (counter, fetching), reload, guard)
-        read, added = Signal(signed(self._word)), Signal(signed(self.program.accumulator_bits))
+        read = Signal(signed(self._word))
+        added = Signal(signed(self.program.accumulator_bits))
         moved = self._accumulate(m, advance, pipeline, (read, added))
         remembered = self._remember(m, (advance, clearing), (counter, added, read, moved, channel), pipeline, guard)
         ends = advance & pipeline[-1].valid & ~pipeline[-2].valid
@@ -268,7 +272,8 @@ class FoldedCore(wiring.Component):
         """
         advance, clearing, start, busy = control
         count, bits = len(self.program.instructions), address_bits(self.program)
-        counter, fetching = Signal(max((count - 1).bit_length(), bits + len(channel))), Signal()
+        counter = Signal(max((count - 1).bit_length(), bits + len(channel)))
+        fetching = Signal()
         fetches = Signal()
         m.d.comb += fetches.eq(fetching | start if early else fetching)
         is_last = channel == self.channels - 1
@@ -299,7 +304,8 @@ class FoldedCore(wiring.Component):
             depth, bits=bits, design=self.fingerprint, protected=self.protect != "none"
         )
         forward_slave(m, self, port)
-        kept, bank = Signal(reset_less=True), Signal()
+        kept = Signal(reset_less=True)
+        bank = Signal()
         with m.If(start):
             m.d.sync += kept.eq(port.bank)
         m.d.comb += [
@@ -328,7 +334,7 @@ class FoldedCore(wiring.Component):
             codes += [0] * ((1 << (len(codes) - 1).bit_length()) - len(codes))
             codes += [0] * len(codes)
         check = CheckBits(instruction_bits(self.program), self.protect)
-        m.submodules.program = program = Memory(
+        m.submodules.instructions = program = Memory(
             shape=check.width, depth=len(codes), init=[check.word(code) for code in codes], attrs=_NO_COLLISIONS
         )
         fetch = program.read_port()
@@ -448,7 +454,8 @@ class FoldedCore(wiring.Component):
         split = (bits + 1) // 2
         low = Signal(split, name="total_low")
         high = Signal(signed(len(added) - split), name="total_high")
-        carries, carried = Signal(), Signal(reset_less=True)
+        carries = Signal()
+        carried = Signal(reset_less=True)
         m.d.comb += carries.eq(advance & last.has(*CARRIES))
         m.d.sync += [low.eq(Mux(carries, added >> bits, added)), high.eq(added >> split), carried.eq(carries)]
         with m.If(~last.valid | (advance & last.has(*CLEARS))):
@@ -525,7 +532,8 @@ class FoldedCore(wiring.Component):
             one = check.word(1) >> low & ((1 << (high - low)) - 1)
             init = [one if address % words == self.program.one else 0 for address in range(depth)]
             m.submodules[f"words{low}"] = ram = Memory(shape=high - low, depth=depth, init=init, attrs=_NO_COLLISIONS)
-            reader, writer = ram.read_port(), ram.write_port()
+            reader = ram.read_port()
+            writer = ram.write_port()
             m.d.comb += [
                 reader.addr.eq(read[0]),
                 reader.en.eq(read[1]),
@@ -559,7 +567,8 @@ class FoldedCore(wiring.Component):
             m.d.sync += self.m_axis_tvalid.eq(1)
         with m.If(self.m_axis_tvalid & self.m_axis_tready):
             m.d.sync += self.m_axis_tvalid.eq(0)
-        rail, outside = Signal(reset_less=True), Signal(reset_less=True)
+        rail = Signal(reset_less=True)
+        outside = Signal(reset_less=True)
         with m.If(start):
             m.d.sync += [rail.eq(at_rail(self.datapath.inputs, self.s_axis_tdata)), outside.eq(0)]
         if self.fingerprint is not None or any(i.opcode is Opcode.JUDGE for i in self.program.instructions):

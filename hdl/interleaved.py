@@ -277,7 +277,8 @@ class InterleavedStage(wiring.Component):
                 init=[0] * self.channels,
                 attrs=_BLOCK_RAM if plan.reading > 1 else {},
             )
-            read, write = memory.read_port(), memory.write_port()
+            read = memory.read_port()
+            write = memory.write_port()
             word = read.data
             if plan.reading > 1:
                 word = Signal(read.data.shape(), name=f"{names[index]}_read", reset_less=True)

@@ -138,7 +138,8 @@ class ReloadPort(wiring.Component):
 
     def _load(self, m: Module, slave: SerialSlave, crc: SerialCrc) -> tuple[Signal, Signal]:
         """Control a load from its beginning to its end; return whether one is going on, and how the last one ended."""
-        loading, outcome = Signal(), Signal(Outcome)
+        loading = Signal()
+        outcome = Signal(Outcome)
         taken = Signal(range(self.depth + 1))
         complete = taken == self.depth
         writable = (
@@ -174,13 +175,15 @@ class ReloadPort(wiring.Component):
 
     def _read(self, m: Module, slave: SerialSlave, crc: SerialCrc, bank: Signal, load: Value) -> None:
         """Answer reads bit by bit: constants and versions from a memory, the rest a clock late as these are."""
-        seen_bank, seen_pending = Signal(), Signal()  # a swap must not show in the middle of a read
+        seen_bank = Signal()
+        seen_pending = Signal()  # a swap must not show in the middle of a read
         with m.If(slave.o_check):
             m.d.sync += [seen_bank.eq(bank), seen_pending.eq(self.pending)]
         copies = 3 if self.protected else 1
         init = [(word >> bit & 1) * ((1 << copies) - 1) for word in self._rows() for bit in range(BITS)]
         m.submodules.words = words = Memory(shape=copies, depth=len(init), init=init, attrs={"ram_style": "block"})
-        store, fetch = words.write_port(), words.read_port()
+        store = words.write_port()
+        fetch = words.read_port()
         m.d.comb += [
             store.addr.eq(Cat(slave.o_count, slave.o_index ^ ~bank)),
             store.data.eq(slave.o_bit.replicate(copies)),

@@ -2,10 +2,10 @@
 
 ::
 
-    i_data 8 --i_start--> [byte] >> 1 ---> byte[0] ---> SerialCrc ---> o_bit
+    i_data 8 --i_start--> [data] >> 1 ---> data[0] ---> SerialCrc ---> o_bit
                              ^                             ^             |
-                             |                          i_turn           +---> = byte[0]? ---> [wrong] ---> o_wrong
-                             +---- byte[0], or o_bit with i_turn <-------+
+                             |                          i_turn           +---> = data[0]? ---> [wrong] ---> o_wrong
+                             +---- data[0], or o_bit with i_turn <-------+
                              |
                              +----> o_data 8, o_write after 8 clocks
 
@@ -66,21 +66,23 @@ class CheckedBytes(wiring.Component):
         """Build the shift register around the CRC."""
         m = Module()
         m.submodules.crc = crc = SerialCrc()
-        byte = Signal(8, reset_less=True)
-        count, turns, writes = Signal(3), Signal(), Signal()
+        data = Signal(8, reset_less=True)
+        count = Signal(3)
+        turns = Signal()
+        writes = Signal()
         m.d.comb += [
             crc.i_clear.eq(self.i_clear),
             crc.i_shift.eq(self.o_busy),
             crc.i_turn.eq(turns),
-            crc.i_bit.eq(byte[0]),
-            self.o_data.eq(byte),
+            crc.i_bit.eq(data[0]),
+            self.o_data.eq(data),
         ]
         m.d.sync += self.o_write.eq(self.o_busy & writes & count.all())
         with m.If(self.o_busy):
-            m.d.sync += [byte.eq(Cat(byte[1:], Mux(turns, crc.o_bit, byte[0]))), count.eq(count + 1)]
-            m.d.sync += [self.o_busy.eq(~count.all()), self.o_wrong.eq(self.o_wrong | (turns & (byte[0] ^ crc.o_bit)))]
+            m.d.sync += [data.eq(Cat(data[1:], Mux(turns, crc.o_bit, data[0]))), count.eq(count + 1)]
+            m.d.sync += [self.o_busy.eq(~count.all()), self.o_wrong.eq(self.o_wrong | (turns & (data[0] ^ crc.o_bit)))]
         with m.If(self.i_clear):
             m.d.sync += self.o_wrong.eq(0)
         with m.If(self.i_start):
-            m.d.sync += [byte.eq(self.i_data), turns.eq(self.i_turn), writes.eq(self.i_write), self.o_busy.eq(1)]
+            m.d.sync += [data.eq(self.i_data), turns.eq(self.i_turn), writes.eq(self.i_write), self.o_busy.eq(1)]
         return m

@@ -221,7 +221,8 @@ class CommandEngine(wiring.Component):
         m = Module()
         m.submodules.bytes = unit = CheckedBytes()
         m.submodules.identity = rom = Memory(shape=8, depth=len(self.memory), init=self.memory, attrs=BLOCK_RAM)
-        machine = _Machine(m, self, unit, rom.read_port())
+        identity = rom.read_port()
+        machine = _Machine(m, self, unit, identity)
         # Every state waits until the last byte is through.
         with m.If(~unit.o_busy), m.FSM(name="engine"):
             machine.check()
@@ -250,13 +251,17 @@ class _Machine:
 
     def __init__(self, m: Module, engine: CommandEngine, unit: CheckedBytes, identity: ReadPort) -> None:
         self.m, self.engine, self.unit, self.face, self.identity = m, engine, unit, engine.face, identity
-        self.address, self.ahead = Signal(8), Signal(8)  # in the message; what it is in the next clock
-        self.end = Signal(8)  # where the CRC of the message begins
+        self.address = Signal(8)
+        self.ahead = Signal(8)  # in the message; what it is in the next clock
+        self.crc_start = Signal(8)  # where the CRC of the message begins
         self.count = Signal(range(max(BLOCK_BYTES, engine.face.readings)))
         self.word = Signal(8 * engine.face.word_bytes, reset_less=True)
         known = Type.CONVERTERS if engine.face.readings else Type.COUNTERS
-        self.kind, self.unknown, self.status = Signal(range(known + 1)), Signal(), Signal(3)
-        self.expected, self.retained = Signal(8), Signal(2)  # the next number; responses that can be sent again
+        self.kind = Signal(range(known + 1))
+        self.unknown = Signal()
+        self.status = Signal(3)
+        self.expected = Signal(8)
+        self.retained = Signal(2)  # the next number; responses that can be sent again
         self.gap = Signal()  # a result was given up since the channel of the first one was told
         self.target = Signal(8)  # channel, address of a register, or block of the identity
         m.d.sync += self.address.eq(self.ahead)
@@ -320,12 +325,12 @@ class _Machine:
             with m.If(engine.i_full):
                 m.next = "length"
         with m.State("length"):
-            m.d.sync += self.end.eq(engine.i_data - CRC_BYTES)
+            m.d.sync += self.crc_start.eq(engine.i_data - CRC_BYTES)
             m.d.comb += unit.i_clear.eq(1)
             self.go(0)
             m.next = "check"
         with m.State("check"):
-            at_end = self.address == self.end
+            at_end = self.address == self.crc_start
             m.d.comb += [unit.i_start.eq(1), unit.i_data.eq(engine.i_data), unit.i_turn.eq(at_end)]
             self.go(self.address + 1)
             with m.If(at_end):
@@ -402,11 +407,11 @@ class _Machine:
 
     def _requests(self) -> dict[Type, tuple[Value, str]]:
         """For each request that is known, whether its length is right, and its first state."""
-        none, one = self.end == HEAD_BYTES, self.end == HEAD_BYTES + 1
+        none, one = self.crc_start == HEAD_BYTES, self.crc_start == HEAD_BYTES + 1
         few: Value = ~none
         longest = HEAD_BYTES + 1 + self.face.samples * self.face.sample_bytes
         if longest < HEAD_BYTES + MAX_BODY:
-            few = few & (self.end <= longest)
+            few = few & (self.crc_start <= longest)
         fed = {Type.POLL: (none, "poll"), Type.CONVERTERS: (none, "reading")}
         known = {
             Type.OPEN: (none, "version"),
@@ -446,7 +451,7 @@ class _Machine:
         if self.face.address_bits:
             last = Mux(writes, WORD_BYTES - 1, last)
         with m.State("load"):
-            with m.If(self.address == self.end):
+            with m.If(self.address == self.crc_start):
                 m.d.sync += self.count.eq(0)
                 self.answer(Status.OK)
                 with m.If(self.count != 0):

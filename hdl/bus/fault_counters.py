@@ -46,8 +46,10 @@ class FaultCounters(wiring.Component):
         """Build the memory and its updater."""
         m = Module()
         m.submodules.counts = counts = Memory(shape=8, depth=COUNT, init=[], attrs=BLOCK_RAM)
-        store, fetch = counts.write_port(), counts.read_port()
-        pending, writes = Signal(COUNT), Signal()
+        store = counts.write_port()
+        fetch = counts.read_port()
+        pending = Signal(COUNT)
+        writes = Signal()
         chosen: Value = Const(0, range(COUNT))
         for k in reversed(range(COUNT)):
             chosen = Mux(pending[k], k, chosen)

@@ -82,8 +82,11 @@ class FrameSender(wiring.Component):
         """Build the encoder, the buffers and the reader."""
         m = Module()
         m.submodules.buffers = buffers = Memory(shape=8, depth=512, init=[], attrs=BLOCK_RAM)
-        store, fetch = buffers.write_port(), buffers.read_port()
-        slot, code, index = Signal(), Signal(8), Signal(8)
+        store = buffers.write_port()
+        fetch = buffers.read_port()
+        slot = Signal()
+        code = Signal(8)
+        index = Signal(8)
         zero = self.i_code | (self.i_write & (self.i_data == 0))
         m.d.comb += [
             store.addr.eq(Cat(Mux(zero, code, index), slot)),
@@ -97,7 +100,10 @@ class FrameSender(wiring.Component):
             with m.If(zero):
                 m.d.sync += code.eq(index)
         # The reader: from address 0, which is never written, to the zero byte behind the frame.
-        source, place, there, sent = Signal(), Signal(8), Signal(), Signal()
+        source = Signal()
+        place = Signal(8)
+        there = Signal()
+        sent = Signal()
         goes = self.o_valid & self.i_ready
         m.d.comb += [
             fetch.addr.eq(Cat(place, source)),

@@ -113,7 +113,9 @@ class Link(wiring.Component):
         for name, member in core_side(self.face).items():
             inner, outer = getattr(engine, name), getattr(self, name)
             m.d.comb += inner.eq(outer) if member.flow is In else outer.eq(inner)
-        activity, damaged, alarm = Signal(), Signal(), Signal()
+        activity = Signal()
+        damaged = Signal()
+        alarm = Signal()
         with m.If(engine.o_accepted):
             m.d.sync += activity.eq(~activity)
         with m.If(engine.o_reset):

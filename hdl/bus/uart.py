@@ -91,7 +91,8 @@ class UartReceiver(wiring.Component):
         line = sync[1]
         m.d.sync += sync.eq(Cat(self.i_rx, sync[0]))
         phase = _Phase(self.ratio)
-        active, was_high = Signal(), Signal()
+        active = Signal()
+        was_high = Signal()
         # All ones at first: when the start bit, the first zero, has come to the lowest place, the data bits are above.
         bits = Signal(_DATA_BITS + 1, reset_less=True)
         m.d.comb += self.o_data.eq(bits[1:])

@@ -147,7 +147,8 @@ class _Scan:
         port = self.plan.readings[number].port
         memory = Memory(shape=port.bits + 1, depth=max(2, self.plan.channels), init=[])
         self.m.submodules[f"codes_{port.name}"] = memory
-        store, fetch = memory.write_port(), memory.read_port()
+        store = memory.write_port()
+        fetch = memory.read_port()
         self.m.d.comb += [store.addr.eq(self.channel), fetch.addr.eq(self.channel)]
         return store, fetch
 

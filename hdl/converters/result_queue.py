@@ -69,8 +69,10 @@ class ResultQueue(wiring.Component):
         """Build the ring."""
         m = Module()
         m.submodules.results = results = Memory(shape=self.bits, depth=DEPTH, init=[], attrs=BLOCK_RAM)
-        store, fetch = results.write_port(), results.read_port()
-        newest, oldest = Signal(range(DEPTH)), Signal(range(DEPTH))
+        store = results.write_port()
+        fetch = results.read_port()
+        newest = Signal(range(DEPTH))
+        oldest = Signal(range(DEPTH))
         leaves = Signal()
         m.d.comb += [
             store.addr.eq(newest),

@@ -82,7 +82,8 @@ class SpiReader(wiring.Component):
         m = Module()
         taken = Signal(2)
         m.d.sync += taken.eq(Cat(self.miso, taken))
-        command, left = Signal(COMMAND_BITS), Signal.like(self.i_bits)
+        command = Signal(COMMAND_BITS)
+        left = Signal.like(self.i_bits)
         timer = Signal(range(max(self.half, self.deselect)))
         ends = timer == 0
         m.d.sync += timer.eq(Mux(ends, self.half - 1, timer - 1))

@@ -260,7 +260,7 @@ def test_the_scrubber_mends_all_words_while_the_core_waits(channels: int, count:
         line = Line(ctx, dut)
         line.put(samples[:3])
         assert await line.finish(3) == expected[:3]
-        addresses = [("words0", k) for k in range(made.words * channels)] + [("program", k) for k in range(count)]
+        addresses = [("words0", k) for k in range(made.words * channels)] + [("instructions", k) for k in range(count)]
         before = [ctx.get(dut.memory(name)[k]) for name, k in addresses]
         for bit in range(8):
             for name, k in addresses:
@@ -283,8 +283,8 @@ def test_the_scrubber_mends_all_words_while_the_core_waits(channels: int, count:
     [
         ("words0", False, "correct"),
         ("words0", True, "detect"),
-        ("program", False, "detect"),
-        ("program", False, "correct"),
+        ("instructions", False, "detect"),
+        ("instructions", False, "correct"),
     ],
 )
 def test_a_damaged_word_gives_no_wrong_result_without_a_flag(name: str, serial: bool, protect: str) -> None:
@@ -313,7 +313,7 @@ def test_a_damaged_word_gives_no_wrong_result_without_a_flag(name: str, serial: 
             assert found[:first] == expected[:first]
             assert all(faults[first:])
             flagged.append(any(faults))
-            if name == "program":
+            if name == "instructions":
                 dut.damage(ctx, name, address, *bits)
             else:
                 cleared = [result._replace(status=result.status & ~FAULT) for result in found]

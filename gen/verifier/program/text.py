@@ -2,7 +2,7 @@ r"""Reads the program of a folded or serial core from its SystemVerilog.
 
 ::
 
-    reg [n-1:0] \program [count-1:0];  instruction    n-1       2a+4   2a+3   a+4   a+3     4   3      0
+    reg [n-1:0] instructions [count-1:0]; instruction    n-1       2a+4   2a+3   a+4   a+3     4   3      0
     reg [..] words0 [depth-1:0];       word, cut into +--------------+------------+-----------+--------+
     reg [..] words8 [depth-1:0];       slices         |   constant   |   target   |  address  | opcode |
     reg [..] total_low, total_high;    accumulator    +--------------+------------+-----------+--------+
@@ -162,8 +162,8 @@ def read_program(text: str) -> ProgramText:
     )
     require("s_axil_" not in text, "the program must be fixed to be checked, not loadable at run time")
     memories = _memories(text)
-    require("program" in memories, "the core must be folded or serial to have a program, not parallel")
-    codes, code_bits = memories["program"]
+    require("instructions" in memories, "the core must be folded or serial to have a program, not parallel")
+    codes, code_bits = memories["instructions"]
     slices = sorted((int(name[5:]), *memory) for name, memory in memories.items() if re.fullmatch(r"words\d+", name))
     widths = {name: int(top or 0) + 1 for top, name in _REGISTER.findall(text)}
     widths = {name.lstrip("\\"): width for name, width in widths.items()}

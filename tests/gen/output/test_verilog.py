@@ -1,14 +1,21 @@
-"""The SystemVerilog text: equal words of a memory as a loop, read back as the same words."""
+"""The SystemVerilog text: names as in our source, equal words of a memory as a loop, read back as the same words."""
 
 import re
 from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
 
 import pytest
-from amaranth.hdl import Elaboratable, Module, unsigned
+from amaranth.back import rtlil
+from amaranth.hdl import Elaboratable, Module, Signal, unsigned
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import Component, In, Out
-from tests.gen.designs import parallel_design
+from tests.gen.designs import EXAMPLES, parallel_design
+from tests.gen.output.test_converters import SPEC
 
+import sosmith
+from sosmith.gen.output.board_top import board_top
 from sosmith.gen.output.verilog import _MODULE, _with_plain_names, converted, to_rtlil, to_verilog
 from sosmith.gen.verifier.graph import RejectedError
 from sosmith.gen.verifier.parallel.text import read_modules
@@ -16,6 +23,10 @@ from sosmith.gen.verifier.program.text import _memories
 
 WORDS = [3] * 2 + [7] * 20 + [1] + [0] * 30 + [2] * 7
 """Runs of every kind: short ones, long ones, a single word."""
+
+_DECLARED = re.compile(r"^  (?:wire|reg) (?:\[\d+:0\] )?([^ ;]+)", re.MULTILINE)
+_NAMELESS = re.compile(r"^ *wire .*(\\\$\S+)$", re.MULTILINE)
+"""Signals that Amaranth found no name for in our source."""
 
 
 class Table(Component):
@@ -37,19 +48,37 @@ def text() -> str:
     return to_verilog(to_rtlil(Table(), "top"))
 
 
-@pytest.mark.parametrize("channels", [1, 3])
-@pytest.mark.parametrize("architecture", ["parallel", "folded"])
-def test_names_need_no_escape_and_stay_apart(architecture: str, channels: int) -> None:
-    design = replace(parallel_design("audio_lowpass.toml").architecture, name=architecture, channels=channels)
-    escaped = converted(to_rtlil(design.component(), "top"))
-    plain = to_verilog(to_rtlil(design.component(), "top"))
+def stay_apart(escaped: str, plain: str) -> bool:
+    """Whether as many signals of each module have names of their own after renaming as before."""
+    declared = [[{*_DECLARED.findall(module)} for module in text.split("endmodule")] for text in (escaped, plain)]
+    return [*map(len, declared[0])] == [*map(len, declared[1])]
+
+
+@pytest.mark.parametrize("options", [{}, {"channels": 3, "protect": "correct", "reload": True}], ids=["plain", "all"])
+@pytest.mark.parametrize("architecture", ["parallel", "folded", "serial"])
+def test_names_need_no_escape_and_stay_apart(architecture: str, options: dict[str, Any]) -> None:
+    design = replace(parallel_design("audio_lowpass.toml").architecture, name=architecture, **options)
+    text = to_rtlil(design.component(), "top")
+    assert not _NAMELESS.findall(text)
+    escaped = converted(text)
+    plain = _MODULE.sub(_with_plain_names, escaped)
     assert "$" in "".join(re.findall(r"\\\S+", escaped))
-    assert {*re.findall(r"\\\S+", plain)} <= {"\\program"}  # a word of the language
-    for before, after in zip(escaped.split("endmodule"), plain.split("endmodule"), strict=True):
-        declared = [
-            re.findall(r"^  (?:wire|reg) (?:\[\d+:0\] )?([^ ;]+)", text, re.MULTILINE) for text in (before, after)
-        ]
-        assert len({*declared[0]}) == len({*declared[1]})
+    assert "\\" not in plain
+    assert stay_apart(escaped, plain)
+
+
+@pytest.mark.parametrize("spec", [EXAMPLES / "audio_lowpass.toml", SPEC], ids=["link", "converters"])
+def test_nor_do_those_of_a_board(spec: Path | dict[str, Any]) -> None:
+    text = to_rtlil(board_top(sosmith.design(spec).core, clock=Fraction(12_000_000), core="none"), "top")
+    assert not _NAMELESS.findall(text)
+    assert "\\" not in to_verilog(text)
+
+
+def test_signals_without_a_name_are_found() -> None:
+    m = Module()
+    first, second = Signal(4), Signal(4)
+    m.d.comb += second.eq(first)
+    assert _NAMELESS.findall(rtlil.convert(m, ports=[first, second]))
 
 
 def test_a_made_up_name_gives_way() -> None:

@@ -110,7 +110,7 @@ def test_another_certificate_is_rejected() -> None:
 def changed(core: Made, number: int, code: int) -> str:
     """Return the core's text with another instruction."""
     digits = -(-instruction_bits(core.program) // 4)
-    text, count = re.subn(rf"(\\program \[{number}\] = \d+'h)[0-9a-f]+;", rf"\g<1>{code:0{digits}x};", core.text)
+    text, count = re.subn(rf"(instructions\[{number}\] = \d+'h)[0-9a-f]+;", rf"\g<1>{code:0{digits}x};", core.text)
     assert count == 1
     return text
 
@@ -174,8 +174,8 @@ def test_a_word_that_is_not_cleared() -> None:
 def test_words_that_are_hidden_do_not_count(begin: str, end: str) -> None:
     """The hardware would have what follows, which is spaced in another way; the words that are right are hidden."""
     core = small(PLAIN)
-    words = dict(re.findall(r"\\program \[([23])\] = (\S+);", core.text))
-    right, wrong = rf"\program [2] = {words['2']};", rf"\program [2]  =  {words['3']};"
+    words = dict(re.findall(r"instructions\[([23])\] = (\S+);", core.text))
+    right, wrong = rf"instructions[2] = {words['2']};", rf"instructions[2]  =  {words['3']};"
     assert right in core.text
     hidden = core.text.replace(right, f"{wrong}\n{begin}\n{right}\n{end}\n")
     with pytest.raises(RejectedError, match=r"^the text must have no comments over lines and no directives"):
