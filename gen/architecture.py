@@ -131,7 +131,13 @@ class Architecture:
         """Clocks between samples at the highest rate; an upper limit in serial."""
         if self.program is None:
             return 1
-        return folded.cycles_per_sample(self.program, serial=self.name == "serial", protect=self.protect)
+        return folded.cycles_per_sample(
+            self.program,
+            serial=self.name == "serial",
+            channels=self.channels,
+            reload=self.reload,
+            protect=self.protect,
+        )
 
     def component(self) -> Component:
         """Make the hardware; the top module has the name of the datapath."""

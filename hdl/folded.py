@@ -22,7 +22,16 @@ An instruction in pipeline stage 1 has been read from the program memory, in 2 i
 been read, in 4 it is multiplied, and in 5 it is added up. What is added is stored, given or dropped at once, and
 `total` is what is left: shifted by a digit, or 0. A word is written three stages after it is read, with MOVE and TAKE
 two, so that an instruction must follow the one that writes its word by `STORED` or `MOVED` of
-`sosmith.model.dataflow.program`.
+`sosmith.model.dataflow.program`. That holds from one sample to the next as well: with one channel, and neither reload
+nor protection, the program of the next sample is read at once behind that of the one before, whose last instructions
+are then still in the pipeline::
+
+    clock              0   1   2   ..  n-1   n   n+1  ..  n+4  n+5
+    pipeline stage 1       0   1   ..  n-2  n-1   0   ..   3    4      instruction, the same n for every sample
+    pipeline stage 5                                      n-1   0
+    m_axis_tvalid                                               1      next sample: n clocks later
+
+If the sink is not ready by then, the next sample goes on up to its own result, and waits there.
 
 Serial has three pipeline stages and no multiplier block: the word is addressed in stage 1, in stage 2 it has been read
 and is moved, and in stage 3 shifts and additions multiply in the accumulator itself, one clock for each bit of the
@@ -99,8 +108,24 @@ def latency_cycles(program: Program, *, serial: bool, protect: str = "none") -> 
     return late + (program.serial_cycles + _SERIAL_DEPTH if serial else len(program.instructions) + _FOLDED_DEPTH)
 
 
-def cycles_per_sample(program: Program, *, serial: bool, protect: str = "none") -> int:
+def overlaps(program: Program, *, serial: bool, channels: int = 1, reload: bool = False, protect: str = "none") -> bool:
+    """Whether a sample is begun while the last instructions of the one before are still in the pipeline.
+
+    A folded core with one channel does so, if it has neither reload nor protection, unless its program is so short that
+    the sample would still be on offer at its end, or the result before would come after the wait for it to leave.
+    """
+    plain = not serial and channels == 1 and not reload and protect == "none"
+    takes = [number for number, instruction in enumerate(program.instructions) if instruction.opcode is Opcode.TAKE]
+    is_long = min(program.result_start, len(program.instructions) - takes[-1]) >= _FOLDED_DEPTH
+    return plain and is_long
+
+
+def cycles_per_sample(
+    program: Program, *, serial: bool, channels: int = 1, reload: bool = False, protect: str = "none"
+) -> int:
     """Clocks between samples at the highest rate; in serial, an upper bound."""
+    if overlaps(program, serial=serial, channels=channels, reload=reload, protect=protect):
+        return len(program.instructions)
     idle = protect != "none"  # at least one clock, for scrubbing
     return latency_cycles(program, serial=serial, protect=protect) + idle
 
@@ -188,7 +213,10 @@ class FoldedCore(wiring.Component):
         dropped = Signal()
         guard = self._guard(m, busy, clearing)
         leaves = self.m_axis_tvalid & self.m_axis_tready
-        waits = (busy & ~leaves) | clearing if guard is None else busy | clearing | guard.broken
+        if self._overlaps:
+            waits = busy | clearing
+        else:
+            waits = (busy & ~leaves) | clearing if guard is None else busy | clearing | guard.broken
         channel = self._channel(m, waits, dropped, start)
         counter, fetching = self._control(m, (advance, clearing, start, busy), channel, early=guard is None)
         reload = self._reload(m, start, busy)
@@ -197,9 +225,10 @@ class FoldedCore(wiring.Component):
         added = Signal(signed(self.program.accumulator_bits))
         moved = self._accumulate(m, advance, pipeline, (read, added))
         remembered = self._remember(m, (advance, clearing), (counter, added, read, moved, channel), pipeline, guard)
-        ends = advance & pipeline[-1].valid & ~pipeline[-2].valid
-        limits = self._hand_out(m, (advance, start, ends), (added, channel), pipeline, guard)
+        ends = advance & pipeline[-1].valid & (self._gives_last(pipeline) if self._overlaps else ~pipeline[-2].valid)
         taken = Signal()
+        begins = taken if self._overlaps else start
+        limits = self._hand_out(m, (advance, begins, ends), (added, channel), pipeline, guard)
         if guard is None:
             reading = self._reading(pipeline)
             last_digit = reading.is_for(sum(location.digits for location in self.program.inputs) - 1)
@@ -241,6 +270,12 @@ class FoldedCore(wiring.Component):
             ]
 
     @property
+    def _overlaps(self) -> bool:
+        """Whether a sample is begun while the one before is in the pipeline."""
+        reload = self.fingerprint is not None
+        return overlaps(self.program, serial=self.serial, channels=self.channels, reload=reload, protect=self.protect)
+
+    @property
     def _word(self) -> int:
         """Width of a word."""
         return self.program.digit_bits + 1
@@ -269,6 +304,9 @@ class FoldedCore(wiring.Component):
 
         While words are cleared, the channel follows the upper bits of the counter a clock late, so that word 0 of a
         channel is cleared after its others.
+
+        Where samples overlap, the core is busy only while it reads the program, and waits before it computes a result
+        as long as the one before has not left. The accumulator is then empty.
         """
         advance, clearing, start, busy = control
         count, bits = len(self.program.instructions), address_bits(self.program)
@@ -276,6 +314,11 @@ class FoldedCore(wiring.Component):
         fetching = Signal()
         fetches = Signal()
         m.d.comb += fetches.eq(fetching | start if early else fetching)
+        leaves: Value = self.m_axis_tvalid & self.m_axis_tready
+        if self._overlaps:
+            held = (counter == self.program.result_start) & self.m_axis_tvalid & ~self.m_axis_tready
+            m.d.comb += fetches.eq(start | (fetching & ~held))
+            leaves = fetches & (counter == count - 1)
         is_last = channel == self.channels - 1
         with m.If(clearing):
             m.d.sync += [counter.eq(counter + 1), channel.eq(counter[bits:])]
@@ -287,7 +330,7 @@ class FoldedCore(wiring.Component):
                 m.d.sync += [fetching.eq(0), counter.eq(0)]
         with m.If(start):
             m.d.sync += [busy.eq(1), fetching.eq(1)]
-        with m.Elif(self.m_axis_tvalid & self.m_axis_tready):
+        with m.Elif(leaves):
             m.d.sync += busy.eq(0)
         return counter, fetches
 
@@ -556,7 +599,7 @@ class FoldedCore(wiring.Component):
 
         Return whether a wrong bit in the limits of wear was corrected, and whether one was found that could not be.
         """
-        (advance, start, ends), (added, channel) = control, values
+        (advance, begins, ends), (added, channel) = control, values
         last, parts = pipeline[-1], self.program.output.parts
         widths = [self.program.digit_bits] * (parts - 1) + [self._last_part_bits]
         given = [Signal(width, name=f"given{k}", reset_less=True) for k, width in enumerate(widths)]
@@ -569,22 +612,32 @@ class FoldedCore(wiring.Component):
             m.d.sync += self.m_axis_tvalid.eq(0)
         rail = Signal(reset_less=True)
         outside = Signal(reset_less=True)
-        with m.If(start):
+        with m.If(begins):
             m.d.sync += [rail.eq(at_rail(self.datapath.inputs, self.s_axis_tdata)), outside.eq(0)]
         if self.fingerprint is not None or any(i.opcode is Opcode.JUDGE for i in self.program.instructions):
             with m.If(advance & last.valid & last.has(Opcode.JUDGE) & added[-1]):
                 m.d.sync += outside.eq(1)
+        judged: Value = Cat(rail, outside)
+        if self._overlaps:  # the next sample may have begun
+            judged = Signal(2, reset_less=True)
+            with m.If(ends):
+                m.d.sync += judged.eq(Cat(rail, outside))
         code, saturated = self._limited(given)
         # Without protection the limits are read again and again; with it just once, so that an upset changes no flag
         # of a result that waits for the sink.
         wear = worn(m, self.datapath, code, channel, Const(1) if guard is None else ends, self.protect)
-        flags: Value = Cat(rail, outside, saturated, wear.flags)
+        flags: Value = Cat(judged, saturated, wear.flags)
         m.d.comb += [
             self.m_axis_tdata.eq(extended(code, self.datapath.output.bytes * 8)),
             self.m_axis_tuser.eq(flags if guard is None else with_fault(flags, guard.fault | wear.failed)),
         ]
         leaves = self.m_axis_tvalid & self.m_axis_tready
         return leaves & wear.corrected, leaves & wear.failed
+
+    def _gives_last(self, pipeline: list[PipelinedInstruction]) -> Value:
+        """Whether the last pipeline stage has the last part of a result."""
+        parts = self.program.output.parts
+        return pipeline[-1].has(Opcode.GIVE) & (pipeline[-1].gives(parts - 1) if parts > 1 else Const(1))
 
     def _multiply_serially(
         self,

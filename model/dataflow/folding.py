@@ -115,6 +115,8 @@ def program(datapath: Datapath, digit_bits: int, *, spare_words: int = 0, like: 
     flat = _flattened(datapath)
     _share_delays(flat.nodes)
     made = _Folding(flat, digit_bits, kept, datapath.calibrated).program(least, spare_words)
+    while not made.follows_itself:
+        made = made.with_wait()
     if like is None:
         return made
     _check_can_take_over(made, like)

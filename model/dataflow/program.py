@@ -175,6 +175,25 @@ class Program:
         return Instruction(Opcode.MULTIPLY, self.one)
 
     @property
+    def result_start(self) -> int:
+        """Number of the first instruction of the result; the accumulator is empty before it."""
+        _, start, _ = self.schedule[-1]
+        return start
+
+    @property
+    def follows_itself(self) -> bool:
+        """Whether the first instruction may follow the last one at once: no word would be read or written too early."""
+        readable: dict[int, int] = {}
+        last = self.instructions[-1].opcode
+        for number, (opcode, address, _, target) in enumerate((*self.instructions, *self.instructions)):
+            if readable.get(address, 0) > number or (last in LATE_WRITES and opcode in EARLY_WRITES):
+                return False
+            if opcode in LATE_WRITES or opcode in EARLY_WRITES:
+                readable[target] = number + (STORED if opcode in LATE_WRITES else MOVED)
+            last = opcode
+        return True
+
+    @property
     def serial_cycles(self) -> int:
         """Clocks of all instructions, at most, if a multiplication takes one for each bit of its second factor."""
         return sum(map(self._serial_cycles, self.instructions))
@@ -200,6 +219,15 @@ class Program:
             self,
             instructions=(*[self.nothing] * missing, *self.instructions),
             schedule=(*waiting, *((name, start + missing, count) for name, start, count in self.schedule)),
+        )
+
+    def with_wait(self) -> Program:
+        """Return the program with an instruction that changes nothing put before its last one."""
+        *schedule, (name, start, count) = self.schedule
+        return replace(
+            self,
+            instructions=(*self.instructions[:-1], self.nothing, self.instructions[-1]),
+            schedule=(*schedule, (name, start, count + 1)),
         )
 
     def reset(self) -> list[int]:

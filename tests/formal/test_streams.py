@@ -148,6 +148,16 @@ def folded_rules(
     return StreamRules(design, 1, patience=patience, datapath=datapath, source_waits=True)
 
 
+def overlapping_rules(module: ModuleType = folded, datapath: Datapath | None = None) -> StreamRules:
+    """Rules of a folded core that begins a sample while the one before is in its pipeline."""
+    made = limiter() if datapath is None else datapath
+    schedule = program(made, DIGIT_BITS).padded(9)
+    assert folded.overlaps(schedule, serial=False)
+    design = module.FoldedCore(made, schedule, serial=False)
+    patience = folded.latency_cycles(schedule, serial=False)
+    return StreamRules(design, 2, patience=patience, datapath=datapath, source_waits=True)
+
+
 def test_the_output_buffer_keeps_the_rules_and_every_word(tmp_path: Path) -> None:
     assert prove(buffer_rules(), tmp_path) == "PASS"
 
@@ -164,6 +174,27 @@ def test_a_core_of_three_pipeline_stages_computes_its_recursion(tmp_path: Path) 
 @pytest.mark.parametrize("serial", [False, True])
 def test_the_folded_core_keeps_the_rules(serial: bool, tmp_path: Path) -> None:
     assert prove(folded_rules(serial=serial, progress=not serial), tmp_path) == "PASS"
+
+
+def test_samples_that_overlap_keep_the_rules(tmp_path: Path) -> None:
+    assert prove(overlapping_rules(), tmp_path) == "PASS"
+
+
+@pytest.mark.slow
+def test_samples_that_overlap_are_computed_one_by_one(tmp_path: Path) -> None:
+    assert prove(overlapping_rules(datapath=limiter()), tmp_path, timeout=1200) == "PASS"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ("start | (fetching & ~held)", "start | fetching"),  # a result overwritten while it waits
+        ("self._gives_last(pipeline) if", "1 if"),  # handed out before it is complete
+    ],
+)
+def test_samples_that_overlap_too_far_are_found_out(right: str, wrong: str, tmp_path: Path) -> None:
+    assert prove(overlapping_rules(broken(folded, right, wrong), limiter()), tmp_path, timeout=1200) == "FAIL"
 
 
 def channel_rules(module: ModuleType, serial: bool | None = None) -> StreamRules:
@@ -233,7 +264,7 @@ def test_a_broken_core_is_found_out(right: str, wrong: str, tmp_path: Path) -> N
     [
         ("self.s_axis_tready.eq(taken | dropped)", "self.s_axis_tready.eq(1)"),  # taken while at work
         ("busy.eq(1)", "busy.eq(0)"),  # the next one begun before the result is taken
-        ("pipeline[-1].valid & ~pipeline[-2].valid", "pipeline[-1].valid"),  # handed out before it is complete
+        ("else ~pipeline[-2].valid", "else 1"),  # handed out before it is complete
     ],
 )
 def test_a_broken_folded_core_is_found_out(right: str, wrong: str, serial: bool, tmp_path: Path) -> None:

@@ -75,7 +75,14 @@ def some(datapath: Datapath, count: int, channels: int, seed: int = 1) -> list[S
 
 @pytest.mark.parametrize(
     ("serial", "channels", "protect"),
-    [(False, 1, "detect"), (False, 3, "none"), (False, 5, "correct"), (True, 1, "none"), (True, 3, "correct")],
+    [
+        (False, 1, "none"),
+        (False, 1, "detect"),
+        (False, 3, "none"),
+        (False, 5, "correct"),
+        (True, 1, "none"),
+        (True, 3, "correct"),
+    ],
 )
 def test_every_sample_at_any_pace(serial: bool, channels: int, protect: str) -> None:
     """Samples of channels that do not exist are dropped."""
@@ -87,6 +94,23 @@ def test_every_sample_at_any_pace(serial: bool, channels: int, protect: str) -> 
 
     async def testbench(ctx: Any) -> None:
         line = Line(ctx, dut, 0.3, 0.3)
+        line.put(samples)
+        assert await line.finish(len(expected)) == expected
+
+    simulate(dut, testbench)
+
+
+def test_a_result_waits_for_longer_than_the_next_sample_takes() -> None:
+    """Its code and its flags stay, though the next sample has begun."""
+    datapath = mixer()
+    made = program(datapath, 3)
+    assert folded.overlaps(made, serial=False)
+    dut = Probed(datapath, made, serial=False)
+    samples = some(datapath, 40, 1)
+    expected = Model(datapath, made, 1).results(made, samples)
+
+    async def testbench(ctx: Any) -> None:
+        line = Line(ctx, dut, stall=0.99)
         line.put(samples)
         assert await line.finish(len(expected)) == expected
 

@@ -116,9 +116,7 @@ def check_program(
 def _check_order(program: ProgramText) -> None:
     """Check what does not depend on values: TAKE comes first, words are read in time, the result comes last."""
     digits, taken = len(program.digits), 0
-    readable: dict[int, tuple[int, int]] = {}
-    for number, instruction in enumerate(program.instructions):
-        opcode, address, value, target = instruction
+    for number, (opcode, _, value, _) in enumerate(program.instructions):
         named = program.named(number)
         if taken < digits and opcode != "multiply":
             wanted = opcode == "take" and value % (1 << NUMBER_BITS) == taken
@@ -126,6 +124,21 @@ def _check_order(program: ProgramText) -> None:
             taken += 1
         else:
             require(opcode != "take", f"{named} must not take a digit of a sample that has been accepted")
+    _check_words(program)
+    last = len(program.instructions) - 1
+    end = program.instructions[last]
+    is_end = end.opcode == "give" and program.part(end.target) == len(program.results) - 1
+    require(is_end, f"{program.named(last)} must give the last part of the result")
+
+
+def _check_words(program: ProgramText) -> None:
+    """Check that words are read and written in time, for two samples one behind the other."""
+    count = len(program.instructions)
+    readable: dict[int, tuple[int, int]] = {}
+    for number in range(2 * count):
+        instruction = program.instructions[number % count]
+        _, address, _, target = instruction
+        named = program.named(number % count)
         if instruction.reads and address in readable:
             stored, distance = readable[address]
             require(
@@ -133,17 +146,13 @@ def _check_order(program: ProgramText) -> None:
                 f"{named} must read its word {distance} or more instructions after it is stored, not {number - stored}",
             )
         if instruction.is_early and number:
-            before = program.instructions[number - 1]
+            before = program.instructions[(number - 1) % count]
             require(
                 not before.writes or before.is_early,
-                f"{named} must not write at the same clock as {program.named(number - 1)}",
+                f"{named} must not write at the same clock as {program.named((number - 1) % count)}",
             )
         if instruction.writes:
             readable[target] = number, MOVED if instruction.is_early else STORED
-    last = len(program.instructions) - 1
-    end = program.instructions[last]
-    is_end = end.opcode == "give" and program.part(end.target) == len(program.results) - 1
-    require(is_end, f"{program.named(last)} must give the last part of the result")
 
 
 def _located(wrong: _Run, certificate: Certificate) -> RejectedError | None:
