@@ -21,7 +21,7 @@ from sosmith.gen.proof.cascade_proof import (
     through,
 )
 from sosmith.gen.proof.linear_model import linear_models
-from sosmith.gen.proof.peak_gain import Drive, extent
+from sosmith.gen.proof.peak_gain import Drive, difference, extent
 from sosmith.gen.proof.response import IMPULSE, Response
 from sosmith.gen.verifier.certificate_file import (
     FORMAT,
@@ -193,7 +193,7 @@ def _closer(
     low = Fraction(0) if steady else low
     return _Closer(
         rounding=on_grid(_magnitude(error_drives(stages))),
-        coefficients=on_grid(_magnitude([Drive(made_response(stages).minus(exact), low, high)])),
+        coefficients=on_grid(difference(made_response(stages), exact, low, high, _ACCURACY).magnitude),
         gain=_gain(exact),
     )
 

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from sosmith.gen.proof.linear_model import LinearModel, Polynomial
-from sosmith.gen.proof.peak_gain import Drive, Extent, extent
+from sosmith.gen.proof.peak_gain import Drive, Extent, difference, extent
 from sosmith.gen.proof.response import IMPULSE, Response
 
 StageModel = Sequence[LinearModel]
@@ -83,7 +83,7 @@ def prove_cascade(
         nodes=tuple(nodes),
         output=_limits(drives, steady=steady),
         rounding=extent([drive for key, drive in drives.items() if key != INPUT]),
-        coefficients=_limits({INPUT: Drive(drives[INPUT].response.minus(exact), low, high)}, steady=steady),
+        coefficients=_deviation(drives[INPUT].response, exact, low, high, steady=steady),
         gain=_gain(exact),
     )
 
@@ -107,7 +107,15 @@ def coefficient_extent(
     steady: bool = False,
 ) -> Extent:
     """Limits of the output of the stages' transfer functions minus that of the ideal sections."""
-    return _limits({INPUT: Drive(made_response(stages).minus(through(ideal)), low, high)}, steady=steady)
+    return _deviation(made_response(stages), through(ideal), low, high, steady=steady)
+
+
+def _deviation(made: Response, exact: Response, low: Fraction, high: Fraction, *, steady: bool) -> Extent:
+    """Limits of a response minus the exact one; if `steady`, for the input in each of its windows."""
+    if not steady:
+        return difference(made, exact, low, high)
+    limits = difference(made, exact, Fraction(0), high)  # of the opposite window, they are the opposite ones
+    return Extent(-limits.magnitude, limits.magnitude)
 
 
 def made_response(stages: Sequence[StageModel]) -> Response:

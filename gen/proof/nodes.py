@@ -69,6 +69,8 @@ class Nodes:
         Bits to which responses decay, relative to their size; a few more.
     bits : int
         Fraction bits of the weights.
+    block : int or None
+        Length of a block; None chooses one.
 
     Attributes
     ----------
@@ -89,7 +91,9 @@ class Nodes:
         If a pole does not lie inside the unit circle, or a response lasts longer than `LONGEST` samples.
     """
 
-    def __init__(self, denominators: Sequence[Coefficients], accuracy: int, bits: int) -> None:
+    def __init__(
+        self, denominators: Sequence[Coefficients], accuracy: int, bits: int, block: int | None = None
+    ) -> None:
         radii = [radius for denominator in denominators for radius in pole_radii(denominator)]
         if max(radii, default=Fraction(0)) >= 1:
             raise ShortfallError("every pole must lie inside the unit circle, and one does not")
@@ -104,7 +108,7 @@ class Nodes:
         """Bound on ``L1(1/D)``."""
         self.spread = 2 * (1 + (1 << self.degree)) * self.gain
         """Bound on the error of `impulse` and `around`, in units of ``2**-fine``."""
-        self._length, self.block = self._lengths(max(radii, default=Fraction(0)))
+        self._length, self.block = self._lengths(max(radii, default=Fraction(0)), block)
         self.blocks = 0
         self.residue = Fraction(0)
         self.fine = bits + self.gain.bit_length() + self.spread.bit_length() + _GUARD_BITS
@@ -122,13 +126,14 @@ class Nodes:
                 if error.bits:
                     self.fine += error.bits + _GUARD_BITS // 2
 
-    def _lengths(self, radius: Fraction) -> tuple[int, int]:
+    def _lengths(self, radius: Fraction, block: int | None) -> tuple[int, int]:
         """Estimate the length of the responses from the pole that decays most slowly, and choose that of a block."""
         per_sample = -math.log2(radius) if radius > Fraction(1, 2**64) else 64.0
         length = math.ceil((self._decay + 2 * self.degree) / max(per_sample, 2.0**-60)) + 2 * self.degree
         self._check(length)
-        block = min(max(math.isqrt(length), _SMALLEST_BLOCK), _LARGEST_BLOCK, length)
-        return length, block if self.degree else 0
+        if block is None:
+            block = min(max(math.isqrt(length), _SMALLEST_BLOCK), _LARGEST_BLOCK, length) if self.degree else 0
+        return length, block
 
     def _check(self, length: int) -> None:
         if length > self._most:

@@ -4,7 +4,10 @@ With a drive in [low, high] from reset on, the largest contribution of a respons
 ``max(h low, h high) = c h + r |h|``, with the centre c and the radius r of the range. The upper limit of several drives
 together is the largest sum of these, over all responses, up to any sample. If every range contains zero, no
 contribution is negative, and the limit is that of all samples together: c times the gain at zero frequency, which is
-exact, and r times the sum of magnitudes (`sosmith.gen.proof.sums`).
+exact, and r times the sum of magnitudes (`sosmith.gen.proof.sums`). If one does not, as that of a constant, sums up to
+some sample may be larger, but seldom are: what is still to come of the drives without zero is a response with the same
+poles, and that of all others has no negative term. Only where the first is not proven to stay below the second one,
+sums are followed from sample to sample.
 
 Drives whose responses are multiples of one another act as one. The half that rounds to nearest and the error of the
 quantizer behind it make such a pair: together, their range contains zero.
@@ -15,16 +18,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import reduce
+from operator import mul
 
-from flint import fmpq_poly
+from flint import fmpq, fmpq_poly
 
+from sosmith.gen.proof.nodes import polynomial
 from sosmith.gen.proof.poles import Coefficients
 from sosmith.gen.proof.response import IMPULSE, Response, common
-from sosmith.gen.proof.sums import Weighted, recursion
+from sosmith.gen.proof.sums import Numerators, Recursion, Weighted, recursion
 
 ZERO = Fraction(0)
 ACCURACY = 40
 """Approximate relative accuracy of a sum in bits, unless another one is asked for."""
+CLOSER = 72
+"""That of responses whose difference is looked for."""
 
 
 @dataclass(frozen=True)
@@ -69,23 +77,73 @@ def extent(drives: Sequence[Drive], accuracy: int = ACCURACY) -> Extent:
     """
     live = [drive for drive in drives if drive.low or drive.high]
     if not live:
-        return Extent(Fraction(0), Fraction(0))
+        return Extent(ZERO, ZERO)
     under = common([drive.response for drive in live])
-    made = recursion(under, accuracy)
+    made = recursion((under,), accuracy)
     joined = _joined([(drive.response.over(under), drive.low, drive.high) for drive in live])
-    numerators = [numerator for numerator, _, _ in joined]
-    centres = [(low + high) / 2 for _, low, high in joined]
-    radii = [(high - low) / 2 for _, low, high in joined]
-    if all(low <= 0 <= high for _, low, high in joined):
-        middle = sum((c * Response(n, under).at_zero_frequency for n, c in zip(numerators, centres, strict=True)), ZERO)
-        sizes = [total.magnitude + total.uncertainty for total in made.totals(numerators)]
-        reach = sum((r * size for r, size in zip(radii, sizes, strict=True)), ZERO)
+    driven = [((n,), Response(n, under).at_zero_frequency, low, high) for n, low, high in joined]
+    return _extent(made, driven, under, accuracy)
+
+
+def difference(one: Response, other: Response, low: Fraction, high: Fraction, accuracy: int = CLOSER) -> Extent:
+    """Limits of one response minus another, both driven by the same value in [low, high], as in `extent`.
+
+    Each keeps its own denominator. `accuracy` is relative to the size of the two, not of their difference.
+    """
+    if not one.minus(other).numerator:
+        return Extent(ZERO, ZERO)
+    # The other one goes first and chooses the length of blocks: it is the filter wanted, whatever is tried.
+    made = recursion((common([other]), common([one])), accuracy)
+    gain = one.at_zero_frequency - other.at_zero_frequency
+    return _extent(made, [((-other.numerator, one.numerator), gain, low, high)], None, accuracy)
+
+
+_Driven = tuple[Numerators, Fraction, Fraction, Fraction]
+"""A response, its gain at zero frequency, and the range of what drives it."""
+
+
+def _extent(
+    made: Recursion, driven: Sequence[_Driven], under: tuple[Coefficients, ...] | None, accuracy: int
+) -> Extent:
+    """Limits of a sum of responses, over one denominator with the factors `under`, or over several."""
+    numerators = [one[0] for one in driven]
+    centres = [(low + high) / 2 for *_, low, high in driven]
+    radii = [(high - low) / 2 for *_, low, high in driven]
+    sizes = [total.magnitude + total.uncertainty for total in made.totals(numerators)]
+    middle = sum((c * gain for (_, gain, *_), c in zip(driven, centres, strict=True)), ZERO)
+    reach = sum((r * size for r, size in zip(radii, sizes, strict=True)), ZERO)
+    if all(low <= 0 <= high for *_, low, high in driven):
         return Extent(middle - reach, middle + reach)
+    more = None if under is None else _overshoot(made, driven, under, sizes)
+    if more is not None and more <= reach / (1 << accuracy):
+        return Extent(min(middle - reach - more, ZERO), max(middle + reach + more, ZERO))
     above, below = (
         made.highest([Weighted(n, side * c, r) for n, c, r in zip(numerators, centres, radii, strict=True)])
         for side in (1, -1)
     )
     return Extent(-below, above)
+
+
+def _overshoot(
+    made: Recursion, driven: Sequence[_Driven], under: tuple[Coefficients, ...], sizes: Sequence[Fraction]
+) -> Fraction | None:
+    """Bound on how far sums up to some sample leave the limits of the whole sums; None if nothing is known."""
+    steady, rising, most = fmpq_poly([0]), None, ZERO
+    for ((numerator, *_), _, low, high), size in zip(driven, sizes, strict=True):
+        if not low <= 0 <= high:
+            steady += numerator * _rational((low + high) / 2)
+        elif (least := min(-low, high)) * size > most:
+            most, rising = least * size, numerator * _rational(least)
+    if rising is None:
+        return None
+    # What is still to come after sample n is sample n of (gain - steady/D) / (1 - w).
+    denominator = reduce(mul, map(polynomial, under), fmpq_poly([1]))
+    falling = (denominator * (steady(1) / denominator(1)) - steady) / fmpq_poly([1, -1])
+    return made.excess((falling,), (rising,))
+
+
+def _rational(value: Fraction) -> fmpq:
+    return fmpq(value.numerator, value.denominator)
 
 
 def _joined(

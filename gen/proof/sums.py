@@ -1,10 +1,16 @@
-"""Sums over the impulse responses of one denominator: signs in doubles, sums in integers.
+"""Sums over impulse responses, from their samples at nodes: in doubles, or with signs in doubles and sums in integers.
 
-The sum of ``|h|`` is that of ``s h`` with s = 1 or -1, the sign of each sample. Doubles find nearly all signs from the
-samples at the nodes (`sosmith.gen.proof.nodes`): a sum of d products is wrong by at most ``d 2**-53 / (1 - d 2**-53)``
-times the sum of their magnitudes, in any order of summation (Higham, Accuracy and Stability of Numerical Algorithms,
-section 3.1). The others are found in integers. In each block, s is summed with the weights Phi; this is exact, because
-the weights are cut into limbs so short that no double ever rounds. What is left are d products of long integers.
+The samples of a response are weighted sums of those at the nodes (`sosmith.gen.proof.nodes`). In doubles, such a sum of
+d products is wrong by at most ``d 2**-53 / (1 - d 2**-53)`` times the sum of their magnitudes, in any order of
+summation (Higham, Accuracy and Stability of Numerical Algorithms, section 3.1). For an accuracy of up to 40 bits, the
+magnitudes of long responses are added up like this. Otherwise, the sum of ``|h|`` is that of ``s h`` with s = 1 or -1, the sign of
+each sample. Doubles find nearly all signs; the others are found in integers. In each block, s is summed with the
+weights Phi; this is exact, because the weights are cut into limbs so short that no double ever rounds. What is left are
+d products of long integers.
+
+A sum of responses over several denominators is not brought over a common one, which would have twice as many poles,
+close to each other if the responses are nearly the same. Each response keeps its own nodes, and a block has the weights
+of all of them, side by side.
 """
 
 from __future__ import annotations
@@ -31,6 +37,11 @@ _AT_ONCE = 1 << 21  # samples in memory at the same time
 _ROUNDING = 2.0**-53
 _SLACK = 1 + 2.0**-30  # for the rounding of a bound itself
 _CLOSE = 64  # blocks in which a largest sum is looked for in integers
+_IN_DOUBLES = 40  # largest accuracy for which magnitudes are added up in doubles, and
+_SHORT = 1 << 16  # samples that are few enough to add up their magnitudes in integers all the same
+
+Numerators = tuple[fmpq_poly, ...]
+"""Of a sum of responses, one over each denominator."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +64,7 @@ class Total:
 class Weighted:
     """A response of which each sample h counts as ``centre h + radius |h|``; the radius is not negative."""
 
-    numerator: fmpq_poly
+    numerators: Numerators
     centre: Fraction
     radius: Fraction
 
@@ -100,12 +111,12 @@ class _Signs:
 
 
 class Recursion:
-    """All responses over one denominator.
+    """All sums of responses over some denominators.
 
     Parameters
     ----------
-    denominators : tuple of Coefficients
-        Its factors, each of a degree of at most 2 and with the constant term 1.
+    denominators : sequence of tuple of Coefficients
+        The factors of each, all of a degree of at most 2 and with the constant term 1.
     accuracy : int
         Bits to which sums are computed, relative to the size of a response.
 
@@ -115,19 +126,30 @@ class Recursion:
         If a pole does not lie inside the unit circle, or a response lasts too long.
     """
 
-    def __init__(self, denominators: tuple[Coefficients, ...], accuracy: int) -> None:
+    def __init__(self, denominators: Sequence[tuple[Coefficients, ...]], accuracy: int) -> None:
         self._bits = accuracy + _MORE_BITS
-        self._table = made = Nodes(denominators, accuracy, self._bits)
-        self._weights = (made.weights.astype(np.float64) * 2.0**-self._bits).reshape(made.block, made.degree)
-        rows = [sum(map(abs, row)) for row in made.weights.tolist()]
+        self._parts: list[Nodes] = []
+        for factors in denominators:
+            block = next((part.block for part in self._parts if part.block), None)
+            self._parts.append(_nodes(factors, accuracy, self._bits, block))
+        self._degree = sum(part.degree for part in self._parts)
+        self._block = max(part.block for part in self._parts)
+        self._blocks = max(part.blocks for part in self._parts)
+        long = self._block * self._blocks > _SHORT
+        self._in_doubles = long and accuracy <= _IN_DOUBLES and len(self._parts) == 1
+        self._residue = max(part.residue for part in self._parts)
+        weights = [part.weights for part in self._parts if part.degree]
+        self._exact_weights = np.concatenate(weights, axis=1) if weights else np.zeros((0, 0), dtype=object)
+        self._weights = self._exact_weights.astype(np.float64) * 2.0**-self._bits
+        rows = [sum(map(abs, row)) for row in self._exact_weights.tolist()]
         self._widest = (max(rows, default=0) >> self._bits) + 2
-        self._size = Fraction(sum(rows) + 2 * made.weights.size, 1 << self._bits)
-        self._limb = 52 - made.block.bit_length()
-        self._limbs = _limbs(made.weights, self._limb)
+        self._size = Fraction(sum(rows) + 2 * self._exact_weights.size, 1 << self._bits)
+        self._limb = 52 - self._block.bit_length()
+        self._limbs = _limbs(self._exact_weights, self._limb)
         self._totals: dict[tuple[str, ...], Total] = {}
 
-    def totals(self, numerators: Sequence[fmpq_poly]) -> list[Total]:
-        """Sum the magnitudes of the responses of ``numerator/D``, each once."""
+    def totals(self, numerators: Sequence[Numerators]) -> list[Total]:
+        """Sum the magnitudes of responses, each once."""
         named = {_key(numerator): numerator for numerator in numerators}
         missing = [key for key in named if key not in self._totals]
         for keys in self._portions(missing, {key: self._start(named[key]) for key in missing}):
@@ -137,7 +159,7 @@ class Recursion:
 
     def highest(self, weighted: Sequence[Weighted]) -> Fraction:
         """Bound on the sum, up to any sample, of several responses together; at least 0."""
-        numerators = [part.numerator for part in weighted]
+        numerators = [part.numerators for part in weighted]
         slack = sum(
             (
                 (abs(part.centre) + part.radius) * total.uncertainty
@@ -154,11 +176,32 @@ class Recursion:
         ]
         sums = list(accumulate(steps, initial=0))
         best = max(sums)
-        if self._table.degree:
+        if self._degree:
             best = max(best, self._highest_in_blocks(samples, factors, sums[-1], best))
         return Fraction(best, scale << 2 * self._bits) + slack
 
-    def last_above(self, weighted: Sequence[tuple[fmpq_poly, Fraction]], limit: Fraction) -> int | None:
+    def excess(self, falling: Numerators, rising: Numerators) -> Fraction:
+        """Bound, over all n, on ``|f[n]|`` minus the sum of all ``|r[k]|`` with k > n, for two responses; 0 at least.
+
+        The magnitudes are known as well as doubles tell them.
+        """
+        bounds = []
+        for samples, side in zip(self._samples([falling, rising]), (1, -1), strict=True):
+            values, rough, exact = self._in_all_blocks(samples)
+            first = np.array([abs(v) + side * samples.error for v in samples.head], dtype=object).astype(np.float64)
+            every = [
+                first * 2.0**-self._bits * (1 + side * 2.0**-30),
+                (np.abs(values) + side * (rough + exact)).T.ravel(),
+            ]
+            bounds.append(np.maximum(np.concatenate(every), 0.0))
+            if side > 0:
+                tail = self._tail(samples)
+        most, least = bounds
+        # What is added up is rounded by far less than what is taken off here.
+        behind = np.append(np.cumsum(least[:0:-1])[::-1] * (1 - 2.0**-20), 0.0)
+        return Fraction(float((most - behind).max(initial=0.0)) * _SLACK) + tail
+
+    def last_above(self, weighted: Sequence[tuple[Numerators, Fraction]], limit: Fraction) -> int | None:
         """Last sample at which a weighted sum of magnitudes may exceed `limit`, 0 if there is none.
 
         None if that is not proven to come to an end.
@@ -170,8 +213,8 @@ class Recursion:
             total = sum(w * (abs(v) + s.error) for (_, w), v, s in zip(weighted, values, samples, strict=True))
             last = at if total * unit > limit else last
         start = len(samples[0].head) if samples else 0
-        if self._table.degree:
-            sums = np.zeros((self._table.block, self._table.blocks))
+        if self._degree:
+            sums = np.zeros((self._block, self._blocks))
             for (_, weight), part in zip(weighted, samples, strict=True):
                 signs = self._signs(part)
                 sums += float(weight) * (np.abs(signs.values) + signs.unsure)
@@ -188,19 +231,39 @@ class Recursion:
         self, keys: list[tuple[str, ...]], starts: Mapping[tuple[str, ...], int]
     ) -> Iterator[list[tuple[str, ...]]]:
         """Share out what is computed together: responses that begin alike, so that none depends on the others."""
-        count = max(1, _AT_ONCE // max(self._table.block * self._table.blocks, 1))
+        count = max(1, _AT_ONCE // max(self._block * self._blocks, 1))
         for begin in sorted(set(starts.values())):
             alike = [key for key in keys if starts[key] == begin]
             yield from (alike[at : at + count] for at in range(0, len(alike), count))
 
-    def _start(self, numerator: fmpq_poly) -> int:
-        """Sample from which a response solves the recursion alone."""
-        return max(0, int(numerator.degree()) - self._table.degree + 1)
+    def _start(self, numerators: Numerators) -> int:
+        """Sample from which responses solve their recursions alone."""
+        return max(
+            0, *(int(over.degree()) - part.degree + 1 for over, part in zip(numerators, self._parts, strict=True))
+        )
 
-    def _samples(self, numerators: Sequence[fmpq_poly]) -> list[_Samples]:
+    def _samples(self, responses: Sequence[Numerators]) -> list[_Samples]:
         """Compute several responses at the nodes, in blocks that begin at the same sample."""
-        table, bits = self._table, self._bits
-        start = max(map(self._start, numerators), default=0)
+        start = max(map(self._start, responses), default=0)
+        parts = [
+            self._samples_over(part, numerators, start)
+            for part, numerators in zip(self._parts, zip(*responses, strict=True), strict=False)
+        ]
+        if len(parts) == 1:
+            return parts[0]
+        return [
+            _Samples(
+                [sum(values) for values in zip(*(one.head for one in together), strict=True)],
+                np.concatenate([one.nodes for one in together]),
+                np.concatenate([one.values for one in together]),
+                sum(one.error for one in together),
+            )
+            for together in zip(*parts, strict=True)
+        ]
+
+    def _samples_over(self, table: Nodes, numerators: Sequence[fmpq_poly], start: int) -> list[_Samples]:
+        """Compute responses over one denominator; 0 in blocks that only others last for."""
+        bits = self._bits
         impulse = table.impulse(start)
         around = [table.around(place, start)[::-1] for place in table.places]
         heads, firsts, errors = [], [], []
@@ -215,6 +278,8 @@ class Recursion:
         for power in table.powers:
             more = min(nodes.shape[1], table.blocks - nodes.shape[1])
             nodes = np.concatenate([nodes, self._product(power, nodes[:, :more])], axis=1)
+        missing = np.zeros((table.degree, max(0, self._blocks - nodes.shape[1]), count), dtype=object)
+        nodes = np.concatenate([nodes, missing], axis=1)
         values = nodes.astype(np.float64) * 2.0**-bits
         sizes = np.abs(values).sum(axis=0).max(axis=0, initial=0.0) * _SLACK
         largest = [math.ceil(size) for size in sizes.tolist()]
@@ -233,23 +298,29 @@ class Recursion:
 
     # Signs and sums.
 
-    def _signs(self, samples: _Samples) -> _Signs:
-        d = self._table.degree
-        values = self._weights @ samples.values
+    def _in_all_blocks(self, samples: _Samples) -> tuple[Floats, Floats, Floats]:
+        """Samples in doubles, shape (block, blocks), and for each block bounds on rounding and on other errors."""
         sizes = np.abs(samples.values).sum(axis=0) * _SLACK
-        rounding = (d + 4) * _ROUNDING * _SLACK
-        rough = rounding * float(np.abs(self._weights).max()) * sizes
+        rough = self._rounding * float(np.abs(self._weights).max()) * sizes
         exact = (self._widest * samples.error + 2 * sizes) * 2.0**-self._bits * _SLACK
+        return self._weights @ samples.values, rough, exact
+
+    @property
+    def _rounding(self) -> float:
+        return (self._degree + 4) * _ROUNDING * _SLACK
+
+    def _signs(self, samples: _Samples) -> _Signs:
+        values, rough, exact = self._in_all_blocks(samples)
         signs = np.where(values < 0, -1.0, 1.0)
         # Where doubles are as good as the integers, the sign counts as known: what that may cost is in `_total`.
         rows, columns = np.nonzero((np.abs(values) <= rough) & (rough > exact))
         if len(rows):
-            closer = rounding * np.einsum(
+            closer = self._rounding * np.einsum(
                 "km,mk->k", np.abs(self._weights[rows]), np.abs(samples.values[:, columns]), optimize=True
             )
             open_ = (np.abs(values[rows, columns]) <= closer) & (closer > exact[columns])
             rows, columns = rows[open_], columns[open_]
-            sums = (self._table.weights[rows] * samples.nodes[:, columns].T).sum(axis=1)
+            sums = (self._exact_weights[rows] * samples.nodes[:, columns].T).sum(axis=1)
             signs[rows, columns] = np.where(sums < 0, -1.0, 1.0)
         return _Signs(signs, values, rough + exact)
 
@@ -261,52 +332,57 @@ class Recursion:
         return list((factors * nodes).sum(axis=0))
 
     def _total(self, samples: _Samples) -> Total:
-        table, unit = self._table, Fraction(1, 1 << self._bits)
-        found = sum(map(abs, samples.head)) << self._bits
+        unit = Fraction(1, 1 << self._bits)
+        found = Fraction(sum(map(abs, samples.head)), 1 << self._bits)
         uncertainty = len(samples.head) * samples.error * unit
-        if table.degree:
+        if self._degree and self._in_doubles:
+            values, rough, exact = self._in_all_blocks(samples)
+            summed = Fraction(math.fsum(np.abs(values).sum(axis=0).tolist()))
+            unsure = Fraction(math.fsum((rough + exact).tolist()) * _SLACK)
+            found += summed
+            # Each column was added up in doubles, and all together once more.
+            uncertainty += self._block * unsure + summed * (self._block + 8) * Fraction(_ROUNDING) + self._tail(samples)
+        elif self._degree:
             signs = self._signs(samples)
-            found += sum(self._block_sums(signs.signs, samples.nodes))
+            found += sum(self._block_sums(signs.signs, samples.nodes)) * unit * unit
             sizes = Fraction(float(np.abs(samples.values).sum()) * _SLACK)
-            off = table.block * (table.blocks * self._widest * samples.error + 2 * sizes) * unit
+            off = self._block * (self._blocks * self._widest * samples.error + 2 * sizes) * unit
             # Seven times: the samples themselves are off once. A sign found in doubles no better than this may be wrong
             # where the sample is within three times this; that counts twice.
             uncertainty += 7 * off + self._tail(samples)
-        return Total(Fraction(found, 1 << 2 * self._bits), _short(uncertainty))
+        return Total(found, _short(uncertainty))
 
     def _tail(self, samples: _Samples) -> Fraction:
         """Bound on the sum of the magnitudes behind the last block."""
-        table = self._table
         sizes = Fraction(float(np.abs(samples.values).sum()) * _SLACK)
-        sizes += Fraction(table.degree * table.blocks * samples.error, 1 << self._bits)
-        return self._size * sizes * table.residue / (1 - table.residue)
+        sizes += Fraction(self._degree * self._blocks * samples.error, 1 << self._bits)
+        return self._size * sizes * self._residue / (1 - self._residue)
 
     def _highest_in_blocks(
         self, samples: Sequence[_Samples], factors: Sequence[tuple[int, int]], start: int, best: int
     ) -> int:
         """Largest running sum within the blocks, from `start` on."""
-        table = self._table
         found = [self._signs(part) for part in samples]
         largest = max(abs(value) for pair in factors for value in pair)
         shift = max(0, largest.bit_length() - 60)
         weights = [(math.ldexp(c, -shift), math.ldexp(r, -shift)) for c, r in factors]
-        steps = np.zeros((table.block, table.blocks))
-        unsure = np.zeros(table.blocks)
-        sums = [0] * table.blocks
+        steps = np.zeros((self._block, self._blocks))
+        unsure = np.zeros(self._blocks)
+        sums = [0] * self._blocks
         for part, signs, (centre, radius), (c, r) in zip(samples, found, factors, weights, strict=True):
             for sign, factor in ((np.ones_like(signs.signs), centre), (signs.signs, radius)):
                 if factor:
                     sums = [a + factor * b for a, b in zip(sums, self._block_sums(sign, part.nodes), strict=True)]
             size = np.abs(signs.values)
             steps += c * signs.values + r * size
-            unsure += (abs(c) + r) * (table.block * signs.unsure + (table.block + 8) * _ROUNDING * size.sum(axis=0))
+            unsure += (abs(c) + r) * (self._block * signs.unsure + (self._block + 8) * _ROUNDING * size.sum(axis=0))
         starts = list(accumulate(sums, initial=start))[:-1]
         peaks = np.maximum(np.cumsum(steps, axis=0).max(axis=0), 0.0)
         scale = 2 * self._bits + shift
         high = [s + _scaled(p, scale) for s, p in zip(starts, (peaks + unsure * _SLACK).tolist(), strict=True)]
         low = [s + _scaled(p, scale) for s, p in zip(starts, (peaks - unsure * _SLACK).tolist(), strict=True)]
         least = max(best, *low)
-        close = [k for k in range(table.blocks) if high[k] > least]
+        close = [k for k in range(self._blocks) if high[k] > least]
         if len(close) > _CLOSE:
             return max(high)
         for k in close:
@@ -316,21 +392,24 @@ class Recursion:
     def _highest_in_block(
         self, k: int, samples: Sequence[_Samples], found: Sequence[_Signs], factors: Sequence[tuple[int, int]]
     ) -> int:
-        steps = np.zeros(self._table.block, dtype=object)
+        steps = np.zeros(self._block, dtype=object)
         for part, signs, (centre, radius) in zip(samples, found, factors, strict=True):
-            values = (self._table.weights * part.nodes[:, k]).sum(axis=1)
+            values = (self._exact_weights * part.nodes[:, k]).sum(axis=1)
             steps = steps + values * (centre + radius * signs.signs[:, k].astype(np.int64).astype(object))
         return max(accumulate(map(int, steps), initial=0))
 
 
 @lru_cache(maxsize=128)
-def recursion(denominators: tuple[Coefficients, ...], accuracy: int) -> Recursion:
-    """Return the responses over a denominator, given by its factors; the same object for the same factors."""
+def recursion(denominators: tuple[tuple[Coefficients, ...], ...], accuracy: int) -> Recursion:
+    """Return the responses over denominators, given by their factors; the same object for the same factors."""
     return Recursion(denominators, accuracy)
 
 
-def _key(numerator: fmpq_poly) -> tuple[str, ...]:
-    return tuple(map(str, numerator.coeffs()))
+_nodes = lru_cache(maxsize=128)(Nodes)
+
+
+def _key(numerators: Numerators) -> tuple[str, ...]:
+    return tuple(",".join(map(str, over.coeffs())) for over in numerators)
 
 
 def _limbs(weights: Integers, bits: int) -> Floats:

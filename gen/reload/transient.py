@@ -320,7 +320,7 @@ class _Fading:
 def _last_above(weighted: Sequence[tuple[Response, Fraction]], limit: Fraction) -> int:
     """Last sample at which the weighted sum of absolute responses may exceed `limit`."""
     under = common([response for response, _ in weighted])
-    last = recursion(under, ACCURACY).last_above([(r.over(under), weight) for r, weight in weighted], limit)
+    last = recursion((under,), ACCURACY).last_above([((r.over(under),), weight) for r, weight in weighted], limit)
     if last is None:
         raise ShortfallError("a swap must fade in the time in which a response decays, and is not proven to")
     return last

@@ -103,8 +103,8 @@ def test_a_response_may_last_longer_for_sums_of_more_bits() -> None:
 
 @pytest.mark.parametrize("name", DENOMINATORS)
 def test_totals_enclose_the_sum_of_magnitudes(name: str) -> None:
-    made = Recursion(DENOMINATORS[name], ACCURACY)
-    for numerator, found in zip(NUMERATORS, made.totals(list(map(polynomial, NUMERATORS))), strict=True):
+    made = Recursion([DENOMINATORS[name]], ACCURACY)
+    for numerator, found in zip(NUMERATORS, made.totals([(polynomial(one),) for one in NUMERATORS]), strict=True):
         total = sum(map(abs, exact(numerator, DENOMINATORS[name], 4000)), Fraction(0))
         assert abs(found.magnitude - total) <= found.uncertainty < max(total, Fraction(1)) / 2**30
 
@@ -122,7 +122,7 @@ def test_the_uncertainty_of_a_sum_is_what_it_was(name: str, uncertainties: tuple
 
     Whoever changes the bound gives the figures that it has now.
     """
-    found = Recursion(DENOMINATORS[name], ACCURACY).totals([polynomial(NUMERATORS[k]) for k in (0, -1)])
+    found = Recursion([DENOMINATORS[name]], ACCURACY).totals([(polynomial(NUMERATORS[k]),) for k in (0, -1)])
     assert [float(one.uncertainty) for one in found] == pytest.approx(list(uncertainties), rel=1e-9, abs=0)
 
 
@@ -140,34 +140,34 @@ def test_the_largest_sum_up_to_any_sample(name: str, accuracy: int) -> None:
         sum(c * h + r * abs(h) for h, (_, c, r) in zip(hs, parts, strict=True)) for hs in zip(*responses, strict=True)
     ]
     largest = max(accumulate(steps, initial=Fraction(0)))
-    found = Recursion(DENOMINATORS[name], accuracy).highest([Weighted(polynomial(n), c, r) for n, c, r in parts])
+    found = Recursion([DENOMINATORS[name]], accuracy).highest([Weighted((polynomial(n),), c, r) for n, c, r in parts])
     assert largest <= found < largest + max(largest, 1) * Fraction(1, 2 ** (accuracy - 16))
 
 
 def test_the_last_sample_above_a_limit() -> None:
-    made = Recursion(DENOMINATORS["slow and fast"], ACCURACY)
+    made = Recursion([DENOMINATORS["slow and fast"]], ACCURACY)
     samples = exact(dyadic(1, -1), DENOMINATORS["slow and fast"], 4000)
     for limit in (Fraction(1, 100), Fraction(1, 10**6)):
         last = max(k for k, value in enumerate(samples) if 3 * abs(value) > limit)
-        assert made.last_above([(polynomial(dyadic(1, -1)), Fraction(3))], limit) == last
-    assert made.last_above([(polynomial(dyadic(1, -1)), Fraction(3))], Fraction(1000)) == 0
-    assert made.last_above([(polynomial(dyadic(1, -1)), Fraction(3))], Fraction(1, 2**200)) is None
+        assert made.last_above([((polynomial(dyadic(1, -1)),), Fraction(3))], limit) == last
+    assert made.last_above([((polynomial(dyadic(1, -1)),), Fraction(3))], Fraction(1000)) == 0
+    assert made.last_above([((polynomial(dyadic(1, -1)),), Fraction(3))], Fraction(1, 2**200)) is None
 
 
 def test_a_response_without_poles_is_summed_as_it_is() -> None:
-    made = Recursion((), ACCURACY)
-    (found,) = made.totals([polynomial(dyadic(3, -0.5, 0, -2))])
+    made = Recursion([()], ACCURACY)
+    (found,) = made.totals([(polynomial(dyadic(3, -0.5, 0, -2)),)])
     assert abs(found.magnitude - Fraction(11, 2)) <= found.uncertainty < Fraction(1, 2**60)
-    largest = made.highest([Weighted(polynomial(dyadic(3, -0.5, 0, -2)), Fraction(1), Fraction(0))])
+    largest = made.highest([Weighted((polynomial(dyadic(3, -0.5, 0, -2)),), Fraction(1), Fraction(0))])
     assert 3 <= largest < 3 + Fraction(1, 2**60)
 
 
 def test_samples_too_close_to_zero_for_doubles_get_their_sign_from_integers(monkeypatch: pytest.MonkeyPatch) -> None:
     """With a coarse bound on the doubles' error, all signs near zero are looked at again, and the sum is the same."""
-    numerators = [polynomial(dyadic(1, -1))]
-    (before,) = Recursion((SLOW,), ACCURACY).totals(numerators)
+    numerators = [(polynomial(dyadic(1, -1)),)]
+    (before,) = Recursion([(SLOW,)], ACCURACY).totals(numerators)
     monkeypatch.setattr("sosmith.gen.proof.sums._ROUNDING", 2.0**-10)
-    (after,) = Recursion((SLOW,), ACCURACY).totals(numerators)
+    (after,) = Recursion([(SLOW,)], ACCURACY).totals(numerators)
     assert after == before
 
 
@@ -189,6 +189,40 @@ def test_poles_beyond_the_limit_are_refused() -> None:
 @pytest.mark.parametrize("name", DENOMINATORS)
 def test_a_sum_does_not_depend_on_what_was_summed_with_it(name: str) -> None:
     """Certificates are the same bytes whatever was designed before in the same process."""
-    together = Recursion(DENOMINATORS[name], ACCURACY).totals([polynomial(one) for one in NUMERATORS])
-    alone = [Recursion(DENOMINATORS[name], ACCURACY).totals([polynomial(one)])[0] for one in NUMERATORS]
+    together = Recursion([DENOMINATORS[name]], ACCURACY).totals([(polynomial(one),) for one in NUMERATORS])
+    alone = [Recursion([DENOMINATORS[name]], ACCURACY).totals([(polynomial(one),)])[0] for one in NUMERATORS]
     assert together == alone
+
+
+@pytest.mark.parametrize("name", DENOMINATORS)
+def test_in_doubles_a_sum_is_enclosed_as_well(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As it is for long responses, here for short ones."""
+    monkeypatch.setattr("sosmith.gen.proof.sums._SHORT", 0)
+    made = Recursion([DENOMINATORS[name]], ACCURACY)
+    for numerator, found in zip(NUMERATORS, made.totals([(polynomial(one),) for one in NUMERATORS]), strict=True):
+        total = sum(map(abs, exact(numerator, DENOMINATORS[name], 4000)), Fraction(0))
+        assert abs(found.magnitude - total) <= found.uncertainty < max(total, Fraction(1)) / 2**20
+
+
+@pytest.mark.parametrize("pair", [("one pole", "close to each other"), ("close to each other", "slow and fast")])
+@pytest.mark.parametrize("accuracy", [40, 128])
+def test_responses_over_different_denominators_are_added(pair: tuple[str, str], accuracy: int) -> None:
+    """Their nodes lie side by side: the shorter one is zero, with a bound, in the blocks of the longer one."""
+    under = [DENOMINATORS[name] for name in pair]
+    numerators = (dyadic(0, 0, 0.5, -3, 1), dyadic(-1, 2, -1))
+    both = [exact(numerator, one, 12000) for numerator, one in zip(numerators, under, strict=True)]
+    (found,) = Recursion(under, accuracy).totals([tuple(map(polynomial, numerators))])
+    total = sum((abs(a + b) for a, b in zip(*both, strict=True)), Fraction(0))
+    assert abs(found.magnitude - total) <= found.uncertainty < total / 2**30
+
+
+@pytest.mark.parametrize("name", ["one pole", "slow and fast", "every other sample is zero"])
+def test_how_far_a_response_exceeds_what_is_still_to_come_of_another(name: str) -> None:
+    under = DENOMINATORS[name]
+    for factor in (Fraction(1, 8), Fraction(1), Fraction(64)):
+        numerators = dyadic(1, -0.5, 0.25), dyadic(0, float(factor), float(-factor) / 4)
+        falling, rising = (exact(numerator, under, 4000) for numerator in numerators)
+        behind = list(accumulate(map(abs, rising[::-1]), initial=Fraction(0)))[-2::-1]
+        most = max(Fraction(0), *(abs(f) - rest for f, rest in zip(falling, behind, strict=True)))
+        found = Recursion([under], ACCURACY).excess((polynomial(numerators[0]),), (polynomial(numerators[1]),))
+        assert most <= found <= most + max(map(abs, rising)) * 4000 / 2**20
