@@ -3,10 +3,10 @@
 The samples of a response are weighted sums of those at the nodes (`sosmith.gen.proof.nodes`). In doubles, such a sum of
 d products is wrong by at most ``d 2**-53 / (1 - d 2**-53)`` times the sum of their magnitudes, in any order of
 summation (Higham, Accuracy and Stability of Numerical Algorithms, section 3.1). For an accuracy of up to 40 bits, the
-magnitudes of long responses are added up like this. Otherwise, the sum of ``|h|`` is that of ``s h`` with s = 1 or -1, the sign of
-each sample. Doubles find nearly all signs; the others are found in integers. In each block, s is summed with the
-weights Phi; this is exact, because the weights are cut into limbs so short that no double ever rounds. What is left are
-d products of long integers.
+magnitudes of long responses are added up like this. Otherwise, the sum of ``|h|`` is that of ``s h`` with s = 1 or -1,
+the sign of each sample. Doubles find nearly all signs; the others are found in integers. In each block, s is summed
+with the weights Phi; this is exact, because the weights are cut into limbs so short that no double ever rounds. What is
+left are d products of long integers.
 
 A sum of responses over several denominators is not brought over a common one, which would have twice as many poles,
 close to each other if the responses are nearly the same. Each response keeps its own nodes, and a block has the weights
@@ -299,7 +299,7 @@ class Recursion:
     # Signs and sums.
 
     def _in_all_blocks(self, samples: _Samples) -> tuple[Floats, Floats, Floats]:
-        """Samples in doubles, shape (block, blocks), and for each block bounds on rounding and on other errors."""
+        """Return samples in doubles, shape (block, blocks), and for each block bounds on rounding and other errors."""
         sizes = np.abs(samples.values).sum(axis=0) * _SLACK
         rough = self._rounding * float(np.abs(self._weights).max()) * sizes
         exact = (self._widest * samples.error + 2 * sizes) * 2.0**-self._bits * _SLACK

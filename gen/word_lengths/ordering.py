@@ -11,7 +11,8 @@ So with S the set of sections already placed and s the next one::
 is exact (dynamic programming over subsets, Dehner 2003). With q = 2 and m = 2, the sum is the noise power at the
 output relative to that of one quantizer; with q = 1 and m = 1, it is the worst-case error.
 
-Norms are computed in double precision. They only guide the choice; the result is proven afterwards.
+Norms are computed in double precision, those of long responses in single precision. They only guide the choice; the
+result is proven afterwards.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
+from scipy import fft
 
 from sosmith.gen.filter.design import estimated_length
 from sosmith.gen.proof.linear_model import LinearModel
@@ -35,6 +37,12 @@ Spectrum = npt.NDArray[np.complex128]
 
 _MAX_WORK = 1 << 28
 """Largest total number of spectrum samples for which the order is optimized; takes about three seconds."""
+
+_LONG = 1 << 15
+"""Samples of a response beyond which norms are computed in single precision, and from the first half of it."""
+
+_DIGITS, _ROUGH_DIGITS = 12, 5
+"""Decimal digits to which a cost is known, and for long responses."""
 
 _WORTH_IT = 2 / 3
 """The order is changed only if this reduces the error below this fraction of its previous value. Word lengths are whole
@@ -184,7 +192,8 @@ class _Costs:
         length = _length(sections)
         if "linf" not in {scale, noise}:
             length //= 8
-        self._length = length
+        self._rough = {scale, noise} == {"l1"} and length > _LONG
+        self._length = length // 2 if self._rough else length
         self._spectrum = cache(self._spectrum_uncached)
         self._all_pole = [1 / self._spectrum(s.denominator) for s in sections]
         self._numerators = [self._spectrum(s.numerator) for s in sections]
@@ -207,7 +216,7 @@ class _Costs:
         gain, power = self._gain_to(after), 2 if self._noise == "l2" else 1
         total = float(sum((gain * error) ** power for error in self._gains_from(after)[last]))
         # Sections that mirror each other cost the same: their order must not be left to the rounding of spectra.
-        return float(f"{total:.12g}")
+        return float(f"{total:.{_ROUGH_DIGITS if self._rough else _DIGITS}g}")
 
     def _product(self, placed: _Placed) -> Spectrum:
         spectrum = np.ones(self._length // 2 + 1, dtype=np.complex128)
@@ -234,7 +243,8 @@ class _Costs:
         if norm == "linf":
             return float(np.abs(spectrum).max())
         if norm == "l1":
-            return float(np.abs(np.fft.irfft(spectrum, self._length)).sum())
+            spectrum = spectrum.astype(np.complex64) if self._rough else spectrum
+            return float(np.abs(fft.irfft(spectrum, self._length)).sum())
         power = np.abs(spectrum) ** 2
         return math.sqrt(float(2 * power.sum() - power[0] - power[-1]) / self._length)
 
