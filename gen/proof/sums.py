@@ -38,6 +38,7 @@ _ROUNDING = 2.0**-53
 _SLACK = 1 + 2.0**-30  # for the rounding of a bound itself
 _CLOSE = 64  # blocks in which a largest sum is looked for in integers
 _IN_DOUBLES = 40  # largest accuracy for which magnitudes are added up in doubles, and
+_ROOM = Fraction(1, 1 << 38)  # share of such a sum that is added to it
 _SHORT = 1 << 16  # samples that are few enough to add up their magnitudes in integers all the same
 
 Numerators = tuple[fmpq_poly, ...]
@@ -340,8 +341,9 @@ class Recursion:
             summed = Fraction(math.fsum(np.abs(values).sum(axis=0).tolist()))
             unsure = Fraction(math.fsum((rough + exact).tolist()) * _SLACK)
             found += summed
-            # Each column was added up in doubles, and all together once more.
-            uncertainty += self._block * unsure + summed * (self._block + 8) * Fraction(_ROUNDING) + self._tail(samples)
+            # Each column was added up in doubles; there is room for whoever verifies it in doubles, too.
+            rounding = (self._block + 8) * Fraction(_ROUNDING) + _ROOM
+            uncertainty += self._block * unsure + summed * rounding + self._tail(samples)
         elif self._degree:
             signs = self._signs(samples)
             found += sum(self._block_sums(signs.signs, samples.nodes)) * unit * unit

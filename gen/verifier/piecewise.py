@@ -17,7 +17,9 @@ residual of the first samples. No poles are located, no error of a recursion is 
 the response decays.
 
 Signs are taken from sums of products of integers so short that doubles hold them exactly; what is left out is bounded,
-and where it matters, the sign comes from the long integers.
+and where it matters, the sign comes from the long integers. Where an upper bound need not be so close, the products and
+their magnitudes are added up in doubles, with a bound on all rounding (Higham, Accuracy and Stability of Numerical
+Algorithms, section 3.1).
 """
 
 from __future__ import annotations
@@ -41,10 +43,11 @@ Integers = npt.NDArray[np.object_]
 _ACCURACY = 112  # bits behind the binary point to which a sum is found
 _MARGIN = 48  # bits for the sizes of forms and sums
 _LONGEST = 1 << 24  # samples
-_LARGEST_PIECE = 512  # samples
+_LARGEST_PIECE = 1024  # samples
 _SPREAD = 1 / 24  # of the time in which a response decays to 2**-40: where the numbers x of a piece are samples
 _GROUPS, _NEIGHBOURS = 64, 4  # of samples among which these are chosen
 _ROUNDED = 0.51  # bound on what rounding to an integer in doubles changes
+_UNIT = 2.0**-53  # bound on the relative error of an operation in doubles
 
 
 class Pieces:
@@ -64,7 +67,7 @@ class Pieces:
         self._under = [int(c) for c in denominator.numer().coeffs()]
         self._order = len(self._under) - 1
         self._inverse = Fraction(1)
-        self._found: dict[tuple[str, ...], tuple[fmpq, Fraction]] = {}
+        self._found: dict[tuple[tuple[str, ...], bool], tuple[fmpq, Fraction]] = {}
         if self._order:
             self._build()
             total, residual = self._sequence(fmpq_poly([1]))
@@ -72,8 +75,8 @@ class Pieces:
                 raise UndecidedError("the inverse of a denominator could not be enclosed")
             self._inverse = total / (1 - residual)
 
-    def norm(self, numerator: fmpq_poly) -> Fraction:
-        """Upper bound of the sum of magnitudes ``|N/D|``, hardly above it.
+    def norm(self, numerator: fmpq_poly, *, rough: bool = False) -> Fraction:
+        """Upper bound of the sum of magnitudes ``|N/D|``, hardly above it; if `rough`, by about a share of ``2**-40``.
 
         Of numerators that are each other's multiples or delays, it is computed once.
         """
@@ -81,9 +84,10 @@ class Pieces:
         if not coefficients:
             return Fraction(0)
         leading = coefficients[-1]
-        key = tuple(str(value / leading) for value in dropwhile(lambda value: not value, coefficients))
+        shape = tuple(str(value / leading) for value in dropwhile(lambda value: not value, coefficients))
+        key = shape, rough and (shape, False) not in self._found
         if key not in self._found:
-            total, residual = self._sequence(numerator)
+            total, residual = self._sequence(numerator, rough=rough)
             self._found[key] = leading, total + self._inverse * residual
         first, found = self._found[key]
         return abs(fraction(leading / first)) * found
@@ -174,10 +178,11 @@ class Pieces:
     def _check_forms(self) -> bool:
         """Find by how much the forms fail to solve the recursion, exactly; whether that is little enough."""
         d, size, forms = self._order, self._piece, self._forms
-        inside = sum(value * forms[d - k : size + d - k] for k, value in enumerate(self._under))
+        under = fmpz_poly(self._under)
+        inside = ((under * fmpz_poly(column)).coeffs()[d : size + d] for column in forms.T.tolist())
         between = forms[:d] @ self._step - (forms[size:] << self._bits)
         norm = Fraction(sum(map(abs, self._under)), 1 << self._shift)
-        self._residual = Fraction(int(np.abs(inside).sum()), 1 << self._shift + self._bits)
+        self._residual = Fraction(int(sum(sum(map(abs, column)) for column in inside)), 1 << self._shift + self._bits)
         self._residual += norm * Fraction(int(np.abs(between).sum()), 1 << 2 * self._bits)
         return self._residual < self._wanted
 
@@ -206,20 +211,23 @@ class Pieces:
         self._weight = Fraction(int(np.abs(whole).sum()), 1 << bits)
         largest = max(1.0, float(np.abs(whole).max()) * 2.0**-bits)
         self._short = (52 - math.ceil(math.log2(2 * d * largest))) // 2
+        self._doubles = whole.astype(np.float64) * 2.0**-bits
         self._small = np.rint(whole.astype(np.float64) * 2.0 ** (self._short - bits))
         self._limb = 52 - self._piece.bit_length()
         self._limbs = _limbs(whole, self._limb)
 
     # The sequences.
 
-    def _sequence(self, numerator: fmpq_poly) -> tuple[Fraction, Fraction]:
+    def _sequence(self, numerator: fmpq_poly, *, rough: bool = False) -> tuple[Fraction, Fraction]:
         """Upper bounds of ``|h|`` and of the residual ``|N - D h|`` for a sequence h."""
         if not self._order:
             taps, scale = _taps(numerator)
             return Fraction(sum(map(abs, taps)), scale), Fraction(0)
         head, numbers, left_out, residual = self._pieces(numerator)
-        total = Fraction(self._magnitudes(numbers) + (sum(map(abs, head)) << self._bits), 1 << 2 * self._bits)
-        return total + left_out, residual
+        first = Fraction(sum(map(abs, head)), 1 << self._bits)
+        if rough:
+            return first + self._rough_magnitudes(numbers) + left_out, residual
+        return first + Fraction(self._magnitudes(numbers), 1 << 2 * self._bits) + left_out, residual
 
     def _pieces(self, numerator: fmpq_poly) -> tuple[list[int], Integers, Fraction, Fraction]:
         """Find a sequence h: its first samples and the numbers x of its pieces, both in units of ``2**-bits``.
@@ -289,6 +297,15 @@ class Pieces:
         parts = (self._limbs @ signs).reshape(-1, self._order, numbers.shape[1]).astype(np.int64).astype(object)
         added = reduce(lambda high, low: (high << self._limb) + low, reversed(parts))
         return int((added * numbers).sum())
+
+    def _rough_magnitudes(self, numbers: Integers) -> Fraction:
+        """Upper bound of the sum of ``|P x|`` over all pieces, in doubles."""
+        values = numbers.astype(np.float64) * 2.0**-self._bits
+        total = math.fsum(np.abs(self._doubles @ values).sum(axis=0).tolist())
+        products = float(np.abs(self._doubles).sum(axis=0) @ np.abs(values).sum(axis=1))
+        # Of a product, both factors are rounded, and the sums of magnitudes of a piece are made one by one.
+        rounding = (self._order + 4) * products + (self._piece + 4) * total
+        return Fraction(total) + Fraction(rounding * _UNIT * (1 + 2.0**-30))
 
     def _short_sums(self, numbers: Integers) -> tuple[Floats, Floats, npt.NDArray[np.int32]]:
         """Return P x of all pieces from shortened integers, by how much it may be off, and the pieces' exponents.

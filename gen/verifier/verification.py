@@ -341,11 +341,16 @@ class _Cascade:
         bound = stage.nodes[node]
         of = stage.nodes[bound.operands[0]]
         (through, *_), *others = (self._driven(drive, index) for drive in self._at(index, [node], arrived))
-        found = [_extremes(self._up_to(index), [(through, *window), *others]) for window in self._windows]
-        low, high = min(low for low, _ in found) * 2**bound.frac, max(high for _, high in found) * 2**bound.frac
-        require(
-            bound.low <= max(low, of.low) and min(high, of.high) <= bound.high,
-            f"{label(stage, node)} must hold {float(low):.17g}..{float(high):.17g}, not {bound.low}..{bound.high}",
+        low = high = Fraction(0)
+        for rough in (True, False):  # a rough range mostly fits
+            found = [
+                _extremes(self._up_to(index), [(through, *window), *others], rough=rough) for window in self._windows
+            ]
+            low, high = min(low for low, _ in found) * 2**bound.frac, max(high for _, high in found) * 2**bound.frac
+            if bound.low <= max(low, of.low) and min(high, of.high) <= bound.high:
+                return
+        raise RejectedError(
+            f"{label(stage, node)} must hold {float(low):.17g}..{float(high):.17g}, not {bound.low}..{bound.high}"
         )
 
 
@@ -380,9 +385,11 @@ class _Denominator:
         """Approximate inverse, however long."""
         return inverse(self.polynomial) if self._short is None else self._short
 
-    def norm(self, numerator: fmpq_poly) -> Fraction:
-        """Upper bound of the sum of magnitudes."""
-        return response(numerator, self.inverse).gain if self.pieces is None else self.pieces.norm(numerator)
+    def norm(self, numerator: fmpq_poly, *, rough: bool = False) -> Fraction:
+        """Upper bound of the sum of magnitudes; if `rough`, it need not be close."""
+        if self.pieces is None:
+            return response(numerator, self.inverse).gain
+        return self.pieces.norm(numerator, rough=rough)
 
     def total(self, numerator: fmpq_poly) -> Fraction:
         """Sum of all samples, exact."""
@@ -398,7 +405,7 @@ def _magnitude(over: _Denominator, driven: Sequence[_Driven]) -> Fraction:
     return max(-low, high)
 
 
-def _extremes(over: _Denominator, driven: Sequence[_Driven]) -> tuple[Fraction, Fraction]:
+def _extremes(over: _Denominator, driven: Sequence[_Driven], *, rough: bool = False) -> tuple[Fraction, Fraction]:
     """Limits, over all times n, of the sum over all drives of ``sum over k <= n of h_k u(n - k)``.
 
     If every range contains zero, each term with the worst u is on one side of it, and the limits are those of the whole
@@ -409,7 +416,7 @@ def _extremes(over: _Denominator, driven: Sequence[_Driven]) -> tuple[Fraction, 
     centre = reach = Fraction(0)
     for numerator, low, high in summed:
         centre += (low + high) / 2 * over.total(numerator)
-        reach += (high - low) / 2 * over.norm(numerator)
+        reach += (high - low) / 2 * over.norm(numerator, rough=rough)
     apart = [(numerator, low, high) for numerator, low, high in summed if low > 0 or high < 0]
     if not apart:
         return centre - reach, centre + reach
@@ -432,7 +439,7 @@ def _overshoot(over: _Denominator, apart: Sequence[_Driven], driven: Sequence[_D
     steady = sum((numerator * _rational((low + high) / 2) for numerator, low, high in apart), fmpq_poly([0]))
     whole = over.polynomial * (steady(1) / over.polynomial(1))
     falling = (whole - steady) / fmpq_poly([1, -1])
-    rising, least = max(others, key=lambda one: one[1] * over.norm(one[0]))
+    rising, least = max(others, key=lambda one: one[1] * over.norm(one[0], rough=True))
     return over.pieces.excess(falling, rising * _rational(least))
 
 
