@@ -16,42 +16,42 @@ So ``|E|`` is at most the size of these forms, which integers give, times the su
 residual of the first samples. No poles are located, no error of a recursion is estimated, and the bound exists only if
 the response decays.
 
-Signs are taken from sums of products of integers so short that doubles hold them exactly; what is left out is bounded,
-and where it matters, the sign comes from the long integers. Where an upper bound need not be so close, the products and
-their magnitudes are added up in doubles, with a bound on all rounding (Higham, Accuracy and Stability of Numerical
-Algorithms, section 3.1).
+How the magnitudes are added up is in `sosmith.gen.verifier.summed_forms`. The difference of two responses that are
+nearly the same is one of pieces of the same length, side by side: over a common denominator, it would have twice as
+many poles, close to each other.
 """
 
 from __future__ import annotations
 
 import math
 from fractions import Fraction
-from functools import reduce
 from itertools import dropwhile
 from operator import mul
 from typing import cast
 
 import numpy as np
-import numpy.typing as npt
 from flint import acb, arb, arb_mat, ctx, fmpq, fmpq_poly, fmpz, fmpz_mat, fmpz_poly
 
 from sosmith.gen.verifier.l1_response import UndecidedError, fraction
-
-Floats = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.object_]
+from sosmith.gen.verifier.summed_forms import Floats, Integers, SummedForms
 
 _ACCURACY = 112  # bits behind the binary point to which a sum is found
 _MARGIN = 48  # bits for the sizes of forms and sums
 _LONGEST = 1 << 24  # samples
-_LARGEST_PIECE = 1024  # samples
+_LARGEST_PIECE = 2048  # samples
 _SPREAD = 1 / 24  # of the time in which a response decays to 2**-40: where the numbers x of a piece are samples
 _GROUPS, _NEIGHBOURS = 64, 4  # of samples among which these are chosen
-_ROUNDED = 0.51  # bound on what rounding to an integer in doubles changes
-_UNIT = 2.0**-53  # bound on the relative error of an operation in doubles
 
 
 class Pieces:
     """Responses over one denominator, whose constant term is 1 and whose coefficients are binary fractions.
+
+    Parameters
+    ----------
+    denominator : fmpq_poly
+        The denominator.
+    like : Pieces or None
+        Other responses, with whose pieces these are to have the length in common.
 
     Raises
     ------
@@ -59,7 +59,7 @@ class Pieces:
         If the responses do not decay, or not within 16 million samples, or a coefficient is not a binary fraction.
     """
 
-    def __init__(self, denominator: fmpq_poly) -> None:
+    def __init__(self, denominator: fmpq_poly, like: Pieces | None = None) -> None:
         scale = int(denominator.denom())
         if scale & (scale - 1):
             raise UndecidedError("a coefficient is no binary fraction")
@@ -69,7 +69,7 @@ class Pieces:
         self._inverse = Fraction(1)
         self._found: dict[tuple[tuple[str, ...], bool], tuple[fmpq, Fraction]] = {}
         if self._order:
-            self._build()
+            self._build(like)
             total, residual = self._sequence(fmpq_poly([1]))
             if residual >= 1:
                 raise UndecidedError("the inverse of a denominator could not be enclosed")
@@ -103,9 +103,30 @@ class Pieces:
         behind = np.cumsum(least[:0:-1])[::-1] * (1 - 2.0**-20)  # more than the rounding of these sums
         return Fraction(max(0.0, float((most[:-1] - behind).max()))) + off + rising_off
 
+    def distance(self, numerator: fmpq_poly, other: Pieces, subtracted: fmpq_poly) -> Fraction | None:
+        """Upper bound of the sum of magnitudes ``|N/D - N'/D'|``, the second response one of `other`, hardly above it.
+
+        None if their pieces do not have the same length.
+        """
+        if not self._order or not other._order or self._piece != other._piece:
+            return None
+        together = (self, numerator), (other, subtracted)
+        start = max(0, *(over.degree() + 1 - pieces._order for pieces, over in together))
+        bits = max(self._bits, other._bits)
+        heads, vectors, off = [], [], Fraction(0)
+        for pieces, over in together:
+            head, numbers, left_out, residual = pieces._pieces(over, start)
+            heads.append([Fraction(value, 1 << pieces._bits) for value in head])
+            vectors.append(numbers << bits - pieces._bits)
+            off += left_out + pieces._inverse * residual
+        count = max(numbers.shape[1] for numbers in vectors)
+        both = np.concatenate([np.pad(numbers, ((0, 0), (0, count - numbers.shape[1]))) for numbers in vectors])
+        first = sum((abs(a - b) for a, b in zip(*heads, strict=True)), Fraction(0))
+        return first + self._summed.beside(other._summed).magnitudes(both) + off
+
     # The forms.
 
-    def _build(self) -> None:
+    def _build(self, like: Pieces | None) -> None:
         radii = self._radii()
         if max(radii) >= 1:
             raise UndecidedError("the responses of a denominator do not decay")
@@ -118,6 +139,8 @@ class Pieces:
         self._bits = _ACCURACY + _MARGIN + grows + self._grown
         pieces = max(0, math.ceil(math.log2(length / _LARGEST_PIECE)))
         self._piece = max(math.ceil(length / (1 << pieces)), 2 * self._order)
+        if like is not None and like._order and self._piece <= 2 * like._piece and like._piece >= 2 * self._order:
+            self._piece = like._piece
         window = max(math.ceil(40 * _SPREAD / decay), self._piece)
         self._wanted = Fraction(1 << _MARGIN // 2 + self._grown, 1 << self._bits)
         fine = self._bits + 2 * grows + 64
@@ -209,12 +232,7 @@ class Pieces:
         self._count = 1 << len(self._powers)
         whole = self._forms[: self._piece]
         self._weight = Fraction(int(np.abs(whole).sum()), 1 << bits)
-        largest = max(1.0, float(np.abs(whole).max()) * 2.0**-bits)
-        self._short = (52 - math.ceil(math.log2(2 * d * largest))) // 2
-        self._doubles = whole.astype(np.float64) * 2.0**-bits
-        self._small = np.rint(whole.astype(np.float64) * 2.0 ** (self._short - bits))
-        self._limb = 52 - self._piece.bit_length()
-        self._limbs = _limbs(whole, self._limb)
+        self._summed = SummedForms(whole, bits)
 
     # The sequences.
 
@@ -225,18 +243,18 @@ class Pieces:
             return Fraction(sum(map(abs, taps)), scale), Fraction(0)
         head, numbers, left_out, residual = self._pieces(numerator)
         first = Fraction(sum(map(abs, head)), 1 << self._bits)
-        if rough:
-            return first + self._rough_magnitudes(numbers) + left_out, residual
-        return first + Fraction(self._magnitudes(numbers), 1 << 2 * self._bits) + left_out, residual
+        total = self._summed.rough_magnitudes(numbers) if rough else self._summed.magnitudes(numbers)
+        return first + total + left_out, residual
 
-    def _pieces(self, numerator: fmpq_poly) -> tuple[list[int], Integers, Fraction, Fraction]:
+    def _pieces(self, numerator: fmpq_poly, least: int = 0) -> tuple[list[int], Integers, Fraction, Fraction]:
         """Find a sequence h: its first samples and the numbers x of its pieces, both in units of ``2**-bits``.
 
+        The first samples are at least so many.
         Return as well by how much all magnitudes together may differ from those of h, and the residual ``|N - D h|``.
         """
         taps, scale = _taps(numerator)
         d, bits = self._order, self._bits
-        start = max(0, len(taps) - d)
+        start = max(least, len(taps) - d)
         places = [*range(start), *(start + at for at in self._places)]
         impulse = self._impulse_up_to(max(places) + 1)
         under = scale << self._fine - bits
@@ -252,9 +270,8 @@ class Pieces:
     def _samples(self, numerator: fmpq_poly) -> tuple[Floats, Floats, Fraction]:
         """Return bounds of the magnitudes of a response's samples, and by how much they all together may be off."""
         head, numbers, left_out, residual = self._pieces(numerator)
-        sums, doubts, exponents = self._short_sums(numbers)
-        units = np.ldexp(1.0, exponents - 2 * self._short)
-        pieces = [((np.abs(sums) + sign * doubts) * units).T.ravel() for sign in (-1, 1)]
+        sums, doubts = self._summed.values(numbers)
+        pieces = [(np.abs(sums) + sign * doubts).T.ravel() for sign in (-1, 1)]
         first = np.abs(np.array(head, dtype=object).astype(np.float64)) * 2.0**-self._bits
         least, most = (
             np.concatenate([first * (1 + sign * 2.0**-50), values])
@@ -287,37 +304,6 @@ class Pieces:
             rows = [row + made[k * count : (k + 1) * count] for k, row in enumerate(rows)]
         return np.array([list(map(int, row)) for row in rows], dtype=object), error
 
-    def _magnitudes(self, numbers: Integers) -> int:
-        """Sum of ``|P x|`` over all pieces, exact, in units of ``2**-(2 bits)``."""
-        sums, doubts, _ = self._short_sums(numbers)
-        signs = np.where(sums < 0, -1.0, 1.0)
-        rows, columns = np.nonzero(np.abs(sums) <= doubts)
-        exact = (self._forms[rows] * numbers[:, columns].T).sum(axis=1)
-        signs[rows, columns] = np.where(exact < 0, -1.0, 1.0)
-        parts = (self._limbs @ signs).reshape(-1, self._order, numbers.shape[1]).astype(np.int64).astype(object)
-        added = reduce(lambda high, low: (high << self._limb) + low, reversed(parts))
-        return int((added * numbers).sum())
-
-    def _rough_magnitudes(self, numbers: Integers) -> Fraction:
-        """Upper bound of the sum of ``|P x|`` over all pieces, in doubles."""
-        values = numbers.astype(np.float64) * 2.0**-self._bits
-        total = math.fsum(np.abs(self._doubles @ values).sum(axis=0).tolist())
-        products = float(np.abs(self._doubles).sum(axis=0) @ np.abs(values).sum(axis=1))
-        # Of a product, both factors are rounded, and the sums of magnitudes of a piece are made one by one.
-        rounding = (self._order + 4) * products + (self._piece + 4) * total
-        return Fraction(total) + Fraction(rounding * _UNIT * (1 + 2.0**-30))
-
-    def _short_sums(self, numbers: Integers) -> tuple[Floats, Floats, npt.NDArray[np.int32]]:
-        """Return P x of all pieces from shortened integers, by how much it may be off, and the pieces' exponents.
-
-        Both are in units of ``2**(exponent - 2 short)``, and are exact in doubles.
-        """
-        values = numbers.astype(np.float64) * 2.0**-self._bits
-        _, exponents = np.frexp(np.maximum(np.abs(values).max(axis=0), 2.0**-self._bits))
-        small = np.rint(np.ldexp(values, self._short - exponents))
-        doubts = _ROUNDED * (np.abs(self._small).sum(axis=1)[:, None] + np.abs(small).sum(axis=0)) + self._order
-        return self._small @ small, doubts, exponents
-
 
 def _taps(numerator: fmpq_poly) -> tuple[list[int], int]:
     """Return the coefficients of a numerator as integers, and what they are to be divided by."""
@@ -333,13 +319,3 @@ def _integer(value: arb) -> int:
 def _fraction(value: arb) -> Fraction:
     mantissa, exponent = (int(part) for part in value.man_exp())
     return mantissa * Fraction(2) ** exponent
-
-
-def _limbs(forms: Integers, bits: int) -> Floats:
-    """Cut forms, shape (piece, order), into limbs of `bits` bits, lowest first, shape (limbs * order, piece)."""
-    longest = max(abs(value).bit_length() for value in forms.ravel().tolist())
-    parts, rest = [], forms.T
-    while longest > bits:
-        parts.append(rest & ((1 << bits) - 1))
-        rest, longest = rest >> bits, longest - bits
-    return np.concatenate([*parts, rest]).astype(np.float64)

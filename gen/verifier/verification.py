@@ -255,7 +255,7 @@ class _Cascade:
         self._windows = [self._models[0].sources[self._models[0].inputs[0]]] if start is None else start.windows
         exact = self._ideal(certificate)
         self.gain_at_zero = fraction(exact[0](1) / exact[1](1))
-        ideal = self._over_all(exact[1])
+        ideal = self._ideal_over = self._over_all(exact[1])
         gain = ideal.norm(exact[0])
         self.peak_gain = on_grid(gain)
         self.ranges = 0
@@ -273,9 +273,7 @@ class _Cascade:
         made, *errors = (self._driven(drive, last) for drive in drives)
         over = self._up_to(last)
         self.rounding = on_grid(_magnitude(over, errors))
-        difference = made[0] * ideal.polynomial - exact[0] * over.polynomial
-        both = self._over_all(over.polynomial * ideal.polynomial)
-        deviation = max(_magnitude(both, [(difference, *window)]) for window in self._windows)
+        deviation = _deviation(over, made[0], ideal, exact[0], self._windows)
         self.coefficients = on_grid(deviation)
         # Both figures are rounded up: what that adds is room for another ideal filter.
         largest = max(Fraction(1), *(abs(end) for window in self._windows for end in window))
@@ -309,13 +307,14 @@ class _Cascade:
             numerator, denominator = numerator * b, denominator * a
         return numerator, denominator
 
-    def _over_all(self, denominator: fmpq_poly) -> _Denominator:
+    def _over_all(self, denominator: fmpq_poly, like: _Denominator | None = None) -> _Denominator:
         """Return what is known over a denominator; the same for the same one."""
-        return self._over.setdefault(str(denominator.coeffs()), _Denominator(denominator))
+        return self._over.setdefault(str(denominator.coeffs()), _Denominator(denominator, like))
 
     def _up_to(self, last: int) -> _Denominator:
         """Return what is known over the denominators of all sections up to `last`."""
-        return self._over_all(prod((m.denominator for m in self._models[: last + 1]), start=fmpq_poly([1])))
+        under = prod((m.denominator for m in self._models[: last + 1]), start=fmpq_poly([1]))
+        return self._over_all(under, self._ideal_over if last == len(self._models) - 1 else None)
 
     def _at(self, index: int, nodes: Sequence[int], arrived: Sequence[_Drive]) -> list[_Drive]:
         """Everything that drives the given nodes: drives from earlier sections, then the section's own sources."""
@@ -362,10 +361,11 @@ def _combined(numerators: Sequence[fmpq_poly], way: Sequence[fmpq_poly]) -> fmpq
 
 
 class _Denominator:
-    """Sums over responses with one denominator, each computed when it is needed first."""
+    """Sums over responses with one denominator, each computed when it is needed first, in pieces as another's."""
 
-    def __init__(self, polynomial: fmpq_poly) -> None:
+    def __init__(self, polynomial: fmpq_poly, like: _Denominator | None = None) -> None:
         self.polynomial = polynomial
+        self._like = like
 
     @cached_property
     def _short(self) -> Inverse | None:
@@ -378,7 +378,9 @@ class _Denominator:
     @cached_property
     def pieces(self) -> Pieces | None:
         """Responses in pieces, if they are long."""
-        return Pieces(self.polynomial) if self._short is None else None
+        if self._short is not None:
+            return None
+        return Pieces(self.polynomial, None if self._like is None else self._like.pieces)
 
     @cached_property
     def inverse(self) -> Inverse:
@@ -403,6 +405,25 @@ def _rational(value: Fraction) -> fmpq:
 def _magnitude(over: _Denominator, driven: Sequence[_Driven]) -> Fraction:
     low, high = _extremes(over, driven)
     return max(-low, high)
+
+
+def _deviation(
+    over: _Denominator,
+    made: fmpq_poly,
+    ideal: _Denominator,
+    exact: fmpq_poly,
+    windows: Sequence[tuple[Fraction, Fraction]],
+) -> Fraction:
+    """Largest magnitude of one response minus that of the ideal filter, both driven by the same, within any window."""
+    difference = made * ideal.polynomial - exact * over.polynomial
+    size = None
+    if difference and over.pieces is not None and ideal.pieces is not None:
+        size = over.pieces.distance(made, ideal.pieces, exact)
+    if size is None or any(low > 0 or high < 0 for low, high in windows):
+        both = _Denominator(over.polynomial * ideal.polynomial)
+        return max(_magnitude(both, [(difference, *window)]) for window in windows)
+    gain = abs(over.total(made) - ideal.total(exact))
+    return max(abs(low + high) / 2 * gain + (high - low) / 2 * size for low, high in windows)
 
 
 def _extremes(over: _Denominator, driven: Sequence[_Driven], *, rough: bool = False) -> tuple[Fraction, Fraction]:
