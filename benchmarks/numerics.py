@@ -76,7 +76,8 @@ def measure(design: CoreDesign) -> Row:
     quantized, datapath = design.quantized, design.datapath
     assert quantized.filter is not None
     codes = stimulus(design)
-    golden = filtered(calibrated(codes, datapath.inputs, None), quantized.filter.sos, datapath.output)
+    values = calibrated(codes, datapath.inputs, None)
+    golden = filtered(values, quantized.filter.sos, datapath.output, steady=quantized.steady)
     error = (datapath.output.decode(datapath.compute(codes)) - golden) / float(datapath.output.lsb)
     nodes = [node for section in quantized.sections for node in section.graph.nodes]
     coefficients = [abs(node.parameter).bit_length() for node in nodes if node.op is Op.SCALE]

@@ -110,8 +110,9 @@ def readings_table() -> str:
 def measured(design: CoreDesign, trace: Trace, polynomial: Polynomial = EQUATION_5A) -> tuple[Values, Values]:
     """Return the clearance in mm before and after the ideal filter."""
     before = calibrated(trace.codes, trace.ports, polynomial)
-    assert design.quantized.filter is not None
-    return before, filtered(before, design.quantized.filter.sos, design.datapath.output)
+    made = design.quantized
+    assert made.filter is not None
+    return before, filtered(before, made.filter.sos, design.datapath.output, steady=made.steady)
 
 
 def accuracy_table(design: CoreDesign) -> str:

@@ -57,12 +57,12 @@ def without(scenario: ScenarioFile, *what: str) -> ScenarioFile:
 
 
 def accuracies(
-    scenario: ScenarioFile, bench: Bench, sos: Values, seed: int, polynomial: Polynomial
+    scenario: ScenarioFile, bench: Bench, made: CoreDesign, seed: int, polynomial: Polynomial
 ) -> tuple[float, float]:
     """Return the accuracy before and after the ideal filter."""
     trace = emulate_file(scenario, bench, seed=seed)
     raw = calibrated(trace.codes, bench.ports, polynomial)
-    smooth = filtered(raw, sos, bench.output)
+    smooth = filtered(raw, made.quantized.filter.sos, bench.output, steady=made.quantized.steady)
     return accuracy_percent(raw, trace.truth, trace.reading), accuracy_percent(smooth, trace.truth, trace.reading)
 
 
@@ -75,10 +75,9 @@ def over_seeds(
 ) -> list[Run]:
     """Run the bench for each seed: depot, fit, trace, filter and, on request, the hardware's integer model."""
     bench, runs = bench_of(made), []
-    sos = made.quantized.filter.sos
     for seed in seeds:
         fit = depot.fitted(measurements_of(scenario, seed))
-        raw, golden = accuracies(scenario, bench, sos, seed, fit.polynomial)
+        raw, golden = accuracies(scenario, bench, made, seed, fit.polynomial)
         integers = None
         if design_for is not None:
             datapath = design_for(fit.polynomial).datapath
@@ -92,7 +91,7 @@ def over_seeds(
 
 def sources(scenario: ScenarioFile, made: CoreDesign, seeds: range) -> dict[str, list[float]]:
     """Return the accuracy after the filter for each seed, with one source of error removed at a time."""
-    bench, sos = bench_of(made), made.quantized.filter.sos
+    bench = bench_of(made)
     found: dict[str, list[float]] = {}
     for seed in seeds:
         fit = depot.fitted(measurements_of(scenario, seed)).polynomial
@@ -104,7 +103,7 @@ def sources(scenario: ScenarioFile, made: CoreDesign, seeds: range) -> dict[str,
             ("noise alone", without(scenario, "systematic"), EQUATION_5A),
             ("converters alone", without(scenario, "noise", "systematic"), EQUATION_5A),
         ):
-            found.setdefault(name, []).append(accuracies(changed, bench, sos, seed, polynomial)[1])
+            found.setdefault(name, []).append(accuracies(changed, bench, made, seed, polynomial)[1])
     return found
 
 

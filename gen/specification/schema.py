@@ -142,7 +142,7 @@ class HardwareTable(Table):
     clock: Annotated[Fraction, PlainValidator(positive("Hz"))] = Fraction(12_000_000)
     reload: Annotated[bool, PlainValidator(flag)] = False
     protect: Annotated[str, PlainValidator(choice(PROTECTIONS))] = "none"
-    start: Annotated[str, PlainValidator(choice(STARTS))] = "zero"
+    start: Annotated[str, PlainValidator(choice(STARTS))] = "steady"
 
 
 class Document(Table):

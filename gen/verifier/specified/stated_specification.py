@@ -27,7 +27,7 @@ from sosmith.gen.verifier.specified.sections_file import sections_in
 _CALIBRATED = {"voltage": "V", "temperature": "degC"}
 """Inputs of a calibration, in the order of the ports, and their units."""
 
-_START = "zero"
+_START = "steady"
 """How a filter starts if the specification does not say."""
 
 

@@ -44,7 +44,7 @@ CONTRACT = {
         "realization": "auto",
         "architecture": "auto",
         "clock": 12.0e6,
-        "start": "zero",
+        "start": "steady",
         "reload": False,
         "protect": "none",
     },
@@ -114,7 +114,7 @@ def test_example_is_the_contracts_and_is_read_exactly(tmp_path: Path) -> None:
             clock=Fraction(12_000_000),
             reload=False,
             protect="none",
-            start="zero",
+            start="steady",
         ),
     )
 
@@ -168,7 +168,7 @@ def test_plain_filter_has_one_input_in_the_unit_of_the_output_and_defaults(tmp_p
         clock=Fraction(12_000_000),
         reload=False,
         protect="none",
-        start="zero",
+        start="steady",
     )
 
 

@@ -1,6 +1,6 @@
 """Specifications of small cores, for the checkers of the emitted hardware."""
 
-INSTRUMENT = """
+STEADY_INSTRUMENT = """
 name = "smooth"
 sample_rate = 100.0
 input.voltage = { bits = 12, range = [0.0, 10.0] }
@@ -9,12 +9,12 @@ calibration.coefficients = [[1.16, -0.0036], [0.3672, 0.0006618], [0.05812]]
 filter = { family = "butterworth", kind = "lowpass", order = 3, cutoff = 10.0 }
 output = { bits = 12, range = [0.0, 16.0], unit = "mm", max_error = 0.01 }
 """
-PLAIN = """
+STEADY = """
 name = "plain"
 sample_rate = 100.0
 input.x = { bits = 8, signed = true, range = [-1.0, 1.0] }
 filter = { family = "butterworth", kind = "lowpass", order = 2, cutoff = 20.0 }
 output = { bits = 8, signed = true, range = [-1.0, 1.0], unit = "", max_error = "faithful" }
 """
-STEADY = PLAIN + 'hardware.start = "steady"\n'
-STEADY_INSTRUMENT = INSTRUMENT + 'hardware.start = "steady"\n'
+PLAIN = STEADY + 'hardware.start = "zero"\n'
+INSTRUMENT = STEADY_INSTRUMENT + 'hardware.start = "zero"\n'

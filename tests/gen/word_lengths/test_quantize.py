@@ -92,7 +92,8 @@ def errors(quantized: Quantized, codes: np.ndarray) -> np.ndarray:
     """Integer model minus golden chain, in output LSBs."""
     datapath = quantized.datapath
     before = calibrated(codes, datapath.inputs, quantized.polynomial)
-    golden = filtered(before, None if quantized.filter is None else quantized.filter.sos, datapath.output)
+    sos = None if quantized.filter is None else quantized.filter.sos
+    golden = filtered(before, sos, datapath.output, steady=quantized.steady)
     return (datapath.output.decode(datapath.compute(codes)) - golden) / float(datapath.output.lsb)
 
 
