@@ -182,7 +182,7 @@ def test_no_upset_in_a_state_of_one_channel_is_silent(built: Built) -> None:
 def test_after_a_fault_the_core_restarts(built: Built) -> None:
     """Those flagged first may still have met the old states; from one of them on all is as after a reset."""
     places = (*built.target.memories, *built.target.states)
-    kept = [place for place in places if not re.search("bank|program|reload_port", place.name)]
+    kept = [place for place in places if not re.search("bank|instructions|reload_port", place.name)]
     found = built.target.run(kept, 60, 3, double=built.case.protect == "correct")
     hits = [upset for upset in found if upset.fate is Fate.DETECTED]
     assert hits
