@@ -22,6 +22,9 @@ from sosmith.model.dataflow.program import Program
 from sosmith.model.port import Port
 from sosmith.model.sections.start import StartStage
 
+_SEEN = Fraction(1, 20_000)
+"""Least part of an error bound that is shown, in output LSB: it has four decimals."""
+
 
 def print_design(design: Design, *, details: bool = False) -> None:
     """Print a design, with its sections, limit cycles and schedule as `details`."""
@@ -155,10 +158,11 @@ def _print_limit_cycles(console: Console, cycles: Sequence[LimitCycleFacts], lsb
 
 
 def print_budget(console: Console, budget: Mapping[str, Quantity], lsb: Fraction, max_error: Quantity) -> None:
-    """Print the parts of an error bound and the allowed error, in the output's unit and in LSB."""
+    """Print the parts of an error bound that count, and the allowed error, in the output's unit and in LSB."""
     table = new_table(
         "Error budget, proven for all inputs in range", ["part", escape(max_error.unit) or "full scale 1", "output LSB"]
     )
-    for part, value in [*budget.items(), ("[bold]sum[/]", sum(budget.values())), ("allowed", max_error)]:
+    seen = {part: value for part, value in budget.items() if value >= lsb * _SEEN}
+    for part, value in [*seen.items(), ("[bold]sum[/]", sum(budget.values())), ("allowed", max_error)]:
         table.add_row(part, f"{float(value):.3g}", f"{float(value) / float(lsb):.4f}")
     console.print(table)
