@@ -24,7 +24,8 @@ def test_figures_are_those_of_the_proof() -> None:
     assert design.bound.unit == "mm"
     assert sum(design.budget.values()) == pytest.approx(design.bound, rel=1e-12)
     assert design.bound <= design.specification.max_error
-    assert list(design.budget) == ["calibration", "filter coefficients", "filter rounding", "output rounding"]
+    parts = ["calibration", "filter coefficients", "filter rounding", "start", "output rounding"]
+    assert list(design.budget) == parts
     assert (design.kind, design.realization, design.architecture) == ("instrument", "df1_ef1", "parallel")
     assert design.manifest["error_bound"] == design.bound
     assert design.cost.luts > 0
