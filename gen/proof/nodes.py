@@ -40,6 +40,7 @@ LONGEST = 1 << 21
 _LONGEST_BITS = 40  # that accuracy, relative, in bits
 _DECAY_BITS = 16  # to which responses decay beyond the accuracy wanted
 _SMALLEST_BLOCK, _LARGEST_BLOCK = 64, 512
+_LONG = 1 << 16  # samples of a response with longer blocks: what is done for each costs most
 _WINDOWS = 12  # that the nodes are spread over, in the time in which a response decays to `_LONGEST_BITS`
 _FIRST = 64  # places among which the nodes are chosen, and
 _GROUPS, _NEIGHBOURS = 32, 4  # groups of neighbours at even distances, at least; fewer than twice as many
@@ -133,6 +134,7 @@ class Nodes:
         self._check(length)
         if block is None:
             block = min(max(math.isqrt(length), _SMALLEST_BLOCK), _LARGEST_BLOCK, length) if self.degree else 0
+            block *= 4 if length > _LONG else 1
         return length, block
 
     def _check(self, length: int) -> None:

@@ -39,7 +39,10 @@ _MAX_WORK = 1 << 28
 """Largest total number of spectrum samples for which the order is optimized; takes about three seconds."""
 
 _LONG = 1 << 15
-"""Samples of a response beyond which norms are computed in single precision, and from the first half of it."""
+"""Samples of a response beyond which norms are computed in single precision, and with a quarter of the length.
+
+What is behind that is folded back by the periodic transform; its envelope has fallen below 1 %.
+"""
 
 _DIGITS, _ROUGH_DIGITS = 12, 5
 """Decimal digits to which a cost is known, and for long responses."""
@@ -193,7 +196,7 @@ class _Costs:
         if "linf" not in {scale, noise}:
             length //= 8
         self._rough = {scale, noise} == {"l1"} and length > _LONG
-        self._length = length // 2 if self._rough else length
+        self._length = length // 4 if self._rough else length
         self._spectrum = cache(self._spectrum_uncached)
         self._all_pole = [1 / self._spectrum(s.denominator) for s in sections]
         self._numerators = [self._spectrum(s.numerator) for s in sections]

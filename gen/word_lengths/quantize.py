@@ -221,8 +221,10 @@ def prove(planned: Plan) -> Quantized:
         return _assembled(planned, planned.input_stages[0], (), None)
     allowed = planned.allowed
     if search is not None and start is not None:
-        choice = start
+        choice, tried = start, None
         for _ in range(_ATTEMPTS):
+            if choice == tried:
+                break  # nothing else is to be had
             before = planned.input_stages[choice.input_stage]
             try:
                 stages = cascade(ideal, planned.realization, choice.formats, before.output, steady=planned.steady)
@@ -232,6 +234,7 @@ def prove(planned: Plan) -> Quantized:
             excess = made.bound * planned.output.lsb - planned.max_error
             if excess <= 0:
                 return made
+            tried = choice
             allowed -= max(2 * excess / planned.output.lsb, allowed / 64)
             choice = search.trimmed(search.start(float(planned.share), MAX_BITS) or start, float(allowed))
     return _equally_shared(planned, ideal)

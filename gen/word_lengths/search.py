@@ -36,7 +36,7 @@ from sosmith.gen.word_lengths.objective import SMALL_AREA, Objective
 from sosmith.model.dataflow.graph import Range
 from sosmith.model.errors import ShortfallError
 
-Array = npt.NDArray[np.float64]
+Array = npt.NDArray[np.float64] | npt.NDArray[np.float32]
 
 Window = tuple[float, float]
 """Smallest and largest value of an input."""
@@ -274,7 +274,7 @@ class Search:
 
     def _deviation(self, formats: Sequence[SectionFormat], base: _Base | None) -> Array:
         """Deviation of the impulse response due to the coefficients, updated from that of `base`."""
-        response = np.zeros(1) if base is None else base.deviation
+        response = np.zeros(1, dtype=np.float32) if base is None else base.deviation
         for k, (estimate, form) in enumerate(zip(self._estimates, formats, strict=True)):
             before = None if base is None else base.formats[k].coefficients
             for name, (integer, frac) in form.coefficients.items():
@@ -420,9 +420,14 @@ def _added_up(estimates: Sequence[_Estimate]) -> list[_Estimate]:
     ):
         step *= 2
     return [
-        replace(estimate, slopes={name: _sums(slope, step) for name, slope in estimate.slopes.items()})
+        replace(estimate, slopes={name: _single(_sums(slope, step)) for name, slope in estimate.slopes.items()})
         for estimate in estimates
     ]
+
+
+def _single(values: Array) -> Array:
+    """Cut values to single precision if they are many."""
+    return values.astype(np.float32) if len(values) > 2 * _ENOUGH else values
 
 
 def _sums(values: Array, step: int) -> Array:

@@ -97,7 +97,7 @@ def test_a_response_may_last_longer_for_sums_of_more_bits() -> None:
     slow = (dyadic(1, -(1 - 2.0**-15)),)
     for accuracy in (ACCURACY, 128):
         made = Nodes(slow, accuracy, accuracy + 72)
-        assert made.block == 512
+        assert made.block == 2048
         assert (made.block * made.blocks > LONGEST) == (accuracy == 128)
 
 

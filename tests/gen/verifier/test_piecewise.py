@@ -7,7 +7,7 @@ from math import prod
 import pytest
 from flint import fmpq, fmpq_poly
 
-from sosmith.gen.verifier import piecewise, verification
+from sosmith.gen.verifier import piecewise, summed_forms, verification
 from sosmith.gen.verifier.l1_response import BITS, UndecidedError, inverse, response
 from sosmith.gen.verifier.piecewise import Pieces
 
@@ -72,8 +72,43 @@ def test_forms_whose_last_bits_count_get_more_of_them(monkeypatch: pytest.Monkey
 
 def test_signs_close_to_zero_come_from_the_long_integers(monkeypatch: pytest.MonkeyPatch) -> None:
     before = Pieces(SLOW).norm(fmpq_poly([1, -1]))
-    monkeypatch.setattr(piecewise, "_ROUNDED", 1000.0)
+    monkeypatch.setattr(summed_forms, "_UNIT", 2.0**-10)
     assert Pieces(SLOW).norm(fmpq_poly([1, -1])) == before
+
+
+@pytest.mark.parametrize("name", DENOMINATORS)
+def test_a_rough_sum_is_above_the_close_one_by_little(name: str) -> None:
+    for numerator in NUMERATORS:
+        close, rough = (Pieces(DENOMINATORS[name]).norm(numerator, rough=rough) for rough in (False, True))
+        assert close - max(close, 1) / 2**90 <= rough < close + max(close, 1) / 2**36
+
+
+def test_a_rough_sum_is_as_close_as_one_that_is_known() -> None:
+    made = Pieces(SLOW)
+    assert (
+        made.norm(NUMERATORS[1]) == made.norm(NUMERATORS[1], rough=True) < Pieces(SLOW).norm(NUMERATORS[1], rough=True)
+    )
+
+
+@pytest.mark.parametrize("name", ["one pole", "a pair", "slow and fast"])
+def test_the_difference_of_two_responses_from_pieces_side_by_side(name: str) -> None:
+    """The other one has a pole that is a little off, and a numerator that begins later."""
+    other = DENOMINATORS[name] + fmpq_poly([0, fmpq(1, 2**20)])
+    ideal = Pieces(DENOMINATORS[name])
+    made = Pieces(other, ideal)
+    for numerator in NUMERATORS[:3]:
+        found = made.distance(numerator * fmpq_poly([0, 0, 1]), ideal, numerator)
+        assert found is not None
+        first = response(numerator * fmpq_poly([0, 0, 1]), inverse(other))
+        second = response(numerator, inverse(DENOMINATORS[name]))
+        exact = sum(abs(a - b) for a, b in zip_longest(first.samples, second.samples, fillvalue=0))
+        exact, error = Fraction(exact, 1 << BITS), first.error + second.error
+        assert exact - error <= found < exact + error + max(exact, 1) / 2**80
+
+
+def test_pieces_of_different_lengths_have_no_difference() -> None:
+    fast, slow = Pieces(DENOMINATORS["one pole"]), Pieces(fmpq_poly([1, -1 + fmpq(1, 2**12)]))
+    assert slow.distance(fmpq_poly([1]), fast, fmpq_poly([1])) is None
 
 
 @pytest.mark.parametrize("denominator", [[1, 0, 1], [1, -1], [1, fmpq(-5, 4)]])
@@ -89,7 +124,7 @@ def test_a_response_too_long_is_refused(distance: int) -> None:
 
 
 def test_a_response_of_the_longest_length_is_summed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """In 32 pieces of 512 samples, which are as many as there may be."""
+    """In 8 pieces of 2048 samples, which are as many as there may be."""
     monkeypatch.setattr(piecewise, "_LONGEST", 1 << 14)
     pole = fmpq(round(2 ** (40 - 114 / ((1 << 14) - 30))), 2**40)
     exact = 1 / (1 - Fraction(int(pole.p), int(pole.q)))
