@@ -304,6 +304,8 @@ _ALL = (
         clock=27_000_000,
         platform="amaranth_boards.tang_nano_9k:TangNano9kPlatform",
         loader="tangnano9k",
+        # J6 in litex-hub/litex-boards and in the repository of amaranth-boards, which has its bank at 3.3 V; 33 to 35
+        # and 40 to 42 are an LCD's too
         header=_pins("25 26 27 28 29 30 33 34 40 35 41 42"),
     ),
     Board(
@@ -315,7 +317,12 @@ _ALL = (
         clock=27_000_000,
         platform="sosmith.gen.fpga.tang_nano_20k:TangNano20kPlatform",
         loader="tangnano20k",
-        header=_pins("73 74 75 85 77 27 28 25 26 29 30 31"),
+        # J6, then J5, in litex-hub/litex-boards, but for what other parts are at, by the nets' names in
+        # hra1129/TangCartMSX: LEDs 15 to 20 and 79, HDMI 25, 26, 52, 53, audio 51 and 54 to 56, backlight 49, SPI of
+        # the USB bridge 75, 76, 86, microSD 80, 85; and for 74, dead in zizineco/tang-nano-20k-pin73-problem. At 3.3
+        # V: 27 to 31, 41, 42, 48, 77, an LCD's, in sipeed/TangNano-20K-example, 71 and 72 in nand2mario/nestang, 73
+        # in zizineco's
+        header=_pins("73 77 27 28 29 30 31 42 41 48 72 71"),
     ),
     Board(
         name="arty_a7",

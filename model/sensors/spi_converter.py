@@ -7,6 +7,9 @@ MAX31855  Maxim Integrated 19-5793: serial interface characteristics, table 2 (f
 ========  ==============================================================================================
 
 All take SPI mode 0: data is taken at rising edges of SCK and changes at falling ones, the highest bit first.
+
+The frames were compared with the data sheets' own pages (DS21034D and DS21298E, section 5; 19-5793, table 2). Those
+with the tables of timing were not at hand: a comment beside a figure names a public repository that states it.
 """
 
 from __future__ import annotations
@@ -160,28 +163,30 @@ SUPPLY = Fraction("3.3")
 FULL_SUPPLY = Fraction(5)
 """Supply in V from which on the faster of the two timings of a data sheet holds."""
 
+# Clocks: 50,000 conversions a second at 2.7 V and 100,000 at 5 V, by the first page of each data sheet, of 18 clocks
+# in an MCP3202 (fivdi/mcp-spi-adc) and of 20 in an MCP3204 (not confirmed).
 _MCP3202_SLOW = Timing(
     clock=Fraction(900_000),
-    high=250 * ns,
-    low=250 * ns,
-    select=100 * ns,
-    deselect=500 * ns,
-    setup=50 * ns,
-    hold=50 * ns,
-    valid=200 * ns,
+    high=250 * ns,  # not confirmed; half a period of the highest clock is longer
+    low=250 * ns,  # likewise
+    select=100 * ns,  # dominic-meads/SPI-master-for-MCP3202-ADC-and-MCP4822-DAC
+    deselect=500 * ns,  # likewise
+    setup=50 * ns,  # not confirmed; that of the MCP3008 in ma16/rpio
+    hold=50 * ns,  # likewise
+    valid=200 * ns,  # likewise
 )
 _MCP3204_SLOW = replace(_MCP3202_SLOW, clock=Fraction(1_000_000))
 _MAX31855 = Timing(
-    clock=Fraction(5_000_000),
-    high=100 * ns,
-    low=100 * ns,
-    select=100 * ns,
-    deselect=200 * ns,
+    clock=Fraction(5_000_000),  # enjoyneering/MAX31855
+    high=100 * ns,  # arendst/Tasmota, xsns_39_max31855
+    low=100 * ns,  # likewise
+    select=100 * ns,  # that of the MAX31856 in its data sheet
+    deselect=200 * ns,  # not confirmed, and never that short: a conversion goes between two frames
     setup=0 * ns,
     hold=0 * ns,
-    valid=100 * ns,  # behind the falling edge of CS; 40 ns behind one of SCK
-    conversion=100 * ms,
-    power_up=200 * ms,
+    valid=100 * ns,  # behind the falling edge of CS; 40 ns behind one of SCK: arendst/Tasmota
+    conversion=100 * ms,  # enjoyneering/MAX31855
+    power_up=200 * ms,  # likewise
 )
 
 CONVERTERS = {

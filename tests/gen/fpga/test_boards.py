@@ -1,6 +1,7 @@
 """The table of boards."""
 
 import re
+from importlib import import_module
 
 import pytest
 
@@ -31,6 +32,17 @@ def test_an_unknown_board_is_refused_with_those_that_exist() -> None:
     )
     with pytest.raises(SpecificationError, match=f"^{re.escape(message)}$"):
         find_board("kc705")
+
+
+def test_pins_for_converters_are_at_a_connector() -> None:
+    checked = []
+    for board in BOARDS.values():
+        module, _, kind = (board.platform or "").partition(":")
+        connectors = getattr(import_module(module), kind).connectors if board.header else ()
+        if connectors:  # amaranth-boards has none of the Tang Nanos
+            checked.append(board.name)
+            assert {*board.header} <= {pin for connector in connectors for pin in connector.mapping.values()}
+    assert len(checked) == 9
 
 
 def test_what_a_device_lacks_is_told() -> None:
