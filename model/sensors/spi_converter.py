@@ -163,11 +163,11 @@ SUPPLY = Fraction("3.3")
 FULL_SUPPLY = Fraction(5)
 """Supply in V from which on the faster of the two timings of a data sheet holds."""
 
-# Clocks: 50,000 conversions a second at 2.7 V and 100,000 at 5 V, by the first page of each data sheet, of 18 clocks
-# in an MCP3202 (fivdi/mcp-spi-adc) and of 20 in an MCP3204 (not confirmed).
+# Clocks: 50,000 conversions a second at 2.7 V and 100,000 at 5 V, by the first page of each data sheet, of 18 clocks in
+# an MCP3202 and of 20 in an MCP3204: fivdi/mcp-spi-adc.
 _MCP3202_SLOW = Timing(
     clock=Fraction(900_000),
-    high=250 * ns,  # not confirmed; half a period of the highest clock is longer
+    high=250 * ns,  # not confirmed; half a period of the highest clock is at least that
     low=250 * ns,  # likewise
     select=100 * ns,  # dominic-meads/SPI-master-for-MCP3202-ADC-and-MCP4822-DAC
     deselect=500 * ns,  # likewise
