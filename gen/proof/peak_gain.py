@@ -128,18 +128,20 @@ def _overshoot(
     made: Recursion, driven: Sequence[_Driven], under: tuple[Coefficients, ...], sizes: Sequence[Fraction]
 ) -> Fraction | None:
     """Bound on how far sums up to some sample leave the limits of the whole sums; None if nothing is known."""
-    steady, rising, most = fmpq_poly([0]), None, ZERO
+    steady = fmpq_poly([0])
+    others = []
     for ((numerator, *_), _, low, high), size in zip(driven, sizes, strict=True):
-        if not low <= 0 <= high:
+        if low <= 0 <= high:
+            others.append(((high - low) * size, numerator, low, high))
+        else:
             steady += numerator * _rational((low + high) / 2)
-        elif (least := min(-low, high)) * size > most:
-            most, rising = least * size, numerator * _rational(least)
-    if rising is None:
+    if not others:
         return None
     # What is still to come after sample n is sample n of (gain - steady/D) / (1 - w).
     denominator = reduce(mul, map(polynomial, under), fmpq_poly([1]))
     falling = (denominator * (steady(1) / denominator(1)) - steady) / fmpq_poly([1, -1])
-    return made.excess((falling,), (rising,))
+    _, rising, *ends = max(others, key=lambda one: one[0])
+    return made.excess((falling,), (rising,), *ends)
 
 
 def _rational(value: Fraction) -> fmpq:

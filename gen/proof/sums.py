@@ -181,26 +181,28 @@ class Recursion:
             best = max(best, self._highest_in_blocks(samples, factors, sums[-1], best))
         return Fraction(best, scale << 2 * self._bits) + slack
 
-    def excess(self, falling: Numerators, rising: Numerators) -> Fraction:
-        """Bound, over all n, on ``|f[n]|`` minus the sum of all ``|r[k]|`` with k > n, for two responses; 0 at least.
+    def excess(self, falling: Numerators, rising: Numerators, low: Fraction, high: Fraction) -> Fraction:
+        """Bound, over all n, on ``|f[n]|`` minus the sum over k > n of what r[k] contributes, for two responses.
 
-        The magnitudes are known as well as doubles tell them.
+        What drives r is in [low, high], which contains zero; its contribution is that to the upper limit or to the
+        lower one, whichever is less. The bound is 0 at least, and as close as doubles tell it.
         """
-        bounds = []
-        for samples, side in zip(self._samples([falling, rising]), (1, -1), strict=True):
-            values, rough, exact = self._in_all_blocks(samples)
-            first = np.array([abs(v) + side * samples.error for v in samples.head], dtype=object).astype(np.float64)
-            every = [
-                first * 2.0**-self._bits * (1 + side * 2.0**-30),
-                (np.abs(values) + side * (rough + exact)).T.ravel(),
-            ]
-            bounds.append(np.maximum(np.concatenate(every), 0.0))
-            if side > 0:
-                tail = self._tail(samples)
-        most, least = bounds
-        # What is added up is rounded by far less than what is taken off here.
-        behind = np.append(np.cumsum(least[:0:-1])[::-1] * (1 - 2.0**-20), 0.0)
-        return Fraction(float((most - behind).max(initial=0.0)) * _SLACK) + tail
+        (f, f_off, tail), (r, r_off, _) = map(self._in_time, self._samples([falling, rising]))
+        most, largest, more = np.abs(f) + f_off, float(max(-low, high)), 0.0
+        for ends in ((float(low), float(high)), (-float(high), -float(low))):
+            least = np.maximum(np.maximum(ends[0] * r, ends[1] * r) - largest * r_off, 0.0)
+            # What is added up is rounded by far less than what is taken off here.
+            behind = np.append(np.cumsum(least[:0:-1])[::-1] * (1 - 2.0**-20), 0.0)
+            more = max(more, float((most - behind).max(initial=0.0)) * _SLACK)
+        return Fraction(more) + tail
+
+    def _in_time(self, samples: _Samples) -> tuple[Floats, Floats, Fraction]:
+        """Return all samples in doubles, bounds on their errors, and on the sum of the magnitudes behind them."""
+        values, rough, exact = self._in_all_blocks(samples)
+        first = np.array(samples.head, dtype=object).astype(np.float64) * 2.0**-self._bits
+        error = samples.error * 2.0**-self._bits
+        off = np.concatenate([np.abs(first) * 2.0**-30 + error, np.tile(rough + exact, (self._block, 1)).T.ravel()])
+        return np.concatenate([first, values.T.ravel()]), off * _SLACK, self._tail(samples)
 
     def last_above(self, weighted: Sequence[tuple[Numerators, Fraction]], limit: Fraction) -> int | None:
         """Last sample at which a weighted sum of magnitudes may exceed `limit`, 0 if there is none.
@@ -302,7 +304,7 @@ class Recursion:
     def _in_all_blocks(self, samples: _Samples) -> tuple[Floats, Floats, Floats]:
         """Return samples in doubles, shape (block, blocks), and for each block bounds on rounding and other errors."""
         sizes = np.abs(samples.values).sum(axis=0) * _SLACK
-        rough = self._rounding * float(np.abs(self._weights).max()) * sizes
+        rough = self._rounding * float(np.abs(self._weights).max(initial=0.0)) * sizes
         exact = (self._widest * samples.error + 2 * sizes) * 2.0**-self._bits * _SLACK
         return self._weights @ samples.values, rough, exact
 

@@ -92,16 +92,23 @@ class Pieces:
         first, found = self._found[key]
         return abs(fraction(leading / first)) * found
 
-    def excess(self, numerator: fmpq_poly, rising: fmpq_poly) -> Fraction:
-        """Upper bound, over all n, of ``|f[n]|`` minus the sum of all ``|r[k]|`` with k > n; 0 if there is none.
+    def excess(self, numerator: fmpq_poly, rising: fmpq_poly, low: Fraction, high: Fraction) -> Fraction:
+        """Upper bound, over all n, of ``|f[n]|`` minus the sum over k > n of what r[k] contributes; 0 if there is none.
 
-        f and r are the responses of `numerator` and `rising`. Magnitudes are known to about 20 bits.
+        f and r are the responses of `numerator` and `rising`. What drives r is in [low, high], which contains zero, and
+        the contribution is that to the upper limit or to the lower one, whichever is less. Sums are known to about 20
+        bits.
         """
-        (_, most, off), (least, _, rising_off) = map(self._samples, (numerator, rising))
-        count = max(len(most), len(least)) + 1
-        most, least = (np.pad(values, (0, count - len(values))) for values in (most, least))
-        behind = np.cumsum(least[:0:-1])[::-1] * (1 - 2.0**-20)  # more than the rounding of these sums
-        return Fraction(max(0.0, float((most[:-1] - behind).max()))) + off + rising_off
+        (f, f_doubts, off), (r, r_doubts, r_off) = map(self._samples, (numerator, rising))
+        count, largest = max(len(f), len(r)) + 1, max(-low, high)
+        most = np.pad(np.abs(f) + f_doubts, (0, count - len(f)))
+        more = 0.0
+        for ends in ((float(low), float(high)), (-float(high), -float(low))):
+            least = np.maximum(np.maximum(ends[0] * r, ends[1] * r) - float(largest) * r_doubts, 0.0)
+            least = np.pad(least, (0, count - len(r)))
+            behind = np.cumsum(least[:0:-1])[::-1] * (1 - 2.0**-20)  # more than the rounding of these sums
+            more = max(more, float((most[:-1] - behind).max()))
+        return Fraction(more) + off + largest * r_off
 
     def distance(self, numerator: fmpq_poly, other: Pieces, subtracted: fmpq_poly) -> Fraction | None:
         """Upper bound of the sum of magnitudes ``|N/D - N'/D'|``, the second response one of `other`, hardly above it.
@@ -268,16 +275,15 @@ class Pieces:
         return head, numbers, left_out, residual
 
     def _samples(self, numerator: fmpq_poly) -> tuple[Floats, Floats, Fraction]:
-        """Return bounds of the magnitudes of a response's samples, and by how much they all together may be off."""
+        """Return a response's samples, by how much each may be off, and by how much all magnitudes together may be."""
         head, numbers, left_out, residual = self._pieces(numerator)
-        sums, doubts = self._summed.values(numbers)
-        pieces = [(np.abs(sums) + sign * doubts).T.ravel() for sign in (-1, 1)]
-        first = np.abs(np.array(head, dtype=object).astype(np.float64)) * 2.0**-self._bits
-        least, most = (
-            np.concatenate([first * (1 + sign * 2.0**-50), values])
-            for sign, values in zip((-1, 1), pieces, strict=True)
+        values, doubts = self._summed.values(numbers)
+        first = np.array(head, dtype=object).astype(np.float64) * 2.0**-self._bits
+        return (
+            np.concatenate([first, values.T.ravel()]),
+            np.concatenate([np.abs(first) * 2.0**-50, doubts.T.ravel()]),
+            left_out + self._inverse * residual,
         )
-        return np.maximum(least, 0.0), most, left_out + self._inverse * residual
 
     def _first_residual(self, taps: list[int], scale: int, head: list[int], first: Integers) -> Fraction:
         """Sum of the magnitudes of ``N - D h`` before piece 0 carries on by itself."""

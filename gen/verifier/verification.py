@@ -452,16 +452,16 @@ def _overshoot(over: _Denominator, apart: Sequence[_Driven], driven: Sequence[_D
 
     What is still to come after n, with the worst u, is the sum over all drives and k > n of ``c h_k + r |h_k|``. It is
     negative at most by the magnitude of the sum of ``c h_k`` for the drives `apart`, whose ranges do not contain zero.
-    Of the others no term is negative, and those of one alone are at least the smaller end of its range times ``|h_k|``.
+    Of the others no term is negative, and those of the largest one are taken as they are.
     """
-    others = [(numerator, min(-low, high)) for numerator, low, high in driven if low < 0 < high]
+    others = [one for one in driven if one[1] <= 0 <= one[2]]
     if over.pieces is None or not others:
         return None
     steady = sum((numerator * _rational((low + high) / 2) for numerator, low, high in apart), fmpq_poly([0]))
     whole = over.polynomial * (steady(1) / over.polynomial(1))
     falling = (whole - steady) / fmpq_poly([1, -1])
-    rising, least = max(others, key=lambda one: one[1] * over.norm(one[0], rough=True))
-    return over.pieces.excess(falling, rising * _rational(least))
+    largest = max(others, key=lambda one: (one[2] - one[1]) * over.norm(one[0], rough=True))
+    return over.pieces.excess(falling, *largest)
 
 
 def _summed_up(driven: Sequence[_Driven]) -> list[_Driven]:

@@ -222,7 +222,12 @@ def test_how_far_a_response_exceeds_what_is_still_to_come_of_another(name: str) 
     for factor in (Fraction(1, 8), Fraction(1), Fraction(64)):
         numerators = dyadic(1, -0.5, 0.25), dyadic(0, float(factor), float(-factor) / 4)
         falling, rising = (exact(numerator, under, 4000) for numerator in numerators)
-        behind = list(accumulate(map(abs, rising[::-1]), initial=Fraction(0)))[-2::-1]
-        most = max(Fraction(0), *(abs(f) - rest for f, rest in zip(falling, behind, strict=True)))
-        found = Recursion([under], ACCURACY).excess((polynomial(numerators[0]),), (polynomial(numerators[1]),))
-        assert most <= found <= most + max(map(abs, rising)) * 4000 / 2**20
+        for low, high in ((Fraction(-1), Fraction(1)), (Fraction(0), Fraction(2)), (Fraction(-3), Fraction(1))):
+            most = Fraction(0)
+            for ends in ((low, high), (-high, -low)):
+                steps = [max(ends[0] * r, ends[1] * r) for r in rising]
+                behind = list(accumulate(steps[::-1], initial=Fraction(0)))[-2::-1]
+                most = max(most, *(abs(f) - rest for f, rest in zip(falling, behind, strict=True)))
+            taken = (polynomial(numerators[0]),), (polynomial(numerators[1]),)
+            found = Recursion([under], ACCURACY).excess(*taken, low, high)
+            assert most <= found <= most + max(map(abs, rising)) * 4000 / 2**20
