@@ -23,6 +23,13 @@ def example_design(name: str, **options: Any) -> CoreDesign:
 
 
 @cache
+def zero_design(name: str, **options: Any) -> CoreDesign:
+    """Design the same with a filter that starts from zero."""
+    spec = load(EXAMPLES / name)
+    return design_core(replace(spec, hardware=replace(spec.hardware, start="zero")), **options)
+
+
+@cache
 def parallel_design(name: str, **options: Any) -> CoreDesign:
     """Design the same in the parallel architecture, which simulates the most samples a second."""
     spec = load(EXAMPLES / name)

@@ -109,7 +109,7 @@ class Design:
     >>> bool(abs(y - exact).max() <= design.bound)
     True
     >>> list(design.budget)
-    ['filter coefficients', 'filter rounding', 'output rounding']
+    ['filter coefficients', 'filter rounding', 'start', 'output rounding']
     >>> abs(design.frequency_response([0.0, 100.0])).round(3).tolist()
     [1.0, 0.707]
     >>> design.sos.shape, list(design.sections[0].coefficients)

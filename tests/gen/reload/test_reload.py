@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.gen.designs import EXAMPLES, example_design
+from tests.gen.designs import EXAMPLES, zero_design
 from tests.gen.reload.swaps import during, moved, worst_input
 from tests.model.reload.swapping import compute_swapping
 from tests.model.reload.unpacking import unpacked
@@ -34,10 +34,15 @@ EXACT = [name for name in REALIZATIONS if name != "state_space"]  # that one rou
 
 @cache
 def hardware_in(architecture: str, example: str = "audio_lowpass.toml", *, clock: int = 100_000_000) -> CoreDesign:
-    """Design a core that can be loaded anew."""
+    """Design a core that can be loaded anew, and starts from zero; `test_start` has those that start steady."""
     spec = load(EXAMPLES / example)
     hardware = replace(
-        spec.hardware, architecture=architecture, clock=Fraction(clock), realization="df1_ef2", reload=True
+        spec.hardware,
+        architecture=architecture,
+        clock=Fraction(clock),
+        realization="df1_ef2",
+        reload=True,
+        start="zero",
     )
     return design_core(replace(spec, hardware=hardware))
 
@@ -45,7 +50,7 @@ def hardware_in(architecture: str, example: str = "audio_lowpass.toml", *, clock
 @pytest.mark.parametrize("realization", EXACT)
 @pytest.mark.parametrize("example", ["audio_lowpass.toml", "flange_wear_bench.toml"])
 def test_the_same_constants_make_the_same_design(example: str, realization: str) -> None:
-    made = example_design(example, realization=realization).quantized
+    made = zero_design(example, realization=realization).quantized
     again = with_constants(made, made.filter, made.polynomial)
     assert [stage.graph for stage in again.datapath.stages] == [stage.graph for stage in made.datapath.stages]
     assert again.budget == made.budget

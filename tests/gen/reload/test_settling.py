@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from scipy import signal
-from tests.gen.designs import example_design
+from tests.gen.designs import example_design, zero_design
 from tests.gen.word_lengths.test_quantize import butterworth, plain
 from tests.gen.word_lengths.test_start import steady_design
 
@@ -33,7 +33,7 @@ def test_covers_what_any_past_could_change(order: int, cutoff: float, realizatio
 
 def test_a_constant_input_has_settled_by_then() -> None:
     """From 2,000 random starts: afterwards the result is that of a filter which has run for ever."""
-    design = example_design("flange_wear_bench.toml")
+    design = zero_design("flange_wear_bench.toml")
     made, datapath = design.quantized, design.datapath
     samples = settling(made)
     rng = np.random.default_rng(1)
@@ -47,7 +47,7 @@ def test_a_constant_input_has_settled_by_then() -> None:
 
 
 def test_the_manifest_has_it_in_samples_and_seconds() -> None:
-    design = example_design("flange_wear_bench.toml")
+    design = zero_design("flange_wear_bench.toml")
     tree = manifest(core_facts(design))
     samples = settling(design.quantized)
     assert tree["start"] == "zero"

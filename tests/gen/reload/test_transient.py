@@ -4,7 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from tests.gen.designs import example_design
+from tests.gen.designs import zero_design
 from tests.gen.reload.swaps import during, left_behind, moved, worst_input
 from tests.model.reload.swapping import compute_swapping
 
@@ -23,7 +23,7 @@ RATIOS = ("0.5", "1.2")
 @cache
 def sets(realization: str, ratio: str) -> tuple[Quantized, Quantized]:
     """Make a design and the same with another cutoff, in formats in which states carry over."""
-    made = example_design("audio_lowpass.toml", realization=realization)
+    made = zero_design("audio_lowpass.toml", realization=realization)
     own = with_constants(made.quantized, None, None, room=2)
     return own, with_constants(made.quantized, moved(made, ratio), None, finer=2, room=2)
 
