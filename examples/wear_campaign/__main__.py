@@ -46,7 +46,7 @@ def main() -> None:
             filter_table = earlier["ride"]["filters"][-1]["table"]
             compared = methods_campaign(settings, filter_table, arguments.output / "methods", step)
             results, series = {"settings": settings, "methods": compared}, {}
-            results |= {name: earlier[name] for name in ("bench", "ride", "week")}
+            results |= {name: earlier[name] for name in ("bench", "ride", "week", "reloads")}
         else:
             recorded = earlier["methods"] if arguments.without_methods else None
             results, series = carry_out(settings, arguments.output, step, methods=recorded)

@@ -7,6 +7,7 @@ from typing import Any
 
 from examples.wear_campaign import bench, depot, hardware, ride, week
 from examples.wear_campaign.methods import side_by_side
+from examples.wear_campaign.reloads import all_weeks
 from examples.wear_campaign.spread import spread
 
 from sosmith.gen.core import CoreDesign, design_core
@@ -30,16 +31,20 @@ def carry_out(
     """Carry out the whole campaign into `folder`; with `methods`, which do not depend on hardware, all but these."""
     on_bench, bench_series = bench_campaign(settings, folder / "bench", progress)
     on_track, ride_series = ride_campaign(settings, folder / "ride", progress)
-    in_service, week_series = week_campaign(settings, on_track["filters"][-1]["table"], folder / "week", progress)
+    from_spectra = on_track["filters"][-1]["table"]
+    in_service, week_series = week_campaign(settings, from_spectra, folder / "week", progress)
+    week = load_scenario(SCENARIOS / f"{settings['week']['scenario']}.toml")
+    reloads = all_weeks(settings, week, from_spectra, folder / "reloads", progress)
     compared = methods
     if compared is None:
-        compared = methods_campaign(settings, on_track["filters"][-1]["table"], folder / "methods", progress)
+        compared = methods_campaign(settings, from_spectra, folder / "methods", progress)
     results = {
         "settings": settings,
         "methods": compared,
         "bench": on_bench,
         "ride": on_track,
         "week": in_service,
+        "reloads": reloads,
     }
     series = {"bench": bench_series, "runs": bench_series, "ride": ride_series, "week": week_series}
     return results, series

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +32,10 @@ RATE = 100.0
 """Sample rate in Hz, from the paper's section 5.4."""
 
 MAX_ERROR = 0.0005
-"""Allowed error in mm of the reloadable hardware: two LSB, which leaves room for other coefficients."""
+"""Allowed error in mm of the reloadable hardware with its own coefficients: two LSB."""
+
+SET_ERROR = Fraction(1, 1000)
+"""Allowed error in mm with coefficients that are loaded: twice as much, which leaves room for any calibration."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -92,7 +96,8 @@ def live(
     loaded: list[Datapath] = []
     for number, calibration in enumerate(calibrations):
         table = specification_table(calibration.sensor, calibration.version)
-        wanted = hardware.specification(folder, f"week_day_{number}", RATE, table, filter_table, **options)
+        allowed = options | {"max_error": float(SET_ERROR)}
+        wanted = hardware.specification(folder, f"week_day_{number}", RATE, table, filter_table, **allowed)
         progress("week: prove and reload", number, len(calibrations))
         try:
             swap = check_swap(factory, before, set_for(factory, load(wanted)))

@@ -15,7 +15,7 @@ from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.model.errors import ShortfallError
 from sosmith.model.sections.start import StartStage
 
-_MARGIN = Fraction(1, 8)
+_MARGIN = Fraction(1, 4)
 """Share of the range of the samples by which it is widened at either end; none where samples are not calibrated."""
 
 Limits = tuple[Fraction, Fraction]

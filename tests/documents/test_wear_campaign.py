@@ -5,17 +5,20 @@ import re
 import subprocess
 import sys
 import tomllib
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from examples.wear_campaign import bench, campaign, methods, ride
+from examples.wear_campaign import bench, campaign, hardware, methods, reloads, ride, week
 from examples.wear_campaign.document import document
 from examples.wear_campaign.spread import spread
 from scipy import signal
 
+from sosmith.gen.reload.reload import check_swap
 from sosmith.gen.specification.specification import load
+from sosmith.model.calibration.polynomial import EQUATION_5A
 from sosmith.model.scenarios.file import load_scenario
 
 ROOT = Path(__file__).parents[2]
@@ -158,3 +161,53 @@ def test_the_whole_campaign_gives_the_same_again(tmp_path: Path) -> None:
     for name in ("bench", "runs", "ride", "week"):
         picture = f"campaign_{name}.svg"
         assert (tmp_path / "images" / picture).read_bytes() == (ROOT / "docs" / "images" / picture).read_bytes()
+
+
+def test_a_week_s_reloads_are_those_recorded(tmp_path: Path) -> None:
+    """One week: what is refused leaves the active set, and the next swap starts from that."""
+    settings = outcome()["settings"] | {"seeds": 1}
+    settings["methods"] = settings["methods"] | {"sensors": ["equation_4"]}
+    scenario = load_scenario(campaign.SCENARIOS / "a_week_in_service.toml")
+    table = outcome()["ride"]["filters"][-1]["table"]
+    (made,) = reloads.all_weeks(settings, scenario, table, tmp_path, lambda *_: None)
+    (recorded,) = [one for one in outcome()["reloads"] if one["sensor"] == "equation_4"]
+    assert made["mornings"] == 7
+    assert made["proven"] + len(made["kept"]) == 7
+    assert 0 < made["bound"] <= recorded["bound"] <= float(week.SET_ERROR)
+    assert set(made["kept"]) <= set(recorded["kept"])
+
+
+def test_every_reload_is_proven_or_refused_with_its_reason() -> None:
+    found = outcome()
+    days = 7
+    assert [one["sensor"] for one in found["reloads"]] == found["settings"]["methods"]["sensors"]
+    for one in found["reloads"]:
+        assert one["mornings"] == days * found["settings"]["seeds"]
+        assert one["proven"] + len(one["kept"]) == one["mornings"]
+        assert one["bound"] <= float(week.SET_ERROR)
+
+
+def test_a_refused_reload_keeps_the_active_set(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With the hardware's own limit for its sets, some mornings are refused; each swap starts from the last proven."""
+    scenario = load_scenario(campaign.SCENARIOS / "a_week_in_service.toml")
+    table = outcome()["ride"]["filters"][-1]["table"]
+    core = hardware.instrument(
+        tmp_path, "kept", 100.0, hardware.calibration_table(EQUATION_5A), table, reload=True, max_error=week.MAX_ERROR
+    )
+    starts, active = [], []
+
+    def watched(hardware: Any, before: Any, made: Any) -> Any:
+        starts.append((before, active[-1] if active else None))
+        swap = check_swap(hardware, before, made)
+        active.append(swap.made)
+        return swap
+
+    monkeypatch.setattr(reloads, "SET_ERROR", Fraction(week.MAX_ERROR))
+    monkeypatch.setattr(reloads, "check_swap", watched)
+    mornings = reloads.one_week(core, scenario, 1)
+    verdicts = [one["verdict"] for one in mornings]
+    assert set(verdicts) == {"proven", "refused"}
+    assert len(active) == verdicts.count("proven") > 2
+    assert all(before is expected for before, expected in starts if expected is not None)
+    refused = next(one["reason"] for one in mornings if one["verdict"] == "refused")
+    assert refused.startswith("the set must keep its error within 500 nm, and is proven to ")
