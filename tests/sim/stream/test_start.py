@@ -11,6 +11,7 @@ import pytest
 from tests.gen.verifier.small_specifications import STEADY_INSTRUMENT
 
 from sosmith.gen.core import CoreDesign, design_core
+from sosmith.gen.reload.transient import SETTLED, settling
 from sosmith.gen.specification.specification import from_tree
 from sosmith.model.dataflow.status import Flag
 from sosmith.model.reference.golden import calibrated
@@ -22,32 +23,39 @@ WARNING, LIMIT = 4.4, 4.6
 TEXT = STEADY_INSTRUMENT + f"wear = {{ initial = 4.0, warning = {WARNING - 4:.1f}, limit = {LIMIT - 4:.1f} }}\n"
 
 
-def made_in(architecture: str) -> CoreDesign:
+def made_in(architecture: str, start: str) -> CoreDesign:
     spec = from_tree(tomllib.loads(TEXT, parse_float=Decimal), Path("small.toml"))
-    hardware = replace(spec.hardware, architecture=architecture, clock=Fraction(10**10))
+    hardware = replace(spec.hardware, architecture=architecture, clock=Fraction(10**10), start=start)
     return design_core(replace(spec, channels=CHANNELS, hardware=hardware))
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("architecture", ["parallel", "folded", "serial"])
-def test_no_false_wear_flag_and_every_true_one_at_once(architecture: str, tmp_path: Path) -> None:
-    made = made_in(architecture)
-    datapath = made.datapath
+@pytest.mark.parametrize(
+    ("architecture", "start"),
+    [("parallel", "steady"), ("folded", "steady"), ("serial", "steady"), ("parallel", "zero"), ("folded", "zero")],
+)
+def test_flags_of_wear_are_right_once_settled(architecture: str, start: str, tmp_path: Path) -> None:
+    """At once behind a steady start; from zero, once the length has passed that the manifest states."""
+    made = made_in(architecture, start)
+    datapath, settled = made.datapath, settling(made.quantized)
+    assert (settled == 0) == (start == "steady")
+    samples = settled + SAMPLES
     rng = np.random.default_rng(1)
     constant = np.stack([rng.integers(p.lowest, p.highest + 1, 2 * CHANNELS) for p in datapath.inputs], axis=1)
     values = calibrated(constant, datapath.inputs, made.quantized.polynomial)
-    bound = float(made.quantized.bound * datapath.output.lsb)
+    bound = float((made.quantized.bound + SETTLED * bool(settled)) * datapath.output.lsb)
     clear = np.abs(values - WARNING) > bound  # neither just below the limit nor just above
     constant, values = constant[clear][:CHANNELS], values[clear][:CHANNELS]
     assert len(constant) == CHANNELS
     ports, rate = datapath.inputs, made.spec.sample_rate
     traces = [
-        Trace(name="start", ports=ports, sample_rate=rate, codes=np.tile(codes, (SAMPLES, 1))) for codes in constant
+        Trace(name="start", ports=ports, sample_rate=rate, codes=np.tile(codes, (samples, 1))) for codes in constant
     ]
     evidence = simulate(made, traces, tmp_path, seed=1)
     assert evidence.mismatches == 0  # codes and flags are those of the integer model
-    assert evidence.samples == CHANNELS * SAMPLES
-    status = datapath.compute_status(np.broadcast_to(constant, (SAMPLES, *constant.shape)))
-    warned = (status >> Flag.WEAR_WARNING & 1).astype(bool)
-    assert (warned == (values > WARNING)).all()
+    assert evidence.samples == CHANNELS * samples
+    status = datapath.compute_status(np.broadcast_to(constant, (samples, *constant.shape)))
+    right = (status >> Flag.WEAR_WARNING & 1).astype(bool) == (values > WARNING)
+    assert right[settled:].all()
+    assert right[:settled].all() == (start == "steady")
     assert 1000 < np.count_nonzero(values < WARNING) < CHANNELS - 1000
