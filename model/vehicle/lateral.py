@@ -107,12 +107,13 @@ class LateralDynamics:
         for k, (name, (ahead, height)) in enumerate(zip(COORDINATES, self._places(), strict=True)):
             s = centre + ahead
             if name.endswith("lateral"):
-                pose[:, k] = track.offset_at(s) - height * track.cant_at(s) / gauge
-                rate[:, k] = track.heading_at(s) - height * track.cant_slope_at(s) / gauge
+                # the right rail is raised: what is above the rails leans to the left
+                pose[:, k] = track.offset_at(s) + height * track.cant_at(s) / gauge
+                rate[:, k] = track.heading_at(s) + height * track.cant_slope_at(s) / gauge
             elif name.endswith("yaw"):
                 pose[:, k], rate[:, k] = track.heading_at(s), track.curvature_at(s)
             else:
-                pose[:, k], rate[:, k] = track.cant_at(s) / gauge, track.cant_slope_at(s) / gauge
+                pose[:, k], rate[:, k] = -track.cant_at(s) / gauge, -track.cant_slope_at(s) / gauge
         return pose, self.speed * rate
 
     def forces(self, track: Track, irregularity: Irregularity | None, centre: Array) -> Array:
@@ -132,7 +133,7 @@ class LateralDynamics:
             if irregularity is not None:
                 shift = shift + irregularity.alignment.at(s)
             force += np.outer(shift, contact_stiffness[:, 2 * k])
-            roll, roll_rate = track.cant_at(s) / gauge, self.speed * track.cant_slope_at(s) / gauge
+            roll, roll_rate = -track.cant_at(s) / gauge, -self.speed * track.cant_slope_at(s) / gauge
             force -= np.outer(roll, self.suspension.stiffness[:count, count + k])
             force -= np.outer(roll_rate, self.suspension.damping[:count, count + k])
         for k in lateral:

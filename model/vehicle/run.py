@@ -184,7 +184,7 @@ def _creep_force(
     gauge = 2 * wheelset.contact_half_spacing
     for k, ahead in enumerate(wheelset_positions(parameters.layout)):
         s = centre + ahead
-        pose_rate = speed * (track.heading_at(s) - wheelset.rolling_radius * track.cant_slope_at(s) / gauge)
+        pose_rate = speed * (track.heading_at(s) + wheelset.rolling_radius * track.cant_slope_at(s) / gauge)
         across = (rate[:, 2 * k] - pose_rate) / speed - relative[:, 2 * k + 1]
         spin = rate[:, 2 * k + 1] / speed
         along = wheelset.contact_half_spacing * spin + wheelset.conicity * to_rails[:, k] / wheelset.rolling_radius

@@ -61,7 +61,7 @@ def test_motion_is_the_same_in_coordinates_that_go_with_the_track() -> None:
     ahead = wheelset_positions(GIVEN.layout)
     clock = step * np.arange(-1, len(found.time) + 1)
     centre = speed * clock - ahead[0]
-    roll = np.stack([track.cant_at(centre + x) / (2 * 0.7465) for x in ahead], axis=1)
+    roll = -np.stack([track.cant_at(centre + x) / (2 * 0.7465) for x in ahead], axis=1)
     course = np.hstack([lateral.track_pose(track, centre), roll])
     rate = (course[2:] - course[:-2]) / (2 * step)
     acceleration = (course[2:] - 2 * course[1:-1] + course[:-2]) / step**2
@@ -73,12 +73,12 @@ def test_motion_is_the_same_in_coordinates_that_go_with_the_track() -> None:
     contact_stiffness = system.stiffness - suspension.stiffness[:21, :21]
     for k, name in enumerate(COORDINATES):
         if name.endswith("lateral"):
-            # what the pose subtracts for the height comes back as the cant
+            # what the pose adds for the height comes back as the cant
             part = name.split(" ")[0]
             x = {"wheelset": ahead, "frame": frame_positions(GIVEN.layout), "body": np.zeros(1)}[part]
             place = centre[1:-1] + x[0 if part == "body" else int(name.split(" ")[1]) - 1]
             cant = track.cant_at(place) / (2 * 0.7465)
-            assert course[:, k] == pytest.approx(track.offset_at(place) - heights[part] * cant, abs=1e-12)
+            assert course[:, k] == pytest.approx(track.offset_at(place) + heights[part] * cant, abs=1e-12)
             force[:, k] += system.mass[k, k] * GRAVITY * cant
         if name.startswith("wheelset") and name.endswith("yaw"):
             force -= np.outer(rate[:, k], contact_damping[:, k])  # creep along the rails knows the curve
@@ -93,6 +93,22 @@ def test_motion_is_the_same_in_coordinates_that_go_with_the_track() -> None:
     for name, values in together.items():
         difference = np.abs(values - getattr(found, name)).max()
         assert difference < 5e-4 * np.abs(values).max(), name
+
+
+def test_a_canted_track_leans_the_vehicle_to_the_raised_rails_other_side() -> None:
+    """In a curve to the left the right rail is raised: by rotation of a rigid vehicle about the left rail's level."""
+    lateral, centre = lateral_dynamics(GIVEN, 20.0), np.array([200.0])
+    (pose,) = lateral.track_pose(PAPER, centre)
+    found = dict(zip(COORDINATES, pose.tolist(), strict=True))
+    right, left = np.array([-0.7465, 0.09]), np.array([0.7465, 0.0])
+    along = (left - right) / np.hypot(*(left - right))
+    assert found["body roll"] == pytest.approx(np.arcsin(along[1]), rel=2e-3)
+    upward = np.array([-along[1], along[0]])  # of the vehicle, to the left of the vertical
+    lean = (2.2 - 0.625) * upward[0]
+    wheelset = PAPER.offset_at(centre + wheelset_positions(GIVEN.layout)[0])[0]
+    straight = found["wheelset 1 lateral"] - wheelset
+    assert found["body lateral"] - PAPER.offset_at(centre)[0] - straight == pytest.approx(lean, rel=2e-3)
+    assert lean > 0.09
 
 
 def in_a_long_curve(speed: float) -> tuple[Motion, int]:
