@@ -205,16 +205,15 @@ def _ride(found: dict[str, Any], settings: dict[str, Any]) -> str:
         for row in found["runs"]
     ]
     valid = found["validity"]
-    kept = "keeps the model within its limits" if valid["tangent_kept"] else "exceeds its limits as well"
     paper, spectra = found["filters"][0], found["filters"][-1]
     attenuated, ratio = paper["attenuation"]["the paper's passband edge"], spectra["delay"] / paper["delay"]
     offsets = {row["scenario"]: row["mean_after"] for row in found["runs"] if row["filter"] == "from spectra"}
     told = " and ".join(f"{value:+.3f} mm on the {name.removeprefix('ride_')}" for name, value in offsets.items())
     lines = [
         "## Under vehicle motion",
-        "The linear model of a Co-Co locomotive ([vehicle.md](vehicle.md)) runs at 20 m/s over tangent track and "
-        "over the "
-        "paper's curve with its single irregularity, both with random irregularities of the low level; true "
+        f"The {valid.get('model', 'linear')} model of a Co-Co locomotive ([vehicle.md](vehicle.md)) runs at 20 m/s "
+        "over tangent track and over the paper's curve with its single irregularity, both with random irregularities "
+        "of the low level; true "
         "clearance 5 mm, "
         "noise of the sensor, and an exact calibration, so that only the effect of motion remains. Three filters at "
         f"{settings['ride']['sample_rate']:g} Hz: the paper's of tables 9 and 10; one with the paper's 0.02 dB at 10 "
@@ -240,13 +239,27 @@ def _ride(found: dict[str, Any], settings: dict[str, Any]) -> str:
         f"far below 10 Hz. The paper's own coefficients remove it, with {attenuated:.0f} dB at that edge, at the "
         f"cost of delay. The filter from spectra has {100 * ratio:.0f} % of that delay. "
         f"No filter removes the steady offset of a curve: after the last filter the mean error is {told}.",
+        _limits_of_the_ride(valid),
+    ]
+    return "\n\n".join(lines)
+
+
+def _limits_of_the_ride(valid: dict[str, Any]) -> str:
+    """Say how far the model holds on the curve; a record without a model is of the linear one."""
+    if valid.get("model", "linear") == "nonlinear":
+        return (
+            "Creep forces are limited by friction and the flanges meet the rails. On the paper's curve, with its "
+            f"irregularity of 20 mm, the leading wheelset goes {valid['beyond_flange']:.1f} mm beyond first flange "
+            f"contact, for {100 * valid['beyond_share']:.0f} % of the ride, with {valid['friction_used']:.2f} of the "
+            f"friction there is and a Y/Q of up to {valid['derailment_quotient']:.2f}."
+        )
+    kept = "keeps the model within its limits" if valid["tangent_kept"] else "exceeds its limits as well"
+    return (
         "The model is linear. On the paper's curve, with its irregularity of 20 mm, the leading wheelset goes "
         f"{valid['beyond_flange']:.0f} mm beyond flange contact, which it exceeds for "
         f"{100 * valid['beyond_share']:.0f} % of the ride, and needs {valid['friction_used']:.1f} times the "
-        "available "
-        f"friction: the numbers for the curve are those of the model only. Tangent track {kept}.",
-    ]
-    return "\n\n".join(lines)
+        f"available friction: the numbers for the curve are those of the model only. Tangent track {kept}."
+    )
 
 
 _FREQUENCIES = {"hunting": "hunting 1.2 Hz", "irregularity": "irregularity 2 Hz", "the paper's passband edge": "10 Hz"}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +37,9 @@ Values = npt.NDArray[np.float64]
 
 PAPER_FILTER = hardware.filter_by_order(7, 0.2587802)
 """Filter of the paper's tables 9 and 10; examples/flange_wear_locomotive.toml derives its cutoff."""
+
+MODEL = "linear"
+"""Model of the contacts of wheels and rails that the recorded campaign rides on."""
 
 SETTLED = 0.01
 """Remaining fraction of a step at which the filter counts as settled."""
@@ -76,7 +80,7 @@ def prewarped(order: int, edge: float, loss: float, sample_rate: float) -> str:
 
 def trace_of(scenario: ScenarioFile, bench: Bench, seed: int, lead_in: float) -> Trace:
     """Generate the trace; every sample after the first `lead_in` seconds, in which filters settle, is a reading."""
-    trace = emulate_file(scenario, bench, seed=seed, vehicle=vehicle_clearance)
+    trace = emulate_file(scenario, bench, seed=seed, vehicle=partial(vehicle_clearance, model=MODEL))
     return replace(trace, reading=trace.time >= lead_in)
 
 
@@ -146,17 +150,20 @@ def ride(
     )
 
 
-def validity(sample_rate: float) -> dict[str, float | bool]:
-    """Return how far the leading wheelset exceeds the linear model on the curve: mm beyond flange contact, friction."""
+def validity(sample_rate: float) -> dict[str, float | bool | str]:
+    """Return how far the leading wheelset goes on the curve: mm beyond flange contact, share of friction, Y/Q."""
     parameters = built_in()
     track = curved_track(parameters.track)
-    motion = run(parameters, track, speed=SPEED, sample_rate=sample_rate, irregularity=IRREGULARITY, seed=1)
+    settings: dict[str, Any] = {"speed": SPEED, "sample_rate": sample_rate, "irregularity": IRREGULARITY, "seed": 1}
+    motion = run(parameters, track, **settings, model=MODEL)
     found = limits(parameters, track, motion)
     straight = tangent_track(replace(parameters.track, irregularity=0.0))
-    tangent = run(parameters, straight, speed=SPEED, sample_rate=sample_rate, irregularity=IRREGULARITY, seed=1)
+    tangent = run(parameters, straight, **settings, model=MODEL)
     return {
+        "model": MODEL,
         "tangent_kept": limits(parameters, straight, tangent).kept,
         "beyond_flange": 1e3 * float(found.beyond_flange[WHEELSET]),
         "beyond_share": float(found.beyond_flange_share[WHEELSET]),
         "friction_used": float(found.friction_used[WHEELSET]),
+        "derailment_quotient": float(found.derailment_quotient[WHEELSET]),
     }

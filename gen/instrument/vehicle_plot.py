@@ -7,8 +7,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sosmith.gen.instrument.amplitude_spectrum import Array, amplitude_spectrum
-from sosmith.gen.instrument.vehicle_report import TRACKS, VehicleRun
+from sosmith.gen.instrument.vehicle_report import TRACKS, VehicleRun, vehicle_run
 from sosmith.gen.picture import BLUE, GREEN, GREY, RED, legend_below, picture
+from sosmith.model.errors import SpecificationError
 
 SMALLEST = 1e-6
 """Smallest amplitude drawn, in mm: a nanometre."""
@@ -16,8 +17,26 @@ SMALLEST = 1e-6
 _COLOURS = (BLUE, RED, GREEN)
 
 
-def vehicle_plot(made: VehicleRun, file_format: str) -> bytes:
-    """Draw motions over the distance and their spectra.
+def linear_beside(made: VehicleRun) -> VehicleRun | None:
+    """Run the linear model over the same track; None if it is what ran, or is unstable at this speed."""
+    if made.model == "linear":
+        return None
+    try:
+        return vehicle_run(
+            made.parameters,
+            track=made.track,
+            speed=made.speed,
+            sample_rate=made.sample_rate,
+            irregularities=made.irregularities,
+            seed=made.seed,
+            model="linear",
+        )
+    except SpecificationError:
+        return None
+
+
+def vehicle_plot(made: VehicleRun, file_format: str, beside: VehicleRun | None = None) -> bytes:
+    """Draw motions and forces over the distance, and spectra.
 
     Parameters
     ----------
@@ -25,28 +44,43 @@ def vehicle_plot(made: VehicleRun, file_format: str) -> bytes:
         What to draw.
     file_format : str
         One of `sosmith.gen.picture.FORMATS`.
+    beside : VehicleRun, optional
+        The linear model's run over the same track, drawn for the leading wheelset.
     """
     motion = made.motion
 
     def paint(figure: Figure) -> None:
-        axes = figure.subplots(3, 2)
+        axes = figure.subplots(4, 2)
         random = "" if made.irregularities == "none" else f", irregularities {made.irregularities}, seed {made.seed}"
-        figure.suptitle(f"Co-Co locomotive, {made.track} track, {made.speed:g} m/s{random}")
-        room = 1e3 * made.parameters.sensor.flange_clearance
-        _draw(axes[0, 0], made, 1e3 * motion.wheelset_lateral, "lateral (mm)", "Wheelsets, lateral, to the left")
-        for side in (-room, room):
-            axes[0, 0].axhline(side, color=GREY, lw=0.8, ls="--")
-        axes[0, 0].text(made.motion.distance[-1], -room, "flange ", ha="right", va="top", color=GREY)
-        yaw = 1e3 * motion.wheelset_yaw_to_frame
-        _draw(axes[0, 1], made, yaw, "yaw (mrad)", "Wheelsets, yaw in their frames")
+        figure.suptitle(f"Co-Co locomotive, {made.track} track, {made.speed:g} m/s{random}: {made.model} contacts")
+        _draw(axes[0, 0], made, 1e3 * motion.lateral_to_rails, "lateral (mm)", "Wheelsets, lateral to the rails")
+        _draw_flanges(axes[0, 0], made)
+        title = "The leading wheelset, lateral to the rails"
+        _draw_beside(axes[0, 1], made, beside, "lateral_to_rails", 1e3, "lateral (mm)", title)
+        _draw_flanges(axes[0, 1], made)
         _draw(axes[1, 0], made, motion.clearance_mm, "change (mm)", "Clearance at the right wheels' sensors")
-        _draw_vertical(axes[1, 1], made)
-        _draw_spectra(axes[2, 0], made, 1e3 * motion.wheelset_lateral, "Spectrum of the lateral motion")
-        _draw_spectra(axes[2, 1], made, motion.clearance_mm, "Spectrum of the clearance")
+        title = "Clearance at the leading wheelset's sensor"
+        _draw_beside(axes[1, 1], made, beside, "clearance_mm", 1.0, "change (mm)", title)
+        _draw(
+            axes[2, 0],
+            made,
+            motion.friction_used,
+            "of the limit (1)",
+            "Creep force over friction",
+        )
+        _draw(
+            axes[2, 1],
+            made,
+            motion.derailment_quotient,
+            "Y/Q (1)",
+            "Guiding force over wheel load",
+        )
+        _draw_vertical(axes[3, 0], made)
+        _draw_spectra(axes[3, 1], made, motion.clearance_mm, "Spectrum of the clearance")
         figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=6, frameon=False)
 
     style = {"path.simplify": True, "path.simplify_threshold": 0.3, "text.parse_math": True}  # powers of ten
-    return picture("vehicle", (11, 10), paint, file_format, style=style)
+    return picture("vehicle", (11, 13), paint, file_format, style=style)
 
 
 def _draw(axes: Axes, made: VehicleRun, values: Array, label: str, title: str) -> None:
@@ -59,6 +93,30 @@ def _draw(axes: Axes, made: VehicleRun, values: Array, label: str, title: str) -
     _mark_track(axes, made)
     axes.set(xlabel="distance of the first wheelset (m)", ylabel=label)
     axes.set_title(title, loc="left")
+
+
+def _draw_beside(
+    axes: Axes, made: VehicleRun, beside: VehicleRun | None, name: str, scale: float, label: str, title: str
+) -> None:
+    """Draw the leading wheelset's motion by both models."""
+    runs = [(made, BLUE, 1.1)] if beside is None else [(beside, GREY, 1.1), (made, BLUE, 1.1)]
+    for one, colour, width in runs:
+        values = scale * getattr(one.motion, name)[:, 0]
+        axes.plot(one.motion.distance, values, color=colour, lw=width, label=f"{one.model} contacts")
+    _mark_track(axes, made)
+    legend_below(axes)
+    axes.set(xlabel="distance of the first wheelset (m)", ylabel=label)
+    axes.set_title(title, loc="left")
+
+
+def _draw_flanges(axes: Axes, made: VehicleRun) -> None:
+    """Draw where the flanges of the leading wheelset meet the rails; gauge widening moves it."""
+    distance = made.motion.distance
+    track = TRACKS[made.track](made.parameters.track)
+    room = 1e3 * (made.parameters.sensor.flange_clearance + track.widening_at(distance) / 2)
+    for side in (-room, room):
+        axes.plot(distance, side, color=GREY, lw=0.8, ls="--")
+    axes.text(distance[-1], -room[-1], "flange ", ha="right", va="top", color=GREY)
 
 
 def _draw_vertical(axes: Axes, made: VehicleRun) -> None:

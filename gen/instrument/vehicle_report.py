@@ -36,6 +36,8 @@ class VehicleRun:
     irregularities : str
         "none", "low" or "high".
     seed : int
+    model : str
+        "nonlinear" or "linear".
     motion : Motion
     limits : Limits
     lateral_modes, vertical_modes : tuple of Mode
@@ -47,6 +49,7 @@ class VehicleRun:
     sample_rate: float
     irregularities: str
     seed: int
+    model: str
     motion: Motion
     limits: Limits
     lateral_modes: tuple[Mode, ...]
@@ -54,12 +57,19 @@ class VehicleRun:
 
 
 def vehicle_run(
-    parameters: Parameters, *, track: str, speed: float, sample_rate: float, irregularities: str, seed: int
+    parameters: Parameters,
+    *,
+    track: str,
+    speed: float,
+    sample_rate: float,
+    irregularities: str,
+    seed: int,
+    model: str = "nonlinear",
 ) -> VehicleRun:
     """Run the vehicle over one of `TRACKS`; raises what `sosmith.model.vehicle.run.run` raises."""
     made = TRACKS[track](parameters.track)
     level = None if irregularities == "none" else irregularities
-    motion = run(parameters, made, speed=speed, sample_rate=sample_rate, irregularity=level, seed=seed)
+    motion = run(parameters, made, speed=speed, sample_rate=sample_rate, irregularity=level, seed=seed, model=model)
     return VehicleRun(
         parameters=parameters,
         track=track,
@@ -67,6 +77,7 @@ def vehicle_run(
         sample_rate=sample_rate,
         irregularities=irregularities,
         seed=seed,
+        model=model,
         motion=motion,
         limits=limits(parameters, made, motion),
         lateral_modes=lateral_dynamics(parameters, speed).system.modes(),
@@ -81,6 +92,11 @@ def largest(motion: Motion) -> dict[str, float]:
     }
 
 
+def acceleration(motion: Motion) -> float:
+    """Largest magnitude of the lateral acceleration felt in the body, in m/s^2."""
+    return float(np.abs(motion.body_acceleration).max())
+
+
 def vehicle_json(made: VehicleRun) -> dict[str, Any]:
     """Return settings, modes, largest motions and limits of a run; units are in the keys."""
     found = made.limits
@@ -90,19 +106,26 @@ def vehicle_json(made: VehicleRun) -> dict[str, Any]:
         "sample_rate_Hz": made.sample_rate,
         "irregularities": made.irregularities,
         "seed": made.seed,
+        "model": made.model,
         "samples": len(made.motion.time),
         "modes": {"lateral": _modes(made.lateral_modes), "vertical": _modes(made.vertical_modes)},
         "largest": largest(made.motion),
+        "body_acceleration_m_s2": acceleration(made.motion),
         "limits": [
             {
                 "wheelset": k + 1,
                 "beyond_flange_mm": 1e3 * float(found.beyond_flange[k]),
                 "beyond_flange_share": float(found.beyond_flange_share[k]),
+                "flange_force_kN": 1e-3 * float(found.flange_force[k]),
                 "friction_used": float(found.friction_used[k]),
                 "friction_exceeded_share": float(found.friction_exceeded_share[k]),
+                "sliding_share": float(found.sliding_share[k]),
+                "derailment_quotient": float(found.derailment_quotient[k]),
+                "load_share": float(found.load_share[k]),
             }
             for k in range(6)
         ],
+        "nadal_limit": found.nadal,
         "within_limits": found.kept,
     }
 

@@ -39,13 +39,14 @@ def run_of_ours() -> VehicleRun:
 
 def _equation_20() -> Part:
     limits = run_of_ours().limits
-    beyond, friction = 1000 * float(limits.beyond_flange.max()), float(limits.friction_used.max())
     remarks = (
         "Beside tables 5 to 8 stands a run of `sosmith vehicle` over the paper's track, at its speed and with its "
-        "single irregularity, of a six-axle locomotive with parameters from other sources. It is linear, without "
-        f"flanges: a wheelset goes up to {beyond:.1f} mm beyond its flange there, and creep takes up to {friction:.2f} "
-        "times the friction there is. Beyond these limits its figures are not those of a real vehicle, and none is "
-        "claimed to be the paper's.",
+        "single irregularity, of a six-axle locomotive with parameters from other sources. Friction limits its creep "
+        "forces, and its flanges are held by elastic rails: a wheelset goes up to "
+        f"{1e3 * float(limits.beyond_flange.max()):.1f} mm beyond first contact, against up to "
+        f"{1e-3 * float(limits.flange_force.max()):.0f} kN; wheels use up to {float(limits.friction_used.max()):.2f} "
+        f"of the friction there is; the largest Y/Q is {float(limits.derailment_quotient.max()):.2f}, and a flange "
+        f"would climb at {limits.nadal:.2f}. No figure is claimed to be the paper's.",
         f"[vehicle.md](vehicle.md) has the model. Attenuations of {-20 * math.log10(MIN_RIPPLE):.0f} dB stand for "
         "no motion at 50 Hz but rounding.",
     )

@@ -28,10 +28,10 @@ MIN_RIPPLE = 1e-9
 WHEELSETS = 6
 """Number of wheelsets of the vehicle; table 8 lists them first, then the bogies."""
 
-_CONE = "a cone lifts one wheel as much as it lowers the other; real profiles, and the flange, do not"
+_CONE = "a cone lifts one wheel as much as it lowers the other; real profiles do not, and a flange lifts its wheel"
 _CANT = "ours is half the cant, as the inner rail keeps its height; how the paper's track is canted is not told"
-_TWO = "the paper prints two lateral displacements for the wheels of one rigid wheelset; and ours has no flange"
-_YAW = "hangs on the links' stiffness, radius and flange force, which the paper does not give; ours has no flange"
+_TWO = "the paper prints two lateral displacements for the wheels of one rigid wheelset"
+_YAW = "hangs on the links' stiffness, radius and flange force, which the paper does not give"
 _SCALE = "the scale of the paper's transform is not told: its yaw ripple of 0.1 exceeds its largest yaw, 0.0126 rad"
 
 

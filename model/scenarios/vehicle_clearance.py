@@ -24,7 +24,7 @@ MIN_RATE = 1.0
 """Lowest sample rate in Hz of the vehicle model."""
 
 
-def vehicle_clearance(track: str, time: Values, seed: int) -> Values:
+def vehicle_clearance(track: str, time: Values, seed: int, *, model: str = "nonlinear") -> Values:
     """Return the change of the clearance in mm on the paper's curve or on tangent track, of the shape of `time`.
 
     The track is extended straight as far as `time` requires.
@@ -36,6 +36,8 @@ def vehicle_clearance(track: str, time: Values, seed: int) -> Values:
         Time in s, equally spaced from 0.
     seed : int
         Seed of the random irregularities, 0 or more.
+    model : {"nonlinear", "linear"}, optional
+        Of the contacts of wheels and rails.
 
     Raises
     ------
@@ -48,5 +50,14 @@ def vehicle_clearance(track: str, time: Values, seed: int) -> Values:
     table = parameters.track
     table = replace(table, run_out=max(table.run_out, way - table.tangent - 2 * table.spiral - table.curve))
     made = (curved_track if track == "paper" else tangent_track)(table)
-    motion = run(parameters, made, speed=SPEED, sample_rate=rate, irregularity=IRREGULARITY, seed=seed)
+    motion = run(
+        parameters,
+        made,
+        speed=SPEED,
+        sample_rate=rate,
+        irregularity=IRREGULARITY,
+        seed=seed,
+        model=model,
+        distance=way,
+    )
     return np.asarray(motion.clearance_mm[: len(time), WHEELSET])

@@ -5,3 +5,6 @@ TRACK_NAMES = ("paper", "tangent")
 
 LEVELS = ("low", "high")
 """Disturbance levels of ERRI B176."""
+
+MODELS = ("nonlinear", "linear")
+"""Models of the contacts of wheels and rails."""

@@ -8,7 +8,9 @@ import numpy as np
 
 from sosmith.model.arithmetic.matrices import product
 from sosmith.model.vehicle.linear_motion import Array, LinearSystem, Suspension
+from sosmith.model.vehicle.nonlinear_motion import Course
 from sosmith.model.vehicle.parameters import Layout, Parameters
+from sosmith.model.vehicle.saturated_contact import Contacts, Flange
 from sosmith.model.vehicle.track import Track
 from sosmith.model.vehicle.track_irregularity import Irregularity
 from sosmith.model.vehicle.wheel_rail_contact import GRAVITY, contact_matrices, creep_coefficients
@@ -140,6 +142,58 @@ class LateralDynamics:
             s = centre + self._places()[k, 0]
             force[:, k] += self.system.mass[k, k] * GRAVITY * track.cant_at(s) / gauge
         return force
+
+    def contacts(self) -> Contacts:
+        """Return the contacts of the six wheelsets, with the limits that friction and flange set."""
+        wheelset, contact = self.parameters.wheelset, self.parameters.contact
+        load = wheelset_load(self.parameters) / 2
+        return Contacts(
+            speed=self.speed,
+            conicity=wheelset.conicity,
+            rolling_radius=wheelset.rolling_radius,
+            half_spacing=wheelset.contact_half_spacing,
+            creep=creep_coefficients(contact, load),
+            load=load,
+            friction=contact.friction,
+            flange=Flange(stiffness=contact.flange_stiffness, transition=contact.flange_transition),
+        )
+
+    def course(self, track: Track, irregularity: Irregularity | None, centre: Array) -> Course:
+        """Return the track under the wheelsets with the body's centre at `centre` in m, shape (n,).
+
+        The loads of the wheels follow from the balance of moments about the middle of a wheelset that rolls with the
+        track: of the primary suspension's vertical and lateral forces, of its weight and its centrifugal force. Its
+        inertia relative to the track is neglected.
+        """
+        given = self.parameters
+        wheelset, primary = given.wheelset, given.primary
+        gauge = 2 * wheelset.contact_half_spacing
+        pose = np.zeros((len(centre), 4, len(WHEELSETS)))
+        room, shift = np.zeros((len(centre), len(WHEELSETS))), np.zeros((len(centre), len(WHEELSETS)))
+        count = len(COORDINATES)
+        gain = np.zeros((2 * count, len(WHEELSETS)))
+        arm = wheelset.rolling_radius / wheelset.contact_half_spacing
+        tilt = 2 * primary.half_spacing**2 / wheelset.contact_half_spacing
+        for k, ahead in enumerate(wheelset_positions(given.layout)):
+            s = centre + ahead
+            roll, roll_rate = -track.cant_at(s) / gauge, -self.speed * track.cant_slope_at(s) / gauge
+            pose[:, 0, k] = track.offset_at(s) - wheelset.rolling_radius * roll + track.irregularity_at(s)
+            if irregularity is not None:
+                pose[:, 0, k] += irregularity.alignment.at(s)
+            pose[:, 1, k] = track.heading_at(s)
+            pose[:, 2, k] = self.speed * pose[:, 1, k] - wheelset.rolling_radius * roll_rate
+            room[:, k] = given.sensor.flange_clearance + track.widening_at(s) / 2
+            shift[:, k] = tilt * (primary.vertical_stiffness * roll + primary.vertical_damping * roll_rate)
+            shift[:, k] -= arm * wheelset.mass * (GRAVITY * roll + self.speed**2 * track.curvature_at(s))
+            across = primary.middle_lateral_stiffness if k % 3 == 1 else primary.lateral_stiffness
+            for name, factor in primary_elongation(given, k).items():
+                place = COORDINATES.index(name)
+                gain[place, k] -= 2 * arm * across * factor
+                gain[count + place, k] -= 2 * arm * primary.lateral_damping * factor
+            place = COORDINATES.index(f"frame {frame_of(k) + 1} roll")
+            gain[place, k] -= tilt * primary.vertical_stiffness
+            gain[count + place, k] -= tilt * primary.vertical_damping
+        return Course(pose=pose, room=room, load_shift=shift, load_gain=gain)
 
 
 def lateral_dynamics(parameters: Parameters, speed: float) -> LateralDynamics:

@@ -132,14 +132,17 @@ class LinearSystem:
         displacement, velocity : ndarray, shape (m, n)
         """
         n = len(self.names)
-        move, hold, ramp = evaluate(lambda: self._transition(step))
+        move, hold, ramp = self.transition(step)
         push = product(force[:-1], hold.T) + product(np.diff(force, axis=0), ramp.T)
         first = np.zeros(2 * n) if start is None else np.concatenate(start)
         states = _accumulate(move, push, first)
         return states[:, :n], states[:, n:]
 
-    def _transition(self, step: float) -> tuple[Array, Array, Array]:
+    def transition(self, step: float) -> tuple[Array, Array, Array]:
         """Return the factors of the state, the force and its change over a step, in the state one step later."""
+        return evaluate(lambda: self._transition(step))
+
+    def _transition(self, step: float) -> tuple[Array, Array, Array]:
         n = len(self.names)
         none, one = _balls(np.zeros((n, n))), _balls(np.eye(n))
         inputs = _blocks([[none], [_balls(self.mass).inv()]])

@@ -40,8 +40,16 @@ class Motion:
         clearance at rest. At the left wheel it has the opposite sign.
     lateral_to_rails : ndarray, shape (n, 6)
         Lateral position of the wheelsets relative to the rails, including irregularities, in m.
-    creep_force : ndarray, shape (n, 6)
-        Resultant of longitudinal and lateral creep force in N, equal at both wheels of a wheelset.
+    body_acceleration : ndarray, shape (n,)
+        Lateral acceleration in m/s^2 that is felt in the body, to the left: of its motion and of gravity as it rolls.
+    friction_used : ndarray, shape (n, 6)
+        Resultant of longitudinal and lateral creep force over the friction limit, at the wheel where it is larger.
+    flange_force : ndarray, shape (n, 6)
+        Force in N of the rail against the flange that it meets.
+    wheel_load : ndarray, shape (n, 6, 2)
+        Vertical load in N of the left and the right wheel.
+    guiding_force : ndarray, shape (n, 6, 2)
+        Lateral force in N of the left and the right wheel on its rail, outward.
     """
 
     time: Array
@@ -64,11 +72,20 @@ class Motion:
     right_wheel_rise: Array
     clearance_mm: Array
     lateral_to_rails: Array
-    creep_force: Array
+    body_acceleration: Array
+    friction_used: Array
+    flange_force: Array
+    wheel_load: Array
+    guiding_force: Array
 
     def __post_init__(self) -> None:
         for one in fields(self):
             getattr(self, one.name).setflags(write=False)
+
+    @property
+    def derailment_quotient(self) -> Array:
+        """Guiding force over load, Y/Q, at the wheel where it is larger, shape (n, 6)."""
+        return np.asarray((self.guiding_force / self.wheel_load).max(axis=2))
 
     def columns(self) -> Iterator[tuple[str, Array]]:
         """Yield every motion with a column name that includes the unit, such as ``wheelset1_lateral_mm``."""

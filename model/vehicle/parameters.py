@@ -61,6 +61,8 @@ class Contact:
     c23: float = _quantity("1", "coefficient of lateral force and spin", zero=True)
     c33: float = _quantity("1", "coefficient of spin moment", zero=True)
     friction: float = _quantity("1", "coefficient of friction")
+    flange_stiffness: float = _quantity("N/m", "of the rail against the flange, across the track")
+    flange_transition: float = _quantity("m", "way from first flange contact to its full stiffness")
 
 
 @dataclass(frozen=True, kw_only=True)

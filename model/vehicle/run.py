@@ -7,23 +7,22 @@ import math
 import numpy as np
 
 from sosmith.model.errors import SpecificationError
-from sosmith.model.vehicle.choices import LEVELS
+from sosmith.model.vehicle.choices import LEVELS, MODELS
 from sosmith.model.vehicle.lateral import (
     FRAMES,
-    WHEELSETS,
     LateralDynamics,
     lateral_dynamics,
-    wheelset_load,
     wheelset_positions,
 )
 from sosmith.model.vehicle.linear_motion import Array
 from sosmith.model.vehicle.motion import Motion, clearance_change
+from sosmith.model.vehicle.nonlinear_motion import respond
 from sosmith.model.vehicle.parameters import Parameters
 from sosmith.model.vehicle.track import Track
 from sosmith.model.vehicle.track_irregularity import Irregularity
 from sosmith.model.vehicle.track_irregularity import irregularity as make_irregularity
 from sosmith.model.vehicle.vertical import vertical_dynamics
-from sosmith.model.vehicle.wheel_rail_contact import creep_coefficients
+from sosmith.model.vehicle.wheel_rail_contact import GRAVITY
 
 MIN_RATE = 1000.0
 """Lowest internal sample rate in Hz; the track is taken as linear between samples (20 mm apart at 20 m/s)."""
@@ -38,7 +37,10 @@ RATES = (1.0, 20_000.0)
 """Lowest and highest sample rate in Hz."""
 
 LIMIT_SAMPLES = 5_000_000
-"""Largest number of internal samples of a run, to catch values in a wrong unit."""
+"""Largest number of internal samples of a run, to catch values in a wrong unit.
+
+The nonlinear model takes about 0.1 ms for each.
+"""
 
 
 def run(
@@ -49,12 +51,15 @@ def run(
     sample_rate: float,
     irregularity: str | None = None,
     seed: int = 1,
+    model: str = "nonlinear",
+    distance: float = math.inf,
 ) -> Motion:
-    """Run over a track at constant speed until the first wheelset reaches its end.
+    """Run over a track at constant speed until the first wheelset reaches its end, or a `distance` before it.
 
-    The lateral and vertical equations are linear and are solved exactly for forces that are linear between samples at
-    `MIN_RATE` or more. Flange contact and creep saturation are not modelled; `sosmith.model.vehicle.limits` reports
-    where they would occur.
+    Springs, dampers and small motions of the contacts are linear and are solved exactly for forces that are linear
+    between samples at `MIN_RATE` or more. The nonlinear model adds to these forces what the contacts exert beyond the
+    linear ones (`sosmith.model.vehicle.nonlinear_motion`): creep forces that friction limits, and flanges. The linear
+    model does without; `sosmith.model.vehicle.limits` reports where it would need them.
 
     Parameters
     ----------
@@ -70,33 +75,39 @@ def run(
         Level of random irregularities, added to the single one.
     seed : int, optional
         Seed of the random irregularities, 0 or more.
+    model : {"nonlinear", "linear"}, optional
+        One of `MODELS`.
+    distance : float, optional
+        Distance in m at which the first wheelset stops, if that is before the end of the track.
 
     Raises
     ------
     SpecificationError
-        If speed, sample rate, irregularity or seed is out of range, the run is too long, or the vehicle is unstable at
-        that speed.
+        If speed, sample rate, irregularity, seed or model is out of range, the run is too long, or the vehicle is
+        unstable at that speed and the model is linear: a nonlinear one hunts between its flanges.
     """
     _check("speed", speed, SPEEDS, "m/s")
     _check("sample rate", sample_rate, RATES, "Hz")
     if irregularity not in (None, *LEVELS):
         raise SpecificationError(f"the irregularities must be one of none, {', '.join(LEVELS)}, not {irregularity}")
+    if model not in MODELS:
+        raise SpecificationError(f"the model must be one of {', '.join(MODELS)}, not {model}")
     if seed < 0:
         raise SpecificationError(f"the seed must be 0 or more, not {seed}")
     finer = math.ceil(MIN_RATE / sample_rate)
     step = 1 / (finer * sample_rate)
     before = finer * math.ceil(RUN_IN / (speed * step * finer)) if irregularity else 0
-    behind = math.floor(track.length / (speed * step) + 1e-9)
+    behind = math.floor(min(track.length, distance) / (speed * step) + 1e-9)
     if before + behind > LIMIT_SAMPLES:
         raise SpecificationError(
             f"the run must take at most {LIMIT_SAMPLES:,} internal samples, not {before + behind:,}: "
             "shorten the track, raise the speed or lower the sample rate"
         )
     lateral = lateral_dynamics(parameters, speed)
-    growing = max(mode.growth for mode in lateral.system.modes())
+    growing = max(mode.growth for mode in lateral.system.modes()) if model == "linear" else -math.inf
     if growing >= 0:
         raise SpecificationError(
-            f"the speed must be one at which the vehicle is stable, not {speed:g} m/s, "
+            f"the speed must be one at which the linear vehicle is stable, not {speed:g} m/s, "
             f"where a motion grows by {growing:.3g} per second"
         )
     clock = step * np.arange(-before, behind + 1, dtype=np.float64)
@@ -104,7 +115,7 @@ def run(
     random = None
     if irregularity is not None:
         random = make_irregularity(parameters.irregularities, irregularity, _reach(parameters, track), seed)
-    return _motion(lateral, track, random, front, step, keep=slice(before, None, finer))
+    return _motion(lateral, track, random, front, step, keep=slice(before, None, finer), linear=model == "linear")
 
 
 def _check(name: str, value: float, allowed: tuple[float, float], unit: str) -> None:
@@ -120,27 +131,34 @@ def _reach(parameters: Parameters, track: Track) -> float:
 
 
 def _motion(
-    lateral: LateralDynamics, track: Track, random: Irregularity | None, front: Array, step: float, keep: slice
+    lateral: LateralDynamics,
+    track: Track,
+    random: Irregularity | None,
+    front: Array,
+    step: float,
+    keep: slice,
+    *,
+    linear: bool,
 ) -> Motion:
     parameters, speed = lateral.parameters, lateral.speed
-    positions = wheelset_positions(parameters.layout)
-    centre = front - positions[0]
-    moved, rate = lateral.system.respond(lateral.forces(track, random, centre), step)
+    centre = front - wheelset_positions(parameters.layout)[0]
+    pushed = lateral.forces(track, random, centre)
+    if linear:
+        moved, rate = lateral.system.respond(pushed, step)
+    else:
+        course = lateral.course(track, random, centre)
+        moved, rate = respond(lateral.system, pushed, step, lateral.contacts(), course)
     vertical = vertical_dynamics(parameters)
     rails, rails_rate = vertical.rails(track, random, centre, speed)
     lifted, _ = vertical.system.respond(vertical.forces(rails, rails_rate), step)
+    felt = np.gradient(rate[:, -3], step) + GRAVITY * moved[:, -1]
 
-    moved, rate, lifted, rails, centre = (array[keep] for array in (moved, rate, lifted, rails, centre))
+    moved, rate, lifted, rails, centre, felt = (array[keep] for array in (moved, rate, lifted, rails, centre, felt))
     relative = moved - lateral.track_pose(track, centre)
     w, f, b = slice(0, 12), slice(12, 18), slice(18, 21)
     yaw_to_frame = moved[:, w][:, 1::2] - np.repeat(moved[:, f][:, 1::3], 3, axis=1)
-    to_rails = relative[:, w][:, 0::2].copy()
-    for k in WHEELSETS:
-        s = centre + positions[k]
-        to_rails[:, k] -= track.irregularity_at(s)
-        if random is not None:
-            to_rails[:, k] -= random.alignment.at(s)
-    rise = parameters.wheelset.conicity * to_rails
+    at_wheels = _contact(lateral, track, random, centre, np.hstack([moved, rate]), linear=linear)
+    rise = parameters.wheelset.conicity * at_wheels["lateral_to_rails"]
     return Motion(
         time=(front[keep] - front[keep][0]) / speed,
         distance=front[keep],
@@ -168,25 +186,37 @@ def _motion(
             frame_yaw=moved[:, f][:, 1::3],
             frame_roll=moved[:, f][:, 2::3],
         ),
-        lateral_to_rails=to_rails,
-        creep_force=_creep_force(lateral, track, centre, relative, rate, to_rails),
+        body_acceleration=felt,
+        **at_wheels,
     )
 
 
-def _creep_force(
-    lateral: LateralDynamics, track: Track, centre: Array, relative: Array, rate: Array, to_rails: Array
-) -> Array:
-    """Return the resultant creep force of a wheel in N, shape (n, 6)."""
-    parameters, speed = lateral.parameters, lateral.speed
-    wheelset = parameters.wheelset
-    creep = creep_coefficients(parameters.contact, wheelset_load(parameters) / 2)
-    result = np.zeros_like(to_rails)
-    gauge = 2 * wheelset.contact_half_spacing
-    for k, ahead in enumerate(wheelset_positions(parameters.layout)):
-        s = centre + ahead
-        pose_rate = speed * (track.heading_at(s) + wheelset.rolling_radius * track.cant_slope_at(s) / gauge)
-        across = (rate[:, 2 * k] - pose_rate) / speed - relative[:, 2 * k + 1]
-        spin = rate[:, 2 * k + 1] / speed
-        along = wheelset.contact_half_spacing * spin + wheelset.conicity * to_rails[:, k] / wheelset.rolling_radius
-        result[:, k] = np.hypot(creep.f11 * along, creep.f22 * across + creep.f23 * spin)
-    return result
+def _contact(
+    lateral: LateralDynamics,
+    track: Track,
+    random: Irregularity | None,
+    centre: Array,
+    states: Array,
+    *,
+    linear: bool,
+) -> dict[str, Array]:
+    """Return the motion between wheels and rails and the forces there, by the names that `Motion` gives them."""
+    contacts, course = lateral.contacts(), lateral.course(track, random, centre)
+    wheelset, static = lateral.parameters.wheelset, contacts.load
+    state = course.relative(states)
+    y = state[:, 0]
+    loads = np.full((len(states), 2, y.shape[1]), static) if linear else course.loads(states, contacts)
+    forces, used = contacts.creep_forces(state, contacts.loaded(loads), saturated=not linear)
+    flange = np.zeros_like(y) if linear else contacts.flange.force(np.abs(y) - course.room)
+    outward = np.empty_like(loads)
+    for side, sign in enumerate((1, -1)):
+        # on cones that roll by c y / l, the load pushes each wheel towards the middle
+        slope = wheelset.conicity * (1 + sign * y / wheelset.contact_half_spacing)
+        outward[:, side] = static * slope - sign * forces[:, 1, side] + np.where(sign * y > 0, flange, 0.0)
+    return {
+        "lateral_to_rails": y,
+        "friction_used": used.max(axis=1),
+        "flange_force": flange,
+        "wheel_load": np.moveaxis(loads, 1, 2),
+        "guiding_force": np.moveaxis(outward, 1, 2),
+    }

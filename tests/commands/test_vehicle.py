@@ -26,23 +26,61 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def test_it_prints_modes_motions_and_the_paper() -> None:
-    result = good()
+def test_it_answers_in_half_a_screen() -> None:
+    result = good("short.toml")
     shown = re.sub(r" {2,}", "  ", result.stdout)
+    assert len(shown.splitlines()) < 16
     for row in (
+        "Co-Co locomotive, paper track at 20 m/s, smooth track, nonlinear contacts",
+        "  beyond the flange, mm  +",
+        "  flange force, kN  ",
+        "  creep force / friction  1.000  ",
+        "  Y/Q, climbs at 1.34  0.",
+        "  change of clearance, mm  ",
+        "The body feels up to ",
+    ):
+        assert row in shown
+    assert "modes" not in shown
+    assert re.search(r"^sosmith: 130 m of track took \d+\.\d s of processor time$", result.stderr, flags=re.MULTILINE)
+    assert "exceeds the limits" not in result.stderr
+
+
+def test_details_show_modes_motions_and_the_paper() -> None:
+    shown = re.sub(r" {2,}", "  ", good("short.toml", "--details").stdout)
+    for row in (
+        "nonlinear contacts",
         "Lateral modes at 20 m/s",
         "  0.538  0.154  -0.525  body lateral",
         "Vertical modes at 20 m/s",
         "Largest motion of the wheelsets",
+        "  sliding, % of the time  ",
         "Largest motion of frames and body",
         "Comparison with the paper's tables 5 to 8",
         "5: the scale of the paper's transform is not told",
     ):
         assert row in shown
     assert re.search(r"7  yaw, wheelset 1 to bogie 1  rad  0.012578  0.0\d+  differs  4", shown)
+
+
+def test_the_linear_model_tells_what_it_exceeds() -> None:
+    result = good("short.toml", "--model", "linear")
+    assert "smooth track, linear contacts" in result.stdout
     assert re.search(
         r"^sosmith: this run exceeds the limits of the linear model: wheelset 1 moves [\d.]+ mm past the flange and "
         r"the creep force of wheelset 1 is [\d.]+ times the available friction$",
+        result.stderr,
+        flags=re.MULTILINE,
+    )
+
+
+def test_a_wheel_that_would_climb_is_told() -> None:
+    """With so much friction that the slope of the cones is steep enough to climb on."""
+    text = Path("short.toml").read_text()
+    Path("rough.toml").write_text(text.replace("friction = { value = 0.3,", "friction = { value = 1.9,"))
+    result = good("rough.toml")
+    assert re.search(
+        r"^sosmith: this run exceeds the limits of the nonlinear model: wheelset \d climbs the rail, "
+        r"with a Y/Q of [\d.]+ against 0\.14",
         result.stderr,
         flags=re.MULTILINE,
     )
@@ -54,9 +92,12 @@ def test_json_holds_figures_limits_and_sources() -> None:
     assert (found["track"], found["speed_m_s"], found["irregularities"], found["seed"]) == ("paper", 20.0, "none", 1)
     assert found["samples"] == 651
     assert all(mode["growth_per_s"] < 0 for mode in found["modes"]["lateral"] + found["modes"]["vertical"])
-    assert found["largest"]["wheelset1_lateral_mm"] > 20
+    assert found["model"] == "nonlinear"
+    assert 14 < found["largest"]["wheelset1_lateral_mm"] < 25
     assert len(found["limits"]) == 6
-    assert found["within_limits"] is False
+    assert max(one["friction_used"] for one in found["limits"]) == 1
+    assert max(one["derailment_quotient"] for one in found["limits"]) < found["nadal_limit"]
+    assert found["within_limits"] is True
     assert len(found["comparison"]) == 41
     radius = found["parameters"]["track.radius"]
     assert (radius["value"], radius["unit"]) == (350.0, "m")
@@ -95,8 +136,8 @@ def test_a_plot_is_the_same_bytes_every_time(name: str) -> None:
 def test_a_tangent_track_can_be_within_the_limits() -> None:
     text = Path("short.toml").read_text().replace("irregularity = { value = 0.02,", "irregularity = { value = 0.002,")
     Path("calm.toml").write_text(text)
-    result = good("calm.toml", "--track", "tangent")
-    assert "this run leaves" not in result.stderr
+    result = good("calm.toml", "--track", "tangent", "--model", "linear", "--details")
+    assert "this run exceeds" not in result.stderr
     assert "Comparison with the paper" not in result.stdout
 
 
@@ -114,3 +155,4 @@ def test_slips_are_refused() -> None:
     Path("broken.toml").write_text(built_in_text().replace('unit = "kg"', 'unit = "t"', 1))
     refused("broken.toml: wheelset.mass must be in the unit 'kg', not 't'", "broken.toml")
     assert run("--irregularities", "medium").exit_code == 2
+    assert "Did you mean 'linear'" in run("--model", "liner").stderr

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,7 +11,7 @@ import click
 from sosmith.commands.options import OneOf
 from sosmith.gen.picture import format_of
 from sosmith.model.text_files import write_contents, write_files
-from sosmith.model.vehicle.choices import LEVELS, TRACK_NAMES
+from sosmith.model.vehicle.choices import LEVELS, MODELS, TRACK_NAMES
 from sosmith.terminal import JSON_OPTION, note, output_option, print_json, show_progress
 
 if TYPE_CHECKING:
@@ -36,6 +37,14 @@ if TYPE_CHECKING:
     help="Level of random irregularities (ERRI B176), added to the track's single one.",
 )
 @click.option("--seed", type=int, default=1, show_default=True, help="Seed of the random irregularities.")
+@click.option(
+    "--model",
+    type=OneOf(MODELS),
+    default="nonlinear",
+    show_default=True,
+    help="nonlinear: friction limits the creep forces, and flanges meet the rails; linear: neither.",
+)
+@click.option("--details", is_flag=True, help="Also print modes, every part's largest motion, and the paper's tables.")
 @click.option("--plot", type=click.Path(path_type=Path), help="SVG or PNG file for a plot of motions and spectra.")
 @click.option(
     "--write-parameters",
@@ -51,6 +60,8 @@ def vehicle(
     track: str,
     irregularities: str,
     seed: int,
+    model: str,
+    details: bool,
     plot: Path | None,
     write_parameters: Path | None,
     output: Path | None,
@@ -58,13 +69,15 @@ def vehicle(
 ) -> None:
     """Simulate the motion of a six-axle locomotive on a track.
 
-    Prints the modes of free motion, the largest motion of each part, and, at the paper's track and speed, a comparison
-    with the paper's tables 5 to 8. The model is linear: it has no flange contact and no friction limit on the creep
-    forces. The tables show for each wheelset how far the run exceeds these limits. PARAMETERS is a TOML file with
-    masses, springs and track; by default the built-in ones are used.
+    Prints how close each wheelset comes to its limits: flange clearance, friction, derailment quotient, wheel load; and
+    what its sensor sees. With --details also the modes of free motion, the largest motion of each part and, on the
+    paper's track at its speed, the paper's tables 5 to 8 beside ours. Creep forces saturate at the limit of friction
+    and flanges meet the rails; for small motion that is the linear model, which --model linear keeps at any size.
+    PARAMETERS is a TOML file with masses, springs and track; by default the built-in ones are used.
 
     \b
         sosmith vehicle --speed 25 --plot vehicle.svg
+        sosmith vehicle --details --model linear
         sosmith vehicle --write-parameters my_vehicle.toml
         sosmith vehicle my_vehicle.toml --track tangent --irregularities low -o motion.csv
     """
@@ -82,41 +95,59 @@ def vehicle(
 
     with show_progress() as step:
         step("running over the track")
+        begin = time.process_time()
         made = vehicle_run(
-            given, track=track, speed=speed, sample_rate=sample_rate, irregularities=irregularities, seed=seed
+            given,
+            track=track,
+            speed=speed,
+            sample_rate=sample_rate,
+            irregularities=irregularities,
+            seed=seed,
+            model=model,
         )
+        took = time.process_time() - begin
         if output is not None:
             step("writing the motion")
             write_files(output.parent, {output.name: vehicle_csv(made.motion)})
         if plot is not None:
-            from sosmith.gen.instrument.vehicle_plot import vehicle_plot
+            from sosmith.gen.instrument.vehicle_plot import linear_beside, vehicle_plot
 
             step("drawing")
-            write_contents(plot.parent, {plot.name: vehicle_plot(made, file_format)})
+            beside = linear_beside(made)
+            write_contents(plot.parent, {plot.name: vehicle_plot(made, file_format, beside)})
     for path in (output, plot):
         if path is not None:
             note(f"wrote {path}")
+    note(f"{made.motion.distance[-1]:.0f} m of track took {took:.1f} s of processor time")
     if not made.limits.kept:
         note(_warning(made))
     tables = run_comparison(made, read_paper_figures())
     if as_json:
-        beside = {"comparison": comparison_json(tables), "parameters": parameters_json(made.parameters)}
-        print_json(vehicle_json(made) | beside)
+        more = {"comparison": comparison_json(tables), "parameters": parameters_json(made.parameters)}
+        print_json(vehicle_json(made) | more)
     else:
-        from sosmith.commands.tables.vehicle import print_run
+        from sosmith.commands.tables.vehicle import print_details, print_run
 
-        print_run(made, tables)
+        print_run(made)
+        if details:
+            print_details(made, tables)
 
 
 def _warning(made: VehicleRun) -> str:
-    """Describe in one sentence the wheelsets that exceed the model most."""
-    found = made.limits
+    """Describe in one sentence the wheelsets that exceed the limits most."""
+    found, linear = made.limits, made.model == "linear"
     worst, slips = int(found.beyond_flange.argmax()), int(found.friction_used.argmax())
+    climbs, lifts = int(found.derailment_quotient.argmax()), int(found.load_share.argmin())
     parts = []
-    if found.beyond_flange[worst] > 0:
+    if linear and found.beyond_flange[worst] > 0:
         parts.append(f"wheelset {worst + 1} moves {1e3 * found.beyond_flange[worst]:.1f} mm past the flange")
     if found.friction_used[slips] > 1:
         parts.append(
             f"the creep force of wheelset {slips + 1} is {found.friction_used[slips]:.2f} times the available friction"
         )
-    return f"this run exceeds the limits of the linear model: {' and '.join(parts)}"
+    if found.derailment_quotient[climbs] >= found.nadal:
+        ratio = found.derailment_quotient[climbs]
+        parts.append(f"wheelset {climbs + 1} climbs the rail, with a Y/Q of {ratio:.2f} against {found.nadal:.2f}")
+    if found.load_share[lifts] <= 0:
+        parts.append(f"a wheel of wheelset {lifts + 1} lifts off the rail")
+    return f"this run exceeds the limits of the {made.model} model: {' and '.join(parts)}"

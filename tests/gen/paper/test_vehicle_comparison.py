@@ -18,7 +18,8 @@ from sosmith.model.vehicle.parameters import built_in
 
 @pytest.fixture(scope="module")
 def motion() -> Motion:
-    return vehicle_run(built_in(), track="paper", speed=20.0, sample_rate=100.0, irregularities="none", seed=1).motion
+    settings = {"sample_rate": 100.0, "irregularities": "none", "seed": 1, "model": "linear"}
+    return vehicle_run(built_in(), track="paper", speed=20.0, **settings).motion
 
 
 def test_zero_is_written_without_a_sign(motion: Motion) -> None:
@@ -108,7 +109,14 @@ def test_an_amplitude_at_half_the_sample_rate_counts_once() -> None:
 def test_only_the_papers_track_speed_and_rate_are_compared() -> None:
     given = built_in()
     short = replace(given, track=replace(given.track, curve=10.0, run_out=0.0))
-    usual = {"track": "paper", "speed": 20.0, "sample_rate": 100.0, "irregularities": "none", "seed": 1}
+    usual = {
+        "track": "paper",
+        "speed": 20.0,
+        "sample_rate": 100.0,
+        "irregularities": "none",
+        "seed": 1,
+        "model": "linear",
+    }
     figures = read_paper_figures()
     assert list(run_comparison(vehicle_run(short, **usual), figures)) == [5, 6, 7, 8]
     for change in ({"track": "tangent"}, {"speed": 25.0}, {"sample_rate": 99.0}):

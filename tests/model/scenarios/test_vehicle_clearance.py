@@ -6,28 +6,34 @@ import numpy as np
 import pytest
 
 from sosmith.model.scenarios.vehicle_clearance import IRREGULARITY, SPEED, WHEELSET, vehicle_clearance
+from sosmith.model.vehicle.choices import MODELS
 from sosmith.model.vehicle.parameters import built_in
 from sosmith.model.vehicle.run import run
 from sosmith.model.vehicle.track import curved_track, tangent_track
 
 
 @pytest.mark.parametrize(("name", "make"), [("paper", curved_track), ("tangent", tangent_track)])
-def test_it_is_the_models_own_motion(name: str, make: object) -> None:
+@pytest.mark.parametrize("model", MODELS)
+def test_it_is_the_models_own_motion(name: str, make: object, model: str) -> None:
     assert callable(make)
     parameters = built_in()
-    motion = run(parameters, make(parameters.track), speed=SPEED, sample_rate=100.0, irregularity=IRREGULARITY, seed=3)
-    time = np.arange(1500) / 100
-    np.testing.assert_allclose(vehicle_clearance(name, time, 3), motion.clearance_mm[:1500, WHEELSET], atol=1e-6)
+    settings = {"speed": SPEED, "sample_rate": 100.0, "irregularity": IRREGULARITY, "seed": 3}
+    motion = run(parameters, make(parameters.track), **settings, model=model, distance=50.0)
+    time = np.arange(200) / 100
+    found = vehicle_clearance(name, time, 3, model=model)
+    np.testing.assert_allclose(found, motion.clearance_mm[:200, WHEELSET], atol=1e-6)
+    if model == "nonlinear":
+        assert (found == vehicle_clearance(name, time, 3)).all()
 
 
 def test_a_curve_shows_and_another_seed_differs() -> None:
     time = np.arange(6 * 25) / 6
-    curve, straight = vehicle_clearance("paper", time, 1), vehicle_clearance("tangent", time, 1)
+    curve, straight = (vehicle_clearance(track, time, 1, model="linear") for track in ("paper", "tangent"))
     inside = (time > 6) & (time < 16)  # the curve, 60 to 360 m
     assert abs(np.mean((curve - straight)[inside])) > 0.5
-    assert np.any(curve != vehicle_clearance("paper", time, 2))
+    assert np.any(curve != vehicle_clearance("paper", time, 2, model="linear"))
 
 
 @pytest.mark.parametrize(("samples", "rate"), [(1, 100.0), (2, 6.0), (360, 6.0), (3000, 100.0)])
 def test_any_length(samples: int, rate: float) -> None:
-    assert vehicle_clearance("paper", np.arange(samples) / rate, 1).shape == (samples,)
+    assert vehicle_clearance("paper", np.arange(samples) / rate, 1, model="linear").shape == (samples,)

@@ -12,7 +12,7 @@ from sosmith.model.vehicle.parameters import LABELS, built_in, built_in_text, lo
 from sosmith.model.vehicle.wheel_rail_contact import GRAVITY
 
 RIGHT = built_in_text()
-LOAD = 'source = "[assumed] dry rail; only tells where linear creep ends"'
+LOAD = 'source = "[assumed] dry rail"'
 
 
 def changed(old: str, new: str) -> str:
@@ -102,7 +102,7 @@ def test_a_file_is_read_as_the_text(tmp_path: Path) -> None:
         (
             changed(r"\[assumed\] dry rail", "dry rail"),
             "loco.toml: contact.friction must have a source that begins with [published] or [paper] or [from memory] "
-            "or [derived] or [assumed], not 'dry rail; only tells where linear creep ends'",
+            "or [derived] or [assumed], not 'dry rail'",
         ),
         (
             changed(r"bogie_distance = \{ value = 11\.6", "bogie_distance = { value = 4.25"),

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import fields, is_dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 import pytest
 
 from sosmith.model.errors import SpecificationError
+from sosmith.model.vehicle.choices import MODELS
 from sosmith.model.vehicle.lateral import (
     COORDINATES,
     frame_positions,
@@ -19,12 +21,13 @@ from sosmith.model.vehicle.lateral import (
 from sosmith.model.vehicle.limits import limits
 from sosmith.model.vehicle.motion import Motion, clearance_change
 from sosmith.model.vehicle.parameters import Parameters, built_in
-from sosmith.model.vehicle.run import run
+from sosmith.model.vehicle.run import run as run_any
 from sosmith.model.vehicle.track import Track, curved_track, tangent_track
 from sosmith.model.vehicle.wheel_rail_contact import GRAVITY, creep_coefficients
 
 GIVEN = built_in()
 PAPER = curved_track(GIVEN.track)
+run = partial(run_any, model="linear")
 
 
 @pytest.fixture(scope="module")
@@ -150,7 +153,8 @@ def test_creep_force_is_kalkers(steady: tuple[Motion, int]) -> None:
     creep = creep_coefficients(GIVEN.contact, wheelset_load(GIVEN) / 2)
     along = creep.f11 * (0.7465 / 350 + 0.15 * found.wheelset_lateral[k] / 0.625)
     across = -creep.f22 * found.wheelset_yaw[k] + creep.f23 / 350
-    assert found.creep_force[k] == pytest.approx(np.hypot(along, across), rel=1e-6)
+    limit = 0.3 * wheelset_load(GIVEN) / 2
+    assert limit * found.friction_used[k] == pytest.approx(np.hypot(along, across), rel=1e-6)
 
 
 def test_the_body_rolls_with_the_cant_deficiency(steady: tuple[Motion, int]) -> None:
@@ -222,9 +226,11 @@ def test_units_fit_together() -> None:
         factor = length
         if "yaw" in one.name or "roll" in one.name or "pitch" in one.name:
             factor = 1.0
-        factor = {"time": time, "creep_force": force}.get(one.name, factor)
+        factor = 1.0 if one.name == "friction_used" else factor
+        factor = force if one.name in ("wheel_load", "guiding_force") else factor
+        factor = {"time": time, "flange_force": force, "body_acceleration": length / time**2}.get(one.name, factor)
         expected = factor * getattr(here, one.name)
-        assert np.abs(getattr(there, one.name) - expected).max() < 1e-9 * np.abs(expected).max(), one.name
+        assert np.abs(getattr(there, one.name) - expected).max() <= 1e-9 * np.abs(expected).max(), one.name
 
 
 def clearance(**moved: float) -> np.ndarray:
@@ -287,8 +293,7 @@ def test_limits_tell_where_flanges_and_friction_would_act(motion: Motion) -> Non
     assert not found.kept
     assert found.beyond_flange[0] > 0.01  # the first wheelset runs far beyond its flange in this curve
     assert found.friction_used[0] > 1
-    k = int(np.argmax(motion.creep_force[:, 0]))
-    assert found.friction_used[0] == pytest.approx(motion.creep_force[k, 0] / (0.3 * 138_000 * GRAVITY / 12))
+    assert found.friction_used[0] == motion.friction_used[:, 0].max()
     straight = tangent_track(replace(GIVEN.track, irregularity=0.002))
     small = limits(GIVEN, straight, run(GIVEN, straight, speed=20.0, sample_rate=100.0))
     assert small.kept
@@ -305,8 +310,10 @@ def test_the_model_holds_over_random_irregularities_of_a_straight_track(level: s
 
 
 def test_widening_moves_the_flange() -> None:
-    still = Motion(**{one.name: np.zeros((2, 6)) for one in fields(Motion) if one.name not in ("time", "distance")},
-                   time=np.array([0.0, 0.01]), distance=np.array([0.0, 200.0]))  # fmt: skip
+    still = Motion(**{one.name: np.zeros((2, 6)) for one in fields(Motion)} | {
+        "time": np.array([0.0, 0.01]), "distance": np.array([0.0, 200.0]),
+        "wheel_load": np.ones((2, 6, 2)), "guiding_force": np.zeros((2, 6, 2)),
+    })  # fmt: skip
     assert limits(GIVEN, PAPER, still).beyond_flange == pytest.approx([-0.009] * 6)
     wide = replace(PAPER, curvature=np.full_like(PAPER.curvature, 1 / 350))
     assert limits(GIVEN, wide, still).beyond_flange == pytest.approx([-0.014] * 6)
@@ -363,7 +370,7 @@ def test_an_unstable_vehicle_is_refused() -> None:
     sharp = replace(GIVEN, primary=loose, wheelset=replace(GIVEN.wheelset, conicity=0.4))
     with pytest.raises(
         SpecificationError,
-        match=r"^the speed must be one at which the vehicle is stable, not 20 m/s, "
+        match=r"^the speed must be one at which the linear vehicle is stable, not 20 m/s, "
         r"where a motion grows by [\d.]+ per second$",
     ):
         run(sharp, PAPER, speed=20.0, sample_rate=100.0)
@@ -387,3 +394,75 @@ def test_position_on_the_rails_is_that_on_the_track_less_the_irregularity() -> N
     place = found.distance - (wheelset_positions(GIVEN.layout)[0] - wheelset_positions(GIVEN.layout)[4])
     expected = found.wheelset_lateral[:, 4] - straight.irregularity_at(place)
     assert found.lateral_to_rails[:, 4] == pytest.approx(expected, abs=1e-12)
+
+
+@pytest.fixture(scope="module")
+def ridden() -> tuple[Track, Motion]:
+    """Ride into the paper's curve with the nonlinear model, without the single irregularity."""
+    track = curved_track(replace(GIVEN.track, irregularity=0.0))
+    return track, run_any(GIVEN, track, speed=20.0, sample_rate=50.0, distance=220.0)
+
+
+def test_flanges_and_friction_hold_the_vehicle_in_its_curve(ridden: tuple[Track, Motion]) -> None:
+    track, found = ridden
+    assert found.distance[-1] == pytest.approx(220.0)
+    assert limits(GIVEN, track, found).kept
+    beyond = np.abs(found.lateral_to_rails[-1]) - 0.014
+    assert beyond.max() > 5e-3
+    assert found.flange_force[-1] == pytest.approx(14.6e6 * np.maximum(beyond - 5e-4, 0), rel=1e-9)
+    assert found.friction_used.max() == 1.0
+    slope = 0.15 * (1 - found.lateral_to_rails[-1, 0] / 0.7465)
+    creep = found.guiding_force[-1, 0, 1] - found.flange_force[-1, 0] - slope * 138_000 * GRAVITY / 12
+    assert 0 < -creep < 0.3 * found.wheel_load[-1, 0, 1]  # it pushes the outer wheel on to its flange
+    guiding = (found.guiding_force[-1, :, 1] - found.guiding_force[-1, :, 0]).sum()
+    assert guiding == pytest.approx(138_000 * (400 / 350 - GRAVITY * 0.09 / (2 * 0.7465)), rel=0.01)
+    quotient = found.guiding_force[-1, 0, 1] / found.wheel_load[-1, 0, 1]
+    assert found.derailment_quotient[-1, 0] == pytest.approx(quotient)
+    assert 0.3 < quotient < limits(GIVEN, track, found).nadal
+
+
+def test_wheel_loads_carry_weight_and_overturning_moment(ridden: tuple[Track, Motion]) -> None:
+    """The moments of all masses about the track, and of the springs' static loads under masses that roll."""
+    _, found = ridden
+    assert found.wheel_load.sum(axis=(1, 2)) == pytest.approx(138_000 * GRAVITY)
+    outward = 400 / 350 - GRAVITY * 0.09 / (2 * 0.7465)
+    moment = outward * (86_000 * 2.2 + 2 * 14_000 * 0.8 + 6 * 4_000 * 0.625)
+    moment += GRAVITY * 86_000 * (2.2 - 1.2) * found.body_roll[-1]
+    moment += GRAVITY * (43_000 * (1.2 - 0.8) + 57_000 * (0.8 - 0.625)) * found.frame_roll[-1].sum()
+    loads = found.wheel_load[-1]
+    assert 0.7465 * (loads[:, 1] - loads[:, 0]).sum() == pytest.approx(moment, rel=0.02)
+
+
+def test_small_motion_is_the_linear_models() -> None:
+    straight = tangent_track(replace(GIVEN.track, irregularity=2e-5))
+    both = [run_any(GIVEN, straight, speed=20.0, sample_rate=50.0, distance=40.0, model=name) for name in MODELS]
+    for name in ("wheelset_lateral", "wheelset_yaw", "frame_roll", "body_lateral", "clearance_mm", "guiding_force"):
+        nonlinear, linear = (getattr(motion, name) for motion in both)
+        assert np.abs(nonlinear - linear).max() < 2e-3 * np.abs(linear).max(), name
+    assert both[0].wheel_load == pytest.approx(both[1].wheel_load, rel=1e-3)
+
+
+@pytest.mark.slow
+def test_the_papers_curve_is_ridden_within_the_flanges_and_the_friction() -> None:
+    found = run_any(GIVEN, PAPER, speed=20.0, sample_rate=100.0)
+    held = limits(GIVEN, PAPER, found)
+    assert held.kept
+    assert held.beyond_flange == pytest.approx(held.flange_force / 14.6e6 + 5e-4, abs=5e-4)
+    assert held.beyond_flange.max() < 8e-3
+    assert held.friction_used.max() == 1.0
+    assert held.derailment_quotient.max() < 0.8
+    finer = run_any(GIVEN, PAPER, speed=20.0, sample_rate=4000.0)
+    assert np.abs(finer.lateral_to_rails[::40] - found.lateral_to_rails).max() < 1e-5
+    assert np.abs(finer.clearance_mm[::40] - found.clearance_mm).max() < 2e-2
+
+
+@pytest.mark.slow
+def test_above_its_critical_speed_the_locomotive_hunts_between_its_flanges() -> None:
+    loose = replace(GIVEN.primary, longitudinal_stiffness=1e4, lateral_stiffness=1e4, middle_lateral_stiffness=1e4)
+    sharp = replace(GIVEN, primary=loose, wheelset=replace(GIVEN.wheelset, conicity=0.4))
+    track = tangent_track(replace(GIVEN.track, irregularity=0.01))
+    with pytest.raises(SpecificationError, match=r"^the speed must be one at which the linear vehicle is stable"):
+        run(sharp, track, speed=30.0, sample_rate=50.0)
+    found = run_any(sharp, track, speed=30.0, sample_rate=50.0)
+    late = np.abs(found.lateral_to_rails[-300:]).max(axis=0)
+    assert 9e-3 < late.max() < 16e-3
