@@ -155,4 +155,4 @@ def test_slips_are_refused() -> None:
     Path("broken.toml").write_text(built_in_text().replace('unit = "kg"', 'unit = "t"', 1))
     refused("broken.toml: wheelset.mass must be in the unit 'kg', not 't'", "broken.toml")
     assert run("--irregularities", "medium").exit_code == 2
-    assert "Did you mean 'linear'" in run("--model", "liner").stderr
+    assert "did you mean linear?" in run("--model", "liner").stderr

@@ -451,9 +451,10 @@ def test_the_papers_curve_is_ridden_within_the_flanges_and_the_friction() -> Non
     assert held.beyond_flange.max() < 8e-3
     assert held.friction_used.max() == 1.0
     assert held.derailment_quotient.max() < 0.8
-    finer = run_any(GIVEN, PAPER, speed=20.0, sample_rate=4000.0)
-    assert np.abs(finer.lateral_to_rails[::40] - found.lateral_to_rails).max() < 1e-5
-    assert np.abs(finer.clearance_mm[::40] - found.clearance_mm).max() < 2e-2
+    finer = run_any(GIVEN, PAPER, speed=20.0, sample_rate=4000.0, distance=150.0)
+    coarse = slice(len(finer.time[::40]))
+    assert np.abs(finer.lateral_to_rails[::40] - found.lateral_to_rails[coarse]).max() < 1e-5
+    assert np.abs(finer.clearance_mm[::40] - found.clearance_mm[coarse]).max() < 2e-2
 
 
 @pytest.mark.slow
@@ -464,5 +465,6 @@ def test_above_its_critical_speed_the_locomotive_hunts_between_its_flanges() -> 
     with pytest.raises(SpecificationError, match=r"^the speed must be one at which the linear vehicle is stable"):
         run(sharp, track, speed=30.0, sample_rate=50.0)
     found = run_any(sharp, track, speed=30.0, sample_rate=50.0)
-    late = np.abs(found.lateral_to_rails[-300:]).max(axis=0)
-    assert 9e-3 < late.max() < 16e-3
+    away = np.abs(found.lateral_to_rails)
+    assert 9e-3 < away.max() < 18e-3
+    assert away[-300:].max(axis=0) == pytest.approx(away[-600:-300].max(axis=0), rel=0.01)  # a limit cycle
