@@ -17,8 +17,8 @@ from sosmith.model.traces.trace import Trace
 from sosmith.model.traces.trace_file import read_traces
 
 
-def bench_of(design: CoreDesign) -> Bench:
-    """Return the properties of a core that scenarios depend on."""
+def bench_of(design: CoreDesign, *, errors: bool = True) -> Bench:
+    """Return the properties of a core that scenarios depend on; one alone needs the responses to `errors`."""
     quantized = design.quantized
     return Bench(
         ports=design.datapath.inputs,
@@ -26,7 +26,7 @@ def bench_of(design: CoreDesign) -> Bench:
         sample_rate=design.spec.sample_rate,
         polynomial=quantized.polynomial,
         impulse_response=np.ones(1) if quantized.filter is None else quantized.filter.impulse_response,
-        error_responses=tuple(error_responses(quantized)),
+        error_responses=tuple(error_responses(quantized)) if errors else (),
     )
 
 
@@ -74,7 +74,7 @@ def traces_for(design: CoreDesign, source: str, *, seed: int, seconds: float | N
             raise SpecificationError(f"--seconds must come with a scenario, not with the file {source}")
         given = read_traces(Path(source), design.datapath.inputs, design.spec.sample_rate, len(channels))
         return given if len(given) == len(channels) else tuple(given[0].delayed(k) for k in channels)
-    bench = bench_of(design)  # an unknown scenario is refused below, with a list of the valid ones
+    bench = bench_of(design, errors=source == "worst_case_errors")  # an unknown scenario is refused below
     return tuple(emulate(source, bench, seed=seed + k, seconds=seconds).delayed(k) for k in channels)
 
 

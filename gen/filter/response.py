@@ -104,12 +104,16 @@ class ResponseMeasures:
 
 
 def _polynomial(coefficients: Array, omega: Array) -> tuple[Array, Array]:
-    """Real and imaginary part of ``c0 + c1 z^-1 + c2 z^-2`` on the unit circle.
+    """Real and imaginary part of ``c0 + c1 z^-1 + c2 z^-2`` on the unit circle."""
+    return _at(coefficients, np.cos(omega), np.sin(omega))
+
+
+def _at(coefficients: Array, cos: Array, sin: Array) -> tuple[Array, Array]:
+    """Do the same from cosine and sine of the angles.
 
     Complex numbers are avoided, because numpy's complex products differ among machines.
     """
     c0, c1, c2 = (float(c) for c in coefficients)
-    cos, sin = np.cos(omega), np.sin(omega)
     inner_real, inner_imag = c1 + c2 * cos, -c2 * sin
     return c0 + cos * inner_real + sin * inner_imag, cos * inner_imag - sin * inner_real
 
@@ -144,10 +148,11 @@ def magnitude_db(sos: Array, frequency: Array, sample_rate: float) -> Array:
     """
     omega = 2 * np.pi * frequency / sample_rate
     total = np.zeros(omega.shape)
+    cos, sin = np.cos(omega), np.sin(omega)
     tiny = 10 ** (FLOOR_DB / 20)
     for section in sos:
-        numerator = np.hypot(*_polynomial(section[:3], omega))
-        denominator = np.hypot(*_polynomial(section[3:], omega))
+        numerator = np.hypot(*_at(section[:3], cos, sin))
+        denominator = np.hypot(*_at(section[3:], cos, sin))
         total += 20 * log10(np.maximum(numerator, tiny) / np.maximum(denominator, tiny))
     return np.maximum(total, FLOOR_DB)
 
@@ -282,8 +287,10 @@ def measurement_grid(facts: FilterFacts) -> Array:
 def passband_level_db(facts: FilterFacts) -> float:
     """Largest gain of the ideal response in dB in the passband, or anywhere if no passband is known."""
     grid = measurement_grid(facts)
-    ideal = magnitude_db(facts.ideal_sos, grid, facts.sample_rate)
-    inside = _within(grid, passbands(facts))
+    return _level(magnitude_db(facts.ideal_sos, grid, facts.sample_rate), _within(grid, passbands(facts)))
+
+
+def _level(ideal: Array, inside: npt.NDArray[np.bool_]) -> float:
     return float(np.max(ideal[inside] if inside.any() else ideal))
 
 
@@ -297,9 +304,10 @@ def measure_response(facts: FilterFacts) -> ResponseMeasures:
     grid = measurement_grid(facts)
     ideal = magnitude_db(facts.ideal_sos, grid, facts.sample_rate)
     quantized = magnitude_db(facts.quantized_sos, grid, facts.sample_rate)
-    level = passband_level_db(facts)
-    bands = passbands(facts)
-    inside = _within(grid, bands) if bands else ideal >= level - HALF_POWER_DB
+    inside = _within(grid, passbands(facts))
+    level = _level(ideal, inside)
+    if not passbands(facts):
+        inside = ideal >= level - HALF_POWER_DB
     stop = _within(grid, stopbands(facts))
     found: list[complex] = poles(facts.quantized_sos).tolist()
     return ResponseMeasures(

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sosmith.model.arrays import Codes
-from sosmith.model.dataflow.compiled import compile_block
+from sosmith.model.dataflow.compiled import block_for
 from sosmith.model.dataflow.graph import Graph
 from sosmith.model.port import Port
 
@@ -108,7 +108,7 @@ class Datapath:
         """
         checked = self._checked(codes)
         block = checked[:, np.newaxis, :] if checked.ndim == 2 else checked
-        result, _ = compile_block(self)(block)
+        result, _ = block_for(self, block.shape[0] * block.shape[1])(block)
         return result[:, 0] if checked.ndim == 2 else result
 
     def compute_status(self, codes: Codes) -> npt.NDArray[np.uint8]:
@@ -123,7 +123,7 @@ class Datapath:
             raise ValueError(
                 f"codes must be of {len(self.wear)} channels, for each of which wear is judged, not {block.shape[1]}"
             )
-        _, status = compile_block(self)(block, with_status=True)
+        _, status = block_for(self, block.shape[0] * block.shape[1])(block, with_status=True)
         return status[:, 0] if checked.ndim == 2 else status
 
     def compute_exact(self, codes: Codes) -> list[int]:

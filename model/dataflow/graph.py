@@ -251,37 +251,51 @@ def range_of(node: Node, operands: Sequence[Range], constant: tuple[int, int] | 
     constant : tuple of int or None
         Smallest and largest value that the constant of SCALE or CONSTANT may take; None for the one it has.
     """
-    known = constant or (node.parameter, node.parameter)
     if node.op is Op.INPUT:
         return node.range
     if node.op is Op.CONSTANT:
-        return Range(node.frac, *known)
+        return Range(node.frac, *(constant or (node.parameter, node.parameter)))
+    if node.op is Op.SCALE and constant is not None:
+        return _product(operands[0], Range(node.parameter_frac, *constant))
+    return _range_of(node.op, operands, node.range, node.parameter, node.parameter_frac)
+
+
+def _range_of(op: Op, operands: Sequence[Range], stated: Range, parameter: int, parameter_frac: int) -> Range:
+    """Do the same for an operation with operands, from what else its node states."""
     first = operands[0]
-    if node.op in {Op.ADD, Op.SUBTRACT}:
+    if op is Op.ADD:
         frac, a, b = _common(*operands)
-        return Range(frac, a[0] + b[0], a[1] + b[1]) if node.op is Op.ADD else Range(frac, a[0] - b[1], a[1] - b[0])
-    if node.op in {Op.SCALE, Op.MULTIPLY}:
-        frac, *factor = (node.parameter_frac, *known) if node.op is Op.SCALE else operands[1]
-        products = [x * y for x in (first.low, first.high) for y in factor]
-        return Range(first.frac + frac, min(products), max(products))
-    return _range_of_one(node, first)
+        return Range(frac, a[0] + b[0], a[1] + b[1])
+    if op is Op.SUBTRACT:
+        frac, a, b = _common(*operands)
+        return Range(frac, a[0] - b[1], a[1] - b[0])
+    if op is Op.SCALE:
+        return _product(first, Range(parameter_frac, parameter, parameter))
+    if op is Op.MULTIPLY:
+        return _product(*operands)
+    return _range_of_one(op, first, stated, parameter)
 
 
-def _range_of_one(node: Node, of: Range) -> Range:
+def _product(a: Range, b: Range) -> Range:
+    products = (a.low * b.low, a.low * b.high, a.high * b.low, a.high * b.high)
+    return Range(a.frac + b.frac, min(products), max(products))
+
+
+def _range_of_one(op: Op, of: Range, stated: Range, parameter: int) -> Range:
     """Range of an operation with one operand and no factor."""
-    if node.op is Op.SHIFT:
-        return Range(of.frac - node.parameter, of.low, of.high)
-    if node.op is Op.FLOOR:
-        return Range(node.frac, of.low >> (of.frac - node.frac), of.high >> (of.frac - node.frac))
-    if node.op is Op.FRACTION:
-        return Range(of.frac, 0, (1 << (of.frac - node.parameter)) - 1)
-    if node.op is Op.TRUNCATE:
-        low, high = (_truncated(end, of.frac - node.frac) for end in (of.low, of.high))
-        return Range(node.frac, low, high)
-    if node.op is Op.CLAMP:
-        return Range(of.frac, node.low, node.high)
-    if node.op is Op.BOUND:
-        return Range(of.frac, max(node.low, of.low), min(node.high, of.high))
+    if op is Op.SHIFT:
+        return Range(of.frac - parameter, of.low, of.high)
+    if op is Op.FLOOR:
+        return Range(stated.frac, of.low >> (of.frac - stated.frac), of.high >> (of.frac - stated.frac))
+    if op is Op.FRACTION:
+        return Range(of.frac, 0, (1 << (of.frac - parameter)) - 1)
+    if op is Op.TRUNCATE:
+        low, high = (_truncated(end, of.frac - stated.frac) for end in (of.low, of.high))
+        return Range(stated.frac, low, high)
+    if op is Op.CLAMP:
+        return Range(of.frac, stated.low, stated.high)
+    if op is Op.BOUND:
+        return Range(of.frac, max(stated.low, of.low), min(stated.high, of.high))
     return Range(of.frac, min(of.low, 0), max(of.high, 0))  # a DELAY begins at zero
 
 
@@ -292,8 +306,10 @@ def _common(first: Range, second: Range) -> tuple[int, tuple[int, int], tuple[in
     return frac, (first.low << up, first.high << up), (second.low << down, second.high << down)
 
 
-@dataclass(frozen=True)
-class Wire:
+_UNSTATED = Range(0, 0, 0)
+
+
+class Wire(NamedTuple):
     """Handle to a node while its graph is being built."""
 
     index: int
@@ -317,16 +333,16 @@ class GraphBuilder:
         self,
         op: Op,
         *operands: Wire,
-        stated: tuple[int, int, int] = (0, 0, 0),
+        stated: Range = _UNSTATED,
         parameter: int = 0,
         parameter_frac: int = 0,
         name: str = "",
     ) -> Wire:
         """Append a node whose fraction bits and range follow from its operands, and from those `stated`."""
         indices = tuple([wire.index for wire in operands])
-        others = parameter, parameter_frac, name
-        derived = range_of(Node(op, indices, *stated, *others), [self._nodes[index].range for index in indices])
-        return self._append(Node(op, indices, *derived, *others))
+        ranges = [self._nodes[index].range for index in indices]
+        derived = _range_of(op, ranges, stated, parameter, parameter_frac)
+        return self._append(Node(op, indices, *derived, parameter, parameter_frac, name))
 
     def input(self, name: str, frac: int, low: int, high: int) -> Wire:
         """Add an input port whose code is in `low`..`high`."""
@@ -420,7 +436,7 @@ class GraphBuilder:
         shift = self[a].frac - frac
         if shift < 0:
             return self.add(a, self.constant(0, frac), name)
-        return self.named(a, name) if shift == 0 else self._derived(Op.FLOOR, a, stated=(frac, 0, 0), name=name)
+        return self.named(a, name) if shift == 0 else self._derived(Op.FLOOR, a, stated=Range(frac, 0, 0), name=name)
 
     def fraction(self, a: Wire, frac: int, name: str = "") -> Wire:
         """Return what `floor` to `frac` fraction bits drops, exactly: at least 0 and below ``2**-frac``."""
@@ -432,7 +448,7 @@ class GraphBuilder:
         """Round towards zero to `frac` fraction bits; exact if `a` has no more."""
         if self[a].frac <= frac:
             return self.floor(a, frac, name)
-        return self._derived(Op.TRUNCATE, a, stated=(frac, 0, 0), name=name)
+        return self._derived(Op.TRUNCATE, a, stated=Range(frac, 0, 0), name=name)
 
     def round(self, a: Wire, frac: int, name: str = "") -> Wire:
         """Round to nearest, ties upward; exact if `a` has no more than `frac` fraction bits."""
@@ -442,11 +458,11 @@ class GraphBuilder:
 
     def clamp(self, a: Wire, low: int, high: int, name: str = "") -> Wire:
         """Limit the code to `low`..`high`."""
-        return self._derived(Op.CLAMP, a, stated=(0, low, high), name=name)
+        return self._derived(Op.CLAMP, a, stated=Range(0, low, high), name=name)
 
     def bound(self, a: Wire, low: int, high: int, name: str = "") -> Wire:
         """State that the code stays in `low`..`high`, known from a peak gain, and narrow its range to that."""
-        return self._derived(Op.BOUND, a, stated=(0, low, high), name=name)
+        return self._derived(Op.BOUND, a, stated=Range(0, low, high), name=name)
 
     def build(self, outputs: Sequence[Wire]) -> Graph:
         """Freeze the graph.
