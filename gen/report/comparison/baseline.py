@@ -39,6 +39,7 @@ FIGURES: Mapping[str, _Figure] = {
     "accuracy": _Figure(
         "accuracy_percent.hardware", "accuracy, hardware", "accuracy", lambda value, _: f"{value:.4f} %", -1
     ),
+    "true_error": _Figure("true_error.max_abs", "largest error against the true value", "accuracy", quantity),
     "bound": _Figure("error.bound", "error limit", "bounds", quantity),
     "cycles": _Figure("provenance.cycles_per_sample", "clock cycles per sample", "clocks", _count),
     "latency": _Figure("latency_cycles", "latency in clock cycles", "clocks", _count),

@@ -51,6 +51,7 @@ class _Figure:
     title: str
     show: Show
     better: Better | None = None
+    by_all: bool = False  # shown only if all reports know it
 
 
 def _text(value: Any, _unit: str) -> str:
@@ -77,6 +78,8 @@ _FIGURES = (
     _Figure("run", "simulator", "simulator", _text),
     _Figure("run", "passed", "verdict", lambda value, _: "passed" if value else "falls short"),
     _Figure("run", "bit_exact", "equal to the integer model", lambda value, _: "bit for bit" if value else "no"),
+    _Figure("accuracy", "true_error.max_abs", "largest error against the true value", quantity, min, by_all=True),
+    _Figure("accuracy", "true_error.rms", "typical error against the true value (RMS)", quantity, min, by_all=True),
     _Figure("accuracy", "error.max_abs", "largest error", quantity, min),
     _Figure("accuracy", "error.max_lsb", "largest error in LSB", lambda value, _: f"{plain_number(value)} LSB"),
     _Figure("accuracy", "error.rms", "typical error (RMS)", quantity, min),
@@ -113,8 +116,12 @@ def compare(reports: Sequence[Report]) -> list[Row]:
         raise ValueError(f"reports must hold at least two reports, not {len(reports)}")
     fair = fairness(reports)
     reasons = {"accuracy": fair.accuracy, "bounds": fair.bounds, "clocks": fair.clocks, "cost": fair.cost}
-    rows = [_row(reports, figure, fair=not reasons.get(figure.group)) for figure in _FIGURES]
-    return [row for row in rows if row.group in _ALWAYS or any(value is not None for value in row.values)]
+    rows = {figure: _row(reports, figure, fair=not reasons.get(figure.group)) for figure in _FIGURES}
+    return [row for figure, row in rows.items() if row.group in _ALWAYS or _is_known(row, by_all=figure.by_all)]
+
+
+def _is_known(row: Row, *, by_all: bool) -> bool:
+    return (all if by_all else any)(value is not None for value in row.values)
 
 
 def _row(reports: Sequence[Report], figure: _Figure, *, fair: bool) -> Row:

@@ -23,7 +23,8 @@ from sosmith.terminal import JSON_OPTION, note, output_option, print_json, reade
     "--tolerance",
     metavar="FIGURE=AMOUNT,...",
     help="Judge these figures only, each of which may be worse by a share (5%) or an amount (0): error, rms, sqnr, "
-    "accuracy, bound, cycles, latency, lut, multipliers, registers, instructions, words.  [default: all, by nothing]",
+    "accuracy, true_error, bound, cycles, latency, lut, multipliers, registers, instructions, words.  [default: all, "
+    "by nothing]",
 )
 @click.option("--markdown", is_flag=True, help="Print GitHub-flavoured Markdown instead of tables.")
 @JSON_OPTION

@@ -96,9 +96,10 @@ def compare(reports: Sequence[Source], *, baseline: Source | None = None, tolera
         Report that none of the others may be worse than; see `Comparison.passed`.
     tolerance : str
         How much worse a figure may be, such as ``"error=5%,cycles=0,lut=2%"``: a share of the baseline's value, or an
-        amount in the figure's unit. The figures are error, rms, sqnr, accuracy, bound, cycles, latency, lut,
-        multipliers, registers, instructions and words. Only those named are judged; without a tolerance, all that the
-        baseline knows, and none may be worse. A figure that cannot be compared fairly does not pass.
+        amount in the figure's unit. The figures are error, rms, sqnr, accuracy, true_error (against the
+        trace's true value), bound, cycles, latency, lut, multipliers, registers, instructions and words. Only those
+        named are judged; without a tolerance, all that the baseline knows, and none may be worse. A figure that cannot
+        be compared fairly does not pass.
 
     Raises
     ------

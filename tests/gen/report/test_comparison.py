@@ -95,6 +95,23 @@ def test_rows_show_values_with_units() -> None:
     assert rows["samples"].cells == ("20,000", "20,000")
 
 
+def test_errors_against_the_true_value_are_shown_where_all_have_them() -> None:
+    known = {"true_error": {"max_abs": 0.5, "rms": 0.1, "mean": 0.0, "readings": 9}}
+    better = report(true_error={**known["true_error"], "max_abs": 0.4})
+    rows = rows_of(report(**known), better)
+    assert (rows["true_error.max_abs"].cells, rows["true_error.max_abs"].best) == (
+        ("500 µm", "400 µm"),
+        (1,),
+    )
+    assert (rows["true_error.rms"].cells, rows["true_error.rms"].best) == (("100 µm", "100 µm"), ())
+    assert not {"true_error.max_abs", "true_error.rms"} & {*rows_of(report(**known), report())}
+    assert judged(report(**known), "true_error=0").judged[0].verdict == "not comparable"  # the baseline has none
+    (beside,) = judge(report(**known), [better], read_tolerances("true_error=5%"))
+    assert beside.passed
+    (beside,) = judge(better, [report(**known)], read_tolerances("true_error=5%"))
+    assert beside.reasons == ["largest error against the true value: 500 µm instead of 400 µm (+25.00 %), 5% allowed."]
+
+
 def test_best_is_smallest_error_and_largest_ratio() -> None:
     rows = rows_of(report(**PLAIN), report(), report(**PLAIN))
     assert rows["error.max_abs"].best == (1,)
