@@ -33,7 +33,7 @@ from typing import Any
 
 from sosmith.gen.specification.choices import REALIZATIONS
 from sosmith.gen.specification.specification import load
-from sosmith.sim.exploration.grid import tasks_of
+from sosmith.sim.exploration.grid import Subject
 
 ROOT = Path(__file__).resolve().parent.parent
 SPECIFICATION = ROOT / "examples" / "flange_wear_locomotive.toml"
@@ -160,7 +160,8 @@ def measure(designs: int, *, busy_machine: bool) -> Figures:
         alone, _, _ = run(arguments)
         (record,) = (Path(made) / "2").glob("*.jsonl")
         lines = record.read_bytes().splitlines()
-    task = tasks_of(load(SPECIFICATION), grid, core=None, samples=SAMPLES, seed=1, board=None)[0]
+    subject = Subject(spec=load(SPECIFICATION), core=None, samples=SAMPLES, seed=1, board=None)
+    task = subject.task({key: values[0] for key, values in grid.items()})
     return Figures(
         runs=tuple(runs),
         alone=round(alone, 2),
@@ -257,13 +258,19 @@ What no process can share is to check all combinations first, and to write the r
 ## Where the time goes
 
 Nearly all of a design is the search for word lengths and the proof, in Python; the C compiler makes the bit-true model
-of each in about a tenth of a second, and the {SAMPLES:,} samples themselves take milliseconds. Time grows in proportion
+of each in less than a tenth of a second, without optimizing, and the {SAMPLES:,} samples themselves take milliseconds.
+Time grows in proportion
 to the number of designs. It grows with the order, as more sections are searched and proven; with low cutoffs, whose
 responses are long; and with state-space realizations, which have the most coefficients. It does not depend on the
 samples until there are millions.
 
 The processes tell Python's garbage collector to leave alone what was imported, and to look at the rest less often,
 which saves about a tenth.
+
+## Searches
+
+`--search N` asks an optimizer for 24 designs at a time and waits for the slowest before it asks again, so that the same
+designs are made by any number of processes. With more than about ten, a grid keeps them busier.
 
 ## To 1,000 workers, on paper
 

@@ -309,7 +309,8 @@ def _common(first: Range, second: Range) -> tuple[int, tuple[int, int], tuple[in
 _UNSTATED = Range(0, 0, 0)
 
 
-class Wire(NamedTuple):
+@dataclass(frozen=True)
+class Wire:
     """Handle to a node while its graph is being built."""
 
     index: int

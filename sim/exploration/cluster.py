@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+import itertools
+from collections.abc import Generator, Iterable, Sequence
 
 from sosmith.model.errors import ToolError
 from sosmith.sim.exploration.evaluation import Point, evaluate
@@ -15,8 +16,8 @@ _CONNECT = 10
 """Seconds until a scheduler must have answered."""
 
 
-def on_cluster(tasks: Sequence[Task], address: str) -> Generator[Point, None, None]:
-    """Yield the results of `tasks` as they come from the workers of the scheduler at `address`.
+def on_cluster(batches: Iterable[Sequence[Task]], address: str) -> Generator[Point, None, None]:
+    """Yield the results of tasks as they come from the workers of the scheduler at `address`.
 
     A task whose worker dies is done again by another one; the scheduler hands out each result once. When the caller
     stops, what has not begun is dropped.
@@ -39,10 +40,8 @@ def on_cluster(tasks: Sequence[Task], address: str) -> Generator[Point, None, No
     except (OSError, ValueError) as error:
         raise ToolError(f"a Dask scheduler must answer at {address}, not: {error}") from None
     try:
-        for start in range(0, len(tasks), _BATCH):
-            futures = [
-                client.submit(evaluate, task, key=f"sosmith-{task.key}") for task in tasks[start : start + _BATCH]
-            ]
+        for tasks in itertools.chain.from_iterable(map(_parts, batches)):
+            futures = [client.submit(evaluate, task, key=f"sosmith-{task.key}") for task in tasks]
             for future in as_completed(futures, loop=client.loop):
                 yield future.result()
                 future.release()
@@ -50,3 +49,7 @@ def on_cluster(tasks: Sequence[Task], address: str) -> Generator[Point, None, No
         raise ToolError(f"the cluster's workers must live until their designs are done, not: {error}") from None
     finally:
         client.close()
+
+
+def _parts(tasks: Sequence[Task]) -> Iterable[Sequence[Task]]:
+    return (tasks[start : start + _BATCH] for start in range(0, len(tasks), _BATCH))

@@ -5,19 +5,18 @@ from __future__ import annotations
 import hashlib
 import itertools
 import json
-import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass
-from decimal import Decimal
+from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
-from sosmith.gen.specification.choices import REALIZATIONS
 from sosmith.gen.specification.exact_values import exact
 from sosmith.gen.specification.specification import Specification, from_tree
 from sosmith.gen.version import __version__
 from sosmith.model.errors import SpecificationError
+from sosmith.sim.exploration.parameters import Parameters, Span
 
 MAX_POINTS = 100_000
 """Combinations, at most."""
@@ -67,68 +66,53 @@ class Task:
         return from_tree(exact(self.tree), self.path)
 
 
-def default_parameters(spec: Specification) -> dict[str, list[Any]]:
-    """Return what is swept if nothing is asked for: realizations, architectures, word lengths by the allowed error."""
-    allowed = spec.max_error
-    return {
-        "hardware.realization": [name for name in REALIZATIONS if name != "auto"],
-        "hardware.architecture": ["parallel", "folded"],
-        "output.max_error": [float(allowed * factor) for factor in (1, 2, 4)],
-    }
+@dataclass(frozen=True, kw_only=True)
+class Subject:
+    """What all tasks of an exploration have in common.
 
-
-def read_parameter(text: str) -> tuple[str, list[Any]]:
-    """Read ``KEY=V1,V2``: a key of the specification with dots, and values as in TOML; names need no quotes.
-
-    Raises
-    ------
-    SpecificationError
-        If there is no key or no value, or a value cannot be read.
+    Attributes
+    ----------
+    spec : Specification
+        The specification that tasks change.
+    core, samples, seed, board
+        As in `Task`.
     """
-    key, _, values = (part.strip() for part in text.partition("="))
-    if not key or not values:
-        raise SpecificationError(f"a parameter must be KEY=V1,V2,..., not {text}")
-    return key, [_value(part, text) for part in _parts(values)]
+
+    spec: Specification
+    core: str | None
+    samples: int
+    seed: int
+    board: str | None
+
+    @cached_property
+    def _measurements(self) -> str:
+        calibration = self.spec.calibration
+        data = None if calibration is None else calibration.data
+        return "" if data is None else hashlib.sha256(data.read_bytes()).hexdigest()
+
+    def task(self, changes: dict[str, Any]) -> Task:
+        """Make the task with these values.
+
+        Raises
+        ------
+        SpecificationError
+            If a key is of a table that the specification lacks.
+        """
+        tree = changed(self.spec.source, changes)
+        told = [tree, self.core, self.samples, self.seed, self.board, self._measurements, __version__]
+        return Task(
+            key=hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest(),
+            changes=changes,
+            tree=tree,
+            path=self.spec.path,
+            core=self.core,
+            samples=self.samples,
+            seed=self.seed,
+            board=self.board,
+        )
 
 
-def _parts(values: str) -> list[str]:
-    """Split at commas outside of brackets and quotes."""
-    parts, depth, quote = [""], 0, ""
-    for sign in values:
-        if sign in "\"'" and quote in {"", sign}:
-            quote = "" if quote else sign
-        depth += 0 if quote else (sign == "[") - (sign == "]")
-        if sign == "," and depth == 0 and not quote:
-            parts.append("")
-        else:
-            parts[-1] += sign
-    return [part.strip() for part in parts]
-
-
-def _value(part: str, text: str) -> Any:
-    if part.isidentifier() and part not in {"true", "false", "inf", "nan"}:
-        return part
-    try:
-        return _to_json(tomllib.loads(f"value = {part}\n", parse_float=Decimal)["value"])
-    except (tomllib.TOMLDecodeError, RecursionError):
-        raise SpecificationError(f"a value must be one of TOML, or a name, not {part} in {text}") from None
-
-
-def _to_json(value: Any) -> Any:
-    if isinstance(value, list):
-        return [_to_json(item) for item in value]
-    return float(value) if isinstance(value, Decimal) else value
-
-
-def tasks_of(
-    spec: Specification,
-    parameters: Mapping[str, Sequence[Any]],
-    *,
-    core: str | None,
-    samples: int,
-    seed: int,
-    board: str | None,
-) -> list[Task]:
+def tasks_of(subject: Subject, parameters: Parameters) -> list[Task]:
     """Make a task for every combination, the last parameter changing fastest.
 
     Combinations that do not go together are for the evaluation to refuse; a value that goes with nothing is refused
@@ -137,35 +121,36 @@ def tasks_of(
     Raises
     ------
     SpecificationError
-        If a key is of a table that the specification lacks, a value fits no combination, or there are too many.
+        If a key is of a table that the specification lacks, a value fits no combination, there are too many, or a
+        parameter is a range.
     """
     count = 1
-    for values in parameters.values():
+    for key, values in parameters.items():
+        if isinstance(values, Span):
+            raise SpecificationError(f"{key} must be a list of values unless there is a search, not {values}")
         count *= len(values)
     if count > MAX_POINTS:
         raise SpecificationError(f"there must be at most {MAX_POINTS:,} combinations, not {count:,}")
-    measured = None if spec.calibration is None or spec.calibration.data is None else spec.calibration.data
-    data = "" if measured is None else hashlib.sha256(measured.read_bytes()).hexdigest()
-    tasks = []
-    for values in itertools.product(*parameters.values()):
-        changes = dict(zip(parameters, values, strict=True))
-        tree = changed(spec.source, changes)
-        subject = [tree, core, samples, seed, board, data, __version__]
-        key = hashlib.sha256(json.dumps(subject, sort_keys=True).encode()).hexdigest()
-        tasks.append(
-            Task(
-                key=key,
-                changes=changes,
-                tree=tree,
-                path=spec.path,
-                core=core,
-                samples=samples,
-                seed=seed,
-                board=board,
-            )
-        )
-    _check_values(tasks, parameters)
+    tasks = [
+        subject.task(dict(zip(parameters, values, strict=True)))
+        for values in itertools.product(*cast("Iterable[Sequence[Any]]", parameters.values()))
+    ]
+    refusals = [refusal_of(task) for task in tasks]
+    for key, values in parameters.items():
+        for value in cast("Sequence[Any]", values):
+            of_it = [refusal for task, refusal in zip(tasks, refusals, strict=True) if task.changes[key] == value]
+            if of_it and all(of_it):  # it is mistyped
+                raise SpecificationError(f"{of_it[0]}")
     return tasks
+
+
+def refusal_of(task: Task) -> str | None:
+    """Say why the values of a specification do not go together, if they do not."""
+    try:
+        task.specification()
+    except SpecificationError as error:
+        return str(error)
+    return None
 
 
 def changed(source: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
@@ -186,19 +171,3 @@ def changed(source: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, 
                 raise SpecificationError(f"a parameter must be a key of the specification, not {key}")
         place[last] = value
     return tree
-
-
-def _check_values(tasks: Sequence[Task], parameters: Mapping[str, Sequence[Any]]) -> None:
-    """Refuse a value that no combination accepts: it is mistyped."""
-    refusals: list[str | None] = []
-    for task in tasks:
-        try:
-            task.specification()
-            refusals.append(None)
-        except SpecificationError as error:
-            refusals.append(str(error))
-    for key, values in parameters.items():
-        for value in values:
-            of_it = [refusal for task, refusal in zip(tasks, refusals, strict=True) if task.changes[key] == value]
-            if of_it and all(of_it):
-                raise SpecificationError(f"{of_it[0]}")

@@ -45,7 +45,10 @@ def exploration_page(outcome: Outcome) -> str:
         "sosmith.gen.report",
         "exploration.html.jinja",
         outcome=outcome,
-        parameters=[(key, ", ".join(map(_plain, values))) for key, values in outcome.parameters.items()],
+        parameters=[
+            (key, values if isinstance(values, str) else ", ".join(map(_plain, values)))
+            for key, values in outcome.parameters.items()
+        ],
         shown=_shown(outcome),
         kinds=len(kinds),
         figures=[

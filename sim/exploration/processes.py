@@ -7,7 +7,7 @@ import multiprocessing
 import os
 import signal
 import threading
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Iterable, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 
@@ -21,8 +21,8 @@ def processors() -> int:
     return len(os.sched_getaffinity(0))
 
 
-def in_processes(tasks: Sequence[Task], jobs: int) -> Generator[Point, None, None]:
-    """Yield the results of `tasks` as they come, from `jobs` processes; one job runs in this process.
+def in_processes(batches: Iterable[Sequence[Task]], jobs: int) -> Generator[Point, None, None]:
+    """Yield the results of tasks as they come, from `jobs` processes; one job, or a task alone, runs in this process.
 
     When the caller stops, whatever the reason, what has not begun is dropped and the processes end.
 
@@ -31,27 +31,32 @@ def in_processes(tasks: Sequence[Task], jobs: int) -> Generator[Point, None, Non
     ToolError
         If a process dies, or as `evaluate`.
     """
-    if jobs == 1 or len(tasks) < 2:
-        yield from map(evaluate, tasks)
-        return
-    # Processes that are forked would inherit locks of the threads that draw the progress.
-    pool = ProcessPoolExecutor(
-        min(jobs, len(tasks)), mp_context=multiprocessing.get_context("spawn"), initializer=_prepare
-    )
+    pool: ProcessPoolExecutor | None = None
     try:
-        waiting: list[Future[Point]] = [pool.submit(evaluate, task) for task in tasks]
-        for future in as_completed(waiting):
-            yield future.result()
+        for tasks in batches:
+            if jobs == 1 or len(tasks) < 2:
+                yield from map(evaluate, tasks)
+                continue
+            pool = pool or _started(min(jobs, len(tasks)))
+            waiting: list[Future[Point]] = [pool.submit(evaluate, task) for task in tasks]
+            for future in as_completed(waiting):
+                yield future.result()
     except BrokenProcessPool:
         raise ToolError(
             "every process must live until its designs are done, and one ended before; "
             "the same command goes on from what is done"
         ) from None
     finally:
-        workers = list((pool._processes or {}).values())
-        pool.shutdown(wait=False, cancel_futures=True)
-        for worker in workers:
-            worker.terminate()  # in the middle of a design that nobody waits for, or idle
+        if pool is not None:
+            workers = list((pool._processes or {}).values())
+            pool.shutdown(wait=False, cancel_futures=True)
+            for worker in workers:
+                worker.terminate()  # in the middle of a design that nobody waits for, or idle
+
+
+def _started(jobs: int) -> ProcessPoolExecutor:
+    """Start processes; those that are forked would inherit locks of the threads that draw the progress."""
+    return ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn"), initializer=_prepare)
 
 
 def _prepare() -> None:

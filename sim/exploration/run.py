@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Callable, Generator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,11 +13,14 @@ from typing import Any
 from sosmith.gen.specification.specification import Specification
 from sosmith.sim.exploration.evaluation import Point
 from sosmith.sim.exploration.front import pareto_front
-from sosmith.sim.exploration.grid import Task, tasks_of
+from sosmith.sim.exploration.grid import Subject, Task, tasks_of
+from sosmith.sim.exploration.parameters import Parameters, in_json
 from sosmith.sim.exploration.record import record_in
+from sosmith.sim.exploration.search import Search
 
 Progress = Callable[[str, int, int], None]
-Runner = Callable[[Sequence[Task]], Generator[Point, None, None]]
+Runner = Callable[[Iterable[Sequence[Task]]], Generator[Point, None, None]]
+"""Yields the results of batches of tasks, in any order within each; the next batch may depend on them."""
 
 _COLUMNS = (
     "on_front",
@@ -50,20 +53,23 @@ class Outcome:
     name : str
         Of the specification.
     parameters : dict
-        Swept keys and their values.
+        Swept keys and their values, in the types of JSON.
+    search : int or None
+        Number of designs that were searched for; None for a grid.
     samples : int
         Length of the trace for each channel.
     board : str or None
         Board of the synthesis.
     points : tuple of dict
-        Results in the order of the grid, as `evaluate` returns them; those of the front that were co-simulated have
-        ``report``, the path of their page from the folder.
+        Results in the order of the grid or of the search, as `evaluate` returns them; those of the front that were
+        co-simulated have ``report``, the path of their page from the folder.
     tasks : tuple of Task
         What they are results of.
     """
 
     name: str
-    parameters: dict[str, list[Any]]
+    parameters: dict[str, Any]
+    search: int | None
     samples: int
     board: str | None
     points: tuple[Point, ...]
@@ -79,6 +85,7 @@ class Outcome:
         return {
             "name": self.name,
             "parameters": self.parameters,
+            "search": self.search,
             "samples": self.samples,
             "board": self.board,
             "front": self.front,
@@ -108,17 +115,18 @@ def _at(point: Mapping[str, Any], column: str) -> Any:
 
 def explore(
     spec: Specification,
-    parameters: Mapping[str, Sequence[Any]],
+    parameters: Parameters,
     folder: Path,
     runner: Runner,
     *,
+    search: int | None = None,
     core: str | None = None,
     samples: int = 20_000,
     seed: int = 1,
     board: str | None = None,
     progress: Progress = lambda step, done, total: None,
 ) -> Outcome:
-    """Evaluate every combination that `folder` has no result of; results are written as they come.
+    """Evaluate every combination, or search among them; what `folder` has a result of is not done again.
 
     Parameters
     ----------
@@ -127,9 +135,11 @@ def explore(
     parameters : mapping of str to sequence
         Keys with dots, and their values in the types of JSON.
     folder : Path
-        Folder of the results, made if missing.
+        Folder of the results, made if missing; they are written as they come.
     runner : callable
-        Yields the results of tasks in any order, such as `sosmith.sim.exploration.processes.in_processes`.
+        Such as `sosmith.sim.exploration.processes.in_processes`.
+    search : int or None
+        Number of designs to search for, see `sosmith.sim.exploration.search.Search`; None for a grid.
     core, samples, seed, board
         As in `Task`.
     progress : callable
@@ -138,26 +148,38 @@ def explore(
     Raises
     ------
     SpecificationError
-        As `tasks_of` and `record_in`.
+        As `tasks_of`, `Search` and `record_in`.
     ToolError
-        As the runner, or if the disk is full.
+        As the runner and `Search`, or if the disk is full.
     """
     progress("checking combinations", 0, 0)
-    tasks = tasks_of(spec, parameters, core=core, samples=samples, seed=seed, board=board)
+    subject = Subject(spec=spec, core=core, samples=samples, seed=seed, board=board)
+    tasks = tasks_of(subject, parameters) if search is None else []
     with record_in(folder) as record:
-        missing = {task.key: task for task in tasks if task.key not in record.points}
-        done, total = len(tasks) - len(missing), len(tasks)
-        progress("designs", done, total)
-        results = runner(list(missing.values()))
+        searched = None if search is None else Search(subject, parameters, search, record.points)
+        done, total = 0, search or len(tasks)
+
+        def missing() -> Iterator[list[Task]]:
+            """Leave out of each batch what is on record."""
+            nonlocal done
+            for batch in [tasks] if searched is None else searched.batches():
+                left = {task.key: task for task in batch if task.key not in record.points}
+                done += len(batch) - len(left)
+                progress("designs", done, total)
+                yield list(left.values())
+
+        results = runner(missing())
         with closing(results):
             for point in results:
                 record.add(point)
                 done += 1
                 progress("designs", done, total)
+        tasks = tasks if searched is None else searched.tasks
         points = tuple(record.points[task.key] for task in tasks)
     return Outcome(
         name=spec.name,
-        parameters={key: list(values) for key, values in parameters.items()},
+        parameters=in_json(parameters),
+        search=search,
         samples=samples,
         board=board,
         points=points,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -19,8 +20,15 @@ from sosmith.terminal import JSON_OPTION, note, output_option, print_json, reade
     "parameters",
     multiple=True,
     metavar="KEY=V1,V2...",
-    help="Values of a key of the specification, such as hardware.realization=df1,delta; several make a grid.  "
-    "[default: all realizations, parallel and folded, at 1, 2 and 4 times the allowed error]",
+    help="Values of a key of the specification, such as hardware.realization=df1,delta, or for --search a range, "
+    "such as filter.cutoff=0.1..1.6; several make a grid.  [default: all realizations, parallel and folded, at 1, 2 "
+    "and 4 times the allowed error]",
+)
+@click.option(
+    "--search",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Make N designs that an optimizer chooses by the results so far.  [default: all combinations]",
 )
 @CORE
 @click.option(
@@ -53,6 +61,7 @@ from sosmith.terminal import JSON_OPTION, note, output_option, print_json, reade
 def explore_command(
     spec: Path,
     parameters: tuple[str, ...],
+    search: int | None,
     core: str | None,
     board: str | None,
     samples: int,
@@ -64,7 +73,7 @@ def explore_command(
     as_json: bool,
     output: Path | None,
 ) -> None:
-    """Design every combination of values, and show the Pareto front of proven error against cost.
+    """Design every combination of values, or search, and show the Pareto front of proven error against cost.
 
     Every design is proven and run bit-true. Results are kept as they come: interrupted, the same command goes on from
     there. Writes exploration.html, exploration.json and points.csv; exits with 1 if no design passes.
@@ -72,6 +81,7 @@ def explore_command(
     \b
         sosmith explore my.toml
         sosmith explore my.toml -p hardware.realization=df1,df1_ef2,delta -p output.bits=12,14,16
+        sosmith explore my.toml -p filter.order=3..8 -p output.max_error=1e-4..1e-2 --search 200
         sosmith explore my.toml --scheduler tcp://10.0.0.1:8786
     """
     from sosmith.interface.specification import Specification
@@ -79,9 +89,9 @@ def explore_command(
     asked = Specification.load(spec)
     with show_progress(remaining=True) as step:
         from sosmith.interface.exploration import explore
-        from sosmith.sim.exploration.grid import read_parameter
+        from sosmith.sim.exploration.parameters import read_parameter
 
-        read = [read_parameter(text) for text in parameters]
+        read: list[tuple[str, Any]] = [read_parameter(text) for text in parameters]
         twice = [key for k, (key, _) in enumerate(read) if key in dict(read[:k])]
         if twice:
             raise SpecificationError(f"a parameter must be given once, not twice as {twice[0]}")
@@ -90,6 +100,7 @@ def explore_command(
             found = explore(
                 asked,
                 dict(read) or None,
+                search=search,
                 folder=folder,
                 core=core,
                 board=board,

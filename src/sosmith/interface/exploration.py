@@ -1,4 +1,4 @@
-"""Many designs of one specification: every combination of some values, and the front of accuracy against cost."""
+"""Many designs of one specification, all combinations or a search among them: the front of accuracy against cost."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from sosmith.model.errors import SpecificationError
 from sosmith.model.text_files import to_json, write_files
 
 if TYPE_CHECKING:
+    from sosmith.sim.exploration.parameters import Values
     from sosmith.sim.exploration.run import Outcome
 
 
@@ -34,7 +35,7 @@ class Exploration:
 
     @property
     def points(self) -> list[dict[str, Any]]:
-        """Every combination in the order of the grid: `changes`, and `refused` or the figures of the design.
+        """Every combination in the order of the grid or the search: `changes`, and `refused` or the design's figures.
 
         The figures are `error` (`bound` is proven, `max_abs` and `rms` are measured on the bit-true model), `sqnr_db`,
         `cost` (`value` and `unit`, and what it is made of), `cycles_per_sample`, `latency_cycles`, `realization`,
@@ -51,7 +52,7 @@ class Exploration:
         return self.outcome.front
 
     def as_dict(self) -> dict[str, Any]:
-        """Return `name`, `parameters`, `samples`, `board`, `front` and `points`, in JSON types."""
+        """Return `name`, `parameters`, `search`, `samples`, `board`, `front` and `points`, in JSON types."""
         return self.outcome.as_dict()
 
     def page(self) -> str:
@@ -80,6 +81,7 @@ def explore(
     specification: Specification | str | PathLike[str] | Mapping[str, Any],
     parameters: Mapping[str, Sequence[Any]] | None = None,
     *,
+    search: int | None = None,
     folder: str | PathLike[str] | None = None,
     core: str | None = None,
     board: str | None = None,
@@ -91,7 +93,7 @@ def explore(
     scheduler: str | None = None,
     progress: Progress = lambda step, done, total: None,
 ) -> Exploration:
-    """Design every combination of some values, and find the Pareto front of proven error against cost.
+    """Design every combination of some values, or search, and find the Pareto front of proven error against cost.
 
     Every design is proven and run bit-true. Results are kept in `folder` as they come: after an interruption, the same
     call goes on from there. The result does not depend on how many processes or workers took part.
@@ -101,8 +103,12 @@ def explore(
     specification : Specification, path or mapping
         The specification; a path or a mapping is passed to `Specification.load`.
     parameters : mapping of str to sequence
-        Keys of the specification with dots, such as "hardware.realization", and the values of each. By default all
-        realizations, parallel and folded, at one, two and four times the allowed error.
+        Keys of the specification with dots, such as "hardware.realization", and the values of each; for a search also
+        a range as text, such as "0.1..1.6". By default all realizations, parallel and folded, at one, two and four
+        times the allowed error.
+    search : int
+        Number of designs to make; which ones, an optimizer decides by the results so far (TPE of the package
+        optuna). By default all combinations are made.
     folder : path
         Folder of the results, ``build/<name>-exploration`` by default.
     core : str
@@ -141,12 +147,12 @@ def explore(
     <sosmith.Exploration sos_filter: 4 points, ... on the front>
     """
     from sosmith.sim.exploration.confirmation import confirmed
-    from sosmith.sim.exploration.grid import default_parameters
+    from sosmith.sim.exploration.parameters import default_parameters
     from sosmith.sim.exploration.processes import in_processes, processors
     from sosmith.sim.exploration.run import explore as run
 
-    for name, number in (("samples", samples), ("jobs", 1 if jobs is None else jobs)):
-        if number < 1:
+    for name, number in (("samples", samples), ("jobs", jobs), ("search", search)):
+        if number is not None and number < 1:
             raise SpecificationError(f"{name} must be at least 1, not {number}")
     if jobs is not None and scheduler is not None:
         raise SpecificationError("jobs must come without a scheduler, whose workers do the designs, not with one")
@@ -164,6 +170,7 @@ def explore(
         swept,
         place,
         runner,
+        search=search,
         core=core,
         samples=samples,
         seed=seed,
@@ -183,15 +190,23 @@ def explore(
     return made
 
 
-def _plain(parameters: Mapping[str, Sequence[Any]]) -> dict[str, list[Any]]:
-    """Copy parameters in the types of JSON."""
+def _plain(parameters: Mapping[str, Sequence[Any]]) -> dict[str, Values]:
+    """Copy parameters in the types of JSON, ranges apart."""
     from decimal import Decimal
+
+    from sosmith.sim.exploration.parameters import Span, read_span
 
     def plain(value: Any) -> Any:
         if isinstance(value, list):
             return [plain(item) for item in value]
         return float(value) if isinstance(value, Decimal) else value
 
-    if not parameters or not all(len(values) for values in parameters.values()):
+    if not parameters or not all(isinstance(values, Span) or len(values) for values in parameters.values()):
         raise SpecificationError("parameters must have a key and a value, not none")
-    return {key: [plain(exact(value)) for value in values] for key, values in parameters.items()}
+    read: dict[str, Values] = {}
+    for key, values in parameters.items():
+        span = values if isinstance(values, Span) else read_span(values) if isinstance(values, str) else None
+        if span is None and isinstance(values, str):
+            raise SpecificationError(f"{key} must be a list of values, or a range such as 1..8, not {values}")
+        read[key] = span or [plain(exact(value)) for value in values]
+    return read

@@ -49,6 +49,7 @@ def _page(tmp_path_factory: pytest.TempPathFactory) -> Path:
     outcome = Outcome(
         name="flange_wear",
         parameters={"hardware.realization": list(REALIZATIONS), "output.max_error": list(ERRORS)},
+        search=None,
         samples=20_000,
         board=None,
         points=tuple(points),

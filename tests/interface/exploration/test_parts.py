@@ -11,7 +11,8 @@ from tests.interface.small import FILTER
 
 from sosmith import Specification, SpecificationError
 from sosmith.sim.exploration.front import pareto_front
-from sosmith.sim.exploration.grid import Task, changed, default_parameters, read_parameter, tasks_of
+from sosmith.sim.exploration.grid import Subject, Task, changed, tasks_of
+from sosmith.sim.exploration.parameters import Span, Values, default_parameters, read_parameter
 from sosmith.sim.exploration.record import FILE, record_in
 
 SPEC = Specification.load(FILTER).checked
@@ -26,19 +27,23 @@ SPEC = Specification.load(FILTER).checked
         ("output.range=[-1.0, 1.0],[-2.0, 2.0]", "output.range", [[-1.0, 1.0], [-2.0, 2.0]]),
         ('name="a,b"', "name", ["a,b"]),
         ("hardware.reload=true,false", "hardware.reload", [True, False]),
+        ("filter.order=3..8", "filter.order", Span(3, 8)),
+        ("filter.cutoff=0.1..16", "filter.cutoff", Span(0.1, 16)),
     ],
 )
-def test_parameters_are_read(text: str, key: str, values: list[Any]) -> None:
+def test_parameters_are_read(text: str, key: str, values: Values) -> None:
     assert read_parameter(text) == (key, values)
 
 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("filter.order", "a parameter must be KEY=V1,V2,..., not filter.order"),
-        ("=3", "a parameter must be KEY=V1,V2,..., not =3"),
+        ("filter.order", "a parameter must be KEY=V1,V2,... or KEY=LOW..HIGH, not filter.order"),
+        ("=3", "a parameter must be KEY=V1,V2,... or KEY=LOW..HIGH, not =3"),
         ("filter.order=2,,3", "a value must be one of TOML, or a name, not  in filter.order=2,,3"),
         ("filter.order=1 2", "a value must be one of TOML, or a name, not 1 2 in filter.order=1 2"),
+        ("a=8..3", "a range must be LOW..HIGH with LOW less than HIGH, not 8..3"),
+        ("a=0..inf", "a range must be LOW..HIGH with LOW less than HIGH, not 0..inf"),
         ("a=[1", "a value must be one of TOML, or a name, not \\[1 in a=\\[1"),
     ],
 )
@@ -47,9 +52,9 @@ def test_parameters_that_cannot_be_read(text: str, message: str) -> None:
         read_parameter(text)
 
 
-def tasks(parameters: dict[str, list[Any]], **changes: Any) -> list[Task]:
+def tasks(parameters: dict[str, Values], **changes: Any) -> list[Task]:
     known: dict[str, Any] = {"core": None, "samples": 100, "seed": 1, "board": None}
-    return tasks_of(SPEC, parameters, **(known | changes))
+    return tasks_of(Subject(spec=SPEC, **(known | changes)), parameters)
 
 
 def test_every_combination_is_a_task_of_its_own() -> None:
@@ -62,7 +67,7 @@ def test_every_combination_is_a_task_of_its_own() -> None:
 
 
 def test_a_key_holds_all_that_the_result_depends_on() -> None:
-    sweep = {"output.bits": [8]}
+    sweep: dict[str, Values] = {"output.bits": [8]}
     keys = {tasks(sweep, **changes)[0].key for changes in ({}, {"samples": 99}, {"seed": 2}, {"board": "icestick"})}
     assert len(keys) == 4
     assert tasks(sweep)[0].key == tasks({"output.bits": [8], "hardware.realization": ["df1_ef1"]})[0].key
@@ -83,6 +88,10 @@ def test_what_no_grid_can_be_made_of() -> None:
         changed(SPEC.source, {"name.x": 1})
     with pytest.raises(SpecificationError, match=r"^there must be at most 100,000 combinations, not 250,000$"):
         tasks({"output.bits": [8] * 500, "filter.order": [2] * 500})
+    with pytest.raises(
+        SpecificationError, match=r"^output\.bits must be a list of values unless there is a search, not 8\.\.12$"
+    ):
+        tasks({"output.bits": Span(8, 12)})
 
 
 def test_default_parameters() -> None:
