@@ -206,7 +206,7 @@ def test_first_samples_are_held_through_reloads(architecture: str, example: str,
     assert [word for _, word in outcome["received"]] == expected(made, outcome, chosen)
 
 
-WARNING, LIMIT, CHANNELS, LOADS = 4.4, 4.6, 20, 600
+WARNING, LIMIT, CHANNELS = 4.4, 4.6, 20
 WATCHED = STEADY_INSTRUMENT + f"wear = {{ initial = 4.0, warning = {WARNING - 4:.1f}, limit = {LIMIT - 4:.1f} }}\n"
 
 
@@ -236,9 +236,9 @@ def test_ten_thousand_reloads_of_a_filter_raise_no_false_wear_flag(architecture:
     values = calibrated(constants, ports, made.quantized.polynomial)
     clear = np.abs(values - WARNING) > float(allowed)  # neither just below the limit nor just above
     constants, values = constants[clear][:CHANNELS], values[clear][:CHANNELS]
-    outcome, _ = run(
-        tmp_path, made, verilog(made), LOADS, 1, "verilator", sets=sets, constants=[*map(tuple, constants.tolist())]
-    )
+    loads = 1300 if architecture == "serial" else 600  # in serial, not every channel has a sample between two loads
+    codes = [*map(tuple, constants.tolist())]
+    outcome, _ = run(tmp_path, made, verilog(made), loads, 1, "verilator", sets=sets, constants=codes)
     swapped = {dest: set() for dest in range(CHANNELS)}  # the swaps before a sample of each channel
     for dest, swaps in zip(outcome["dests"], outcome["swaps"], strict=True):
         swapped[dest].add(swaps)
