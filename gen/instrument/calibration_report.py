@@ -38,6 +38,7 @@ def calibration_json(made: Calibration) -> dict[str, Any]:
             "filled_cells": quality.filled_cells,
         },
         "weighted_down": sum(weight < 1 for weight in weights),
+        "at_rail": 0 if made.bayesian is None else made.bayesian.at_rail,
         "largest_residuals": [_measurement(made, index) for index in quality.largest_residuals(CALLED_OUT)],
         "leverage": {
             "mean": float(quality.leverage.mean()),

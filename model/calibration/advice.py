@@ -12,7 +12,7 @@ from sosmith.model.arithmetic.stacked_matrices import dot, product, transposed
 from sosmith.model.arrays import Values
 from sosmith.model.calibration.acceptance import Range
 from sosmith.model.calibration.bayesian_fit import BayesianFit
-from sosmith.model.calibration.day_filter import moved
+from sosmith.model.calibration.mixed_effects.day_filter import moved
 from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.calibration.uncertainty import SHARE
 from sosmith.model.errors import SpecificationError

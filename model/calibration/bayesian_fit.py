@@ -29,10 +29,20 @@ from sosmith.model.calibration.fit import (
     untold,
 )
 from sosmith.model.calibration.least_squares import Sums
-from sosmith.model.calibration.mixed_effects import NONE, RATIOS, SCATTERS, Index, Model, Posterior, Rows, Scatters
+from sosmith.model.calibration.mixed_effects.model import (
+    NONE,
+    RATIOS,
+    SCATTERS,
+    Index,
+    Model,
+    Posterior,
+    Rows,
+    Scatters,
+    rows_of,
+)
+from sosmith.model.calibration.mixed_effects.systematic_error import SystematicCurves
 from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.calibration.sensor_type import DEVIATIONS, SYSTEMATIC_FACTOR, TERMS, SensorType
-from sosmith.model.calibration.systematic_error import SystematicCurves
 from sosmith.model.errors import SpecificationError
 
 ORDERS = (2, 1)
@@ -74,6 +84,8 @@ class BayesianFit:
         it would leave the range of the clearance or not rise with the voltage.
     order : ndarray, shape (n,)
         The measurement of each row of the model.
+    at_rail : int
+        Measurements that were left out because the voltage was at an end of its range.
     """
 
     fit: Fit
@@ -81,6 +93,7 @@ class BayesianFit:
     model: Model
     plain: bool
     order: Index
+    at_rail: int
 
     @property
     def surprise(self) -> str:
@@ -113,10 +126,12 @@ def bayesian_fit(
 ) -> BayesianFit:
     """Calibrate a sensor for the day of ordinal `date`.
 
-    1. Without systematic errors of the days, the model gives a curve, at which those errors are then taken.
-    2. Measurements whose residual from the curve of their day is more than `REJECTED` standard deviations are left
+    1. Measurements with the voltage at an end of its range are left out: a sensor at its rail says only that the
+       clearance is there or beyond, and hides the day's systematic error.
+    2. Without systematic errors of the days, the model gives a curve, at which those errors are then taken.
+    3. Measurements whose residual from the curve of their day is more than `REJECTED` standard deviations are left
        out, and the model is fitted again, until these are the same.
-    3. The posterior mean for `date` is the polynomial. If there are measurements of that very day, it is the polynomial
+    4. The posterior mean for `date` is the polynomial. If there are measurements of that very day, it is the polynomial
        nearest to the day's own curve, with squared errors relative to the clearance, unless that polynomial leaves the
        range of the clearance somewhere or falls with the voltage; for a later day the day's own curve is unknown.
 
@@ -136,32 +151,30 @@ def bayesian_fit(
     Raises
     ------
     SpecificationError
-        If measurements are too few, or do not vary, as for `fit`; if more than `MOST_REJECTED` of them are outliers; if
-        the polynomial falls with the voltage somewhere in the region that the measurements cover.
+        If measurements are too few, or do not vary, as for `fit`; if all are at a rail; if more than `MOST_REJECTED` of
+        them are outliers; if the polynomial falls with the voltage somewhere in the region that the measurements cover.
     """
     check_variation(measurements)
-    days = np.array(measurements.days or [date] * len(measurements), dtype=np.int64)
-    # sorted, so that the result does not depend on the order in which files were added
-    order = np.lexsort((measurements.temperature, measurements.voltage, measurements.clearance, days))
+    rows, order = rows_of(measurements, sensor_type, date)
     V, T, d = (values[order] for values in (measurements.voltage, measurements.temperature, measurements.clearance))
-    own_days, day = np.unique(days[order], return_inverse=True)
-    rows = Rows(
-        a=sensor_type.columns(V, T),
-        h=np.zeros((1, len(d))),
-        r=d - sensor_type.polynomial()(V, T),
-        day=day,
-        days=tuple(own_days.tolist()),
-    )
+    low, high = ranges[1]
+    free = np.where((low < V) & (high > V), 1.0, 0.0)
+    at_rail = int(np.count_nonzero(free == 0))
+    if at_rail == len(d):
+        raise SpecificationError(
+            f"{measurements.source}: some voltage_V must be inside the range {low:g} to {high:g} V, "
+            f"not all {len(d):,} at an end of it"
+        )
     progress(0, 3)
-    model, at, weights = _rejecting(sensor_type, rows, np.ones(len(d)), NONE)
+    model, at, weights = _rejecting(sensor_type, rows, free, free, NONE)
     curve = sensor_type.polynomial(tuple(at.mean_of(model.course(at).mean[-1]).tolist()))
     clearance = curve(V, T)
     curves = SystematicCurves(float(clearance.min()), float(clearance.max()), sensor_type.correlation)
     rows = Rows(rows.a, curves.columns(clearance), rows.r, rows.day, rows.days)
     progress(1, 3)
-    model, _, weights = _rejecting(sensor_type, rows, weights, RATIOS)
+    model, _, weights = _rejecting(sensor_type, rows, weights, free, RATIOS)
     progress(2, 3)
-    outliers = int(np.count_nonzero(weights == 0))
+    outliers = int(np.count_nonzero(weights == 0)) - at_rail
     if outliers > MOST_REJECTED * len(d):
         raise SpecificationError(
             f"{measurements.source}: at most a quarter of the measurements must be outliers for a sensor of the type "
@@ -171,17 +184,22 @@ def bayesian_fit(
     polynomial, plain = _polynomial(posterior, measurements, ranges)
     given = np.empty(len(d))
     given[order] = weights
-    return BayesianFit(_as_fit(measurements, polynomial, given), posterior, model, plain, order)
+    return BayesianFit(_as_fit(measurements, polynomial, given), posterior, model, plain, order, at_rail)
 
 
-def _rejecting(sensor_type: SensorType, rows: Rows, weights: Values, ratios: Values) -> tuple[Model, Scatters, Values]:
-    """Fit on the coarse grid, leaving out outliers; return the model, its scatters and weights of 0 or 1."""
+def _rejecting(
+    sensor_type: SensorType, rows: Rows, weights: Values, free: Values, ratios: Values
+) -> tuple[Model, Scatters, Values]:
+    """Fit on the coarse grid, leaving out outliers; return the model, its scatters and weights of 0 or 1.
+
+    `free` is 0 for what is left out in any case.
+    """
     for _ in range(MAX_ROUNDS):
         model = Model.of(sensor_type, rows, weights)
         at = model.weighed(SCATTERS, ratios)
         off = np.abs(model.residuals(at.likeliest))
-        allowed = REJECTED * max(NORMAL_CONSISTENCY * float(np.median(off)), MIN_SCATTER)
-        kept = np.where(off > allowed, 0.0, 1.0)
+        allowed = REJECTED * max(NORMAL_CONSISTENCY * float(np.median(off[free > 0])), MIN_SCATTER)
+        kept = np.where(off > allowed, 0.0, free)
         if np.array_equal(kept, weights):
             return model, at, weights
         weights = kept

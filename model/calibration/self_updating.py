@@ -24,6 +24,7 @@ from sosmith.model.calibration.fit import (
     untold,
 )
 from sosmith.model.calibration.fit_quality import FitQuality, assess, assess_posterior
+from sosmith.model.calibration.health.monitoring import Health, health_of
 from sosmith.model.calibration.measurement_files import (
     MeasurementFile,
     Refusal,
@@ -328,6 +329,22 @@ def advice_for(
     low, high = measurements.covered[1]
     usual = (low, (low + high) / 2, high)
     return advise(made, ranges, clearances, temperatures or usual, within=within, days=day - last, most=most)
+
+
+def health_for(store: MeasurementStore, sensor: str, since: str | None = None) -> Health:
+    """Return the health of a sensor, with charts from the date `since` on; see `health_of`.
+
+    Raises
+    ------
+    SpecificationError
+        If the sensor has no measurements; as for `health_of`.
+    """
+    _known(store, sensor)
+    ranges = store.ranges(sensor)
+    assert ranges is not None, "a sensor has ranges"
+    measurements = as_measurements(store.measurements(sensor), f"{store.path}, sensor {sensor}")
+    first = None if since is None else datetime.date.fromisoformat(since).toordinal()
+    return health_of(measurements, store.sensor_type(sensor), ranges[1], first)
 
 
 def _known(store: MeasurementStore, sensor: str) -> None:

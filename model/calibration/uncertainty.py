@@ -14,11 +14,11 @@ from sosmith.model.arithmetic.stacked_matrices import dot, product, transposed
 from sosmith.model.arrays import Values
 from sosmith.model.calibration.bayesian_fit import BayesianFit
 from sosmith.model.calibration.covered_region import CoveredRegion
-from sosmith.model.calibration.day_filter import smoothed
 from sosmith.model.calibration.fit import Fit, Measurements, residuals, root_mean_square, terms_of
 from sosmith.model.calibration.lack_of_fit import LackOfFit, lack_of_fit
 from sosmith.model.calibration.least_squares import Sums
-from sosmith.model.calibration.mixed_effects import mixture_half_width
+from sosmith.model.calibration.mixed_effects.day_filter import smoothed
+from sosmith.model.calibration.mixed_effects.model import mixture_half_width
 
 SHARE = 0.95
 """Probability with which an interval holds the true clearance."""

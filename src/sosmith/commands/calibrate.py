@@ -37,6 +37,7 @@ reaches the required value. To get started:
     sosmith calibrate history --sensor left            list all versions and their drift
     sosmith calibrate export --sensor left             print [calibration] for a specification
     sosmith calibrate advise --sensor left 2mm 3mm     what to measure next
+    sosmith calibrate health --sensor left             whether the sensor has changed
 """
 
 
@@ -51,6 +52,10 @@ def _day(ctx: click.Context, parameter: click.Parameter, text: str | None) -> st
     from sosmith.model.calibration.measurement_files import parse_date
 
     return parse_date(text)
+
+
+def _optional_day(ctx: click.Context, parameter: click.Parameter, text: str | None) -> str | None:
+    return None if text is None else _day(ctx, parameter, text)
 
 
 def _range(quantity: str, unit: str, usual: Range) -> Callable[[Any], Any]:
@@ -451,6 +456,54 @@ def advise_command(
         raise ShortfallError(
             f"the intervals must be within {within:g} mm, and {found.count} measurements bring them to "
             f"{max(found.after):.3g} mm only"
+        )
+
+
+@calibrate.command("health")
+@_STORE
+@_SENSOR
+@click.option(
+    "--since",
+    callback=_optional_day,
+    metavar="YYYY-MM-DD",
+    help="Begin the charts at this date: what was before is known, and raises no alarm.  [default: the first day]",
+)
+@click.option("--plot", type=click.Path(path_type=Path), help="SVG or PNG file for the charts.")
+@JSON_OPTION
+def health_command(store: Path, sensor: str, since: str | None, plot: Path | None, as_json: bool) -> None:
+    """Say whether a sensor still behaves as its measurements so far and its type let expect.
+
+    Each day's measurements are predicted from the days before. Control charts of the differences raise alarms for a
+    step of offset or gain, for drift, and for more scatter; a sentence says what explains the change best. Exits with 1
+    while an alarm stands.
+
+    \b
+        sosmith calibrate health --sensor left --plot health.svg
+        sosmith calibrate health --sensor left --since 2026-04-20
+    """
+    file_format = "" if plot is None else format_of(plot)
+    from sosmith.commands.tables.calibration import print_health
+    from sosmith.gen.instrument.health_report import health_json
+    from sosmith.model.calibration.measurement_store import open_store
+    from sosmith.model.calibration.self_updating import health_for
+
+    with show_progress() as step, open_store(store) as opened:
+        step(f"going through the days of {sensor}")
+        found = health_for(opened, sensor, since)
+        if plot is not None:
+            from sosmith.gen.instrument.health_plot import health_plot
+
+            step("drawing")
+            write_contents(plot.parent, {plot.name: health_plot(sensor, found, file_format)})
+    if plot is not None:
+        note(f"wrote {plot}")
+    if as_json:
+        print_json(health_json(sensor, found))
+    else:
+        print_health(sensor, found)
+    if found.alarms:
+        raise ShortfallError(
+            f"sensor {sensor}: {_counted(len(found.alarms), 'alarm')}; look at the sensor, then use --since"
         )
 
 

@@ -8,7 +8,7 @@ from tests.model.calibration.test_bayesian_fit import FIRST, RANGES, TYPE, fitte
 
 from sosmith.model.calibration.advice import advise
 from sosmith.model.calibration.bayesian_fit import BayesianFit
-from sosmith.model.calibration.mixed_effects import Model, Rows
+from sosmith.model.calibration.mixed_effects.model import Model, Rows
 from sosmith.model.errors import SpecificationError
 
 

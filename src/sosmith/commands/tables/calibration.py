@@ -9,6 +9,7 @@ from sosmith.commands.tables.console import TableConsole, new_table
 from sosmith.gen.instrument.calibration_report import CALLED_OUT, uncertainty_plane
 from sosmith.model.calibration.advice import Advice
 from sosmith.model.calibration.fit_quality import CELLS
+from sosmith.model.calibration.health.monitoring import Health, date_of
 from sosmith.model.calibration.measurement_store import Version
 from sosmith.model.calibration.self_updating import Calibration
 
@@ -47,7 +48,10 @@ def print_calibration(made: Calibration) -> None:
         "leverage, largest", f"{quality.leverage.max():.4f} (mean {mean:.4f}; {high} above three times the mean)"
     )
     if made.bayesian is not None:
-        overview.add_row("left out as outliers", f"{sum(weight == 0 for weight in made.fit.weights):,}")
+        at_rail = made.bayesian.at_rail
+        overview.add_row("left out as outliers", f"{sum(weight == 0 for weight in made.fit.weights) - at_rail:,}")
+        if at_rail:
+            overview.add_row("left out at a rail", f"{at_rail:,}, with the voltage at an end of its range")
     if version.robust:
         overview.add_row("given less weight", f"{sum(weight < 1 for weight in made.fit.weights):,}")
     for number, drift in sorted(made.drift.items(), reverse=True)[:5]:
@@ -103,6 +107,26 @@ def _rejected(made: Calibration) -> str:
     shown = [f"{trial.orders[0]}, {trial.orders[1]}: {trial.adjusted_r:.6f}" for trial in made.fit.rejected[:3]]
     more = [f"{len(made.fit.rejected) - 3} more"] if len(made.fit.rejected) > 3 else []
     return f" (orders {'; '.join(shown + more)})" if shown else ""
+
+
+def print_health(sensor: str, found: Health) -> None:
+    """Print the charts of a sensor, and a sentence for each alarm."""
+    console = TableConsole()
+    known = found.innovations
+    days, outliers = len(known.days) - found.first, int(known.outliers.sum())
+    verdict = "no alarm" if not found.alarms else f"{len(found.alarms)} alarm{'s' * (len(found.alarms) > 1)}"
+    left_out = f", {outliers:,} outliers left out" if outliers else ""
+    console.print(
+        f"Sensor {escape(sensor)}: {verdict}; {days:,} days on the charts, to {date_of(known.days[-1])}{left_out}\n"
+    )
+    table = new_table("Control charts", ["", "last day", "largest", "limit", "alarm"])
+    raised = {alarm.chart.name: alarm.raised for alarm in found.alarms}
+    for chart in found.charts:
+        values = [f"{value:.2f}" for value in (chart.values[-1], chart.values.max(), chart.limit)]
+        table.add_row(chart.name, *values, raised.get(chart.name, "-"))
+    console.print(table)
+    for alarm in found.alarms:
+        console.print(escape(alarm.sentence))
 
 
 def print_advice(sensor: str, date: str, found: Advice) -> None:

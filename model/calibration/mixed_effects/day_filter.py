@@ -21,7 +21,7 @@ from sosmith.model.arithmetic.stacked_matrices import (
     transposed,
 )
 from sosmith.model.arrays import Values
-from sosmith.model.calibration.day_sums import Scaled
+from sosmith.model.calibration.mixed_effects.day_sums import Scaled
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,21 +66,39 @@ def course(
     z, s = np.zeros((size, *stack)), identity(size, stack)
     means, factors = [], []
     quadratic, root = np.zeros(stack), Scaled(np.ones(stack), np.zeros(stack))
-    for number, (j, h, q) in enumerate(days):
+    for number, day in enumerate(days):
         if number:
             s = moved(s, gaps[number - 1], drifts)
-        of_s = product(j, s)
-        lower = cholesky(identity(size, stack) + product(transposed(s), of_s))
-        of_z = applied(j, z)
-        forward = solved(lower, applied(transposed(s), h - of_z)[:, None])
-        quadratic = quadratic + (q - 2.0 * dot(z, h) + dot(z, of_z) - dot(forward[:, 0], forward[:, 0]))
+        z, s, off, lower = updated(z, s, day)
+        quadratic = quadratic + off
         for k in range(size):
             root = root.times(lower[k, k])
-        s = transposed(solved(lower, transposed(s)))
-        z = z + applied(s, forward[:, 0])
         means.append(z)
         factors.append(s)
     return Course(means, factors, quadratic, root)
+
+
+def updated(z: Values, s: Values, day: tuple[Values, Values, Values]) -> tuple[Values, Values, Values, Values]:
+    """Take in the information (j, h, q) of one day.
+
+    Returns
+    -------
+    z, s : ndarray, shapes (5, ...) and (5, 5, ...)
+        Mean and factor of the covariance afterwards.
+    off : ndarray, shape stack
+        Squared distance of the day's measurements from their prediction, in its standard deviations: chi-square
+        distributed with as many degrees of freedom as there are measurements.
+    lower : ndarray, shape (5, 5, ...)
+        Triangular; the product of its diagonal stands in the denominator of the likelihood.
+    """
+    j, h, q = day
+    of_s = product(j, s)
+    lower = cholesky(identity(len(z), z.shape[1:]) + product(transposed(s), of_s))
+    of_z = applied(j, z)
+    forward = solved(lower, applied(transposed(s), h - of_z)[:, None])
+    off = q - 2.0 * dot(z, h) + dot(z, of_z) - dot(forward[:, 0], forward[:, 0])
+    s = transposed(solved(lower, transposed(s)))
+    return z + applied(s, forward[:, 0]), s, np.asarray(off), lower
 
 
 def moved(factor: Values, gap: int, drifts: tuple[float, ...]) -> Values:

@@ -21,10 +21,11 @@ from scipy import special
 
 from sosmith.model.arithmetic.stacked_matrices import applied, dot, product, transposed
 from sosmith.model.arrays import Values
-from sosmith.model.calibration.day_filter import Course, course, moved, smoothed
-from sosmith.model.calibration.day_sums import DaySums, Information, Scaled
+from sosmith.model.calibration.fit import Measurements
+from sosmith.model.calibration.mixed_effects.day_filter import Course, course, moved, smoothed
+from sosmith.model.calibration.mixed_effects.day_sums import DaySums, Information, Scaled
+from sosmith.model.calibration.mixed_effects.systematic_error import SystematicCurves
 from sosmith.model.calibration.sensor_type import SYSTEMATIC_FACTOR, SensorType
-from sosmith.model.calibration.systematic_error import SystematicCurves
 
 SCATTERS = np.array(list(itertools.accumulate([1.5] * 23, operator.mul, initial=0.0005)))
 """Scatter of a measurement in mm rms: the points of the coarse grid, 0.5 um to 5.6 mm."""
@@ -75,6 +76,26 @@ class Rows:
     def gaps(self) -> list[int]:
         """Days from each day to the next."""
         return [later - day for day, later in zip(self.days, self.days[1:], strict=False)]
+
+
+def rows_of(measurements: Measurements, sensor_type: SensorType, date: int = 0) -> tuple[Rows, Index]:
+    """Return measurements as rows without systematic curves, and the measurement of each row.
+
+    They are sorted, so that a result does not depend on the order in which files were added. Without their own `days`,
+    all are taken to be of the day `date`.
+    """
+    days = np.array(measurements.days or [date] * len(measurements), dtype=np.int64)
+    order = np.lexsort((measurements.temperature, measurements.voltage, measurements.clearance, days))
+    V, T, d = (values[order] for values in (measurements.voltage, measurements.temperature, measurements.clearance))
+    own_days, day = np.unique(days[order], return_inverse=True)
+    rows = Rows(
+        a=sensor_type.columns(V, T),
+        h=np.zeros((1, len(d))),
+        r=d - sensor_type.polynomial()(V, T),
+        day=day,
+        days=tuple(own_days.tolist()),
+    )
+    return rows, order
 
 
 @dataclass(frozen=True, eq=False)
