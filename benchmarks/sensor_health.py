@@ -51,10 +51,10 @@ SCENARIO = ROOT / "examples" / "scenarios" / "a_week_in_service.toml"
 """The week in service, gone on with for more days: 15 measurements each morning of an ageing sensor."""
 
 SENSORS = tuple(FORWARD_MODELS)
-DAYS, SEEDS = 250, 40
+DAYS, SEEDS = 250, 24
 """Days without a fault, and sensors of each kind."""
 
-FAULT_DAY, FAULT_DAYS, FAULT_SEEDS = 60, 40, 30
+FAULT_DAY, FAULT_DAYS, FAULT_SEEDS = 60, 40, 24
 """First day of a fault, days that it lasts, and sensors with it."""
 
 FIRST_SEED = 5001

@@ -18,6 +18,7 @@ import numpy.typing as npt
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.fpga.boards import Board
 from sosmith.gen.fpga.synthesis import Netlist, synthesize
+from sosmith.gen.instrument.uncertainty_budget import budget_json, budget_of
 from sosmith.gen.output.core_facts import CoreFacts, core_facts
 from sosmith.gen.output.generate import generate
 from sosmith.gen.output.vectors import Vectors, vector_files
@@ -165,7 +166,7 @@ def _evidence(
     unfiltered = np.stack([calibrated(t.codes, datapath.inputs, quantized.polynomial) for t in traces], axis=1)
     sos = None if quantized.filter is None else quantized.filter.sos
     golden = np.stack([filtered(column, sos, output, steady=quantized.steady) for column in unfiltered.T], axis=1)
-    trace = traces[0]
+    trace, worth = traces[0], budget_of(design)
     low, high = output.decode(np.array([output.lowest, output.highest]))
     evidence = Evidence(
         name=datapath.name,
@@ -207,6 +208,7 @@ def _evidence(
         recursions=tuple(recursion_of(section.name, section.graph) for section in quantized.sections),
         limit_cycles=facts.limit_cycles,
         settling=facts.settling,
+        uncertainty=None if worth is None else budget_json(worth),
         filter=filter_facts(quantized),
         alternatives=_alternatives(quantized, codes, golden),
         provenance=provenance_of(design, traces, netlist),

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 
 from sosmith.model.arrays import Values
 from sosmith.model.calibration.advice import Advice
+from sosmith.model.calibration.coefficient_covariance import CoefficientUncertainty, of_bayes, of_least_squares
 from sosmith.model.calibration.fit import COLUMNS
-from sosmith.model.calibration.measurement_store import StoredMeasurement, Version
+from sosmith.model.calibration.measurement_store import StoredMeasurement, Version, as_measurements
 from sosmith.model.calibration.self_updating import Addition, Calibration
 from sosmith.model.calibration.uncertainty import SHARE
 
 PLANE = (6, 4)
 """Voltages and temperatures at which the interval of a reading is told."""
+
+SIGNIFICANT = 9
+"""Digits of an exported covariance: its last ones may differ from machine to machine."""
 
 CALLED_OUT = 5
 """Count of measurements that the report lists by their residuals, and by their leverage."""
@@ -167,8 +172,11 @@ def advice_json(sensor: str, date: str, within: float, found: Advice) -> dict[st
     }
 
 
-def specification_table(sensor: str, version: Version) -> str:
-    """TOML for a specification: the table ``[calibration]``; numbers read back as the same doubles."""
+def specification_table(sensor: str, version: Version, made: Calibration | None = None) -> str:
+    """TOML for a specification: the table ``[calibration]``; numbers read back as the same doubles.
+
+    With the calibration, also ``[calibration.uncertainty]``, to `SIGNIFICANT` digits.
+    """
     robust = ", robust" if version.robust else ""
     name = sensor.replace("\\", "\\\\")  # the comment ends with its line whatever the name holds
     return (
@@ -176,7 +184,32 @@ def specification_table(sensor: str, version: Version) -> str:
         f"# Hash over them: {version.data_sha256}\n"
         "[calibration]\n"
         f"coefficients = {_coefficients(version)}\n"
-    )
+    ) + ("" if made is None else _uncertainty_table(coefficient_uncertainty(made)))
+
+
+def coefficient_uncertainty(made: Calibration) -> CoefficientUncertainty:
+    """Return what the coefficients of a calibration are worth."""
+    measurements = as_measurements(made.stored, made.sensor)
+    return of_least_squares(measurements, made.fit) if made.bayesian is None else of_bayes(measurements, made.bayesian)
+
+
+def _uncertainty_table(found: CoefficientUncertainty) -> str:
+    # rounded as correlations, which stay below 1
+    shrunk = 1.0 - 10.0 ** (1 - SIGNIFICANT)
+    rounded = [
+        [float(f"{value * (1.0 if i == j else shrunk):.{SIGNIFICANT}g}") for j, value in enumerate(row)]
+        for i, row in enumerate(((found.covariance + found.covariance.T) / 2).tolist())
+    ]
+    freedoms = {"freedom": found.freedom, "systematic_freedom": found.systematic_freedom}
+    lines = [
+        "[calibration.uncertainty]",
+        f"covariance = {rounded}",
+        f"systematic = {float(f'{found.systematic:.4g}')}",
+        *(f"{key} = {float(f'{value:.4g}')}" for key, value in freedoms.items() if math.isfinite(value)),
+        f"voltage = {list(found.voltage)}",
+        f"temperature = {list(found.temperature)}",
+    ]
+    return "\n".join(lines) + "\n"
 
 
 def measurements_csv(stored: list[StoredMeasurement]) -> str:

@@ -102,6 +102,9 @@ class Evidence:
         One for each section, in `unit`.
     settling : SettlingFacts or None
         Samples that show the start of the filter from zero; None if it starts otherwise.
+    uncertainty : Mapping or None
+        The uncertainty budget of a reading, as `sosmith.gen.instrument.uncertainty_budget.budget_json` has it; None if
+        nothing is known of what the calibration is worth.
     shown_channel : int or None
         Channel that the sample arrays are of, where they are of one of several.
     filter : FilterFacts or None
@@ -157,6 +160,7 @@ class Evidence:
     recursions: Sequence[Recursion] = ()
     limit_cycles: Sequence[LimitCycleFacts] = ()
     settling: SettlingFacts | None = None
+    uncertainty: Mapping[str, Any] | None = None
     shown_channel: int | None = None
     filter: FilterFacts | None = None
     gates: Netlist | None = None

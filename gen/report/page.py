@@ -209,6 +209,41 @@ def _budget_table(evidence: Evidence) -> Table:
     return Table(head=("contribution", unit.titled("at most"), "in LSB"), rows=rows, numbers=(1, 2))
 
 
+def _uncertainty_table(found: Mapping[str, Any]) -> Table:
+    at, unit = found["at"], found["unit"]
+    rows = [
+        (
+            one["source"],
+            one["distribution"],
+            f"{plain_number(one['standard_uncertainty'])} {one['unit']}",
+            plain_number(one["sensitivity"]),
+            plain_number(one["contribution"]),
+            _freedom(one["degrees_of_freedom"]),
+        )
+        for one in at["contributions"]
+    ]
+    rows.append(("combined", "", "", "", plain_number(at["combined"]), _freedom(at["degrees_of_freedom"])))
+    factor = f"k = {plain_number(at['coverage_factor'])}"
+    rows.append((f"expanded, {100 * found['probability']:g} %", "", "", factor, plain_number(at["expanded"]), ""))
+    head = ("source", "distribution", "standard uncertainty", "sensitivity", unit, "degrees of freedom")
+    return Table(head=head, rows=rows, numbers=range(2, 6))
+
+
+def _freedom(value: float | None) -> str:
+    return "known" if value is None else plain_number(value)
+
+
+def _uncertainty_caption(found: Mapping[str, Any]) -> str:
+    at, unit = found["at"], found["unit"]
+    smallest, largest = (plain_number(found["expanded"][key]) for key in ("smallest", "largest"))
+    text = (
+        f"{100 * found['probability']:g} % of readings are within ±{smallest} to ±{largest} {unit} of the true value. "
+        f"The table is for {plain_number(at['clearance'])} {unit}, at {plain_number(at['voltage_V'])} V and "
+        f"{plain_number(at['temperature_C'])} °C, where it is largest."
+    )
+    return text + (f" Not stated: {', '.join(found['not_stated'])}." if found["not_stated"] else "")
+
+
 def _limit_cycles_table(evidence: Evidence) -> Table:
     """Tell what each section's rounding can sustain by itself, at the section's own output."""
     rows, unit = [], ErrorUnit.of(evidence)
@@ -402,6 +437,9 @@ def render_page(evidence: Evidence, summary: Summary) -> str:
     found = behaviour(evidence)
     told_by, derived = _evidence_tables(shown)
     parts: dict[str, Any] = {}
+    if shown.uncertainty is not None:
+        parts["uncertainty"] = _uncertainty_table(shown.uncertainty)
+        parts["uncertainty_caption"] = _uncertainty_caption(shown.uncertainty)
     if shown.rivals:
         parts["alternatives"] = _alternatives_figure(shown)
         parts["alternatives_table"] = _alternatives_table(shown, summary)

@@ -88,11 +88,13 @@ def summarise(evidence: Evidence) -> dict[str, Any]:
         ``error.{max_lsb,mean,proven,parts}``, ``first_mismatch``, ``latency_cycles``, ``cycles_per_sample`` (of
         this run, waiting included), ``start_up.{samples,seconds,limit}`` (None unless the filter starts from zero;
         ``accuracy_percent`` and ``true_error`` leave these samples out, unless the trace marks its readings),
-        ``alternatives``, ``limit_cycles``, ``tools``, ``sosmith_version``, ``date`` (as
-        given by the user, else None), ``files`` (SHA-256 of each generated file), ``true_error.{max_abs,rms,mean,
-        readings}`` (hardware against the true value at the readings), ``delay.{seconds,frequency}`` (group delay, and
-        where it is taken), ``settling.{seconds,half_lsb_seconds,overshoot_percent}`` (after a step, to 1 %, and to half
-        an LSB over the whole range), ``shortfalls`` (why it did not pass), ``notes``,
+        ``uncertainty`` (the budget of a reading in the terms of the GUM, at the point where it is largest; None if
+        nothing is known of what the calibration is worth), ``alternatives``, ``limit_cycles``, ``tools``,
+        ``sosmith_version``, ``date`` (as given by the user, else None), ``files`` (SHA-256 of each generated file),
+        ``true_error.{max_abs,rms,mean,readings}`` (hardware against the true value at the readings),
+        ``delay.{seconds,frequency}`` (group delay, and where it is taken), ``settling.{seconds,half_lsb_seconds,
+        overshoot_percent}`` (after a step, to 1 %, and to half an LSB over the whole range), ``shortfalls`` (why it did
+        not pass), ``notes``,
         ``provenance.{specification,specification_sha256,
         reference_sha256,trace_sha256,datapath_sha256,cycles_per_sample,cost}`` (see
         `sosmith.gen.report.provenance.Provenance`) and ``curves.{error,spectrum,filter}`` (see
@@ -140,6 +142,7 @@ def summarise(evidence: Evidence) -> dict[str, Any]:
         "sqnr_db": sqnr_db(evidence.golden, evidence.error),
         "frequency_response": _response_summary(measures),
         "accuracy_percent": _accuracy(evidence),
+        "uncertainty": evidence.uncertainty,
         "start_up": None if evidence.settling is None else asdict(evidence.settling),
         "alternatives": [
             {"name": other.name, "max_abs": other.max_abs, "rms": other.rms} for other in evidence.alternatives

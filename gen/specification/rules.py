@@ -11,6 +11,7 @@ from fractions import Fraction
 
 from sosmith.gen.specification.choices import CALIBRATION_INPUTS, FAMILIES, KINDS
 from sosmith.gen.specification.schema import MAX_ORDER, Document, FilterTable, InputTable
+from sosmith.gen.specification.uncertainty import check_coefficients
 from sosmith.gen.specification.values import UnfitError, identifier, key_text, listed, literal, one_of
 from sosmith.model.sensors.spi_converter import CONVERTERS
 
@@ -43,6 +44,7 @@ def check(document: Document) -> None:
     """
     _check_inputs(document)
     _check_calibration(document)
+    _check_uncertainty(document)
     _check_filter(document.filter, document.sample_rate)
     _check_output(document)
     _check_wear(document)
@@ -101,6 +103,22 @@ def _check_calibration(document: Document) -> None:
         raise UnfitError("given by one of coefficients and data", found, where="calibration")
     if calibration.coefficients is not None and not any(map(any, calibration.coefficients)):
         raise UnfitError("a polynomial that is not zero", "zeros only", where="calibration.coefficients")
+    check_coefficients(calibration)
+
+
+def _check_uncertainty(document: Document) -> None:
+    table = document.uncertainty
+    if table is None:
+        return
+    if document.calibration is None:
+        raise UnfitError("left out without a table [calibration]", "given", where="uncertainty")
+    nyquist = document.sample_rate / 2
+    for k, (frequency, amplitude) in enumerate(table.motion):
+        if not 0 < frequency < nyquist:
+            expected = f"above 0 and below half the sample rate, {float(nyquist):g} Hz"
+            raise UnfitError(expected, f"{float(frequency):g} Hz", where=f"uncertainty.motion[{k}]")
+        if amplitude < 0:
+            raise UnfitError("of an amplitude of 0 or more", f"{float(amplitude):g}", where=f"uncertainty.motion[{k}]")
 
 
 def _check_filter(table: FilterTable, sample_rate: Fraction) -> None:

@@ -7,6 +7,7 @@ the messages about unknown and missing keys follow from that.
 from __future__ import annotations
 
 from fractions import Fraction
+from functools import partial
 from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, PlainValidator, ValidationError
@@ -50,6 +51,8 @@ LOSS_LIMITS = (Fraction(1, 10**6), Fraction(200))
 
 Rows = tuple[tuple[Fraction, ...], ...]
 Loss = Annotated[Fraction | None, PlainValidator(between(*LOSS_LIMITS, "dB"))]
+Freedom = Annotated[Fraction | None, PlainValidator(between(Fraction(1), Fraction(10**9), "degrees of freedom"))]
+NOT_NEGATIVE = partial(between, Fraction(0), Fraction(10**6))
 Edges = Annotated[tuple[Fraction, ...] | None, PlainValidator(edges)]
 
 
@@ -87,6 +90,33 @@ class OutputTable(InputTable):
     max_error: Annotated[Fraction | None, PlainValidator(read_max_error)] = None
 
 
+class CoefficientsTable(Table):
+    """``[calibration.uncertainty]``: what the coefficients are worth."""
+
+    covariance: Annotated[Rows, PlainValidator(list_of(list_of(number, 1, 64), 1, 64, "rows of numbers"))] = Field(
+        description="rows of numbers, the covariance of the coefficients"
+    )
+    freedom: Freedom = None
+    systematic: Annotated[Fraction, PlainValidator(NOT_NEGATIVE("mm"))] = Fraction(0)
+    systematic_freedom: Freedom = None
+    voltage: Annotated[tuple[Fraction, Fraction], PlainValidator(rising_pair)] = Field(
+        description="a list of 2 numbers, [low, high], the voltages that the calibration was made at"
+    )
+    temperature: Annotated[tuple[Fraction, Fraction], PlainValidator(rising_pair)] = Field(
+        description="a list of 2 numbers, [low, high], the temperatures that the calibration was made at"
+    )
+
+
+class UncertaintyTable(Table):
+    """``[uncertainty]``: what is known of the instrument's errors."""
+
+    noise: Annotated[Fraction | None, PlainValidator(NOT_NEGATIVE("V"))] = None
+    temperature: Annotated[Fraction | None, PlainValidator(NOT_NEGATIVE("degC"))] = None
+    voltage: Annotated[Fraction | None, PlainValidator(NOT_NEGATIVE("V"))] = None
+    clearance_rate: Annotated[Fraction | None, PlainValidator(NOT_NEGATIVE("mm/s"))] = None
+    motion: Annotated[Rows, PlainValidator(list_of(list_of(number, 2, 2), 0, 16, "pairs [frequency, amplitude]"))] = ()
+
+
 class CalibrationTable(Table):
     """``[calibration]``: the polynomial, or measurements to fit it to."""
 
@@ -94,6 +124,7 @@ class CalibrationTable(Table):
         Rows | None, PlainValidator(list_of(list_of(number, 1, 8), 1, 8, "rows of 1 to 8 numbers"))
     ] = None
     data: Annotated[str | None, PlainValidator(file_name)] = None
+    uncertainty: CoefficientsTable | None = Field(default=None, description="a table [calibration.uncertainty]")
 
 
 class FilterTable(Table):
@@ -156,6 +187,7 @@ class Document(Table):
     filter: FilterTable = Field(description="a table [filter]")
     output: OutputTable = Field(description="a table [output]")
     wear: WearTable | None = Field(default=None, description="a table [wear]")
+    uncertainty: UncertaintyTable | None = Field(default=None, description="a table [uncertainty]")
     converter: dict[str, ConverterTable] = Field(default={}, description="a table [converter.NAME] per input")
     hardware: HardwareTable = Field(default=HardwareTable(), description="a table [hardware]")
 
@@ -165,6 +197,7 @@ _TABLES: dict[str, type[Table]] = {
     "filter": FilterTable,
     "output": OutputTable,
     "wear": WearTable,
+    "uncertainty": UncertaintyTable,
     "hardware": HardwareTable,
 }
 
@@ -232,6 +265,8 @@ def _table_at(path: tuple[str, ...]) -> type[Table]:
             return Table
         case ("input", _):
             return InputTable
+        case ("calibration", "uncertainty"):
+            return CoefficientsTable
         case ("converter", _):
             return ConverterTable
         case _:

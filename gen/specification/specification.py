@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from sosmith.gen.specification.choices import CALIBRATION_INPUTS
 from sosmith.gen.specification.converters import ConverterSpec, converters
 from sosmith.gen.specification.toml_text import toml_text
+from sosmith.gen.specification.uncertainty import CoefficientsSpec, UncertaintySpec
 from sosmith.gen.specification.values import UnfitError
 from sosmith.gen.specification.wear_limits import WearSpec
 from sosmith.model.errors import SpecificationError
@@ -21,7 +22,7 @@ from sosmith.model.port import Port
 from sosmith.model.tables.toml_file import parse_toml, read_text
 
 if TYPE_CHECKING:
-    from sosmith.gen.specification.schema import Document, FilterTable, InputTable, OutputTable
+    from sosmith.gen.specification.schema import Document, FilterTable, InputTable, OutputTable, UncertaintyTable
 
 MAX_BYTES = 1 << 16
 """Maximum size of a specification in bytes; typical ones have one or two thousand."""
@@ -43,10 +44,13 @@ class CalibrationSpec:
         the temperature (degC). Rows may differ in length.
     data : Path or None
         CSV file of measurements to fit the polynomial to; relative to the folder of the specification.
+    uncertainty : CoefficientsSpec or None
+        What the coefficients are worth, if it is stated.
     """
 
     coefficients: tuple[tuple[Fraction, ...], ...] | None
     data: Path | None
+    uncertainty: CoefficientsSpec | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -145,6 +149,8 @@ class Specification:
         Largest allowed |hardware - exact|, in the unit of the output, more than half an LSB of the output.
     wear : WearSpec or None
         Wear limits, for the wear flags.
+    uncertainty : UncertaintySpec or None
+        What is known of the instrument's errors; the hardware does not depend on it.
     hardware : HardwareSpec
         The hardware.
     converters : tuple of ConverterSpec
@@ -163,6 +169,7 @@ class Specification:
     output: Port
     max_error: Fraction
     wear: WearSpec | None
+    uncertainty: UncertaintySpec | None = None
     hardware: HardwareSpec
     converters: tuple[ConverterSpec, ...] = ()
 
@@ -243,6 +250,7 @@ def _specification(path: Path, tree: dict[str, Any], document: Document) -> Spec
         wear=None
         if wear is None
         else WearSpec(initial=wear.initial, warning=wear.warning, limit=wear.limit, sensor_range=wear.sensor_range),
+        uncertainty=None if document.uncertainty is None else _uncertainty(document.uncertainty),
         hardware=HardwareSpec(
             realization=hardware.realization,
             architecture=hardware.architecture,
@@ -280,7 +288,13 @@ def _calibration(path: Path, document: Document) -> CalibrationSpec | None:
     return CalibrationSpec(
         coefficients=calibration.coefficients,
         data=None if calibration.data is None else path.parent / calibration.data,
+        uncertainty=None if calibration.uncertainty is None else CoefficientsSpec(**dict(calibration.uncertainty)),
     )
+
+
+def _uncertainty(table: UncertaintyTable) -> UncertaintySpec:
+    motion = tuple((frequency, amplitude) for frequency, amplitude in table.motion)
+    return UncertaintySpec(**dict(table) | {"motion": motion})
 
 
 def _filter(path: Path, table: FilterTable) -> FilterSpec:

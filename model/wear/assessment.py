@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
@@ -114,6 +115,26 @@ class WearLimits:
 
 
 @dataclass(frozen=True, kw_only=True)
+class ClearanceUncertainty:
+    """What the clearances of a record are worth, from the uncertainty budget of the instrument.
+
+    Attributes
+    ----------
+    standard : float
+        Combined standard uncertainty in mm of a reading at the present clearance.
+    freedom : float
+        Its effective degrees of freedom.
+    rise : float
+        Standard uncertainty in mm of the rise of the clearance over the record, from the calibration that all readings
+        share; what is new each day is in the scatter of the blocks.
+    """
+
+    standard: float
+    freedom: float
+    rise: float
+
+
+@dataclass(frozen=True, kw_only=True)
 class WearRate:
     """Rate of wear in mm per day.
 
@@ -178,6 +199,8 @@ class WearReport:
         Median of the last block in mm.
     wear : float
         ``clearance - initial`` in mm: s_w = s_r - s_i. Negative if the initial clearance is set too large.
+    wear_low, wear_high : float
+        Interval of the wear in mm: by the uncertainty of a reading if it is known, else by the scatter of the blocks.
     remaining : float
         Wear left before the critical clearance, in mm; 0 beyond it.
     rate : WearRate
@@ -191,6 +214,8 @@ class WearReport:
         The last reading in mm.
     state : WearState
         State of the last reading, as the flags of the hardware show it.
+    uncertainty : ClearanceUncertainty or None
+        What the clearances are worth; None if it is not known.
     first_warning, first_critical : float or None
         Time of the first reading in that state or a worse one, in days on the time axis of the record.
     warnings, criticals : int
@@ -204,6 +229,8 @@ class WearReport:
     duration: float
     clearance: float
     wear: float
+    wear_low: float
+    wear_high: float
     remaining: float
     rate: WearRate
     fall: Fall | None
@@ -212,6 +239,7 @@ class WearReport:
     life_high: float | None
     last: float
     state: WearState
+    uncertainty: ClearanceUncertainty | None
     first_warning: float | None
     first_critical: float | None
     warnings: int
@@ -364,11 +392,14 @@ def judge(
     block: float | None = None,
     window: float | None = None,
     confidence: float = 0.95,
+    uncertainty: Callable[[float, float], ClearanceUncertainty] | None = None,
 ) -> WearReport:
     """Assess the wear from a clearance record.
 
     The interval of the remaining life follows from the ends of the rate's interval and from the scatter of the present
-    clearance at the same confidence. It assumes that wear continues at this rate.
+    clearance at the same confidence. It assumes that wear continues at this rate. With an `uncertainty`, the interval
+    of the wear is that of a reading, that of the rate also holds the uncertainty of the rise over the record, and that
+    of the remaining life follows from both.
 
     Parameters
     ----------
@@ -384,6 +415,8 @@ def judge(
         Estimate the rate from this many days at the end of the record only.
     confidence : float
         Confidence level of the intervals, between 0 and 1.
+    uncertainty : callable, optional
+        What the clearances are worth, for the first and the last block's clearance in mm.
 
     Raises
     ------
@@ -415,6 +448,10 @@ def judge(
     remaining = max(limits.critical_clearance - now, 0.0)
     gone = float(time[-1] - times[-1])
     off = float(stats.norm.ppf((1 + confidence) / 2)) * rate.scatter
+    known = None if uncertainty is None else uncertainty(float(medians[0]), now)
+    if known is not None:
+        off = float(stats.t.ppf((1 + confidence) / 2, known.freedom)) * known.standard
+        rate = _with_rise(rate, known, float(times[-1] - times[0]), confidence)
     states = [limits.state(value) for value in clearance.tolist()]
     end = states[-last_block:]
     critical = [state is WearState.CRITICAL for state in states]
@@ -425,6 +462,8 @@ def judge(
         duration=float(time[-1] - time[0]),
         clearance=now,
         wear=now - limits.initial,
+        wear_low=now - off - limits.initial,
+        wear_high=now + off - limits.initial,
         remaining=remaining,
         rate=rate,
         fall=None if fall is None else replace(fall, window=fall.window + gone),
@@ -433,11 +472,22 @@ def judge(
         life_high=_life(remaining + off if remaining else 0.0, rate.low, gone),
         last=float(clearance[-1]),
         state=states[-1],
+        uncertainty=known,
         first_warning=float(time[warned.index(True)]) if any(warned) and limits.warning is not None else None,
         first_critical=float(time[critical.index(True)]) if any(critical) else None,
         warnings=sum(state is not WearState.GOOD for state in end),
         criticals=sum(state is WearState.CRITICAL for state in end),
         last_block=last_block,
+    )
+
+
+def _with_rise(rate: WearRate, known: ClearanceUncertainty, span: float, confidence: float) -> WearRate:
+    """Widen the interval of a rate by the uncertainty of the rise over `span` days; independent, so squares add."""
+    of_rise = float(stats.t.ppf((1 + confidence) / 2, known.freedom)) * known.rise / span
+    return replace(
+        rate,
+        low=rate.rate - math.hypot(rate.rate - rate.low, of_rise),
+        high=rate.rate + math.hypot(rate.high - rate.rate, of_rise),
     )
 
 

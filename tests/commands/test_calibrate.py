@@ -8,15 +8,19 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from tests.commands.invocation import Invocation
 from tests.model.calibration.measuring import readings, write_csv
 
 from sosmith.commands.calibrate import calibrate
 from sosmith.gen.core import design_core
+from sosmith.gen.instrument.uncertainty_budget import instrument_of
 from sosmith.gen.specification.specification import example, load
+from sosmith.interface.specification import Specification
 from sosmith.model.calibration.fit import fit, read_measurements
 from sosmith.model.calibration.measurement_store import open_store
+from sosmith.model.calibration.polynomial import EQUATION_5A
 from sosmith.model.calibration.self_updating import Addition, add, refused_first_file
 from sosmith.model.errors import ShortfallError, SpecificationError
 
@@ -157,7 +161,9 @@ def test_exports_feed_a_specification_and_give_the_same_polynomial() -> None:
     assert table == Path("left.toml").read_text()
     assert table.startswith("# Sensor left, version 2 of 2024-03-01: 120 measurements.\n# Hash over them: ")
     coefficients = json.loads(good("history", "--sensor", "left", "--json").stdout)[-1]["coefficients"]
-    assert tomllib.loads(table) == {"calibration": {"coefficients": coefficients}}
+    made = tomllib.loads(table)["calibration"]
+    assert made["coefficients"] == coefficients
+    assert len(made["uncertainty"]["covariance"]) == sum(map(len, coefficients))
     fitted = fit(read_measurements(Path("left.csv"))).polynomial
     assert [[float(a) for a in row] for row in fitted.coefficients] == coefficients
 
@@ -279,6 +285,39 @@ def test_advice_reaches_what_it_promises() -> None:
     )
 
 
+def test_a_sensor_mounted_anew_raises_an_alarm_until_it_is_accepted() -> None:
+    generator = np.random.default_rng(1)
+    rows = []
+    for day in range(1, 13):
+        V, T = generator.uniform(0.5, 9.5, 12), generator.uniform(20, 90, 12)
+        d = EQUATION_5A(V, T) + generator.normal(0, 0.05, 12) + (0.8 if day >= 8 else 0.0)
+        rows += [
+            f"{a!r},{b!r},{c!r},2024-03-{day:02}" for a, b, c in zip(d.tolist(), V.tolist(), T.tolist(), strict=True)
+        ]
+    Path("days.csv").write_text("\n".join(["clearance_mm,voltage_V,temperature_C,date", *rows, ""]))
+    good("add", "days.csv", "--date", "2024-03-12")
+    result = run("health", "--plot", "health.svg")
+    assert isinstance(result.exception, ShortfallError)
+    assert re.search(r"^Sensor sensor: \d alarms?; 11 days on the charts, to 2024-03-12", result.stdout, re.M)
+    assert "the offset stepped up; all clearances stepped alike" in " ".join(result.stdout.split())
+    assert Path("health.svg").read_bytes().startswith(b"<?xml")
+    told = json.loads(run("health", "--json").stdout)
+    first = told["alarms"][0]
+    assert (first["chart"], first["date"], first["explanation"]) == ("offset step", "2024-03-08", "mounted anew")
+    assert len(told["days"]) == 12
+    assert good("health", "--since", "2024-03-11").stdout.startswith("Sensor sensor: no alarm; 2 days on the charts")
+
+
+def test_an_export_carries_what_the_calibration_is_worth(tmp_path: Path) -> None:
+    good("add", "a.csv", *DAY)
+    table = tomllib.loads(good("export").stdout)["calibration"]
+    assert len(table["uncertainty"]["covariance"]) == 5
+    spec = Specification.example().replaced(calibration=table)
+    found = instrument_of(spec.checked)
+    assert found is not None
+    assert 0 < found.budget(np.array([5.0]), np.array([50.0])).expanded.item() < 0.2
+
+
 UNFIT = {
     "no store": (
         ("history",),
@@ -324,7 +363,7 @@ def test_an_unknown_sensor_is_told_which_there_are() -> None:
 
 
 def test_help_shows_every_command_and_its_options() -> None:
-    assert list(calibrate.commands) == ["add", "fit", "history", "export", "plot", "advise"]
+    assert list(calibrate.commands) == ["add", "fit", "history", "export", "plot", "advise", "health"]
     for command in calibrate.commands:
         shown = good(command, "--help").stdout
         for option in ("--store", "--sensor"):

@@ -36,6 +36,9 @@ outlier."""
 MIN_FOR_OUTLIERS = 8
 """Measurements of a day below which none can be told to be an outlier."""
 
+LEARNING = 4
+"""Days after which the scatters that are possible decide on the fine grid; before it, nearly all are."""
+
 MAX_ROUNDS = 10
 """Limit on rounds of rejection."""
 
@@ -228,7 +231,7 @@ def course_of(measurements: Measurements, sensor_type: SensorType, voltages: Ran
     coarse = Course(sensor_type, rows.days, count, outliers, sums, SCATTERS, RATIOS)
     likely = np.full((len(SCATTERS), len(RATIOS)), -np.inf)
     for number, (belief, _) in enumerate(coarse.beliefs()):
-        if number:
+        if number >= min(LEARNING, len(rows.days) - 1):
             likely = np.maximum(likely, belief.logarithm - belief.logarithm.max())
     if len(rows.days) == 1:
         return coarse

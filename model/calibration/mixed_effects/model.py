@@ -277,13 +277,29 @@ class Posterior:
 
     def predicted(self, voltage: Values, temperature: Values) -> tuple[Values, Values]:
         """Return mean and variance of the clearance of a reading for each pair of scatters, shapes (n, k)."""
+        mean, of_curve, of_day = self.predicted_parts(voltage, temperature)
+        return mean, dot(of_curve, of_curve) + of_day
+
+    def predicted_parts(self, voltage: Values, temperature: Values) -> tuple[Values, Values, Values]:
+        """Return the mean of the clearance, and the variance in two parts, for each pair of scatters.
+
+        Returns
+        -------
+        mean : ndarray, shape (n, k)
+            In mm.
+        of_curve : ndarray, shape (r, n, k)
+            Factor F of the covariance ``F' F`` between the points that the curve has, by the deviations and by the
+            day's own curve as far as its measurements leave it open.
+        of_day : ndarray, shape (n, k)
+            Variance of the systematic error of a day without measurements, else 0.
+        """
         plain = self.sensor_type.polynomial()(voltage, temperature)
         a = self.sensor_type.columns(voltage, temperature)
         systematic = self.scatters.scatter * self.scatters.ratio
         if self.offset is None or self.slope is None or self.curve_factor is None:
             mean = plain[:, None] + product(transposed(a), self.mean)
             shifted = product(transposed(self.factor), a[:, :, None])
-            return mean, dot(shifted, shifted) + systematic**2
+            return mean, shifted, np.broadcast_to(systematic**2, mean.shape)
         at = self.sensor_type.polynomial(self.deviations)(voltage, temperature)
         h = self.curves.columns(at)[:, :, None]
         mean = (
@@ -294,7 +310,7 @@ class Posterior:
         left = a[:, :, None] - product(transposed(self.slope)[:, :, None], h[:, None])[:, 0]
         shifted = product(transposed(self.factor)[:, :, None], left[:, None])[:, 0]
         own = product(self.curve_factor[:, :, None], h[:, None])[:, 0]
-        return mean, dot(shifted, shifted) + systematic**2 * dot(own, own)
+        return mean, np.concatenate((shifted, systematic * own)), np.zeros_like(mean)
 
     def curve(self, voltage: Values, temperature: Values) -> Values:
         """Return the mean clearance of a reading in mm, shape (n,)."""

@@ -353,9 +353,9 @@ def history_command(store: Path, sensor: str, verify: bool, as_json: bool) -> No
 def export_command(store: Path, sensor: str, number: int | None, file_format: str, output: Path | None) -> None:
     """Write the coefficients or the measurements of a version.
 
-    The format toml is the table [calibration] of a specification, csv the measurements that it was fitted to. Either
-    file reads back to exactly the same doubles. A core with reload = true can load the new coefficients at run
-    time; see `sosmith reload`.
+    The format toml is the table [calibration] of a specification, with the covariance of its coefficients; csv the
+    measurements that it was fitted to. Either file reads back to exactly the same coefficients. A core with
+    reload = true can load the new coefficients at run time; see `sosmith reload`.
 
     \b
         sosmith calibrate export --sensor left -o left.toml
@@ -363,15 +363,20 @@ def export_command(store: Path, sensor: str, number: int | None, file_format: st
     """
     from sosmith.gen.instrument.calibration_report import measurements_csv, specification_table
     from sosmith.model.calibration.measurement_store import open_store
-    from sosmith.model.calibration.self_updating import find_version
+    from sosmith.model.calibration.self_updating import calibration_of, find_version
 
-    with open_store(store) as opened:
+    with show_progress() as step, open_store(store) as opened:
         version = find_version(opened, sensor, number)
-        text = (
-            specification_table(sensor, version)
-            if file_format == "toml"
-            else measurements_csv(opened.measurements(sensor, version.last_measurement))
-        )
+        if file_format == "toml":
+            step("fitting again")
+            made = None
+            try:
+                made = calibration_of(opened, sensor, version.number)
+            except ShortfallError as error:
+                note(f"the uncertainty is left out: {error}")
+            text = specification_table(sensor, version, made)
+        else:
+            text = measurements_csv(opened.measurements(sensor, version.last_measurement))
     if output is None:
         click.echo(text, nl=False)
     else:

@@ -58,7 +58,7 @@ def init(file: Path | None, named: str, listed: bool, force: bool) -> None:
 @REALIZATION
 @WIDTHS_OF
 @BOARD
-@click.option("--details", is_flag=True, help="Also show sections, limit cycles and schedule.")
+@click.option("--details", is_flag=True, help="Also show the uncertainty budget, sections, limit cycles and schedule.")
 @click.option(
     "--plot", type=click.Path(path_type=Path), help="SVG or PNG file for a plot of gain, delay and calibration."
 )
@@ -101,7 +101,11 @@ def design_command(
     if plot is not None:
         note(f"wrote {plot}")
     if as_json:
-        print_json(made.manifest if cost is None else made.manifest | {"board": cost})
+        from sosmith.gen.instrument.uncertainty_budget import budget_json
+
+        worth = None if made.uncertainty is None else budget_json(made.uncertainty)
+        shown = made.manifest | {"uncertainty": worth}
+        print_json(shown if cost is None else shown | {"board": cost})
     else:
         from sosmith.commands.tables.design import print_design
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,7 +16,7 @@ from sosmith.model.wear.record_columns import CLEARANCES, TIMES
 from sosmith.terminal import JSON_OPTION, note, print_json, show_progress
 
 if TYPE_CHECKING:
-    from sosmith.model.wear.assessment import WearLimits, WearReport
+    from sosmith.model.wear.assessment import ClearanceUncertainty, WearLimits, WearReport
     from sosmith.model.wear.record_file import WearRecord
 
 _HELP = f"""Estimate the wear, wear rate and remaining life of a wheel flange from TRACE.csv.
@@ -41,7 +42,7 @@ same comparisons as the wear flags of the hardware.
     "--spec",
     type=click.Path(path_type=Path),
     metavar="SPEC",
-    help="Take these four from [wear] of this specification.",
+    help="Take these four from [wear] of this specification, and what a reading is worth from its calibration.",
 )
 @click.option(
     "--channel",
@@ -76,10 +77,11 @@ def wear_command(
     from sosmith.model.wear.assessment import WearLimits, judge
     from sosmith.model.wear.record_file import read_wear_record
 
+    worth = None
     if spec is not None:
         if any(value is not None for value in (initial, limit, warning, sensor_range)):
             raise SpecificationError("the limits must be given by --spec or one by one, not both")
-        limits = _limits_of(spec, channel)
+        limits, worth = _limits_of(spec, channel), _uncertainty_of(spec)
     elif initial is None or limit is None:
         raise SpecificationError("the limits must be given by --initial and --limit, or by --spec, not left out")
     else:
@@ -90,7 +92,15 @@ def wear_command(
         if channel and spec is None and not record.channels:
             raise SpecificationError("--channel must come with --spec or with a column channel, not without both")
         step("rate of wear")
-        report = judge(record.time, record.clearance, limits, block=block, window=window, confidence=confidence)
+        report = judge(
+            record.time,
+            record.clearance,
+            limits,
+            block=block,
+            window=window,
+            confidence=confidence,
+            uncertainty=worth,
+        )
         drawn = None
         if plot is not None:
             from sosmith.gen.instrument.wear_plot import wear_plot
@@ -128,6 +138,15 @@ def _limits_of(path: Path, channel: int) -> WearLimits:
     )
 
 
+def _uncertainty_of(path: Path) -> Callable[[float, float], ClearanceUncertainty] | None:
+    """Return what clearances are worth; None if the specification does not say what its calibration is worth."""
+    from sosmith.gen.instrument.uncertainty_budget import instrument_of
+    from sosmith.gen.specification.specification import load
+
+    found = instrument_of(load(path))
+    return None if found is None else found.of_wear
+
+
 def _json(record: WearRecord, report: WearReport) -> dict[str, Any]:
     """Return all results, with the unit in each key."""
     rate = report.rate
@@ -139,6 +158,10 @@ def _json(record: WearRecord, report: WearReport) -> dict[str, Any]:
         "limits_mm": asdict(report.limits) | {"critical_clearance": report.limits.critical_clearance},
         "clearance_mm": report.clearance,
         "wear_mm": report.wear,
+        "wear_interval_mm": {"low": report.wear_low, "high": report.wear_high, "confidence": rate.confidence},
+        "uncertainty": None
+        if report.uncertainty is None
+        else {"standard_mm": report.uncertainty.standard, "rise_mm": report.uncertainty.rise},
         "remaining_mm": report.remaining,
         "rate_mm_per_day": {"value": rate.rate, "low": rate.low, "high": rate.high, "confidence": rate.confidence},
         "fall": None if report.fall is None else {"mm": report.fall.size, "window_days": report.fall.window},

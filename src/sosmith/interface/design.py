@@ -16,6 +16,7 @@ import numpy.typing as npt
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.filter.response import complex_response
 from sosmith.gen.fpga.boards import BUILDABLE, MODELLED, PROJECTS, RATE, find_board
+from sosmith.gen.instrument.uncertainty_budget import InstrumentBudget, budget_of
 from sosmith.gen.output.certificate import about, certificate
 from sosmith.gen.output.core_facts import CoreFacts, core_facts
 from sosmith.gen.output.generate import generate
@@ -148,6 +149,11 @@ class Design:
     def reasons(self) -> dict[str, str]:
         """Why this realization and this architecture were chosen, one sentence each."""
         return dict(self.core.reasons)
+
+    @cached_property
+    def uncertainty(self) -> InstrumentBudget | None:
+        """The uncertainty budget of a reading in the terms of the GUM; None if the calibration's is not known."""
+        return budget_of(self.core)
 
     @property
     def latency_cycles(self) -> int:

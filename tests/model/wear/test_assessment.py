@@ -8,13 +8,22 @@ from typing import Any
 
 import numpy as np
 import pytest
+from benchmarks.uncertainty import wear_covered
 from scipy import stats
 
 from sosmith.gen.specification.wear_limits import WearSpec
 from sosmith.model.arrays import Values
 from sosmith.model.errors import SpecificationError
 from sosmith.model.port import Port
-from sosmith.model.wear.assessment import WearLimits, WearState, block_medians, judge, last_fall, rate_of
+from sosmith.model.wear.assessment import (
+    ClearanceUncertainty,
+    WearLimits,
+    WearState,
+    block_medians,
+    judge,
+    last_fall,
+    rate_of,
+)
 
 LIMITS = WearLimits(initial=1.5, limit=9, warning=7)
 
@@ -249,3 +258,33 @@ def test_limits_that_make_no_sense(given: dict[str, Any], message: str) -> None:
 def test_records_that_make_no_sense(time: list[float], given: dict[str, float], message: str) -> None:
     with pytest.raises(SpecificationError, match=f"^{re.escape(message)}$"):
         judge(np.array(time), np.full(len(time), 2.0), LIMITS, **given)
+
+
+def test_what_the_clearances_are_worth_widens_depth_rate_and_life() -> None:
+    time = np.arange(80) / 2
+    clearance = 3.0 + 0.1 * time + 0.02 * noise(80, 0.0, 4)
+    asked: list[tuple[float, float]] = []
+
+    def worth(begin: float, now: float) -> ClearanceUncertainty:
+        asked.append((begin, now))
+        return ClearanceUncertainty(standard=0.2, freedom=10.0, rise=0.3)
+
+    plain, known = judge(time, clearance, LIMITS), judge(time, clearance, LIMITS, uncertainty=worth)
+    t = float(stats.t.ppf(0.975, 10))
+    assert asked == [(pytest.approx(3.0, abs=0.1), pytest.approx(6.95, abs=0.1))]
+    assert (known.wear_low, known.wear_high) == pytest.approx((known.wear - 0.2 * t, known.wear + 0.2 * t))
+    assert known.rate.rate == plain.rate.rate
+    assert known.rate.high - known.rate.rate == pytest.approx(
+        np.hypot(plain.rate.high - plain.rate.rate, 0.3 * t / 39), rel=1e-3
+    )
+    assert plain.wear_high - plain.wear_low < 0.2
+    assert known.life_low is not None
+    assert plain.life_low is not None
+    assert known.life_low < plain.life_low
+
+
+@pytest.mark.slow
+def test_intervals_with_an_uncertainty_hold_as_often_as_they_claim() -> None:
+    inside = wear_covered()
+    assert all(0.93 <= inside[f"{what}, with"] <= 0.99 for what in ("depth", "rate", "life"))
+    assert all(inside[f"{what}, without"] < 0.9 for what in ("depth", "rate", "life"))

@@ -115,7 +115,7 @@ def print_health(sensor: str, found: Health) -> None:
     known = found.innovations
     days, outliers = len(known.days) - found.first, int(known.outliers.sum())
     verdict = "no alarm" if not found.alarms else f"{len(found.alarms)} alarm{'s' * (len(found.alarms) > 1)}"
-    left_out = f", {outliers:,} outliers left out" if outliers else ""
+    left_out = f", {outliers:,} outlier{'s' * (outliers > 1)} left out" if outliers else ""
     console.print(
         f"Sensor {escape(sensor)}: {verdict}; {days:,} days on the charts, to {date_of(known.days[-1])}{left_out}\n"
     )

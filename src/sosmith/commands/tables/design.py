@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 
 from rich.console import Console
 from rich.markup import escape
+from rich.table import Table
 
 from sosmith.commands.tables.console import TableConsole, new_table
 from sosmith.gen.architecture import Architecture
+from sosmith.gen.instrument.uncertainty_budget import InstrumentBudget
 from sosmith.gen.output.core_facts import LimitCycleFacts
 from sosmith.gen.specification.specification import Specification
 from sosmith.gen.specification.wear_limits import WearSpec
@@ -20,6 +23,7 @@ from sosmith.model.calibration.fit import Fit, read_measurements
 from sosmith.model.calibration.uncertainty import of_polynomial
 from sosmith.model.dataflow.program import Program
 from sosmith.model.port import Port
+from sosmith.model.reference.uncertainty_budget import SHARE
 from sosmith.model.sections.start import StartStage
 
 _SEEN = Fraction(1, 20_000)
@@ -39,16 +43,7 @@ def print_design(design: Design, *, details: bool = False) -> None:
         if aliasing is not None:
             deviation, dc = 100 * aliasing.max_deviation, 100 * aliasing.dc_error
             overview.add_row("aliasing", f"at most {deviation:.3g} % of the gain, {dc:.3g} % at zero frequency")
-    if made.fit is not None:
-        m, n = made.fit.orders
-        overview.add_row(
-            "calibration",
-            f"fitted: orders {m} in voltage, {n} in temperature, adjusted r {made.fit.adjusted_r:.4f}",
-        )
-        overview.add_row("its measurements", _worth(made.spec, made.fit))
-    elif quantized.polynomial is not None:
-        m, n = quantized.polynomial.orders
-        overview.add_row("calibration", f"given: orders {m} in voltage, {n} in temperature")
+    _add_calibration(overview, design)
     for subject, reason in made.reasons.items():
         overview.add_row(subject, reason)
     overview.add_row("output", f"{datapath.output.bits} bits, one LSB = {lsb:.6g}{unit}")
@@ -62,6 +57,8 @@ def print_design(design: Design, *, details: bool = False) -> None:
     print_budget(console, design.budget, datapath.output.lsb, design.specification.max_error)
     if not details:
         return
+    if design.uncertainty is not None:
+        print_uncertainty(console, design.uncertainty)
     sections = new_table("Sections", ["section", "coefficients", "input", "states", "output"])
     for section in design.facts.sections:
         coefficients = "\n".join(f"{c.name} = {c.integer} * 2^-{c.frac}" for c in section.coefficients)
@@ -71,6 +68,23 @@ def print_design(design: Design, *, details: bool = False) -> None:
         console.print(sections)
         _print_limit_cycles(console, design.facts.limit_cycles, lsb)
     _print_schedule(console, made.architecture.program)
+
+
+def _add_calibration(overview: Table, design: Design) -> None:
+    """Say where the calibration comes from, and what a reading is worth."""
+    made, polynomial, worth = design.core, design.core.quantized.polynomial, design.uncertainty
+    if polynomial is None:
+        return
+    m, n = polynomial.orders
+    if made.fit is not None:
+        overview.add_row(
+            "calibration",
+            f"fitted: orders {m} in voltage, {n} in temperature, adjusted r {made.fit.adjusted_r:.4f}",
+        )
+        overview.add_row("its measurements", _worth(made.spec, made.fit))
+    else:
+        overview.add_row("calibration", f"given: orders {m} in voltage, {n} in temperature")
+    overview.add_row("reading", UNKNOWN if worth is None else escape(worth.summary))
 
 
 def _worth(spec: Specification, fitted: Fit) -> str:
@@ -157,10 +171,44 @@ def _print_limit_cycles(console: Console, cycles: Sequence[LimitCycleFacts], lsb
     console.print(table)
 
 
+def print_uncertainty(console: Console, found: InstrumentBudget) -> None:
+    """Print the uncertainty budget at the point of the largest uncertainty."""
+    at, budget, unit = found.worst, found.budget, found.unit
+    where = f"{found.clearance[at]:.3g} {unit} ({found.voltage[at]:.3g} V, {found.temperature[at]:.3g} °C)"
+    table = new_table(
+        f"Uncertainty of a reading at {escape(where)}, where it is largest",
+        ["source", "distribution", "u", "sensitivity", escape(unit), "freedom"],
+    )
+    for one in budget.contributions:
+        per = "" if one.unit == unit else " s" if one.unit == f"{unit}/s" else f" {unit}/{one.unit}"
+        freedom = f"{one.freedom:.3g}" if math.isfinite(one.freedom) else "known"
+        table.add_row(
+            one.source,
+            one.kind,
+            f"{one.uncertainty[at]:.3g} {escape(one.unit)}",
+            f"{one.sensitivity[at]:.3g}{escape(per)}",
+            f"{one.contribution[at]:.3g}",
+            freedom,
+        )
+    freedom = f"{budget.freedom[at]:.3g}" if math.isfinite(budget.freedom[at]) else "known"
+    table.add_row("[bold]combined[/]", "", "", "", f"{budget.combined[at]:.3g}", freedom)
+    table.add_row(
+        "[bold]expanded[/]", f"{100 * SHARE:g} %", "", f"k = {budget.factor[at]:.3g}", f"{budget.expanded[at]:.3g}", ""
+    )
+    console.print(table)
+
+
+UNKNOWN = "not stated; the bound below is that of the arithmetic alone"
+"""What stands for the uncertainty of a reading where the calibration's own is not known."""
+
+
 def print_budget(console: Console, budget: Mapping[str, Quantity], lsb: Fraction, max_error: Quantity) -> None:
     """Print the parts of an error bound that count, and the allowed error, in the output's unit and in LSB."""
     table = new_table(
-        "Error budget, proven for all inputs in range", ["part", escape(max_error.unit) or "full scale 1", "output LSB"]
+        "Error budget of the arithmetic, proven for all inputs in range"
+        if "calibration" in budget
+        else "Error budget, proven for all inputs in range",
+        ["part", escape(max_error.unit) or "full scale 1", "output LSB"],
     )
     seen = {part: value for part, value in budget.items() if value >= lsb * _SEEN}
     for part, value in [*seen.items(), ("[bold]sum[/]", sum(budget.values())), ("allowed", max_error)]:

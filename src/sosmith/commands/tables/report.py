@@ -33,6 +33,10 @@ def _measurement(summary: dict[str, Any], unit: str) -> Iterator[tuple[str, str]
         without = accuracy["unfiltered"]
         beside = "" if without is None else f"; {without:.2f} % without the filter"
         yield "accuracy, the paper's measure", f"{accuracy['hardware']:.2f} %{beside}"
+    worth = summary["uncertainty"]
+    if worth is not None:
+        low, high = (plain_number(worth["expanded"][key]) for key in ("smallest", "largest"))
+        yield "uncertainty of a reading", f"±{low} to ±{high} {worth['unit']} at {100 * worth['probability']:g} %"
     delay, settling = summary["delay"], summary["settling"]
     if delay is not None:
         where = "" if delay["frequency"] == 0 else f" at {quantity(delay['frequency'], 'Hz')}"

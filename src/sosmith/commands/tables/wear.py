@@ -19,7 +19,8 @@ def print_wear(record: WearRecord, report: WearReport, channel: int) -> None:
         "clearance",
         f"{report.clearance:.4g} mm, the median of the last {_length(rate.block)} ({limits.initial:g} mm new)",
     )
-    table.add_row("wear", f"{report.wear:.4g} mm")
+    by = "the scatter alone" if report.uncertainty is None else f"±{report.uncertainty.standard:.2g} mm standard"
+    table.add_row("wear", f"{report.wear:.4g} mm ({report.wear_low:.4g} to {report.wear_high:.4g}, by {by})")
     table.add_row("remaining", f"{report.remaining:.4g} mm {_end(limits)}")
     interval = f"{rate.low:.3g} to {rate.high:.3g} at {100 * rate.confidence:g} %"
     table.add_row("rate", f"{rate.rate:.3g} mm a day ({interval}), {_yearly(rate.rate)} mm a year")
