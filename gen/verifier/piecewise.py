@@ -92,23 +92,25 @@ class Pieces:
         first, found = self._found[key]
         return abs(fraction(leading / first)) * found
 
-    def excess(self, numerator: fmpq_poly, rising: fmpq_poly, low: Fraction, high: Fraction) -> Fraction:
-        """Upper bound, over all n, of ``|f[n]|`` minus the sum over k > n of what r[k] contributes; 0 if there is none.
+    def excess(
+        self, numerator: fmpq_poly, rising: fmpq_poly, low: Fraction, high: Fraction
+    ) -> tuple[Fraction, Fraction]:
+        """Upper bounds, over all n, of ``|f[n]|`` minus the sum over k > n of what r[k] contributes; 0 if there is none.
 
-        f and r are the responses of `numerator` and `rising`. What drives r is in [low, high], which contains zero, and
-        the contribution is that to the upper limit or to the lower one, whichever is less. Sums are known to about 20
-        bits.
+        f and r are the responses of `numerator` and `rising`. What drives r is in [low, high], which contains zero. The
+        first bound is with what it contributes to the upper limit, the second to the lower one. Sums are known to about
+        20 bits.
         """
         (f, f_doubts, off), (r, r_doubts, r_off) = map(self._samples, (numerator, rising))
         count, largest = max(len(f), len(r)) + 1, max(-low, high)
         most = np.pad(np.abs(f) + f_doubts, (0, count - len(f)))
-        more = 0.0
+        found = []
         for ends in ((float(low), float(high)), (-float(high), -float(low))):
             least = np.maximum(np.maximum(ends[0] * r, ends[1] * r) - float(largest) * r_doubts, 0.0)
             least = np.pad(least, (0, count - len(r)))
             behind = np.cumsum(least[:0:-1])[::-1] * (1 - 2.0**-20)  # more than the rounding of these sums
-            more = max(more, float((most[:-1] - behind).max()))
-        return Fraction(more) + off + largest * r_off
+            found.append(Fraction(max(0.0, float((most[:-1] - behind).max()))) + off + largest * r_off)
+        return found[0], found[1]
 
     def distance(self, numerator: fmpq_poly, other: Pieces, subtracted: fmpq_poly) -> Fraction | None:
         """Upper bound of the sum of magnitudes ``|N/D - N'/D'|``, the second response one of `other`, hardly above it.

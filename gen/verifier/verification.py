@@ -431,7 +431,8 @@ def _extremes(over: _Denominator, driven: Sequence[_Driven], *, rough: bool = Fa
 
     If every range contains zero, each term with the worst u is on one side of it, and the limits are those of the whole
     sums: with ``u = c + v`` and ``|v| <= r``, c times the sum of all samples, and r times the sum of magnitudes. If one
-    does not, sums up to some n may be beyond these, by what `_overshoot` bounds.
+    does not, sums up to some n may be beyond these, by what `_overshoot` bounds. If that is not next to nothing, they
+    are followed from sample to sample, unless limits may be `rough`.
     """
     summed = _summed_up(driven)
     centre = reach = Fraction(0)
@@ -442,22 +443,29 @@ def _extremes(over: _Denominator, driven: Sequence[_Driven], *, rough: bool = Fa
     if not apart:
         return centre - reach, centre + reach
     more = _overshoot(over, apart, summed)
-    if more is None or more > reach * _NEGLIGIBLE:
+    if more is None or (max(more) > reach * _NEGLIGIBLE and not rough):
         return _running_extremes(over, summed)
-    return centre - reach - more, centre + reach + more
+    above, below = more
+    return centre - reach - below, centre + reach + above
 
 
-def _overshoot(over: _Denominator, apart: Sequence[_Driven], driven: Sequence[_Driven]) -> Fraction | None:
-    """Bound on how far sums up to some n leave the limits of the whole sums; None if responses are short.
+def _overshoot(
+    over: _Denominator, apart: Sequence[_Driven], driven: Sequence[_Driven]
+) -> tuple[Fraction, Fraction] | None:
+    """Bounds on how far sums up to some n leave the upper and lower limit of whole sums; None if responses are short.
 
-    What is still to come after n, with the worst u, is the sum over all drives and k > n of ``c h_k + r |h_k|``. It is
-    negative at most by the magnitude of the sum of ``c h_k`` for the drives `apart`, whose ranges do not contain zero.
-    Of the others no term is negative, and those of the largest one are taken as they are.
+    Each of the drives `apart`, whose ranges do not contain zero, is a constant, its end next to zero, and a drive from
+    there on, whose range does. What is still to come after n, with the worst u, is negative at most by the magnitude of
+    what is to come of the constants. Of all the others no term is negative, and those of the largest one are taken as
+    they are.
     """
-    others = [one for one in driven if one[1] <= 0 <= one[2]]
-    if over.pieces is None or not others:
+    if over.pieces is None:
         return None
-    steady = sum((numerator * _rational((low + high) / 2) for numerator, low, high in apart), fmpq_poly([0]))
+    steady, others = fmpq_poly([0]), [one for one in driven if one[1] <= 0 <= one[2]]
+    for numerator, low, high in apart:
+        constant = low if low > 0 else high
+        steady += numerator * _rational(constant)
+        others.append((numerator, low - constant, high - constant))
     whole = over.polynomial * (steady(1) / over.polynomial(1))
     falling = (whole - steady) / fmpq_poly([1, -1])
     largest = max(others, key=lambda one: (one[2] - one[1]) * over.norm(one[0], rough=True))
