@@ -95,7 +95,7 @@ class Pieces:
     def excess(
         self, numerator: fmpq_poly, rising: fmpq_poly, low: Fraction, high: Fraction
     ) -> tuple[Fraction, Fraction]:
-        """Upper bounds, over all n, of ``|f[n]|`` minus the sum over k > n of what r[k] contributes; 0 if there is none.
+        """Upper bounds, over all n, of ``|f[n]|`` minus the sum over k > n of what r[k] contributes; at least 0.
 
         f and r are the responses of `numerator` and `rising`. What drives r is in [low, high], which contains zero. The
         first bound is with what it contributes to the upper limit, the second to the lower one. Sums are known to about
