@@ -4,7 +4,7 @@ import pytest
 
 from tests.house import ROOMS, ROOT, WITH_SUB_ROOMS, arrows, floors, imported, modules
 
-ABOVE = ("cli", "commands", "interface", "host", "terminal")
+ABOVE = ("cli", "commands", "studio", "interface", "host", "terminal")
 """What stands above the rooms, in src/sosmith."""
 MAX_PARTS = 20
 
@@ -40,6 +40,15 @@ def test_the_verifier_shares_nothing_with_what_it_checks() -> None:
     allowed = ("sosmith.gen.verifier", "sosmith.model.errors")
     shared = {f"{path} from {name}" for path in inside for name in imported(path) if not name.startswith(allowed)}
     assert shared == set()
+
+
+def test_the_studio_computes_with_the_public_interface_only() -> None:
+    inside = sorted((ROOT / "src" / "sosmith" / "studio").glob("*.py"))
+    assert len(inside) > 4
+    # beside it: how a page is framed, and how a file is written
+    allowed = ("sosmith.studio", "sosmith.model.templates", "sosmith.model.text_files", "sosmith.gen.report")
+    others = {f"{path.name} from {name}" for path in inside for name in imported(path) if not name.startswith(allowed)}
+    assert others == set()
 
 
 @pytest.mark.parametrize("folder", [*ROOMS, "src/sosmith/commands", "tests"])

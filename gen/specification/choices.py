@@ -5,6 +5,13 @@ Those of `hardware.protect` are in `sosmith.model.dataflow.protection`.
 
 FAMILIES = ("butterworth", "chebyshev1", "chebyshev2", "elliptic", "bessel")
 KINDS = ("lowpass", "highpass", "bandpass", "bandstop")
+LOSSES = {
+    "chebyshev1": ("passband_loss",),
+    "chebyshev2": ("stopband_loss",),
+    "elliptic": ("passband_loss", "stopband_loss"),
+}
+"""Losses that a family needs in addition to order and cutoff: they set the size of its ripples."""
+
 METHODS = ("bilinear", "impulse_invariant")
 REALIZATIONS = ("auto", "df1", "df1_ef1", "df1_ef2", "df2t", "delta", "state_space", "normal", "lattice_wdf")
 STARTS = ("steady", "zero")

@@ -9,7 +9,7 @@ import math
 from collections.abc import Sequence
 from fractions import Fraction
 
-from sosmith.gen.specification.choices import CALIBRATION_INPUTS, FAMILIES, KINDS
+from sosmith.gen.specification.choices import CALIBRATION_INPUTS, FAMILIES, KINDS, LOSSES
 from sosmith.gen.specification.schema import MAX_ORDER, Document, FilterTable, InputTable
 from sosmith.gen.specification.uncertainty import check_coefficients
 from sosmith.gen.specification.values import UnfitError, identifier, key_text, listed, literal, one_of
@@ -29,9 +29,6 @@ _FORMS = (
     "given by order and cutoff, by passband_edge, stopband_edge, passband_loss and stopband_loss, "
     "or by one of sos and sos_file"
 )
-
-_LOSSES = {"chebyshev1": ("passband_loss",), "chebyshev2": ("stopband_loss",), "elliptic": _BY_EDGES[2:]}
-"""Losses that a family needs in addition to order and cutoff: they set the size of its ripples."""
 
 
 def check(document: Document) -> None:
@@ -138,7 +135,7 @@ def _check_by_order(table: FilterTable, given: Sequence[str], sample_rate: Fract
     family, kind = _family_and_kind(table)
     if table.method == "impulse_invariant":
         _check_impulse_invariant(table, family, kind)
-    losses = _LOSSES.get(family, ())
+    losses = LOSSES.get(family, ())
     beside = f"with order and cutoff for {family}"
     _check_given(given, _BY_ORDER)
     for key in _BY_EDGES[2:]:

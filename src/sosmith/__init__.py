@@ -2,7 +2,7 @@
 
 The public interface is the names in `__all__`; docs/python.md documents them. Everything is imported on first use, so
 that importing the package itself is fast. The rooms behind it, each importing only from those to its right:
-``cli -> interface -> host -> sim -> gen -> hdl -> model``.
+``cli -> studio -> interface -> host -> sim -> gen -> hdl -> model``.
 """
 
 from __future__ import annotations
@@ -23,9 +23,11 @@ if TYPE_CHECKING:
     from sosmith.interface.comparison import Comparison, compare
     from sosmith.interface.design import Coefficient, Design, Section, design
     from sosmith.interface.exploration import Exploration, explore
+    from sosmith.interface.filter import Filter
     from sosmith.interface.quantity import Quantity
     from sosmith.interface.report import Report
     from sosmith.interface.specification import Specification
+    from sosmith.interface.trace import Trace
     from sosmith.model.errors import (
         LinkError,
         LinkLostError,
@@ -47,6 +49,7 @@ __all__ = [
     "Comparison",
     "Design",
     "Exploration",
+    "Filter",
     "Identity",
     "LinkError",
     "LinkLostError",
@@ -62,6 +65,7 @@ __all__ = [
     "Specification",
     "SpecificationError",
     "ToolError",
+    "Trace",
     "__version__",
     "compare",
     "design",
@@ -78,9 +82,11 @@ _MODULES = {
     "interface.comparison": ("Comparison", "compare"),
     "interface.design": ("Coefficient", "Design", "Section", "design"),
     "interface.exploration": ("Exploration", "explore"),
+    "interface.filter": ("Filter",),
     "interface.quantity": ("Quantity",),
     "interface.report": ("Report",),
     "interface.specification": ("Specification",),
+    "interface.trace": ("Trace",),
     "model.link.identity": ("Identity",),
     "model.errors": (
         "LinkError",

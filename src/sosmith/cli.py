@@ -61,6 +61,9 @@ _COMMANDS = {
         "reload_command",
         "Prove that a running core can load new coefficients, and save the register writes.",
     ),
+    "studio": _Command(
+        "studio", "studio_command", "Design a filter by looking: a page with the design of SPEC, live and proven."
+    ),
     "build": _Command(
         "build",
         "build_command",
@@ -94,23 +97,25 @@ _COMMANDS = {
         "Design every combination of values, and show the Pareto front of proven error against cost.",
     ),
     "calibrate": _Command(
-        "calibrate",
+        "instrument.calibrate",
         "calibrate",
         "Store sensor measurements, and refit the calibration with every addition.",
     ),
     "spectrum": _Command(
-        "spectrum",
+        "instrument.spectrum",
         "spectrum_command",
         "Show the spectra of traces, and propose a low-pass filter based on them.",
     ),
-    "vehicle": _Command("vehicle", "vehicle", "Simulate the motion of a six-axle locomotive on a track."),
+    "vehicle": _Command("instrument.vehicle", "vehicle", "Simulate the motion of a six-axle locomotive on a track."),
     "wear": _Command(
-        "wear",
+        "instrument.wear",
         "wear_command",
         "Estimate the wear, wear rate and remaining life of a wheel flange from TRACE.csv.",
     ),
     "paper": _Command(
-        "paper", "paper", "Recompute the paper's equations and tables, and compare them with the printed figures."
+        "instrument.paper",
+        "paper",
+        "Recompute the paper's equations and tables, and compare them with the printed figures.",
     ),
     "demo": _Command(
         "simulate", "demo", "Run the complete flow on the built-in example: a locomotive's flange wear at 100 Hz."
@@ -118,14 +123,11 @@ _COMMANDS = {
 }
 """The commands in the order they are used; the module of each one is imported when the command is called."""
 
-_LATER = ("studio",)
-"""Commands that are planned but not available yet."""
-
 _INTERRUPTED = 130
 
 
 class _Commands(click.Group):
-    """Lists commands without importing them, and recognizes those that are planned."""
+    """Lists commands without importing them."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(_COMMANDS)
@@ -138,8 +140,6 @@ class _Commands(click.Group):
             return command
         if ctx.resilient_parsing:  # during shell completion
             return None
-        if cmd_name in _LATER:
-            raise click.UsageError(f"{cmd_name} is not yet available: the commands so far are {', '.join(_COMMANDS)}")
         raise click.UsageError(f"No such command {cmd_name!r}{did_you_mean(cmd_name, _COMMANDS)}.", ctx)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:

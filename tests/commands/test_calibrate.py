@@ -13,7 +13,7 @@ import pytest
 from tests.commands.invocation import Invocation
 from tests.model.calibration.measuring import readings, write_csv
 
-from sosmith.commands.calibrate import calibrate
+from sosmith.commands.instrument.calibrate import calibrate
 from sosmith.gen.core import design_core
 from sosmith.gen.instrument.uncertainty_budget import instrument_of
 from sosmith.gen.specification.specification import example, load

@@ -24,12 +24,14 @@ from sosmith.gen.output.manifest import manifest
 from sosmith.gen.output.packages.package import package
 from sosmith.gen.output.packages.vlnv import Vlnv
 from sosmith.gen.output.vectors import check_format
+from sosmith.gen.stimuli import bench_of
 from sosmith.gen.word_lengths.cost import Cost
 from sosmith.interface.certificate import Certificate, Progress, Proof
 from sosmith.interface.inputs import codes_of, encoded, traces_of
 from sosmith.interface.notebook import table_html
 from sosmith.interface.quantity import Quantity
 from sosmith.interface.specification import Specification, specification_of
+from sosmith.interface.trace import Trace
 from sosmith.model.calibration.measurement_files import parse_date
 from sosmith.model.errors import SpecificationError
 from sosmith.model.reference.golden import calibrated, filtered
@@ -287,6 +289,48 @@ class Design:
             for k in range(block.shape[1])
         ]
         return np.stack(columns, axis=1).reshape(codes.shape[:-1])
+
+    @property
+    def scenarios(self) -> dict[str, str]:
+        """Descriptions of the built-in traces for this design, by their names; `trace` and `simulate` take them."""
+        from sosmith.model.scenarios.summaries import SUMMARIES, fitting
+
+        return {name: SUMMARIES[name].description for name in fitting(bench_of(self.core).kind)}
+
+    def trace(self, source: str | PathLike[str] | None = None, *, seconds: float | None = None, seed: int = 1) -> Trace:
+        """Make the inputs of a built-in trace, or read those of a file.
+
+        Parameters
+        ----------
+        source : str or path
+            Name of a built-in trace, one of `scenarios`, or a CSV or scenario file. By default a trace that exercises
+            most of the design.
+        seconds : float
+            Length of a built-in trace, in seconds of simulated time.
+        seed : int
+            Random seed for its noise.
+
+        Raises
+        ------
+        SpecificationError
+            If there is no such trace, or the file does not fit.
+
+        Examples
+        --------
+        >>> import sosmith
+        >>> design = sosmith.design({
+        ...     "name": "smooth",
+        ...     "sample_rate": 1000,
+        ...     "input": {"x": {"bits": 12, "range": [-1.0, 1.0], "signed": True}},
+        ...     "filter": {"family": "butterworth", "kind": "lowpass", "order": 2, "cutoff": 100.0},
+        ...     "output": {"bits": 12, "range": [-1.0, 1.0], "signed": True},
+        ... })
+        >>> trace = design.trace("noise", seconds=0.5)
+        >>> error = design.run(**trace.inputs) - design.run_exact(**trace.inputs)
+        >>> len(trace.time), bool(abs(error).max() <= design.bound)
+        (500, True)
+        """
+        return Trace.of(traces_of(self.core, source, seed=seed, seconds=seconds))
 
     def board(self) -> Board:
         """Open a `Board` at whose other end is the integer model: for trying out, and for tests without hardware.

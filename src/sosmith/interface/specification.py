@@ -9,14 +9,17 @@ from os import PathLike, fspath
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from sosmith.gen.specification.choices import ARCHITECTURES, FAMILIES, KINDS, LOSSES, METHODS, REALIZATIONS, STARTS
 from sosmith.gen.specification.exact_values import exact
 from sosmith.gen.specification.specification import Specification as Checked
-from sosmith.gen.specification.specification import example, from_tree, load
+from sosmith.gen.specification.specification import example, from_text, from_tree, load
 from sosmith.interface.quantity import Quantity
 from sosmith.model.errors import SpecificationError
 
 if TYPE_CHECKING:
     import numpy.typing as npt
+
+    from sosmith.interface.filter import Filter
 
 _UNNAMED = Path("specification")
 """Name in messages for a specification that does not come from a file."""
@@ -70,6 +73,32 @@ class Specification:
         if isinstance(source, Mapping):
             return cls(from_tree(exact(source), _UNNAMED))
         return cls(load(Path(fspath(source))))
+
+    @classmethod
+    def from_toml(cls, text: str, path: str | PathLike[str] = _UNNAMED) -> Specification:
+        """Check the text of a TOML file.
+
+        Parameters
+        ----------
+        text : str
+            The text.
+        path : path
+            Name of the file in messages, which need not exist; files that the text names are relative to its folder.
+
+        Raises
+        ------
+        SpecificationError
+            As `load`.
+
+        Examples
+        --------
+        >>> import sosmith
+        >>> sosmith.Specification.from_toml("name = 3", "my.toml")
+        Traceback (most recent call last):
+        ...
+        sosmith.model.errors.SpecificationError: my.toml: name must be ..., not 3 (and 4 more)
+        """
+        return cls(from_text(text, Path(fspath(path))))
 
     @classmethod
     def from_sos(
@@ -187,6 +216,50 @@ class Specification:
         """
         tree = {key: value for key, value in (self.as_dict() | keys).items() if value is not None}
         return type(self)(from_tree(exact(tree), self.checked.path))
+
+    @staticmethod
+    def choices() -> dict[str, tuple[str, ...]]:
+        """Return the valid names of each key that takes one of several, by the path of the key.
+
+        Examples
+        --------
+        >>> import sosmith
+        >>> sosmith.Specification.choices()["filter.kind"]
+        ('lowpass', 'highpass', 'bandpass', 'bandstop')
+        """
+        return {
+            "filter.family": FAMILIES,
+            "filter.kind": KINDS,
+            "filter.method": METHODS,
+            "hardware.realization": REALIZATIONS,
+            "hardware.architecture": ARCHITECTURES,
+            "hardware.start": STARTS,
+        }
+
+    @staticmethod
+    def losses(family: str) -> tuple[str, ...]:
+        """Return the keys of the losses that a family of filters needs beside order and cutoff.
+
+        Examples
+        --------
+        >>> import sosmith
+        >>> sosmith.Specification.losses("elliptic"), sosmith.Specification.losses("bessel")
+        (('passband_loss', 'stopband_loss'), ())
+        """
+        return LOSSES.get(family, ())
+
+    @property
+    def filter(self) -> Filter:
+        """The ideal filter, without any rounding; takes milliseconds.
+
+        Raises
+        ------
+        ShortfallError
+            If there is no such filter, for instance because no order meets the edges.
+        """
+        from sosmith.interface.filter import Filter
+
+        return Filter.of(self)
 
     @property
     def name(self) -> str:

@@ -1,0 +1,56 @@
+"""Inputs of a design over time, from a scenario or a file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from sosmith.model.traces.trace import Trace as Coded
+
+Floats = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """Inputs of a design over time, from `Design.trace`.
+
+    Arrays hold one sample per row, shape (samples,) for one channel and (samples, channels) for several.
+
+    Attributes
+    ----------
+    name : str
+        Name of the scenario or of the file.
+    time : ndarray of float, shape (samples,)
+        Time of each sample in s.
+    inputs : dict of str to ndarray of float
+        Physical values of each input: `Design.run(**inputs)` takes them.
+    truth : ndarray of float or None
+        True values, in the unit of the output, if they are known.
+    """
+
+    name: str
+    time: Floats = field(repr=False)
+    inputs: dict[str, Floats] = field(repr=False)
+    truth: Floats | None = field(repr=False)
+
+    @classmethod
+    def of(cls, channels: Sequence[Coded]) -> Trace:
+        """Make it of one trace per channel, all of the same length."""
+        first = channels[0]
+        truths = [trace.truth for trace in channels if trace.truth is not None]
+        return cls(
+            name=first.name,
+            time=first.time,
+            inputs={
+                port.name: _columns([port.decode(trace.codes[:, k]) for trace in channels])
+                for k, port in enumerate(first.ports)
+            },
+            truth=_columns(truths) if len(truths) == len(channels) else None,
+        )
+
+
+def _columns(channels: Sequence[Floats]) -> Floats:
+    return channels[0] if len(channels) == 1 else np.stack(channels, axis=1)

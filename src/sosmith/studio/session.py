@@ -1,0 +1,397 @@
+"""What is being designed: the text of a specification, and everything that is known about it at the moment."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from sosmith import SosmithError, Specification, SpecificationError
+from sosmith.model.text_files import write_files
+from sosmith.studio.edits import changed
+from sosmith.studio.lane import Lane, warm_up
+
+MAX_TEXT = 1 << 16
+"""Longest text of a specification, in characters."""
+
+MAX_FILE = 8 << 20
+"""Longest file that is dropped on the page, in characters."""
+
+LATE = 1.0
+"""Seconds after which a preview is given up for a newer one; before that, the newer one waits."""
+
+
+class MessageError(Exception):
+    """A page has said what no page of ours says."""
+
+
+class Session:
+    """The state behind the page, which changes by what pages say and by what jobs say.
+
+    The state is one tree for JSON for each topic: ``document``, ``preview``, ``proof``, ``realizations``, ``trace``,
+    ``report``, ``calibration``. `wait` returns what is new.
+
+    Parameters
+    ----------
+    file : Path
+        Where the specification is saved; relative names in it are relative to its folder.
+    text : str
+        The text to begin with.
+    on_disk : str or None
+        Content of `file` as it was read; None if it is not the file that was read, and must not be replaced unasked.
+    folder : Path
+        Folder of the session, for dropped files and for the report.
+    """
+
+    def __init__(self, file: Path, text: str, on_disk: str | None, folder: Path) -> None:
+        self.file = file
+        self._text, self._on_disk = text, on_disk
+        self._folder = folder
+        warm_up()
+        lock = threading.RLock()
+        self._changed = threading.Condition(lock)
+        self._versions: dict[str, int] = {}
+        self._state: dict[str, Any] = {}
+        self._version = 0
+        self._last: tuple[str, int] = ("", 0)
+        self._previews, self._proofs, self._others = Lane(lock), Lane(lock), Lane(lock)
+        self._previewed, self._begun = "", 0.0
+        self._queued: Callable[[], None] | None = None
+        self._side_by_side = False
+        self._closed = False
+        self._tell("preview", {"error": None})
+        self._tell("realizations", {"state": "off", "rows": []})
+        for topic in ("trace", "report", "calibration"):
+            self._tell(topic, {"state": "none"})
+        self._renew(moving=False)
+
+    @property
+    def report(self) -> Path:
+        """The report of the last co-simulation, which may not exist."""
+        return self._folder / "report" / "report.html"
+
+    @property
+    def processes(self) -> list[int]:
+        """Ids of the processes that work for this session."""
+        return [pid for lane in (self._previews, self._proofs, self._others) for pid in lane.processes]
+
+    @property
+    def busy(self) -> bool:
+        """Whether any job is being done."""
+        return any(lane.busy for lane in (self._previews, self._proofs, self._others))
+
+    def wait(self, seen: int, left: threading.Event) -> tuple[int, dict[str, Any], bool]:
+        """Wait for news after version `seen`; return their version, the topics that are new, and whether it is the end.
+
+        Once `left` is set, the next call of `nudge` ends the wait.
+        """
+        with self._changed:
+            while self._version == seen and not self._closed and not left.is_set():
+                self._changed.wait()
+            return (
+                self._version,
+                {topic: self._state[topic] for topic, version in self._versions.items() if version > seen},
+                self._closed or left.is_set(),
+            )
+
+    def nudge(self) -> None:
+        """Wake up all who wait."""
+        with self._changed:
+            self._changed.notify_all()
+
+    def close(self) -> None:
+        """End all work."""
+        with self._changed:
+            self._closed = True
+            self._changed.notify_all()
+        for lane in (self._previews, self._proofs, self._others):
+            lane.close()
+
+    def handle(self, message: Any, client: str) -> None:
+        """Do what a page asks for.
+
+        Parameters
+        ----------
+        message : dict
+            What is asked for, under ``"do"``, and how.
+        client : str
+            Which page it is.
+
+        Raises
+        ------
+        MessageError
+            If no page of ours says this.
+        """
+        actions: dict[str, Callable[[dict[str, Any]], None]] = {
+            "change": self._change,
+            "text": self._replace,
+            "save": self._save,
+            "reread": self._reread,
+            "realizations": self._compare,
+            "trace": self._trace,
+            "stop": self._stop,
+            "calibration": self._calibrate,
+        }
+        if not isinstance(message, dict) or message.get("do") not in actions:
+            raise MessageError
+        with self._changed:
+            self._last = client, int(_typed(message, "n", int, 0))
+            actions[message["do"]](message)
+
+    # What pages ask for
+
+    def _change(self, message: dict[str, Any]) -> None:
+        from tomlkit.exceptions import TOMLKitError
+
+        changes = _typed(message, "changes", dict)
+        try:
+            text = changed(self._text, changes)
+        except (TOMLKitError, TypeError, ValueError, AttributeError):
+            text = self._text  # it is no TOML, or a table is none: the preview says so
+        self._take(text, moving=_typed(message, "moving", bool, False))
+
+    def _replace(self, message: dict[str, Any]) -> None:
+        self._take(_short(_typed(message, "text", str), MAX_TEXT), moving=False)
+
+    def _take(self, text: str, *, moving: bool) -> None:
+        if len(text) > MAX_TEXT:
+            raise MessageError
+        if text == self._text and self._state["proof"]["state"] in {"working", "proven"}:
+            self._document()
+            return
+        self._text = text
+        self._renew(moving=moving)
+
+    def _save(self, message: dict[str, Any]) -> None:
+        try:
+            found = self.file.read_text(encoding="utf-8") if self.file.exists() else None
+        except (OSError, ValueError):
+            found = ""  # it is no specification of ours: ask
+        if found not in {None, self._on_disk} and not _typed(message, "overwrite", bool, False):
+            self._document(
+                question=f"{self.file.name} has changed on the disk since it was read. Overwrite it?"
+                if self._on_disk is not None
+                else f"There is a {self.file.name} already. Overwrite it?"
+            )
+            return
+        try:
+            write_files(self.file.parent, {self.file.name: self._text})
+        except SosmithError as error:
+            self._document(problem=str(error))
+            return
+        self._on_disk = self._text
+        self._document()
+
+    def _reread(self, message: dict[str, Any]) -> None:
+        try:
+            text = self.file.read_text(encoding="utf-8")
+        except (OSError, ValueError):
+            self._document(problem=f"{self.file}: the specification must be a readable file")
+            return
+        self._on_disk = text
+        self._take(_short(text, MAX_TEXT), moving=False)
+
+    def _compare(self, message: dict[str, Any]) -> None:
+        self._side_by_side = _typed(message, "on", bool)
+        if not self._side_by_side:
+            self._others.cancel()
+            self._tell("realizations", {"state": "off", "rows": []})
+        elif self._state["proof"]["state"] == "proven":
+            self._begin_side_by_side()
+
+    def _trace(self, message: dict[str, Any]) -> None:
+        topic = "report" if _typed(message, "report", bool, False) else "trace"
+        seconds = message.get("seconds")
+        if seconds is not None and not isinstance(seconds, int | float):
+            raise MessageError
+        source = _typed(message, "source", str)
+        if message.get("csv") is not None:
+            source = self._dropped("trace.csv", message)
+        elif source not in (self._state["proof"].get("result") or {}).get("scenarios", {}):
+            raise MessageError  # a name of ours, never a path
+        arguments: dict[str, Any] = {"source": source, "seconds": None if message.get("csv") is not None else seconds}
+        job = "trace"
+        if topic == "report":
+            job = "simulate"
+            arguments["folder"] = str(self._folder / "report")
+        self._tell(topic, {"state": "working", "step": "waiting for the proof"})
+
+        def begin() -> None:
+            self._proofs.run(self._noted(topic), job, text=self._text, path=str(self.file), **arguments)
+
+        if self._state["proof"]["state"] == "working":
+            self._queued = begin
+        else:
+            begin()
+
+    def _stop(self, message: dict[str, Any]) -> None:
+        self._queued = None
+        for topic in ("trace", "report"):
+            if self._state[topic]["state"] == "working":
+                if self._state["proof"]["state"] != "working":
+                    self._proofs.cancel()
+                self._tell(topic, {"state": "none"})
+
+    def _calibrate(self, message: dict[str, Any]) -> None:
+        place = self._dropped("measurements.csv", message)
+
+        def news(kind: str, value: Any) -> None:
+            with self._changed:
+                self._noted("calibration")(kind, value)
+                if kind == "result":
+                    self._change(
+                        {"changes": {"calibration.data": None, "calibration.coefficients": value["coefficients"]}}
+                    )
+
+        self._tell("calibration", {"state": "working", "step": "fitting"})
+        self._others.run(news, "calibrate", measurements=place)
+
+    def _dropped(self, name: str, message: dict[str, Any]) -> str:
+        """Keep a file that was dropped on the page, under a name of ours."""
+        place = self._folder / name
+        place.write_text(_short(_typed(message, "csv", str), MAX_FILE), encoding="utf-8")
+        return str(place)
+
+    # What follows
+
+    def _renew(self, *, moving: bool) -> None:
+        """Begin anew after a change of the text: what is known of the former one goes, or is marked as old."""
+        self._document()
+        if self._text != self._previewed and (not self._previews.busy or time.monotonic() > self._begun + LATE):
+            self._preview()
+        self._others.cancel()
+        if self._side_by_side:
+            self._tell("realizations", {"state": "waiting", "rows": []})
+        for topic in ("trace", "report"):
+            if self._state[topic]["state"] == "working" and self._queued is None:
+                self._tell(topic, {"state": "none"})
+            elif self._state[topic]["state"] == "done":
+                self._tell(topic, self._state[topic] | {"old": True})
+        result = self._state.get("proof", {}).get("result")
+        if moving:
+            self._proofs.cancel()
+            self._tell("proof", {"state": "waiting", "result": result})
+            return
+        self._tell("proof", {"state": "working", "step": "beginning", "result": result})
+        self._proofs.run(self._proof_news, "prove", text=self._text, path=str(self.file))
+
+    def _document(self, **more: str) -> None:
+        client, n = self._last
+        self._tell(
+            "document",
+            {
+                "text": self._text,
+                "file": self.file.name,
+                "saved": self._text == self._on_disk,
+                "client": client,
+                "n": n,
+                **more,
+            },
+        )
+
+    def _preview(self) -> None:
+        self._previewed, self._begun = self._text, time.monotonic()
+        last = self._last
+        self._previews.run(
+            lambda kind, value: self._preview_news(last, kind, value), "preview", text=self._text, path=str(self.file)
+        )
+
+    def _preview_news(self, last: tuple[str, int], kind: str, value: Any) -> None:
+        with self._changed:
+            told = {"client": last[0], "n": last[1]}
+            if kind == "result":
+                self._tell("preview", told | {"error": None, **value})
+            else:
+                error = value if kind == "refused" else "the preview must live until it is done, and has ended before"
+                self._tell("preview", self._state["preview"] | told | {"error": error})
+            if self._text != self._previewed:
+                self._preview()
+
+    def _proof_news(self, kind: str, value: Any) -> None:
+        with self._changed:
+            former = self._state["proof"].get("result")
+            if kind == "step":
+                self._tell("proof", {"state": "working", "step": value, "result": former})
+            elif kind == "result":
+                self._tell("proof", {"state": "proven", "result": value})
+                if self._side_by_side:
+                    self._begin_side_by_side()
+            else:
+                error = value if kind == "refused" else "the proof must live until it is done, and has ended before"
+                self._tell("proof", {"state": "refused", "error": error, "result": former})
+            if kind != "step" and self._queued is not None:
+                begin, self._queued = self._queued, None
+                begin()
+
+    def _begin_side_by_side(self) -> None:
+        rows: list[Any] = []
+
+        def news(kind: str, value: Any) -> None:
+            with self._changed:
+                state = {"step": "working", "part": "working", "result": "done"}.get(kind, "none")
+                if kind == "part":
+                    rows.append(value)
+                step = value if kind == "step" else ""
+                self._tell("realizations", {"state": state, "step": step, "rows": list(rows)})
+
+        self._tell("realizations", {"state": "working", "step": "", "rows": []})
+        self._others.run(news, "side_by_side", text=self._text, path=str(self.file))
+
+    def _noted(self, topic: str) -> Callable[[str, Any], None]:
+        """Return what tells a topic about a job."""
+
+        def news(kind: str, value: Any) -> None:
+            with self._changed:
+                if kind == "step":
+                    self._tell(topic, {"state": "working", "step": value})
+                elif kind == "result":
+                    self._tell(topic, {"state": "done", "old": False, **value})
+                else:
+                    error = value or "the process must live until its job is done, and has ended before"
+                    # a dropped file goes by its name, not by where it is kept
+                    self._tell(topic, {"state": "refused", "error": error.replace(f"{self._folder}/", "")})
+
+        return news
+
+    def _tell(self, topic: str, tree: dict[str, Any]) -> None:
+        with self._changed:
+            self._version += 1
+            self._versions[topic], self._state[topic] = self._version, tree
+            self._changed.notify_all()
+
+
+def opened(spec: Path | None, output: Path | None, folder: Path) -> Session:
+    """Open the specification in the file `spec`, or the example; save to `output` if it is given.
+
+    Raises
+    ------
+    SpecificationError
+        If the file cannot be read. What is wrong with its content, the page says.
+    """
+    if spec is None:
+        example = Specification.example()
+        return Session(output or Path(f"{example.name}.toml"), example.toml(), None, folder)
+    try:
+        text = spec.read_text(encoding="utf-8")
+    except (OSError, ValueError):
+        Specification.load(spec)  # says what is wrong with the file
+        raise SpecificationError(f"{spec}: the specification must be a readable file") from None
+    if len(text) > MAX_TEXT:
+        raise SpecificationError(f"{spec}: the specification must be at most {MAX_TEXT} characters, not longer")
+    same = output is None or output.resolve() == spec.resolve()
+    return Session(output or spec, text, text if same else None, folder)
+
+
+def _typed(message: dict[str, Any], key: str, kind: type, default: Any = None) -> Any:
+    value = message.get(key, default)
+    if not isinstance(value, kind):
+        raise MessageError
+    return value
+
+
+def _short(text: str, longest: int) -> str:
+    if len(text) > longest:
+        raise MessageError
+    return text
