@@ -31,6 +31,10 @@ def studio_command(spec: Path | None, output: Path | None, port: int, no_browser
     import tempfile
     import threading
 
+    from sosmith.studio.lane import warm_up
+
+    warm_up()  # loads what designs need while the server is loaded
+
     from sosmith.studio.server import Studio
     from sosmith.studio.session import opened
 

@@ -19,11 +19,7 @@ from sosmith.gen.fpga.boards import BUILDABLE, MODELLED, PROJECTS, RATE, find_bo
 from sosmith.gen.instrument.uncertainty_budget import InstrumentBudget, budget_of
 from sosmith.gen.output.certificate import about, certificate
 from sosmith.gen.output.core_facts import CoreFacts, core_facts
-from sosmith.gen.output.generate import generate
 from sosmith.gen.output.manifest import manifest
-from sosmith.gen.output.packages.package import package
-from sosmith.gen.output.packages.vlnv import Vlnv
-from sosmith.gen.output.vectors import check_format
 from sosmith.gen.stimuli import bench_of
 from sosmith.gen.word_lengths.cost import Cost
 from sosmith.interface.certificate import Certificate, Progress, Proof
@@ -32,7 +28,6 @@ from sosmith.interface.notebook import table_html
 from sosmith.interface.quantity import Quantity
 from sosmith.interface.specification import Specification, specification_of
 from sosmith.interface.trace import Trace
-from sosmith.model.calibration.measurement_files import parse_date
 from sosmith.model.errors import SpecificationError
 from sosmith.model.reference.golden import calibrated, filtered
 
@@ -391,6 +386,8 @@ class Design:
         ToolError
             If Yosys fails, or the disk is full.
         """
+        from sosmith.gen.output.generate import generate  # Amaranth is slow to import
+
         return generate(self.core, Path(fspath(folder)), lambda step: progress(step, 0, 0))
 
     def package(
@@ -418,6 +415,9 @@ class Design:
         ToolError
             If Yosys fails, or the disk is full.
         """
+        from sosmith.gen.output.packages.package import package
+        from sosmith.gen.output.packages.vlnv import Vlnv
+
         named = None if vlnv is None else Vlnv.read(vlnv)
         return package(self.core, Path(fspath(folder)), lambda step: progress(step, 0, 0), vlnv=named)
 
@@ -590,7 +590,9 @@ class Design:
             If the board does not answer.
         """
         # The simulation modules are slow to import; a design that only computes does not need them.
+        from sosmith.gen.output.vectors import check_format
         from sosmith.interface.report import Report
+        from sosmith.model.calibration.measurement_files import parse_date
         from sosmith.sim.simulation import simulate
         from sosmith.sim.simulators import check_name
 

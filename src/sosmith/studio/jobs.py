@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 import sosmith
-from sosmith import Calibration, Design, Filter, Report, Specification  # noqa: F401 (loads what they need)
+from sosmith import Design, Filter, Specification
 
 Tell = Callable[[str, Any], None]
 Floats = npt.NDArray[np.float64]
@@ -31,7 +31,7 @@ _proven: dict[str, Design] = {}
 def preview(tell: Tell, *, text: str, path: str) -> dict[str, Any]:
     """Return what a specification asks for and its ideal filter: takes milliseconds."""
     spec = _specification(text, path)
-    ideal = spec.filter
+    ideal: Filter = spec.filter
     f = ideal.frequencies(POINTS)
     gain = abs(ideal.frequency_response(f))
     level = max(float(gain.max()), 1e-12)
@@ -161,7 +161,7 @@ def simulate(tell: Tell, *, text: str, path: str, source: str, seconds: float | 
     def progress(step: str, done: int, total: int) -> None:
         tell("step", f"{step}, {done:,} of {total:,}" if total else step)
 
-    report: Report = made.simulate(source, seconds=seconds, folder=folder, progress=progress)
+    report = made.simulate(source, seconds=seconds, folder=folder, progress=progress)
     return {
         "passed": report.passed,
         "shortfalls": list(report.shortfalls),
@@ -173,7 +173,7 @@ def simulate(tell: Tell, *, text: str, path: str, source: str, seconds: float | 
 
 def calibrate(tell: Tell, *, measurements: str) -> dict[str, Any]:
     """Fit a calibration to the measurements in a CSV file."""
-    fitted = Calibration.load(measurements)
+    fitted = sosmith.Calibration.load(measurements)
     given = fitted.measurements
     widths = fitted.half_width(given.voltage, given.temperature)
     return {

@@ -38,15 +38,14 @@ function release(changes) {
   change(changes);
 }
 
-function asked(path) {
-  if (pending[path]) return pending[path].value;
-  return path.split(".").reduce((tree, key) => (tree === undefined || tree === null ? undefined : tree[key]), known.preview && known.preview.spec);
-}
+// What the specification has, and what it will have once the changes are answered that are on their way.
+const given = (path) => path.split(".").reduce((tree, key) => (tree === undefined || tree === null ? undefined : tree[key]), known.preview && known.preview.spec);
+const asked = (path) => (pending[path] ? pending[path].value : given(path));
 
 const numbers = (value) => (value === undefined || value === null ? [] : Array.isArray(value) ? value : [value]);
 const rounded = (value, digits = 5) => Number(value.toPrecision(digits));
 const withUnit = (text, unit) => (unit ? `${text} ${unit}` : text);
-const isBand = () => ["bandpass", "bandstop"].includes(asked("filter.kind"));
+const isBand = () => ["bandpass", "bandstop"].includes(given("filter.kind"));
 
 function say(id, text) {
   if (byId(id).textContent !== text) byId(id).textContent = text;
@@ -75,7 +74,7 @@ function rows(table, head, body) {
 // ---- Controls
 
 const fields = [...document.querySelectorAll("[data-key]")];
-const form = () => (numbers(asked("filter.passband_edge")).length ? "mask" : numbers(asked("filter.cutoff")).length ? "order" : "sections");
+const form = () => (numbers(given("filter.passband_edge")).length ? "mask" : numbers(given("filter.cutoff")).length ? "order" : "sections");
 
 for (const field of fields.filter((each) => each.tagName === "SELECT")) {
   for (const name of choices[field.dataset.key]) field.append(element("option", name, { value: name }));
