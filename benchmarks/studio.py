@@ -1,11 +1,11 @@
 """Measures how fast the studio leads to a proven design, for docs/speed.md: `python -m benchmarks.studio`.
 
-Each example is opened with `sosmith studio`. As soon as its response is there, the cutoff is changed, as a page does it,
-and the proof of the changed design is waited for; then it is changed once more. Times are of a clock on the wall, from the
-start of the command for the first proof, so the machine must have nothing else to do; the least of several runs
-counts. Processor time is that of all processes of the studio when the first proof is there. The figures are recorded in
-benchmarks/studio.json; `--document` only writes the section of the document from that record again. `--check` writes
-nothing, and fails if an example takes longer than the goal.
+Each example is opened with `sosmith studio`. As soon as its response is there, the cutoff is changed, as a page does
+it, and the proof of the changed design is waited for; then it is changed once more. Times are of a clock on the wall,
+for the first proof from the start of the command, so the machine must have nothing else to do; the least of several
+runs counts. Processor time is that of all processes of the studio when the first proof is there. The figures are
+recorded in benchmarks/studio.json; `--document` only writes the section of the document from that record again.
+`--check` writes nothing, and fails if an example takes longer than the goal.
 """
 
 from __future__ import annotations
@@ -138,13 +138,13 @@ def section(rows: list[Times]) -> str:
     return f"""
 ## The studio
 
-Written by `python -m benchmarks.studio` from the figures that it records in `benchmarks/studio.json`. `--check` measures
-again and fails if an example takes longer than {GOAL:g} s.
+Written by `python -m benchmarks.studio` from the figures that it records in `benchmarks/studio.json`. `--check`
+measures again and fails if an example takes longer than {GOAL:g} s.
 
 `sosmith studio` opens an example; as soon as its response is shown, the cutoff is changed, and then once more. Seconds
-of a clock on the wall: the first two from the start of the command, the third from the second change. The processor time
-is that of all processes until the first proof, most of it on two cores at once. The goal, {GOAL:g} s from opening to a proven
-design of a changed cutoff on two cores, is {kept} here.
+of a clock on the wall: the first two from the start of the command, the third from the second change. The processor
+time is that of all processes until the first proof, partly on two cores at once. The goal, {GOAL:g} s from opening to a
+proven design of a changed cutoff on two cores, is {kept} here.
 
 {table(rows)}
 """

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import pytest
-from benchmarks import design, model, random_designs, simulation, speed_page
+from benchmarks import design, model, random_designs, simulation, speed_page, studio
 
 
 def test_the_document_shows_the_recorded_figures() -> None:
@@ -80,3 +80,14 @@ def test_a_random_design_that_is_slow_is_named_and_gaps_are_told() -> None:
     assert "| seeds up to 200 not measured yet, or stopped | 1, 3, 6 to 200 |" in text
     assert "| slowest design | 30.0 s (long) |" in text
     assert "| above 30 s, or verified more slowly than designed | 2 |" in text
+
+
+def test_an_example_that_takes_too_long_in_the_studio_is_named() -> None:
+    quick = studio.Times("quick", 1.0, 2.9, 1.0, 3.0)
+    slow = studio.Times("slow", 1.0, 3.14, 1.0, 3.0)
+    assert studio.losses([], [quick, slow]) == [
+        "slow: a changed cutoff must be proven within 3 s of opening, not 3.1 s"
+    ]
+    assert "is not reached for slow here" in studio.section([quick, slow]).replace("\n", " ")
+    assert "is reached for all of them here" in studio.section([quick]).replace("\n", " ")
+    assert "| quick | 1.0 | 2.9 | 1.0 | 3.0 |\n" in studio.section([quick])

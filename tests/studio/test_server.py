@@ -18,7 +18,7 @@ from urllib.request import Request, urlopen
 
 import pytest
 from tests.interface.small import FILTER
-from tests.studio.sessions import PATIENCE, file_in, session_in
+from tests.studio.sessions import PATIENCE, file_in, proven, session_in, state, until
 from tests.studio.test_session import lives
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import ClientConnection, connect
@@ -181,3 +181,42 @@ def test_a_specification_that_cannot_be_read_is_refused_at_once(tmp_path: Path) 
     assert (process.returncode, output) == (2, "")
     told = "the specification must be a readable file, not: no such file or directory"
     assert errors == f"sosmith: error: {tmp_path}/none.toml: {told}\n"
+
+
+@pytest.mark.slow
+def test_a_cosimulation_ends_in_a_report_under_the_same_address(studio: tuple[Session, Studio]) -> None:
+    session, server = studio
+    proven(session)
+    session.handle({"do": "trace", "source": "noise", "seconds": 0.5, "report": True}, "page")
+    known = until(session, lambda known: known["report"]["state"] in {"done", "refused"})
+    assert known["report"] | {"simulator": "verilator"} == {
+        "state": "done",
+        "old": False,
+        "passed": True,
+        "shortfalls": [],
+        "samples": 500,
+        "simulator": "verilator",
+        "bit_exact": True,
+    }
+    with urlopen(server.address + "report") as answer:
+        assert "script-src 'unsafe-inline'" in answer.headers["Content-Security-Policy"]
+        assert "connect-src" not in answer.headers["Content-Security-Policy"]
+        assert "<title>plain" in answer.read().decode()
+
+
+@pytest.mark.slow
+def test_a_stopped_cosimulation_leaves_no_simulator(studio: tuple[Session, Studio]) -> None:
+    session, _ = studio
+    proven(session)
+    session.handle({"do": "change", "changes": {"filter.cutoff": 121.0}}, "page")
+    session.handle({"do": "trace", "source": "noise", "seconds": 900.0, "report": True}, "page")
+    until(session, lambda known: "of" in known["report"].get("step", "") and children_of(session))
+    family = children_of(session)
+    session.handle({"do": "stop"}, "page")
+    assert state(session)["report"] == {"state": "none"}
+    assert [pid for pid in family if lives(pid)] == []
+
+
+def children_of(session: Session) -> set[int]:
+    """Ids of the processes that a session's own have started."""
+    return {child for pid in session.processes for child in children(pid)}

@@ -13,8 +13,8 @@ from typing import Any
 
 from sosmith.studio.worker import PRELOADED, work
 
-PATIENCE = 5.0
-"""Seconds that a process has to end in order."""
+PATIENCE = 30.0
+"""Seconds that a process has to end in order, which takes hundredths of one; killed, it could not end its simulator."""
 
 News = Callable[[str, Any], None]
 """Told what a job says: a kind, which is one of those in `sosmith.studio.worker.work` or ``"died"``, and its value."""

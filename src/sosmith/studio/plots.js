@@ -18,10 +18,16 @@ function short(value, digits = 4) {
   if (value === 0) return "0";
   const size = Math.abs(value);
   if (size < 1e-4 || size >= 1e7) {
-    const [mantissa, power] = value.toExponential(Math.max(digits - 2, 0)).split("e");
+    const [mantissa, power] = value.toExponential(digits - 1).split("e");
     return minus(`${Number(mantissa)} × 10`) + superscript(Number(power));
   }
   return minus(Number(value.toPrecision(digits)).toLocaleString("en", { maximumSignificantDigits: digits }));
+}
+
+// Seconds in the unit in which a number of this size is read.
+function inTime(size) {
+  const [factor, unit] = [[1, "s"], [1e3, "ms"], [1e6, "µs"], [1e9, "ns"]].find(([each]) => size * each >= 0.5) || [1, "s"];
+  return { factor, unit, text: (value, digits = 4) => `${short(value * factor, digits)} ${unit}` };
 }
 
 const superscript = (power) => [...`${power}`].map((each) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[each] ?? "⁻").join("");

@@ -327,20 +327,22 @@ function step() {
   const { step: { t, y }, filter } = known.preview;
   const facts = [];
   if (filter.overshoot !== null) facts.push(`overshoot ${short(100 * filter.overshoot, 3)} %`);
-  if (filter.settling !== null) facts.push(`within 1 % after ${short(filter.settling, 4)} s`);
+  if (filter.settling !== null) facts.push(`within 1 % after ${inTime(filter.settling).text(filter.settling)}`);
   say("stepfacts", facts.join(", "));
   if (!t.length) { byId("step").replaceChildren(element("p", "It does not settle in a million samples.")); return; }
-  const to = axes(byId("step"), { x: [0, t.at(-1) || 1], y: span([0, ...y]), xUnit: "s" });
-  curve(to, "ideal", t, y);
+  const { factor, unit } = inTime(t.at(-1));
+  const to = axes(byId("step"), { x: [0, factor * t.at(-1) || 1], y: span([0, ...y]), xUnit: unit });
+  curve(to, "ideal", t.map((time) => factor * time), y);
   shown(byId("step"), to, "Step response");
 }
 
 function delay() {
   const { response, filter } = known.preview, where = byId("delay");
   const pass = filter.passbands.length ? response.delay.filter((_, k) => filter.passbands.some(([from, until]) => response.f[k] >= from && response.f[k] <= until)) : response.delay;
-  const to = axes(where, { x: scales.range.x, y: span([0, ...(pass.length > 2 ? pass : response.delay)], 0.15), logarithmic: true, xUnit: "Hz", yUnit: "s" });
-  curve(to, "ideal", response.f, response.delay);
-  shown(where, to, "Group delay over frequency, in seconds");
+  const values = span([0, ...(pass.length > 2 ? pass : response.delay)], 0.15), { factor, unit } = inTime(values[1]);
+  const to = axes(where, { x: scales.range.x, y: values.map((each) => factor * each), logarithmic: true, xUnit: "Hz", yUnit: unit });
+  curve(to, "ideal", response.f, response.delay.map((each) => (each === null ? null : factor * each)));
+  shown(where, to, `Group delay over frequency, in ${unit}`);
 }
 
 // The unit circle, or its neighbourhood of z = 1 where the poles of a low cutoff would fall into one spot.
@@ -364,7 +366,7 @@ function plane() {
   where.replaceChildren(svg);
   const far = poles.length ? Math.max(...poles.map(([re, im]) => Math.hypot(re, im))) : 0;
   const radii = poles.length ? `radius up to ${far > 0.999 ? `1 − ${short(1 - far, 3)}` : short(far, 4)}` : "";
-  say("poles", near ? `${radii}; the neighbourhood of z = 1` : radii);
+  say("poles", near ? `${radii}, near z = 1` : radii);
 }
 
 // ---- What the proof says
@@ -487,6 +489,7 @@ byId("run").addEventListener("submit", async (event) => {
   event.preventDefault();
   const file = byId("csv").files[0], seconds = byId("seconds").value.trim();
   const csv = file ? await file.text() : null;
+  if (csv === null && !byId("source").value) { say("running", "Traces are there once the first design is proven."); return; }
   send({ do: "trace", source: byId("source").value, seconds: seconds === "" ? null : Number(seconds), csv, report: event.submitter && event.submitter.value === "report" });
 });
 byId("stop").addEventListener("click", () => send({ do: "stop" }));
