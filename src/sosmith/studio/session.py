@@ -153,11 +153,10 @@ class Session:
         self._take(text, moving=_typed(message, "moving", bool, False))
 
     def _replace(self, message: dict[str, Any]) -> None:
-        self._take(_short(_typed(message, "text", str), MAX_TEXT), moving=False)
+        self._take(_typed(message, "text", str), moving=False)
 
     def _take(self, text: str, *, moving: bool) -> None:
-        if len(text) > MAX_TEXT:
-            raise MessageError
+        _short(text, MAX_TEXT)
         if text == self._text and self._state["proof"]["state"] in {"working", "proven"}:
             self._document()
             return
@@ -191,7 +190,7 @@ class Session:
             self._document(problem=f"{self.file}: the specification must be a readable file")
             return
         self._on_disk = text
-        self._take(_short(text, MAX_TEXT), moving=False)
+        self._take(text, moving=False)
 
     def _compare(self, message: dict[str, Any]) -> None:
         self._side_by_side = _typed(message, "on", bool)

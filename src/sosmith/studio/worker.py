@@ -12,6 +12,7 @@ import os
 import signal
 import sys
 import threading
+from functools import partial
 from multiprocessing.connection import Connection
 from types import FrameType
 from typing import Any
@@ -37,20 +38,22 @@ def work(connection: Connection) -> None:
     parent = multiprocessing.parent_process()
     assert parent is not None
     threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+
+    def say(*message: Any) -> None:
+        try:
+            connection.send(message)
+        except OSError:
+            sys.exit()  # there is nobody any more
+
     while True:
         try:
             number, name, arguments = connection.recv()
-        except EOFError:
+        except (EOFError, OSError):
             return
-        answer: tuple[str, Any]
         try:
-            answer = (
-                "result",
-                getattr(jobs, name)(lambda *news, number=number: connection.send((number, *news)), **arguments),
-            )
+            say(number, "result", getattr(jobs, name)(partial(say, number), **arguments))
         except SosmithError as error:
-            answer = "refused", str(error)
-        connection.send((number, *answer))
+            say(number, "refused", str(error))
 
 
 def _leave(number: int, frame: FrameType | None) -> None:
