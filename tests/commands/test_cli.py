@@ -742,7 +742,7 @@ def test_reports_side_by_side(sosmith: Command) -> None:
     assert (table.status, table.messages) == (0, [])
     assert "What differs" in table.stdout
     words = " ".join(table.stdout.split())
-    assert re.search(r"df1_ef2 is the cheapest of all 2: \d+ instructions; .* The smallest limit is df1's, ", words)
+    assert re.search(r"df1_ef2 is the cheapest of both: \d+ instructions; .* The smallest limit is df1's, ", words)
     compared = sosmith("compare", "df1", "df1_ef2", "--json", "-o", "pages/both.html")
     assert compared.messages == ["sosmith: wrote pages/both.html"]
     tree = json.loads(compared.stdout)

@@ -11,6 +11,9 @@ from sosmith.gen.report.comparison.fairness import fairness
 from sosmith.gen.report.comparison.report_file import Report, fact
 from sosmith.gen.word_lengths.cost import LUTS_OF_A_BLOCK
 
+SMALLEST_FIRST = ("serial", "folded", "parallel")
+"""Architectures by the hardware that they take where multiplications are many: no multiplier block, one, many."""
+
 
 @dataclass(frozen=True)
 class Choice:
@@ -34,8 +37,9 @@ class Choice:
 def choose(reports: Sequence[Report], names: Sequence[str]) -> Choice:
     """Choose among reports, which the reason calls by their `names`.
 
-    The cheapest that passes is taken, of equal ones that with the smallest bound; where costs cannot be compared, the
-    one with the smallest bound.
+    The cheapest that passes is taken, of equal ones that with the smallest bound. Where costs of several architectures
+    cannot be compared, it is the cheapest of the smallest architecture, as all keep up with the sample rate; where they
+    cannot be compared otherwise, the one with the smallest bound.
     """
     fair = fairness(reports)
     passing = [k for k, report in enumerate(reports) if report["passed"] and report["bit_exact"]]
@@ -43,22 +47,54 @@ def choose(reports: Sequence[Report], names: Sequence[str]) -> Choice:
         return Choice(None, f"No choice between different jobs. {fair.bounds}")
     if not passing:
         return Choice(None, "None of them passed.")
+    if len(passing) == 1:
+        return Choice(passing[0], f"{names[passing[0]]} is the only one of {len(reports)} that passes.")
     bounds = {k: _bound(reports[k]) for k in passing}
-    costs = {k: hardware_cost(reports[k]) for k in passing}
-    accurate = min(passing, key=lambda k: bounds[k])
-    if fair.cost or any(cost is None for cost in costs.values()):
+    rivals = _of_smallest_architecture(reports, passing) if fair.cost else passing
+    costs = {k: hardware_cost(reports[k]) for k in rivals}
+    unfair = fair.cost if rivals == passing else ""
+    if unfair or any(cost is None for cost in costs.values()):
+        accurate = min(passing, key=lambda k: bounds[k])
         why = fair.cost or "A report does not tell what its hardware costs."
         limit = quantity(bounds[accurate], _unit(reports))
         return Choice(accurate, f"{names[accurate]} has the smallest error limit, {limit}. {why}")
     known = {k: cost for k, cost in costs.items() if cost is not None}
-    taken = min(passing, key=lambda k: (known[k], bounds[k]))
+    taken = min(rivals, key=lambda k: (known[k], bounds[k]))
     beaten = tuple(
         k
-        for k in passing
+        for k in rivals
         if any(known[o] <= known[k] and bounds[o] <= bounds[k] and (known[o], bounds[o]) != (known[k], bounds[k])
-               for o in passing)
+               for o in rivals)
     )  # fmt: skip
-    return Choice(taken, _why(reports, names, passing, taken, accurate, known, bounds), beaten)
+    if rivals == passing:
+        everyone = "both" if len(reports) == 2 else f"all {len(reports)}"
+        of = everyone if len(passing) == len(reports) else f"the {len(passing)} of {len(reports)} that pass"
+        return Choice(taken, _why(reports, names, rivals, taken, known, bounds, of), beaten)
+    name = str(reports[taken]["architecture"])
+    if len(rivals) == 1:
+        size = f"{known[taken]:,.0f} {cost_unit(reports[taken])}"
+        limit = quantity(bounds[taken], _unit(reports))
+        first = f"{names[taken]} is the only {name} one that passes: {size}; its error limit is {limit}."
+    else:
+        first = _why(reports, names, rivals, taken, known, bounds, f"the {len(rivals)} {name} ones")
+    accurate = min((k for k in passing if k not in rivals), key=lambda k: bounds[k])
+    return Choice(
+        taken,
+        f"{first} The {name} architecture is the smallest here, and fast enough; of the others, {names[accurate]} "
+        f"({reports[accurate]['architecture']}) has the smallest limit, {quantity(bounds[accurate], _unit(reports))}.",
+        beaten,
+    )
+
+
+def _of_smallest_architecture(reports: Sequence[Report], passing: Sequence[int]) -> Sequence[int]:
+    """Return those of `passing` that have the smallest architecture, all where its costs cannot be compared either."""
+    names = [str(reports[k]["architecture"]) for k in passing]
+    synthesized = any(fact(reports[k], "provenance.cost.source") == "synthesis" for k in passing)
+    if synthesized or not set(names) <= set(SMALLEST_FIRST):
+        return passing
+    smallest = min(names, key=SMALLEST_FIRST.index)
+    rivals = [k for k, name in zip(passing, names, strict=True) if name == smallest]
+    return passing if fairness([reports[k] for k in rivals]).cost else rivals
 
 
 def hardware_cost(report: Report) -> float | None:
@@ -94,22 +130,20 @@ def _unit(reports: Sequence[Report]) -> str:
 def _why(
     reports: Sequence[Report],
     names: Sequence[str],
-    passing: Sequence[int],
+    rivals: Sequence[int],
     taken: int,
-    accurate: int,
     costs: dict[int, float],
     bounds: dict[int, float],
+    of: str,
 ) -> str:
     unit = _unit(reports)
-    of = f"all {len(reports)}" if len(passing) == len(reports) else f"the {len(passing)} of {len(reports)} that pass"
-    if len(passing) == 1:
-        return f"{names[taken]} is the only one of {len(reports)} that passes."
     size = f"{costs[taken]:,.0f} {cost_unit(reports[taken])}"
-    if all(costs[k] == costs[taken] for k in passing):
+    if all(costs[k] == costs[taken] for k in rivals):
         limit = quantity(bounds[taken], unit)
         return f"{of[0].upper()}{of[1:]} cost the same, {size}; {names[taken]} has the smallest error limit, {limit}."
     first = f"{names[taken]} is the cheapest of {of}: {size}; its error limit is {quantity(bounds[taken], unit)}."
-    if accurate == taken or bounds[accurate] == bounds[taken]:
+    accurate = min(rivals, key=lambda k: bounds[k])
+    if bounds[accurate] == bounds[taken]:
         return f"{first} None has a smaller limit."
     times = plain_number(costs[accurate] / costs[taken], 2)
     limit = quantity(bounds[accurate], unit)

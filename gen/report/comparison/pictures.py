@@ -14,7 +14,7 @@ from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from sosmith.gen.filter.response import magnitude_db
 from sosmith.gen.quantity import scale
-from sosmith.gen.report.comparison.choice import Choice, cost_unit, hardware_cost
+from sosmith.gen.report.comparison.choice import SMALLEST_FIRST, Choice, cost_unit, hardware_cost
 from sosmith.gen.report.comparison.report_file import Report, fact
 from sosmith.gen.report.page import Figure
 from sosmith.gen.report.plots import COLOUR, NARROW, SERIES, WIDE, clip, decades, draw, frequency_axis
@@ -33,14 +33,17 @@ _DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1.5, 1.2)))
 
 
 def standing_figure(reports: Sequence[Report], names: Sequence[str], choice: Choice) -> Figure | None:
-    """Largest error, its limit and the cost of every report, the cheapest first; None where units differ."""
+    """Largest error, its limit and the cost of every report; None where units differ.
+
+    The cheapest is first; where costs cannot be compared, those of the smallest architecture.
+    """
     units = {str(report["error"]["unit"]) for report in reports}
     if len(units) > 1:
         return None
     costs = [hardware_cost(report) for report in reports]
     counted = {cost_unit(report) for report in reports}
     with_costs = None not in costs and len(counted) == 1
-    order = sorted(range(len(reports)), key=lambda k: (costs[k] if with_costs else 0.0) or 0.0)
+    order = sorted(range(len(reports)), key=lambda k: (0 if with_costs else _size(reports[k]), costs[k] or 0.0))
     unit = units.pop()
 
     def picture(width: int) -> str:
@@ -68,6 +71,11 @@ def standing_figure(reports: Sequence[Report], names: Sequence[str], choice: Cho
         caption="The limit holds for all inputs in range; this trace need not reach it.",
         legend=legend,
     )
+
+
+def _size(report: Report) -> int:
+    name = report["architecture"]
+    return SMALLEST_FIRST.index(name) if name in SMALLEST_FIRST else len(SMALLEST_FIRST)
 
 
 def _place(order: Sequence[int], taken: int | None) -> int | None:

@@ -235,9 +235,33 @@ def test_of_equal_costs_the_smallest_limit_is_taken() -> None:
 
 
 def test_without_fair_costs_the_smallest_limit_is_taken() -> None:
-    choice = choose([report(), report(architecture="serial", **{"error.bound": 0.0001})], NAMES)
+    synthesized = {"provenance.cost.source": "synthesis", "provenance.cost.board": "icestick"}
+    choice = choose([report(), report(**synthesized, **{"error.bound": 0.0001})], NAMES)
     assert choice.taken == 1
-    assert choice.reason.startswith("b has the smallest error limit, 100 nm. Before synthesis, architectures")
+    assert choice.reason.startswith("b has the smallest error limit, 100 nm. The costs have different origins")
+
+
+def folded(instructions: int, bound: float) -> dict[str, Any]:
+    """Make a report of a program, whose cost is its length."""
+    cost = {"source": "program", "instructions": instructions, "memory_words": 64}
+    return report(architecture="folded", **{"provenance.cost": cost, "error.bound": bound})
+
+
+def test_of_several_architectures_the_cheapest_of_the_smallest_is_taken() -> None:
+    """The parallel one is more accurate, but takes a multiplier for every product."""
+    accurate = report(**{"error.bound": 0.0001})
+    choice = choose([accurate, folded(120, 0.00015), folded(100, 0.0002)], NAMES)
+    assert (choice.taken, choice.beaten) == (2, ())
+    assert choice.reason == (
+        "c is the cheapest of the 2 folded ones: 100 instructions; its error limit is 200 nm. The smallest limit is "
+        "b's, 150 nm, at 1.2 times the cost. The folded architecture is the smallest here, and fast enough; of the "
+        "others, a (parallel) has the smallest limit, 100 nm."
+    )
+    choice = choose([accurate, folded(100, 0.0002)], NAMES)
+    assert choice.taken == 1
+    assert choice.reason.startswith("b is the only folded one that passes: 100 instructions; its error limit is 200 nm")
+    failing = folded(100, 0.0002) | {"passed": False}
+    assert choose([accurate, failing], NAMES).reason == "a is the only one of 2 that passes."
 
 
 def test_nothing_is_taken_of_different_jobs_or_of_failures() -> None:
@@ -330,7 +354,7 @@ def test_markdown() -> None:
     assert "| clock cycles per sample | 3 | 3 | +0.00 % | 0 allowed | ⚪ equal |" in text
     plain_text = comparison_markdown(pair)
     assert "| largest error | 120 nm ★ | 130 nm |" in plain_text
-    assert "is the cheapest of all 2" in plain_text
+    assert "is the cheapest of both" in plain_text
 
 
 def test_column_names_tell_reports_apart() -> None:

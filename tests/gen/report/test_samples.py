@@ -8,8 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.gen.report.test_report import LSB, evidence, plain
+from tests.gen.designs import example_design
+from tests.gen.report.test_behaviour import told
+from tests.gen.report.test_report import LSB, evidence, page_of, plain
 
+from sosmith.gen.report.recursion import recursion_of
 from sosmith.gen.report.samples import MAX_POINTS, packed, viewer_data
 
 
@@ -60,3 +63,32 @@ def test_a_long_run_keeps_the_largest_error_of_each_stretch() -> None:
     for k in (0, 1, 7777, MAX_POINTS - 1):
         assert index[k] == 3 * k + int(np.argmax(np.abs(error[3 * k : 3 * k + 3])))
     assert unpacked(data["error"]) == pytest.approx(error[index], abs=2 * LSB / 65535)
+
+
+def test_the_page_of_the_largest_run_is_below_a_megabyte() -> None:
+    """Order 12, 12 channels, 60,000 samples of each; noise everywhere, which no packing makes small."""
+    samples, channels = 60_000, 12
+    generator = np.random.default_rng(3)
+    time = np.arange(samples) / 100
+    truth = np.repeat((3 + 0.01 * time)[:, np.newaxis], channels, axis=1)
+    golden = truth + 0.1 * generator.standard_normal((samples, channels))
+    section = example_design("flange_wear_bench.toml", core="filter", realization="lattice_wdf").quantized.sections[0]
+    one = evidence()
+    run = evidence(
+        time=time,
+        samples=samples * channels,
+        channels=channels,
+        truth=truth,
+        reading=np.full((samples, channels), fill_value=True),
+        golden=golden,
+        hardware=np.round(golden / LSB) * LSB,
+        unfiltered=golden + generator.standard_normal((samples, channels)),
+        proven=True,
+        provenance=told(),
+        formats=one.formats * 80,
+        sections=one.sections * 6,
+        limit_cycles=one.limit_cycles[:1] * 6,
+        recursions=(recursion_of(section.name, section.graph),) * 6,
+    )
+    size = len(page_of(run).encode())
+    assert 500_000 < size < 1_000_000

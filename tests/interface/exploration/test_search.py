@@ -19,6 +19,9 @@ from sosmith.sim.exploration.run import Outcome, explore
 
 SPEC = Specification.load(FILTER).checked
 
+COUNT = 80
+"""Designs of a search: the optimizer has learned by then, and takes longer for each that it adds."""
+
 SPACE: Parameters = {
     "hardware.realization": ["df1", "df2t", "delta", "state_space"],
     "output.bits": Span(9, 16),
@@ -64,7 +67,9 @@ class Machine:
                 yield result(task)
 
 
-def searched(folder: Path, count: int = 120, *, seed: int = 1, machine: Machine | None = None, **more: Any) -> Outcome:
+def searched(
+    folder: Path, count: int = COUNT, *, seed: int = 1, machine: Machine | None = None, **more: Any
+) -> Outcome:
     return explore(SPEC, SPACE | more, folder, machine or Machine(), search=count, samples=100, seed=seed)
 
 
@@ -74,7 +79,7 @@ def search(tmp_path_factory: pytest.TempPathFactory) -> Outcome:
 
 
 def test_no_design_is_made_twice(found: Outcome) -> None:
-    assert len({point["key"] for point in found.points}) == len(found.points) == 120
+    assert len({point["key"] for point in found.points}) == len(found.points) == COUNT
     assert [task.key for task in found.tasks] == [point["key"] for point in found.points]
 
 
@@ -89,8 +94,9 @@ def test_values_are_within_their_ranges(found: Outcome) -> None:
 
 def test_the_search_is_drawn_to_the_front(found: Outcome) -> None:
     """The best designs are of df1 with few bits: the second half has far more of them than chance would give."""
-    later = found.points[60:]
-    assert sum(point["changes"]["hardware.realization"] == "df1" for point in later) > 30  # 15 by chance
+    later = found.points[COUNT // 2 :]
+    of_df1 = sum(point["changes"]["hardware.realization"] == "df1" for point in later)
+    assert of_df1 > COUNT // 4  # half as many by chance
     assert {point["changes"]["hardware.realization"] for point in found.front} == {"df1"}
 
 
@@ -98,13 +104,13 @@ def test_the_order_of_the_results_is_of_no_account(found: Outcome, tmp_path: Pat
     assert searched(tmp_path, machine=Machine(lambda tasks: reversed(list(tasks)))) == found
 
 
-@pytest.mark.parametrize("ends", [24, 61])
+@pytest.mark.parametrize("ends", [24, 53])
 def test_a_search_that_was_killed_goes_on(found: Outcome, tmp_path: Path, ends: int) -> None:
     killed, again = Machine(ends=ends), Machine()
     with pytest.raises(ToolError, match=r"^killed$"):
         searched(tmp_path, machine=killed)
     assert searched(tmp_path, machine=again) == found
-    assert len(again.done) == 120 - ends
+    assert len(again.done) == COUNT - ends
     assert not set(killed.done) & set(again.done)
 
 
