@@ -264,13 +264,12 @@ to the number of designs. It grows with the order, as more sections are searched
 responses are long; and with state-space realizations, which have the most coefficients. It does not depend on the
 samples until there are millions.
 
-The processes tell Python's garbage collector to leave alone what was imported, and to look at the rest less often,
-which saves about a tenth.
+The processes tell Python's garbage collector to leave alone what was imported, and to look at the rest less often.
 
 ## Searches
 
 `--search N` asks an optimizer for 24 designs at a time and waits for the slowest before it asks again, so that the same
-designs are made by any number of processes. With more than about ten, a grid keeps them busier.
+designs are made by any number of processes. No more than 24 are ever busy; a grid has no such limit.
 
 ## To 1,000 workers, on paper
 

@@ -41,9 +41,15 @@ def standing_figure(reports: Sequence[Report], names: Sequence[str], choice: Cho
     if len(units) > 1:
         return None
     costs = [hardware_cost(report) for report in reports]
-    counted = {cost_unit(report) for report in reports}
-    with_costs = None not in costs and len(counted) == 1
-    order = sorted(range(len(reports)), key=lambda k: (0 if with_costs else _size(reports[k]), costs[k] or 0.0))
+    units_of_cost = [cost_unit(report) for report in reports]
+    alike = len(set(units_of_cost)) == 1
+    counted = units_of_cost[choice.taken or 0]
+    smallest = choice.taken is not None and all(_size(reports[choice.taken]) <= _size(report) for report in reports)
+    with_costs = None not in costs and (alike or smallest)
+    order = sorted(
+        range(len(reports)),
+        key=lambda k: (0 if alike else _size(reports[k]), costs[k] or 0.0, reports[k]["error"]["bound"] or 0.0),
+    )
     unit = units.pop()
 
     def picture(width: int) -> str:
@@ -51,7 +57,11 @@ def standing_figure(reports: Sequence[Report], names: Sequence[str], choice: Cho
             panels = drawing.subplots(1, 2 if with_costs else 1, sharey=True, squeeze=False)[0]
             _paint_errors(panels[0], [reports[k] for k in order], unit, _place(order, choice.taken))
             if with_costs:
-                _paint_costs(panels[1], [costs[k] or 0.0 for k in order], next(iter(counted)), order, choice)
+                shown = [costs[k] or 0.0 if units_of_cost[k] == counted else None for k in order]
+                _paint_costs(panels[1], shown, counted, order, choice)
+                for place, k in enumerate(order):
+                    if shown[place] is None:
+                        panels[1].text(0, place, f" {clip(reports[k]['architecture'], 12)}", va="center")
             longest = width // 32
             labels = [clip(("▸ " if k == choice.taken else "") + names[k], longest) for k in order]
             panels[0].set_yticks(range(len(order)), labels)
@@ -111,13 +121,13 @@ def _error_axis(axes: Axes, low: float, high: float, unit: str) -> None:
     axes.set_xlabel("largest error, and its limit (logarithmic)")
 
 
-def _paint_costs(axes: Axes, costs: Sequence[float], counted: str, order: Sequence[int], choice: Choice) -> None:
+def _paint_costs(axes: Axes, costs: Sequence[float | None], counted: str, order: Sequence[int], choice: Choice) -> None:
     for place, cost in enumerate(costs):
         role = (
             "truth" if order[place] == choice.taken else "unfiltered" if order[place] in choice.beaten else "hardware"
         )
-        axes.barh([place], [cost], height=0.5, color=COLOUR[role])
-    axes.set_xlim(0, 1.08 * max([*costs, 1.0]))
+        axes.barh([place], [cost or 0.0], height=0.5, color=COLOUR[role])
+    axes.set_xlim(0, 1.08 * max(1.0, *(cost or 0.0 for cost in costs)))
     axes.xaxis.set_major_locator(MaxNLocator(4))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:,.0f}"))
     axes.set_xlabel(f"cost in {counted.partition(',')[0]}")
