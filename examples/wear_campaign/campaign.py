@@ -140,7 +140,8 @@ def ride_campaign(settings: dict[str, Any], folder: Path, progress: Progress) ->
     calibration, rate = hardware.calibration_table(EQUATION_5A), own["sample_rate"]
     progress("ride: vehicle and spectra", 0, 0)
     paper = hardware.instrument(folder, "ride_paper", rate, calibration, ride.PAPER_FILTER)
-    _, table = ride.from_spectra(scenarios, bench_of(paper), seed, own["lead_in"], own["tolerance"])
+    straight = [scenario for scenario in scenarios if scenario.path.stem in own["proposed_from"]]
+    _, table = ride.from_spectra(straight, bench_of(paper), seed, own["lead_in"], own["tolerance"])
     exact = ride.prewarped(own["order"], own["passband_edge"], own["passband_loss"], rate)
     made = [
         ("the paper's 7th order", ride.PAPER_FILTER, paper),

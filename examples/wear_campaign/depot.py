@@ -9,13 +9,15 @@ import numpy as np
 
 from sosmith.model.calibration.fit import COLUMNS, Fit, Measurements, fit
 from sosmith.model.calibration.measurement_store import open_store
-from sosmith.model.calibration.self_updating import Calibration, add
+from sosmith.model.calibration.self_updating import Calibration, Method, add
 from sosmith.model.scenarios.depot_measurements import DepotMeasurement, measurements_csv, measurements_of
 from sosmith.model.scenarios.file import ScenarioFile
 from sosmith.model.text_files import write_files
 
 
-def into_store(scenario: ScenarioFile, seed: int, folder: Path, sensor: str) -> list[Calibration]:
+def into_store(
+    scenario: ScenarioFile, seed: int, folder: Path, sensor: str, method: Method = "paper"
+) -> list[Calibration]:
     """Add the measurements of each day as a separate file; return the calibration after each day."""
     folder.mkdir(parents=True, exist_ok=True)
     store = folder / "measurements.sqlite"
@@ -24,7 +26,7 @@ def into_store(scenario: ScenarioFile, seed: int, folder: Path, sensor: str) -> 
     with open_store(store, create=True) as opened:
         for date, rows in groupby(measurements_of(scenario, seed), key=lambda row: row.date):
             (path,) = write_files(folder, {f"depot-{date}.csv": measurements_csv(tuple(rows))})
-            addition = add(opened, sensor, path, date)
+            addition = add(opened, sensor, path, date, method=method)
             if addition.file.refusals or addition.calibration is None:
                 raise RuntimeError(f"{path}: {addition.shortfall or addition.file.refusals[0].reason}")
             made.append(addition.calibration)

@@ -218,7 +218,7 @@ def _ride(found: dict[str, Any], settings: dict[str, Any]) -> str:
         "noise of the sensor, and an exact calibration, so that only the effect of motion remains. Three filters at "
         f"{settings['ride']['sample_rate']:g} Hz: the paper's of tables 9 and 10; one with the paper's 0.02 dB at 10 "
         "Hz, "
-        "correctly pre-warped; and one that `sosmith spectrum` would propose from these rides "
+        "correctly pre-warped; and one that `sosmith spectrum` would propose from the ride on tangent track "
         f"for a tolerance of {settings['ride']['tolerance']:g} mm.",
         _table(["filter", "", "delay, s", "step to 1 %, s", *heads], filters),
         _table(
@@ -290,8 +290,8 @@ def _week(found: dict[str, Any], settings: dict[str, Any]) -> str:
     lines = [
         "## A week in service",
         f"`examples/scenarios/{settings['week']['scenario']}.toml`: an ageing sensor. Every morning there are "
-        "measurements in the depot, a refit, and the proof by `sosmith reload` that must succeed before the new "
-        "coefficients are "
+        "measurements in the depot, a refit by `bayes`, and the proof by `sosmith reload` that must succeed before the "
+        "new coefficients are "
         "loaded; then journeys with motion and tread braking. Accuracies are those of the integer model with the day's "
         "coefficients, from reset each day; the load itself is not simulated here. The last column is the share of "
         "readings with the flag `wear_warning`, which means "

@@ -38,7 +38,7 @@ Values = npt.NDArray[np.float64]
 PAPER_FILTER = hardware.filter_by_order(7, 0.2587802)
 """Filter of the paper's tables 9 and 10; examples/flange_wear_locomotive.toml derives its cutoff."""
 
-MODEL = "linear"
+MODEL = "nonlinear"
 """Model of the contacts of wheels and rails that the recorded campaign rides on."""
 
 SETTLED = 0.01

@@ -77,7 +77,7 @@ def live(
     progress: Progress,
 ) -> Week:
     """Run the week: each morning depot, refit, proof and reload; then the journeys of the day."""
-    calibrations = depot.into_store(scenario, seed, folder, settings["sensor"])
+    calibrations = depot.into_store(scenario, seed, folder, settings["sensor"], settings["method"])
     initial = scenario.document.wear.initial_clearance
     wear = hardware.Wear(initial=initial, warning=settings["warning"], limit=settings["limit"])
 
