@@ -168,7 +168,7 @@ def _with_spare_bits(node: Node) -> Node:
     """Return a BOUND with `SPARE_BITS` more, another node as it is."""
     if node.op is not Op.BOUND:
         return node
-    return replace(node, low=node.low << SPARE_BITS, high=node.high << SPARE_BITS)
+    return replace(node, low=min(node.low, node.low << SPARE_BITS), high=max(node.high, node.high << SPARE_BITS))
 
 
 def values_of(datapath: Datapath, loadable: Sequence[Constant]) -> list[int]:

@@ -62,7 +62,9 @@ _COMMANDS = {
         "Prove that a running core can load new coefficients, and save the register writes.",
     ),
     "studio": _Command(
-        "studio", "studio_command", "Design a filter by looking: a page with the design of SPEC, live and proven."
+        "studio",
+        "studio_command",
+        "Design a filter by looking: a page with the design of SPEC, or of the example, live and proven.",
     ),
     "build": _Command(
         "build",
@@ -94,7 +96,7 @@ _COMMANDS = {
     "explore": _Command(
         "explore",
         "explore_command",
-        "Design every combination of values, and show the Pareto front of proven error against cost.",
+        "Design every combination of values, or search, and show the Pareto front of proven error against cost.",
     ),
     "calibrate": _Command(
         "instrument.calibrate",

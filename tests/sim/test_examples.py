@@ -14,11 +14,12 @@ import numpy as np
 import pytest
 from tests.gen.designs import ALL, EXAMPLES, parallel_design
 
-from sosmith.gen.core import CoreDesign
+from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.output.generate import generate
 from sosmith.gen.realizations.registry import REALIZATIONS
 from sosmith.gen.report.evidence import Evidence
 from sosmith.gen.report.report import summarise
+from sosmith.gen.specification.specification import load
 from sosmith.gen.stimuli import bench_of, traces_for
 from sosmith.model.errors import ShortfallError
 from sosmith.model.scenarios.summaries import fitting
@@ -239,7 +240,8 @@ def test_a_wrong_bit_in_the_hardware_is_found(
     example: str, spoil: Callable[[str], str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     spoil_emitted_file(spoil, monkeypatch)
-    made = parallel_design(example)
+    spec = load(EXAMPLES / example)
+    made = design_core(replace(spec, hardware=replace(spec.hardware, architecture="parallel", start="zero")))
     trace = short(traces_for(made, "worst_case", seed=1)[0], 3000)
     evidence = simulate(made, [trace], tmp_path, simulator="icarus", idle=0.1, stall=0.1)
     report = summarise(evidence)

@@ -28,14 +28,14 @@ sample_rate = 48000.0
 input.x = { bits = 8, signed = true, range = [-1.0, 1.0] }
 filter = { family = "butterworth", kind = "lowpass", order = 2, cutoff = 4000.0 }
 output = { bits = 8, signed = true, range = [-1.0, 1.0], max_error = 0.01 }
-hardware = { architecture = "ARCHITECTURE", realization = "df1_ef2", clock = 48.0e6 }
+hardware = { architecture = "ARCHITECTURE", realization = "df1_ef2", start = "START", clock = 48.0e6 }
 """
 
 
-def little(architecture: str, folder: Path) -> CoreDesign:
+def little(architecture: str, folder: Path, start: str = "steady") -> CoreDesign:
     """Design a small filter."""
     path = folder / "little.toml"
-    path.write_text(SMALL.replace("ARCHITECTURE", architecture), encoding="utf-8")
+    path.write_text(SMALL.replace("ARCHITECTURE", architecture).replace("START", start), encoding="utf-8")
     return design_core(load(path))
 
 
@@ -165,7 +165,7 @@ def test_a_flip_flop_without_its_reset_is_found(folder: Path, monkeypatch: pytes
     break_netlist(without_reset, monkeypatch)
     message = "little in icarus: the first results after a reset must not depend on what came before it"
     with pytest.raises(ShortfallError, match=f"^{message}$"):
-        run(little("parallel", folder), "ulx3s_25f", folder, samples=80)
+        run(little("parallel", folder, "zero"), "ulx3s_25f", folder, samples=80)
 
 
 def test_a_use_of_a_cell_that_its_model_has_not_is_refused(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -126,7 +126,8 @@ def test_a_port_that_is_taken_is_refused(studio: tuple[Session, Studio]) -> None
 
 def command(*arguments: str) -> subprocess.Popen[str]:
     """Run the command, without a browser."""
-    line = [sys.executable, "-m", "sosmith.cli", "studio", *arguments, "--no-browser"]
+    # A shell makes what it runs in the background ignore SIGINT, this test included.
+    line = ["env", "--default-signal=INT", sys.executable, "-m", "sosmith.cli", "studio", *arguments, "--no-browser"]
     return subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
@@ -166,7 +167,10 @@ def test_all_processes_end_with_the_command(tmp_path: Path, how: signal.Signals,
             family = children(process.pid)
             assert len(family) >= 3  # the fork server, and a process each for preview and proof
             os.kill(process.pid, how)
-            assert process.wait(PATIENCE) == status
+            try:
+                assert process.wait(PATIENCE) == status
+            finally:
+                process.kill()
         assert process.stderr.read().startswith(f"sosmith: the studio saves to {tmp_path}/plain.toml; Ctrl-C ends it\n")
     for _ in range(1200):
         if not any(map(lives, family)):

@@ -112,10 +112,11 @@ def test_samples_of_all_channels_give_the_results_of_the_model(board: Both) -> N
 
 def test_a_session_clears_the_states(board: Both) -> None:
     board.open()
-    first = board.ask(Type.SAMPLES, b"\0" + b"\xff\x07" * 30)
-    second = board.ask(Type.SAMPLES, b"\0" + b"\xff\x07" * 30)
+    step = b"\0\0" + b"\xff\x07" * 29
+    first = board.ask(Type.SAMPLES, b"\0" + step)
+    second = board.ask(Type.SAMPLES, b"\0" + step)
     board.open()
-    assert board.ask(Type.SAMPLES, b"\0" + b"\xff\x07" * 30) == first != second
+    assert board.ask(Type.SAMPLES, b"\0" + step) == first != second
 
 
 def test_what_cannot_be_carried_out_is_told(board: Both) -> None:

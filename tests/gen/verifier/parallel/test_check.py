@@ -204,7 +204,7 @@ CHANNEL_BREAKS = {
     "too few words": (
         r"(clear_channel == 2'h)2;",
         r"\g<1>1;",
-        "signal_ must be 1 after a clock with aresetn = 1, signal_ = 1, clear_channel = 1",
+        "clear must be 1 after a clock with aresetn = 1, clear = 1, clear_channel = 1",
     ),
     "a channel": (
         r"s_axis_tdest < 2'h3",
