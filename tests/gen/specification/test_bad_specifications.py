@@ -60,8 +60,8 @@ EDGES = "passband_edge = {}\nstopband_edge = {}\npassband_loss = {}\nstopband_lo
 
 # Phrases that stand in several sentences.
 TABLES = (
-    "one of the keys name, sample_rate, channels, input, calibration, filter, output, wear, uncertainty, converter, hardware, "
-    "not an unknown one"
+    "one of the keys name, sample_rate, channels, input, calibration, filter, output, wear, uncertainty, converter, "
+    "hardware, not an unknown one"
 )
 FILTER_KEYS = (
     "one of the keys family, kind, method, order, cutoff, passband_edge, stopband_edge, passband_loss,"
