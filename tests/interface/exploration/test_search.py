@@ -19,7 +19,7 @@ from sosmith.sim.exploration.run import Outcome, explore
 
 SPEC = Specification.load(FILTER).checked
 
-COUNT = 80
+COUNT = 120
 """Designs of a search: the optimizer has learned by then, and takes longer for each that it adds."""
 
 SPACE: Parameters = {
