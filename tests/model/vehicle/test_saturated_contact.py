@@ -53,8 +53,8 @@ def test_kalkers_coefficients_grow_with_the_load() -> None:
     for k, side, wheelset in ((0, 0, 0), (7, 1, 4), (31, 0, 5)):
         load = LOADS[k, side, wheelset]
         creep = creep_coefficients(GIVEN.contact, load)
-        l = GIVEN.wheelset.contact_half_spacing  # noqa: E741
-        expected = [[creep.f11, 0, 0], [0, -creep.f22, -creep.f23], [-l * creep.f11, creep.f23, -creep.f33]]
+        half = GIVEN.wheelset.contact_half_spacing
+        expected = [[creep.f11, 0, 0], [0, -creep.f22, -creep.f23], [-half * creep.f11, creep.f23, -creep.f33]]
         assert at.kalker[k, :, :, side, wheelset] == pytest.approx(np.array(expected), rel=1e-12)
         assert at.limit[k, side, wheelset] == pytest.approx(0.3 * load, rel=1e-15)
 
