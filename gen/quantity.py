@@ -9,6 +9,8 @@ BASE_UNITS = ("m", "s", "Hz", "V", "A", "W", "N", "Pa", "g", "bar", "Ω")
 SYMBOLS = {"degC": "°C", "degF": "°F", "ohm": "Ω", "um": "µm", "uV": "µV", "us": "µs", "uA": "µA", "deg": "°"}
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 MINUS = "−"
+_NOTHING = 1e-300
+"""What is smaller is shown as zero: its factor is beyond a double."""
 
 
 def unit_symbol(unit: str) -> str:
@@ -70,15 +72,15 @@ def scale(peak: float, unit: str, digits: int = 3) -> tuple[float, str]:
     ((1000000.0, 'nm'), (1000000.0, '10⁻⁶ °C'), (1.0, '°C'))
     """
     symbol = unit_symbol(unit)
-    if not math.isfinite(peak) or peak == 0:
+    if not math.isfinite(peak) or abs(peak) < _NOTHING:
         return 1.0, symbol
     split = _split_unit(unit)
     if split is not None:
         own, base = split
         # 10 ** own times the value may round to just below a power of ten, so the exponents are added instead
         exponent = 3 * ((own + int(f"{abs(peak):.{digits - 1}e}".partition("e")[2])) // 3)
-        exponent = min(max(exponent, min(PREFIXES)), max(PREFIXES))
-        return 10.0 ** (own - exponent), PREFIXES[exponent] + base
+        if exponent in PREFIXES:
+            return 10.0 ** (own - exponent), PREFIXES[exponent] + base
     if 1e-2 <= abs(peak) < 1e6:
         return 1.0, symbol
     exponent = _engineering_exponent(peak, digits)
@@ -104,6 +106,7 @@ def quantity(value: float | None, unit: str, digits: int = 3) -> str:
     """
     if value is None or not math.isfinite(value):
         return "—"
+    value = 0.0 if abs(value) < _NOTHING else value
     factor, symbol = scale(value, unit, digits)
     joint = " × " if symbol.startswith("10") else " "
     return f"{plain_number(value * factor, digits)}{joint}{symbol}".rstrip()

@@ -88,7 +88,7 @@ def choose(reports: Sequence[Report], names: Sequence[str]) -> Choice:
 
 def _of_smallest_architecture(reports: Sequence[Report], passing: Sequence[int]) -> Sequence[int]:
     """Return those of `passing` that have the smallest architecture, all where its costs cannot be compared either."""
-    names = [str(reports[k]["architecture"]) for k in passing]
+    names = [str(fact(reports[k], "architecture")) for k in passing]  # a report of an earlier version may not tell
     synthesized = any(fact(reports[k], "provenance.cost.source") == "synthesis" for k in passing)
     if synthesized or not set(names) <= set(SMALLEST_FIRST):
         return passing

@@ -23,6 +23,8 @@ from sosmith.model.arithmetic.elementary import geometric
 Array = npt.NDArray[np.float64]
 
 _POINTS = 500
+_WIDEST = 1e12
+"""Range of a logarithmic axis at most: what lies further below the largest value is left of the picture."""
 _ONE_SIZE = 20
 """Factor between errors up to which their axis is linear."""
 _LARGEST_DB = 300.0
@@ -84,7 +86,7 @@ def standing_figure(reports: Sequence[Report], names: Sequence[str], choice: Cho
 
 
 def _size(report: Report) -> int:
-    name = report["architecture"]
+    name = fact(report, "architecture")
     return SMALLEST_FIRST.index(name) if name in SMALLEST_FIRST else len(SMALLEST_FIRST)
 
 
@@ -115,6 +117,7 @@ def _error_axis(axes: Axes, low: float, high: float, unit: str) -> None:
         axes.xaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{v * factor:g}"))
         axes.set_xlabel(f"largest error, and its limit, in {symbol}" if symbol else "largest error, and its limit")
         return
+    low = max(low, high / _WIDEST)
     axes.set_xscale("log")
     axes.set_xlim(low / 1.6, high * 1.6)
     decades(axes.xaxis, low / 1.6, high * 1.6, unit, 4)

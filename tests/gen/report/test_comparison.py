@@ -264,6 +264,20 @@ def test_of_several_architectures_the_cheapest_of_the_smallest_is_taken() -> Non
     assert choose([accurate, failing], NAMES).reason == "a is the only one of 2 that passes."
 
 
+def test_reports_of_earlier_versions_need_not_tell_their_architecture() -> None:
+    untold = {key: value for key, value in report(**{"error.bound": 0.0001}).items() if key != "architecture"}
+    choice = choose([untold, folded(100, 0.0002)], NAMES)
+    assert choice.taken == 0
+    assert choice.reason.startswith("a has the smallest error limit, 100 nm.")
+    assert "<svg" in comparison_page([untold, folded(100, 0.0002)], [])
+
+
+@pytest.mark.parametrize("extreme", [5e-324, 1e-300, 1e300])
+def test_extreme_errors_are_drawn(extreme: float) -> None:
+    """Nothing warns that the labels of an axis have no room; warnings are errors here."""
+    assert "<svg" in comparison_page([report(**{"error.max_abs": extreme}), report()], [])
+
+
 def test_nothing_is_taken_of_different_jobs_or_of_failures() -> None:
     assert choose([report(), report(**OTHER_JOB)], NAMES).taken is None
     assert choose([report(passed=False), report(bit_exact=False)], NAMES).reason == "None of them passed."
