@@ -20,7 +20,7 @@ _AREAS_OF_AN_INSTRUCTION = 4096
 """Estimated area of the parallel core, in LUT4, that weighs as much as one instruction while word lengths are trimmed.
 
 Far more than one instruction is worth: it decides between steps that save no instruction yet. Shorter words lead to
-those that do. Without it, the program of flange_wear_locomotive has 136 instructions instead of 128.
+those that do. Without it, the program of flange_wear_locomotive is some steps longer.
 """
 
 _WORDS, _ACCUMULATOR_BITS = Fraction(1, 1 << 16), Fraction(1, 1 << 24)
