@@ -7,11 +7,13 @@ import zlib
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
+from typing import NamedTuple
 
 from amaranth.lib.wiring import Component
 
 from sosmith.gen.fpga.boards import Board
-from sosmith.gen.word_lengths.objective import SMALL_AREA, Objective, ShortProgram, unsuitable
+from sosmith.gen.word_lengths.cost import MULTIPLIER_BITS, Cost, cost_of, products_from_adders
+from sosmith.gen.word_lengths.objective import FEW_ADDERS, SMALL_AREA, Objective, ShortProgram, unsuitable
 from sosmith.hdl import core, folded
 from sosmith.hdl.axi_lite import BITS
 from sosmith.hdl.instruction import instruction_bits
@@ -35,6 +37,16 @@ SPARE_INSTRUCTIONS = 4
 """A replaceable program has spare instructions: one for each group of this many."""
 
 
+class Blocks(NamedTuple):
+    """How many multiplier blocks there are, None for as many as it takes, and the bits of a signed operand."""
+
+    available: int | None
+    bits: int = MULTIPLIER_BITS
+
+
+NO_LIMIT = Blocks(None)
+
+
 @dataclass(frozen=True)
 class Architecture:
     """A datapath and the architecture of its hardware.
@@ -55,6 +67,8 @@ class Architecture:
     digit_bits : int
         Width of a digit of the program, one bit less than a factor of the multiplier; less if an instruction must fit
         a register to be loadable.
+    blocks : Blocks
+        Multiplier blocks that there are for the products of the parallel architecture.
     """
 
     name: str
@@ -63,6 +77,22 @@ class Architecture:
     reload: bool = False
     protect: str = "none"
     digit_bits: int = DIGIT_BITS
+    blocks: Blocks = NO_LIMIT
+
+    @cached_property
+    def adders(self) -> tuple[frozenset[int], ...]:
+        """Products by constants that are made of adders, by stage: for which there are no multiplier blocks left.
+
+        None of them if the constants can be loaded, and in the other architectures.
+        """
+        graphs = [stage.graph for stage in self.datapath.stages]
+        fixed = self.name == "parallel" and not self.reload
+        return products_from_adders(graphs, self.blocks.available if fixed else None, self.blocks.bits)
+
+    @property
+    def cost(self) -> Cost:
+        """Operators of the parallel architecture, before synthesis."""
+        return cost_of(self.datapath, self.adders)
 
     @cached_property
     def program(self) -> Program | None:
@@ -142,7 +172,9 @@ class Architecture:
     def component(self) -> Component:
         """Make the hardware; the top module has the name of the datapath."""
         if self.program is None:
-            return core.Core(self.built, self.channels, fingerprint=self.fingerprint, protect=self.protect)
+            return core.Core(
+                self.built, self.channels, fingerprint=self.fingerprint, protect=self.protect, adders=self.adders
+            )
         return folded.FoldedCore(
             self.datapath,
             self.program,
@@ -162,7 +194,7 @@ def structure(node: Node) -> tuple[object, ...]:
 
 @dataclass(frozen=True, kw_only=True)
 class Budget:
-    """Time available to the hardware.
+    """Time and multiplier blocks available to the hardware.
 
     Attributes
     ----------
@@ -174,6 +206,8 @@ class Budget:
         Whether the hardware's constants can be loaded.
     protect : str
         One of `sosmith.model.dataflow.protection.PROTECTIONS`.
+    blocks : Blocks
+        Multiplier blocks.
     """
 
     clock: Fraction
@@ -181,6 +215,12 @@ class Budget:
     channels: int = 1
     reload: bool = False
     protect: str = "none"
+    blocks: Blocks = NO_LIMIT
+
+    @property
+    def adders(self) -> bool:
+        """Whether no product by a constant may take a multiplier block in the parallel architecture."""
+        return self.blocks.available == 0 and not self.reload
 
     @property
     def cycles(self) -> int:
@@ -217,14 +257,22 @@ def _told_apart(most: Fraction, wanted: Fraction) -> tuple[str, str]:
     return texts
 
 
-def candidates(wanted: str, board: Board | None) -> tuple[str, ...]:
+def blocks_for(wanted: int | None, board: Board | None) -> Blocks:
+    """Multiplier blocks that a core may take: as the specification says, or else all that the board has."""
+    if board is None:
+        return Blocks(wanted)
+    device = board.device
+    return Blocks(device.multipliers if wanted is None else wanted, device.factor_bits or MULTIPLIER_BITS)
+
+
+def candidates(wanted: str, blocks: Blocks) -> tuple[str, ...]:
     """Architectures to try for the one that the specification asks for, the smallest first.
 
-    On boards without multiplier blocks, shifts and additions are smaller than a multiplier made of LUT4.
+    Without multiplier blocks, shifts and additions are smaller than a multiplier made of LUT4.
     """
     if wanted != "auto":
         return (wanted,)
-    return ("folded", "parallel") if board is None or board.device.multipliers else ("serial", "folded", "parallel")
+    return ("serial", "folded", "parallel") if blocks.available == 0 else ("folded", "parallel")
 
 
 def digit_bits_on(board: Board | None, name: str) -> int:
@@ -234,9 +282,14 @@ def digit_bits_on(board: Board | None, name: str) -> int:
     return board.device.factor_bits - 1
 
 
-def objective_of(name: str, board: Board | None) -> Objective:
-    """Return what word lengths and a realization are chosen for in the architecture `name`."""
-    return SMALL_AREA if name == "parallel" else ShortProgram(name, digit_bits_on(board, name))
+def objective_of(name: str, board: Board | None, *, adders: bool = False) -> Objective:
+    """Return what word lengths and a realization are chosen for in the architecture `name`.
+
+    `adders` says that no product by a constant may take a multiplier block in the parallel one.
+    """
+    if name != "parallel":
+        return ShortProgram(name, digit_bits_on(board, name))
+    return FEW_ADDERS if adders else SMALL_AREA
 
 
 def fitting(name: str, budget: Budget, datapath: Datapath, board: Board | None = None) -> Architecture:
@@ -248,7 +301,9 @@ def fitting(name: str, budget: Budget, datapath: Datapath, board: Board | None =
         If the datapath cannot be folded, or the architecture does not keep up.
     """
     digit_bits = digit_bits_on(board, name)
-    architecture = Architecture(name, datapath, budget.channels, budget.reload, budget.protect, digit_bits)
+    architecture = Architecture(
+        name, datapath, budget.channels, budget.reload, budget.protect, digit_bits, budget.blocks
+    )
     budget.check(architecture)
     return architecture
 
@@ -262,5 +317,14 @@ def reason_for(architecture: Architecture, budget: Budget, *, asked: bool, board
         smallest += f" on {board.name}, whose {board.device.title} has {there}"
     why = "asked for in the specification" if asked else refused or smallest
     if architecture.program is None:
-        return f"{name}: {why}"
+        return f"{name}: {why}{_made_of_adders(architecture)}"
     return f"{name}: {why}; takes {needed:,} of {budget.cycles:,} clocks a sample"
+
+
+def _made_of_adders(architecture: Architecture) -> str:
+    """Say which products are made of adders, and why."""
+    count, there = sum(map(len, architecture.adders)), architecture.blocks.available
+    if not count:
+        return ""
+    blocks = "without multiplier blocks" if not there else f"with at most {there} multiplier blocks"
+    return f"; {blocks}, {count} product{'s' * (count > 1)} by constants made of adders"

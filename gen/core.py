@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 
-from sosmith.gen.architecture import Architecture, Budget, candidates, fitting, objective_of, reason_for
+from sosmith.gen.architecture import Architecture, Budget, blocks_for, candidates, fitting, objective_of, reason_for
 from sosmith.gen.filter.design import Filter, design
 from sosmith.gen.fpga.boards import Board
 from sosmith.gen.realizations.registry import REALIZATIONS
@@ -88,8 +88,8 @@ def design_core(
         Choose fraction bits and coefficients for this realization, then use `realization` with these widths; the
         error may then exceed the limit in the specification.
     board : Board or None
-        Target board; the automatic choice of an architecture considers its multipliers, and the folded architecture
-        has digits as wide as they take.
+        Target board; the automatic choice of an architecture considers its multipliers, the folded architecture has
+        digits as wide as they take, and the parallel one makes products of adders where they are too few.
     progress : callable
         Called with the name of each step.
 
@@ -132,7 +132,7 @@ def design_core(
         """Choose the realization and its word lengths for an architecture."""
         if ideal is None:
             return prove(plan_of(next(iter(REALIZATIONS)))), "none: a calibration has no filter sections"
-        objective = objective_of(architecture, board)
+        objective = objective_of(architecture, board, adders=budget.adders)
         selection = Selection(
             lambda name: plan_of(name).under(objective),
             lambda name: least_size(ideal, name, objective),
@@ -164,8 +164,9 @@ def design_core(
         channels=spec.channels,
         reload=hardware.reload,
         protect=hardware.protect,
+        blocks=blocks_for(hardware.multipliers, board),
     )
-    names = candidates(hardware.architecture, board)
+    names = candidates(hardware.architecture, budget.blocks)
     refused = ""
     for name in names:
         try:

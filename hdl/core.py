@@ -36,7 +36,7 @@ With loadable constants, `sosmith.hdl.constant_banks` has them twice, and each s
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from typing import NamedTuple
 
 from amaranth.hdl import Cat, ClockDomain, ClockSignal, Const, Module, Mux, ResetSignal, Signal, Value
@@ -113,6 +113,8 @@ class Core(wiring.Component):
         loaded while the core works: each sample is computed with the bank that was active when the core accepted it.
     protect : str
         One of `sosmith.model.dataflow.protection.PROTECTIONS`.
+    adders : sequence of collection of int
+        Products by constants that are made of adders, by stage and node; only without a fingerprint.
 
     Members
     -------
@@ -133,9 +135,16 @@ class Core(wiring.Component):
     """
 
     def __init__(
-        self, datapath: Datapath, channels: int = 1, fingerprint: int | None = None, *, protect: str = "none"
+        self,
+        datapath: Datapath,
+        channels: int = 1,
+        fingerprint: int | None = None,
+        *,
+        protect: str = "none",
+        adders: Sequence[Collection[int]] = (),
     ) -> None:
         self.protect = protect
+        self.adders = adders or [()] * len(datapath.stages)
         self.datapath = datapath
         self.channels = channels
         self.fingerprint = fingerprint
@@ -155,7 +164,7 @@ class Core(wiring.Component):
         loadable = constants(self.datapath)
         banks = None if self.fingerprint is None else ConstantBanks(self.datapath, loadable, parity=guarded)
         stages = [
-            self._stage(m, stage, NO_CONSTANTS if banks is None else banks.of_stage(k), buffer.advance)
+            self._stage(m, stage, NO_CONSTANTS if banks is None else banks.of_stage(k), self.adders[k], buffer.advance)
             for k, stage in enumerate(self.datapath.stages)
         ]
         bank = Signal()
@@ -293,13 +302,13 @@ class Core(wiring.Component):
         return list(later)
 
     def _stage(
-        self, m: Module, stage: Stage, constants: Mapping[int, Pair], advance: Value
+        self, m: Module, stage: Stage, constants: Mapping[int, Pair], adders: Collection[int], advance: Value
     ) -> PipelinedStage | InterleavedStage:
         several = self.channels > 1
         component = (
-            InterleavedStage(stage, self.channels, constants, protect=self.protect)
+            InterleavedStage(stage, self.channels, constants, protect=self.protect, adders=adders)
             if several
-            else PipelinedStage(stage, constants, parity=self.protect != "none")
+            else PipelinedStage(stage, constants, parity=self.protect != "none", adders=adders)
         )
         m.submodules[stage.name] = component
         m.d.comb += component.advance.eq(advance)

@@ -47,7 +47,7 @@ register before it and one behind.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 from amaranth.hdl import Const, Module, Mux, Signal, Value
@@ -201,6 +201,8 @@ class InterleavedStage(wiring.Component):
         Constants that come from one of two banks, by node.
     protect : str
         One of `sosmith.model.dataflow.protection.PROTECTIONS`, for the memories of the states.
+    adders : collection of int
+        Products by constants that are made of adders, by node.
 
     Members
     -------
@@ -233,9 +235,16 @@ class InterleavedStage(wiring.Component):
     """
 
     def __init__(
-        self, stage: Stage, channels: int, constants: Mapping[int, Pair] = NO_CONSTANTS, *, protect: str = "none"
+        self,
+        stage: Stage,
+        channels: int,
+        constants: Mapping[int, Pair] = NO_CONSTANTS,
+        *,
+        protect: str = "none",
+        adders: Collection[int] = (),
     ) -> None:
         self.stage = stage
+        self.adders = adders
         self.protect = protect
         self.constants = constants
         self.channels = channels
@@ -263,6 +272,7 @@ class InterleavedStage(wiring.Component):
             banks=banks,
             takes=[self.advance] * plan.depth,
             valid=valid,
+            adders=self.adders,
         )
         logic.connect([getattr(self, f"i{k}") for k in range(len(graph.inputs))])
         at, wires, names = logic.at, logic.wires, logic.names

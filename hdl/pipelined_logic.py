@@ -19,7 +19,9 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 
 from amaranth.hdl import Cat, Const, Module, Mux, Shape, Signal, Value
 
+from sosmith.hdl.adders import multiples
 from sosmith.hdl.constant_banks import Pair, chosen
+from sosmith.model.dataflow.adder_graph import by_operand
 from sosmith.model.dataflow.graph import Graph, Node, Op
 
 
@@ -49,6 +51,8 @@ class PipelinedLogic:
         Whether the registers behind each pipeline stage are loaded at this clock.
     valid : sequence of Value
         Whether each pipeline stage holds a sample; asked where one uses a state that belongs to a later one.
+    adders : collection of int
+        Products by constants that are made of adders, see `sosmith.hdl.adders`.
 
     Attributes
     ----------
@@ -68,10 +72,13 @@ class PipelinedLogic:
         banks: Sequence[Value],
         takes: Sequence[Value],
         valid: Sequence[Value],
+        adders: Collection[int] = (),
     ) -> None:
         self._m, self._graph, self._pipeline_stages = m, graph, pipeline_stages
         self._constants, self._banks, self._takes, self._valid = constants, banks, takes, valid
         self._passed: dict[tuple[int, int], Value] = {}
+        self._adders = adders
+        self._multiples: dict[int, Value] = {}
         self.names = unique_names(graph)
         self.wires: list[Value] = []
 
@@ -108,8 +115,22 @@ class PipelinedLogic:
                     pair = self._constants.get(index)
                     factor = None if pair is None else chosen(pair, self._banks[own])
                     operands = [self.at(i, own) for i in node.operands]
-                    self._m.d.comb += wire.eq(logic(self._graph, node, operands, factor))
+                    made = index in self._adders
+                    value = self._multiple(index) if made else logic(self._graph, node, operands, factor)
+                    self._m.d.comb += wire.eq(value)
                 self.wires.append(wire)
+
+    def _multiple(self, index: int) -> Value:
+        """Product by a constant from adders, made with those of its operand in the same pipeline stage."""
+        if index not in self._multiples:
+            own, nodes = self._pipeline_stages[index], self._graph.nodes
+            together = [i for i in self._adders if self._pipeline_stages[i] == own]
+            operand, products = next(group for group in by_operand(self._graph, together) if index in group[1])
+            constants = [nodes[i].parameter for i in products]
+            name = self.names[operand] if own == self._pipeline_stages[operand] else f"{self.names[operand]}_in{own}"
+            made = multiples(self._m, self.at(operand, own), nodes[operand].range, constants, name)
+            self._multiples |= dict(zip(products, made, strict=True))
+        return self._multiples[index]
 
 
 def banks_in_use(valid: Sequence[Value], banks: Sequence[Value]) -> Value:

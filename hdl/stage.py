@@ -54,7 +54,7 @@ With x = -2 at each clock, from reset on, the output is valid three clocks after
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 from amaranth.hdl import Cat, Const, Module, Signal, Value
 from amaranth.lib import wiring
@@ -165,6 +165,8 @@ class PipelinedStage(wiring.Component):
         Constants that come from one of two banks, by node.
     parity : bool
         Whether each register that holds a state has a parity bit, which every sample checks.
+    adders : collection of int
+        Products by constants that are made of adders, by node.
 
     Members
     -------
@@ -190,8 +192,16 @@ class PipelinedStage(wiring.Component):
         Whether to set the states to 0; no sample may be inside. Only with parity.
     """
 
-    def __init__(self, stage: Stage, constants: Mapping[int, Pair] = NO_CONSTANTS, *, parity: bool = False) -> None:
+    def __init__(
+        self,
+        stage: Stage,
+        constants: Mapping[int, Pair] = NO_CONSTANTS,
+        *,
+        parity: bool = False,
+        adders: Collection[int] = (),
+    ) -> None:
         self.stage = stage
+        self.adders = adders
         self.constants = constants
         self.parity = parity
         graph = stage.graph
@@ -209,7 +219,16 @@ class PipelinedStage(wiring.Component):
         stages = pipeline_stages(graph)
         valid, takes, banks = self._control(m, max(stages) + 1)
         apart = _known_early(graph, stages)
-        logic = PipelinedLogic(m, graph, stages, constants=self.constants, banks=banks, takes=takes, valid=valid)
+        logic = PipelinedLogic(
+            m,
+            graph,
+            stages,
+            constants=self.constants,
+            banks=banks,
+            takes=takes,
+            valid=valid,
+            adders=self.adders,
+        )
         logic.connect([getattr(self, f"i{k}") for k in range(len(graph.inputs))], apart)
         at, wires, names = logic.at, logic.wires, logic.names
         for i in graph.delays:

@@ -13,7 +13,7 @@ from sosmith.gen.proof.limit_cycles import limit_cycles, recursions
 from sosmith.gen.proof.linear_model import linear_model
 from sosmith.gen.reload.register_writes import bank_size
 from sosmith.gen.reload.transient import SETTLED, settling
-from sosmith.gen.word_lengths.cost import Cost, cost_of
+from sosmith.gen.word_lengths.cost import Cost
 from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.hdl.axi_stream import Field, dest_width, fields
 from sosmith.model.dataflow.datapath import Datapath, Stage
@@ -319,7 +319,7 @@ def core_facts(design: CoreDesign) -> CoreFacts:
         unit=output.unit,
         limit_cycles=tuple(_limit_cycles(name, graph, output) for name, graph in parts),
         aliasing=None if quantized.filter is None else quantized.filter.aliasing,
-        cost=cost_of(datapath),
+        cost=architecture.cost,
     )
 
 

@@ -12,7 +12,6 @@ import numpy as np
 
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.fpga.synthesis import Netlist
-from sosmith.gen.word_lengths.cost import cost_of
 from sosmith.model.dataflow.c_model import c_source
 from sosmith.model.port import Port
 from sosmith.model.traces.trace import Trace
@@ -116,7 +115,7 @@ def hardware_cost(design: CoreDesign, netlist: Netlist | None = None) -> dict[st
         return {"source": "synthesis", "board": netlist.board.name, **made}
     if program is not None:
         return {"source": "program", "board": None, **made}
-    cost = cost_of(design.datapath)
+    cost = design.architecture.cost
     made |= {
         "luts": cost.luts,
         "multiplier_blocks": cost.multiplier_blocks,

@@ -52,6 +52,12 @@ def check(document: Document) -> None:
             literal(document.hardware.clock),
             where="hardware.clock",
         )
+    if document.hardware.reload and document.hardware.multipliers is not None:
+        raise UnfitError(
+            '"auto" with hardware.reload = true: adders multiply by constants that are fixed',
+            literal(document.hardware.multipliers),
+            where="hardware.multipliers",
+        )
 
 
 def _check_inputs(document: Document) -> None:

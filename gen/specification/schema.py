@@ -46,6 +46,9 @@ MAX_ORDER = 20
 MAX_CHANNELS = 65536
 """Maximum number of channels: their numbers fit in two bytes."""
 
+MAX_MULTIPLIERS = 9999
+"""Largest number of multiplier blocks that can be asked for."""
+
 LOSS_LIMITS = (Fraction(1, 10**6), Fraction(200))
 """Limits in dB: double precision can design ripples down to the first; the range of 32 bits is below the second."""
 
@@ -65,6 +68,15 @@ def read_max_error(value: object) -> Fraction | None:
     if exact <= 0:
         raise UnfitError(expected, literal(value))
     return exact
+
+
+def read_multipliers(value: object) -> int | None:
+    """Read a number of multiplier blocks; "auto" gives None."""
+    if value == "auto":
+        return None
+    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= MAX_MULTIPLIERS:
+        raise UnfitError(f'"auto", or a whole number from 0 to {MAX_MULTIPLIERS}', literal(value))
+    return value
 
 
 class Table(BaseModel):
@@ -174,6 +186,7 @@ class HardwareTable(Table):
     reload: Annotated[bool, PlainValidator(flag)] = False
     protect: Annotated[str, PlainValidator(choice(PROTECTIONS))] = "none"
     start: Annotated[str, PlainValidator(choice(STARTS))] = "steady"
+    multipliers: Annotated[int | None, PlainValidator(read_multipliers)] = None
 
 
 class Document(Table):

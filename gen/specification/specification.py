@@ -108,6 +108,9 @@ class HardwareSpec:
         One of `sosmith.model.dataflow.protection.PROTECTIONS`.
     start : str
         "steady" if the filter starts from the steady state of its first sample, "zero" if from states of 0.
+    multipliers : int or None
+        Multiplier blocks that the parallel architecture may take, where the rest is made of adders; None for as many
+        as the board has, or as synthesis makes.
     """
 
     realization: str
@@ -116,6 +119,7 @@ class HardwareSpec:
     reload: bool
     protect: str
     start: str
+    multipliers: int | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -258,6 +262,7 @@ def _specification(path: Path, tree: dict[str, Any], document: Document) -> Spec
             reload=hardware.reload,
             protect=hardware.protect,
             start=hardware.start,
+            multipliers=hardware.multipliers,
         ),
         converters=converters(inputs, document.converter),
     )

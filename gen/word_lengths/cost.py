@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from sosmith.model.dataflow.adder_graph import adder_bits, adder_graph, by_operand, signed_digits
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.graph import Graph, Node, Op
 
@@ -46,7 +47,11 @@ class Multiplication:
     @property
     def blocks(self) -> int:
         """Hardware multipliers of 18 x 18 bits, signed."""
-        return _pieces(self.data.beside(self.factor)) * _pieces(self.factor.beside(self.data))
+        return self.blocks_of(MULTIPLIER_BITS)
+
+    def blocks_of(self, bits: int) -> int:
+        """Hardware multipliers whose operands have `bits` bits, signed."""
+        return _pieces(self.data.beside(self.factor), bits) * _pieces(self.factor.beside(self.data), bits)
 
     @property
     def extra_bits(self) -> int:
@@ -61,9 +66,10 @@ class Cost:
     Attributes
     ----------
     multiplications : tuple of Multiplication
-        In the order of the datapath.
+        In the order of the datapath, without those that are made of adders.
     adder_bits : int
-        Result bits of all additions, subtractions and products with a single bit.
+        Result bits of all additions, subtractions and products with a single bit, and of the sums that products by
+        constants are made of.
     register_bits : int
         State bits and pipeline registers.
     """
@@ -110,27 +116,32 @@ class Cost:
         return ", ".join(f"{self.multipliers.count(size)} of {size[0]} x {size[1]}" for size in distinct) or "none"
 
 
-def cost_of(datapath: Datapath) -> Cost:
-    """Count the operators of `datapath`."""
-    return cost_of_graphs([stage.graph for stage in datapath.stages])
+def cost_of(datapath: Datapath, adders: Sequence[Collection[int]] = ()) -> Cost:
+    """Count the operators of `datapath`; the products in `adders`, by stage, are made of adders."""
+    return cost_of_graphs([stage.graph for stage in datapath.stages], adders)
 
 
-def cost_of_graphs(graphs: Sequence[Graph]) -> Cost:
-    """Count the operators of a chain of graphs."""
+def cost_of_graphs(
+    graphs: Sequence[Graph],
+    from_adders: Sequence[Collection[int]] = (),
+    bits: Callable[[Graph, Collection[int]], int] | None = None,
+) -> Cost:
+    """Count the operators of a chain of graphs; the products in `from_adders`, by graph, are made of adders.
+
+    `bits` says how many adder bits products of a graph take; None for those of the sums that are really made.
+    """
     multiplications: list[Multiplication] = []
     adders = registers = 0
-    for graph in graphs:
+    for graph, products in zip(graphs, from_adders or [()] * len(graphs), strict=True):
         nodes = graph.nodes
-        for node in nodes:
-            if node.op is Op.SCALE:
-                factor = Operand(abs(node.parameter).bit_length() + (node.parameter < 0), node.parameter < 0)
-                multiplications.append(Multiplication(_operand(nodes[node.operands[0]]), factor))
-            elif graph.is_gate(node):
-                adders += node.width
-            elif node.op is Op.MULTIPLY:
-                a, b = (_operand(nodes[i]) for i in node.operands)
-                multiplications.append(Multiplication(a, b))
-            elif node.op in {Op.ADD, Op.SUBTRACT}:
+        adders += (bits or _bits_of_products)(graph, products)
+        for index, node in enumerate(nodes):
+            if index in products:
+                continue
+            multiplication = _multiplication(graph, node)
+            if multiplication is not None:
+                multiplications.append(multiplication)
+            elif graph.is_gate(node) or node.op in {Op.ADD, Op.SUBTRACT}:
                 adders += node.width
             elif node.op is Op.TRUNCATE:  # an adder makes negative values round up
                 adders += nodes[node.operands[0]].width
@@ -145,6 +156,87 @@ def area_of(graph: Graph) -> int:
     return cost_of_graphs([graph]).area
 
 
+def area_by_digits(graph: Graph) -> int:
+    """Estimate the contribution of a graph without multiplier blocks, by the signed digits of its constants.
+
+    Each digit but the first of a constant takes a sum of about the width of the operand. `adder_graph` finds sums that
+    take less, but not in the time that a search among thousands of constants has.
+    """
+    return cost_of_graphs([graph], [scalings(graph)], _bits_by_digits).area
+
+
+def scalings(graph: Graph) -> frozenset[int]:
+    """Return the products by constants that can be made of adders: all but those by 0."""
+    return frozenset(index for index, node in enumerate(graph.nodes) if node.op is Op.SCALE and node.parameter)
+
+
+def products_from_adders(
+    graphs: Sequence[Graph], blocks: int | None, block_bits: int = MULTIPLIER_BITS
+) -> tuple[frozenset[int], ...]:
+    """Return the products by constants that are made of adders, so that the others take no more blocks than there are.
+
+    Products of two values, which nothing else can make, take blocks first; then products by constants, those first
+    that would take most adder bits for each block.
+
+    Parameters
+    ----------
+    graphs : sequence of Graph
+        The stages.
+    blocks : int or None
+        Number of multiplier blocks; None for as many as it takes.
+    block_bits : int
+        Bits of each operand of a block, signed.
+    """
+    found: list[set[int]] = [set() for _ in graphs]
+    scaled: list[tuple[float, int, int, int]] = []
+    needed = 0
+    for k, graph in enumerate(graphs):
+        constant = scalings(graph)
+        for index, node in enumerate(graph.nodes):
+            multiplication = _multiplication(graph, node)
+            if multiplication is None:
+                continue
+            taken = multiplication.blocks_of(block_bits)
+            needed += taken
+            if index in constant:
+                scaled.append((_bits_of_products(graph, [index]) / taken, k, index, taken))
+    for _, k, index, taken in sorted(scaled):
+        if blocks is None or needed <= blocks:
+            break
+        found[k].add(index)
+        needed -= taken
+    return tuple(map(frozenset, found))
+
+
+def _bits_of_products(graph: Graph, products: Iterable[int]) -> int:
+    """Return the adder bits of products by constants."""
+    total = 0
+    for operand, group in by_operand(graph, products):
+        sums = adder_graph(tuple(graph.nodes[index].parameter for index in group))
+        total += adder_bits(sums, *graph.nodes[operand].range[1:])
+    return total
+
+
+def _bits_by_digits(graph: Graph, products: Iterable[int]) -> int:
+    """Estimate the adder bits of products by constants."""
+    nodes = graph.nodes
+    return sum(
+        (len(signed_digits(nodes[index].parameter)) - 1) * (nodes[nodes[index].operands[0]].width + 1)
+        for index in products
+    )
+
+
+def _multiplication(graph: Graph, node: Node) -> Multiplication | None:
+    """Return the multiplication that a node is, None if it is none."""
+    if node.op is Op.SCALE:
+        factor = Operand(abs(node.parameter).bit_length() + (node.parameter < 0), node.parameter < 0)
+        return Multiplication(_operand(graph.nodes[node.operands[0]]), factor)
+    if node.op is Op.MULTIPLY and not graph.is_gate(node):
+        a, b = (_operand(graph.nodes[i]) for i in node.operands)
+        return Multiplication(a, b)
+    return None
+
+
 def _operand(node: Node) -> Operand:
     return Operand(node.width, node.signed)
 
@@ -154,5 +246,5 @@ def _extra(operand: Operand, other: Operand) -> bool:
     return seen == operand.bits and seen > MULTIPLIER_BITS and seen % MULTIPLIER_BITS == 1
 
 
-def _pieces(bits: int) -> int:
-    return max(1, -(-(bits - 1) // MULTIPLIER_BITS))
+def _pieces(bits: int, block_bits: int) -> int:
+    return max(1, -(-(bits - 1) // block_bits))

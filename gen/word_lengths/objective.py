@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Protocol
 
-from sosmith.gen.word_lengths.cost import LUTS_OF_A_BLOCK, area_of, cost_of
+from sosmith.gen.word_lengths.cost import LUTS_OF_A_BLOCK, area_by_digits, area_of, cost_of, scalings
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.folding import FoldingError, columns_of, program
 from sosmith.model.dataflow.graph import Graph, Op
@@ -46,6 +46,10 @@ class Objective(Protocol):
     def hopeless(self) -> float:
         """Ratio to the smallest size beyond which a plan is not trimmed."""
 
+    @property
+    def few_digits(self) -> bool:
+        """Whether a coefficient of fewer signed digits takes less, though it has as many bits."""
+
     def of_graph(self, graph: Graph) -> float:
         """Estimate what one stage adds to the size; infinite if it does not suit."""
 
@@ -73,6 +77,7 @@ class SmallArea:
     beyond = "more in multiplier blocks alone"
     unsuited = "not for this filter"
     hopeless = 2.5  # trimming saved less than half in every design seen
+    few_digits = False
 
     def of_graph(self, graph: Graph) -> float:
         """Return the area of the graph's operators, in LUT4."""
@@ -100,6 +105,37 @@ SMALL_AREA = SmallArea()
 
 
 @dataclass(frozen=True)
+class FewAdders:
+    """Estimated area of the parallel architecture whose products by constants are made of adders."""
+
+    best = "the smallest estimated area"
+    beyond = "more in multiplier blocks alone"
+    unsuited = "not for this filter"
+    hopeless = SmallArea.hopeless
+    few_digits = True
+
+    def of_graph(self, graph: Graph) -> float:
+        """Return the area of the graph's operators, in LUT4, by the digits of its constants."""
+        return area_by_digits(graph)
+
+    def of_datapath(self, datapath: Datapath) -> float:
+        """Return the area of all operators, in LUT4, with the adders that products are made of."""
+        return cost_of(datapath, [scalings(stage.graph) for stage in datapath.stages]).area
+
+    def least(self, graphs: Sequence[Graph]) -> float:
+        """Return 0: every constant may turn out to be a power of two."""
+        return 0
+
+    def told(self, datapath: Datapath) -> str:
+        """Return the area in words."""
+        return f"{self.of_datapath(datapath):,} LUT4 with products by constants made of adders"
+
+
+FEW_ADDERS = FewAdders()
+"""For the parallel architecture without multiplier blocks."""
+
+
+@dataclass(frozen=True)
 class ShortProgram:
     """Length of the program of the folded and serial architectures, then its memory, then its accumulator.
 
@@ -114,6 +150,7 @@ class ShortProgram:
     architecture: str
     digit_bits: int
 
+    few_digits = False
     beyond = "longer even with one digit for each value"
     unsuited = "not to be folded"
     hopeless = 1.5  # trimming saved less than a fifth in every design seen

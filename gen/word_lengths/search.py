@@ -3,7 +3,8 @@
 The start keeps to the error allowed. Each step is the one that saves the most estimated size for the error it costs;
 the search ends when no further step fits. A step drops bits of one quantizer, of the calibration or of one
 coefficient, which may become either neighbour of its ideal value; or it starts to quantize a product's operand so that
-it fits one hardware multiplier.
+it fits one hardware multiplier. Where products are made of adders, a coefficient may also become a number near its
+ideal value that has fewer signed digits.
 
 All errors here are linear estimates in double precision: the gain to the output for a quantizer, the response of the
 derivative for a coefficient, so that errors of several coefficients may cancel. They only guide the choice; the result
@@ -33,6 +34,7 @@ from sosmith.gen.word_lengths.bit_limits import MIN_BITS
 from sosmith.gen.word_lengths.cost import MULTIPLIER_BITS
 from sosmith.gen.word_lengths.input_stage import InputStage
 from sosmith.gen.word_lengths.objective import SMALL_AREA, Objective
+from sosmith.model.dataflow.adder_graph import signed_digits
 from sosmith.model.dataflow.graph import Range
 from sosmith.model.errors import ShortfallError
 
@@ -231,6 +233,9 @@ class Search:
         for name, frac in fits.items():
             yield form.with_frac(name, frac)
         for name, (integer, frac) in form.coefficients.items():
+            if self._objective.few_digits:
+                for nearest in _with_fewer_digits(integer, self._estimates[k].ideal[name] * 2.0**frac):
+                    yield form.with_coefficient(name, lowest_terms(nearest, frac))
             for step in _STEPS:
                 exact = self._estimates[k].ideal[name] * 2.0 ** (frac - step)
                 if abs(integer).bit_length() > step + 1:
@@ -470,6 +475,18 @@ def _slope(row: Sequence[float], realization: str, section: Section, name: str, 
         for above, below in zip_longest(_product(changed_b, a), _product(b, changed_a), fillvalue=Fraction(0))
     ]
     return _filtered((1,), _floats(changed_a), _filtered(terms, _floats(a), others))
+
+
+def _with_fewer_digits(integer: int, exact: float) -> Iterator[int]:
+    """Yield integers near `exact`, above and below, with fewer signed digits than `integer`."""
+    least = len(signed_digits(integer))
+    for whole in (math.floor(exact), math.ceil(exact)):
+        digits = signed_digits(whole)[::-1]
+        for count in range(1, len(digits) + 1):
+            near = sum(sign << power for sign, power in digits[:count])
+            for other in (near, near + (1 << digits[count - 1][1]), near - (1 << digits[count - 1][1])):
+                if other and other != integer and len(signed_digits(other)) < least:
+                    yield other
 
 
 def _bits_below(error: float, share: float) -> int:

@@ -777,6 +777,25 @@ BAD = [
         "hardware.start must be one of steady, zero, not 'warm'",
     ),
     (
+        "multipliers below zero",
+        CLOCK,
+        CLOCK + "\nmultipliers = -1",
+        'hardware.multipliers must be "auto", or a whole number from 0 to 9999, not -1',
+    ),
+    (
+        "no multipliers, but another word",
+        CLOCK,
+        CLOCK + '\nmultipliers = "none"',
+        "hardware.multipliers must be \"auto\", or a whole number from 0 to 9999, not 'none'",
+    ),
+    (
+        "no multipliers for loadable constants",
+        CLOCK,
+        CLOCK + "\nreload = true\nmultipliers = 0",
+        'hardware.multipliers must be "auto" with hardware.reload = true: adders multiply by constants that are '
+        "fixed, not 0",
+    ),
+    (
         "unknown architecture",
         CLOCK,
         CLOCK + '\narchitecture = "systolic"',

@@ -16,7 +16,6 @@ from sosmith.gen.instrument.uncertainty_budget import InstrumentBudget
 from sosmith.gen.output.core_facts import LimitCycleFacts
 from sosmith.gen.specification.specification import Specification
 from sosmith.gen.specification.wear_limits import WearSpec
-from sosmith.gen.word_lengths.cost import cost_of
 from sosmith.interface.design import Design
 from sosmith.interface.quantity import Quantity
 from sosmith.model.calibration.fit import Fit, read_measurements
@@ -111,7 +110,7 @@ def _wear_text(wear: WearSpec, output: Port) -> str:
 
 def _hardware_rows(architecture: Architecture) -> list[tuple[str, str]]:
     """Return the resources of the hardware, before synthesis."""
-    program, cost = architecture.program, cost_of(architecture.datapath)
+    program, cost = architecture.program, architecture.cost
     latency = ("latency", f"{architecture.latency_cycles:,} clocks")
     if program is None:
         sizes = f"{cost.adder_bits}, {cost.register_bits}"

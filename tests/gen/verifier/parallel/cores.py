@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from tests.gen.verifier.small_specifications import PLAIN
 
-from sosmith.gen.architecture import Architecture
+from sosmith.gen.architecture import NO_LIMIT, Architecture, Blocks
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.output.certificate import certificate
 from sosmith.gen.output.verilog import to_rtlil, to_verilog
@@ -38,8 +38,8 @@ def specified(text: str) -> Specification:
     return from_tree(tomllib.loads(text, parse_float=Decimal), Path("small.toml"))
 
 
-def made(design: CoreDesign, channels: int = 1, *, reload: bool = False) -> Made:
-    core = Architecture("parallel", design.datapath, channels, reload=reload)
+def made(design: CoreDesign, channels: int = 1, *, reload: bool = False, blocks: Blocks = NO_LIMIT) -> Made:
+    core = Architecture("parallel", design.datapath, channels, reload=reload, blocks=blocks)
     text = to_verilog(to_rtlil(core.component(), design.datapath.name))
     read = json.loads(certificate_text(certificate(design.quantized, design.spec.max_error)))
     return Made(design, text, Certificate.model_validate(read), channels)

@@ -1,0 +1,87 @@
+"""Word lengths for products that are made of adders."""
+
+from dataclasses import replace
+
+import pytest
+from tests.gen.verifier.parallel.cores import specified
+from tests.gen.verifier.small_specifications import PLAIN
+
+from sosmith.gen.architecture import Blocks, Budget, blocks_for, candidates, objective_of
+from sosmith.gen.core import design_core
+from sosmith.gen.fpga.boards import find_board
+from sosmith.gen.word_lengths.cost import area_by_digits, cost_of_graphs, products_from_adders, scalings
+from sosmith.gen.word_lengths.objective import FEW_ADDERS, SMALL_AREA
+from sosmith.gen.word_lengths.search import _with_fewer_digits
+from sosmith.model.dataflow.adder_graph import signed_digits
+from sosmith.model.dataflow.graph import Graph, GraphBuilder
+
+
+def graph(*constants: int) -> Graph:
+    """Return products of one operand of 8 bits by constants, and one of two operands."""
+    g = GraphBuilder()
+    x, y = g.input("x", 0, -128, 127), g.input("y", 0, -128, 127)
+    return g.build([*(g.scale(x, constant, 0) for constant in constants), g.multiply(x, y)])
+
+
+def test_products_of_two_values_take_blocks_first() -> None:
+    graphs = [graph(3, 683), graph(8)]
+    assert products_from_adders(graphs, None) == (frozenset(), frozenset())
+    assert products_from_adders(graphs, 5) == (frozenset(), frozenset())
+    assert products_from_adders(graphs, 4) == (frozenset(), frozenset({2}))
+    assert products_from_adders(graphs, 3) == (frozenset({2}), frozenset({2}))
+    assert products_from_adders(graphs, 2) == (frozenset({2, 3}), frozenset({2}))
+    assert products_from_adders(graphs, 0) == (frozenset({2, 3}), frozenset({2}))
+
+
+def test_a_product_by_zero_is_no_sum() -> None:
+    assert scalings(graph(0, 5)) == {3}
+
+
+def test_sums_are_counted_once_where_they_are_shared() -> None:
+    made = graph(5, 45)
+    apart = sum(cost_of_graphs([graph(k)], [scalings(graph(k))]).adder_bits for k in (5, 45))
+    together = cost_of_graphs([made], [scalings(made)])
+    assert together.adder_bits == (11 - 2) + 14 - 0 or together.adder_bits < apart
+    assert together.multiplier_blocks == 1
+    assert cost_of_graphs([made]).multiplier_blocks == 3
+
+
+def test_each_digit_but_the_first_is_a_sum() -> None:
+    sizes = [area_by_digits(graph(k)) for k in (1, 64, 5, 7, 21, 85)]
+    assert sizes[0] == sizes[1] < sizes[2] == sizes[3] < sizes[4] < sizes[5]
+
+
+@pytest.mark.parametrize("exact", [216531.4, -216531.4, 5.9, 1023.2])
+def test_neighbours_with_fewer_digits(exact: float) -> None:
+    integer = round(exact)
+    found = list(_with_fewer_digits(integer, exact))
+    assert found
+    assert all(near and len(signed_digits(near)) < len(signed_digits(integer)) for near in found)
+    assert min(found) < exact < max(found)
+
+
+def test_the_board_and_the_specification_say_how_many_blocks_there_are() -> None:
+    hx8k, up5k = find_board("ice40_hx8k_b_evn"), find_board("icebreaker")
+    assert blocks_for(None, None) == Blocks(None)
+    assert blocks_for(None, hx8k) == Blocks(0)
+    assert blocks_for(None, up5k) == Blocks(8, 16)
+    assert blocks_for(3, up5k) == Blocks(3, 16)
+    assert candidates("auto", Blocks(0)) == ("serial", "folded", "parallel")
+    assert candidates("auto", Blocks(8)) == ("folded", "parallel")
+    assert objective_of("parallel", hx8k, adders=True) == FEW_ADDERS
+    assert objective_of("parallel", up5k) == SMALL_AREA
+    budget = Budget(clock=specified(PLAIN).hardware.clock, sample_rate=specified(PLAIN).sample_rate, blocks=Blocks(0))
+    assert budget.adders
+    assert not replace(budget, reload=True).adders
+
+
+def test_a_design_for_adders_takes_less_than_one_for_blocks_made_of_adders() -> None:
+    spec = specified(PLAIN)
+    for_blocks, for_adders = (
+        design_core(
+            replace(spec, hardware=replace(spec.hardware, architecture="parallel", multipliers=count)),
+            realization="df1_ef2",
+        ).architecture
+        for count in (None, 0)
+    )
+    assert for_adders.cost.area <= replace(for_blocks, blocks=Blocks(0)).cost.area
