@@ -31,7 +31,7 @@ from benchmarks.synthesis import GOAL, TARGETS, Area, place, placer, synthesize,
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
-from sosmith.gen.architecture import Architecture, digit_bits_on
+from sosmith.gen.architecture import Architecture, blocks_for, digit_bits_on
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.output.verilog import converted, to_rtlil, to_verilog
 from sosmith.gen.picture import settled
@@ -140,18 +140,25 @@ def jobs() -> list[Job]:
 
 
 @cache
-def design(example: str, architecture: str) -> CoreDesign:
+def design(example: str, architecture: str, multipliers: int | None = None) -> CoreDesign:
     """Design an example in an architecture, for one channel; the datapath is the same for more."""
     spec = load(ROOT / "examples" / f"{example}.toml")
-    wanted = replace(spec, hardware=replace(spec.hardware, architecture=architecture))
+    wanted = replace(spec, hardware=replace(spec.hardware, architecture=architecture, multipliers=multipliers))
     return design_core(wanted, core=EXAMPLES[example])
 
 
 def architecture_on(core: Core, key: str) -> Architecture:
-    """Return the architecture of a core on a target, with digits as wide as its multipliers take."""
-    made = design(core.example, core.architecture).architecture
-    digit_bits = digit_bits_on(TARGETS[key], core.architecture)
-    return replace(made, channels=core.channels, protect=core.protect, digit_bits=digit_bits)
+    """Return the architecture of a core on a target: digits as wide as its multipliers take, adders if too few."""
+    target = TARGETS[key]
+    adders = core.architecture == "parallel" and not target.device.multipliers
+    made = design(core.example, core.architecture, 0 if adders else None).architecture
+    return replace(
+        made,
+        channels=core.channels,
+        protect=core.protect,
+        digit_bits=digit_bits_on(target, core.architecture),
+        blocks=blocks_for(None, target),
+    )
 
 
 @cache
@@ -431,6 +438,8 @@ GOALS = (
     Goal(_AUDIO["parallel"], "ecp5", "all LUT4, to beat", 500, _area("all_luts")),
     Goal(_AUDIO["parallel"], "ecp5", "fmax, MHz", 70, fmax),
     Goal(_EIGHT, "ecp5", "fmax, MHz", 120, fmax),
+    Goal(_AUDIO["parallel"], "hx8k", "LC, no multipliers", 2000, _cells),
+    Goal(_AUDIO["parallel"], "hx8k", "fmax, MHz, no less than with multipliers of LUT4", 49, fmax),
     Goal(_AUDIO["folded"], "ecp5", "MULT18X18D", 1, _area("multipliers")),
     Goal(_AUDIO["folded"], "ecp5", "LUT4 alone", 400, _area("luts")),
     Goal(_AUDIO["folded"], "ecp5", "all LUT4", 400, _area("all_luts")),
