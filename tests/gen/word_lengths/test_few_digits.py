@@ -7,7 +7,6 @@ from tests.gen.verifier.parallel.cores import specified
 from tests.gen.verifier.small_specifications import PLAIN
 
 from sosmith.gen.architecture import Blocks, Budget, blocks_for, candidates, objective_of
-from sosmith.gen.core import design_core
 from sosmith.gen.fpga.boards import find_board
 from sosmith.gen.word_lengths.cost import area_by_digits, cost_of_graphs, products_from_adders, scalings
 from sosmith.gen.word_lengths.objective import FEW_ADDERS, SMALL_AREA
@@ -41,7 +40,7 @@ def test_sums_are_counted_once_where_they_are_shared() -> None:
     made = graph(5, 45)
     apart = sum(cost_of_graphs([graph(k)], [scalings(graph(k))]).adder_bits for k in (5, 45))
     together = cost_of_graphs([made], [scalings(made)])
-    assert together.adder_bits == (11 - 2) + 14 - 0 or together.adder_bits < apart
+    assert together.adder_bits < apart
     assert together.multiplier_blocks == 1
     assert cost_of_graphs([made]).multiplier_blocks == 3
 
@@ -51,7 +50,7 @@ def test_each_digit_but_the_first_is_a_sum() -> None:
     assert sizes[0] == sizes[1] < sizes[2] == sizes[3] < sizes[4] < sizes[5]
 
 
-@pytest.mark.parametrize("exact", [216531.4, -216531.4, 5.9, 1023.2])
+@pytest.mark.parametrize("exact", [216531.4, -216531.4, 5.9, 1000.3])
 def test_neighbours_with_fewer_digits(exact: float) -> None:
     integer = round(exact)
     found = list(_with_fewer_digits(integer, exact))
@@ -73,15 +72,3 @@ def test_the_board_and_the_specification_say_how_many_blocks_there_are() -> None
     budget = Budget(clock=specified(PLAIN).hardware.clock, sample_rate=specified(PLAIN).sample_rate, blocks=Blocks(0))
     assert budget.adders
     assert not replace(budget, reload=True).adders
-
-
-def test_a_design_for_adders_takes_less_than_one_for_blocks_made_of_adders() -> None:
-    spec = specified(PLAIN)
-    for_blocks, for_adders = (
-        design_core(
-            replace(spec, hardware=replace(spec.hardware, architecture="parallel", multipliers=count)),
-            realization="df1_ef2",
-        ).architecture
-        for count in (None, 0)
-    )
-    assert for_adders.cost.area <= replace(for_blocks, blocks=Blocks(0)).cost.area

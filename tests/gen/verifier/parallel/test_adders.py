@@ -10,7 +10,7 @@ from sosmith.gen.architecture import Blocks
 from sosmith.gen.core import design_core
 from sosmith.gen.verifier.graph import RejectedError
 
-WITHOUT = ODD + 'hardware = { architecture = "parallel", multipliers = 0 }\n'
+WITHOUT = ODD + 'hardware.architecture = "parallel"\nhardware.multipliers = 0\n'
 
 
 def without_multipliers(realization: str, channels: int = 1) -> Made:
@@ -27,14 +27,14 @@ def test_the_hardware_is_proven(realization: str, channels: int) -> None:
     core.check()
 
 
-@pytest.mark.parametrize(("right", "wrong"), [(" - ", " + "), (" + ", " - ")])
-def test_a_wrong_sum_is_rejected(right: str, wrong: str) -> None:
+def test_a_wrong_sum_is_rejected() -> None:
     core = without_multipliers("df1_ef2")
-    sums = re.findall(rf"^ *assign \w+_times_\w+ = .*{re.escape(right)}.*;$", core.text, re.MULTILINE)
-    assert sums
-    for line in sums:
+    lines = [line for line in core.text.splitlines() if re.match(r" *assign .*_times_\w+ (\} )?= .* [+-] ", line)]
+    assert lines
+    for line in lines:
+        wrong = line.replace(" - ", " + ") if " - " in line else line.replace(" + ", " - ")
         with pytest.raises(RejectedError):
-            core.check(core.text.replace(line, line.replace(right, wrong, 1)))
+            core.check(core.text.replace(line, wrong))
 
 
 def test_the_design_takes_adders_and_says_so() -> None:
