@@ -31,7 +31,8 @@ def multiples(m: Module, operand: Value, known: Range, constants: Sequence[int],
     places = {1: 0}
     for adder in adder_graph(tuple(constants)):
         low, high = multiple_range(adder.multiple, known.low, known.high)
-        shape = Shape.cast(range(low, high + 1))
+        bits = max((end if end >= 0 else ~end).bit_length() for end in (low, high))
+        shape = Shape(bits + (low < 0), signed=low < 0)  # a `range` beyond 63 bits has no length
         sign = "minus_" if adder.multiple < 0 else ""
         wire = Signal(shape, name=f"{name}_times_{sign}{abs(adder.multiple)}", attrs={"keep": 1})
         left, right = (values[k].shift_left(shift) for k, shift in (adder.left, adder.right))

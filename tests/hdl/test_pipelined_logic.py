@@ -116,3 +116,10 @@ def test_the_text_names_the_sums_and_has_no_product() -> None:
 
 def test_a_loadable_constant_needs_a_multiplier() -> None:
     assert not any(Architecture("parallel", datapath(), reload=True, blocks=Blocks(0)).adders)
+
+
+def test_sums_may_have_more_than_63_bits() -> None:
+    x = Signal(Shape(64, signed=True))
+    known, codes = Range(0, -(2**63), 2**63 - 1), [2**63 - 1, -1, -(2**63)]
+    found = values([x], lambda m: multiples(m, x, known, [85], "x")[0], [(code,) for code in codes])
+    assert found == [85 * code for code in codes]
