@@ -312,7 +312,7 @@ class MeasurementStore:
         return [
             Version(
                 number,
-                date,
+                self._date(date),
                 count,
                 last,
                 data,
@@ -398,6 +398,13 @@ class MeasurementStore:
             return Polynomial.from_numbers([[float.fromhex(a) for a in row] for row in json.loads(coefficients)])
         except (ValueError, TypeError, ArithmeticError, RecursionError):
             raise self._damaged(coefficients) from None
+
+    def _date(self, text: str) -> str:
+        try:
+            datetime.date.fromisoformat(text)
+        except ValueError:
+            raise self._damaged(text) from None
+        return text
 
     def _type(self, text: str) -> SensorType:
         try:

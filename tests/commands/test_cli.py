@@ -875,15 +875,16 @@ def test_a_signal_in_the_middle_of_the_simulation(
 
 
 def test_two_runs_in_one_folder_at_once(process: Start, tmp_path: Path) -> None:
-    """The second is refused at once, and the first is none the worse for it."""
+    """The second is refused at once, and the first, held up meanwhile, is none the worse for it."""
     parallel = f'{FILTER}\n[hardware]\narchitecture = "parallel"\n'  # many clocks a second
     (tmp_path / "plain.toml").write_text(parallel, encoding="utf-8")
-    arguments = ["simulate", "plain.toml", "--trace", "noise", "--seconds", "40", "--simulator", "icarus", "-o", "out"]
+    arguments = ["simulate", "plain.toml", "--trace", "noise", "--seconds", "1", "--simulator", "icarus", "-o", "out"]
     first = process(*arguments)
     wait_for((tmp_path / "out" / "simulation").exists)
+    first.send_signal(signal.SIGSTOP)
     second = process(*arguments)
     output, errors = second.communicate(timeout=HANGS)
-    assert first.poll() is None
+    first.send_signal(signal.SIGCONT)
     assert (second.returncode, output) == (2, "")
     assert errors.splitlines()[-1] == (
         "sosmith: error: out: the output folder must be free, not in use by another run; choose one with -o"

@@ -168,11 +168,12 @@ def test_a_specification_for_tread_braking_shows_all_of_its_temperatures() -> No
 
 
 def test_the_vehicles_motion_reaches_the_trace(folder: Path) -> None:
-    ride = SHORT.replace('"depot"', '"curve"\nmotion_from = "vehicle"')
-    (folder / "ride.toml").write_text(ride, encoding="utf-8")
+    rest = SHORT.replace("seconds = 20", "seconds = 8")
+    (folder / "rest.toml").write_text(rest, encoding="utf-8")
+    (folder / "ride.toml").write_text(rest.replace('"depot"', '"curve"\nmotion_from = "vehicle"'), encoding="utf-8")
     made = design_core(load(folder / "spec.toml"))
     (moving,) = traces_for(made, "ride.toml", seed=1)
-    (at_rest,) = traces_for(made, "day.toml", seed=1)
+    (at_rest,) = traces_for(made, "rest.toml", seed=1)
     difference = moving.values()[:, 0] - at_rest.values()[:, 0]
     motion = vehicle_clearance("paper", moving.time, 1)
     # Noise and truth are the same, so that the voltages differ by the motion alone, at some 1.3 V/mm.

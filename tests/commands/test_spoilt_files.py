@@ -108,7 +108,7 @@ SUBJECTS = (
     Subject(
         "report.json",
         ("compare report.json other.json -o out.html", "compare report.json --baseline other.json --json"),
-        120,
+        40,
     ),
     Subject("plain.json", ("verify plain.json", "compare plain.json plain.json"), 10),
 )

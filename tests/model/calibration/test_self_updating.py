@@ -273,7 +273,7 @@ def test_a_store_of_version_1_is_brought_up_to_date(tmp_path: Path) -> None:
         assert calibration_of(store, "left").version == other.version
 
 
-@pytest.mark.parametrize(("column", "value"), [("method", "guess"), ("type", "{}"), ("accept_mm", "wide")])
+@pytest.mark.parametrize(("column", "value"), [("date", "x"), ("method", "guess"), ("type", "{}"), ("accept_mm", "wide")])
 def test_a_spoilt_version_is_refused(tmp_path: Path, column: str, value: str) -> None:
     path = tmp_path / "c.db"
     with open_store(path, create=True) as store:
@@ -462,7 +462,7 @@ def test_killed_at_any_statement_of_an_addition(tmp_path: Path) -> None:
     for k in range(2):
         batch(tmp_path, f"{k}.csv", size, seed=k)
     outcomes, journals = [], 0
-    for statement in (1, 4, 8, 12, 16, 20, 24, 28, 32, 10_000):
+    for statement in (1, 8, 12, 16, 20, 24, 28, 10_000):
         path = tmp_path / f"{statement}.db"
         with open_store(path, create=True) as opened:
             add(opened, "left", tmp_path / "0.csv", DAY, required_r=0.9)
