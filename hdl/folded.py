@@ -136,7 +136,7 @@ _SLICES = {256: 16, 512: 8, 1024: 4, 2048: 2}
 
 def reset_cycles(program: Program, channels: int) -> int:
     """Clocks after a reset in which the memory is cleared."""
-    return memory_depth(program, channels) + (channels > 1)
+    return memory_depth(program, channels) + 1
 
 
 def memory_depth(program: Program, channels: int) -> int:
@@ -220,11 +220,11 @@ class FoldedCore(wiring.Component):
         channel = self._channel(m, waits, dropped, start)
         counter, fetching = self._control(m, (advance, clearing, start, busy), channel, early=guard is None)
         reload = self._reload(m, start, busy)
-        pipeline, fetched = self._fetch(m, advance, (counter, fetching), reload, guard)
+        pipeline, fetched = self._fetch(m, advance, (counter, fetching, clearing), reload, guard)
         read = Signal(signed(self._word))
         added = Signal(signed(self.program.accumulator_bits))
         moved = self._accumulate(m, advance, pipeline, (read, added))
-        remembered = self._remember(m, (advance, clearing), (counter, added, read, moved, channel), pipeline, guard)
+        remembered = self._remember(m, (advance, clearing), (added, read, moved, channel), pipeline, guard)
         ends = advance & pipeline[-1].valid & (self._gives_last(pipeline) if self._overlaps else ~pipeline[-2].valid)
         taken = Signal()
         begins = taken if self._overlaps else start
@@ -302,15 +302,15 @@ class FoldedCore(wiring.Component):
         Return the address of an instruction, and whether it is read for a sample. If that is to be `early`, the first
         one is read at the clock that finds the sample.
 
-        While words are cleared, the channel follows the upper bits of the counter a clock late, so that word 0 of a
-        channel is cleared after its others.
+        While words are cleared, their channel and their address in the last pipeline stage follow the counter a clock
+        late.
 
         Where samples overlap, the core is busy only while it reads the program, and waits before it computes a result
         as long as the one before has not left. The accumulator is then empty.
         """
         advance, clearing, start, busy = control
         count, bits = len(self.program.instructions), address_bits(self.program)
-        counter = Signal(max((count - 1).bit_length(), bits + len(channel)))
+        counter = Signal(max((count - 1).bit_length(), bits + max(1, len(channel))))
         fetching = Signal()
         fetches = Signal()
         m.d.comb += fetches.eq(fetching | start if early else fetching)
@@ -322,7 +322,7 @@ class FoldedCore(wiring.Component):
         is_last = channel == self.channels - 1
         with m.If(clearing):
             m.d.sync += [counter.eq(counter + 1), channel.eq(counter[bits:])]
-            with m.If(self._is_one(counter) if self.channels == 1 else is_last & ~counter[:bits].any()):
+            with m.If(counter[bits] if self.channels == 1 else is_last & ~counter[:bits].any()):
                 m.d.sync += [clearing.eq(0), counter.eq(0)]
         with m.Elif(fetches & advance):
             m.d.sync += [counter.eq(counter + 1), fetching.eq(1)]
@@ -333,10 +333,6 @@ class FoldedCore(wiring.Component):
         with m.Elif(leaves):
             m.d.sync += busy.eq(0)
         return counter, fetches
-
-    def _is_one(self, address: Value) -> Value:
-        """Whether an address is that of the word that always holds 1, the last one of a channel."""
-        return address[: address_bits(self.program)].all()
 
     def _reload(self, m: Module, start: Signal, busy: Signal) -> tuple[ReloadPort, Signal] | None:
         """Return the reload port, and the bank that the sample in work uses."""
@@ -362,15 +358,17 @@ class FoldedCore(wiring.Component):
         self,
         m: Module,
         advance: Signal,
-        position: tuple[Signal, Signal],
+        position: tuple[Signal, Signal, Signal],
         reload: tuple[ReloadPort, Signal] | None,
         guard: FaultGuard | None,
     ) -> tuple[list[PipelinedInstruction], tuple[Value, Value]]:
         """Read the program; return the instructions in the pipeline stages, the one just read first.
 
+        While words are cleared, the last one's target is the address of the next.
+
         Return besides whether a wrong bit was corrected at this clock, and whether one was found that could not be.
         """
-        counter, fetching = position
+        counter, fetching, clearing = position
         codes = [encoded(instruction, self.program) for instruction in self.program.instructions]
         count = len(codes)
         if reload is not None:
@@ -402,6 +400,8 @@ class FoldedCore(wiring.Component):
                 valid = Signal(name=f"valid{k}")
                 m.d.sync += [code.eq(pipeline[-1].code), valid.eq(pipeline[-1].valid)]
                 pipeline.append(PipelinedInstruction(code, valid, self.program))
+            with m.If(clearing):  # in place of a target, the address of the word to clear
+                m.d.sync += pipeline[-1].target.eq(counter[: address_bits(self.program)])
         return pipeline, (looks & found.corrected, looks & found.failed)
 
     def _program_address(
@@ -511,7 +511,7 @@ class FoldedCore(wiring.Component):
         self,
         m: Module,
         control: tuple[Signal, Signal],
-        values: tuple[Signal, Signal, Signal, Value, Signal],
+        values: tuple[Signal, Signal, Value, Signal],
         pipeline: list[PipelinedInstruction],
         guard: FaultGuard | None,
     ) -> tuple[Value, Value]:
@@ -519,18 +519,17 @@ class FoldedCore(wiring.Component):
 
         Return whether a wrong bit was corrected at this clock, and whether one was found that could not be.
         """
-        (advance, clearing), (counter, added, read, moved, channel) = control, values
+        (advance, clearing), (added, read, moved, channel) = control, values
         addressing, present, last = pipeline[-3 if self.serial else -4], pipeline[-2], pipeline[-1]
         moves = present.valid & present.has(*EARLY_WRITES)
         stores = last.valid & last.has(*LATE_WRITES)
         finishes = last.valid & last.has(*FINISHES)
         address: Value = Cat(addressing.address, channel)
-        target: Value = Mux(moves, present.target, last.target)
-        where = Cat(Mux(clearing, counter[: address_bits(self.program)], target), channel)
+        where: Value = Cat(Mux(moves, present.target, last.target), channel)
         sign = self._word - 1
         # One LUT4 for each bit, since the sum is late: nothing is moved while something is stored.
         what = Cat(Mux(stores, added[:sign], moved[:sign]), Mux(finishes, added[sign], moved[sign]))
-        what = what | (clearing & self._is_one(counter))
+        what = what | (clearing & last.target.all())  # the word that always holds 1 is the last one of a channel
         enable = clearing | (advance & (moves | stores))
         check = CheckBits(self._word, self.protect)
         looks: Value = advance & self._reading(pipeline).valid
