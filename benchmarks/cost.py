@@ -31,11 +31,12 @@ from benchmarks.synthesis import GOAL, TARGETS, Area, place, placer, synthesize,
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
-from sosmith.gen.architecture import Architecture, blocks_for, digit_bits_on
+from sosmith.gen.architecture import Architecture, blocks_for, objective_of
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.output.verilog import converted, to_rtlil, to_verilog
 from sosmith.gen.picture import settled
 from sosmith.gen.specification.specification import load
+from sosmith.gen.word_lengths.objective import Objective
 from sosmith.model.dataflow.protection import PROTECTIONS
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -139,26 +140,30 @@ def jobs() -> list[Job]:
     return sorted(((core, key) for core in CORES for key in core.targets), key=rank)
 
 
+def objective_on(architecture: str, key: str) -> Objective:
+    """Return what a core is designed for on a target: digits as wide as its multipliers take, adders without any."""
+    target = TARGETS[key]
+    return objective_of(architecture, target, adders=not target.device.multipliers)
+
+
 @cache
-def design(example: str, architecture: str, multipliers: int | None = None) -> CoreDesign:
+def design(example: str, architecture: str, objective: Objective) -> CoreDesign:
     """Design an example in an architecture, for one channel; the datapath is the same for more."""
     spec = load(ROOT / "examples" / f"{example}.toml")
-    wanted = replace(spec, hardware=replace(spec.hardware, architecture=architecture, multipliers=multipliers))
-    return design_core(wanted, core=EXAMPLES[example])
+    wanted = replace(spec, hardware=replace(spec.hardware, architecture=architecture))
+    first = next(target for key, target in TARGETS.items() if objective_on(architecture, key) == objective)
+    return design_core(wanted, core=EXAMPLES[example], board=first)
 
 
 def architecture_on(core: Core, key: str) -> Architecture:
-    """Return the architecture of a core on a target: digits as wide as its multipliers take, adders if too few."""
-    target = TARGETS[key]
-    adders = core.architecture == "parallel" and not target.device.multipliers
-    made = design(core.example, core.architecture, 0 if adders else None).architecture
-    return replace(
-        made,
-        channels=core.channels,
-        protect=core.protect,
-        digit_bits=digit_bits_on(target, core.architecture),
-        blocks=blocks_for(None, target),
-    )
+    """Return the architecture of a core as it is designed for a target."""
+    made = design(core.example, core.architecture, objective_on(core.architecture, key)).architecture
+    return replace(made, channels=core.channels, protect=core.protect, blocks=blocks_for(None, TARGETS[key]))
+
+
+def realization_on(core: Core, key: str) -> str:
+    """Return the realization of a core on a target."""
+    return design(core.example, core.architecture, objective_on(core.architecture, key)).quantized.realization
 
 
 @cache
@@ -226,11 +231,10 @@ def measure(processes: int) -> None:
     old: Figures = json.loads(RECORD.read_text(encoding="utf-8"))
     unchanged = (old["tools"], old["seeds"]) == (record["tools"], record["seeds"])
     for core in CORES:
-        realization = design(core.example, core.architecture).quantized.realization
         kept = targets_in(old, core) if unchanged else {}
         for key, figures in kept.items():
             figures["earlier"] = figures["source"] != source(core, key)
-        record["cores"][core.key] = {"realization": realization, "targets": kept}
+        record["cores"][core.key] = {"targets": kept}
     RECORD.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
     for core, key in jobs():
         targets = targets_in(record, core)
@@ -241,6 +245,7 @@ def measure(processes: int) -> None:
             targets[key] = {
                 "source": source(core, key),
                 "earlier": False,
+                "realization": realization_on(core, key),
                 "cycles": architecture_on(core, key).cycles_per_sample,
                 "area": asdict(Area.of(cells)),
                 **placed(Path(scratch), key, cells, processes),
@@ -425,9 +430,34 @@ def _cells(figures: Figures) -> float:
     return figures["cells"]
 
 
+def _clocks(figures: Figures) -> float:
+    return figures["cycles"]
+
+
 _AUDIO = {name: Core("audio_lowpass", name) for name in ARCHITECTURES}
 _EIGHT = Core("audio_lowpass", "parallel", 8)
 _LOCOMOTIVE = {(name, n): Core("flange_wear_locomotive", name, n) for name in ARCHITECTURES for n in CHANNELS}
+
+_FOLDED = {
+    ("audio_lowpass", "up5k"): (85, {"LC": 342}),
+    ("audio_lowpass", "ecp5"): (75, {"LUT4 alone": 192, "all LUT4": 294}),
+    ("flange_wear_locomotive", "up5k"): (150, {"LC": 319}),
+    ("flange_wear_locomotive", "ecp5"): (120, {"LUT4 alone": 268, "all LUT4": 374}),
+}
+"""Clocks that a folded core may take, and its logic when it took an instruction of its own for each column's end."""
+
+_LOGIC = {"LC": _cells, "LUT4 alone": _area("luts"), "all LUT4": _area("all_luts")}
+
+
+def _folded_goals() -> Iterable[Goal]:
+    """Few clocks, without much more logic."""
+    for (example, key), (clocks, before) in _FOLDED.items():
+        core = Core(example, "folded")
+        yield Goal(core, key, "clocks per sample", clocks, _clocks)
+        for figure, count in before.items():
+            name = f"{figure}, 10 % above the {count:,} of the first version"
+            yield Goal(core, key, name, count * 11 // 10, _LOGIC[figure])
+
 
 GOALS = (
     Goal(_AUDIO["parallel"], "ecp5", "MULT18X18D", 16, _area("multipliers")),
@@ -444,6 +474,7 @@ GOALS = (
     Goal(_AUDIO["folded"], "ecp5", "LUT4 alone", 400, _area("luts")),
     Goal(_AUDIO["folded"], "ecp5", "all LUT4", 400, _area("all_luts")),
     Goal(_AUDIO["folded"], "ecp5", "fmax, MHz", 100, fmax),
+    *_folded_goals(),
     Goal(_AUDIO["serial"], "up5k", "MAC16", 0, _area("multipliers")),
     Goal(_AUDIO["serial"], "up5k", "LC", 500, _cells),
     Goal(_AUDIO["serial"], "hx8k", "LC", 500, _cells),
@@ -574,7 +605,8 @@ def plot(record: Figures) -> str:
 
 def document(record: Figures) -> dict[str, str]:
     """Return the texts of the document and its plot, by path from the root, from the recorded figures only."""
-    realizations = sorted({found["realization"] for found in record["cores"].values()})
+    found = (figures for core in record["cores"].values() for figures in core["targets"].values())
+    realizations = sorted({figures["realization"] for figures in found})
     left = "".join(f"- {core}.\n" for core in missing(record))
     if left:
         left = f"\nNot measured yet:\n\n{left}"
