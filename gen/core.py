@@ -16,6 +16,7 @@ from sosmith.gen.word_lengths.other_realization import with_realization
 from sosmith.gen.word_lengths.quantize import Plan, least_size, plan, prove
 from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.gen.word_lengths.selection import Selection
+from sosmith.gen.word_lengths.settling import samples_to_settle, with_settling
 from sosmith.model.calibration.fit import Fit, fit, read_measurements
 from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.dataflow.datapath import Datapath
@@ -151,13 +152,17 @@ def design_core(
         source = "on the command line" if realization is not None else "in the specification"
         return selection.proven(wanted), f"{wanted}: asked for {source}"
 
+    hardware = spec.hardware
+
     def in_hardware(name: str, datapath: Datapath) -> Architecture:
-        """Architecture with the calibrated range, which costs a program instructions, and the limits of wear."""
+        """Architecture with what costs a program instructions: the calibrated range, limits of wear, and settling."""
         codes = () if fitted is None else calibrated_codes(datapath.inputs, fitted)
         wear = () if spec.wear is None else spec.wear.codes(spec.output)
-        return fitting(name, budget, replace(datapath, calibrated=codes, wear=wear), board)
+        # Constants that are loaded may make the filter slower, and in parallel hardware the count is not among them.
+        spare = 2 if hardware.reload and name == "parallel" else 1
+        flagged = with_settling(datapath, spare * samples_to_settle(datapath))
+        return fitting(name, budget, replace(flagged, calibrated=codes, wear=wear), board)
 
-    hardware = spec.hardware
     budget = Budget(
         clock=hardware.clock,
         sample_rate=spec.sample_rate,

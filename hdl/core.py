@@ -57,7 +57,7 @@ from sosmith.hdl.interleaved import InterleavedStage, schedule
 from sosmith.hdl.pipelined_logic import banks_in_use
 from sosmith.hdl.reload import ReloadPort
 from sosmith.hdl.stage import PipelinedStage, pipeline_depth
-from sosmith.hdl.status import at_rail, flag_count, outside_calibration, with_fault, worn
+from sosmith.hdl.status import at_rail, flag_count, in_order, outside_calibration, with_fault, worn
 from sosmith.model.dataflow.datapath import Datapath, Stage
 from sosmith.model.reload.constants import constants
 from sosmith.model.reload.registers import ADDRESS_BITS
@@ -176,25 +176,27 @@ class Core(wiring.Component):
         if banks is not None:
             port = self._reload(m, banks, bank, Cat(waiting, *(component.uses for component in stages)))
         status: Value = Cat(at_rail(self.datapath.inputs, data), outside_calibration(self.datapath, data))
-        last, code = self._chain(m, stages, first, data)
+        last, (code, *counted) = self._chain(m, stages, first, data)
         for k in range(sum(_depths(self.datapath, self.channels, self.protect))):
             held = Signal(len(status), name=f"status{k + 1}", reset_less=True)
             with m.If(buffer.advance):
                 m.d.sync += held.eq(status)
             status = held
         saturated, fault = stages[-1].o_saturated, last.fault
+        settling = counted[0][-1] if self.datapath.settles else Const(0, 0)
         if banks is not None and guarded:
             fault = fault | (last.valid & Mux(last.bank, banks.wrong[1], banks.wrong[0]))
         fault = fault & (last.valid | last.scrub)
         valid, channel = last.valid, last.channel
         if len(self.datapath.wear) > 1:  # it takes a clock to read the limits of the channel
-            valid, code, status, saturated, channel = self._delayed(
-                m, buffer.advance, [valid, code, status, saturated, channel]
+            valid, code, status, saturated, channel, *flagged = self._delayed(
+                m, buffer.advance, [valid, code, status, saturated, channel, *[settling] * self.datapath.settles]
             )
+            settling = flagged[0] if flagged else settling
             if guarded:
                 (fault,) = self._delayed(m, buffer.advance, [fault], "fault_judged")
         wear = worn(m, self.datapath, code, last.channel, buffer.advance, self.protect)
-        flags: Value = Cat(status, saturated, wear.flags)
+        flags = in_order(self.datapath, status, saturated, wear, settling)
         if guard is not None:
             fault = fault | (valid & wear.failed)
             flags = Cat(flags, guard.fault | fault)
@@ -208,8 +210,8 @@ class Core(wiring.Component):
 
     def _chain(
         self, m: Module, stages: list[PipelinedStage | InterleavedStage], first: _Place, data: Value
-    ) -> tuple[_Place, Value]:
-        """Connect the stages one behind the other; return what is behind the last one, and the code of the result."""
+    ) -> tuple[_Place, list[Value]]:
+        """Connect the stages one behind the other; return what is behind the last one, and its outputs."""
         place = first
         codes: list[Value] = [data[f.offset : f.offset + f.port.bits] for f in fields(self.datapath.inputs)]
         for component in stages:
@@ -226,7 +228,7 @@ class Core(wiring.Component):
                     m.d.comb += component.i_scrub.eq(place.scrub)
                     following = following._replace(scrub=component.o_scrub)
             place, codes = following, [getattr(component, f"o{k}") for k in range(len(component.stage.graph.outputs))]
-        return place, codes[0]
+        return place, codes
 
     def _hand_out(
         self, m: Module, buffer: StreamBuffer, valid: Value, code: Value, flags: Value, channel: Value

@@ -74,7 +74,7 @@ from sosmith.hdl.fault_guard import FaultGuard
 from sosmith.hdl.instruction import PipelinedInstruction, address_bits, encoded, instruction_bits
 from sosmith.hdl.pipelined_logic import limits
 from sosmith.hdl.reload import ReloadPort
-from sosmith.hdl.status import at_rail, with_fault, worn
+from sosmith.hdl.status import at_rail, in_order, with_fault, worn
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.graph import Op
 from sosmith.model.dataflow.program import (
@@ -84,6 +84,7 @@ from sosmith.model.dataflow.program import (
     FINISHES,
     LATE_WRITES,
     PRODUCTS,
+    Judged,
     Location,
     Opcode,
     Program,
@@ -614,24 +615,39 @@ class FoldedCore(wiring.Component):
         with m.If(begins):
             m.d.sync += [rail.eq(at_rail(self.datapath.inputs, self.s_axis_tdata)), outside.eq(0)]
         if self.fingerprint is not None or any(i.opcode is Opcode.JUDGE for i in self.program.instructions):
-            with m.If(advance & last.valid & last.has(Opcode.JUDGE) & added[-1]):
+            judges = last.valid & last.has(Opcode.JUDGE) & added[-1]
+            if self.datapath.settles:
+                judges = judges & last.judges(Judged.OUTSIDE)
+            with m.If(advance & judges):
                 m.d.sync += outside.eq(1)
         judged: Value = Cat(rail, outside)
+        settling = self._settling(m, advance, last, added)
         if self._overlaps:  # the next sample may have begun
-            judged = Signal(2, reset_less=True)
+            now = Cat(judged, settling)
+            judged = Signal(len(now), name="judged", reset_less=True)
             with m.If(ends):
-                m.d.sync += judged.eq(Cat(rail, outside))
+                m.d.sync += judged.eq(now)
+            judged, settling = judged[:2], judged[2:]
         code, saturated = self._limited(given)
         # Without protection the limits are read again and again; with it just once, so that an upset changes no flag
         # of a result that waits for the sink.
         wear = worn(m, self.datapath, code, channel, Const(1) if guard is None else ends, self.protect)
-        flags: Value = Cat(judged, saturated, wear.flags)
+        flags = in_order(self.datapath, judged, saturated, wear, settling)
         m.d.comb += [
             self.m_axis_tdata.eq(extended(code, self.datapath.output.bytes * 8)),
             self.m_axis_tuser.eq(flags if guard is None else with_fault(flags, guard.fault | wear.failed)),
         ]
         leaves = self.m_axis_tvalid & self.m_axis_tready
         return leaves & wear.corrected, leaves & wear.failed
+
+    def _settling(self, m: Module, advance: Signal, last: PipelinedInstruction, added: Signal) -> Value:
+        """Return whether the program has judged that the sample comes before the filter has settled."""
+        if not self.datapath.settles:
+            return Const(0, 0)
+        settling = Signal(reset_less=True)
+        with m.If(advance & last.valid & last.has(Opcode.JUDGE) & last.judges(Judged.SETTLING)):
+            m.d.sync += settling.eq(added[-1])
+        return settling
 
     def _gives_last(self, pipeline: list[PipelinedInstruction]) -> Value:
         """Whether the last pipeline stage has the last part of a result."""

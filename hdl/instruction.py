@@ -18,7 +18,7 @@ from __future__ import annotations
 from amaranth.hdl import Cat, Value, signed
 from amaranth.lib import data
 
-from sosmith.model.dataflow.program import Instruction, Opcode, Program
+from sosmith.model.dataflow.program import Instruction, Judged, Opcode, Program
 
 _NUMBER_BITS = 8
 """Bits of the constant that may hold a digit's number: no value has more than 256 digits."""
@@ -87,6 +87,10 @@ class PipelinedInstruction:
     def gives(self, part: int) -> Value:
         """Whether its target is the number `part`, as that of GIVE."""
         return _is(self.target, part)
+
+    def judges(self, flag: Judged) -> Value:
+        """Whether its target is a flag, as that of JUDGE, which has no other targets."""
+        return self.target[0] if flag else ~self.target[0]
 
 
 def _is(number: Value, wanted: int) -> Value:

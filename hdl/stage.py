@@ -83,11 +83,22 @@ def pipeline_stages(graph: Graph) -> list[int]:
     loop = _recursive(graph)
     late = _late(graph, loop)
     stages = [0] * len(graph.nodes)
-    for part, whole in ((loop, set(range(len(stages)))), (late, loop)):
+    for part, whole in ((loop, _needed(graph, loop)), (late, loop)):
         if part and any(graph.nodes[i].op not in NO_LOGIC for i in whole - part):
             for i in part:
                 stages[i] += 1
     return stages
+
+
+def _needed(graph: Graph, nodes: set[int]) -> set[int]:
+    """Return `nodes` and all that they depend on."""
+    found, left = set[int](), [*nodes]
+    while left:
+        index = left.pop()
+        if index not in found:
+            found.add(index)
+            left += graph.nodes[index].operands
+    return found
 
 
 def _known_early(graph: Graph, stages: list[int]) -> set[int]:

@@ -7,6 +7,8 @@
     output code  --+--> CLAMP of the stage --> output_saturated        2
                    +--> worn: >= limits -----> wear_warning            3
       channel ----> memory of the limits       wear_critical           4   if each channel has its own
+                          ^ not while
+    counter of the stage -+-----------------> settling                5   of a filter that starts from zero
     check bits of the memories --------------> fault                   6   of a protected core
 
 All are combinational, but for the memory of limits: it takes one clock.
@@ -53,8 +55,21 @@ def outside_calibration(datapath: Datapath, tdata: Value) -> Value:
 
 
 def flag_count(datapath: Datapath) -> int:
-    """Return the number of flags that hardware without protection can set: without limits of wear, the first three."""
-    return 5 if datapath.wear else 3
+    """Return the number of the flags up to the last one that hardware without protection can set."""
+    if datapath.settles:
+        return Flag.SETTLING + 1
+    return Flag.WEAR_CRITICAL + 1 if datapath.wear else Flag.OUTPUT_SATURATED + 1
+
+
+def in_order(datapath: Datapath, judged: Value, saturated: Value, wear: Wear, settling: Value) -> Value:
+    """Return `flag_count` flags in the bits of `Flag`, the first two of which are `judged`.
+
+    Wear is not told of a sample that comes before the filter has settled.
+    """
+    if not datapath.settles:
+        return Cat(judged, saturated, wear.flags)
+    worn = Cat(flag & ~settling for flag in wear.flags) if datapath.wear else Const(0, 2)
+    return Cat(judged, saturated, worn, settling)
 
 
 def with_fault(flags: Value, fault: Value) -> Value:

@@ -168,7 +168,13 @@ def _claims(quantized: Quantized, ideal: Sequence[TransferFunction]) -> ClaimsEn
         if quantized.steady:
             budget[START] = on_grid(budget[START])
         sections = tuple(_gains(s.name, m) for s, m in zip(quantized.sections, models, strict=True))
-    return ClaimsEntry(budget=budget, bound=sum(budget.values(), Fraction(0)), peak_gain=gain, sections=sections)
+    return ClaimsEntry(
+        budget=budget,
+        bound=sum(budget.values(), Fraction(0)),
+        peak_gain=gain,
+        sections=sections,
+        settling=quantized.settling or None,
+    )
 
 
 @dataclass(frozen=True)

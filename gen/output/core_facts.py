@@ -11,8 +11,8 @@ from sosmith.gen.core import CoreDesign
 from sosmith.gen.filter.impulse_invariance import Aliasing
 from sosmith.gen.proof.limit_cycles import limit_cycles, recursions
 from sosmith.gen.proof.linear_model import linear_model
+from sosmith.gen.proof.settling import SETTLED
 from sosmith.gen.reload.register_writes import bank_size
-from sosmith.gen.reload.transient import SETTLED, settling
 from sosmith.gen.word_lengths.cost import Cost
 from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.hdl.axi_stream import Field, dest_width, fields
@@ -112,7 +112,8 @@ class SettlingFacts:
     Attributes
     ----------
     samples : int
-        Number of samples after a reset until no other past could change the output by more than `limit`; proven.
+        Number of samples after a start until no other past could change the output by more than `limit`; proven. So
+        many are flagged.
     seconds : float
         The same at the sample rate.
     limit : float
@@ -343,7 +344,7 @@ def _start(quantized: Quantized) -> str | None:
 
 
 def _settling(design: CoreDesign) -> SettlingFacts | None:
-    samples, output = settling(design.quantized), design.datapath.output
+    samples, output = design.quantized.settling, design.datapath.output
     if not samples:
         return None
     return SettlingFacts(

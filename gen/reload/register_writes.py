@@ -7,8 +7,8 @@ from typing import Any
 
 from sosmith.gen.architecture import Architecture
 from sosmith.gen.core import CoreDesign
+from sosmith.gen.proof.fading import RESIDUE
 from sosmith.gen.reload.reload import OtherSet, Swap, parallel_bank
-from sosmith.gen.reload.transient import RESIDUE
 from sosmith.hdl.axi_lite import BITS
 from sosmith.hdl.instruction import encoded, instruction_bits
 from sosmith.model.reload.constants import constants

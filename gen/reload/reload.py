@@ -19,6 +19,7 @@ from sosmith.gen.reload.other_constants import with_constants
 from sosmith.gen.reload.transient import transient
 from sosmith.gen.specification.specification import Specification
 from sosmith.gen.word_lengths.quantized import Quantized
+from sosmith.gen.word_lengths.settling import samples_to_settle, with_settling
 from sosmith.hdl import folded
 from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.dataflow.datapath import Datapath
@@ -62,7 +63,7 @@ class Swap:
         The new set. Its program, if any, allows for all values that the swap can cause.
     samples : int
         Length of the transient: from then on the error is at most the set's bound plus
-        `sosmith.gen.reload.transient.RESIDUE` output LSB, and another swap may follow.
+        `sosmith.gen.proof.fading.RESIDUE` output LSB, and another swap may follow.
     use : Fraction
         Largest share of its hardware range that any state may use, at most 1.
     """
@@ -80,12 +81,35 @@ def own_set(hardware: CoreDesign) -> OtherSet:
     ShortfallError
         If these formats cannot represent its constants exactly.
     """
-    quantized = with_constants(hardware.quantized, None, None, room=room_of(hardware))
+    quantized = _flagged(hardware, with_constants(hardware.quantized, None, None, room=room_of(hardware)))
     if _values(quantized.datapath) != _values(hardware.datapath):
         raise ShortfallError(
             f"the realization must keep its coefficients to be loaded anew, and {quantized.realization} does not"
         )
     return OtherSet(quantized=quantized, program=hardware.architecture.program)
+
+
+def _flagged(hardware: CoreDesign, made: Quantized) -> Quantized:
+    """Return a set that flags samples until it has settled, if the hardware does.
+
+    A program counts to its own number of samples; parallel hardware counts to that which it was generated with.
+
+    Raises
+    ------
+    ShortfallError
+        If the hardware does not count far enough.
+    """
+    counted = hardware.quantized.settling
+    if not counted:
+        return made
+    samples = samples_to_settle(made.datapath)
+    if hardware.architecture.program is None:
+        if samples > counted:
+            raise ShortfallError(
+                f"the set must settle within {counted:,} samples, to which the hardware counts, not {samples:,}"
+            )
+        samples = counted
+    return replace(made, datapath=with_settling(made.datapath, samples))
 
 
 def _values(datapath: Datapath) -> list[Fraction]:
@@ -171,6 +195,7 @@ def other_set(
     for finer in range((0 if ideal is None else room) + 1):
         try:
             quantized = with_constants(hardware.quantized, ideal, polynomial, finer=finer, room=room)
+            quantized = _flagged(hardware, quantized)
             _check_bound(quantized, allowed)
             if calibrated is not None:
                 _check_calibrated(hardware, calibrated)

@@ -158,12 +158,17 @@ class GainEntry(_Part):
 
 
 class ClaimsEntry(_Part):
-    """Claims, in output LSBs; gains have no unit, and `peak_gain` is that of the ideal filter."""
+    """Claims, in output LSBs; gains have no unit, and `peak_gain` is that of the ideal filter.
+
+    `settling` is the number of samples after a start from zero that are flagged, since another past could change their
+    results by more than half an LSB; None without the flag.
+    """
 
     budget: dict[Text, Rational]
     bound: Rational
     peak_gain: Rational | None
     sections: tuple[GainEntry, ...]
+    settling: Annotated[int, Field(strict=True, ge=1, le=1 << 21)] | None = None
 
 
 class FileEntry(_Part):

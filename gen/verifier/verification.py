@@ -10,6 +10,9 @@
    (`sosmith.gen.verifier.l1_response`). Every range that a BOUND states must contain the proven range, and every
    claimed figure must equal the proven one, to the last unit of the certificate's grid.
 
+5. Where a filter starts from zero, samples may be flagged until it has settled: the counter is run, and what any other
+   past could change is followed until it has faded (`sosmith.gen.verifier.settling`).
+
 The ranges hold by induction. Unbounded integers obey the linear model exactly, with the quantizers' errors as further
 inputs. The limits from the linear model therefore hold at every sample, and signals with these ranges never overflow.
 """
@@ -30,6 +33,7 @@ from sosmith.gen.verifier.graph import RejectedError, Transfer, check_graph, inp
 from sosmith.gen.verifier.l1_response import BITS, Inverse, UndecidedError, fraction, inverse, is_stable, response
 from sosmith.gen.verifier.piecewise import Pieces
 from sosmith.gen.verifier.polynomial import output_error, polynomial_error
+from sosmith.gen.verifier.settling import check_fading, without_counter
 from sosmith.gen.verifier.start import Start, check_start, section_alone
 
 Progress = Callable[[str, int, int], None]
@@ -116,7 +120,8 @@ def _verified(certificate: Certificate, progress: Progress) -> Verdict:
         f"the hardware's sections must stand for ideal ones, not {len(sections)} for {len(certificate.ideal.sections)}",
     )
     start = _start(certificate, starts)
-    rounding, added = output_error(certificate, last[0])
+    settling = certificate.claims.settling
+    rounding, added = output_error(certificate, without_counter(last[0], settling))
     require(start is not None or not added, "the output stage must add nothing where no first sample is passed to it")
     ranges, margin = 0, Fraction(0)
     if sections:
@@ -126,6 +131,10 @@ def _verified(certificate: Certificate, progress: Progress) -> Verdict:
             budget[part] *= cascade.peak_gain
         budget["filter coefficients"], budget["filter rounding"] = cascade.coefficients, cascade.rounding
         ranges, margin = cascade.ranges, cascade.margin
+        if settling is not None:
+            require(start is None, "settling must not be claimed of a filter that starts from its first sample")
+            progress("settling", 0, 0)
+            check_fading(sections, settling)
         if start is not None:
             error = abs(added - cascade.gain_at_zero) * start.size
             budget["start"] = on_grid(error)
@@ -133,6 +142,7 @@ def _verified(certificate: Certificate, progress: Progress) -> Verdict:
         _compare("peak_gain of the filter", certificate.claims.peak_gain, cascade.peak_gain)
     else:
         _compare("peak_gain of the filter", certificate.claims.peak_gain, None)
+        require(settling is None, "settling must not be claimed where there are no sections")
         require(not certificate.claims.sections, "the gains of sections must not be given where there are none")
     budget["output rounding"] = rounding
     _compare_budget(certificate, budget)
@@ -189,7 +199,6 @@ def _check_seams(certificate: Certificate) -> None:
             )
         wires = [(stage.nodes[i].frac, stage.nodes[i].low, stage.nodes[i].high) for i in stage.outputs]
     output, node = certificate.output, stages[-1].nodes[stages[-1].outputs[0]]
-    require(len(wires) == 1, f"the last stage must have one output, not {len(wires)}")
     require(
         node.frac == 0 and output.lowest <= node.low and node.high <= output.highest,
         f"the output must be whole codes in {output.lowest}..{output.highest}, not in {node.low}..{node.high} "

@@ -82,6 +82,11 @@ class Quantized:
         """The first sample as the last stage adds it; None if it does not."""
         return cast("OutputStage", self.datapath.stages[-1]).held
 
+    @property
+    def settling(self) -> int:
+        """Samples after a start that are flagged as settling; 0 without the flag."""
+        return cast("OutputStage", self.datapath.stages[-1]).settling
+
     @cached_property
     def quantized_sos(self) -> Array:
         """Second-order sections that the integer coefficients realize, shape (sections, 6)."""

@@ -193,9 +193,14 @@ def _status(datapath: Datapath) -> str:
         before = f"w.{_wire(len(datapath.stages) - 1, node.operands[0])}"
         conditions[Flag.OUTPUT_SATURATED] += [f"{before} < {_literal(node.low)}", f"{before} > {_literal(node.high)}"]
     terms = [f"({' || '.join(found)}) << {flag.value}" for flag, found in conditions.items() if found]
+    settling = ""
+    if datapath.settles:
+        settling = f"w.{_wire(len(datapath.stages) - 1, last.outputs[1])} < 0"
+        terms.append(f"({settling}) << {Flag.SETTLING.value}")
     if datapath.wear:
         channel = "channel" if _takes_channel(datapath) else "0"
-        terms.append(f"{datapath.name}_wear_flags({channel}, (int64_t)w.{_result(datapath)})")
+        worn = f"{datapath.name}_wear_flags({channel}, (int64_t)w.{_result(datapath)})"
+        terms.append(f"({settling} ? 0 : {worn})" if settling else worn)
     return f"(uint8_t)({' | '.join(terms)})"
 
 

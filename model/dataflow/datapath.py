@@ -72,8 +72,8 @@ class Datapath:
             raise ValueError(f"input ports must have the ranges {expected}, not {ports}")
         for before, after in zip(self.stages, self.stages[1:], strict=False):
             _check_seam(before, after)
-        if len(last.outputs) != 1:
-            raise ValueError(f"the last stage must have one output, not {len(last.outputs)}")
+        if len(last.outputs) not in {1, 2}:
+            raise ValueError(f"the last stage must have one output, or a flag beside it, not {len(last.outputs)}")
         node = last.nodes[last.outputs[0]]
         if node.frac != 0 or node.low < self.output.lowest or node.high > self.output.highest:
             raise ValueError(f"the last stage's output must fit the output port, not {node!r}")
@@ -83,6 +83,11 @@ class Datapath:
                     f"wear must be codes that rise within {self.output.lowest + 1}..{self.output.highest}, "
                     f"not {warning}, {critical}"
                 )
+
+    @property
+    def settles(self) -> bool:
+        """Whether samples before the filter has settled are flagged: the last stage's second output, -1 for those."""
+        return len(self.stages[-1].graph.outputs) > 1
 
     def compute(self, codes: Codes) -> Codes:
         """Compute the output codes for input codes, from reset, bit for bit as the hardware does.

@@ -77,6 +77,7 @@ from sosmith.model.dataflow.program import (
     CARRIES,
     CLEARS,
     PRODUCTS,
+    Judged,
     Location,
     Opcode,
     Program,
@@ -175,11 +176,12 @@ def _forms(locations: Sequence[Location]) -> list[tuple[int, int]]:
 
 
 class _Flat(NamedTuple):
-    """All stages' nodes in one list; `inputs` and `output` index it."""
+    """All stages' nodes in one list, which the rest indexes; `settling` is None without that flag."""
 
     nodes: list[Node]
     inputs: list[int]
     output: int
+    settling: int | None = None
 
 
 def _flattened(datapath: Datapath) -> _Flat:
@@ -205,8 +207,7 @@ def _flattened(datapath: Datapath) -> _Flat:
             node = nodes[index]
             nodes[index] = Node(**{**vars(node), "operands": tuple(at[i] for i in node.operands)})
         passed = [at[i] for i in graph.outputs]
-    (output,) = passed
-    return _Flat(nodes, inputs, output)
+    return _Flat(nodes, inputs, *passed)
 
 
 def _share_delays(nodes: list[Node]) -> None:
@@ -265,7 +266,7 @@ class _Folding:
     def __init__(
         self, flat: _Flat, digit_bits: int, kept: Mapping[str, int], calibrated: Sequence[tuple[int, int]]
     ) -> None:
-        self._nodes, self._inputs, self._output = flat
+        self._nodes, self._inputs, self._output, self._settling = flat
         self._calibrated = calibrated
         self._bits = digit_bits
         last = self._nodes[self._output]
@@ -299,13 +300,17 @@ class _Folding:
                 copies.setdefault(source, []).append(digit)
         computed = self._computed()
         judged = [*self._judged()]
+        settling = [] if self._settling is None else [self._flagged(self._settling)]
         result = self._result(computed, copies)
-        made = Scheduler(states, copies, [*judged, *computed.values(), result])
+        made = Scheduler(states, copies, [*judged, *computed.values(), *settling, result])
         made.take(Digit(index, k) for index in self._inputs for k in range(self._forms[index].digits))
         for one in judged:
             made.compute(one)
         made.note("range")
         self._schedule(made, computed)
+        for one in settling:
+            made.compute(one)
+        made.note("settling")
         made.finish(result)
         words = max(1 << (made.words + spare_words).bit_length(), least_words)
         where = {digit: address % words for digit, address in made.where.items()}  # that of ONE was -1
@@ -505,6 +510,11 @@ class _Folding:
                     products = [Product(Digit(index, k), sign)] + [Product(ONE, -sign * digit)] * (digit != 0)
                     columns.append(Column(tuple(products), Opcode.JUDGE if k == form.digits - 1 else Opcode.DROP))
                 yield Sum("range", -1, tuple(columns))
+
+    def _flagged(self, index: int) -> Sum:
+        """Return the sum that sets a flag if a value of one digit is negative."""
+        (column,) = self._columns(self._value(index), _Form(1, 0), -1)
+        return Sum("settling", -1, (column._replace(end=Opcode.JUDGE, part=Judged.SETTLING),))
 
     def _result(self, computed: dict[int, Sum], copies: Mapping[Digit, object]) -> Sum:
         """Return the sum that hands the result out, instead of one that stores it if nothing else needs it."""

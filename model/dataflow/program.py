@@ -34,7 +34,7 @@ class Opcode(IntEnum):
     DROP = 2  # acc >>= digit_bits
     FINISH = 3  # target = low digit_bits + 1 bits of acc, signed; acc = 0
     GIVE = 4  # part number `target` of the result = acc, of all but the last its low digit; acc >>= digit_bits
-    JUDGE = 5  # if acc < 0, the input is outside the calibrated range; acc = 0
+    JUDGE = 5  # if acc < 0, flag `target` is set, one of `Judged`; acc = 0
     MOVE = 6  # target = m
     OPERAND = 7  # t = m
     PRODUCT = 8  # acc += m * t
@@ -77,6 +77,13 @@ MOVED = 3
 """Least number of instructions from one of `EARLY_WRITES` to one that reads its word."""
 
 
+class Judged(IntEnum):
+    """Flag that JUDGE sets, by its target."""
+
+    OUTSIDE = 0  # the input is outside the calibrated range
+    SETTLING = 1  # the filter started from zero and has not settled
+
+
 class Instruction(NamedTuple):
     """One step of a program."""
 
@@ -87,10 +94,21 @@ class Instruction(NamedTuple):
 
 
 class Sample(NamedTuple):
-    """Result of a sample: the output code before it is limited, and whether the input left the calibrated range."""
+    """Result of a sample.
+
+    Attributes
+    ----------
+    code : int
+        The output code before it is limited.
+    outside : bool
+        Whether the input left the calibrated range.
+    settling : bool
+        Whether the sample comes before the filter has settled.
+    """
 
     code: int
     outside: bool
+    settling: bool = False
 
 
 @dataclass(frozen=True)
@@ -263,7 +281,7 @@ class Program:
             for digit in digits_of(code << (location.frac - frac), location.digits, self.digit_bits)
         ]
         code = 0
-        outside = False
+        flags = dict.fromkeys(Judged, False)
         acc = operand = 0
         for opcode, address, constant, target in self.instructions:
             word = words[address]
@@ -283,11 +301,11 @@ class Program:
             elif opcode is Opcode.GIVE:
                 code += (acc if target == self.output.parts - 1 else acc % base) << (self.digit_bits * target)
             elif opcode is Opcode.JUDGE:
-                outside = outside or acc < 0
+                flags[Judged(target)] |= acc < 0
             acc = 0 if opcode in CLEARS else acc >> self.digit_bits if opcode in CARRIES else acc
             if not -base <= words[target] < base:
                 raise OverflowError(f"a word must hold {self.digit_bits + 1} bits, not {words[target]}")
-        return Sample(code, outside)
+        return Sample(code, flags[Judged.OUTSIDE], flags[Judged.SETTLING])
 
 
 def serial_clocks(factor: int) -> int:

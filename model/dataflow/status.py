@@ -16,6 +16,7 @@ class Flag(IntEnum):
     OUTPUT_SATURATED = 2
     WEAR_WARNING = 3
     WEAR_CRITICAL = 4
+    SETTLING = 5
     FAULT = 6
 
     @property
@@ -30,5 +31,6 @@ _MEANINGS = {
     Flag.OUTPUT_SATURATED: "the output was limited to its range",
     Flag.WEAR_WARNING: "the wear has reached the warning",
     Flag.WEAR_CRITICAL: "the wear has reached its limit, or the end of the sensor's range",
+    Flag.SETTLING: "the filter started from zero and has not settled yet; wear is not judged",
     Flag.FAULT: "a bit in the hardware was found wrong and could not be corrected, for this sample or an earlier one",
 }

@@ -1,7 +1,8 @@
 """The last stage of a datapath: from output LSBs with guard bits to the output code, limited to its range.
 
 Behind a filter that starts from its first sample it adds what was taken off before the sections
-(`sosmith.model.sections.start`).
+(`sosmith.model.sections.start`). Behind one that starts from zero it tells which samples come before that has settled
+(`sosmith.model.sections.settling`).
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from sosmith.model.dataflow.graph import Graph, GraphBuilder, Range
+from sosmith.model.sections.settling import settling
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,6 +50,8 @@ class OutputStage:
         Range of the output code; the only saturation in a datapath.
     held : Held or None
         The first sample of a filter that starts from it; None if none is passed on.
+    settling : int
+        Number of samples after a start that are flagged as settling; 0 without the flag.
     """
 
     offset: int
@@ -56,12 +60,18 @@ class OutputStage:
     low: int
     high: int
     held: Held | None = None
+    settling: int = 0
     name: str = "output_stage"
 
     @cached_property
     def graph(self) -> Graph:
-        """The stage as a dataflow graph with the input ``x``, ``held`` if there is one, and the output ``code``."""
+        """The stage as a dataflow graph.
+
+        Its inputs are ``x``, and ``held`` if there is one; its outputs the code, and what is -1 while the filter
+        settles if that is flagged.
+        """
         g = GraphBuilder()
+        flags = [settling(g, self.settling)] if self.settling else []  # first: what is limited has to come last
         x = g.input("x", *self.x)
         if self.held is not None:
             held = g.input("held", *self.held.range)
@@ -71,5 +81,5 @@ class OutputStage:
             x = g.add(x, g.constant(self.offset, self.offset_frac, "offset"))
         rounded = g.round(x, 0, "rounded")
         if self.low <= g[rounded].low and g[rounded].high <= self.high:
-            return g.build([rounded])
-        return g.build([g.clamp(rounded, self.low, self.high, "code")])
+            return g.build([rounded, *flags])
+        return g.build([g.clamp(rounded, self.low, self.high, "code"), *flags])

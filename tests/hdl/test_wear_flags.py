@@ -16,6 +16,7 @@ from tests.hdl.core_bench import Pace, run_core
 from sosmith.gen.architecture import Architecture
 from sosmith.gen.core import design_core
 from sosmith.gen.specification.specification import load
+from sosmith.gen.word_lengths.settling import samples_to_settle
 from sosmith.model.dataflow.c_model import c_header, c_source, state_bytes
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.status import Flag
@@ -23,7 +24,7 @@ from sosmith.model.dataflow.status import Flag
 SAMPLES = 30
 
 
-def made(folder: Path, architecture: str, channels: int) -> Architecture:
+def made(folder: Path, architecture: str, channels: int, start: str, protect: str) -> Architecture:
     """Design the bench's instrument with a filter of first order, and a calibration fitted to a part of its ranges."""
     rows = [
         f"{1.2 + 0.3 * voltage + 0.06 * voltage**2},{voltage},{temperature + voltage / 10}"
@@ -40,9 +41,16 @@ def made(folder: Path, architecture: str, channels: int) -> Architecture:
         replace(
             spec,
             channels=channels,
-            filter=replace(spec.filter, order=1),
+            filter=replace(spec.filter, order=1, cutoff=(Fraction(2),) if start == "zero" else spec.filter.cutoff),
             output=replace(spec.output, lsb=spec.output.lsb / 4),
-            hardware=replace(spec.hardware, architecture=architecture, realization="df1_ef2", clock=Fraction(10**8)),
+            hardware=replace(
+                spec.hardware,
+                architecture=architecture,
+                realization="df1_ef2",
+                clock=Fraction(10**8),
+                start=start,
+                protect=protect,
+            ),
         )
     ).architecture
 
@@ -62,9 +70,22 @@ def step_of(datapath: Datapath, folder: Path) -> Any:
 
 
 @pytest.mark.parametrize("architecture", ["parallel", "folded", pytest.param("serial", marks=pytest.mark.slow)])
-@pytest.mark.parametrize(("channels", "limits"), [(1, 1), (3, 1), (3, 3)], ids=["1", "3", "3-different"])
-def test_a_sample_has_the_same_flags_everywhere(channels: int, limits: int, architecture: str, tmp_path: Path) -> None:
-    plain = made(tmp_path, architecture, channels)
+@pytest.mark.parametrize(
+    ("channels", "limits", "start", "protect"),
+    [
+        (1, 1, "steady", "none"),
+        (3, 1, "steady", "none"),
+        (3, 3, "steady", "none"),
+        (1, 1, "zero", "none"),
+        (3, 3, "zero", "none"),
+        (1, 1, "zero", "correct"),
+        (3, 3, "zero", "correct"),
+    ],
+)
+def test_a_sample_has_the_same_flags_everywhere(
+    channels: int, limits: int, start: str, protect: str, architecture: str, tmp_path: Path
+) -> None:
+    plain = made(tmp_path, architecture, channels, start, protect)
     # The voltage goes from rail to rail and back, in each channel at another time; the temperature hardly changes.
     voltage, temperature = plain.datapath.inputs
     codes = np.empty((SAMPLES, channels, 2), dtype=np.int64)
@@ -74,10 +95,15 @@ def test_a_sample_has_the_same_flags_everywhere(channels: int, limits: int, arch
     results = plain.datapath.compute(codes)
     # Limits that the codes meet exactly, in each channel at other codes.
     met = [np.unique(column) for column in results.T]
-    wear = tuple((int(met[c][8 + c]), int(met[c][14 - c])) for c in range(limits))
+    wear = tuple((int(met[c][5 + c]), int(met[c][11 - c])) for c in range(limits))
     core = replace(plain, datapath=replace(plain.datapath, wear=wear))
     datapath, flags = core.datapath, core.datapath.compute_status(codes)
-    for flag in set(Flag) - {Flag.FAULT}:
+    settling = flags >> Flag.SETTLING & 1
+    assert settling.sum(axis=0).tolist() == [samples_to_settle(plain.datapath)] * channels
+    assert not np.any(settling & (flags >> Flag.WEAR_WARNING | flags >> Flag.WEAR_CRITICAL))
+    if start == "zero":
+        assert np.any(settling & (results >= core.datapath.wear[0][0]))  # which a filter that has settled would tell
+    for flag in set(Flag) - {Flag.FAULT, Flag.SETTLING}:
         for c in range(channels):
             assert {int(value) >> flag & 1 for value in flags[:, c]} == {0, 1}, (flag, c)
 

@@ -13,7 +13,8 @@ The core is read from its SystemVerilog, which is what tools synthesize, and not
    source, sink and reset do (`sosmith.gen.verifier.parallel.control`).
 2. What a register holds is a form of its own sample, and it is loaded exactly when a sample moves there; a register of
    a recursion holds the code of a DELAY node, by induction over the clocks (`sosmith.gen.verifier.parallel.pipeline`).
-3. What leaves is the output of the graph, extended to whole bytes, with the flags input_at_rail and output_saturated.
+3. What leaves is the output of the graph, extended to whole bytes, with the flags input_at_rail, output_saturated and
+   settling.
 
 Sums and products are those of the hardware, modulo the width of each net; extensions by a sign or by zeros, and bits
 that are left out, change a value unless its range says otherwise. The only ranges are those of the certificate, which
@@ -43,7 +44,7 @@ OUTPUT, FLAGS, OUTPUT_DEST = "m_axis_tdata", "m_axis_tuser", "m_axis_tdest"
 _PORTS = frozenset(
     {CLOCK, "aresetn", DATA, "s_axis_tvalid", "s_axis_tready", OUTPUT, FLAGS, "m_axis_tvalid", "m_axis_tready"}
 )
-_AT_RAIL, _SATURATED = 0, 2
+_AT_RAIL, _SATURATED, _SETTLING = 0, 2, 5
 """Bits of the flags."""
 
 
@@ -120,6 +121,7 @@ def _check_output(
     for bit, flag, wanted in (
         (_AT_RAIL, "input_at_rail", _at_rail(graph, forms, certificate)),
         (_SATURATED, "output_saturated", _saturated(graph, forms)),
+        (_SETTLING, "settling", {} if graph.settling is None else forms.negative(graph.codes[graph.settling])),
     ):
         require(
             pipeline.same(logic.net(FLAGS, bit, 1), wanted, 1),

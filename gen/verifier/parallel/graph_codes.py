@@ -65,6 +65,8 @@ class GraphCodes:
         The inputs, in the order of the ports.
     output : int
         The output.
+    settling : int or None
+        What is negative for the samples that are flagged as settling; None without the flag.
     codes : list of Form
         Code of each node.
     """
@@ -78,7 +80,8 @@ class GraphCodes:
         for number, stage in enumerate(certificate.stages):
             between.update(passed)
             passed = self._join(stage, passed if number else None)
-        (self.output,) = passed
+        self.output, *flags = passed
+        self.settling = flags[0] if flags else None
         self._ranges: dict[Origin, tuple[int, int]] = {}
         for index in self.delays:
             entry, origin = self.nodes[index].entry, self.origin(index)

@@ -225,6 +225,7 @@ class _Run:
         self._writers: dict[int, int] = {}
         self.values = 0
         self.judges: dict[int, int] = {}
+        self._flagged = False
         self.purpose: dict[int, int] = {}
         self._groups: dict[int, list[int]] = {}
         self._suspects: list[int] = []
@@ -289,7 +290,7 @@ class _Run:
         elif end == "finish":
             self._finish(number, target)
         elif end == "judge":
-            self._judge(number)
+            self._judge(number, target)
         if end not in {"finish", "judge"}:
             self._group.instructions.append(number)
 
@@ -423,10 +424,17 @@ class _Run:
                 best = high - low, node, frac
         return None if best is None else best[1:]
 
-    def _judge(self, number: int) -> None:
-        """Compare an input with a limit: negative if it is outside."""
+    def _judge(self, number: int, target: int) -> None:
+        """Compare an input with a limit: negative if it is outside; or judge whether the filter has settled."""
         self._fits(number)
         total = self._acc.total
+        if self.graph.settling is not None:
+            require(target in {0, 1}, f"{self.program.named(number)} must judge flag 0 or 1, not {target}")
+            if target == 1:
+                right = total == self._of[self.graph.settling] and not self._acc.begun
+                require(right, f"{self.program.named(number)} must judge {self.graph.nodes[self.graph.settling].label}")
+                self._acc, self._group, self._flagged = _Accumulator(), Group(), True
+                return
         free = total.get(ONE, 0)
         for index, node in enumerate(self.graph.inputs):
             code = scaled(self._of[node], self._frac(node))
@@ -448,7 +456,10 @@ class _Run:
     # The end of the sample.
 
     def _finish_sample(self) -> None:
-        """Check the result and the states once all instructions have run."""
+        """Check the result, the states and the flag once all instructions have run."""
+        require(
+            self._flagged or self.graph.settling is None, "the program must judge whether the sample is before settling"
+        )
         self._check_result()
         for state in self.states:
             entry = self.graph.nodes[state.node].entry

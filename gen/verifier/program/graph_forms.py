@@ -54,12 +54,15 @@ class Graph:
         The DELAY nodes.
     output : int
         The output before it is limited to the port's range.
+    settling : int or None
+        What is negative for the samples that are flagged as settling; None without the flag.
     """
 
     nodes: tuple[GraphNode, ...]
     inputs: tuple[int, ...]
     delays: tuple[int, ...]
     output: int
+    settling: int | None = None
 
     def values(self, forms: Forms, floors: Mapping[int, int] = NO_FLOORS) -> list[Form]:
         """Return the value of each node as a form of the variables ``("node", index)``: inputs and delays.
@@ -127,7 +130,7 @@ def joined(certificate: Certificate) -> Graph:
         if not passed:
             inputs = [i for i, node in enumerate(nodes) if node.entry.op is Operation.INPUT]
         passed = [at[i] for i in stage.outputs]
-    (output,) = passed
+    output, *flags = passed
     if nodes[output].entry.op is Operation.CLAMP and output == len(nodes) - 1:
         (output,) = nodes.pop().entry.operands
     for node in nodes:
@@ -136,7 +139,7 @@ def joined(certificate: Certificate) -> Graph:
             f"{node.label} must not be inside a graph that a program computes",
         )
     delays = tuple(i for i, node in enumerate(nodes) if node.entry.op is Operation.DELAY)
-    return Graph(tuple(nodes), tuple(inputs), delays, output)
+    return Graph(tuple(nodes), tuple(inputs), delays, output, *flags)
 
 
 def floored(form: Form, kept: int, forms: Forms) -> Form:

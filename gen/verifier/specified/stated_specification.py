@@ -109,6 +109,8 @@ def _checked(certificate: Certificate, tree: Mapping[str, Any], margin: Fraction
     if sections:
         stated = tree.get("hardware", {}).get("start", _START)
         _equal("the start of the filter", certificate.ideal.start or "zero", stated)
+        flagged = certificate.claims.settling is not None
+        _equal("whether samples are flagged until the filter has settled", flagged, stated == "zero")
     return Agreement(core, _filter_distance(certificate, tree, margin, folder) if sections else None, fitted)
 
 

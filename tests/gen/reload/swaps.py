@@ -7,7 +7,8 @@ import numpy as np
 
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.filter.design import Filter, design
-from sosmith.gen.reload.transient import RESIDUE, transient
+from sosmith.gen.proof.fading import RESIDUE
+from sosmith.gen.reload.transient import transient
 from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.graph import Graph, Op

@@ -8,9 +8,10 @@ from tests.gen.designs import zero_design
 from tests.gen.reload.swaps import during, left_behind, moved, worst_input
 from tests.model.reload.swapping import compute_swapping
 
+from sosmith.gen.proof.fading import RESIDUE
 from sosmith.gen.reload import transient as module
 from sosmith.gen.reload.other_constants import with_constants
-from sosmith.gen.reload.transient import RESIDUE, transient
+from sosmith.gen.reload.transient import transient
 from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.graph import RangeError

@@ -12,7 +12,7 @@ from sosmith.gen.specification.wear_limits import WearSpec
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.status import Flag
 
-RAIL, OUTSIDE, SATURATED, WARNING, CRITICAL = (1 << flag for flag in Flag if flag is not Flag.FAULT)
+RAIL, OUTSIDE, SATURATED, WARNING, CRITICAL = (1 << flag for flag in Flag if flag < Flag.SETTLING)
 
 
 def calibration(calibrated: tuple[tuple[int, int], ...]) -> Datapath:

@@ -11,7 +11,7 @@ import pytest
 from tests.gen.verifier.small_specifications import STEADY_INSTRUMENT
 
 from sosmith.gen.core import CoreDesign, design_core
-from sosmith.gen.reload.transient import SETTLED, settling
+from sosmith.gen.proof.settling import SETTLED
 from sosmith.gen.specification.specification import from_tree
 from sosmith.model.dataflow.status import Flag
 from sosmith.model.reference.golden import calibrated
@@ -37,7 +37,7 @@ def made_in(architecture: str, start: str) -> CoreDesign:
 def test_flags_of_wear_are_right_once_settled(architecture: str, start: str, tmp_path: Path) -> None:
     """At once behind a steady start; from zero, once the length has passed that the manifest states."""
     made = made_in(architecture, start)
-    datapath, settled = made.datapath, settling(made.quantized)
+    datapath, settled = made.datapath, made.quantized.settling
     assert (settled == 0) == (start == "steady")
     samples = settled + SAMPLES
     rng = np.random.default_rng(1)

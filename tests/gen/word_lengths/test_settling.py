@@ -9,8 +9,9 @@ from tests.gen.word_lengths.test_start import steady_design
 
 from sosmith.gen.output.core_facts import core_facts
 from sosmith.gen.output.manifest import manifest
-from sosmith.gen.reload.transient import SETTLED, settling
+from sosmith.gen.proof.settling import SETTLED
 from sosmith.gen.word_lengths.quantized import Quantized
+from sosmith.gen.word_lengths.settling import samples_to_settle
 from sosmith.model.reference.golden import calibrated
 
 
@@ -26,7 +27,7 @@ def remains(made: Quantized, samples: int) -> float:
 @pytest.mark.parametrize(("order", "cutoff"), [(1, 0.1), (3, 0.02)])
 def test_covers_what_any_past_could_change(order: int, cutoff: float, realization: str) -> None:
     made = plain(butterworth(order, cutoff), realization)
-    samples = settling(made)
+    samples = samples_to_settle(made.datapath)
     assert remains(made, samples) <= float(SETTLED)
     assert remains(made, samples // 2) > float(SETTLED)
 
@@ -35,7 +36,7 @@ def test_a_constant_input_has_settled_by_then() -> None:
     """From 2,000 random starts: afterwards the result is that of a filter which has run for ever."""
     design = zero_design("flange_wear_bench.toml")
     made, datapath = design.quantized, design.datapath
-    samples = settling(made)
+    samples = made.settling
     rng = np.random.default_rng(1)
     constant = np.stack([rng.integers(port.lowest, port.highest + 1, 2000) for port in datapath.inputs], axis=1)
     results = datapath.output.decode(datapath.compute(np.broadcast_to(constant, (samples + 20, *constant.shape))))
@@ -49,7 +50,7 @@ def test_a_constant_input_has_settled_by_then() -> None:
 def test_the_manifest_has_it_in_samples_and_seconds() -> None:
     design = zero_design("flange_wear_bench.toml")
     tree = manifest(core_facts(design))
-    samples = settling(design.quantized)
+    samples = design.quantized.settling
     assert tree["start"] == "zero"
     assert tree["settling"] == {
         "samples": samples,
