@@ -158,8 +158,8 @@ def design_core(
         """Architecture with what costs a program instructions: the calibrated range, limits of wear, and settling."""
         codes = () if fitted is None else calibrated_codes(datapath.inputs, fitted)
         wear = () if spec.wear is None else spec.wear.codes(spec.output)
-        # Constants that are loaded may make the filter slower, and in parallel hardware the count is not among them.
-        spare = 2 if hardware.reload and name == "parallel" else 1
+        # Constants that are loaded may make the filter slower, and the count is not among them.
+        spare = 3 if hardware.reload else 1
         flagged = with_settling(datapath, spare * samples_to_settle(datapath))
         return fitting(name, budget, replace(flagged, calibrated=codes, wear=wear), board)
 

@@ -17,6 +17,7 @@ from sosmith.gen.word_lengths.cascade import cascade, chosen_formats, parts_of, 
 from sosmith.gen.word_lengths.input_stage import InputStage, horner_error, normalised, starting_like
 from sosmith.gen.word_lengths.quantize import gain_at_zero, gain_of
 from sosmith.gen.word_lengths.quantized import Quantized, assembled
+from sosmith.gen.word_lengths.settling import with_settling
 from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.errors import ShortfallError
 from sosmith.model.sections.horner import HornerPolynomial, HornerStep, Variable
@@ -81,7 +82,8 @@ def with_constants(
         sections=sections,
         proof=proof,
     )
-    return replace(found, datapath=replace(found.datapath, calibrated=datapath.calibrated, wear=datapath.wear))
+    flagged = with_settling(found.datapath, made.settling)
+    return replace(found, datapath=replace(flagged, calibrated=datapath.calibrated, wear=datapath.wear))
 
 
 def _with_any_first_sample(before: InputStage, held: Limits, sections: Sequence[Section], ideal: Filter) -> InputStage:

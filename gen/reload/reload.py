@@ -19,7 +19,7 @@ from sosmith.gen.reload.other_constants import with_constants
 from sosmith.gen.reload.transient import transient
 from sosmith.gen.specification.specification import Specification
 from sosmith.gen.word_lengths.quantized import Quantized
-from sosmith.gen.word_lengths.settling import samples_to_settle, with_settling
+from sosmith.gen.word_lengths.settling import samples_to_settle
 from sosmith.hdl import folded
 from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.dataflow.datapath import Datapath
@@ -28,6 +28,7 @@ from sosmith.model.dataflow.graph import Node, Op
 from sosmith.model.dataflow.program import Program
 from sosmith.model.errors import ShortfallError, SpecificationError
 from sosmith.model.reload.constants import constants, packed, values_of, with_ranges, with_room
+from sosmith.model.sections.output import OutputStage
 from sosmith.model.sections.start import StartStage
 
 ADVICE = (
@@ -81,7 +82,7 @@ def own_set(hardware: CoreDesign) -> OtherSet:
     ShortfallError
         If these formats cannot represent its constants exactly.
     """
-    quantized = _flagged(hardware, with_constants(hardware.quantized, None, None, room=room_of(hardware)))
+    quantized = with_constants(hardware.quantized, None, None, room=room_of(hardware))
     if _values(quantized.datapath) != _values(hardware.datapath):
         raise ShortfallError(
             f"the realization must keep its coefficients to be loaded anew, and {quantized.realization} does not"
@@ -89,27 +90,14 @@ def own_set(hardware: CoreDesign) -> OtherSet:
     return OtherSet(quantized=quantized, program=hardware.architecture.program)
 
 
-def _flagged(hardware: CoreDesign, made: Quantized) -> Quantized:
-    """Return a set that flags samples until it has settled, if the hardware does.
-
-    A program counts to its own number of samples; parallel hardware counts to that which it was generated with.
-
-    Raises
-    ------
-    ShortfallError
-        If the hardware does not count far enough.
-    """
+def _check_settling(hardware: CoreDesign, made: Quantized) -> None:
+    """Check that the hardware counts far enough for a set, if it flags samples until the filter has settled."""
     counted = hardware.quantized.settling
-    if not counted:
-        return made
-    samples = samples_to_settle(made.datapath)
-    if hardware.architecture.program is None:
-        if samples > counted:
-            raise ShortfallError(
-                f"the set must settle within {counted:,} samples, to which the hardware counts, not {samples:,}"
-            )
-        samples = counted
-    return replace(made, datapath=with_settling(made.datapath, samples))
+    samples = samples_to_settle(made.datapath) if counted else 0
+    if samples > counted:
+        raise ShortfallError(
+            f"the set must settle within {counted:,} samples, to which the hardware counts, not {samples:,}"
+        )
 
 
 def _values(datapath: Datapath) -> list[Fraction]:
@@ -195,7 +183,7 @@ def other_set(
     for finer in range((0 if ideal is None else room) + 1):
         try:
             quantized = with_constants(hardware.quantized, ideal, polynomial, finer=finer, room=room)
-            quantized = _flagged(hardware, quantized)
+            _check_settling(hardware, quantized)
             _check_bound(quantized, allowed)
             if calibrated is not None:
                 _check_calibrated(hardware, calibrated)
@@ -282,8 +270,8 @@ def _use(hardware: CoreDesign, during: Datapath, made: Program | None) -> Fracti
     locations = {} if made is None else {location.name: location for location in made.locations}
     own = hardware.datapath
     for before, stage, roomy in zip(own.stages, during.stages, with_room(own).stages, strict=True):
-        if isinstance(before, StartStage):
-            continue  # a first sample may have any value
+        if isinstance(before, StartStage | OutputStage):
+            continue  # a first sample may have any value, and a counter keeps to its own
         for index in stage.graph.delays:
             node = stage.graph.nodes[index]
             if stage.graph.nodes[node.operands[0]].op in {Op.INPUT, Op.FRACTION, Op.DELAY}:

@@ -94,7 +94,7 @@ def with_room(datapath: Datapath) -> Datapath:
 
 def _ending(graph: Graph, port: Port) -> Graph:
     """Return the last stage with the range of its output cut to the port's, to which every set has to keep."""
-    (output,) = graph.outputs
+    output = graph.outputs[0]
     nodes = list(graph.nodes)
     node = nodes[output]
     nodes[output] = replace(node, low=max(node.low, port.lowest), high=min(node.high, port.highest))

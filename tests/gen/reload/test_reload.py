@@ -24,7 +24,7 @@ from sosmith.gen.specification.specification import load
 from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.hdl.instruction import encoded
 from sosmith.model.calibration.polynomial import Polynomial
-from sosmith.model.dataflow.program import Opcode, Program
+from sosmith.model.dataflow.program import Judged, Opcode, Program
 from sosmith.model.errors import ShortfallError, SpecificationError
 from sosmith.model.reload.constants import constants
 from sosmith.model.reload.registers import CRC, DATA, VERSION
@@ -307,7 +307,8 @@ def test_a_calibration_brings_its_range_along(tmp_path: Path) -> None:
     made = set_for(hardware, wanted)
     assert made.quantized.datapath.calibrated == ((13107, 52429), (0, 51200))
     assert made.program is not None
-    assert sum(instruction.opcode is Opcode.JUDGE for instruction in made.program.instructions) == 3
+    judges = [one for one in made.program.instructions if one.opcode is Opcode.JUDGE]
+    assert [one.target for one in judges] == [Judged.OUTSIDE] * 3 + [Judged.SETTLING]
     assert check_swap(hardware, own_set(hardware), made).samples > 0
 
 

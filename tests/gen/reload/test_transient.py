@@ -52,7 +52,7 @@ def test_without_its_own_proof_a_swap_does_leave_ranges() -> None:
 
 def test_the_answer_to_the_differences_is_needed(monkeypatch: pytest.MonkeyPatch) -> None:
     active, other = sets("df1_ef2", "0.5")
-    monkeypatch.setattr(module, "_sum", lambda equations, answer: equations)
+    monkeypatch.setattr(module, "added", lambda equations, answer: equations)
     broken = during(active, other)
     with pytest.raises(RangeError):
         swapped(active, other, broken)
