@@ -55,7 +55,10 @@ def test_flags_of_wear_are_right_once_settled(architecture: str, start: str, tmp
     assert evidence.mismatches == 0  # codes and flags are those of the integer model
     assert evidence.samples == CHANNELS * samples
     status = datapath.compute_status(np.broadcast_to(constant, (samples, *constant.shape)))
-    right = (status >> Flag.WEAR_WARNING & 1).astype(bool) == (values > WARNING)
+    warned = (status >> Flag.WEAR_WARNING & 1).astype(bool)
+    assert not warned[:settled].any()
+    assert np.array_equal(status >> Flag.SETTLING & 1, np.tile(np.arange(samples)[:, None] < settled, (1, CHANNELS)))
+    right = warned == (values > WARNING)
     assert right[settled:].all()
     assert right[:settled].all() == (start == "steady")
     assert 1000 < np.count_nonzero(values < WARNING) < CHANNELS - 1000
