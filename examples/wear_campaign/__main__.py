@@ -45,10 +45,10 @@ def main() -> None:
         if arguments.only_methods:
             filter_table = earlier["ride"]["filters"][-1]["table"]
             compared = methods_campaign(settings, filter_table, arguments.output / "methods", step)
-            results, series = {"settings": settings, "methods": compared}, {}
+            results, series = {"settings": settings, **compared}, {}
             results |= {name: earlier[name] for name in ("bench", "ride", "week", "reloads")}
         else:
-            recorded = earlier["methods"] if arguments.without_methods else None
+            recorded = {name: earlier[name] for name in ("methods", "wear")} if arguments.without_methods else None
             results, series = carry_out(settings, arguments.output, step, methods=recorded)
         step("pictures and document")
         drawn = pictures(results, series)

@@ -9,6 +9,7 @@ from examples.wear_campaign import bench, depot, hardware, ride, week
 from examples.wear_campaign.methods import side_by_side
 from examples.wear_campaign.reloads import all_weeks
 from examples.wear_campaign.spread import spread
+from examples.wear_campaign.wear_intervals import wear_covered
 
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.instrument.calibration_report import specification_table
@@ -26,7 +27,7 @@ REALIZATION = "df1_ef2"
 
 
 def carry_out(
-    settings: dict[str, Any], folder: Path, progress: Progress, *, methods: list[dict[str, Any]] | None = None
+    settings: dict[str, Any], folder: Path, progress: Progress, *, methods: dict[str, Any] | None = None
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """Carry out the whole campaign into `folder`; with `methods`, which do not depend on hardware, all but these."""
     on_bench, bench_series = bench_campaign(settings, folder / "bench", progress)
@@ -40,7 +41,7 @@ def carry_out(
         compared = methods_campaign(settings, from_spectra, folder / "methods", progress)
     results = {
         "settings": settings,
-        "methods": compared,
+        **compared,
         "bench": on_bench,
         "ride": on_track,
         "week": in_service,
@@ -50,13 +51,13 @@ def carry_out(
     return results, series
 
 
-def methods_campaign(
-    settings: dict[str, Any], filter_table: str, folder: Path, progress: Progress
-) -> list[dict[str, Any]]:
-    """Fit in different ways, on the bench and in the week, with different true sensors."""
+def methods_campaign(settings: dict[str, Any], filter_table: str, folder: Path, progress: Progress) -> dict[str, Any]:
+    """Fit in different ways, with different true sensors; and count how often the intervals of wear hold."""
     names = [*settings["bench"]["scenarios"], settings["week"]["scenario"]]
     scenarios = {name: load_scenario(SCENARIOS / f"{name}.toml") for name in names}
-    return side_by_side(settings, scenarios, filter_table, folder, progress)
+    compared = side_by_side(settings, scenarios, filter_table, folder, progress)
+    progress("intervals of wear", 0, 0)
+    return {"methods": compared, "wear": wear_covered()}
 
 
 def bench_campaign(settings: dict[str, Any], folder: Path, progress: Progress) -> tuple[dict[str, Any], dict[str, Any]]:

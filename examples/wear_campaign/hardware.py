@@ -39,6 +39,11 @@ def filter_by_order(order: int, cutoff: float) -> str:
     return f'[filter]\nfamily = "butterworth"\nkind = "lowpass"\norder = {order}\ncutoff = {cutoff!r}\n'
 
 
+def uncertainty_table(stated: dict[str, Any]) -> str:
+    """Return the table ``[uncertainty]`` of what is known of the instrument's errors."""
+    return "[uncertainty]\n" + "".join(f"{key} = {value}\n" for key, value in stated.items())
+
+
 def specification(
     folder: Path,
     name: str,
@@ -49,6 +54,7 @@ def specification(
     wear: Wear | None = None,
     reload: bool = False,
     max_error: float | None = None,
+    uncertainty: str = "",
 ) -> Path:
     """Write the specification of an instrument into `folder`."""
     limits = wear or Wear()
@@ -63,7 +69,7 @@ def specification(
         reload=str(reload).lower(),
         max_error='"faithful"' if max_error is None else max_error,
     )
-    (path,) = write_files(folder, {f"{name}.toml": text})
+    (path,) = write_files(folder, {f"{name}.toml": text + uncertainty})
     return path
 
 

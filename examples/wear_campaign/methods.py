@@ -12,12 +12,15 @@ import numpy as np
 import numpy.typing as npt
 from examples.wear_campaign import hardware
 from examples.wear_campaign.bench import PAPER_FILTER
+from examples.wear_campaign.ceilings import Curve, ceilings
 from examples.wear_campaign.spread import spread
 
 from sosmith.gen.core import CoreDesign
+from sosmith.gen.instrument.uncertainty_budget import Instrument
 from sosmith.gen.stimuli import bench_of
 from sosmith.model.calibration.acceptance import DEFAULT_RANGES
 from sosmith.model.calibration.bayesian_fit import bayesian_fit
+from sosmith.model.calibration.coefficient_covariance import CoefficientUncertainty, of_bayes, of_least_squares
 from sosmith.model.calibration.fit import COLUMNS, Measurements, fit
 from sosmith.model.calibration.least_squares import Sums
 from sosmith.model.calibration.polynomial import EQUATION_5A, Polynomial
@@ -34,8 +37,11 @@ from sosmith.sim.simulation import Progress
 
 Values = npt.NDArray[np.float64]
 
-EVERY = 10
-"""One reading in so many is held against its interval."""
+HELD = 200
+"""About so many readings of a run, or of a day, are held against their intervals."""
+
+PART = "source: "
+"""Begins the names of the figures of the budget's parts."""
 
 DIGITS = 4
 """Decimals of the recorded figures."""
@@ -48,32 +54,54 @@ PRIOR = SENSOR_TYPES["equation_5a"]
 
 
 @dataclass(frozen=True, eq=False)
-class Made:
-    """A calibration: its polynomial, and the half-width of its 95 % intervals in mm."""
+class Worth:
+    """What a calibration says of itself.
 
-    polynomial: Polynomial
+    Attributes
+    ----------
+    known : CoefficientUncertainty
+        What the budget makes its intervals of.
+    interval : Interval
+        Half-width in mm of the 95 % intervals of the calibration alone.
+    """
+
+    known: CoefficientUncertainty
     interval: Interval
+
+
+@dataclass(frozen=True, eq=False)
+class Made:
+    """A calibration: its curve, the order in the voltage, and what it is worth, if it says so."""
+
+    curve: Curve
+    order: int
+    worth: Worth | None = None
     plain: bool = True
+
+
+BEFORE = Made(EQUATION_5A, 2)
+"""What the hardware has before the first fit."""
 
 
 def by_the_rule(measurements: Measurements, date: int) -> Made:
     """Fit by the paper's rule."""
     made = fit(measurements)
-    return Made(made.polynomial, of_polynomial(measurements, made).half_width)
+    worth = Worth(of_least_squares(measurements, made), of_polynomial(measurements, made).half_width)
+    return Made(made.polynomial, made.orders[0], worth)
 
 
 def by_least_squares(measurements: Measurements, date: int) -> Made:
     """Fit the paper's orders (2, 1), whatever r is reached."""
     solution = Sums(measurements.clearance, measurements.voltage, measurements.temperature).solve(TERMS)
     assert solution is not None, "the depot measures at enough voltages and temperatures"
-    polynomial = solution.polynomial
-    return Made(polynomial, lambda V, T: np.zeros(len(V)))
+    return Made(solution.polynomial, 2)
 
 
 def by_bayes(measurements: Measurements, date: int) -> Made:
     """Fit the mixed-effects model for the day."""
     made = bayesian_fit(measurements, PRIOR, date, DEFAULT_RANGES)
-    return Made(made.fit.polynomial, of_posterior(measurements, made).half_width, made.plain)
+    worth = Worth(of_bayes(measurements, made), of_posterior(measurements, made).half_width)
+    return Made(made.fit.polynomial, made.fit.orders[0], worth, made.plain)
 
 
 METHODS: dict[str, Callable[[Measurements, int], Made]] = {
@@ -117,20 +145,38 @@ def until(measurements: Measurements, date: int) -> Measurements:
 
 
 def judged(made: Made, trace: Trace, core: CoreDesign) -> dict[str, float]:
-    """Return accuracy in per cent, share of true clearances inside their intervals, mean half-width in mm."""
+    """Return the accuracy in per cent; of the intervals the share that hold the true clearance, and half-widths in mm.
+
+    Both are those of the whole budget and, as ``calibration ...``, those of the calibration alone; with the standard
+    uncertainty in mm that each source of the budget has on average, as ``PART`` and its name.
+    """
     bench = bench_of(core)
     V, T = (port.decode(trace.codes[:, k]) for k, port in enumerate(bench.ports))
-    reading = trace.reading
-    quantized = core.quantized
-    clearance = filtered(made.polynomial(V, T), quantized.filter.sos, bench.output, steady=quantized.steady)
-    some = np.flatnonzero(reading)[::EVERY]
-    half = made.interval(V[some], T[some])
-    return {
+    quantized, reading = core.quantized, trace.reading
+    clearance = filtered(made.curve(V, T), quantized.filter.sos, bench.output, steady=quantized.steady)
+    found = {
         "accuracy": accuracy_percent(clearance, trace.truth, reading),
-        "inside": float(np.mean(np.abs(clearance - trace.truth)[some] <= half)),
-        "half_width": float(half.mean()),
+        "order": float(made.order),
         "plain": float(made.plain),
     }
+    if made.worth is None:
+        return found
+    some = np.flatnonzero(reading)
+    some = some[:: max(len(some) // HELD, 1)]
+    off, V, T = np.abs(clearance - trace.truth)[some], V[some], T[some]
+    assert isinstance(made.curve, Polynomial), "what says its worth is a polynomial"
+    instrument = Instrument(
+        spec=core.spec,
+        polynomial=made.curve,
+        known=made.worth.known,
+        ideal=quantized.filter,
+        bound=float(core.spec.max_error),
+    )
+    budget = instrument.budget(V, T)
+    for name, half in (("", budget.expanded), ("calibration ", made.worth.interval(V, T))):
+        found[f"{name}inside"] = float(np.mean(off <= half))
+        found[f"{name}half_width"] = float(half.mean())
+    return found | {f"{PART}{one.source}": float(one.contribution.mean()) for one in budget.contributions}
 
 
 def on_the_bench(scenario: ScenarioFile, core: CoreDesign, seed: int) -> Iterator[tuple[str, dict[str, float]]]:
@@ -140,6 +186,8 @@ def on_the_bench(scenario: ScenarioFile, core: CoreDesign, seed: int) -> Iterato
     rows, trace = measured(scenario, seed), emulate_file(scenario, bench_of(core), seed=seed)
     for name, method in METHODS.items():
         yield name, judged(method(rows, date), trace, core)
+    for name, curve in ceilings(scenario, trace, seed).items():
+        yield name, judged(Made(curve, 2), trace, core)
 
 
 def in_the_week(
@@ -159,9 +207,10 @@ def in_the_week(
             try:
                 made = method(until(rows, date), date)
             except SpecificationError:  # no polynomial is good enough: the calibration stays
-                made = made if days else Made(EQUATION_5A, lambda V, T: np.zeros(len(V)))
+                made = made if days else BEFORE
             days.append(judged(made, part, core))
-        yield name, {figure: float(np.mean([one[figure] for one in days])) for figure in days[0]}
+        every = dict.fromkeys(figure for one in days for figure in one)
+        yield name, {figure: float(np.mean([one[figure] for one in days if figure in one])) for figure in every}
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,8 +227,10 @@ def cases(settings: dict[str, Any], scenarios: dict[str, ScenarioFile], filter_t
     """Return all cases; `scenarios` are those of the bench and that of the week, by name, the week's last."""
     calibration = hardware.calibration_table(EQUATION_5A)
     *bench_names, week_name = scenarios
-    bench = hardware.instrument(folder, "bench", settings["bench"]["sample_rate"], calibration, PAPER_FILTER)
-    week = hardware.instrument(folder, "week", RATE, calibration, filter_table)
+    stated = [hardware.uncertainty_table(settings[name]["uncertainty"]) for name in ("bench", "week")]
+    rate = settings["bench"]["sample_rate"]
+    bench = hardware.instrument(folder, "bench", rate, calibration, PAPER_FILTER, uncertainty=stated[0])
+    week = hardware.instrument(folder, "week", RATE, calibration, filter_table, uncertainty=stated[1])
 
     own, all_seeds = settings["methods"], settings["seeds"]
     some_seeds = min(all_seeds, own["variant_seeds"])
@@ -196,12 +247,13 @@ def cases(settings: dict[str, Any], scenarios: dict[str, ScenarioFile], filter_t
     for sensor in own["sensors"]:
         found += [bench_case(name, sensor, scenarios[name]) for name in bench_names]
         found.append(week_case(week_name, sensor, scenarios[week_name]))
+    for sensor in own["sensors"]:
+        for name in bench_names:
+            table, (excerpt,) = scenarios[name].document.calibration, scenarios[name].document.excerpt
+            assert table is not None, "the scenario has measurements"
+            same_day = with_calibration(scenarios[name], days=(*table.days, excerpt.day))
+            found.append(bench_case(f"{name}, same day", sensor, same_day, some_seeds))
     first = own["sensors"][0]
-    for name in bench_names:
-        table, (excerpt,) = scenarios[name].document.calibration, scenarios[name].document.excerpt
-        assert table is not None, "the scenario has measurements"
-        same_day = with_calibration(scenarios[name], days=(*table.days, excerpt.day))
-        found.append(bench_case(f"{name}, same day", first, same_day, some_seeds))
     near = with_calibration(scenarios[week_name], clearances=tuple(own["near"]))
     found.append(week_case(f"{week_name}, near", first, near, some_seeds))
     found.append(week_case(f"{week_name}, outliers", first, scenarios[week_name], some_seeds, own["outliers"]))
@@ -214,10 +266,20 @@ def figures(case: Case, confidence: float, progress: Callable[[int], None]) -> d
     for seed in range(1, case.seeds + 1):
         for method, one in case.run(seed):
             for figure, value in one.items():
-                found.setdefault(method, {}).setdefault(figure, []).append(round(value, DIGITS))
+                digits = DIGITS if not figure.startswith(PART) else 2 * DIGITS
+                found.setdefault(method, {}).setdefault(figure, []).append(round(value, digits))
         progress(seed)
     accuracy = {method: spread(one["accuracy"], confidence) for method, one in found.items()}
-    return {"case": case.name, "sensor": case.sensor, "methods": found, "accuracy": accuracy}
+    budget = {
+        figure.removeprefix(PART): float(f"{np.mean(values):.{DIGITS}g}")
+        for figure, values in found["bayes"].items()
+        if figure.startswith(PART)
+    }
+    kept = {
+        method: {figure: values for figure, values in one.items() if not figure.startswith(PART)}
+        for method, one in found.items()
+    }
+    return {"case": case.name, "sensor": case.sensor, "methods": kept, "accuracy": accuracy, "budget": budget}
 
 
 def side_by_side(

@@ -96,8 +96,8 @@ def of_bayes(measurements: Measurements, made: BayesianFit) -> CoefficientUncert
 
     The curve of the day is projected on the terms of the polynomial, by least squares over the covered region: the
     covariance is that of the projection about the coefficients, and the systematic error, in the mean over the region,
-    the rest, which includes that of a day without measurements. Degrees of freedom are those of the variances over the
-    pairs of scatters (GUM, G.4.2).
+    the rest, which includes that of a day without measurements. Both variances are uncertain over the pairs of
+    scatters; `student` makes of each a standard uncertainty with degrees of freedom.
     """
     posterior, polynomial = made.posterior, made.fit.polynomial
     lengths = tuple(map(len, polynomial.coefficients))
@@ -118,19 +118,41 @@ def of_bayes(measurements: Measurements, made: BayesianFit) -> CoefficientUncert
         covariance += float(weight[k]) * own
         inside[k] = float(np.mean(np.sum(x * (own @ x), axis=0)))
         outside[k] = max(float(np.mean(np.sum(spread**2, axis=0) + of_day[:, k])) - inside[k], 0.0)
+    of_curve_share, freedom = student(inside, weight)
+    of_rest_share, systematic_freedom = student(outside, weight)
     return CoefficientUncertainty(
         lengths=lengths,
-        covariance=covariance,
-        freedom=_freedom(inside, weight),
-        systematic=math.sqrt(float(weight @ outside)),
-        systematic_freedom=_freedom(outside, weight),
+        covariance=of_curve_share * covariance,
+        freedom=freedom,
+        systematic=math.sqrt(of_rest_share * float(weight @ outside)),
+        systematic_freedom=systematic_freedom,
         voltage=made.fit.covered[0],
         temperature=made.fit.covered[1],
     )
 
 
-def _freedom(variances: Values, weight: Values) -> float:
-    """Return the degrees of freedom of a variance whose probabilities are `weight`."""
+def student(variances: Values, weight: Values) -> tuple[float, float]:
+    """Return Student's distribution for an error whose variance is uncertain: with probabilities `weight`, shape (n,).
+
+    A normal error whose variance is scaled inverse chi-square distributed with v degrees of freedom about ``s**2`` is
+    s times Student's t (JCGM 101:2008, 6.4.9). The variance then has the mean ``m = s**2 v / (v - 2)`` and the variance
+    ``2 m**2 / (v - 4)``, from which v and s follow. To widen m itself by t would count its uncertainty twice.
+
+    Returns
+    -------
+    share : float
+        ``s**2`` divided by the mean of the variances.
+    freedom : float
+        v, above 4; infinite if the variance is certain.
+
+    Examples
+    --------
+    >>> student(np.array([1.0, 3.0]), np.array([0.5, 0.5]))
+    (0.8333333333333334, 12.0)
+    """
     mean = float(weight @ variances)
     spread = float(weight @ (variances - mean) ** 2)
-    return max(2.0 * mean**2 / spread, 1.0) if spread > 0 else math.inf
+    if not spread > 0:
+        return 1.0, math.inf
+    freedom = 4.0 + 2.0 * mean**2 / spread
+    return (freedom - 2.0) / freedom, freedom
