@@ -63,7 +63,8 @@ def test_the_figures_of_methods_are_those_of_the_recorded_seeds() -> None:
     for row in rows:
         for method, figures in row["methods"].items():
             seeds = found["settings"]["methods"]["variant_seeds"] if "," in row["case"] else found["settings"]["seeds"]
-            assert {len(values) for values in figures.values()} == {seeds}
+            assert len(figures["accuracy"]) == seeds
+            assert max(map(len, figures.values())) == seeds  # fewer intervals: no fit on any day of a week
             expected = spread(figures["accuracy"], found["settings"]["confidence"])
             assert row["accuracy"][method] == pytest.approx(expected, rel=1e-12)
 
