@@ -273,7 +273,9 @@ def test_a_store_of_version_1_is_brought_up_to_date(tmp_path: Path) -> None:
         assert calibration_of(store, "left").version == other.version
 
 
-@pytest.mark.parametrize(("column", "value"), [("date", "x"), ("method", "guess"), ("type", "{}"), ("accept_mm", "wide")])
+@pytest.mark.parametrize(
+    ("column", "value"), [("date", "x"), ("method", "guess"), ("type", "{}"), ("accept_mm", "wide")]
+)
 def test_a_spoilt_version_is_refused(tmp_path: Path, column: str, value: str) -> None:
     path = tmp_path / "c.db"
     with open_store(path, create=True) as store:
