@@ -17,7 +17,6 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 from flint import acb, arb, fmpq
-from scipy import signal
 
 from sosmith.gen.filter.impulse_invariance import Aliasing, aliasing, impulse_invariant, simple_level
 from sosmith.gen.filter.minimum_order import least_order
@@ -35,6 +34,7 @@ from sosmith.gen.filter.sections import (
 from sosmith.gen.filter.transformations import bilinear, unwarped, warped
 from sosmith.gen.specification.specification import FilterSpec
 from sosmith.model.arithmetic.correct_rounding import evaluate, nearest_double, sign
+from sosmith.model.arithmetic.recursive_filters import sosfilt
 from sosmith.model.errors import ShortfallError, SpecificationError
 
 Array = npt.NDArray[np.float64]
@@ -136,7 +136,7 @@ def impulse_response(sos: Array) -> Array:
     length = decay_length(sos)
     impulse = np.zeros(length)
     impulse[0] = 1.0
-    return np.asarray(signal.sosfilt(sos, impulse), dtype=np.float64)
+    return sosfilt(sos, impulse)
 
 
 def decay_length(sos: Array) -> int:

@@ -6,9 +6,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import signal
 
 from sosmith.gen.filter.response import Array, poles
+from sosmith.model.arithmetic.recursive_filters import sosfilt
 
 MAX_SAMPLES = 1 << 20
 """Longest response that is computed; a filter that is slower than that has none."""
@@ -92,6 +92,6 @@ def step_response(sos: Array, sample_rate: float, precision: float) -> StepRespo
     samples = 8 + 2 * len(sos) + math.ceil(1.5 * decay)
     if samples > MAX_SAMPLES:
         return None
-    values = signal.sosfilt(sos / sos[:, 3:4], np.ones(samples))
+    values = sosfilt(sos / sos[:, 3:4], np.ones(samples))
     final = float(np.prod(sos[:, :3].sum(axis=1) / sos[:, 3:].sum(axis=1)))
     return StepResponse(sample_rate=sample_rate, values=values, final=final)

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy import signal
 
 from sosmith.gen.core import CoreDesign, filter_of, polynomial_of
 from sosmith.gen.filter.design import Filter, decay_length
 from sosmith.gen.filter.response import complex_response, group_delay
 from sosmith.gen.specification.specification import CalibrationSpec, Specification
 from sosmith.gen.specification.uncertainty import UncertaintySpec
+from sosmith.model.arithmetic.recursive_filters import sosfilt
 from sosmith.model.arrays import Values
 from sosmith.model.calibration.coefficient_covariance import CoefficientUncertainty, of_least_squares
 from sosmith.model.calibration.fit import Fit, read_measurements
@@ -268,7 +268,7 @@ def noise_gain(ideal: Filter | None) -> float:
         return 1.0
     impulse = np.zeros(decay_length(ideal.sos))
     impulse[0] = 1.0
-    return math.sqrt(float(np.sum(signal.sosfilt(ideal.sos, impulse) ** 2)))
+    return math.sqrt(float(np.sum(sosfilt(ideal.sos, impulse) ** 2)))
 
 
 def budget_json(found: InstrumentBudget) -> dict[str, Any]:

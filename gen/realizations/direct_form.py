@@ -9,10 +9,10 @@ from functools import lru_cache
 from itertools import product as cartesian
 
 import numpy as np
-from scipy import signal
 
 from sosmith.gen.filter.design import decay_length
 from sosmith.gen.realizations.coefficients import Rounding
+from sosmith.model.arithmetic.recursive_filters import lfilter
 from sosmith.model.dataflow.graph import Range
 from sosmith.model.errors import ShortfallError
 from sosmith.model.sections.direct_form import DirectForm1, Product
@@ -212,7 +212,7 @@ def best_feedback(denominator: tuple[Fraction, Fraction], integer_part: tuple[in
     a = [1.0, float(denominator[0]), float(denominator[1])]
     impulse = np.zeros(decay_length(np.array([[1.0, 0.0, 0.0, *a]])))
     impulse[0] = 1.0
-    plain = np.asarray(signal.lfilter([1.0], a, impulse), dtype=np.float64)
+    plain = lfilter([1.0], a, impulse)
 
     def cost(k: tuple[int, int]) -> tuple[float, bool]:
         shaped = np.array(plain)

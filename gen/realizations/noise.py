@@ -16,7 +16,6 @@ from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
-from scipy import linalg
 
 Array = npt.NDArray[np.float64]
 
@@ -43,12 +42,12 @@ class StateSystem:
     @cached_property
     def controllability(self) -> Array:
         """Controllability Gramian, shape (n, n)."""
-        return np.asarray(linalg.solve_discrete_lyapunov(self.A, np.outer(self.B, self.B)), dtype=np.float64)
+        return _gramian(self.A, self.B)
 
     @cached_property
     def observability(self) -> Array:
         """Observability Gramian, shape (n, n)."""
-        return np.asarray(linalg.solve_discrete_lyapunov(self.A.T, np.outer(self.C, self.C)), dtype=np.float64)
+        return _gramian(self.A.T, self.C)
 
     @property
     def noise(self) -> Array:
@@ -64,6 +63,12 @@ class StateSystem:
         """Return the system in the coordinates ``T^-1 x``."""
         inverse: Array = np.linalg.inv(T).astype(np.float64)
         return StateSystem(inverse @ self.A @ T, inverse @ self.B, self.C @ T, self.D)
+
+
+def _gramian(A: Array, B: Array) -> Array:
+    from scipy import linalg  # noqa: PLC0415 - a design uses the system alone
+
+    return np.asarray(linalg.solve_discrete_lyapunov(A, np.outer(B, B)), dtype=np.float64)
 
 
 def companion(row: Sequence[float]) -> StateSystem:

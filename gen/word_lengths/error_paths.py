@@ -10,11 +10,11 @@ from fractions import Fraction
 
 import numpy as np
 import numpy.typing as npt
-from scipy import signal
 
 from sosmith.gen.filter.design import decay_length
 from sosmith.gen.proof.linear_model import LinearModel, Source, linear_models
 from sosmith.gen.word_lengths.quantized import Quantized
+from sosmith.model.arithmetic.recursive_filters import lfilter
 
 Array = npt.NDArray[np.float64]
 
@@ -58,4 +58,4 @@ def error_paths(quantized: Quantized) -> list[tuple[int, LinearModel, Source, Ar
 
 def _filtered(numerator: Sequence[Fraction], denominator: Sequence[Fraction], values: Array) -> Array:
     over, under = ([float(value) for value in polynomial] for polynomial in (numerator, denominator))
-    return np.asarray(signal.lfilter(over, under, values), dtype=np.float64)
+    return lfilter(over, under, values)

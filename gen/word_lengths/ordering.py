@@ -25,7 +25,6 @@ from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
-from scipy import fft
 
 from sosmith.gen.filter.design import estimated_length
 from sosmith.gen.proof.linear_model import LinearModel
@@ -247,7 +246,7 @@ class _Costs:
             return float(np.abs(spectrum).max())
         if norm == "l1":
             spectrum = spectrum.astype(np.complex64) if self._rough else spectrum
-            return float(np.abs(fft.irfft(spectrum, self._length)).sum())
+            return float(np.abs(np.fft.irfft(spectrum, self._length)).sum())
         power = np.abs(spectrum) ** 2
         return math.sqrt(float(2 * power.sum() - power[0] - power[-1]) / self._length)
 

@@ -23,7 +23,6 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from scipy import signal
 
 from sosmith.gen.filter.design import estimated_length
 from sosmith.gen.proof.linear_model import Source, linear_model, quantizers, transfer_function
@@ -34,6 +33,7 @@ from sosmith.gen.word_lengths.bit_limits import MIN_BITS
 from sosmith.gen.word_lengths.cost import MULTIPLIER_BITS
 from sosmith.gen.word_lengths.input_stage import InputStage
 from sosmith.gen.word_lengths.objective import SMALL_AREA, Objective
+from sosmith.model.arithmetic.recursive_filters import lfilter, sosfilt
 from sosmith.model.dataflow.adder_graph import signed_digits
 from sosmith.model.dataflow.graph import Range
 from sosmith.model.errors import ShortfallError
@@ -385,14 +385,9 @@ def _estimates(rows: Sequence[Sequence[float]], realization: str, windows: Seque
     sos = np.array(rows, dtype=np.float64)
     impulse = np.zeros(estimated_length(sos))
     impulse[0] = 1.0
-    through = [np.asarray(signal.sosfilt(sos[:k], impulse)) if k else impulse for k in range(len(rows))]
-    behind = [
-        np.asarray(signal.sosfilt(sos[k + 1 :], impulse)) if k + 1 < len(rows) else impulse for k in range(len(rows))
-    ]
-    others = [
-        np.asarray(signal.sosfilt(np.delete(sos, k, axis=0), impulse)) if len(rows) > 1 else impulse
-        for k in range(len(rows))
-    ]
+    through = [sosfilt(sos[:k], impulse) if k else impulse for k in range(len(rows))]
+    behind = [sosfilt(sos[k + 1 :], impulse) if k + 1 < len(rows) else impulse for k in range(len(rows))]
+    others = [sosfilt(np.delete(sos, k, axis=0), impulse) if len(rows) > 1 else impulse for k in range(len(rows))]
     result = []
     for k, row in enumerate(rows):
         section = _exact(row, realization)
@@ -507,7 +502,7 @@ def _floats(values: Sequence[Fraction | int]) -> list[float]:
 
 
 def _filtered(numerator: Sequence[Fraction | int], denominator: Sequence[float], values: Array) -> Array:
-    return np.asarray(signal.lfilter(_floats(numerator), denominator, values), dtype=np.float64)
+    return lfilter(_floats(numerator), denominator, values)
 
 
 def _limits(response: Array, windows: Sequence[Window]) -> tuple[float, float]:

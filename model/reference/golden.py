@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy import signal
 
+from sosmith.model.arithmetic.recursive_filters import sosfilt
 from sosmith.model.arrays import Codes, Values
 from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.port import Port
@@ -43,7 +43,7 @@ def filtered(values: Values, sos: Values | None, output: Port, *, steady: bool =
         Whether the filter starts from the steady state of the first value, and not from zero.
     """
     first = values[0] if steady and sos is not None and len(values) else 0.0
-    result = values if sos is None else np.asarray(signal.sosfilt(sos, values - first), dtype=np.float64)
+    result = values if sos is None else sosfilt(sos, values - first)
     if sos is not None and first:
         result = result + np.prod(sos[:, :3].sum(axis=1) / sos[:, 3:].sum(axis=1)) * first
     low, high = output.decode(np.array([output.lowest, output.highest]))

@@ -16,13 +16,9 @@ import numpy.typing as npt
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.filter.response import complex_response
 from sosmith.gen.fpga.boards import BUILDABLE, MODELLED, PROJECTS, RATE, find_board
-from sosmith.gen.instrument.uncertainty_budget import InstrumentBudget, budget_of
-from sosmith.gen.output.certificate import about, certificate
 from sosmith.gen.output.core_facts import CoreFacts, core_facts
 from sosmith.gen.output.manifest import manifest
-from sosmith.gen.stimuli import bench_of
 from sosmith.gen.word_lengths.cost import Cost
-from sosmith.interface.certificate import Certificate, Progress, Proof
 from sosmith.interface.inputs import codes_of, encoded, traces_of
 from sosmith.interface.notebook import table_html
 from sosmith.interface.quantity import Quantity
@@ -32,8 +28,10 @@ from sosmith.model.errors import SpecificationError
 from sosmith.model.reference.golden import calibrated, filtered
 
 if TYPE_CHECKING:
+    from sosmith.gen.instrument.uncertainty_budget import InstrumentBudget
     from sosmith.host.board import Board
     from sosmith.interface.build import Build
+    from sosmith.interface.certificate import Certificate, Progress, Proof
     from sosmith.interface.report import Report
 
 Floats = npt.NDArray[np.float64]
@@ -150,6 +148,8 @@ class Design:
     @cached_property
     def uncertainty(self) -> InstrumentBudget | None:
         """The uncertainty budget of a reading in the terms of the GUM; None if the calibration's is not known."""
+        from sosmith.gen.instrument.uncertainty_budget import budget_of
+
         return budget_of(self.core)
 
     @property
@@ -213,6 +213,9 @@ class Design:
     @cached_property
     def certificate(self) -> Certificate:
         """The claims about the design, for an independent proof; the one that `generate` writes names its files too."""
+        from sosmith.gen.output.certificate import about, certificate
+        from sosmith.interface.certificate import Certificate
+
         return Certificate(certificate(self.core.quantized, self.core.spec.max_error, about(self.core, {})))
 
     def verify(self, progress: Progress = lambda step, done, total: None) -> Proof:
@@ -290,7 +293,8 @@ class Design:
         """Descriptions of the built-in traces for this design, by their names; `trace` and `simulate` take them."""
         from sosmith.model.scenarios.summaries import SUMMARIES, fitting
 
-        return {name: SUMMARIES[name].description for name in fitting(bench_of(self.core).kind)}
+        kind = "filter" if self.core.quantized.polynomial is None else "instrument"
+        return {name: SUMMARIES[name].description for name in fitting(kind)}
 
     def trace(self, source: str | PathLike[str] | None = None, *, seconds: float | None = None, seed: int = 1) -> Trace:
         """Make the inputs of a built-in trace, or read those of a file.

@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 
 from sosmith.gen.core import CoreDesign
-from sosmith.gen.stimuli import default_scenario, traces_for
 from sosmith.model.arrays import Codes
 from sosmith.model.errors import SpecificationError
 from sosmith.model.suggestion import did_you_mean
@@ -67,6 +66,8 @@ def traces_of(
         As `encoded` and `sosmith.gen.stimuli.traces_for`.
     """
     if not isinstance(trace, Mapping):
+        from sosmith.gen.stimuli import default_scenario, traces_for  # and with it all scenarios
+
         source = default_scenario(design) if trace is None else fspath(trace)
         return traces_for(design, source, seed=seed, seconds=seconds)
     if seconds is not None:
