@@ -224,6 +224,18 @@ def folder(valid: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path
 SENTENCE = re.compile(r"^(sosmith: error|Error): \S.*\S$", re.MULTILINE)
 
 
+STEP = re.compile(r"^\[\d+:\d\d\] (.*)$", re.MULTILINE)
+
+
+def fit_for_a_log(command: str, outcome: Outcome) -> None:
+    """Where no terminal is: no bars, no blanks at an end of a line, and each step once."""
+    for text in (outcome.stdout, outcome.stderr):
+        assert not {"\r", "━"} & set(text), (command, text)
+        assert [line for line in text.splitlines() if line != line.rstrip()] == [], command
+    steps = STEP.findall(outcome.stderr)
+    assert len(steps) == len(set(steps)), (command, steps)
+
+
 def check(commands: Sequence[str], kept: Path) -> list[int]:
     """Carry out commands on a spoilt file; `kept` is what they may change, and is put back before each."""
     content = kept.read_bytes() if kept.is_file() else None
@@ -237,6 +249,7 @@ def check(commands: Sequence[str], kept: Path) -> list[int]:
         assert outcome.status in {0, 1, 2}, (command, outcome)  # 3 is for tools, and none is in play
         assert outcome.status == 0 or SENTENCE.search(outcome.stderr), (command, outcome)
         assert all(c.isprintable() or c in "\n\t" for c in outcome.stderr), (command, outcome)
+        fit_for_a_log(command, outcome)
         statuses.append(outcome.status)
     return statuses
 
@@ -267,6 +280,13 @@ def expected(command: str) -> int:
 @pytest.mark.parametrize("subject", SUBJECTS, ids=NAMES)
 def test_files_as_they_were(subject: Subject, folder: Path) -> None:
     assert check(subject.commands, folder / subject.file) == [expected(command) for command in subject.commands]
+
+
+@pytest.mark.parametrize("subject", SUBJECTS, ids=NAMES)
+def test_nothing_but_messages_when_quiet(subject: Subject, folder: Path) -> None:
+    outcome = carried_out(f"{subject.commands[0]} --quiet")
+    assert outcome.status == expected(subject.commands[0])
+    assert STEP.findall(outcome.stderr) == []
 
 
 @pytest.mark.parametrize("subject", SUBJECTS, ids=NAMES)
