@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import base64
+import json
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 from tests.host.browser import BROWSER, Tab, browser
+from tests.house import ROOT
+from tests.interface.small import INSTRUMENT
 from tests.studio.sessions import TEXT, session_in, state, until
 
+from sosmith import Specification
 from sosmith.studio.server import Studio
 from sosmith.studio.session import Session
 
@@ -217,6 +221,27 @@ def test_realizations_and_a_trace_are_shown(tab: Tab, page: Session) -> None:
     assert text_of(tab, "#tracetitle") == "Output on noise"
     assert "bit for bit what the hardware computes: largest error" in text_of(tab, "#tracefacts")
     assert tab.value("document.querySelectorAll('#traceerror path.line').length") == 2
+
+
+def dropped(tab: Tab, text: str) -> None:
+    """Drop a file with this text, as a file manager does."""
+    tab.value(
+        f"{{const carried = new DataTransfer(); carried.items.add(new File([{json.dumps(text)}], 'measured.csv'));"
+        "for (const kind of ['dragover', 'drop']) document.getElementById('drop').dispatchEvent("
+        "new DragEvent(kind, {dataTransfer: carried, bubbles: true, cancelable: true}))}"
+    )
+
+
+def test_measurements_are_dropped(tab: Tab, page: Session) -> None:
+    page.handle({"do": "text", "text": Specification.load(INSTRUMENT).toml()}, "test")
+    dropped(tab, "a,b\n")
+    tab.until("document.getElementById('fitted').className === 'problem'")
+    assert "clearance_mm" in text_of(tab, "#fitted")
+    dropped(tab, (ROOT / "examples/measurements/march.csv").read_text(encoding="utf-8"))
+    tab.until("document.getElementById('fitted').innerText.includes(' measurements, orders ')")
+    assert tab.value("document.getElementById('fitted').className") == ""
+    assert not tab.value("document.getElementById('drop').classList.contains('over')")
+    tab.until("document.getElementById('toml').value.includes('coefficients = [[')")
 
 
 @pytest.mark.parametrize(("width", "dark"), [(390, False), (390, True), (1200, False), (1200, True)])
