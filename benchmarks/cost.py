@@ -440,8 +440,10 @@ _LOCOMOTIVE = {(name, n): Core("flange_wear_locomotive", name, n) for name in AR
 
 _FOLDED = {
     ("audio_lowpass", "up5k"): (85, {"LC": 342}),
+    ("audio_lowpass", "hx8k"): (85, {"LC": 1110}),
     ("audio_lowpass", "ecp5"): (75, {"LUT4 alone": 192, "all LUT4": 294}),
     ("flange_wear_locomotive", "up5k"): (150, {"LC": 319}),
+    ("flange_wear_locomotive", "hx8k"): (150, {"LC": 1171}),
     ("flange_wear_locomotive", "ecp5"): (120, {"LUT4 alone": 268, "all LUT4": 374}),
 }
 """Clocks that a folded core may take, and its logic when it took an instruction of its own for each column's end."""

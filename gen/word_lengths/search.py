@@ -334,8 +334,13 @@ class Search:
         return self._objective.of_graph(graph), output.range, fits
 
     def _ranges_of(self, k: int, frac: int, form: SectionFormat, name: str) -> dict[str, tuple[int, int]]:
-        """Estimated codes of the nodes of section k, which do not depend on the range of its input."""
-        key = (k, frac, tuple(form.coefficients.items()), tuple(form.fracs.items()))
+        """Estimated codes of the nodes of section k, which do not depend on the range of its input.
+
+        Of the coefficients, only what decides which nodes there are and where their points lie counts: the fraction
+        bits, and whether a product is none, a shift or a multiplication.
+        """
+        kinds = tuple((one, frac_of, _kind(integer)) for one, (integer, frac_of) in form.coefficients.items())
+        key = (k, frac, kinds, tuple(form.fracs.items()))
         if key not in self._ranges:
             ranges = {}
             for node in self._build(self._rows[k], replace(form, x=unknown_range(frac)), name).graph.nodes:
@@ -344,6 +349,11 @@ class Search:
                     ranges[node.name] = math.floor(low * 2.0**node.frac), math.ceil(high * 2.0**node.frac)
             self._ranges[key] = ranges
         return self._ranges[key]
+
+
+def _kind(integer: int) -> int | None:
+    """Return the value of a coefficient that takes no multiplication, 0 or a power of two; None for all others."""
+    return None if abs(integer) & (abs(integer) - 1) else integer
 
 
 @dataclass(frozen=True, eq=False)

@@ -421,7 +421,7 @@ function proven() {
   );
   const part = (value) => `${short(100 * value / result.allowed, 3)} %`;
   rows("budget", [["part", false], [unit || "full scale 1", true], ["LSB", true], ["of allowed", true]], [
-    ...result.budget.map(([name, value]) => ({ cells: [name, short(value, 3), short(value / lsb, 3), part(value)] })),
+    ...result.budget.filter(([, value]) => value >= lsb / 20000).map(([name, value]) => ({ cells: [name, short(value, 3), short(value / lsb, 3), part(value)] })),
     { cells: ["sum", short(result.bound, 3), short(result.bound / lsb, 3), part(result.bound)] },
   ]);
   byId("reasons").replaceChildren(...Object.entries(result.reasons).map(([name, reason]) => element("p", `${name}: ${reason}.`)));

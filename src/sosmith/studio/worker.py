@@ -19,7 +19,7 @@ from typing import Any
 
 from sosmith import SosmithError
 
-PRELOADED = ["sosmith.studio.jobs"]
+PRELOADED = ["sosmith.studio.jobs", "sosmith.gen.specification.schema"]
 """What the fork server loads."""
 
 
