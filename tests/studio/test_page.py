@@ -257,9 +257,8 @@ def test_it_fits_every_window(tab: Tab, page: Session, width: int, dark: bool) -
 
 def test_it_is_printed_without_its_controls(tab: Tab, page: Session, tmp_path: Path) -> None:
     tab.call("Emulation.setEmulatedMedia", media="print")
-    hidden = (
-        "[...document.querySelectorAll('#controls, .tools, .drop, .save, .hint')].filter((each) => each.checkVisibility())"
-    )
+    places = "#controls, .tools, .drop, .save, .hint"
+    hidden = f"[...document.querySelectorAll('{places}')].filter((each) => each.checkVisibility())"
     assert tab.value(f"{hidden}.length") == 0
     assert tab.value("document.querySelector('#gain svg').checkVisibility()")
     printed = tab.call("Page.printToPDF", printBackground=True)
