@@ -82,7 +82,12 @@ def test_the_locomotive() -> None:
     assert verdict.bound == read.claims.bound <= read.max_error / read.output.lsb
     assert verdict.ranges >= 4
     assert verdict.nodes == sum(len(stage.nodes) for stage in read.stages)
-    assert steps == [("graphs", 0, 0), ("calibration", 0, 0), *(("sections", k, 4) for k in range(5))]
+    assert steps == [
+        ("graphs", 0, 0),
+        ("calibration", 0, 0),
+        *(("sections", k, 4) for k in range(5)),
+        ("settling", 0, 0),
+    ]
 
 
 @pytest.mark.parametrize("core", ["filter", "calibration"])

@@ -132,7 +132,7 @@ BREAKS = {
         r"output_buffer\.o_valid must be 1 after a clock with .*",
     ),
     "a second sample": (
-        r"= full \? o_next : (.*);",
+        r"= full \? \{ o_next.*? \} : (.*);",
         r"= full ? \1 : \1;",
         r"output_stage\.code_register must be loaded whenever a sample leaves position 4",
     ),
@@ -147,8 +147,8 @@ BREAKS = {
         rf"m_axis_tdata must be {NODE}output_stage, not another value",
     ),
     "a flag": (
-        r"m_axis_tuser = \{ 5'h00, o_data\[10:8\] \}",
-        "m_axis_tuser = { 6'h00, o_data[9:8] }",
+        r"m_axis_tuser = \{ 2'h0, o_data\[13:8\] \}",
+        "m_axis_tuser = { 2'h0, o_data[13:11], 1'h0, o_data[9:8] }",
         rf"bit 2 of m_axis_tuser must be output_saturated, as the ports and {NODE}output_stage say, "
         "not another value",
     ),
@@ -222,8 +222,8 @@ CHANNEL_BREAKS = {
         r"input_buffer\.o_ready must be 1 just when i_valid\S+ is",
     ),
     "a label": (
-        r"(m_axis_tdest = .*)\[12:11\]",
-        r"\1[11:10]",
+        r"(m_axis_tdest = .*)\[15:14\]",
+        r"\1[14:13]",
         "m_axis_tdest must be the channel of the sample, not another value",
     ),
 }
