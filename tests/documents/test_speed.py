@@ -11,6 +11,7 @@ def test_the_document_shows_the_recorded_figures() -> None:
     assert speed_page.shown("model") == model.section(model.BENCHMARK.recorded())
     assert speed_page.shown("design") == design.section(design.BENCHMARK.recorded())
     assert speed_page.shown("random_designs") == random_designs.section(random_designs.recorded())
+    assert speed_page.shown("studio") == studio.section(studio.BENCHMARK.recorded())
     with pytest.raises(ValueError, match=r"speed\.md must have a section none$"):
         speed_page.shown("none")
 
