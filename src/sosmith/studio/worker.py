@@ -19,8 +19,8 @@ from typing import Any
 
 from sosmith import SosmithError
 
-PRELOADED = ["sosmith.studio.jobs", "sosmith.gen.specification.schema"]
-"""What the fork server loads."""
+PRELOADED = ["sosmith.studio.jobs", "pydantic"]
+"""What the fork server loads; the last one is what the first specification would load."""
 
 
 def work(connection: Connection) -> None:
