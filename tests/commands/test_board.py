@@ -90,7 +90,7 @@ def test_a_board_measures_a_trace_by_itself(tmp_path: Path) -> None:
         assert process.stdout is not None
         path = process.stdout.readline().strip()
         try:
-            monitor = [sys.executable, "-m", "sosmith.cli", "monitor", path, "-o", "record.csv"]
+            monitor = [*command[:5], "monitor", path, "-o", "record.csv"]
             with subprocess.Popen(monitor, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as watching:
                 deadline = time.monotonic() + 120
                 while time.monotonic() < deadline and len(record(tmp_path)) < 60:
