@@ -145,7 +145,8 @@ def folded_rules(
     schedule = program(made, DIGIT_BITS)
     patience = folded.latency_cycles(schedule, serial=serial) if progress else None
     design = module.FoldedCore(made, schedule, serial=serial)
-    return StreamRules(design, 1, patience=patience, datapath=datapath, source_waits=True)
+    held = 2 if folded.overlaps(schedule, serial=serial) else 1
+    return StreamRules(design, held, patience=patience, datapath=datapath, source_waits=True)
 
 
 def overlapping_rules(module: ModuleType = folded, datapath: Datapath | None = None) -> StreamRules:
