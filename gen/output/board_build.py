@@ -203,6 +203,6 @@ def board_cost(
 
 def texts(design: CoreDesign, board: Board, rate: int, progress: Callable[[str], None]) -> tuple[str, str]:
     """Return the SystemVerilog of the core, and of the board's top."""
-    progress("SystemVerilog")
+    progress("SystemVerilog of the board")
     core = core_verilog(design)
     return core, board_verilog(design, clock=Fraction(board.clock), rate=rate, core=core)

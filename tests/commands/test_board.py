@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.commands.command_line import FILTER
 from tests.commands.invocation import Invocation
-from tests.commands.test_cli import FILTER
 
 import sosmith
 from sosmith.gen.output.board_top import schedule_of

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
-from tests.commands.test_cli import FILTER, INSTRUMENT
+from tests.commands.command_line import FILTER, INSTRUMENT
 from tests.model.scenarios.scenario_texts import CALIBRATION, PLAIN
 
 from sosmith.cli import cli

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.commands.test_cli import FILTER, reloadable
+from tests.commands.command_line import FILTER, reloadable
 from tests.gen.report.test_comparison import report
 from tests.model.calibration.measuring import readings, write_csv
 

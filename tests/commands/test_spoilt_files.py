@@ -19,8 +19,8 @@ import numpy as np
 import openpyxl
 import pytest
 import scipy.io
+from tests.commands.command_line import FILTER, INSTRUMENT
 from tests.commands.spoilt_files import Spoil, spoilt, spoilt_store, spoilt_workbook
-from tests.commands.test_cli import FILTER, INSTRUMENT
 from tests.gen.report.test_comparison import report
 from tests.house import ROOT
 from tests.model.scenarios.scenario_texts import CALIBRATION, FAULT, PLAIN

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from sosmith.commands.options import CORE, REALIZATION, SPEC, default_folder
+from sosmith.commands.options import CORE, REALIZATION, SPEC, completed_by, default_folder
 from sosmith.gen.fpga.boards import BUILDABLE, PROJECTS, find_board
 from sosmith.model.errors import SpecificationError
 from sosmith.terminal import JSON_OPTION, note, output_option, print_json, show_progress
@@ -23,6 +23,7 @@ from sosmith.terminal import JSON_OPTION, note, output_option, print_json, show_
     required=True,
     metavar="BOARD",
     callback=lambda ctx, parameter, name: find_board(name, (*BUILDABLE, *PROJECTS)).name,
+    shell_complete=completed_by((*BUILDABLE, *PROJECTS)),
     help=f"Target board: {', '.join(BUILDABLE)}; project files only: {', '.join(PROJECTS)}.",
 )
 @click.option(

@@ -19,7 +19,13 @@ from sosmith.terminal import JSON_OPTION, note, output_option, print_json, show_
 @click.command()
 @click.argument("file", required=False, type=click.Path(path_type=Path))
 @click.option(
-    "--example", "named", metavar="NAME", default=DEFAULT, show_default=True, help="Which example; --list names them."
+    "--example",
+    "named",
+    metavar="NAME",
+    default=DEFAULT,
+    show_default=True,
+    shell_complete=lambda ctx, parameter, begun: [name for name in titles() if name.startswith(begun)],
+    help="Which example; --list names them.",
 )
 @click.option("--list", "listed", is_flag=True, help="List the examples, and write nothing.")
 @click.option("--force", is_flag=True, help="Overwrite an existing file.")

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from sosmith.commands.options import CORE, SEED, SPEC, OneOf
+from sosmith.commands.options import CORE, SEED, SPEC, OneOf, completed_by
 from sosmith.gen.fpga.boards import SYNTHESIZED, find_board
 from sosmith.model.errors import SpecificationError
 from sosmith.terminal import JSON_OPTION, note, output_option, print_json, reader_may_leave, show_progress
@@ -35,6 +35,7 @@ from sosmith.terminal import JSON_OPTION, note, output_option, print_json, reade
     "--board",
     metavar="BOARD",
     callback=lambda ctx, parameter, name: None if name is None else find_board(name, SYNTHESIZED).name,
+    shell_complete=completed_by(SYNTHESIZED),
     help="Count the cost after synthesis for the FPGA of this board, which takes seconds for each design: "
     f"{', '.join(SYNTHESIZED)}.  [default: an estimate]",
 )
@@ -87,16 +88,16 @@ def explore_command(
     from sosmith.interface.specification import Specification
 
     asked = Specification.load(spec)
-    with show_progress(remaining=True) as step:
-        from sosmith.interface.exploration import explore
-        from sosmith.sim.exploration.parameters import read_parameter
+    folder = output or Path("build") / f"{asked.name}-exploration"
+    try:
+        with show_progress(remaining=True) as step:
+            from sosmith.interface.exploration import explore
+            from sosmith.sim.exploration.parameters import read_parameter
 
-        read: list[tuple[str, Any]] = [read_parameter(text) for text in parameters]
-        twice = [key for k, (key, _) in enumerate(read) if key in dict(read[:k])]
-        if twice:
-            raise SpecificationError(f"a parameter must be given once, not twice as {twice[0]}")
-        folder = output or Path("build") / f"{asked.name}-exploration"
-        try:
+            read: list[tuple[str, Any]] = [read_parameter(text) for text in parameters]
+            twice = [key for k, (key, _) in enumerate(read) if key in dict(read[:k])]
+            if twice:
+                raise SpecificationError(f"a parameter must be given once, not twice as {twice[0]}")
             found = explore(
                 asked,
                 dict(read) or None,
@@ -112,9 +113,10 @@ def explore_command(
                 scheduler=scheduler,
                 progress=step,
             )
-        except KeyboardInterrupt:
+    except KeyboardInterrupt:
+        if folder.exists():  # said after the bars, which would be drawn over it
             note(f"what is done is kept in {folder}; the same command goes on from there")
-            raise
+        raise
     with reader_may_leave():
         if as_json:
             print_json(found.as_dict())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,11 @@ class OneOf(click.Choice[str]):
 
     def get_invalid_choice_message(self, value: Any, ctx: click.Context | None) -> str:
         return f"{super().get_invalid_choice_message(value, ctx)[:-1]}{did_you_mean(str(value), self.choices)}."
+
+
+def completed_by(names: Iterable[str]) -> Callable[[click.Context, click.Parameter, str], list[str]]:
+    """Return what a shell completes an option's value by, where the option checks its value itself."""
+    return lambda ctx, parameter, begun: [name for name in names if name.startswith(begun)]
 
 
 SPEC = click.argument("spec", type=click.Path(path_type=Path))
@@ -35,6 +41,7 @@ BOARD = click.option(
     "--board",
     metavar="BOARD",
     callback=lambda ctx, parameter, name: None if name is None else find_board(name).name,
+    shell_complete=completed_by(BOARDS),
     help=f"Target board, whose multipliers an automatic choice of the architecture considers: {', '.join(BOARDS)}.",
 )
 SEED = click.option(

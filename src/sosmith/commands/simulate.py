@@ -20,6 +20,7 @@ from sosmith.commands.options import (
     SPEC,
     WIDTHS_OF,
     OneOf,
+    completed_by,
     default_folder,
 )
 from sosmith.gen.fpga.boards import MODELLED, find_board
@@ -103,6 +104,7 @@ def _empty_cache(ctx: click.Context, param: click.Parameter, wanted: bool) -> No
 @click.option(
     "--gates",
     metavar="BOARD",
+    shell_complete=completed_by(MODELLED),
     help="Simulate the netlist that Yosys synthesizes for the FPGA of this board instead: "
     f"{', '.join(MODELLED)}. Synthesis takes seconds, and the simulation is slower.",
 )

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.commands.test_cli import FILTER
+from tests.commands.command_line import FILTER
 from tests.gen.report.test_report import evidence
 
 from sosmith.gen.core import CoreDesign, design_core
