@@ -11,6 +11,10 @@ SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 MINUS = "−"
 _NOTHING = 1e-300
 """What is smaller is shown as zero: its factor is beyond a double."""
+_LEAST_DECIMAL = 1e-6
+"""What is smaller is shown with a power of ten: nobody counts more zeros."""
+LEAST_PART = 1 / 20_000
+"""Least part of an error bound that is shown, in output LSB: at four decimals the others are zero."""
 
 
 def unit_symbol(unit: str) -> str:
@@ -40,15 +44,18 @@ def power_of_ten(exponent: int) -> str:
 
 
 def plain_number(value: float, digits: int = 3) -> str:
-    """Decimal number of `digits` significant digits, with a true minus sign and no exponent.
+    """Decimal number of `digits` significant digits, with a true minus sign; a power of ten only below a millionth.
 
     Examples
     --------
-    >>> plain_number(-0.01234), plain_number(1234567.0), plain_number(2.0)
-    ('−0.0123', '1,234,567', '2.00')
+    >>> plain_number(-0.01234), plain_number(1234567.0), plain_number(2.0), plain_number(2.63e-76)
+    ('−0.0123', '1,234,567', '2.00', '263 × 10⁻⁷⁸')
     """
-    if value == 0:
+    if abs(value) < _NOTHING:
         return "0"
+    if abs(value) < _LEAST_DECIMAL:
+        exponent = _engineering_exponent(value, digits)
+        return f"{plain_number(value * 10.0**-exponent, digits)} × {power_of_ten(exponent)}"
     rounded = float(f"{value:.{digits - 1}e}")
     exponent = math.floor(math.log10(abs(rounded)))
     if exponent >= digits:

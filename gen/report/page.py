@@ -12,7 +12,7 @@ from typing import Any
 from sosmith.gen.filter.response import FilterFacts
 from sosmith.gen.filter.step_response import SETTLED, StepResponse
 from sosmith.gen.fpga.synthesis import Netlist
-from sosmith.gen.quantity import count, decibels, duration, plain_number, quantity, scale, unit_symbol
+from sosmith.gen.quantity import LEAST_PART, count, decibels, duration, plain_number, quantity, scale, unit_symbol
 from sosmith.gen.report import plots
 from sosmith.gen.report.behaviour import behaviour
 from sosmith.gen.report.diagram import diagram
@@ -202,7 +202,8 @@ def _alternatives_table(evidence: Evidence, summary: Summary) -> Table:
 
 
 def _budget_table(evidence: Evidence) -> Table:
-    parts = [(name.replace("_", " "), value) for name, value in evidence.bound_parts.items()]
+    seen = {name: value for name, value in evidence.bound_parts.items() if value >= evidence.lsb * LEAST_PART}
+    parts = [(name.replace("_", " "), value) for name, value in seen.items()]
     parts += [("limit", evidence.bound), ("allowed by the specification", evidence.max_error)]
     unit = ErrorUnit.of(evidence)
     rows = [(name, unit.number(value), plain_number(value / evidence.lsb)) for name, value in parts]

@@ -652,6 +652,14 @@ def page_of(run: Evidence) -> str:
     return render_page(run, summarise(run))
 
 
+def test_parts_of_the_limit_that_count_for_nothing_are_left_out() -> None:
+    """A part may be the width of a ball, with dozens of zeros behind the point."""
+    rows = page_of(evidence(bound_parts={"output": LSB / 2, "start": 2.6e-76 * LSB, "coefficients": LSB / 10_000}))
+    table = rows[rows.index("What the limit is made of") :]
+    assert re.findall(r"<tr><th>(.*?)</th>", table)[1:4] == ["output", "coefficients", "limit"]
+    assert [word for word in Page(rows).words if "0.0000" in word] == []
+
+
 def test_texts_are_escaped_once(tmp_path: Path) -> None:
     """The name of a board stands in the verdict and in the facts about the run."""
     board = replace(find_board("icebreaker"), title="<Ice> & 'Breaker'")

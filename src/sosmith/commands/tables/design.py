@@ -14,6 +14,7 @@ from sosmith.commands.tables.console import TableConsole, new_table
 from sosmith.gen.architecture import Architecture
 from sosmith.gen.instrument.uncertainty_budget import InstrumentBudget
 from sosmith.gen.output.core_facts import LimitCycleFacts
+from sosmith.gen.quantity import LEAST_PART
 from sosmith.gen.specification.specification import Specification
 from sosmith.gen.specification.wear_limits import WearSpec
 from sosmith.interface.design import Design
@@ -24,9 +25,6 @@ from sosmith.model.dataflow.program import Program
 from sosmith.model.port import Port
 from sosmith.model.reference.uncertainty_budget import SHARE
 from sosmith.model.sections.start import StartStage
-
-_SEEN = Fraction(1, 20_000)
-"""Least part of an error bound that is shown, in output LSB: it has four decimals."""
 
 
 def print_design(design: Design, *, details: bool = False) -> None:
@@ -209,7 +207,7 @@ def print_budget(console: Console, budget: Mapping[str, Quantity], lsb: Fraction
         else "Error budget, proven for all inputs in range",
         ["part", escape(max_error.unit) or "full scale 1", "output LSB"],
     )
-    seen = {part: value for part, value in budget.items() if value >= lsb * _SEEN}
+    seen = {part: value for part, value in budget.items() if value >= float(lsb) * LEAST_PART}
     for part, value in [*seen.items(), ("[bold]sum[/]", sum(budget.values())), ("allowed", max_error)]:
         table.add_row(part, f"{float(value):.3g}", f"{float(value) / float(lsb):.4f}")
     console.print(table)
