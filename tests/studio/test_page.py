@@ -221,6 +221,22 @@ def test_realizations_and_a_trace_are_shown(tab: Tab, page: Session) -> None:
     assert text_of(tab, "#tracetitle") == "Output on noise"
     assert "bit for bit what the hardware computes: largest error" in text_of(tab, "#tracefacts")
     assert tab.value("document.querySelectorAll('#traceerror path.line').length") == 2
+    assert not tab.value("document.getElementById('channels').checkVisibility()")
+
+
+def test_a_channel_of_a_trace_is_chosen(tab: Tab, page: Session) -> None:
+    page.handle({"do": "change", "changes": {"channels": 2, "hardware.architecture": "folded"}}, "test")
+    tab.until(f"document.getElementById('toml').value.includes('channels = 2') && {PROVEN}")
+    tab.value(
+        "document.getElementById('source').value = 'noise'; document.querySelector('#run button[value=trace]').click()"
+    )
+    tab.until("document.getElementById('channels').checkVisibility()")
+    assert text_of(tab, "#tracetitle") == "Output on noise, channel 0"
+    first = tab.value("document.querySelector('#traceerror path.line').getAttribute('d')")
+    tab.value("const s = document.getElementById('channel'); s.value = '1'; s.dispatchEvent(new Event('change'))")
+    assert text_of(tab, "#tracetitle") == "Output on noise, channel 1"
+    assert tab.value("document.querySelector('#traceerror path.line').getAttribute('d')") != first
+    assert "samples on each of 2 channels" in text_of(tab, "#tracefacts")
 
 
 def dropped(tab: Tab, text: str) -> None:

@@ -203,11 +203,25 @@ def test_a_trace_is_run_on_the_integer_model(session: Session) -> None:
     inputs = design.trace("noise", seconds=2.0).inputs
     error = design.run(**inputs) - design.run_exact(**inputs)
     assert (found["samples"], found["max_error"]) == (2000, float(abs(error).max()))
-    assert max(found["error"]) == pytest.approx(found["max_error"], rel=1e-6)
+    (channel,) = found["channels"]
+    assert max(channel["error"]) == pytest.approx(found["max_error"], rel=1e-6)
     assert len(found["t"]) == 400
     assert found["max_error"] <= found["bound"]
     change(session, {"filter.cutoff": 90.0})
     assert state(session)["trace"]["old"] is True
+
+
+def test_a_trace_of_two_channels(session: Session) -> None:
+    csv = "time_s,channel,x\n" + "".join(
+        f"{k / 1000},{channel},{value}\n" for k in range(200) for channel, value in enumerate((0.5, -0.25))
+    )
+    change(session, {"channels": 2, "hardware.architecture": "folded"})
+    proven(session)
+    session.handle({"do": "trace", "source": "", "csv": csv}, "page")
+    found = until(session, lambda known: known["trace"]["state"] in {"done", "refused"})["trace"]
+    ends = [channel["high"][-1] for channel in found["channels"]]
+    assert ends == pytest.approx([0.5, -0.25], abs=0.002)
+    assert max(max(channel["error"]) for channel in found["channels"]) == pytest.approx(found["max_error"], rel=1e-6)
 
 
 def test_a_dropped_trace_is_run_after_the_proof(session: Session) -> None:
@@ -216,7 +230,7 @@ def test_a_dropped_trace_is_run_after_the_proof(session: Session) -> None:
     session.handle({"do": "trace", "source": "", "csv": csv}, "page")
     found = until(session, lambda known: known["trace"]["state"] in {"done", "refused"})["trace"]
     assert (found["state"], found["samples"]) == ("done", 200)
-    assert found["high"][-1] == pytest.approx(0.5, abs=0.002)
+    assert found["channels"][0]["high"][-1] == pytest.approx(0.5, abs=0.002)
     session.handle({"do": "trace", "source": "", "csv": "a,b\n1,2\n"}, "page")
     found = until(session, lambda known: known["trace"]["state"] == "refused")["trace"]
     assert "x" in found["error"]

@@ -124,6 +124,11 @@ def side_by_side(tell: Tell, *, text: str, path: str) -> list[dict[str, Any]]:
     return rows
 
 
+def _columns(values: Floats) -> list[Floats]:
+    """Return the samples of each channel, of one or of several."""
+    return [values] if values.ndim == 1 else list(values.T)
+
+
 def trace(tell: Tell, *, text: str, path: str, source: str, seconds: float | None) -> dict[str, Any]:
     """Run the integer model of a design on a trace, and hold it against the exact result."""
     made = _designed(tell, text, path)
@@ -134,23 +139,26 @@ def trace(tell: Tell, *, text: str, path: str, source: str, seconds: float | Non
     tell("step", "exact result")
     exact = made.run_exact(**inputs.inputs)
     error = hardware - exact
-    first = (slice(None), 0) if error.ndim == 2 else (slice(None),)
     edges = np.unique(np.linspace(0, len(error), min(POINTS, len(error)) + 1).astype(int))
-    truth = None if inputs.truth is None else inputs.truth[first]
+    truth = [None] * error[0].size if inputs.truth is None else _columns(inputs.truth)
     return {
         "name": inputs.name,
         "samples": len(error),
-        "channels": 1 if error.ndim == 1 else error.shape[1],
         "unit": made.bound.unit,
         "bound": float(made.bound),
         "max_error": float(abs(error).max()),
         "rms_error": float(np.sqrt(np.mean(error**2))),
         "t": _numbers(inputs.time[edges[:-1]]),
-        "low": _buckets(np.minimum, hardware[first], edges),
-        "high": _buckets(np.maximum, hardware[first], edges),
-        "error": _buckets(np.maximum, abs(error[first]), edges),
-        "truth": None if truth is None else _numbers(truth[edges[:-1]]),
-        "from_truth": None if truth is None else float(np.sqrt(np.mean((hardware[first] - truth) ** 2))),
+        "channels": [
+            {
+                "low": _buckets(np.minimum, output, edges),
+                "high": _buckets(np.maximum, output, edges),
+                "error": _buckets(np.maximum, abs(wrong), edges),
+                "truth": None if true is None else _numbers(true[edges[:-1]]),
+                "from_truth": None if true is None else float(np.sqrt(np.mean((output - true) ** 2))),
+            }
+            for output, wrong, true in zip(_columns(hardware), _columns(error), truth, strict=True)
+        ],
     }
 
 

@@ -469,20 +469,23 @@ function traced() {
   byId("tracefigure").hidden = trace.state !== "done";
   if (trace.state !== "done") return;
   byId("tracefigure").classList.toggle("old", trace.old);
-  const { unit, t, low, high } = trace;
-  say("tracetitle", `Output on ${trace.name}${trace.channels > 1 ? ", channel 0" : ""}${trace.old ? ", of an earlier design" : ""}`);
+  const { unit, t, channels } = trace, select = byId("channel");
+  if (select.length !== channels.length) select.replaceChildren(...channels.map((_, k) => new Option(k)));
+  byId("channels").hidden = channels.length === 1;
+  const { low, high, error, truth: exact, from_truth } = channels[select.selectedIndex];
+  say("tracetitle", `Output on ${trace.name}${channels.length > 1 ? `, channel ${select.value}` : ""}${trace.old ? ", of an earlier design" : ""}`);
   const to = axes(byId("trace"), { x: [0, t.at(-1) || 1], y: span([...low, ...high]), xUnit: "s", yUnit: unit });
   const top = t.map((time, k) => `${to.x(time).toFixed(1)} ${to.y(high[k]).toFixed(1)}`), base = t.map((time, k) => `${to.x(time).toFixed(1)} ${to.y(low[k]).toFixed(1)}`).reverse();
   to.layer.append(drawn("path", { class: "line hardware", d: `M${top.join("L")}L${base.join("L")}Z` }));
-  if (trace.truth) curve(to, "truth", t, trace.truth);
-  byId("truthlegend").hidden = !trace.truth;
+  if (exact) curve(to, "truth", t, exact);
+  byId("truthlegend").hidden = !exact;
   shown(byId("trace"), to, "Output over time");
   const under = axes(byId("traceerror"), { x: [0, t.at(-1) || 1], y: [0, trace.bound * 1.1], xUnit: "s", yUnit: unit, height: 150 });
-  curve(under, "integer", t, trace.error);
+  curve(under, "integer", t, error);
   curve(under, "limit", [0, t.at(-1)], [trace.bound, trace.bound]);
   shown(byId("traceerror"), under, "Largest error over time, and the bound");
-  const truth = trace.from_truth === null ? "" : ` Against the true value, ${withUnit(short(trace.from_truth, 3), unit)} rms, delay included.`;
-  say("tracefacts", `${trace.samples.toLocaleString("en")} samples, bit for bit what the hardware computes: largest error ${withUnit(short(trace.max_error), unit)} of ${withUnit(short(trace.bound), unit)} proven, ${withUnit(short(trace.rms_error, 3), unit)} rms.${truth}`);
+  const truth = from_truth === null ? "" : ` Against the true value, ${withUnit(short(from_truth, 3), unit)} rms, delay included.`;
+  say("tracefacts", `${trace.samples.toLocaleString("en")} samples${channels.length > 1 ? ` on each of ${channels.length} channels` : ""}, bit for bit what the hardware computes: largest error ${withUnit(short(trace.max_error), unit)} of ${withUnit(short(trace.bound), unit)} proven, ${withUnit(short(trace.rms_error, 3), unit)} rms.${truth}`);
 }
 
 byId("run").addEventListener("submit", async (event) => {
@@ -492,6 +495,7 @@ byId("run").addEventListener("submit", async (event) => {
   if (csv === null && !byId("source").value) { say("running", "Traces are there once the first design is proven."); return; }
   send({ do: "trace", source: byId("source").value, seconds: seconds === "" ? null : Number(seconds), csv, report: event.submitter && event.submitter.value === "report" });
 });
+byId("channel").addEventListener("change", traced);
 byId("stop").addEventListener("click", () => send({ do: "stop" }));
 byId("compare").addEventListener("click", () => send({ do: "realizations", on: known.realizations.state === "off" }));
 
