@@ -22,6 +22,7 @@ The program is made from the graphs alone and computes the same codes.
 
 As an example, ``y(n) = floor(3 / 4 y(n-1) + 4 x(n))`` with digits of 4 bits. x takes one digit, y and its state y1 two:
 
+>>> from fractions import Fraction
 >>> from types import SimpleNamespace
 >>> from sosmith.model.dataflow.graph import GraphBuilder
 >>> from sosmith.model.port import Port
@@ -68,7 +69,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from fractions import Fraction
 from typing import NamedTuple
 
 from sosmith.model.dataflow.datapath import Datapath
@@ -256,8 +256,25 @@ class _Form(NamedTuple):
     frac: int
 
 
-_Sum = dict[_Term, Fraction]
-"""Multiples of stored digits, each read as a number with the fraction bits of its lowest digit."""
+class _Total(NamedTuple):
+    """Multiples of stored digits and a constant: integers that are all multiples of ``2**-frac``.
+
+    Digits are read as a number with the fraction bits of the lowest one.
+    """
+
+    weights: dict[_Term, int]
+    constant: int
+    frac: int
+
+    def with_frac(self, frac: int) -> tuple[dict[_Term, int], int]:
+        """Return the integers as multiples of ``2**-frac``, which must be at least as fine."""
+        up = frac - self.frac
+        return {term: weight << up for term, weight in self.weights.items()}, self.constant << up
+
+    def times(self, factor: int, frac: int) -> _Total:
+        """Return the product with ``factor * 2**-frac``."""
+        weights = {term: weight * factor for term, weight in self.weights.items()}
+        return _Total(weights, self.constant * factor, self.frac + frac)
 
 
 class _Folding:
@@ -278,7 +295,7 @@ class _Folding:
         while apart := self._cut_elsewhere():
             self._stored |= apart
             self._fracs = self._find_fracs()
-        self._sums: dict[int, tuple[_Sum, Fraction]] = {}
+        self._totals: dict[int, _Total] = {}
         self._forms = {index: self._form(index, kept) for index in sorted(self._stored)}
 
     def _form(self, index: int, kept: Mapping[str, int]) -> _Form:
@@ -424,31 +441,31 @@ class _Folding:
 
     # What values are made of.
 
-    def _value(self, index: int) -> tuple[_Sum, Fraction]:
-        """Return a node as a sum of stored digits and a constant."""
+    def _value(self, index: int) -> _Total:
+        """Return a node as multiples of stored digits and a constant."""
         if index in self._stored:
-            return {_Term(index, 0, self._forms[index].digits): Fraction(1)}, Fraction(0)
-        if index not in self._sums:
-            self._sums[index] = self._definition(index)
-        return self._sums[index]
+            return _Total({_Term(index, 0, self._forms[index].digits): 1}, 0, 0)
+        if index not in self._totals:
+            self._totals[index] = self._definition(index)
+        return self._totals[index]
 
-    def _definition(self, index: int) -> tuple[_Sum, Fraction]:
-        """Return a node as a sum of stored digits and a constant, from its operands."""
+    def _definition(self, index: int) -> _Total:
+        """Return a node as multiples of stored digits and a constant, from its operands."""
         node = self._nodes[index]
         if node.op is Op.CONSTANT:
-            return {}, node.parameter * Fraction(2) ** -node.frac
-        if node.op in {Op.ADD, Op.SUBTRACT}:
+            return _Total({}, node.parameter, node.frac)
+        if node.op is Op.ADD or node.op is Op.SUBTRACT:
             sign = 1 if node.op is Op.ADD else -1
-            (a, constant_a), (b, constant_b) = map(self._value, node.operands)
-            total = dict(a)
-            for term, weight in b.items():
-                total[term] = total.get(term, Fraction(0)) + sign * weight
-            return {term: weight for term, weight in total.items() if weight}, constant_a + sign * constant_b
-        if node.op in {Op.SHIFT, Op.SCALE}:
-            scales = node.op is Op.SCALE
-            factor = node.parameter * Fraction(2) ** -node.parameter_frac if scales else Fraction(2) ** node.parameter
-            total, constant = self._value(node.operands[0])
-            return {term: weight * factor for term, weight in total.items()}, constant * factor
+            a, b = map(self._value, node.operands)
+            frac = max(a.frac, b.frac)
+            (total, constant), (added, more) = a.with_frac(frac), b.with_frac(frac)
+            for term, weight in added.items():
+                total[term] = total.get(term, 0) + sign * weight
+            return _Total({term: weight for term, weight in total.items() if weight}, constant + sign * more, frac)
+        if node.op is Op.SHIFT:
+            return self._value(node.operands[0]).times(1, -node.parameter)
+        if node.op is Op.SCALE:
+            return self._value(node.operands[0]).times(node.parameter, node.parameter_frac)
         if node.op is Op.BOUND:
             return self._value(node.operands[0])
         if node.op is Op.MULTIPLY:
@@ -457,16 +474,14 @@ class _Folding:
             return self._cut(node)
         raise FoldingError(f"the datapath must not {node.op.value} inside to be folded")
 
-    def _product(self, a: int, b: int) -> tuple[_Sum, Fraction]:
+    def _product(self, a: int, b: int) -> _Total:
         """Return the product of two nodes, one of which may be a constant."""
         for one, other in ((a, b), (b, a)):
             if self._nodes[one].op is Op.CONSTANT:
-                _, factor = self._value(one)
-                total, constant = self._value(other)
-                return {term: weight * factor for term, weight in total.items()}, constant * factor
-        return {_Term(a, 0, self._forms[a].digits, b): Fraction(1)}, Fraction(0)
+                return self._value(other).times(self._nodes[one].parameter, self._nodes[one].frac)
+        return _Total({_Term(a, 0, self._forms[a].digits, b): 1}, 0, 0)
 
-    def _cut(self, node: Node) -> tuple[_Sum, Fraction]:
+    def _cut(self, node: Node) -> _Total:
         """Return the upper or the lower digits of a stored value."""
         root = node.operands[0]
         if root not in self._stored:
@@ -477,26 +492,25 @@ class _Folding:
         if rest:
             raise FoldingError(f"{node.name!r} must cut its value where another quantizer does to be folded")
         if node.op is Op.FRACTION:
-            return ({_Term(root, 0, lower): Fraction(1)} if lower else {}), Fraction(0)
+            return _Total({_Term(root, 0, lower): 1} if lower else {}, 0, 0)
         if lower >= form.digits:
             raise FoldingError(f"{node.name!r} must leave a digit to be folded")
-        return {_Term(root, lower, form.digits - lower): Fraction(1)}, Fraction(0)
+        return _Total({_Term(root, lower, form.digits - lower): 1}, 0, 0)
 
     # How they are computed.
 
-    def _sum(self, index: int) -> tuple[_Sum, Fraction]:
+    def _sum(self, index: int) -> _Total:
         """Return a stored value in terms of other stored values."""
         node = self._nodes[index]
         return self._value(node.operands[0]) if node.op in {Op.FLOOR, Op.DELAY} else self._definition(index)
 
     def _copied(self, index: int) -> list[tuple[Digit, Digit]]:
         """Return the digits that a state takes over, each with its own; none if they are not just those of a value."""
-        (total, constant), form = self._sum(index), self._forms[index]
-        if constant or len(total) != 1:
+        total, form = self._sum(index), self._forms[index]
+        if total.constant or len(total.weights) != 1:
             return []
-        ((term, weight),) = total.items()
-        frac = self._forms[term.value].frac - self._bits * term.first
-        if term.other >= 0 or weight != 1 or (term.length, frac) != form:
+        ((term, weight),) = total.weights.items()
+        if term.other >= 0 or weight != _shifted(1, total.frac) or (term.length, self._frac_of(term)) != form:
             return []
         return [(Digit(term.value, term.first + k), Digit(index, k)) for k in range(form.digits)]
 
@@ -557,29 +571,29 @@ class _Folding:
             made.compute(one)
             made.note(one.name)
 
-    def _columns(self, of: tuple[_Sum, Fraction], form: _Form, value: int) -> tuple[Column, ...]:
+    def _columns(self, total: _Total, form: _Form, value: int) -> tuple[Column, ...]:
         """Return the columns of a sum, the lowest first: those below its lowest digit are dropped, others are stored.
 
         If the value is -1, they are handed out, the last of them with all that is carried on from it.
         """
-        total, constant = of
-        terms: list[tuple[_Term, int, Fraction]] = []
-        for term, weight in total.items():
-            frac = self._forms[term.value].frac - self._bits * term.first
-            if term.other >= 0:
-                frac += self._forms[term.other].frac
-            terms.append((term, frac, weight))
-        exact = max([frac + _fraction_bits(weight) for _, frac, weight in terms] + [_fraction_bits(constant)])
+        fracs = [self._frac_of(term) for term in total.weights]
+        exact = max(
+            [_fraction_bits(total.constant, total.frac)]
+            + [
+                frac + _fraction_bits(weight, total.frac)
+                for frac, weight in zip(fracs, total.weights.values(), strict=True)
+            ]
+        )
         below = max(0, -(-(exact - form.frac) // self._bits))
-        unit = Fraction(2) ** (form.frac + self._bits * below)
+        finest = form.frac + self._bits * below - total.frac
         products = [
             placed
-            for term, frac, weight in terms
-            for placed in self._products(term, int(weight * unit / Fraction(2) ** frac))
+            for frac, (term, weight) in zip(fracs, total.weights.items(), strict=True)
+            for placed in self._products(term, _shifted(weight, finest - frac))
         ]
         products += [
             (Product(ONE, digit), column)
-            for column, digit in enumerate(self._constant_digits(int(constant * unit)))
+            for column, digit in enumerate(self._constant_digits(_shifted(total.constant, finest)))
             if digit
         ]
         count = form.digits if value >= 0 else max([column + 1 - below for _, column in products] + [1])
@@ -596,6 +610,11 @@ class _Folding:
             else:
                 made.append(Column(tuple(found), Opcode.STORE if k < count - 1 else Opcode.FINISH, Digit(value, k)))
         return tuple(made)
+
+    def _frac_of(self, term: _Term) -> int:
+        """Return the fraction bits of a term: those of the lowest digit, or of its product with the other value."""
+        frac = self._forms[term.value].frac - self._bits * term.first
+        return frac if term.other < 0 else frac + self._forms[term.other].frac
 
     def _add_to_column(self, product: Product, column: int, columns: list[list[Product]]) -> None:
         """Add a product to a column.
@@ -673,5 +692,6 @@ def _shifted(code: int, shift: int) -> int:
     return code << shift if shift >= 0 else code >> -shift
 
 
-def _fraction_bits(value: Fraction) -> int:
-    return value.denominator.bit_length() - 1
+def _fraction_bits(number: int, frac: int) -> int:
+    """Return the fraction bits that ``number * 2**-frac`` takes."""
+    return max(0, frac - (number & -number).bit_length() + 1) if number else 0
