@@ -67,7 +67,7 @@ class Pair:
                 self.place.append(before[node.name])
             else:
                 self.place.append(len(nodes))
-                nodes.append(replace(node, operands=tuple(self.place[i] for i in node.operands)))
+                nodes.append(node._replace(operands=tuple(self.place[i] for i in node.operands)))
         self.differences: dict[int, int] = {}
         ends = [(b.nodes[i].operands[0], a.nodes[before[b.nodes[i].name]].operands[0]) for i in b.delays]
         ends += list(zip(b.outputs, a.outputs, strict=True))
@@ -117,7 +117,7 @@ class Pair:
 
 def _with_additions(graph: Graph) -> tuple[Graph, tuple[int, ...]]:
     """Add an input to every state and every output; return also the nodes of the states' next values."""
-    nodes = [replace(node, parameter=0, low=0, high=0) if node.op is Op.CONSTANT else node for node in graph.nodes]
+    nodes = [node._replace(parameter=0, low=0, high=0) if node.op is Op.CONSTANT else node for node in graph.nodes]
     added, sums = [], []
     for k, source in enumerate([*(graph.nodes[i].operands[0] for i in graph.delays), *graph.outputs]):
         frac = graph.nodes[source].frac
@@ -130,7 +130,7 @@ def _with_additions(graph: Graph) -> tuple[Graph, tuple[int, ...]]:
     for delay, total in zip(graph.delays, sums, strict=False):
         watched.append(len(nodes))
         nodes.append(Node(Op.BOUND, (total,), nodes[total].frac, 0, 0))
-        nodes[delay] = replace(nodes[delay], operands=(watched[-1],))
+        nodes[delay] = nodes[delay]._replace(operands=(watched[-1],))
     return Graph(tuple(nodes), (*graph.inputs, *added), tuple(sums[states:])), tuple(watched)
 
 

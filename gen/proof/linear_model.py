@@ -9,7 +9,7 @@ in several places is therefore one source; error feedback depends on this. All t
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
 
@@ -150,7 +150,7 @@ def cone(graph: Graph, output: int, beside: Sequence[int] = ()) -> tuple[Graph, 
     nodes = (graph.nodes[index] for index in indices)
     entries = tuple(k for k, index in enumerate(graph.inputs) if index in reached)
     part = Graph(
-        tuple(replace(node, operands=tuple(place[i] for i in node.operands)) for node in nodes),
+        tuple(node._replace(operands=tuple(place[i] for i in node.operands)) for node in nodes),
         tuple(place[graph.inputs[k]] for k in entries),
         (place[output],),
     )

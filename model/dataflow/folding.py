@@ -200,12 +200,12 @@ def _flattened(datapath: Datapath) -> _Flat:
                 continue
             at.append(len(nodes))
             name = f"{stage.name}.{node.name}" if node.name else ""
-            nodes.append(Node(**{**vars(node), "name": name}))
+            nodes.append(node._replace(name=name))
             if node.op is Op.INPUT:
                 inputs.append(len(nodes) - 1)
         for index in range(start, len(nodes)):
             node = nodes[index]
-            nodes[index] = Node(**{**vars(node), "operands": tuple(at[i] for i in node.operands)})
+            nodes[index] = node._replace(operands=tuple(at[i] for i in node.operands))
         passed = [at[i] for i in graph.outputs]
     return _Flat(nodes, inputs, *passed)
 
@@ -228,12 +228,12 @@ def _share_delays(nodes: list[Node]) -> None:
             source = node.operands[0]
             of = nodes[source]
             if kept[source] != index:
-                nodes[index] = replace(node, op=Op.BOUND, operands=(kept[source],))
+                nodes[index] = node._replace(op=Op.BOUND, operands=(kept[source],))
                 for other, user in enumerate(nodes):
                     moved = tuple(kept[source] if i == index else i for i in user.operands)
-                    nodes[other] = replace(user, operands=moved)
+                    nodes[other] = user._replace(operands=moved)
             elif of.op is Op.FLOOR and of.operands[0] in kept:
-                nodes[index] = replace(node, op=Op.FLOOR, operands=(kept[of.operands[0]],))
+                nodes[index] = node._replace(op=Op.FLOOR, operands=(kept[of.operands[0]],))
             else:
                 continue
             changed = True

@@ -13,10 +13,10 @@ a value larger: a recursion that cannot gain energy then comes to rest.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import Enum
 from fractions import Fraction
-from typing import NamedTuple
+from typing import NamedTuple, NewType
 
 
 class Op(Enum):
@@ -53,8 +53,7 @@ class Range(NamedTuple):
         return self.low * unit, self.high * unit
 
 
-@dataclass(frozen=True)
-class Node:
+class Node(NamedTuple):
     """One operation.
 
     Attributes
@@ -309,11 +308,8 @@ def _common(first: Range, second: Range) -> tuple[int, tuple[int, int], tuple[in
 _UNSTATED = Range(0, 0, 0)
 
 
-@dataclass(frozen=True)
-class Wire:
-    """Handle to a node while its graph is being built."""
-
-    index: int
+Wire = NewType("Wire", int)
+"""Handle to a node while its graph is being built: its index."""
 
 
 class GraphBuilder:
@@ -324,7 +320,7 @@ class GraphBuilder:
         self._inputs: list[int] = []
 
     def __getitem__(self, wire: Wire) -> Node:
-        return self._nodes[wire.index]
+        return self._nodes[wire]
 
     def _append(self, node: Node) -> Wire:
         self._nodes.append(node)
@@ -340,15 +336,14 @@ class GraphBuilder:
         name: str = "",
     ) -> Wire:
         """Append a node whose fraction bits and range follow from its operands, and from those `stated`."""
-        indices = tuple([wire.index for wire in operands])
-        ranges = [self._nodes[index].range for index in indices]
+        ranges = [self._nodes[wire].range for wire in operands]
         derived = _range_of(op, ranges, stated, parameter, parameter_frac)
-        return self._append(Node(op, indices, *derived, parameter, parameter_frac, name))
+        return self._append(Node(op, operands, *derived, parameter, parameter_frac, name))
 
     def input(self, name: str, frac: int, low: int, high: int) -> Wire:
         """Add an input port whose code is in `low`..`high`."""
         wire = self._append(Node(Op.INPUT, (), frac, low, high, name=name))
-        self._inputs.append(wire.index)
+        self._inputs.append(wire)
         return wire
 
     def constant(self, code: int, frac: int, name: str = "") -> Wire:
@@ -372,7 +367,7 @@ class GraphBuilder:
             raise ValueError(f"wire must be an unconnected delay, not {state.op.value} {state.name!r}")
         if node.frac != state.frac or node.low < state.low or node.high > state.high:
             raise ValueError(f"source of {state.name!r} must fit its format and range, not {node!r}")
-        self._nodes[delay.index] = replace(state, operands=(source.index,))
+        self._nodes[delay] = state._replace(operands=(source,))
 
     def previous(self, source: Wire, name: str) -> Wire:
         """Return `source` delayed by one sample; `source` must already be computed."""
@@ -429,7 +424,7 @@ class GraphBuilder:
     def named(self, wire: Wire, name: str) -> Wire:
         """Name an intermediate result, unless it has a name."""
         if name and not self[wire].name:
-            self._nodes[wire.index] = replace(self[wire], name=name)
+            self._nodes[wire] = self[wire]._replace(name=name)
         return wire
 
     def floor(self, a: Wire, frac: int, name: str = "") -> Wire:
@@ -476,7 +471,7 @@ class GraphBuilder:
         for node in self._nodes:
             if node.op is Op.DELAY and node.operands == (-1,):
                 raise ValueError(f"delay {node.name!r} must be connected")
-        return Graph(tuple(self._nodes), tuple(self._inputs), tuple(wire.index for wire in outputs))
+        return Graph(tuple(self._nodes), tuple(self._inputs), tuple(outputs))
 
 
 def value(node: Node, code: int) -> Fraction:

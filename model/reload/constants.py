@@ -97,7 +97,7 @@ def _ending(graph: Graph, port: Port) -> Graph:
     output = graph.outputs[0]
     nodes = list(graph.nodes)
     node = nodes[output]
-    nodes[output] = replace(node, low=max(node.low, port.lowest), high=min(node.high, port.highest))
+    nodes[output] = node._replace(low=max(node.low, port.lowest), high=min(node.high, port.highest))
     return replace(graph, nodes=tuple(nodes))
 
 
@@ -160,7 +160,7 @@ def _roomy(
                 constant = None if width is None else (-1 << (width - 1), (1 << (width - 1)) - 1)
                 operands = [nodes[i].range for i in node.operands]
                 _, low, high = range_of(_with_spare_bits(node), operands, constant)
-            nodes[index] = replace(node, low=low, high=high)
+            nodes[index] = node._replace(low=low, high=high)
     return replace(graph, nodes=tuple(nodes))
 
 
@@ -168,7 +168,7 @@ def _with_spare_bits(node: Node) -> Node:
     """Return a BOUND with `SPARE_BITS` more, another node as it is."""
     if node.op is not Op.BOUND:
         return node
-    return replace(node, low=min(node.low, node.low << SPARE_BITS), high=max(node.high, node.high << SPARE_BITS))
+    return node._replace(low=min(node.low, node.low << SPARE_BITS), high=max(node.high, node.high << SPARE_BITS))
 
 
 def values_of(datapath: Datapath, loadable: Sequence[Constant]) -> list[int]:

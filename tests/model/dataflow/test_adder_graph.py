@@ -122,6 +122,6 @@ def test_the_range_of_a_negative_multiple() -> None:
 def test_products_by_operand_see_through_shifts() -> None:
     g = GraphBuilder()
     x, y = g.input("x", 0, -8, 7), g.input("y", 0, -8, 7)
-    nodes = [g.scale(wire, 3, 0).index for wire in (x, g.shift(g.shift(x, 1), 2), y)]
+    nodes = [g.scale(wire, 3, 0) for wire in (x, g.shift(g.shift(x, 1), 2), y)]
     graph = g.build([x])
     assert by_operand(graph, nodes) == [(x.index, nodes[:2]), (y.index, nodes[2:])]
