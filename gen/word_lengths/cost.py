@@ -187,6 +187,8 @@ def products_from_adders(
     block_bits : int
         Bits of each operand of a block, signed.
     """
+    if blocks is None:
+        return tuple(frozenset() for _ in graphs)
     found: list[set[int]] = [set() for _ in graphs]
     scaled: list[tuple[float, int, int, int]] = []
     needed = 0
@@ -201,7 +203,7 @@ def products_from_adders(
             if index in constant:
                 scaled.append((_bits_of_products(graph, [index]) / taken, k, index, taken))
     for _, k, index, taken in sorted(scaled):
-        if blocks is None or needed <= blocks:
+        if needed <= blocks:
             break
         found[k].add(index)
         needed -= taken

@@ -31,6 +31,7 @@ second order for poles near z = 1 (Laakso and Hartimo 1992; residue feedback aft
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -124,11 +125,7 @@ class DirectForm1:
     v_range: tuple[int, int]
 
     def __post_init__(self) -> None:
-        if not self.products:
-            raise ValueError("products must not be empty")
-        if not self.is_stable:
-            a1, a2 = self.denominator
-            raise ValueError(f"poles must lie inside the unit circle, not at a1 = {float(a1)}, a2 = {float(a2)}")
+        check_products(self.products, self.integer_part)
 
     @cached_property
     def numerator(self) -> tuple[Fraction, Fraction, Fraction]:
@@ -143,18 +140,8 @@ class DirectForm1:
     @cached_property
     def denominator(self) -> tuple[Fraction, Fraction]:
         """Exact (a1, a2) of the integer coefficients."""
-        a = [Fraction(self.integer_part[0]), Fraction(self.integer_part[1])]
-        for product in self.products:
-            for k, tap in enumerate(product.y):
-                if tap:
-                    a[k] -= product.value * tap / 2**product.shift
-        return a[0], a[1]
-
-    @property
-    def is_stable(self) -> bool:
-        """Whether both poles lie inside the unit circle, decided in rationals."""
-        a1, a2 = self.denominator
-        return abs(a2) < 1 and abs(a1) < 1 + a2
+        a1, a2, frac = _denominator(self.products, self.integer_part)
+        return Fraction(a1, 1 << frac), Fraction(a2, 1 << frac)
 
     @cached_property
     def graph(self) -> Graph:
@@ -211,6 +198,33 @@ class DirectForm1:
             exact = max(inputs) + p.shift
             fracs.append((exact if p.kept is None else min(exact, p.kept)) + p.frac)
         return max(fracs)
+
+
+def check_products(products: Sequence[Product], integer_part: tuple[int, int]) -> None:
+    """Check that there are products, and that both poles lie inside the unit circle, which integers decide.
+
+    Raises
+    ------
+    ValueError
+        If there are none, or a pole does not.
+    """
+    if not products:
+        raise ValueError("products must not be empty")
+    a1, a2, frac = _denominator(products, integer_part)
+    unit = 1 << frac
+    if not (abs(a2) < unit and abs(a1) < unit + a2):
+        raise ValueError(f"poles must lie inside the unit circle, not at a1 = {a1 / unit}, a2 = {a2 / unit}")
+
+
+def _denominator(products: Sequence[Product], integer_part: tuple[int, int]) -> tuple[int, int, int]:
+    """Return (a1, a2) as integers with common fraction bits, and these."""
+    fed_back = [(p, p.frac + p.shift) for p in products if any(p.y)]
+    frac = max([0, *(exact for _, exact in fed_back)])
+    a1, a2 = (part << frac for part in integer_part)
+    for p, exact in fed_back:
+        a1 -= p.coefficient * p.y[0] << (frac - exact)
+        a2 -= p.coefficient * p.y[1] << (frac - exact)
+    return a1, a2, frac
 
 
 def _operand(g: GraphBuilder, product: Product, taps: Wire) -> Wire:

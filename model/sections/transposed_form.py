@@ -27,7 +27,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from sosmith.model.dataflow.graph import Graph, GraphBuilder, Range, Wire
-from sosmith.model.sections.direct_form import DirectForm1, Product
+from sosmith.model.sections.direct_form import DirectForm1, Product, check_products
 
 Limits = tuple[int, int]
 """Smallest and largest code."""
@@ -76,7 +76,7 @@ class TransposedForm:
     def __post_init__(self) -> None:
         if self.operator not in {-1, 0, 1}:
             raise ValueError(f"operator must be -1, 0 or 1, not {self.operator!r}")
-        assert self.direct.is_stable  # its constructor refuses unstable coefficients
+        check_products(self.products, self.integer_part)
 
     @property
     def order(self) -> int:

@@ -10,7 +10,7 @@ from scipy import signal
 from tests.model.datapaths import butterworth, sections_of
 
 from sosmith.model.dataflow.graph import Range
-from sosmith.model.sections.direct_form import DirectForm1, Product
+from sosmith.model.sections.direct_form import DirectForm1, Product, check_products
 
 F7 = butterworth(7, 0.002588)
 
@@ -72,6 +72,33 @@ def test_rounding_error_is_bounded_by_the_shaped_peak_gain() -> None:
     b = [float(v) for v in section.numerator]
     exact = signal.lfilter(b, [1.0, *map(float, section.denominator)], x.astype(float))
     assert 0.5 < np.abs(y - exact).max() <= 4.1214 / 2
+
+
+@pytest.mark.parametrize(
+    ("part", "taps", "stable"),
+    [
+        ((-1, 0), (-1, 0), True),
+        ((-1, 0), (1, 0), False),
+        ((1, 0), (1, 0), True),
+        ((1, 0), (-1, 0), False),
+        ((0, 1), (0, 1), True),
+        ((0, 1), (1, 0), False),
+        ((0, 1), (0, -1), False),
+        ((-2, 1), (-2, 1), True),
+        ((-2, 1), (-1, 1), False),
+        ((2, 1), (2, 1), True),
+        ((2, 1), (1, 1), False),
+    ],
+)
+def test_stability_is_decided_to_the_last_bit(part: tuple[int, int], taps: tuple[int, int], stable: bool) -> None:
+    """The integer part is on the edge of the triangle of stable (a1, a2); a product moves it by about 2**-400."""
+    coarse = Product("A1", 3, 2, (1, 0, 0), (0, 0))
+    for product in (Product("A2", 1, 400, (0, 0, 0), taps), Product("A2", 1, 397, (0, 0, 0), taps, 3)):
+        if stable:
+            check_products([coarse, product], part)
+            continue
+        with pytest.raises(ValueError, match=r"^poles must lie inside the unit circle, not at a1 = .*, a2 = .*$"):
+            check_products([coarse, product], part)
 
 
 def test_refusals() -> None:
