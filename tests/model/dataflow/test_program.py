@@ -13,7 +13,8 @@ from tests.gen.designs import ALL, example_design
 
 from sosmith.model.dataflow import folding
 from sosmith.model.dataflow.datapath import Datapath
-from sosmith.model.dataflow.folding import FoldingError, program
+from sosmith.model.dataflow.folding import FoldingError, columns_of, program
+from sosmith.model.dataflow.graph import GraphBuilder
 from sosmith.model.dataflow.program import (
     EARLY_WRITES,
     LATE_WRITES,
@@ -25,6 +26,7 @@ from sosmith.model.dataflow.program import (
     Program,
     digits_of,
 )
+from sosmith.model.dataflow.scheduling import ONE
 
 FOLDABLE = ("df1", "df1_ef1", "df1_ef2", "df2t", "delta", "state_space")
 WRITES = EARLY_WRITES | LATE_WRITES
@@ -111,6 +113,36 @@ def test_an_accumulator_that_is_too_narrow_is_noticed() -> None:
     made = program(datapath, 15)
     with pytest.raises(OverflowError, match=r"^the accumulator must stay within 24 bits, not -?\d+$"):
         run(replace(made, accumulator_bits=24), datapath, stimulus(datapath, 60))
+
+
+@given(
+    st.integers(-(1 << 40), 1 << 40).filter(bool),
+    st.integers(0, 50),
+    st.integers(-30, 30),
+    st.integers(-(1 << 30), 1 << 30),
+    st.integers(0, 50),
+    st.sampled_from([4, 15]),
+)
+def test_columns_begin_where_the_exact_sum_does(
+    coefficient: int, frac: int, shift: int, constant: int, constant_frac: int, digit_bits: int
+) -> None:
+    """The columns of ``floor(c x 2**shift + k)`` against the same sum in rationals."""
+    g = GraphBuilder()
+    x = g.input("x", frac=0, low=-8, high=7)
+    total = g.add(g.shift(g.scale(x, coefficient, frac), shift), g.constant(constant, constant_frac))
+    columns = columns_of(g.build([g.bound(g.floor(total, 0), -(1 << 99), 1 << 99, "y")]), digit_bits)
+    slope, offset = coefficient * Fraction(2) ** (shift - frac), Fraction(constant, 1 << constant_frac)
+    below = -(-(max(slope.denominator, offset.denominator).bit_length() - 1) // digit_bits)
+    assert sum(column.end is Opcode.DROP for column in columns) == below
+    end = 1 + next(k for k, column in enumerate(columns) if column.end is Opcode.FINISH)
+    for code in (-8, -1, 0, 5, 7):
+        found = sum(
+            product.constant * (1 if product.digit == ONE else code) << (digit_bits * k)
+            for k, column in enumerate(columns[:end])
+            for product in column.products
+        )
+        wrong = Fraction(found, 1 << (digit_bits * below)) - slope * code - offset
+        assert wrong % (2 << (digit_bits * (end - below))) == 0  # FINISH keeps one bit beyond the top digit's
 
 
 def test_truncation_cannot_be_folded() -> None:
