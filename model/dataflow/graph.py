@@ -106,6 +106,9 @@ class Node(NamedTuple):
         return f"UQ{self.width - self.frac}.{self.frac}"
 
 
+_Ranged = Range | Node
+
+
 class RangeError(ArithmeticError):
     """A value left the range that its node states: an overflow in hardware."""
 
@@ -256,18 +259,19 @@ def range_of(node: Node, operands: Sequence[Range], constant: tuple[int, int] | 
         return Range(node.frac, *(constant or (node.parameter, node.parameter)))
     if node.op is Op.SCALE and constant is not None:
         return _product(operands[0], Range(node.parameter_frac, *constant))
-    return _range_of(node.op, operands, node.range, node.parameter, node.parameter_frac)
+    return _range_of(node.op, operands, node, node.parameter, node.parameter_frac)
 
 
-def _range_of(op: Op, operands: Sequence[Range], stated: Range, parameter: int, parameter_frac: int) -> Range:
+def _range_of(op: Op, operands: Sequence[_Ranged], stated: _Ranged, parameter: int, parameter_frac: int) -> Range:
     """Do the same for an operation with operands, from what else its node states."""
     first = operands[0]
-    if op is Op.ADD:
-        frac, a, b = _common(*operands)
-        return Range(frac, a[0] + b[0], a[1] + b[1])
-    if op is Op.SUBTRACT:
-        frac, a, b = _common(*operands)
-        return Range(frac, a[0] - b[1], a[1] - b[0])
+    if op is Op.ADD or op is Op.SUBTRACT:
+        second = operands[1]
+        frac = max(first.frac, second.frac)
+        up, down = frac - first.frac, frac - second.frac
+        ends = second.low << down, second.high << down
+        low, high = ends if op is Op.ADD else (-ends[1], -ends[0])
+        return Range(frac, (first.low << up) + low, (first.high << up) + high)
     if op is Op.SCALE:
         return _product(first, Range(parameter_frac, parameter, parameter))
     if op is Op.MULTIPLY:
@@ -275,12 +279,12 @@ def _range_of(op: Op, operands: Sequence[Range], stated: Range, parameter: int, 
     return _range_of_one(op, first, stated, parameter)
 
 
-def _product(a: Range, b: Range) -> Range:
+def _product(a: _Ranged, b: _Ranged) -> Range:
     products = (a.low * b.low, a.low * b.high, a.high * b.low, a.high * b.high)
     return Range(a.frac + b.frac, min(products), max(products))
 
 
-def _range_of_one(op: Op, of: Range, stated: Range, parameter: int) -> Range:
+def _range_of_one(op: Op, of: _Ranged, stated: _Ranged, parameter: int) -> Range:
     """Range of an operation with one operand and no factor."""
     if op is Op.SHIFT:
         return Range(of.frac - parameter, of.low, of.high)
@@ -296,13 +300,6 @@ def _range_of_one(op: Op, of: Range, stated: Range, parameter: int) -> Range:
     if op is Op.BOUND:
         return Range(of.frac, max(stated.low, of.low), min(stated.high, of.high))
     return Range(of.frac, min(of.low, 0), max(of.high, 0))  # a DELAY begins at zero
-
-
-def _common(first: Range, second: Range) -> tuple[int, tuple[int, int], tuple[int, int]]:
-    """Fraction bits that both ranges can be written with, and their ends with these."""
-    frac = max(first.frac, second.frac)
-    up, down = frac - first.frac, frac - second.frac
-    return frac, (first.low << up, first.high << up), (second.low << down, second.high << down)
 
 
 _UNSTATED = Range(0, 0, 0)
@@ -336,8 +333,7 @@ class GraphBuilder:
         name: str = "",
     ) -> Wire:
         """Append a node whose fraction bits and range follow from its operands, and from those `stated`."""
-        ranges = [self._nodes[wire].range for wire in operands]
-        derived = _range_of(op, ranges, stated, parameter, parameter_frac)
+        derived = _range_of(op, [self._nodes[wire] for wire in operands], stated, parameter, parameter_frac)
         return self._append(Node(op, operands, *derived, parameter, parameter_frac, name))
 
     def input(self, name: str, frac: int, low: int, high: int) -> Wire:
