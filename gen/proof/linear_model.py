@@ -12,8 +12,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
+from typing import NamedTuple, TypeVar
 
-from flint import fmpq
+from flint import fmpq, fmpq_mat, fmpq_poly
 
 from sosmith.model.dataflow.graph import Graph, Node, Op
 
@@ -161,11 +162,12 @@ def _model(graph: Graph, indices: Sequence[int], entries: tuple[int, ...]) -> Li
     """Model of `graph`, which has one output; `indices` and `entries` are as `cone` returns them."""
     (output,) = graph.outputs
     bounds = tuple(i for i, node in enumerate(graph.nodes) if node.op is Op.BOUND)
-    denominator = _denominator(state_matrix(graph))
+    forms = _forms(graph)
+    denominator = _denominator(_state_matrix(graph, forms))
     watched = tuple(dict.fromkeys((output, *bounds)))
     sources = []
     for key in _source_keys(graph):
-        numerators = {indices[i]: p for i, p in _numerators(graph, key, watched, denominator).items()}
+        numerators = {indices[i]: p for i, p in _numerators(graph, forms, key, watched, denominator).items()}
         low, high = _range(graph, key)
         kept = key[2] if key[0] in {"error", "truncation"} else None
         sources.append(Source(_name(graph, key), low, high, kept, numerators))
@@ -175,8 +177,9 @@ def _model(graph: Graph, indices: Sequence[int], entries: tuple[int, ...]) -> Li
 def transfer_function(graph: Graph) -> tuple[Polynomial, Polynomial]:
     """Numerator and denominator from the only input of a graph to its only output, as in `linear_model`."""
     (source,), (output,) = graph.inputs, graph.outputs
-    denominator = _denominator(state_matrix(graph))
-    return _numerators(graph, ("input", source, 0), [output], denominator)[output], denominator
+    forms = _forms(graph)
+    denominator = _denominator(_state_matrix(graph, forms))
+    return _numerators(graph, forms, ("input", source, 0), [output], denominator)[output], denominator
 
 
 def quantizers(graph: Graph) -> list[str]:
@@ -184,12 +187,15 @@ def quantizers(graph: Graph) -> list[str]:
     return [_name(graph, key) for key in _source_keys(graph) if key[0] in {"error", "truncation"}]
 
 
-def _numerators(graph: Graph, key: _Key, watched: Sequence[int], denominator: Polynomial) -> dict[int, Polynomial]:
+def _numerators(
+    graph: Graph, forms: Sequence[_Form], key: _Key, watched: Sequence[int], denominator: Polynomial
+) -> dict[int, Polynomial]:
     """Numerators from a source to the nodes `watched`."""
     # A numerator's degree is at most the number of states and the longest delay of an error together.
-    responses = _impulse_responses(graph, key, watched, 2 * len(graph.delays) + 1)
-    under = [fmpq(c.numerator, c.denominator) for c in denominator]
-    return {i: _trim(_fractions(_product(found, under, len(found)))) for i, found in responses.items()}
+    length = 2 * len(graph.delays) + 1
+    responses = _impulse_responses(graph, forms, key, watched, length)
+    under = fmpq_poly([fmpq(c.numerator, c.denominator) for c in denominator])
+    return {i: _trim(_fractions((fmpq_poly(found) * under).coeffs()[:length])) for i, found in responses.items()}
 
 
 _Key = tuple[str, int, int]
@@ -239,85 +245,90 @@ def _name(graph: Graph, key: _Key) -> str:
     return kind if kind in {"input", "constant"} else graph.nodes[index].name or f"node{index}"
 
 
-def _impulse_responses(graph: Graph, key: _Key, watched: Sequence[int], length: int) -> dict[int, list[fmpq]]:
-    state = [fmpq(0)] * len(graph.delays)
-    result: dict[int, list[fmpq]] = {i: [] for i in watched}
-    for time in range(length):
-        values = _step(graph, state, key, time)
-        for i in watched:
-            result[i].append(values[i])
-        state = [values[graph.nodes[i].operands[0]] for i in graph.delays]
-    return result
+class _Form(NamedTuple):
+    """What a node is the sum of: weights of the states, by position, and of the sources at samples before."""
+
+    states: dict[int, fmpq]
+    sources: dict[tuple[_Key, int], fmpq]
+
+    def times(self, factor: fmpq) -> _Form:
+        return _Form(_scaled(self.states, factor), _scaled(self.sources, factor))
+
+    def plus(self, other: _Form, sign: int = 1) -> _Form:
+        return _Form(_sum(self.states, other.states, sign), _sum(self.sources, other.sources, sign))
+
+    def value(self, state: Sequence[fmpq], impulse: _Key, time: int) -> fmpq:
+        """Return the value at a state, at a time after the impulse of a source."""
+        driven = self.sources.get((impulse, time), fmpq(0))
+        return sum((weight * state[j] for j, weight in self.states.items()), start=driven)
 
 
-def _step(graph: Graph, state: Sequence[fmpq], key: _Key | None, time: int) -> list[fmpq]:
-    """Values of all nodes for a unit impulse of the source `key` at time 0, with all other sources at 0."""
-    kind, source, kept = key or ("", -1, 0)
-    memory = iter(state)
-    values: list[fmpq] = []
+_Part = TypeVar("_Part")
+
+
+def _scaled(of: Mapping[_Part, fmpq], factor: fmpq) -> dict[_Part, fmpq]:
+    return {part: weight * factor for part, weight in of.items()}
+
+
+def _sum(a: Mapping[_Part, fmpq], b: Mapping[_Part, fmpq], sign: int) -> dict[_Part, fmpq]:
+    return {**a, **{part: a.get(part, 0) + sign * weight for part, weight in b.items()}}
+
+
+def _forms(graph: Graph) -> list[_Form]:
+    """Return all nodes as sums of states and sources."""
+    forms: list[_Form] = []
+    positions = iter(range(len(graph.nodes)))
     for index, node in enumerate(graph.nodes):
-        operands = [values[i] for i in node.operands if node.op is not Op.DELAY]
-        value = fmpq(0)
+        of = [forms[i] for i in node.operands if node.op is not Op.DELAY]
         if node.op is Op.DELAY:
-            value = next(memory)
+            form = _Form({next(positions): fmpq(1)}, {})
         elif node.op in {Op.INPUT, Op.CONSTANT}:
-            value = fmpq(int(index == source and kind in {"input", "constant"} and time == 0))
-        elif node.op is Op.ADD:
-            value = operands[0] + operands[1]
-        elif node.op is Op.SUBTRACT:
-            value = operands[0] - operands[1]
+            form = _Form({}, {((node.op.value, index, 0), 0): fmpq(1)})
+        elif node.op in {Op.ADD, Op.SUBTRACT}:
+            form = of[0].plus(of[1], 1 if node.op is Op.ADD else -1)
         elif node.op is Op.SHIFT:
-            value = operands[0] * (1 << max(node.parameter, 0)) / (1 << max(-node.parameter, 0))
+            form = of[0].times(fmpq(1 << max(node.parameter, 0), 1 << max(-node.parameter, 0)))
         elif node.op is Op.SCALE:
-            value = operands[0] * fmpq(node.parameter, 1 << node.parameter_frac)
+            form = of[0].times(fmpq(node.parameter, 1 << node.parameter_frac))
         elif node.op is Op.BOUND:
-            value = operands[0]
+            form = of[0]
         else:
             root, delay = _undelayed(graph, node.operands[0])
-            error = fmpq(int((_kind(node), root, _kept(node), delay) == (kind, source, kept, time)))
-            value = error if node.op is Op.FRACTION else operands[0] - error
-        values.append(value)
-    return values
+            error = _Form({}, {((_kind(node), root, _kept(node)), delay): fmpq(1)})
+            form = error if node.op is Op.FRACTION else of[0].plus(error, -1)
+        forms.append(form)
+    return forms
+
+
+def _impulse_responses(
+    graph: Graph, forms: Sequence[_Form], key: _Key, watched: Sequence[int], length: int
+) -> dict[int, list[fmpq]]:
+    """Values of the nodes `watched` after a unit impulse of the source `key` at time 0, the others being 0."""
+    following = [forms[graph.nodes[i].operands[0]] for i in graph.delays]
+    state = [fmpq(0)] * len(following)
+    result: dict[int, list[fmpq]] = {i: [] for i in watched}
+    for time in range(length):
+        for i in watched:
+            result[i].append(forms[i].value(state, key, time))
+        state = [form.value(state, key, time) for form in following]
+    return result
 
 
 def state_matrix(graph: Graph) -> list[list[Fraction]]:
     """State transition matrix of `graph` without quantizers; the states are its delays, in their order."""
-    size = len(graph.delays)
-    columns = []
-    for j in range(size):
-        values = _step(graph, [fmpq(int(i == j)) for i in range(size)], None, 0)
-        columns.append(_fractions([values[graph.nodes[i].operands[0]] for i in graph.delays]))
-    return [[columns[j][i] for j in range(size)] for i in range(size)]
+    matrix = _state_matrix(graph, _forms(graph))
+    return [_fractions(row) for row in matrix.tolist()]
 
 
-def _denominator(matrix: list[list[Fraction]]) -> Polynomial:
-    """``det(I - w A)`` by the Faddeev-LeVerrier recursion, exact in rationals."""
-    size = len(matrix)
-    coefficients = [Fraction(1)]
-    power = [[Fraction(int(i == j)) for j in range(size)] for i in range(size)]
-    for k in range(1, size + 1):
-        power = _matrix_product(matrix, power)
-        coefficients.append(-sum((power[i][i] for i in range(size)), Fraction(0)) / k)
-        for i in range(size):
-            power[i][i] += coefficients[-1]
-    return _trim(coefficients)
+def _state_matrix(graph: Graph, forms: Sequence[_Form]) -> fmpq_mat:
+    following = [forms[graph.nodes[i].operands[0]].states for i in graph.delays]
+    size = len(following)
+    return fmpq_mat(size, size, [states.get(j, 0) for states in following for j in range(size)])
 
 
-def _matrix_product(a: list[list[Fraction]], b: list[list[Fraction]]) -> list[list[Fraction]]:
-    size = len(a)
-    return [
-        [sum((a[i][k] * b[k][j] for k in range(size) if a[i][k] and b[k][j]), Fraction(0)) for j in range(size)]
-        for i in range(size)
-    ]
-
-
-def _product(a: Sequence[fmpq], b: Sequence[fmpq], length: int) -> list[fmpq]:
-    result = [fmpq(0)] * length
-    for i, x in enumerate(a):
-        if x:
-            for j, y in enumerate(b[: length - i]):
-                result[i + j] += x * y
-    return result
+def _denominator(matrix: fmpq_mat) -> Polynomial:
+    """``det(I - w A)``: the characteristic polynomial, its coefficients in the opposite order."""
+    return _trim(_fractions(matrix.charpoly().coeffs()[::-1]))
 
 
 def _fractions(values: Sequence[fmpq]) -> list[Fraction]:
@@ -326,4 +337,4 @@ def _fractions(values: Sequence[fmpq]) -> list[Fraction]:
 
 def _trim(values: Sequence[Fraction]) -> Polynomial:
     end = max((k for k, value in enumerate(values) if value), default=0)
-    return tuple(values[: end + 1])
+    return tuple(values[: end + 1]) or (Fraction(0),)

@@ -33,6 +33,19 @@ def test_a_leaky_sum(feedback: bool, noise: tuple[int, ...]) -> None:
     assert error.numerators[model.output] == noise
 
 
+def test_an_error_does_not_reach_what_was_computed_before_it() -> None:
+    g = GraphBuilder()
+    t = g.bound(g.scale(g.input("u", 0, -8, 7), 5, 3), -40, 35, "t")
+    before = g.previous(t, "t1")
+    model = linear_model(g.build([g.shift(g.subtract(g.floor(before, 0), g.constant(1, 0)), 2)]))
+    source, error, constant = model.sources
+    (bounded,) = model.bounds
+    assert model.denominator == (1,)
+    assert source.numerators == {bounded: (Fraction(5, 8),), model.output: (0, Fraction(5, 2))}
+    assert constant.numerators == {bounded: (0,), model.output: (-4,)}
+    assert error.numerators == {bounded: (0,), model.output: (0, -4)}
+
+
 def two_outputs() -> Graph:
     g = GraphBuilder()
     u = g.input("u", 0, -8, 7)

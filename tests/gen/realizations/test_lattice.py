@@ -339,7 +339,7 @@ def test_every_section_comes_to_rest(kind: str, order: int, cutoff: float, bits:
 
 def with_floors(graph: Graph) -> Graph:
     """Break a section: bits are dropped downward, not towards zero."""
-    return replace(graph, nodes=tuple(replace(n, op=Op.FLOOR) if n.op is Op.TRUNCATE else n for n in graph.nodes))
+    return replace(graph, nodes=tuple(n._replace(op=Op.FLOOR) if n.op is Op.TRUNCATE else n for n in graph.nodes))
 
 
 def test_it_is_truncation_that_brings_them_to_rest() -> None:

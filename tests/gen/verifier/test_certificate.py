@@ -291,7 +291,7 @@ def unlimited(made: Graph) -> Graph:
     """Let nodes leave their ranges: a section's hold for what the sections before it give, which noise is not."""
     keep = {Op.INPUT, Op.CLAMP}
     return replace(
-        made, nodes=tuple(n if n.op in keep else replace(n, low=-(1 << 256), high=1 << 256) for n in made.nodes)
+        made, nodes=tuple(n if n.op in keep else n._replace(low=-(1 << 256), high=1 << 256) for n in made.nodes)
     )
 
 

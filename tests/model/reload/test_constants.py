@@ -1,6 +1,5 @@
 """The words of a bank, and ranges that hold whatever a loadable constant may make."""
 
-from dataclasses import replace
 
 import pytest
 from hypothesis import given
@@ -45,7 +44,7 @@ def test_room_holds_every_constant_that_fits(example: str) -> None:
         here = {constant.node: constant.bits for constant in constants(datapath) if constant.stage == place}
         for old, new in zip(stage.graph.nodes, wide.graph.nodes, strict=True):
             assert new.low <= old.low <= old.high <= new.high
-            assert replace(new, low=old.low, high=old.high) == old
+            assert new._replace(low=old.low, high=old.high) == old
         for index, bits in here.items():
             node = wide.graph.nodes[index]
             if node.op is Op.SCALE:
