@@ -33,6 +33,11 @@ class Section(Stage, Protocol):
         """Names of the nodes whose quantizers are optional."""
         ...
 
+    @property
+    def stated_fracs(self) -> dict[str, int]:
+        """Fraction bits of the nodes with a stated range, by name."""
+        ...
+
 
 @dataclass(frozen=True, kw_only=True)
 class Realization:

@@ -138,15 +138,14 @@ def cost_of_graphs(
         for index, node in enumerate(nodes):
             if index in products:
                 continue
-            multiplication = _multiplication(graph, node)
-            if multiplication is not None:
-                multiplications.append(multiplication)
-            elif graph.is_gate(node) or node.op in {Op.ADD, Op.SUBTRACT}:
+            if node.op is Op.ADD or node.op is Op.SUBTRACT or graph.is_gate(node):
                 adders += node.width
             elif node.op is Op.TRUNCATE:  # an adder makes negative values round up
                 adders += nodes[node.operands[0]].width
             elif node.op is Op.DELAY:
                 registers += node.width
+            elif (multiplication := _multiplication(graph, node)) is not None:
+                multiplications.append(multiplication)
         registers += sum(nodes[i].width for i in graph.outputs)
     return Cost(multiplications=tuple(multiplications), adder_bits=adders, register_bits=registers)
 

@@ -325,7 +325,8 @@ class Search:
         section = self._build(self._rows[k], replace(form, ranges=ranges, x=x), name)
         graph = section.graph
         output = graph.nodes[graph.outputs[0]]
-        operands = {node.name: node for node in graph.nodes if node.name in section.optional_quantizers}
+        optional = section.optional_quantizers
+        operands = {node.name: node for node in graph.nodes if node.name in optional}
         fits = {
             name: node.frac - (node.width - MULTIPLIER_BITS)
             for name, node in operands.items()
@@ -343,10 +344,10 @@ class Search:
         key = (k, frac, kinds, tuple(form.fracs.items()))
         if key not in self._ranges:
             ranges = {}
-            for node in self._build(self._rows[k], replace(form, x=unknown_range(frac)), name).graph.nodes:
-                if node.name in self._estimates[k].limits:
-                    low, high = self._estimates[k].limits_of(node.name, form.fracs)
-                    ranges[node.name] = math.floor(low * 2.0**node.frac), math.ceil(high * 2.0**node.frac)
+            section = self._build(self._rows[k], replace(form, x=unknown_range(frac)), name)
+            for node, bits in section.stated_fracs.items():
+                low, high = self._estimates[k].limits_of(node, form.fracs)
+                ranges[node] = math.floor(low * 2.0**bits), math.ceil(high * 2.0**bits)
             self._ranges[key] = ranges
         return self._ranges[key]
 

@@ -266,11 +266,6 @@ class _Total(NamedTuple):
     constant: int
     frac: int
 
-    def with_frac(self, frac: int) -> tuple[dict[_Term, int], int]:
-        """Return the integers as multiples of ``2**-frac``, which must be at least as fine."""
-        up = frac - self.frac
-        return {term: weight << up for term, weight in self.weights.items()}, self.constant << up
-
     def times(self, factor: int, frac: int) -> _Total:
         """Return the product with ``factor * 2**-frac``."""
         weights = {term: weight * factor for term, weight in self.weights.items()}
@@ -458,10 +453,12 @@ class _Folding:
             sign = 1 if node.op is Op.ADD else -1
             a, b = map(self._value, node.operands)
             frac = max(a.frac, b.frac)
-            (total, constant), (added, more) = a.with_frac(frac), b.with_frac(frac)
-            for term, weight in added.items():
-                total[term] = total.get(term, 0) + sign * weight
-            return _Total({term: weight for term, weight in total.items() if weight}, constant + sign * more, frac)
+            up, more = frac - a.frac, sign << (frac - b.frac)
+            total = {term: weight << up for term, weight in a.weights.items()}
+            for term, weight in b.weights.items():
+                total[term] = total.get(term, 0) + more * weight
+            constant = (a.constant << up) + more * b.constant
+            return _Total({term: weight for term, weight in total.items() if weight}, constant, frac)
         if node.op is Op.SHIFT:
             return self._value(node.operands[0]).times(1, -node.parameter)
         if node.op is Op.SCALE:

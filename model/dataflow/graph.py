@@ -148,7 +148,9 @@ class Graph:
 
     def is_gate(self, node: Node) -> bool:
         """Whether a node is a product with a bit that is not a constant: all bits of the other operand, or none."""
-        factors = [self.nodes[i] for i in node.operands] if node.op is Op.MULTIPLY else []
+        if node.op is not Op.MULTIPLY:
+            return False
+        factors = [self.nodes[i] for i in node.operands]
         return any(of.width == 1 and not of.signed and of.op is not Op.CONSTANT for of in factors)
 
     def reset(self) -> list[int]:

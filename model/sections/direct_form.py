@@ -185,6 +185,16 @@ class DirectForm1:
         return tuple(p.operand for p in self.products if p.is_sum)
 
     @property
+    def stated_fracs(self) -> dict[str, int]:
+        """Fraction bits of the nodes with a stated range, by name, which follow without the graph."""
+        fracs = {"v": self.total_frac}
+        for p in self.products:
+            if p.range is not None:
+                taps = [(self.x.frac, tap) for tap in p.x if tap] + [(self.y_frac, tap) for tap in p.y if tap]
+                fracs[p.operand] = p.shift + max(frac - abs(tap).bit_length() + 1 for frac, tap in taps)
+        return fracs
+
+    @property
     def _order(self) -> int:
         second = self.integer_part[1] or self.feedback[1] or any(p.y[1] for p in self.products)
         return 2 if second else 1

@@ -31,7 +31,7 @@ from fractions import Fraction
 from functools import cached_property
 from typing import NamedTuple
 
-from sosmith.model.dataflow.graph import Graph, GraphBuilder, Range, Wire
+from sosmith.model.dataflow.graph import Graph, GraphBuilder, Op, Range, Wire
 from sosmith.model.sections.state_space import Coefficient
 
 LANES = ("upper", "lower")
@@ -122,6 +122,11 @@ class LatticeStage:
         """None."""
         return ()
 
+    @property
+    def stated_fracs(self) -> dict[str, int]:
+        """Fraction bits of the nodes with a stated range, by name."""
+        return {node.name: node.frac for node in self.graph.nodes if node.op is Op.BOUND}
+
     @cached_property
     def graph(self) -> Graph:
         """The stage as a dataflow graph with the outputs ``upper_y`` and ``lower_y``.
@@ -168,6 +173,11 @@ class LatticeJoin:
     def optional_quantizers(self) -> tuple[str, ...]:
         """None."""
         return ()
+
+    @property
+    def stated_fracs(self) -> dict[str, int]:
+        """None."""
+        return {}
 
     @cached_property
     def graph(self) -> Graph:

@@ -107,6 +107,11 @@ class StateSpace:
         return ()
 
     @property
+    def stated_fracs(self) -> dict[str, int]:
+        """Fraction bits of the nodes with a stated range, by name, which follow without the graph."""
+        return {f"x{i}_next": x.frac for i, x in enumerate(self.x, start=1)} | {"y": self.y.frac}
+
+    @property
     def denominator(self) -> tuple[Fraction, Fraction]:
         """Exact (a1, a2) of the integer coefficients, in scipy's sign convention."""
         if len(self.a) == 1:

@@ -93,6 +93,13 @@ class TransposedForm:
         """Names of the nodes that may be quantized but need not be: none."""
         return ()
 
+    @property
+    def stated_fracs(self) -> dict[str, int]:
+        """Fraction bits of the nodes with a stated range, by name, which follow without the graph."""
+        states = self._state_fracs
+        fracs = {"v": max([*self._fracs_added(0), states[0][1]])}
+        return fracs | {name: exact for name, (exact, _) in zip(("t1", "t2"), states, strict=False)}
+
     @cached_property
     def direct(self) -> DirectForm1:
         """The direct form I with the same coefficients, formats of x and y, and error path of y."""
@@ -106,7 +113,7 @@ class TransposedForm:
             y_frac=self.y_frac,
             v_range=(0, 0),
         )
-        finer = section.total_frac - max([*self._fracs_added(0), self._state_fracs[0][1]])
+        finer = section.total_frac - self.stated_fracs["v"]
         return replace(section, v_range=(self.v_range[0] << finer, self.v_range[1] << finer))
 
     @cached_property
