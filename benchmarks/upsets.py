@@ -24,7 +24,7 @@ from sosmith.gen.architecture import Architecture
 from sosmith.gen.core import design_core
 from sosmith.gen.output.core_facts import StreamFacts
 from sosmith.gen.specification.specification import load
-from sosmith.hdl.axi_stream import dest_width, fields
+from sosmith.hdl.plan.streams import dest_width, fields
 from sosmith.sim import upsets
 from sosmith.sim.stream_packing import pack, random_order
 from sosmith.sim.upsets import Fate, Target

@@ -7,22 +7,23 @@ import zlib
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
-from typing import NamedTuple
-
-from amaranth.lib.wiring import Component
+from typing import TYPE_CHECKING, NamedTuple
 
 from sosmith.gen.fpga.boards import Board
 from sosmith.gen.word_lengths.cost import MULTIPLIER_BITS, Cost, cost_of, products_from_adders
 from sosmith.gen.word_lengths.objective import FEW_ADDERS, SMALL_AREA, Objective, ShortProgram, unsuitable
-from sosmith.hdl import core, folded
-from sosmith.hdl.axi_lite import BITS
-from sosmith.hdl.instruction import instruction_bits
+from sosmith.hdl.plan import folded_clocks, parallel_clocks
+from sosmith.hdl.plan.instructions import instruction_bits
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.folding import FoldingError, program
 from sosmith.model.dataflow.graph import Node, Op
 from sosmith.model.dataflow.program import Program
 from sosmith.model.errors import ShortfallError
 from sosmith.model.reload.constants import with_room
+from sosmith.model.reload.registers import BITS
+
+if TYPE_CHECKING:
+    from amaranth.lib.wiring import Component
 
 DIGIT_BITS = 15
 """Width of a digit without a board: factors of 16 bits, a sign included, suit every multiplier block that is known."""
@@ -146,22 +147,22 @@ class Architecture:
     def latency_cycles(self) -> int:
         """Clocks from the edge that accepts a sample to the edge that can output it; an upper limit in serial."""
         if self.program is None:
-            return core.latency_cycles(self.built, self.channels, protect=self.protect)
-        return folded.latency_cycles(self.program, serial=self.name == "serial", protect=self.protect)
+            return parallel_clocks.latency_cycles(self.built, self.channels, protect=self.protect)
+        return folded_clocks.latency_cycles(self.program, serial=self.name == "serial", protect=self.protect)
 
     @property
     def reset_cycles(self) -> int:
         """Clocks after a reset until the first sample is accepted, while memories are cleared."""
         if self.program is None:
             return self.channels if self.channels > 1 else 0
-        return folded.reset_cycles(self.program, self.channels)
+        return folded_clocks.reset_cycles(self.program, self.channels)
 
     @property
     def cycles_per_sample(self) -> int:
         """Clocks between samples at the highest rate; an upper limit in serial."""
         if self.program is None:
             return 1
-        return folded.cycles_per_sample(
+        return folded_clocks.cycles_per_sample(
             self.program,
             serial=self.name == "serial",
             channels=self.channels,
@@ -171,11 +172,14 @@ class Architecture:
 
     def component(self) -> Component:
         """Make the hardware; the top module has the name of the datapath."""
+        from sosmith.hdl.core import Core  # only what makes hardware loads Amaranth
+        from sosmith.hdl.folded import FoldedCore
+
         if self.program is None:
-            return core.Core(
+            return Core(
                 self.built, self.channels, fingerprint=self.fingerprint, protect=self.protect, adders=self.adders
             )
-        return folded.FoldedCore(
+        return FoldedCore(
             self.datapath,
             self.program,
             serial=self.name == "serial",

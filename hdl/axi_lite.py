@@ -24,8 +24,7 @@ from amaranth.hdl import Cat, Module, Mux, Signal
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
-BITS = 32
-"""Width of the data bus, and of its words."""
+from sosmith.model.reload.registers import BITS
 
 
 def slave_members(address_bits: int) -> dict[str, In | Out]:

@@ -43,37 +43,19 @@ from amaranth.hdl import Cat, ClockDomain, ClockSignal, Const, Module, Mux, Rese
 from amaranth.lib import wiring
 
 from sosmith.hdl.axi_lite import forward_slave, slave_members
-from sosmith.hdl.axi_stream import (
-    StreamBuffer,
-    channel_bits,
-    core_members,
-    extended,
-    fields,
-    width,
-)
+from sosmith.hdl.axi_stream import StreamBuffer, core_members, extended
 from sosmith.hdl.constant_banks import NO_CONSTANTS, ConstantBanks, Pair
 from sosmith.hdl.fault_guard import FaultGuard
-from sosmith.hdl.interleaved import InterleavedStage, schedule
+from sosmith.hdl.interleaved import InterleavedStage
 from sosmith.hdl.pipelined_logic import banks_in_use
+from sosmith.hdl.plan.parallel_clocks import depths
+from sosmith.hdl.plan.streams import channel_bits, fields, width
 from sosmith.hdl.reload import ReloadPort
-from sosmith.hdl.stage import PipelinedStage, pipeline_depth
+from sosmith.hdl.stage import PipelinedStage
 from sosmith.hdl.status import at_rail, flag_count, in_order, outside_calibration, with_fault, worn
 from sosmith.model.dataflow.datapath import Datapath, Stage
 from sosmith.model.reload.constants import constants
 from sosmith.model.reload.registers import ADDRESS_BITS
-
-
-def latency_cycles(datapath: Datapath, channels: int = 1, *, protect: str = "none") -> int:
-    """Clocks from the edge that accepts a sample to the edge that can hand its result on, without a stall."""
-    return sum(_depths(datapath, channels, protect)) + 1 + (channels > 1) + (len(datapath.wear) > 1)
-
-
-def _depths(datapath: Datapath, channels: int, protect: str) -> list[int]:
-    """Return the number of pipeline stages of each datapath stage."""
-    if channels == 1:
-        return [pipeline_depth(stage.graph) for stage in datapath.stages]
-    rewrites = protect != "none"
-    return [schedule(stage.graph, channels, rewrites=rewrites).depth for stage in datapath.stages]
 
 
 class _Place(NamedTuple):
@@ -177,7 +159,7 @@ class Core(wiring.Component):
             port = self._reload(m, banks, bank, Cat(waiting, *(component.uses for component in stages)))
         status: Value = Cat(at_rail(self.datapath.inputs, data), outside_calibration(self.datapath, data))
         last, (code, *counted) = self._chain(m, stages, first, data)
-        for k in range(sum(_depths(self.datapath, self.channels, self.protect))):
+        for k in range(sum(depths(self.datapath, self.channels, self.protect))):
             held = Signal(len(status), name=f"status{k + 1}", reset_less=True)
             with m.If(buffer.advance):
                 m.d.sync += held.eq(status)
@@ -294,7 +276,7 @@ class Core(wiring.Component):
     @property
     def _depth(self) -> int:
         """Clocks of the pipeline from the first stage to the output buffer."""
-        return sum(_depths(self.datapath, self.channels, self.protect)) + (len(self.datapath.wear) > 1)
+        return sum(depths(self.datapath, self.channels, self.protect)) + (len(self.datapath.wear) > 1)
 
     def _delayed(self, m: Module, advance: Value, values: list[Value], name: str = "judged") -> list[Value]:
         """Return the values a clock of the pipeline later; the first is the valid bit, which alone is reset."""

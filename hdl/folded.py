@@ -68,11 +68,14 @@ from amaranth.lib import wiring
 from amaranth.lib.memory import Memory
 
 from sosmith.hdl.axi_lite import forward_slave, slave_members
-from sosmith.hdl.axi_stream import channel_bits, core_members, extended, fields
+from sosmith.hdl.axi_stream import core_members, extended
 from sosmith.hdl.check_bits import CheckBits
 from sosmith.hdl.fault_guard import FaultGuard
-from sosmith.hdl.instruction import PipelinedInstruction, address_bits, encoded, instruction_bits
+from sosmith.hdl.instruction import PipelinedInstruction
 from sosmith.hdl.pipelined_logic import limits
+from sosmith.hdl.plan.folded_clocks import FOLDED_DEPTH, SERIAL_DEPTH, memory_depth, overlaps
+from sosmith.hdl.plan.instructions import address_bits, encoded, instruction_bits
+from sosmith.hdl.plan.streams import channel_bits, fields
 from sosmith.hdl.reload import ReloadPort
 from sosmith.hdl.status import at_rail, in_order, with_fault, worn
 from sosmith.model.dataflow.datapath import Datapath
@@ -91,9 +94,6 @@ from sosmith.model.dataflow.program import (
 )
 from sosmith.model.reload.registers import ADDRESS_BITS
 
-_FOLDED_DEPTH, _SERIAL_DEPTH = 5, 3
-"""Pipeline stages from the program memory to the accumulator."""
-
 _NO_COLLISIONS = {"no_rw_check": 1}
 """Attribute of memories: no word is used that is read at the clock at which it is written.
 
@@ -103,46 +103,8 @@ comparator to make both equal.
 """
 
 
-def latency_cycles(program: Program, *, serial: bool, protect: str = "none") -> int:
-    """Clocks from the edge that finds a sample to the edge that can hand its result on; in serial, an upper bound."""
-    late = protect != "none"  # the first instruction is then read once there is a sample, since scrubbing uses the port
-    return late + (program.serial_cycles + _SERIAL_DEPTH if serial else len(program.instructions) + _FOLDED_DEPTH)
-
-
-def overlaps(program: Program, *, serial: bool, channels: int = 1, reload: bool = False, protect: str = "none") -> bool:
-    """Whether a sample is begun while the last instructions of the one before are still in the pipeline.
-
-    A folded core with one channel does so, if it has neither reload nor protection, unless its program is so short that
-    the sample would still be on offer at its end, or the result before would come after the wait for it to leave.
-    """
-    plain = not serial and channels == 1 and not reload and protect == "none"
-    takes = [number for number, instruction in enumerate(program.instructions) if instruction.opcode is Opcode.TAKE]
-    is_long = min(program.result_start, len(program.instructions) - takes[-1]) >= _FOLDED_DEPTH
-    return plain and is_long
-
-
-def cycles_per_sample(
-    program: Program, *, serial: bool, channels: int = 1, reload: bool = False, protect: str = "none"
-) -> int:
-    """Clocks between samples at the highest rate; in serial, an upper bound."""
-    if overlaps(program, serial=serial, channels=channels, reload=reload, protect=protect):
-        return len(program.instructions)
-    idle = protect != "none"  # at least one clock, for scrubbing
-    return latency_cycles(program, serial=serial, protect=protect) + idle
-
-
 _SLICES = {256: 16, 512: 8, 1024: 4, 2048: 2}
 """Width of an iCE40's block RAM, by its number of words."""
-
-
-def reset_cycles(program: Program, channels: int) -> int:
-    """Clocks after a reset in which the memory is cleared."""
-    return memory_depth(program, channels) + 1
-
-
-def memory_depth(program: Program, channels: int) -> int:
-    """Return the number of words of the memory; the upper bits of an address are the channel."""
-    return program.words * channels
 
 
 class FoldedCore(wiring.Component):
@@ -396,7 +358,7 @@ class FoldedCore(wiring.Component):
         pipeline = [PipelinedInstruction(found.data, valid, self.program)]
         with m.If(advance):
             m.d.sync += valid.eq(fetching)
-            for k in range(2, _SERIAL_DEPTH + 1 if self.serial else _FOLDED_DEPTH + 1):
+            for k in range(2, SERIAL_DEPTH + 1 if self.serial else FOLDED_DEPTH + 1):
                 code = Signal(len(found.data), name=f"instruction{k}", reset_less=True)
                 valid = Signal(name=f"valid{k}")
                 m.d.sync += [code.eq(pipeline[-1].code), valid.eq(pipeline[-1].valid)]

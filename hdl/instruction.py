@@ -18,37 +18,17 @@ from __future__ import annotations
 from amaranth.hdl import Cat, Value, signed
 from amaranth.lib import data
 
-from sosmith.model.dataflow.program import Instruction, Judged, Opcode, Program
+from sosmith.hdl.plan.instructions import field_bits
+from sosmith.model.dataflow.program import Judged, Opcode, Program
 
 _NUMBER_BITS = 8
 """Bits of the constant that may hold a digit's number: no value has more than 256 digits."""
 
 
-def address_bits(program: Program) -> int:
-    """Width of an address within the words of one channel."""
-    return (program.words - 1).bit_length()
-
-
 def instruction_layout(program: Program) -> data.StructLayout:
-    """Layout of an instruction, as wide as the words and digits of `program` need."""
-    return data.StructLayout(
-        {
-            "opcode": Opcode,
-            "address": address_bits(program),
-            "target": address_bits(program),
-            "constant": signed(program.digit_bits + 1),
-        }
-    )
-
-
-def instruction_bits(program: Program) -> int:
-    """Width of an instruction."""
-    return int(instruction_layout(program).size)
-
-
-def encoded(instruction: Instruction, program: Program) -> int:
-    """Return an instruction of `program` as its memory holds it."""
-    return int(instruction_layout(program).const(instruction._asdict()).as_bits())
+    """Layout of an instruction of `program`; that of an opcode follows from its class."""
+    bits = field_bits(program)
+    return data.StructLayout({**bits, "opcode": Opcode, "constant": signed(bits["constant"])})
 
 
 class PipelinedInstruction:

@@ -22,10 +22,11 @@ from amaranth.lib import wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
-from sosmith.hdl.axi_lite import BITS, SerialSlave, forward_slave, slave_members
+from sosmith.hdl.axi_lite import SerialSlave, forward_slave, slave_members
 from sosmith.hdl.serial_crc import SerialCrc
 from sosmith.model.reload.registers import (
     ADDRESS_BITS,
+    BITS,
     CRC,
     DATA,
     DESIGN,

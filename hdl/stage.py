@@ -62,43 +62,9 @@ from amaranth.lib.wiring import In, Out
 
 from sosmith.hdl.constant_banks import NO_CONSTANTS, Pair
 from sosmith.hdl.pipelined_logic import PipelinedLogic, banks_in_use, limits, shape_of
+from sosmith.hdl.plan.pipeline import pipeline_stages
 from sosmith.model.dataflow.datapath import Stage
 from sosmith.model.dataflow.graph import Graph, Node, Op
-
-NO_LOGIC = {Op.INPUT, Op.CONSTANT, Op.DELAY, Op.SHIFT, Op.FLOOR, Op.FRACTION, Op.BOUND}
-"""Operations that are wires or registers only and take no time."""
-
-
-def pipeline_depth(graph: Graph) -> int:
-    """Return the number of pipeline stages that `graph` takes, 1 to 3."""
-    return max(pipeline_stages(graph)) + 1
-
-
-def pipeline_stages(graph: Graph) -> list[int]:
-    """Return the pipeline stage of each node, 0 to 2.
-
-    First comes what no recursion reaches. Then comes what depends on a recursion only through states that are at least
-    two samples old, which are known a clock before they are needed; and last the rest of the loop.
-    """
-    loop = _recursive(graph)
-    late = _late(graph, loop)
-    stages = [0] * len(graph.nodes)
-    for part, whole in ((loop, _needed(graph, loop)), (late, loop)):
-        if part and any(graph.nodes[i].op not in NO_LOGIC for i in whole - part):
-            for i in part:
-                stages[i] += 1
-    return stages
-
-
-def _needed(graph: Graph, nodes: set[int]) -> set[int]:
-    """Return `nodes` and all that they depend on."""
-    found, left = set[int](), [*nodes]
-    while left:
-        index = left.pop()
-        if index not in found:
-            found.add(index)
-            left += graph.nodes[index].operands
-    return found
 
 
 def _known_early(graph: Graph, stages: list[int]) -> set[int]:
@@ -118,48 +84,6 @@ def _known_early(graph: Graph, stages: list[int]) -> set[int]:
         for i in node.operands
         if i not in products and stages[i] == stages[index] and graph.nodes[i].op in {Op.ADD, Op.SUBTRACT}
     }
-
-
-def _recursive(graph: Graph) -> set[int]:
-    """Return the nodes that depend on a state that depends on itself."""
-    sources = {delay: set[int]() for delay in graph.delays}
-    while True:
-        reached: list[set[int]] = []  # the delays that a node depends on, through any number of samples
-        for index, node in enumerate(graph.nodes):
-            own = {index} | sources[index] if node.op is Op.DELAY else set[int]()
-            reached.append(own.union(*(reached[i] for i in node.operands if node.op is not Op.DELAY)))
-        found = {delay: reached[graph.nodes[delay].operands[0]] for delay in graph.delays}
-        if found == sources:
-            break
-        sources = found
-    loop = {delay for delay in graph.delays if delay in sources[delay]}
-    return {index for index, depends in enumerate(reached) if depends & loop}
-
-
-def _late(graph: Graph, loop: set[int]) -> set[int]:
-    """Return the nodes of the loop that depend on the newest sample that it remembers, or all if there is but one."""
-    late = {i for i in graph.delays if i in loop and graph.nodes[i].operands[0] in loop and _is_followed(graph, i)}
-    if not late:
-        return loop
-    while more := {i for i in loop - late if any(_is_new(graph, i, k, late) for k in graph.nodes[i].operands)}:
-        late |= more
-    return late
-
-
-def _is_new(graph: Graph, user: int, operand: int, late: set[int]) -> bool:
-    """Whether `user` can have `operand` in the last pipeline stage only."""
-    return operand in late and not (_is_older(graph, operand) and graph.nodes[user].op is not Op.DELAY)
-
-
-def _is_followed(graph: Graph, delay: int) -> bool:
-    """Whether a delay is delayed again."""
-    return any(graph.nodes[other].operands[0] == delay for other in graph.delays)
-
-
-def _is_older(graph: Graph, index: int) -> bool:
-    """Whether a node is a delay of another delay."""
-    node = graph.nodes[index]
-    return node.op is Op.DELAY and graph.nodes[node.operands[0]].op is Op.DELAY
 
 
 class PipelinedStage(wiring.Component):

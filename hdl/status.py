@@ -22,8 +22,8 @@ from typing import NamedTuple
 from amaranth.hdl import Cat, Const, Module, Value
 from amaranth.lib.memory import Memory
 
-from sosmith.hdl.axi_stream import fields
 from sosmith.hdl.check_bits import CheckBits
+from sosmith.hdl.plan.streams import fields
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.status import Flag
 from sosmith.model.port import Port

@@ -15,7 +15,7 @@ from sosmith.gen.proof.settling import SETTLED
 from sosmith.gen.reload.register_writes import bank_size
 from sosmith.gen.word_lengths.cost import Cost
 from sosmith.gen.word_lengths.quantized import Quantized
-from sosmith.hdl.axi_stream import Field, dest_width, fields
+from sosmith.hdl.plan.streams import Field, dest_width, fields
 from sosmith.model.dataflow.datapath import Datapath, Stage
 from sosmith.model.dataflow.graph import Graph, Op
 from sosmith.model.dataflow.program import Program

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from sosmith.hdl.axi_lite import BITS
 from sosmith.model.reload.registers import (
+    BITS,
     DESIGN,
     ID,
     INTERFACE,

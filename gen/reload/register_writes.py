@@ -9,10 +9,9 @@ from sosmith.gen.architecture import Architecture
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.proof.fading import RESIDUE
 from sosmith.gen.reload.reload import OtherSet, Swap, parallel_bank
-from sosmith.hdl.axi_lite import BITS
-from sosmith.hdl.instruction import encoded, instruction_bits
+from sosmith.hdl.plan.instructions import encoded, instruction_bits
 from sosmith.model.reload.constants import constants
-from sosmith.model.reload.registers import CRC, DATA, VERSION, Register
+from sosmith.model.reload.registers import BITS, CRC, DATA, VERSION, Register
 
 
 def bank_size(architecture: Architecture) -> tuple[int, int]:

@@ -20,7 +20,7 @@ from sosmith.gen.reload.transient import transient
 from sosmith.gen.specification.specification import Specification
 from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.gen.word_lengths.settling import samples_to_settle
-from sosmith.hdl import folded
+from sosmith.hdl.plan import folded_clocks
 from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.folding import program
@@ -325,7 +325,7 @@ def _fitted(hardware: CoreDesign, datapath: Datapath, what: str) -> Program | No
         raise ShortfallError(f"the {what} must fit the hardware: {error}") from None
     spec, architecture = hardware.spec, hardware.architecture
     budget = Budget(clock=spec.hardware.clock, sample_rate=spec.sample_rate, channels=architecture.channels)
-    needed = folded.cycles_per_sample(made, serial=architecture.name == "serial", protect=architecture.protect)
+    needed = folded_clocks.cycles_per_sample(made, serial=architecture.name == "serial", protect=architecture.protect)
     if needed > budget.cycles:
         raise ShortfallError(f"the {what} must take at most {budget.cycles:,} clocks a sample, not {needed:,}")
     return made

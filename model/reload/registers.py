@@ -1,6 +1,6 @@
 """The registers of a reloadable core, described once for hardware, host, C header and documents.
 
-All are 32 bits wide; the address of a register is four times its index in `REGISTERS`.
+The address of a register is four times its index in `REGISTERS`.
 """
 
 from __future__ import annotations
@@ -13,6 +13,9 @@ MAGIC = int.from_bytes(b"SOSM", "little")
 
 INTERFACE = 1
 """Version of this register map, in ``LAYOUT``."""
+
+BITS = 32
+"""Width of a register, and of the data bus to it."""
 
 MAX_WORDS = (1 << 16) - 1
 """Most words of a bank: what the field of ``LAYOUT`` holds."""

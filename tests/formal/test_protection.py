@@ -11,6 +11,7 @@ from tests.formal.small import leaky
 from tests.formal.test_streams import StreamRules
 
 from sosmith.hdl import core, stage
+from sosmith.hdl.plan import parallel_clocks
 
 Change = tuple[str, str]
 """A piece of text that is there once, and what takes its place."""
@@ -45,7 +46,7 @@ class OneUpset(StreamRules):
         whole: Any = broken(core, "import PipelinedStage, ", "import ", *in_core)
         whole.PipelinedStage = parts.PipelinedStage
         design = whole.Core(leaky(), protect="detect")
-        super().__init__(design, core.latency_cycles(leaky()) + 1, datapath=leaky())
+        super().__init__(design, parallel_clocks.latency_cycles(leaky()) + 1, datapath=leaky())
         self.excused = design.m_axis_tuser[FAULT]
         self._inputs.append(self.upset)
 

@@ -12,6 +12,7 @@ from tests.formal.prover import Proof, broken, combinational_outputs, prove
 from tests.formal.small import leaky, limiter, reference, resonator
 
 from sosmith.hdl import axi_stream, core, folded
+from sosmith.hdl.plan import folded_clocks, parallel_clocks
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.folding import program
 
@@ -134,7 +135,7 @@ def buffer_rules(module: ModuleType = axi_stream) -> StreamRules:
 
 def core_rules(module: ModuleType = core, datapath: Datapath | None = None) -> StreamRules:
     made = leaky() if datapath is None else datapath
-    latency = core.latency_cycles(made)
+    latency = parallel_clocks.latency_cycles(made)
     return StreamRules(module.Core(made), latency + 1, patience=latency, datapath=made)
 
 
@@ -143,9 +144,9 @@ def folded_rules(
 ) -> StreamRules:
     made = limiter() if datapath is None else datapath
     schedule = program(made, DIGIT_BITS)
-    patience = folded.latency_cycles(schedule, serial=serial) if progress else None
+    patience = folded_clocks.latency_cycles(schedule, serial=serial) if progress else None
     design = module.FoldedCore(made, schedule, serial=serial)
-    held = 2 if folded.overlaps(schedule, serial=serial) else 1
+    held = 2 if folded_clocks.overlaps(schedule, serial=serial) else 1
     return StreamRules(design, held, patience=patience, datapath=datapath, source_waits=True)
 
 
@@ -153,9 +154,9 @@ def overlapping_rules(module: ModuleType = folded, datapath: Datapath | None = N
     """Rules of a folded core that begins a sample while the one before is in its pipeline."""
     made = limiter() if datapath is None else datapath
     schedule = program(made, DIGIT_BITS).padded(9)
-    assert folded.overlaps(schedule, serial=False)
+    assert folded_clocks.overlaps(schedule, serial=False)
     design = module.FoldedCore(made, schedule, serial=False)
-    patience = folded.latency_cycles(schedule, serial=False)
+    patience = folded_clocks.latency_cycles(schedule, serial=False)
     return StreamRules(design, 2, patience=patience, datapath=datapath, source_waits=True)
 
 
@@ -201,7 +202,7 @@ def test_samples_that_overlap_too_far_are_found_out(right: str, wrong: str, tmp_
 def channel_rules(module: ModuleType, serial: bool | None = None) -> StreamRules:
     """Rules of a core with three channels, parallel if `serial` is None."""
     if serial is None:
-        return StreamRules(module.Core(limiter(), 3), core.latency_cycles(limiter(), 3) + 2)
+        return StreamRules(module.Core(limiter(), 3), parallel_clocks.latency_cycles(limiter(), 3) + 2)
     design = module.FoldedCore(limiter(), program(limiter(), DIGIT_BITS), serial=serial, channels=3)
     return StreamRules(design, 1, source_waits=True)
 

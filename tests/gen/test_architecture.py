@@ -15,7 +15,7 @@ from sosmith.gen.fpga.boards import find_board
 from sosmith.gen.output.core_facts import core_facts
 from sosmith.gen.output.manifest import manifest
 from sosmith.gen.specification.specification import load
-from sosmith.hdl.instruction import instruction_bits
+from sosmith.hdl.plan.instructions import instruction_bits
 from sosmith.model.errors import ShortfallError
 
 

@@ -11,7 +11,7 @@ from amaranth.hdl import ClockDomain, ClockSignal, Module
 from amaranth.sim import Simulator
 
 from sosmith.gen.architecture import Architecture
-from sosmith.hdl.axi_stream import fields
+from sosmith.hdl.plan.streams import fields
 
 _PATIENCE = 20_000
 """Clocks without a transfer after which the core counts as hung."""

@@ -10,8 +10,8 @@ from amaranth.hdl import ClockDomain, ClockSignal, Module
 from amaranth.sim import Simulator
 from tests.hdl.axi_lite_bench import OKAY
 
-from sosmith.hdl.axi_stream import fields
 from sosmith.hdl.folded import FoldedCore
+from sosmith.hdl.plan.streams import fields
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.program import Program
 from sosmith.model.dataflow.status import Flag

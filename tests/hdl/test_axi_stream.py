@@ -9,7 +9,8 @@ import pytest
 from amaranth.hdl import Const, Shape
 from amaranth.sim import Simulator
 
-from sosmith.hdl.axi_stream import StreamBuffer, extended, fields, width
+from sosmith.hdl.axi_stream import StreamBuffer, extended
+from sosmith.hdl.plan.streams import fields, width
 from sosmith.model.port import Port
 
 

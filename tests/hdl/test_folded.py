@@ -13,8 +13,8 @@ from tests.formal.small import leaky, limiter
 from tests.hdl.folded_bench import Line, Model, Probed, Result, Sample, simulate
 from tests.hdl.test_reload import crc_of
 
-from sosmith.hdl import folded
-from sosmith.hdl.instruction import encoded
+from sosmith.hdl.plan import folded_clocks
+from sosmith.hdl.plan.instructions import encoded
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.folding import program
 from sosmith.model.dataflow.graph import GraphBuilder
@@ -104,7 +104,7 @@ def test_a_result_waits_for_longer_than_the_next_sample_takes() -> None:
     """Its code and its flags stay, though the next sample has begun."""
     datapath = mixer()
     made = program(datapath, 3)
-    assert folded.overlaps(made, serial=False)
+    assert folded_clocks.overlaps(made, serial=False)
     dut = Probed(datapath, made, serial=False)
     samples = some(datapath, 40, 1)
     expected = Model(datapath, made, 1).results(made, samples)
@@ -129,12 +129,12 @@ def test_every_length_of_a_program(count: int, protect: str) -> None:
 
     async def testbench(ctx: Any) -> None:
         line = Line(ctx, dut)
-        await line.wait(folded.reset_cycles(made, 1) + 5)
+        await line.wait(folded_clocks.reset_cycles(made, 1) + 5)
         line.put(samples)
         start = line.clocks
         assert await line.finish(len(expected)) == expected
-        rate = folded.cycles_per_sample(made, serial=False, protect=protect)
-        latency = folded.latency_cycles(made, serial=False, protect=protect)
+        rate = folded_clocks.cycles_per_sample(made, serial=False, protect=protect)
+        latency = folded_clocks.latency_cycles(made, serial=False, protect=protect)
         assert line.clocks - start - 3 == 3 * rate + latency + 1
 
     simulate(dut, testbench)
@@ -175,7 +175,7 @@ def test_memories_hold_at_power_up_what_a_reset_leaves(protect: str) -> None:
         for name in names:
             for word in dut.memory(name):
                 ctx.set(word, 3)
-        await Line(ctx, dut).wait(folded.reset_cycles(made, dut.channels) + 2)
+        await Line(ctx, dut).wait(folded_clocks.reset_cycles(made, dut.channels) + 2)
         assert [[ctx.get(word) for word in dut.memory(name)] for name in names] == before
         assert [value & 63 for value in before[0][: made.words]] == made.reset()
 
@@ -326,7 +326,7 @@ def test_a_damaged_word_gives_no_wrong_result_without_a_flag(name: str, serial: 
         for _ in range(7):
             await line.reset()
             line.put(samples)
-            await line.wait(folded.reset_cycles(made, 3) + chance.randrange(80))
+            await line.wait(folded_clocks.reset_cycles(made, 3) + chance.randrange(80))
             state = chance.randrange(3) * made.words + chance.randrange(made.states)
             address = state if name == "words0" else chance.randrange(len(made.instructions))
             bits = chance.sample(range(8), 1 if protect == "detect" else 2)

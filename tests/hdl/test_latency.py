@@ -8,9 +8,9 @@ from tests.gen.designs import example_design
 from tests.hdl.stream_bench import run
 from tests.hdl.test_status import A, B, adder
 
-from sosmith.hdl import core, folded
 from sosmith.hdl.core import Core
 from sosmith.hdl.folded import FoldedCore
+from sosmith.hdl.plan import folded_clocks, parallel_clocks
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.folding import program
 
@@ -33,20 +33,20 @@ def taken(made: Core | FoldedCore) -> set[int]:
 )
 def test_parallel(make: Callable[[], Datapath], channels: int) -> None:
     datapath = make()
-    assert taken(Core(datapath, channels)) == {core.latency_cycles(datapath, channels)}
+    assert taken(Core(datapath, channels)) == {parallel_clocks.latency_cycles(datapath, channels)}
 
 
 @pytest.mark.parametrize("realization", ["df1_ef2", "df2t", "lattice_wdf"])
 def test_parallel_filters(realization: str) -> None:
     datapath = example_design("audio_lowpass.toml", realization=realization).datapath
-    assert taken(Core(datapath)) == {core.latency_cycles(datapath)}
+    assert taken(Core(datapath)) == {parallel_clocks.latency_cycles(datapath)}
 
 
 @pytest.mark.parametrize(("make", "channels"), [(limiter, 1), (resonator, 1), (resonator, 3), (worn, 3)])
 def test_folded(make: Callable[[], Datapath], channels: int) -> None:
     made = program(make(), 3)
     assert taken(FoldedCore(make(), made, serial=False, channels=channels)) == {
-        folded.latency_cycles(made, serial=False)
+        folded_clocks.latency_cycles(made, serial=False)
     }
 
 
@@ -54,5 +54,5 @@ def test_folded(make: Callable[[], Datapath], channels: int) -> None:
 def test_serial_takes_no_longer_than_it_states(make: Callable[[], Datapath]) -> None:
     """Small factors take fewer clocks than the bound allows for, but not many."""
     made = program(make(), 3)
-    stated = folded.latency_cycles(made, serial=True)
+    stated = folded_clocks.latency_cycles(made, serial=True)
     assert 0.8 * stated <= max(taken(FoldedCore(make(), made, serial=True, channels=3))) <= stated

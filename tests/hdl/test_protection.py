@@ -16,7 +16,7 @@ from sosmith.gen.architecture import Architecture
 from sosmith.gen.core import design_core
 from sosmith.gen.output.core_facts import StreamFacts
 from sosmith.gen.stimuli import traces_for
-from sosmith.hdl.axi_stream import dest_width, fields
+from sosmith.hdl.plan.streams import dest_width, fields
 from sosmith.model.arrays import Codes
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.sim import upsets

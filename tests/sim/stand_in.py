@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from sosmith.gen.output.core_facts import InterfaceFacts, StreamFacts
-from sosmith.hdl.axi_stream import fields
+from sosmith.hdl.plan.streams import fields
 from sosmith.model.port import Port
 
 INTERFACE = InterfaceFacts(

@@ -19,9 +19,9 @@ from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.output.verilog import to_rtlil, to_verilog
 from sosmith.gen.realizations.registry import REALIZATIONS
 from sosmith.gen.specification.specification import load
-from sosmith.hdl.axi_stream import fields
 from sosmith.hdl.check_bits import CheckBits
 from sosmith.hdl.folded import FoldedCore
+from sosmith.hdl.plan.streams import fields
 
 UNFOLDABLE = {"normal", "lattice_wdf"}
 SAMPLES = {"parallel": 120, "folded": 24, "serial": 8}

@@ -29,8 +29,8 @@ from sosmith.gen.reload.other_constants import with_constants
 from sosmith.gen.reload.register_writes import register_writes
 from sosmith.gen.reload.reload import OtherSet, other_set, room_of
 from sosmith.gen.specification.specification import from_tree, load
-from sosmith.hdl.axi_stream import fields
 from sosmith.hdl.folded import FoldedCore
+from sosmith.hdl.plan.streams import fields
 from sosmith.hdl.reload import ReloadPort
 from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.dataflow.status import Flag

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sosmith.gen.output.core_facts import InterfaceFacts, StreamFacts
-from sosmith.hdl.axi_stream import fields
+from sosmith.hdl.plan.streams import fields
 from sosmith.model.errors import ShortfallError
 from sosmith.model.port import Port
 from sosmith.sim.beats import Beats

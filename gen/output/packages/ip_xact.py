@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from sosmith.gen.output.packages.facts import PackageFacts
-from sosmith.hdl.axi_lite import BITS
-from sosmith.model.reload.registers import DESIGN, ID, INTERFACE, LAYOUT, MAGIC
+from sosmith.model.reload.registers import BITS, DESIGN, ID, INTERFACE, LAYOUT, MAGIC
 from sosmith.model.templates import render
 
 

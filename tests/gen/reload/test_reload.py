@@ -22,7 +22,7 @@ from sosmith.gen.reload.register_writes import bank_size, register_writes, reloa
 from sosmith.gen.reload.reload import ADVICE, OtherSet, check_swap, other_set, own_set, parallel_bank, room_of, set_for
 from sosmith.gen.specification.specification import load
 from sosmith.gen.word_lengths.quantized import Quantized
-from sosmith.hdl.instruction import encoded
+from sosmith.hdl.plan.instructions import encoded
 from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.dataflow.program import Judged, Opcode, Program
 from sosmith.model.errors import ShortfallError, SpecificationError

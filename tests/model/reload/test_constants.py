@@ -1,6 +1,5 @@
 """The words of a bank, and ranges that hold whatever a loadable constant may make."""
 
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st

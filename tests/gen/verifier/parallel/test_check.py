@@ -13,7 +13,7 @@ from tests.gen.verifier.small_specifications import INSTRUMENT, PLAIN
 from sosmith.gen.realizations.registry import REALIZATIONS
 from sosmith.gen.verifier.graph import RejectedError
 from sosmith.gen.verifier.parallel.check import check_hardware
-from sosmith.hdl.core import latency_cycles
+from sosmith.hdl.plan.parallel_clocks import latency_cycles
 
 # What the generator writes is accepted.
 

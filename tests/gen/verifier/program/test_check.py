@@ -25,7 +25,7 @@ from sosmith.gen.specification.specification import Specification, from_tree, lo
 from sosmith.gen.verifier.certificate_file import Certificate, certificate_text
 from sosmith.gen.verifier.graph import RejectedError
 from sosmith.gen.verifier.program.check import ProgramVerdict, check_program
-from sosmith.hdl.instruction import address_bits, encoded, instruction_bits
+from sosmith.hdl.plan.instructions import address_bits, encoded, instruction_bits
 from sosmith.model.dataflow.program import EARLY_WRITES, LATE_WRITES, PRODUCTS, Instruction, Opcode, Program
 
 FOLDABLE = ("df1", "df1_ef1", "df1_ef2", "df2t", "delta", "state_space")

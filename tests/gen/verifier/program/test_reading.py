@@ -9,7 +9,7 @@ from tests.gen.verifier.small_specifications import PLAIN
 from sosmith.gen.verifier.graph import RejectedError
 from sosmith.gen.verifier.program.logic import Logic
 from sosmith.gen.verifier.program.text import _number, read_program
-from sosmith.hdl.instruction import encoded
+from sosmith.hdl.plan.instructions import encoded
 from sosmith.model.dataflow.program import Opcode
 
 

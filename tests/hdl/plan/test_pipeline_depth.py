@@ -4,7 +4,7 @@ import pytest
 from tests.formal.small import resonator
 from tests.gen.designs import example_design
 
-from sosmith.hdl.stage import pipeline_depth, pipeline_stages
+from sosmith.hdl.plan.pipeline import pipeline_depth, pipeline_stages
 
 
 @pytest.mark.parametrize(

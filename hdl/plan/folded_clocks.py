@@ -1,0 +1,46 @@
+"""Clocks and words of the folded and serial architectures."""
+
+from __future__ import annotations
+
+from sosmith.model.dataflow.program import Opcode, Program
+
+FOLDED_DEPTH, SERIAL_DEPTH = 5, 3
+"""Pipeline stages from the program memory to the accumulator."""
+
+
+def latency_cycles(program: Program, *, serial: bool, protect: str = "none") -> int:
+    """Clocks from the edge that finds a sample to the edge that can hand its result on; in serial, an upper bound."""
+    late = protect != "none"  # the first instruction is then read once there is a sample, since scrubbing uses the port
+    return late + (program.serial_cycles + SERIAL_DEPTH if serial else len(program.instructions) + FOLDED_DEPTH)
+
+
+def overlaps(program: Program, *, serial: bool, channels: int = 1, reload: bool = False, protect: str = "none") -> bool:
+    """Whether a sample is begun while the last instructions of the one before are still in the pipeline.
+
+    A folded core with one channel does so, if it has neither reload nor protection, unless its program is so short that
+    the sample would still be on offer at its end, or the result before would come after the wait for it to leave.
+    """
+    plain = not serial and channels == 1 and not reload and protect == "none"
+    takes = [number for number, instruction in enumerate(program.instructions) if instruction.opcode is Opcode.TAKE]
+    is_long = min(program.result_start, len(program.instructions) - takes[-1]) >= FOLDED_DEPTH
+    return plain and is_long
+
+
+def cycles_per_sample(
+    program: Program, *, serial: bool, channels: int = 1, reload: bool = False, protect: str = "none"
+) -> int:
+    """Clocks between samples at the highest rate; in serial, an upper bound."""
+    if overlaps(program, serial=serial, channels=channels, reload=reload, protect=protect):
+        return len(program.instructions)
+    idle = protect != "none"  # at least one clock, for scrubbing
+    return latency_cycles(program, serial=serial, protect=protect) + idle
+
+
+def reset_cycles(program: Program, channels: int) -> int:
+    """Clocks after a reset in which the memory is cleared."""
+    return memory_depth(program, channels) + 1
+
+
+def memory_depth(program: Program, channels: int) -> int:
+    """Return the number of words of the memory; the upper bits of an address are the channel."""
+    return program.words * channels

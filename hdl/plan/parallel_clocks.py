@@ -1,0 +1,20 @@
+"""Clocks of the parallel architecture."""
+
+from __future__ import annotations
+
+from sosmith.hdl.plan.interleaving import schedule
+from sosmith.hdl.plan.pipeline import pipeline_depth
+from sosmith.model.dataflow.datapath import Datapath
+
+
+def latency_cycles(datapath: Datapath, channels: int = 1, *, protect: str = "none") -> int:
+    """Clocks from the edge that accepts a sample to the edge that can hand its result on, without a stall."""
+    return sum(depths(datapath, channels, protect)) + 1 + (channels > 1) + (len(datapath.wear) > 1)
+
+
+def depths(datapath: Datapath, channels: int, protect: str) -> list[int]:
+    """Return the number of pipeline stages of each datapath stage."""
+    if channels == 1:
+        return [pipeline_depth(stage.graph) for stage in datapath.stages]
+    rewrites = protect != "none"
+    return [schedule(stage.graph, channels, rewrites=rewrites).depth for stage in datapath.stages]
