@@ -112,12 +112,18 @@ ROOMS = {
         tests=("tests/model/arithmetic",),
     ),
     "hdl": Room(
-        files=("hdl/[!fi]*.py", "hdl/fault_guard.py", "hdl/interleaved.py"),
+        files=(
+            "hdl/[!fi]*.py",
+            "hdl/fault_guard.py",
+            "hdl/interleaved.py",
+            "hdl/plan/[!fi]*.py",
+            "hdl/plan/interleaving.py",
+        ),
         tests=("tests/hdl",),
         without=_HDL,
     ),
     "folded": Room(
-        files=("hdl/folded.py", "hdl/instruction.py"),
+        files=("hdl/folded.py", "hdl/instruction.py", "hdl/plan/folded_clocks.py", "hdl/plan/instructions.py"),
         tests=("tests/hdl",),
         without=_HDL,
     ),
