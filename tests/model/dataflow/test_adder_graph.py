@@ -124,4 +124,4 @@ def test_products_by_operand_see_through_shifts() -> None:
     x, y = g.input("x", 0, -8, 7), g.input("y", 0, -8, 7)
     nodes = [g.scale(wire, 3, 0) for wire in (x, g.shift(g.shift(x, 1), 2), y)]
     graph = g.build([x])
-    assert by_operand(graph, nodes) == [(x.index, nodes[:2]), (y.index, nodes[2:])]
+    assert by_operand(graph, nodes) == [(x, nodes[:2]), (y, nodes[2:])]
