@@ -119,6 +119,27 @@ def test_a_wrong_specification_is_told_as_the_command_line_tells_it(session: Ses
 
 
 @pytest.mark.parametrize(
+    ("typed", "told"),
+    [
+        (f"cutoff = 1{'0' * 400}", "filter.cutoff must be a number"),
+        (f"sample_rate = 1{'0' * 400}", "sample_rate must be a number"),
+        ("passband_edge = []\nstopband_edge = []\npassband_loss = 1\nstopband_loss = 9", "passband_edge must be "),
+    ],
+)
+def test_a_number_that_is_none_of_ours_outlasts_the_form(session: Session, typed: str, told: str) -> None:
+    """What is typed as text is there when the form is changed next."""
+    key = typed.partition(" ")[0]
+    rest = [line for line in TEXT.splitlines() if not line.startswith((f"{key} ", "cutoff ", "order "))]
+    place = 0 if key == "sample_rate" else rest.index("[filter]") + 1
+    text = "\n".join([*rest[:place], typed, *(["order = 2"] * (key == "cutoff")), *rest[place:]])
+    session.handle({"do": "text", "text": text}, "page")
+    change(session, {"filter.kind": "bandpass"})
+    known = until(session, lambda known: known["proof"]["state"] == "refused" and not session.busy)
+    assert known["document"]["text"] == text
+    assert told in known["proof"]["error"]
+
+
+@pytest.mark.parametrize(
     ("table", "named"), [("calibration]\ndata", "calibration.data"), ("filter]\nsos_file", "filter.sos_file")]
 )
 @pytest.mark.parametrize("place", ["/etc/passwd", "../secret.csv"])

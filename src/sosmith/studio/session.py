@@ -148,8 +148,8 @@ class Session:
         changes = _typed(message, "changes", dict)
         try:
             text = changed(self._text, changes)
-        except (TOMLKitError, TypeError, ValueError, AttributeError):
-            text = self._text  # it is no TOML, or a table is none: the preview says so
+        except (TOMLKitError, TypeError, ValueError, AttributeError, LookupError, ArithmeticError):
+            text = self._text  # it is no TOML, a table is none, or a number is none of ours: the preview says so
         self._take(text, moving=_typed(message, "moving", bool, False))
 
     def _replace(self, message: dict[str, Any]) -> None:
