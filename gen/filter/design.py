@@ -118,7 +118,7 @@ class Filter:
     def describe(self) -> str:
         """One-line description: family, kind, order, cutoff, sample rate, and the method if it is not the default."""
         if self.cutoff is None:
-            return f"{len(self.rows)} given sections at {self.sample_rate:g} Hz"
+            return f"{len(self.rows)} given section{'s' * (len(self.rows) > 1)} at {self.sample_rate:g} Hz"
         edges = " to ".join(f"{edge:.6g}" for edge in self.cutoff)
         method = "" if self.aliasing is None else ", impulse-invariant"
         filter_ = f"{self.family.capitalize()} {self.kind}, order {self.order}"

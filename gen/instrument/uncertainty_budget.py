@@ -76,8 +76,10 @@ class InstrumentBudget:
     def summary(self) -> str:
         """One sentence."""
         low, high = float(self.budget.expanded.min()), float(self.budget.expanded.max())
+        least, most = f"±{low:.2g}", f"±{high:.2g}"
+        span = f"{most} {self.unit} holds" if least == most else f"{least} to {most} {self.unit} hold"
         text = (
-            f"±{low:.2g} to ±{high:.2g} {self.unit} hold the true value in {100 * SHARE:g} %, "
+            f"{span} the true value in {100 * SHARE:g} %, "
             f"most of it {self.main_source(self.worst)}; the arithmetic is {self.bound:.2g} {self.unit} of it"
         )
         return text + (f"; not stated: {', '.join(self.missing)}" if self.missing else "")

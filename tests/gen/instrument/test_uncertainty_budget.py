@@ -128,9 +128,7 @@ def test_a_design_has_the_whole_budget(tmp_path: Path) -> None:
     told = json.loads(json.dumps(budget_json(made)))
     assert told["at"]["expanded"] == told["expanded"]["largest"] > 0.1
     assert told["arithmetic_bound"] < 0.01
-    assert made.summary.startswith(
-        "±0.12 to ±0.12 mm hold the true value in 95 %, most of it systematic error of a day;"
-    )
+    assert made.summary.startswith("±0.12 mm holds the true value in 95 %, most of it systematic error of a day;")
 
 
 def test_what_wear_is_worth(tmp_path: Path) -> None:
