@@ -30,15 +30,17 @@ def on_cluster(batches: Iterable[Sequence[Task]], address: str) -> Generator[Poi
     """
     try:
         from distributed import Client, as_completed
+        from distributed.comm import resolve_address
         from distributed.scheduler import KilledWorker
     except ImportError:
         raise ToolError(
             "the package distributed is needed for --scheduler, and was not found: pip install 'sosmith[cluster]'"
         ) from None
     try:
+        resolve_address(address)  # a client that cannot read its address would wait for an answer when it is collected
         client = Client(address, timeout=_CONNECT, set_as_default=False)
-    except (OSError, ValueError) as error:
-        raise ToolError(f"a Dask scheduler must answer at {address}, not: {error}") from None
+    except (OSError, ValueError, TypeError) as error:  # the last for TLS without a configuration
+        raise ToolError(f"a Dask scheduler must answer at {address or 'an address'}, not: {error}") from None
     try:
         for tasks in itertools.chain.from_iterable(map(_parts, batches)):
             futures = [client.submit(evaluate, task, key=f"sosmith-{task.key}") for task in tasks]

@@ -56,6 +56,7 @@ def exploration_page(outcome: Outcome) -> str:
         ],
         front=[_line(point, outcome, numbers, front) for point in outcome.front],
         lines=[_line(point, outcome, numbers, front) for point in designs],
+        plain=_plain,
         refused=[point for point in outcome.points if point["refused"] is not None],
         jobs=len({point["reference_sha256"] for point in designs}),
         passed=sum(bool(point["passed"]) for point in designs),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -108,12 +109,36 @@ def _value(part: str, text: str) -> Any:
     if part.isidentifier() and part not in {"true", "false", "inf", "nan"}:
         return part
     try:
-        return _to_json(tomllib.loads(f"value = {part}\n", parse_float=Decimal)["value"])
+        return tomllib.loads(f"value = {part}\n")["value"]
     except (tomllib.TOMLDecodeError, RecursionError):
-        raise SpecificationError(f"a value must be one of TOML, or a name, not {part} in {text}") from None
+        raise SpecificationError(f"a value must be one of TOML, or a name, not {part or 'nothing'} in {text}") from None
+
+
+def plain(key: str, values: Sequence[Any]) -> list[Any]:
+    """Return the values of a parameter in the types of JSON.
+
+    Raises
+    ------
+    SpecificationError
+        If JSON has no such value, or the same one comes twice.
+    """
+    read: dict[str, Any] = {}
+    for value in map(_to_json, values):
+        try:
+            text = json.dumps(value, allow_nan=False)
+        except (TypeError, ValueError):  # a date, or no finite number
+            raise SpecificationError(
+                f"{key} must have finite numbers, texts, true, false, or lists of these as its values, not {value}"
+            ) from None
+        if text in read:
+            raise SpecificationError(f"{key} must have each of its values once, not {value} twice")
+        read[text] = value
+    return list(read.values())
 
 
 def _to_json(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _to_json(item) for key, item in value.items()}
     if isinstance(value, list):
         return [_to_json(item) for item in value]
     return float(value) if isinstance(value, Decimal) else value

@@ -175,7 +175,8 @@ def explore(
                 done += 1
                 progress("designs", done, total)
         tasks = tasks if searched is None else searched.tasks
-        points = tuple(record.points[task.key] for task in tasks)
+        # a point on record may be of another sweep, which came to the same specification by other changes
+        points = tuple(record.points[task.key] | {"changes": task.changes} for task in tasks)
     return Outcome(
         name=spec.name,
         parameters=in_json(parameters),

@@ -192,14 +192,7 @@ def explore(
 
 def _plain(parameters: Mapping[str, Sequence[Any]]) -> dict[str, Values]:
     """Copy parameters in the types of JSON, ranges apart."""
-    from decimal import Decimal
-
-    from sosmith.sim.exploration.parameters import Span, read_span
-
-    def plain(value: Any) -> Any:
-        if isinstance(value, list):
-            return [plain(item) for item in value]
-        return float(value) if isinstance(value, Decimal) else value
+    from sosmith.sim.exploration.parameters import Span, plain, read_span
 
     if not parameters or not all(isinstance(values, Span) or len(values) for values in parameters.values()):
         raise SpecificationError("parameters must have a key and a value, not none")
@@ -208,5 +201,5 @@ def _plain(parameters: Mapping[str, Sequence[Any]]) -> dict[str, Values]:
         span = values if isinstance(values, Span) else read_span(values) if isinstance(values, str) else None
         if span is None and isinstance(values, str):
             raise SpecificationError(f"{key} must be a list of values, or a range such as 1..8, not {values}")
-        read[key] = span or [plain(exact(value)) for value in values]
+        read[key] = span or plain(key, [exact(value) for value in values])
     return read

@@ -9,9 +9,11 @@ import re
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
+from datetime import date
 from pathlib import Path
 from typing import Any
 
@@ -36,7 +38,7 @@ FILES = ("exploration.json", "exploration.html", "points.csv")
 
 
 def explored(folder: Path, **changes: Any) -> sosmith.Exploration:
-    return sosmith.explore(FILTER, SWEEP, folder=folder, **({"samples": 300, "jobs": 1} | changes))
+    return sosmith.explore(FILTER, folder=folder, **({"parameters": SWEEP, "samples": 300, "jobs": 1} | changes))
 
 
 @pytest.fixture(scope="module", name="found")
@@ -134,11 +136,40 @@ def test_a_run_that_failed_goes_on(found: sosmith.Exploration, tmp_path: Path, m
     assert contents(tmp_path) == contents(found.folder)
 
 
+def test_a_design_that_another_sweep_has_made_is_shown_with_the_changes_of_this_one(tmp_path: Path) -> None:
+    made = [
+        explored(tmp_path, parameters={key: [value]}, samples=100).points
+        for key, value in (("hardware.architecture", "parallel"), ("hardware.realization", "df1_ef1"))
+    ]
+    assert made[0][0]["key"] == made[1][0]["key"]
+    assert [point["changes"] for (point,) in made] == [
+        {"hardware.architecture": "parallel"},
+        {"hardware.realization": "df1_ef1"},
+    ]
+
+
+def test_an_address_that_is_none_leaves_no_client_behind(tmp_path: Path) -> None:
+    pytest.importorskip("distributed", reason="the package distributed is not installed")
+    before = set(threading.enumerate())
+    with pytest.raises(ToolError, match=r"^a Dask scheduler must answer at nowhere, not: missing port number in "):
+        explored(tmp_path, jobs=None, scheduler="nowhere")
+    assert set(threading.enumerate()) == before
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [
         ({"samples": 0}, "samples must be at least 1, not 0"),
         ({"jobs": 0}, "jobs must be at least 1, not 0"),
+        ({"parameters": {"output.bits": [9, 10, 9]}}, "output.bits must have each of its values once, not 9 twice"),
+        (
+            {"parameters": {"output.max_error": [float("nan")]}},
+            "output.max_error must have finite numbers, texts, true, false, or lists of these as its values, not nan",
+        ),
+        (
+            {"parameters": {"name": [date(2024, 1, 2)]}},
+            "name must have finite numbers, texts, true, false, or lists of these as its values, not 2024-01-02",
+        ),
         ({"scheduler": "tcp://x"}, "jobs must come without a scheduler, whose workers do the designs, not with one"),
     ],
 )

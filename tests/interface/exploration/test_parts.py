@@ -40,7 +40,7 @@ def test_parameters_are_read(text: str, key: str, values: Values) -> None:
     [
         ("filter.order", "a parameter must be KEY=V1,V2,... or KEY=LOW..HIGH, not filter.order"),
         ("=3", "a parameter must be KEY=V1,V2,... or KEY=LOW..HIGH, not =3"),
-        ("filter.order=2,,3", "a value must be one of TOML, or a name, not  in filter.order=2,,3"),
+        ("filter.order=2,,3", "a value must be one of TOML, or a name, not nothing in filter.order=2,,3"),
         ("filter.order=1 2", "a value must be one of TOML, or a name, not 1 2 in filter.order=1 2"),
         ("a=8..3", "a range must be LOW..HIGH with LOW less than HIGH, not 8..3"),
         ("a=0..inf", "a range must be LOW..HIGH with LOW less than HIGH, not 0..inf"),

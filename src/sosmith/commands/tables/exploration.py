@@ -39,11 +39,22 @@ def print_exploration(found: Exploration) -> None:
         console.print(table)
     designs = [point for point in found.points if point["refused"] is None]
     passed = sum(bool(point["passed"]) for point in designs)
+    jobs = len({point["reference_sha256"] for point in designs})
+    if jobs > 1:
+        console.print(
+            f"The designs do {jobs:,} different jobs (other filters, inputs, ranges or channels): each bound is "
+            "against its own exact calculation.",
+            highlight=False,
+        )
     console.print(
-        f"{len(found.points):,} combinations: {len(designs):,} designs, of which {passed:,} pass and {len(front):,} "
-        "are on the front",
+        f"{_counted(len(found.points), 'combination')}: {_counted(len(designs), 'design')}, of which {passed:,} "
+        f"{'passes' if passed == 1 else 'pass'} and {len(front):,} {'is' if len(front) == 1 else 'are'} on the front",
         highlight=False,
     )
+
+
+def _counted(number: int, thing: str) -> str:
+    return f"{number:,} {thing}{'' if number == 1 else 's'}"
 
 
 def _plain(value: object) -> str:
