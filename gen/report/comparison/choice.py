@@ -44,7 +44,7 @@ def choose(reports: Sequence[Report], names: Sequence[str]) -> Choice:
     fair = fairness(reports)
     passing = [k for k, report in enumerate(reports) if report["passed"] and report["bit_exact"]]
     if fair.bounds:
-        return Choice(None, f"No choice between different jobs. {fair.bounds}")
+        return Choice(None, f"They do different jobs. {fair.bounds}")
     if not passing:
         return Choice(None, "None of them passed.")
     if len(passing) == 1:
@@ -140,6 +140,8 @@ def _why(
     size = f"{costs[taken]:,.0f} {cost_unit(reports[taken])}"
     if all(costs[k] == costs[taken] for k in rivals):
         limit = quantity(bounds[taken], unit)
+        if all(bounds[k] == bounds[taken] for k in rivals):
+            return f"{of[0].upper()}{of[1:]} cost the same, {size}, and have the same error limit, {limit}."
         return f"{of[0].upper()}{of[1:]} cost the same, {size}; {names[taken]} has the smallest error limit, {limit}."
     first = f"{names[taken]} is the cheapest of {of}: {size}; its error limit is {quantity(bounds[taken], unit)}."
     accurate = min(rivals, key=lambda k: bounds[k])

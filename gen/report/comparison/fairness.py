@@ -47,7 +47,7 @@ def fairness(reports: Sequence[Report]) -> Fairness:
 
 def _reference(reports: Sequence[Report]) -> str:
     if _differ(reports, "error.unit"):
-        units = _listed(reports, "error.unit")
+        units = _listed(reports, "error.unit").replace(", ", " and ")
         return f"Errors in {units} cannot be compared."
     if _unknown(reports, "provenance.reference_sha256"):
         return "A report of an earlier version does not tell which exact calculation the hardware was held against."

@@ -234,6 +234,12 @@ def test_of_equal_costs_the_smallest_limit_is_taken() -> None:
     assert choice.reason.endswith("b has the smallest error limit, 100 nm.")
 
 
+def test_nobody_wins_among_equals() -> None:
+    assert choose([report(), report()], NAMES).reason == (
+        "Both cost the same, 2,728 LUT4 equivalents, estimated before synthesis, and have the same error limit, 200 nm."
+    )
+
+
 def test_without_fair_costs_the_smallest_limit_is_taken() -> None:
     synthesized = {"provenance.cost.source": "synthesis", "provenance.cost.board": "icestick"}
     choice = choose([report(), report(**synthesized, **{"error.bound": 0.0001})], NAMES)
@@ -449,7 +455,7 @@ def test_page_of_different_units_has_no_picture_of_errors() -> None:
     assert "Error over time" in comparison_page([report(), report()])
     content = comparison_page([report(), report(**{"error.unit": "V"})])
     assert "Error over time" not in content
-    assert "Errors in mm, V cannot be compared." in content
+    assert "Errors in mm and V cannot be compared." in content
 
 
 def test_page_beside_a_baseline() -> None:
