@@ -185,7 +185,7 @@ def _evidence(
         time=trace.time,
         truth=_stacked([trace.truth for trace in traces]),
         reading=_stacked([trace.reading for trace in traces]),
-        unfiltered=unfiltered,
+        unfiltered=None if sos is None else unfiltered,
         golden=golden,
         hardware=output.decode(received),
         mismatches=int(np.count_nonzero(differs)),

@@ -105,6 +105,11 @@ class Filter:
         return float(np.prod(sos[:, :3].sum(axis=1) / sos[:, 3:].sum(axis=1)))
 
     @property
+    def cutoff_of_stopband(self) -> bool:
+        """Whether the cut-off is where the stopband begins, as that of a Chebyshev filter of the second kind."""
+        return self.family == "chebyshev2" and self.passband_edge is None
+
+    @property
     def decimation(self) -> int:
         """Largest power-of-two decimation that leaves the upper band edge below a twentieth of the sample rate.
 

@@ -51,6 +51,9 @@ class FilterFacts:
         Largest loss in the passband and smallest in the stopband, in dB, both positive.
     cutoff : tuple of float or None
         Cut-off frequencies in Hz, as many as edges.
+    cutoff_of_stopband : bool
+        Whether the stopband begins at the cut-off, as that of a Chebyshev filter of the second kind, and the passband
+        somewhere before it.
     """
 
     sample_rate: float
@@ -62,6 +65,7 @@ class FilterFacts:
     passband_loss: float | None = None
     stopband_loss: float | None = None
     cutoff: tuple[float, ...] | None = None
+    cutoff_of_stopband: bool = False
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
@@ -242,19 +246,34 @@ def _outside(edges: tuple[float, ...], kind: str, nyquist: float, *, stop: bool)
 
 
 def passbands(facts: FilterFacts) -> list[Band]:
-    """Passbands in Hz: from the passband edges if given, else from the cut-off, else empty."""
+    """Passbands in Hz: from the passband edges if given, else from the cut-off, else empty.
+
+    Where the cut-off is that of the stopband, they reach as far as the ideal response stays within 3.01 dB of its peak.
+    """
+    if facts.cutoff_of_stopband and facts.passband_edge is None:
+        return _half_power_bands(facts)
     edges = facts.passband_edge or facts.cutoff
     return _outside(edges, facts.kind, facts.sample_rate / 2, stop=False) if edges else []
 
 
+def _half_power_bands(facts: FilterFacts) -> list[Band]:
+    """Return stretches of the grid in which the ideal response stays within 3.01 dB of its peak."""
+    grid = _grid(facts)
+    ideal = magnitude_db(facts.ideal_sos, grid, facts.sample_rate)
+    inside = np.concatenate([[False], ideal >= float(np.max(ideal)) - HALF_POWER_DB, [False]])
+    starts, ends = np.flatnonzero(inside[1:] & ~inside[:-1]), np.flatnonzero(inside[:-1] & ~inside[1:]) - 1
+    return [(float(grid[a]), float(grid[b])) for a, b in zip(starts, ends, strict=True)]
+
+
 def stopbands(facts: FilterFacts) -> list[Band]:
-    """Stopbands in Hz: from the stopband edges if given, else from an octave beyond the cut-off.
+    """Stopbands in Hz: from the stopband edges if given, or the cut-off that is theirs, else from an octave beyond it.
 
     If an octave does not fit, they start half-way to the Nyquist frequency, or are the middle half of a band-stop.
     """
     nyquist = facts.sample_rate / 2
-    if facts.stopband_edge:
-        return _outside(facts.stopband_edge, facts.kind, nyquist, stop=True)
+    known = facts.stopband_edge or (facts.cutoff if facts.cutoff_of_stopband else None)
+    if known:
+        return _outside(known, facts.kind, nyquist, stop=True)
     if not facts.cutoff:
         return []
     low, high = facts.cutoff[0], facts.cutoff[-1]
@@ -280,8 +299,12 @@ def measurement_grid(facts: FilterFacts) -> Array:
     """Frequencies in Hz for the measures: DC, the logarithmic grid, an even grid, and all band edges."""
     nyquist = facts.sample_rate / 2
     edges = [f for band in passbands(facts) + stopbands(facts) for f in band]
-    even = np.linspace(0, nyquist, 4001)
-    return np.unique(np.concatenate([even, frequency_grid(facts, 4000), np.clip(edges, 0, nyquist)]))
+    return np.unique(np.concatenate([_grid(facts), np.clip(edges, 0, nyquist)]))
+
+
+def _grid(facts: FilterFacts) -> Array:
+    even = np.linspace(0, facts.sample_rate / 2, 4001)
+    return np.unique(np.concatenate([even, frequency_grid(facts, 4000)]))
 
 
 def passband_level_db(facts: FilterFacts) -> float:

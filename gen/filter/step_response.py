@@ -16,6 +16,10 @@ MAX_SAMPLES = 1 << 20
 SETTLED = 0.01
 """Tolerance of the settling time as engineers quote it, as a fraction of the step."""
 
+_PASSES = 0.1
+"""Least share of the peak that the end of a response must be; below, a constant is in the stopband, not in the
+passband."""
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class StepResponse:
@@ -39,11 +43,11 @@ class StepResponse:
     def scale(self) -> float:
         """Magnitude of the final value, or of the peak where a constant does not pass."""
         peak = float(np.max(np.abs(self.values)))
-        return abs(self.final) if abs(self.final) > 1e-6 * peak else peak
+        return abs(self.final) if abs(self.final) > _PASSES * peak else peak
 
     @property
     def passes_constants(self) -> bool:
-        """Whether the response ends at another value than zero."""
+        """Whether the response ends at a value that stands beside its peak, and is not what a stopband leaves."""
         return self.scale == abs(self.final)
 
     @property

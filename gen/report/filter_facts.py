@@ -21,4 +21,5 @@ def filter_facts(quantized: Quantized) -> FilterFacts | None:
         passband_loss=ideal.passband_loss,
         stopband_loss=ideal.stopband_loss,
         cutoff=ideal.cutoff,
+        cutoff_of_stopband=ideal.cutoff_of_stopband,
     )

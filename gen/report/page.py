@@ -325,7 +325,7 @@ def _filter_figures(facts: FilterFacts) -> dict[str, Figure]:
 def _step_figure(step: StepResponse) -> Figure:
     legend = [
         ("hardware", "", "integer coefficients"),
-        ("truth", "area", f"within {100 * SETTLED:g} % of the end"),
+        ("truth", "area", f"within {100 * SETTLED:g} % of the {'end' if step.passes_constants else 'peak'}"),
         ("limit", "dashed", f"settled after {amount(step.samples_to(SETTLED) / step.sample_rate, 's')}"),
     ]
     if step.overshoot:

@@ -147,6 +147,7 @@ class Filter:
             passband_loss=made.passband_loss,
             stopband_loss=made.stopband_loss,
             cutoff=made.cutoff,
+            cutoff_of_stopband=made.cutoff_of_stopband,
         )
 
     def __repr__(self) -> str:

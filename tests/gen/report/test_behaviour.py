@@ -15,6 +15,7 @@ from tests.gen.report.test_report import F7, LSB, Page, bandpass, evidence, fact
 
 from sosmith.cli import cli
 from sosmith.commands.tables.report import print_summary
+from sosmith.gen.filter import response
 from sosmith.gen.filter.step_response import step_response
 from sosmith.gen.output.core_facts import SettlingFacts
 from sosmith.gen.report.behaviour import behaviour
@@ -212,3 +213,24 @@ def test_a_date_must_be_one(date: str, tmp_path: Path) -> None:
     result = CliRunner().invoke(cli, ["simulate", spec, "--date", date, "-o", str(tmp_path / "out")])
     assert str(result.exception) == f"date must be a date such as 2024-03-01, not '{date}'"
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(("kind", "passes"), [("lowpass", 0.0), ("highpass", 50.0)])
+def test_the_cutoff_of_a_second_kind_is_no_edge_of_the_passband(kind: str, passes: float) -> None:
+    """At its cut-off the loss is that of the stopband already."""
+    sos = signal.cheby2(6, 60, 12.5, btype=kind, fs=100, output="sos")
+    made = facts(ideal_sos=sos, quantized_sos=sos, kind=kind, cutoff=(12.5,), cutoff_of_stopband=True)
+    ((low, high),) = response.passbands(made)
+    assert passes in {low, high}
+    assert response.stopbands(made) == ([(12.5, 50.0)] if kind == "lowpass" else [(0.0, 12.5)])
+    measured = response.measure_response(made)
+    assert measured.passband_loss_db == pytest.approx(3.01, abs=0.05)
+    assert measured.stopband_attenuation_db == pytest.approx(60.0, abs=0.01)
+
+
+def test_what_a_stopband_leaves_of_a_constant_is_no_end_to_overshoot() -> None:
+    step = step_response(signal.cheby2(6, 60, 12.5, btype="highpass", fs=100, output="sos"), 100.0, 1e-6)
+    assert step is not None
+    assert abs(step.final) == pytest.approx(0.001)
+    assert (step.passes_constants, step.overshoot) == (False, None)
+    assert step.scale == pytest.approx(float(np.max(np.abs(step.values))))
