@@ -100,6 +100,8 @@ def test_it_shows_the_design(tab: Tab, page: Session) -> None:
     assert tab.value("document.querySelector('#budget tbody').rows.length") == 4  # without the start
     assert text_of(tab, "#budget tbody tr:last-child").split()[0] == "sum"
     assert tab.value("document.getElementById('toml').value") == TEXT
+    assert "start" not in TEXT
+    assert tab.value("document.querySelector('[data-key=\"hardware.start\"]').value") == "steady"
     assert tab.value("[...document.getElementById('source').options].map((each) => each.value)") == list(
         proof["scenarios"]
     )

@@ -146,7 +146,7 @@ function controls() {
     const path = field.dataset.key, value = numbers(asked(path))[Number(field.dataset.at || 0)];
     if (field === document.activeElement && field.tagName !== "SELECT") continue;
     field.removeAttribute("aria-invalid");
-    const fallback = field.tagName === "SELECT" ? (path.endsWith("start") ? "zero" : path.endsWith("method") ? "bilinear" : "auto") : "";
+    const fallback = field.tagName === "SELECT" ? (path.endsWith("start") ? "steady" : path.endsWith("method") ? "bilinear" : "auto") : "";
     const text = value === undefined ? fallback : `${value}`;
     if (field.value !== text) field.value = text;
     if (field.tagName === "SELECT" && path.startsWith("filter.")) field.disabled = now === "sections";
