@@ -54,6 +54,7 @@ from sosmith.terminal import JSON_OPTION, note, output_option, print_json, reade
     show_default=True,
     help="Simulator for --simulate.",
 )
+@click.option("--parquet", is_flag=True, help="Write points.parquet too, for data frames; takes the extra parquet.")
 @click.option("--jobs", type=click.IntRange(min=1), help="Number of processes.  [default: one for each processor]")
 @click.option("--scheduler", metavar="ADDRESS", help="Have the workers of this Dask scheduler do the designs.")
 @SEED
@@ -68,6 +69,7 @@ def explore_command(
     samples: int,
     simulate: bool,
     simulator: str,
+    parquet: bool,
     jobs: int | None,
     scheduler: str | None,
     seed: int,
@@ -117,6 +119,8 @@ def explore_command(
         if folder.exists():  # said after the bars, which would be drawn over it
             note(f"what is done is kept in {folder}; the same command goes on from there")
         raise
+    if parquet:
+        found.to_parquet(found.folder / "points.parquet")
     with reader_may_leave():
         if as_json:
             print_json(found.as_dict())

@@ -15,8 +15,8 @@ from sosmith.gen.specification.exact_values import exact
 from sosmith.interface.certificate import Progress
 from sosmith.interface.notebook import table_html
 from sosmith.interface.specification import Specification, specification_of
-from sosmith.model.errors import SpecificationError
-from sosmith.model.text_files import to_json, write_files
+from sosmith.model.errors import SpecificationError, ToolError
+from sosmith.model.text_files import to_json, write_contents, write_files
 
 if TYPE_CHECKING:
     from sosmith.sim.exploration.parameters import Values
@@ -60,6 +60,34 @@ class Exploration:
         from sosmith.sim.exploration.page import exploration_page
 
         return exploration_page(self.outcome)
+
+    def to_parquet(self, path: str | PathLike[str]) -> Path:
+        """Write what ``points.csv`` holds as a Parquet file, with types, for data frames.
+
+        Parameters
+        ----------
+        path : path
+            File to write; an existing one is replaced.
+
+        Returns
+        -------
+        Path
+            The file.
+
+        Raises
+        ------
+        ToolError
+            If pyarrow is missing, which the extra ``parquet`` brings.
+        """
+        from io import BytesIO
+
+        csv, parquet = _arrow()
+        rows = csv.read_csv(BytesIO(self.outcome.table().encode()))
+        content = BytesIO()
+        parquet.write_table(rows, content)
+        place = Path(fspath(path))
+        write_contents(place.parent, {place.name: content.getvalue()})
+        return place
 
     def _repr_html_(self) -> str:
         rows = [
@@ -188,6 +216,15 @@ def explore(
     }
     write_files(place, files)
     return made
+
+
+def _arrow() -> tuple[Any, Any]:
+    """Return pyarrow's modules for CSV and Parquet."""
+    try:
+        from pyarrow import csv, parquet
+    except ImportError:
+        raise ToolError("pyarrow must be installed for Parquet: pip install 'sosmith[parquet]'") from None
+    return csv, parquet
 
 
 def _plain(parameters: Mapping[str, Sequence[Any]]) -> dict[str, Values]:

@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pyarrow import parquet
 from tests.interface.small import FILTER
 
 import sosmith
@@ -94,6 +95,16 @@ def test_files(found: sosmith.Exploration) -> None:
     assert [row["error.bound"] for row in rows if row["refused"] == ""] == [
         str(point["error"]["bound"]) for point in found.points if point["refused"] is None
     ]
+
+
+def test_points_as_parquet(found: sosmith.Exploration, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    rows = parquet.read_table(found.to_parquet(tmp_path / "points.parquet")).to_pylist()
+    assert [row["error.bound"] for row in rows] == [point.get("error", {}).get("bound") for point in found.points]
+    assert sum(row["on_front"] for row in rows) == len(found.front)
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    with pytest.raises(ToolError) as refusal:
+        found.to_parquet(tmp_path / "other.parquet")
+    assert str(refusal.value) == "pyarrow must be installed for Parquet: pip install 'sosmith[parquet]'"
 
 
 def test_page_leads_from_a_point_to_its_design(found: sosmith.Exploration) -> None:
