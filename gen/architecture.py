@@ -139,9 +139,15 @@ class Architecture:
         if made is not None:
             count = len(made.instructions)
             sizes = f"({made.digit_bits}, {made.locations}, {made.words}, {made.accumulator_bits}, {count})"
-        # An unprotected core keeps the number that it had before there were protected ones.
+        # A core without them keeps the number that it had before there were protection and restarts.
         guarded = "" if self.protect == "none" else f", {self.protect!r}"
-        return zlib.crc32(f"({shape!r}, {sizes}{guarded})".encode())
+        restarts = ", 'restarts'" if self.restarts else ""
+        return zlib.crc32(f"({shape!r}, {sizes}{guarded}{restarts})".encode())
+
+    @property
+    def restarts(self) -> bool:
+        """Whether the hardware restarts with constants that are loaded."""
+        return self.reload and self.datapath.restarts
 
     @property
     def latency_cycles(self) -> int:

@@ -31,12 +31,17 @@ such sample raises the flag `fault`, and the core restarts once it has left::
                               +-----> broken: no sample enters --> [inside] = 0 --> restart: states are cleared
                               +-----> scrubs: a place in the pipeline without a sample, with several channels
 
-With loadable constants, `sosmith.hdl.constant_banks` has them twice, and each sample takes its bank along.
+With loadable constants, `sosmith.hdl.constant_banks` has them twice, and each sample takes its bank along. A core that
+judges wear restarts with new ones, as it would with a fault::
+
+    load is complete --> pending: no sample enters --> [inside] = 0 --> swap: the other bank, states are cleared
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from functools import reduce
+from operator import or_
 from typing import NamedTuple
 
 from amaranth.hdl import Cat, ClockDomain, ClockSignal, Const, Module, Mux, ResetSignal, Signal, Value
@@ -71,6 +76,26 @@ class _Place(NamedTuple):
     fault: Value = Const(0, 1)
 
 
+class _Swap(NamedTuple):
+    """How a core that restarts with other constants takes them over.
+
+    Attributes
+    ----------
+    pending : Signal
+        Whether a swap is due: no sample may enter.
+    may : Signal
+        Whether no sample is inside, so that it may be.
+    """
+
+    pending: Signal
+    may: Signal
+
+    @property
+    def now(self) -> Value:
+        """Whether it is at this clock: states are cleared from the next one on."""
+        return self.pending & self.may
+
+
 class Core(wiring.Component):
     """A datapath in the parallel architecture: every operation has its own hardware.
 
@@ -93,6 +118,8 @@ class Core(wiring.Component):
     fingerprint : int or None
         Fingerprint of the structure, 32 bits; None for a core whose constants cannot be loaded. Otherwise they can be
         loaded while the core works: each sample is computed with the bank that was active when the core accepted it.
+        If the datapath `restarts`, a swap waits until all samples inside have left, and clears the states as a reset
+        does; meanwhile no sample is accepted.
     protect : str
         One of `sosmith.model.dataflow.protection.PROTECTIONS`.
     adders : sequence of collection of int
@@ -152,11 +179,12 @@ class Core(wiring.Component):
         bank = Signal()
         waiting = Signal(2)
         guard = FaultGuard(max(1, channel_bits(self.channels))) if guarded else None
+        swap = _Swap(Signal(name="pending"), Signal(name="may_swap")) if self._restarts else None
         empty = Signal()
-        first, data = self._source(m, stages, (buffer.advance, bank, waiting), guard, empty)
+        first, data = self._source(m, stages, (buffer.advance, bank, waiting), (guard, swap), empty)
         port = None
         if banks is not None:
-            port = self._reload(m, banks, bank, Cat(waiting, *(component.uses for component in stages)))
+            port = self._reload(m, banks, bank, Cat(waiting, *(component.uses for component in stages)), swap)
         status: Value = Cat(at_rail(self.datapath.inputs, data), outside_calibration(self.datapath, data))
         last, (code, *counted) = self._chain(m, stages, first, data)
         for k in range(sum(depths(self.datapath, self.channels, self.protect))):
@@ -183,12 +211,25 @@ class Core(wiring.Component):
             fault = fault | (valid & wear.failed)
             flags = Cat(flags, guard.fault | fault)
             m.submodules.guard = guard
+            m.d.comb += guard.failed.eq(fault & buffer.advance)
+        causes = self._causes(guard, swap)
+        if causes:
             enters = (first.valid | first.scrub) & buffer.advance
-            m.d.comb += empty.eq(self._restart(m, guard, enters, stages, fault, buffer.advance))
-            if port is not None:
-                self._report(m, guard, port, stages, valid & wear.corrected & buffer.advance)
+            m.d.comb += empty.eq(self._restart(m, reduce(or_, causes), enters, stages, buffer.advance))
+        if guard is not None and port is not None:
+            self._report(m, guard, port, stages, valid & wear.corrected & buffer.advance)
         self._hand_out(m, buffer, valid, code, flags, channel)
         return m
+
+    @property
+    def _restarts(self) -> bool:
+        """Whether the core restarts with other constants."""
+        return self.fingerprint is not None and self.datapath.restarts
+
+    @staticmethod
+    def _causes(guard: FaultGuard | None, swap: _Swap | None) -> list[Value]:
+        """Return what clears the states, each of them for one clock."""
+        return [*([] if guard is None else [guard.restart]), *([] if swap is None else [swap.now])]
 
     def _chain(
         self, m: Module, stages: list[PipelinedStage | InterleavedStage], first: _Place, data: Value
@@ -250,13 +291,12 @@ class Core(wiring.Component):
     def _restart(
         self,
         m: Module,
-        guard: FaultGuard,
+        clears: Value,
         enters: Value,
         stages: list[PipelinedStage | InterleavedStage],
-        fault: Value,
         advance: Value,
     ) -> Signal:
-        """Tell the guard what leaves with a fault, and clear registers at a restart; return whether none is inside.
+        """Clear registers at the clock of a restart; return whether the pipeline is empty, so that one may begin.
 
         `enters` is whether a sample or a scrub is taken by the first stage at this clock.
         """
@@ -265,10 +305,9 @@ class Core(wiring.Component):
             m.d.sync += remaining.eq(self._depth)
         with m.Elif(advance & remaining.any()):
             m.d.sync += remaining.eq(remaining - 1)
-        m.d.comb += guard.failed.eq(fault & advance)
         for component in stages:
             if isinstance(component, PipelinedStage):
-                m.d.comb += component.clear.eq(guard.restart)
+                m.d.comb += component.clear.eq(clears)
         empty = Signal()
         m.d.comb += empty.eq(~remaining.any())
         return empty
@@ -292,13 +331,13 @@ class Core(wiring.Component):
         component = (
             InterleavedStage(stage, self.channels, constants, protect=self.protect, adders=adders)
             if several
-            else PipelinedStage(stage, constants, parity=self.protect != "none", adders=adders)
+            else PipelinedStage(stage, constants, parity=self.protect != "none", clears=self._restarts, adders=adders)
         )
         m.submodules[stage.name] = component
         m.d.comb += component.advance.eq(advance)
         return component
 
-    def _reload(self, m: Module, banks: ConstantBanks, bank: Signal, uses: Value) -> ReloadPort:
+    def _reload(self, m: Module, banks: ConstantBanks, bank: Signal, uses: Value, swap: _Swap | None) -> ReloadPort:
         """Connect the reload port to the banks, and return it.
 
         `uses` are pairs of bits: whether samples use bank 0, and bank 1.
@@ -311,13 +350,15 @@ class Core(wiring.Component):
         forward_slave(m, self, port)
         m.d.comb += [
             bank.eq(port.bank),
-            port.may_swap.eq(1),
+            port.may_swap.eq(1 if swap is None else swap.may),
             port.shadow_free.eq(~Mux(port.bank, uses[::2].any(), uses[1::2].any())),
             banks.write_enable.eq(port.write_enable),
             banks.write_bank.eq(~port.bank),
             banks.write_address.eq(port.write_address),
             banks.write_data.eq(port.write_data),
         ]
+        if swap is not None:
+            m.d.comb += swap.pending.eq(port.pending)
         return port
 
     def _source(
@@ -325,7 +366,7 @@ class Core(wiring.Component):
         m: Module,
         stages: list[PipelinedStage | InterleavedStage],
         control: tuple[Value, Value, Signal],
-        guard: FaultGuard | None,
+        restarts: tuple[FaultGuard | None, _Swap | None],
         empty: Value,
     ) -> tuple[_Place, Value]:
         """Return what is there for the first stage, and the sample's codes.
@@ -333,15 +374,20 @@ class Core(wiring.Component):
         The control is `advance`; the bank of samples accepted now;
         and a signal that is driven with the banks that waiting samples use. `empty` is whether the pipeline is.
         """
-        advance, bank, waiting = control
-        blocked: Value = Const(0, 1) if guard is None else guard.broken
+        (advance, bank, waiting), (guard, swap) = control, restarts
         interleaved = [component for component in stages if isinstance(component, InterleavedStage)]
         if not interleaved:
-            if guard is None:
+            blocks = [*([] if guard is None else [guard.broken]), *([] if swap is None else [swap.pending])]
+            if not blocks:
                 m.d.comb += self.s_axis_tready.eq(advance)
                 return _Place(self.s_axis_tvalid, Const(0, 0), bank), self.s_axis_tdata
-            m.d.comb += [self.s_axis_tready.eq(advance & ~blocked), guard.idle.eq(blocked & empty)]
-            return _Place(self.s_axis_tvalid & ~blocked, Const(0, 0), bank), self.s_axis_tdata
+            open_ = ~reduce(or_, blocks)
+            m.d.comb += self.s_axis_tready.eq(advance & open_)
+            if guard is not None:
+                m.d.comb += guard.idle.eq(guard.broken & empty)
+            if swap is not None:
+                m.d.comb += swap.may.eq(empty)
+            return _Place(self.s_axis_tvalid & open_, Const(0, 0), bank), self.s_axis_tdata
         bits = channel_bits(self.channels)
         buffer = m.submodules.input_buffer = StreamBuffer(len(self.s_axis_tdata) + bits + 1)
         clearing = Signal(init=1)
@@ -352,9 +398,9 @@ class Core(wiring.Component):
         if guard is not None:
             dest = Mux(buffer.o_valid, dest, guard.address)
             scrubs = guard.scrubs & (guard.address < self.channels)
-            with m.If(guard.restart):
+        for cause in self._causes(guard, swap):
+            with m.If(cause):
                 m.d.sync += [clearing.eq(1), cleared.eq(0)]
-            blocked = blocked | clearing
         with m.If(clearing):
             m.d.sync += cleared.eq(cleared + 1)
             with m.If(cleared == self.channels - 1):
@@ -371,10 +417,11 @@ class Core(wiring.Component):
                 m.d.sync += [taken.eq(before[0]), channel.eq(before[1])]
             near.append((taken, channel))
             waits = waits | (taken & (channel == dest))
-        moves = ~waits if guard is None else ~waits & ~blocked
+        moves = ~waits if guard is None else ~waits & ~(guard.broken | clearing)
+        shut: Value = clearing if swap is None else clearing | swap.pending
         m.d.comb += [
-            self.s_axis_tready.eq(buffer.advance & ~clearing),
-            buffer.i_valid.eq(self.s_axis_tvalid & exists & ~clearing),
+            self.s_axis_tready.eq(buffer.advance & ~shut),
+            buffer.i_valid.eq(self.s_axis_tvalid & exists & ~shut),
             buffer.i_data.eq(Cat(self.s_axis_tdest[:bits], bank, self.s_axis_tdata)),
             waiting.eq(banks_in_use([buffer.o_valid, ~buffer.advance], [buffer.o_data[bits], buffer.o_next[bits]])),
             valid.eq(buffer.o_valid & moves),
@@ -382,7 +429,11 @@ class Core(wiring.Component):
         ]
         if guard is not None:
             free = advance & moves & ~buffer.o_valid
+            if swap is not None:
+                free = free & ~swap.pending  # a scrub is inside like a sample
             m.d.comb += guard.idle.eq(Mux(guard.broken, empty, free))
+        if swap is not None:
+            m.d.comb += swap.may.eq(empty & ~buffer.o_valid & ~clearing)
         for component in interleaved:
             m.d.comb += [component.clear.eq(clearing), component.clear_channel.eq(cleared)]
         return _Place(valid, dest, buffer.o_data[bits], scrubs), buffer.o_data[bits + 1 :]

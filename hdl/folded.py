@@ -120,7 +120,8 @@ class FoldedCore(wiring.Component):
     and goes on. A sample is accepted when its result is there, so that a damaged program neither loses nor doubles one.
 
     With a fingerprint, the core has two banks for its program, so that another one can be loaded while it works. Each
-    sample is computed by the bank that was active when the core found it.
+    sample is computed by the bank that was active when the core found it. If the datapath `restarts`, a swap waits
+    for the result of the sample in work to leave, and the core then clears its memory as after a reset.
 
     Parameters
     ----------
@@ -180,9 +181,12 @@ class FoldedCore(wiring.Component):
             waits = busy | clearing
         else:
             waits = (busy & ~leaves) | clearing if guard is None else busy | clearing | guard.broken
+        pending = Signal()
+        if self._restarts:
+            waits = waits | pending
         channel = self._channel(m, waits, dropped, start)
         counter, fetching = self._control(m, (advance, clearing, start, busy), channel, early=guard is None)
-        reload = self._reload(m, start, busy)
+        reload = self._reload(m, start, busy, clearing)
         pipeline, fetched = self._fetch(m, advance, (counter, fetching, clearing), reload, guard)
         read = Signal(signed(self._word))
         added = Signal(signed(self.program.accumulator_bits))
@@ -198,10 +202,19 @@ class FoldedCore(wiring.Component):
             m.d.sync += taken.eq(advance & reading.valid & reading.has(Opcode.TAKE) & last_digit)
         else:
             m.d.sync += taken.eq(ends)
-            self._restart(m, guard, (clearing, channel))
+            self._restart(m, guard.restart, (clearing, channel))
             self._report(m, guard, reload, [fetched, remembered, limits])
+        if reload is not None and self._restarts:
+            port, _ = reload
+            m.d.comb += pending.eq(port.pending)
+            self._restart(m, port.pending & port.may_swap, (clearing, channel))
         m.d.comb += self.s_axis_tready.eq(taken | dropped)
         return m
+
+    @property
+    def _restarts(self) -> bool:
+        """Whether the core restarts with another program."""
+        return self.fingerprint is not None and self.datapath.restarts
 
     def _guard(self, m: Module, busy: Signal, clearing: Signal) -> FaultGuard | None:
         """Return the guard of the memories; None without protection."""
@@ -212,10 +225,10 @@ class FoldedCore(wiring.Component):
         m.d.comb += guard.idle.eq(~busy & ~clearing)
         return guard
 
-    def _restart(self, m: Module, guard: FaultGuard, cleared: tuple[Signal, Signal]) -> None:
-        """Clear what a damaged program or word may have left: the words, as after a reset."""
+    def _restart(self, m: Module, cause: Value, cleared: tuple[Signal, Signal]) -> None:
+        """Clear what a damaged program or word, or another program, may have left: the words, as after a reset."""
         clearing, channel = cleared
-        with m.If(guard.restart):
+        with m.If(cause):
             m.d.sync += [clearing.eq(1), channel.eq(0)]
 
     def _report(
@@ -297,7 +310,7 @@ class FoldedCore(wiring.Component):
             m.d.sync += busy.eq(0)
         return counter, fetches
 
-    def _reload(self, m: Module, start: Signal, busy: Signal) -> tuple[ReloadPort, Signal] | None:
+    def _reload(self, m: Module, start: Signal, busy: Signal, clearing: Signal) -> tuple[ReloadPort, Signal] | None:
         """Return the reload port, and the bank that the sample in work uses."""
         if self.fingerprint is None:
             return None
@@ -312,7 +325,7 @@ class FoldedCore(wiring.Component):
             m.d.sync += kept.eq(port.bank)
         m.d.comb += [
             bank.eq(Mux(start, port.bank, kept)),
-            port.may_swap.eq(1),
+            port.may_swap.eq(~busy & ~clearing if self._restarts else 1),
             port.shadow_free.eq(~busy | (kept == port.bank)),
         ]
         return port, bank

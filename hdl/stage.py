@@ -100,6 +100,8 @@ class PipelinedStage(wiring.Component):
         Constants that come from one of two banks, by node.
     parity : bool
         Whether each register that holds a state has a parity bit, which every sample checks.
+    clears : bool
+        Whether the states can be cleared while the core works, as they always can with parity.
     adders : collection of int
         Products by constants that are made of adders, by node.
 
@@ -124,7 +126,7 @@ class PipelinedStage(wiring.Component):
     i_fault, o_fault : In(1), Out(1)
         Whether a wrong bit was found for the sample at the inputs, and for the one at the outputs; only with parity.
     clear : In(1)
-        Whether to set the states to 0; no sample may be inside. Only with parity.
+        Whether to set the states to 0; no sample may be inside. Only with parity or `clears`.
     """
 
     def __init__(
@@ -133,18 +135,22 @@ class PipelinedStage(wiring.Component):
         constants: Mapping[int, Pair] = NO_CONSTANTS,
         *,
         parity: bool = False,
+        clears: bool = False,
         adders: Collection[int] = (),
     ) -> None:
         self.stage = stage
         self.adders = adders
         self.constants = constants
         self.parity = parity
+        self.clears = clears
         graph = stage.graph
         members = {f"i{k}": In(shape_of(graph.nodes[i])) for k, i in enumerate(graph.inputs)}
         members |= {f"o{k}": Out(shape_of(graph.nodes[i])) for k, i in enumerate(graph.outputs)}
         members |= {"i_bank": In(1), "o_bank": Out(1), "uses": Out(2)}
         if parity:
-            members |= {"i_fault": In(1), "o_fault": Out(1), "clear": In(1)}
+            members |= {"i_fault": In(1), "o_fault": Out(1)}
+        if parity or clears:
+            members |= {"clear": In(1)}
         super().__init__({**members, "i_valid": In(1), "advance": In(1), "o_valid": Out(1), "o_saturated": Out(1)})
 
     def elaborate(self, platform: object) -> Module:
@@ -172,6 +178,9 @@ class PipelinedStage(wiring.Component):
                 m.d.sync += wires[i].eq(following)
         if self.parity:
             self._check(m, logic, stages, takes)
+        elif self.clears:
+            with m.If(self.clear):
+                m.d.sync += [wires[i].eq(0) for i in graph.delays]
         last = len(takes) - 1
         for k, i in enumerate(graph.outputs):
             output = getattr(self, f"o{k}")

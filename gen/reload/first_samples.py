@@ -1,6 +1,7 @@
 """The first samples that a core with loadable constants may still hold when another set is loaded.
 
-A filter that starts from its first sample holds it until the next reset, whatever is loaded in between. With another
+A filter that starts from its first sample holds it until the next reset, whatever is loaded in between, unless its core
+restarts with what is loaded. With another
 calibration, samples have another range, so a first sample may lie outside the range of those that follow. All sets that
 are loaded without a reset must therefore keep their samples within one range, which is that of the hardware's own set
 and a margin; what is proven of a swap holds for first samples anywhere in it.

@@ -67,7 +67,7 @@ def with_constants(
         if made.steady:
             before = starting_like(before, gain_at_zero(filled), made.held)
         sections, proof = cascade(filled, made.realization, formats, before.output, steady=made.steady)
-        if made.steady:
+        if made.steady and not made.datapath.restarts:  # which would take another first sample
             before = _with_any_first_sample(before, first_samples(made), sections, filled)
     datapath = made.datapath
     found = assembled(

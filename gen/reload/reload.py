@@ -2,7 +2,8 @@
 
 Ranges and bound of a set are proven for a core that runs with it from reset. A swap, however, starts from states of
 another set, so it is proven too: that nothing wraps from the first sample on, for all inputs before and after, and
-after how many samples the bound holds again (`sosmith.gen.reload.transient`).
+after how many samples the bound holds again (`sosmith.gen.reload.transient`). A core that judges wear restarts with
+the new set instead, so that the proof of the set by itself is all that it takes.
 """
 
 from __future__ import annotations
@@ -64,7 +65,7 @@ class Swap:
         The new set. Its program, if any, allows for all values that the swap can cause.
     samples : int
         Length of the transient: from then on the error is at most the set's bound plus
-        `sosmith.gen.proof.fading.RESIDUE` output LSB, and another swap may follow.
+        `sosmith.gen.proof.fading.RESIDUE` output LSB, and another swap may follow. 0 if the core restarts.
     use : Fraction
         Largest share of its hardware range that any state may use, at most 1.
     """
@@ -232,7 +233,7 @@ def check_swap(hardware: CoreDesign, active: OtherSet | None, other: OtherSet) -
         Design of the core.
     active : OtherSet or None
         Set in use: since reset, or since a swap whose transient has ended. None if the core is reset between the
-        swap and the next sample: then only the set itself is proven.
+        swap and the next sample: then only the set itself is proven, as it is if the core restarts by itself.
     other : OtherSet
         The new set.
 
@@ -241,7 +242,7 @@ def check_swap(hardware: CoreDesign, active: OtherSet | None, other: OtherSet) -
     ShortfallError
         If a signal could exceed its range in the hardware.
     """
-    if active is None or not other.quantized.sections:
+    if active is None or hardware.architecture.restarts or not other.quantized.sections:
         return Swap(made=other, samples=0, use=_use(hardware, other.quantized.datapath, other.program))
     old, new = active.quantized, other.quantized
     held = first_samples(hardware.quantized) if new.steady else None

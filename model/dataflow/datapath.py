@@ -89,6 +89,14 @@ class Datapath:
         """Whether samples before the filter has settled are flagged: the last stage's second output, -1 for those."""
         return len(self.stages[-1].graph.outputs) > 1
 
+    @property
+    def restarts(self) -> bool:
+        """Whether hardware into which other constants are loaded restarts with them: if it judges wear by its states.
+
+        A swap that keeps the states is a step, and what the filter makes of that is not the wear.
+        """
+        return bool(self.wear) and any(stage.graph.delays for stage in self.stages)
+
     def compute(self, codes: Codes) -> Codes:
         """Compute the output codes for input codes, from reset, bit for bit as the hardware does.
 
