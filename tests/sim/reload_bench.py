@@ -3,7 +3,6 @@
 Reads ``job.json`` of the folder named by RELOAD_BENCH: ``words`` of the input stream, ``dests`` (their channels; empty
 if there is one channel only), ``loads`` (each a list of register writes [address, data], and whether it is right),
 ``seed``. Writes ``outcome.json``: ``received`` (pairs of channel and word),
-``flags`` (what came with each of them on ``m_axis_tuser``),
 ``swaps`` (number of swaps before each sample that was taken), ``accepted`` (numbers of the loads in the order in which
 they were accepted), ``refused`` (those whose last write was refused).
 """
@@ -30,7 +29,6 @@ class Bench:
         self.loading = True
         self.used: list[int] = []
         self.received: list[tuple[int, int]] = []
-        self.flags: list[int] = []
         self.accepted: list[int] = []
         self.refused: list[int] = []
 
@@ -81,7 +79,6 @@ class Bench:
                 continue
             dest = int(dut.m_axis_tdest.value) if self.job["dests"] else 0
             self.received.append((dest, int(dut.m_axis_tdata.value)))
-            self.flags.append(int(dut.m_axis_tuser.value))
             await RisingEdge(dut.aclk)
             await self.falling
             dut.m_axis_tready.value = 0
@@ -141,6 +138,6 @@ async def reloading(dut: Any) -> None:
     await bench.send()
     await loading
     await ClockCycles(dut.aclk, 3000)
-    names = ("received", "flags", "accepted", "refused")
+    names = ("received", "accepted", "refused")
     outcome = {name: getattr(bench, name) for name in names} | {"swaps": bench.used}
     (folder / "outcome.json").write_text(json.dumps(outcome))

@@ -4,10 +4,7 @@ import json
 import os
 import random
 import sys
-import tomllib
-from collections.abc import Sequence
 from dataclasses import replace
-from decimal import Decimal
 from fractions import Fraction
 from functools import cache
 from pathlib import Path
@@ -19,7 +16,6 @@ import pytest
 from amaranth.hdl import Module, Signal
 from cocotb_tools.runner import Icarus, Verilator
 from tests.gen.designs import EXAMPLES
-from tests.gen.verifier.small_specifications import STEADY_INSTRUMENT
 from tests.model.reload.swapping import compute_swapping
 
 from sosmith.gen.core import CoreDesign, design_core
@@ -28,13 +24,12 @@ from sosmith.gen.output.verilog import to_rtlil, to_verilog
 from sosmith.gen.reload.other_constants import with_constants
 from sosmith.gen.reload.register_writes import register_writes
 from sosmith.gen.reload.reload import OtherSet, other_set, room_of
-from sosmith.gen.specification.specification import from_tree, load
+from sosmith.gen.specification.specification import load
+from sosmith.gen.specification.wear_limits import WearSpec
 from sosmith.hdl.folded import FoldedCore
 from sosmith.hdl.plan.streams import fields
 from sosmith.hdl.reload import ReloadPort
 from sosmith.model.calibration.polynomial import Polynomial
-from sosmith.model.dataflow.status import Flag
-from sosmith.model.reference.golden import calibrated
 from sosmith.sim.simulators import find_simulator
 
 RATIOS = ("0.8", "0.9", "1.1", "1.2")
@@ -42,10 +37,16 @@ RATIOS = ("0.8", "0.9", "1.1", "1.2")
 
 ARCHITECTURES = ("parallel", "folded", "serial")
 
+WORN = "worn"
+"""The bench's instrument with limits of wear: a core that restarts with what is loaded."""
+
 
 @cache
 def hardware_in(architecture: str, example: str, channels: int = 1, start: str = "zero") -> CoreDesign:
-    spec = load(EXAMPLES / f"{example}.toml")
+    spec = load(EXAMPLES / f"{'flange_wear_bench' if example == WORN else example}.toml")
+    if example == WORN:
+        limits = WearSpec(initial=(Fraction(1),), warning=Fraction(4), limit=Fraction(6))
+        spec = replace(spec, name=WORN, wear=limits)
     hardware = replace(
         spec.hardware, architecture=architecture, realization="df1_ef2", clock=Fraction(10**9), reload=True, start=start
     )
@@ -83,16 +84,13 @@ def run(
     count: int,
     seed: int,
     simulator: str = "icarus",
-    *,
-    sets: Sequence[OtherSet] = (),
-    constants: Sequence[tuple[int, ...]] = (),
 ) -> tuple[dict[str, Any], list[int]]:
     """Simulate `count` loads, one in eight with a wrong CRC; return the outcome and which set each load has.
 
-    They are of `sets`, or those of `sets_for`. Samples are random, or the channels' `constants` in turn.
+    Samples are random.
     """
     pace = random.Random(seed)
-    sets = sets or sets_for(made.architecture.name, made.spec.name, made.spec.hardware.start)
+    sets = sets_for(made.architecture.name, made.spec.name, made.spec.hardware.start)
     chosen = [pace.randrange(len(sets)) for _ in range(count)]
     wrong = [pace.randrange(8) == 0 for _ in range(count)]
     loads = [
@@ -105,8 +103,6 @@ def run(
     codes = list(zip(*columns, strict=True))
     channels = made.spec.channels
     dests = rng.integers(channels, size=len(codes)).tolist() if channels > 1 else []
-    if constants:
-        codes, dests = list(constants), list(range(channels))
     job = {
         "dests": dests,
         "words": [
@@ -183,6 +179,11 @@ COUNTS = [
     pytest.param("parallel", "audio_lowpass", 20, 40, id="parallel-20-channels"),
     *(pytest.param(name, "flange_wear_bench", 1, 20, id=f"{name}-calibration") for name in ("parallel", "folded")),
     pytest.param("parallel", "flange_wear_bench", 20, 20, id="parallel-calibration-20-channels"),
+    pytest.param("parallel", WORN, 1, 20, id="parallel-restarts"),
+    *(
+        pytest.param(name, WORN, 3, 20, id=f"{name}-restarts-3-channels", marks=pytest.mark.slow)
+        for name in ARCHITECTURES
+    ),
     *(
         pytest.param(name, "audio_lowpass", channels, count, id=f"{name}-{channels}-{count}", marks=pytest.mark.slow)
         for name in ARCHITECTURES
@@ -206,48 +207,6 @@ def test_first_samples_are_held_through_reloads(architecture: str, example: str,
     assert [word for _, word in outcome["received"]] == expected(made, outcome, chosen)
 
 
-WARNING, LIMIT, CHANNELS = 4.4, 4.6, 20
-WATCHED = STEADY_INSTRUMENT + f"wear = {{ initial = 4.0, warning = {WARNING - 4:.1f}, limit = {LIMIT - 4:.1f} }}\n"
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("architecture", ARCHITECTURES)
-def test_ten_thousand_reloads_of_a_filter_raise_no_false_wear_flag(architecture: str, tmp_path: Path) -> None:
-    """Each channel has a constant clearance of its own: nothing is filtered, so that no set changes a result."""
-    spec = from_tree(tomllib.loads(WATCHED, parse_float=Decimal), Path("small.toml"))
-    hardware = replace(
-        spec.hardware, architecture=architecture, realization="df1_ef2", clock=Fraction(10**9), reload=True
-    )
-    assert spec.filter is not None
-    wanted, allowed = replace(spec.filter, order=2, cutoff=(Fraction(3),)), 4 * spec.max_error
-    assert wanted.cutoff is not None
-    made = design_core(replace(spec, filter=wanted, channels=CHANNELS, hardware=hardware))
-    sets = [
-        other_set(
-            made,
-            ideal=design(replace(wanted, cutoff=tuple(f * Fraction(ratio) for f in wanted.cutoff)), 100.0),
-            max_error=allowed,
-        )
-        for ratio in RATIOS
-    ]
-    rng = np.random.default_rng(1)
-    ports = made.datapath.inputs
-    constants = np.stack([rng.integers(p.lowest, p.highest + 1, 4 * CHANNELS) for p in ports], axis=1)
-    values = calibrated(constants, ports, made.quantized.polynomial)
-    clear = np.abs(values - WARNING) > float(allowed)  # neither just below the limit nor just above
-    constants, values = constants[clear][:CHANNELS], values[clear][:CHANNELS]
-    loads = 1300 if architecture == "serial" else 600  # in serial, not every channel has a sample between two loads
-    codes = [*map(tuple, constants.tolist())]
-    outcome, _ = run(tmp_path, made, verilog(made), loads, 1, "verilator", sets=sets, constants=codes)
-    swapped = {dest: set() for dest in range(CHANNELS)}  # the swaps before a sample of each channel
-    for dest, swaps in zip(outcome["dests"], outcome["swaps"], strict=True):
-        swapped[dest].add(swaps)
-    assert sum(len(found) - 1 for found in swapped.values()) >= 10_000
-    for (dest, _), flags in zip(outcome["received"], outcome["flags"], strict=True):
-        assert (flags >> Flag.WEAR_WARNING & 1) == (values[dest] > WARNING)
-    assert 2 < np.count_nonzero(values < WARNING) < CHANNELS - 2
-
-
 @pytest.mark.parametrize(("architecture", "example", "channels", "count"), COUNTS)
 def test_reloads_at_any_moment(architecture: str, example: str, channels: int, count: int, tmp_path: Path) -> None:
     made = hardware_in(architecture, example, channels)
@@ -263,8 +222,8 @@ def test_reloads_at_any_moment(architecture: str, example: str, channels: int, c
 def test_a_sample_that_sees_two_banks_is_noticed(tmp_path: Path) -> None:
     """Break the core: what a sample uses follows the swap at once."""
 
-    def careless(core: FoldedCore, m: Module, start: Signal, busy: Signal) -> tuple[ReloadPort, Signal] | None:
-        found = original(core, m, start, busy)
+    def careless(core: FoldedCore, m: Module, *control: Signal) -> tuple[ReloadPort, Signal] | None:
+        found = original(core, m, *control)
         assert found is not None
         port, _ = found
         return port, port.bank

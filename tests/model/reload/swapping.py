@@ -9,7 +9,9 @@ from sosmith.model.dataflow.datapath import Datapath
 
 
 def compute_swapping(first: Datapath, swaps: Sequence[tuple[int, Datapath]], codes: Codes) -> list[int]:
-    """Compute one channel in exact integers, from reset; each datapath starts from the states of the one before.
+    """Compute one channel in exact integers, from reset.
+
+    Each datapath starts from the states of the one before or, if it `restarts`, from reset.
 
     Parameters
     ----------
@@ -42,6 +44,8 @@ def compute_swapping(first: Datapath, swaps: Sequence[tuple[int, Datapath]], cod
             if _states(new) != _states(active):
                 raise ValueError(f"states must be {_states(active)}, not {_states(new)}")
             active = new
+            if active.restarts:
+                states = [stage.graph.reset() for stage in active.stages]
         wires = sample
         for stage, state in zip(active.stages, states, strict=True):
             wires = stage.graph.step(wires, state)
