@@ -94,6 +94,8 @@ class ReloadFacts:
         Fingerprint of everything except the constants.
     words, word_bits : int
         Size of a bank of constants.
+    restarts : bool
+        Whether the core restarts with a set that is loaded, as after a reset.
     registers : tuple of str
         Names of the files that describe the registers.
     """
@@ -102,6 +104,7 @@ class ReloadFacts:
     design: int
     words: int
     word_bits: int
+    restarts: bool
     registers: tuple[str, ...]
 
 
@@ -413,6 +416,7 @@ def _reload(design: CoreDesign) -> ReloadFacts | None:
         design=design.architecture.fingerprint,
         words=words,
         word_bits=bits,
+        restarts=design.architecture.restarts,
         registers=(f"{design.spec.name}_registers.h", f"{design.spec.name}.rdl"),
     )
 

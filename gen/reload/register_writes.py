@@ -59,6 +59,7 @@ def reload_json(hardware: CoreDesign, swap: Swap, version: int) -> dict[str, Any
         "error_bound": float(swap.made.quantized.bound * output.lsb),
         "error_parts": {part: float(value * output.lsb) for part, value in swap.made.quantized.budget.items()},
         "error_unit": output.unit,
+        "restarts": hardware.architecture.restarts,
         "transient_samples": swap.samples,
         "error_after_transient": float((swap.made.quantized.bound + (RESIDUE if swap.samples else 0)) * output.lsb),
         "state_use": float(swap.use),

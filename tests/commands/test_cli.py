@@ -177,6 +177,21 @@ def test_reload_proves_a_set_and_writes_what_loads_it(sosmith: Command) -> None:
     assert json.loads(again.stdout)["transient_samples"] == 0
 
 
+@pytest.mark.parametrize(
+    ("start", "sentence"),
+    [("steady", "in the steady state of its next sample"), ("zero", "from zero; it flags "), (None, None)],
+)
+def test_reload_says_how_a_core_restarts_that_judges_wear(
+    sosmith: Command, start: str | None, sentence: str | None
+) -> None:
+    wear = "" if start is None else f'start = "{start}"\n[wear]\ninitial = 0.1\nwarning = 0.2\nlimit = 0.3\n'
+    Path("core.toml").write_text(reloadable("100.0") + wear, encoding="utf-8")
+    outcome = sosmith("reload", "core.toml", "core.toml")
+    assert outcome.status == 0
+    assert ("the core restarts" in outcome.stdout) == (start is not None)
+    assert sentence is None or sentence in outcome.stdout
+
+
 def test_reload_refuses_a_set_that_breaks_the_bound(sosmith: Command) -> None:
     Path("core.toml").write_text(reloadable("100.0"), encoding="utf-8")
     Path("next.toml").write_text(reloadable("105.0").replace('"faithful"', "0.00025"), encoding="utf-8")

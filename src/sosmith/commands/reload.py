@@ -63,6 +63,7 @@ def reload_command(
     The word lengths of the hardware are fixed, so not every set of coefficients fits. The proof shows that with the new
     set the error stays within OTHER's max_error, and that nothing can overflow while the filter's states still come
     from the previous set. The table says after how many samples the bound holds again; do not swap again before that.
+    A core that judges wear restarts with the new set, as after a reset, and needs no more than the proof of its error.
     Exits with 1 and the reason if the set is refused; do not load it then.
 
     With --port, the set is loaded into the board there, and what became active is read back.

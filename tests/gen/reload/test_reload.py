@@ -22,6 +22,7 @@ from sosmith.gen.reload.register_writes import bank_size, register_writes, reloa
 from sosmith.gen.reload.reload import ADVICE, OtherSet, check_swap, other_set, own_set, parallel_bank, room_of, set_for
 from sosmith.gen.specification.specification import load
 from sosmith.gen.word_lengths.quantized import Quantized
+from sosmith.gen.word_lengths.settling import samples_to_settle
 from sosmith.hdl.plan.instructions import encoded
 from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.dataflow.program import Judged, Opcode, Program
@@ -113,6 +114,19 @@ def test_a_program_takes_over_at_any_sample(example: str) -> None:
     expected = compute_swapping(own, datapaths, codes)
     assert interpreted(hardware, swaps, codes) == expected
     assert interpreted(hardware, [(0, first), (38, one.program), *swaps[2:]], codes) != expected
+
+
+def test_a_set_that_settles_too_slowly_is_refused() -> None:
+    """The hardware counts to three times the length with its own filter, and no further."""
+    hardware = hardware_in("parallel")
+    counted = hardware.quantized.settling
+    assert counted == 3 * samples_to_settle(hardware.datapath)
+    slow = moved(hardware, "0.3")
+    samples = samples_to_settle(with_constants(hardware.quantized, slow, None).datapath)
+    assert samples > counted
+    sentence = f"the set must settle within {counted:,} samples, to which the hardware counts, not {samples:,}"
+    with pytest.raises(ShortfallError, match=f"^{sentence}$"):
+        other_set(hardware, ideal=slow, max_error=100 * hardware.spec.max_error)
 
 
 def test_a_set_that_breaks_the_bound_is_refused() -> None:

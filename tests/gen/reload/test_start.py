@@ -11,13 +11,16 @@ from tests.gen.reload.swaps import moved
 from tests.model.reload.swapping import compute_swapping
 
 from sosmith.gen.core import CoreDesign, design_core
+from sosmith.gen.output.core_facts import core_facts
 from sosmith.gen.proof.cascade_proof import made_response
 from sosmith.gen.proof.linear_model import linear_models
 from sosmith.gen.reload.first_samples import check_samples, first_samples, held_codes, samples_of
 from sosmith.gen.reload.other_constants import with_constants
+from sosmith.gen.reload.register_writes import reload_json
 from sosmith.gen.reload.reload import check_swap, other_set, own_set, room_of
 from sosmith.gen.reload.transient import transient
 from sosmith.gen.specification.specification import load
+from sosmith.gen.specification.wear_limits import WearSpec
 from sosmith.gen.word_lengths.input_stage import InputStage, Start, starting_like
 from sosmith.gen.word_lengths.quantize import gain_at_zero
 from sosmith.gen.word_lengths.quantized import START, Quantized
@@ -137,3 +140,21 @@ def test_a_gain_that_the_hardware_cannot_give_is_refused() -> None:
             starting_like(stage, Fraction(gain), held)
     made = starting_like(stage, Fraction(3, 4), Held(range=stage.output, gain=5, gain_frac=3))
     assert made.start == Start(held=Held(range=stage.output, gain=6, gain_frac=3), error=Fraction(0))
+
+
+@pytest.mark.parametrize("architecture", ["parallel", "folded"])
+def test_a_core_that_judges_wear_restarts_and_takes_any_set(architecture: str) -> None:
+    """A calibration that is refused where first samples are held needs no proof of a swap here."""
+    plain = hardware("flange_wear_bench", architecture)
+    limits = WearSpec(initial=(Fraction(1),), warning=Fraction(4), limit=Fraction(6))
+    made = design_core(replace(plain.spec, wear=limits))
+    assert (plain.architecture.restarts, made.architecture.restarts) == (False, True)
+    assert made.architecture.fingerprint != plain.architecture.fingerprint
+    assert core_facts(made).reload.restarts
+    far = other_set(made, polynomial=scaled(made, "1.35"), max_error=3 * made.spec.max_error)
+    for pair in ((own_set(made), far), (far, own_set(made))):
+        assert check_swap(made, *pair).samples == 0
+    tree = reload_json(made, check_swap(made, own_set(made), far), 1)
+    assert (tree["restarts"], tree["transient_samples"]) == (True, 0)
+    assert tree["error_after_transient"] == tree["error_bound"]
+    assert not design_core(made.spec, core="calibration").architecture.restarts  # it has no states

@@ -12,6 +12,15 @@ from sosmith.gen.reload.reload import Swap
 from sosmith.gen.specification.specification import Specification
 
 
+def _start(made: CoreDesign) -> str:
+    """Say how a core starts with a new set."""
+    settling = made.quantized.settling
+    if not settling:
+        return "in the steady state of its next sample"
+    seconds = settling / float(made.spec.sample_rate)
+    return f"from zero; it flags {settling:,} samples as settling, {seconds:.3g} s"
+
+
 def print_swap(made: CoreDesign, wanted: Specification, swap: Swap, tree: dict[str, Any]) -> None:
     """Print the error bound of the new set and the transient of the swap; `tree` is the content of the file."""
     console = TableConsole()
@@ -28,6 +37,8 @@ def print_swap(made: CoreDesign, wanted: Specification, swap: Swap, tree: dict[s
         table.add_row("transient", f"{swap.samples:,} samples, {seconds:.3g} s, until the bound holds again")
     else:
         table.add_row("transient", "none, the bound holds from the first sample")
+    if made.architecture.restarts:
+        table.add_row("the core restarts", _start(made))
     table.add_row("states", f"use at most {100 * float(swap.use):.3g} % of their range")
     crc = tree["writes"][-1][1]
     table.add_row("load", f"version {tree['version']}, {tree['words']:,} words, CRC 0x{crc:08X}")
