@@ -30,6 +30,7 @@ from sosmith.gen.specification.choices import ERROR_FEEDBACK
 from sosmith.gen.word_lengths.other_realization import with_realization
 from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.model.arrays import Codes, Values
+from sosmith.model.dataflow.status import Flag
 from sosmith.model.errors import SpecificationError
 from sosmith.model.reference.golden import calibrated, filtered
 from sosmith.model.text_files import write_contents, write_files
@@ -208,6 +209,7 @@ def _evidence(
         recursions=tuple(recursion_of(section.name, section.graph) for section in quantized.sections),
         limit_cycles=facts.limit_cycles,
         settling=facts.settling,
+        unsettled=(result.status >> Flag.SETTLING & 1).astype(np.bool_) if datapath.settles else None,
         uncertainty=None if worth is None else budget_json(worth),
         filter=filter_facts(quantized),
         alternatives=_alternatives(quantized, codes, golden),

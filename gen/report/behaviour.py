@@ -35,7 +35,7 @@ class Behaviour:
     settling_to_lsb : float or None
         Time in s after a step over the whole range of the output until the output stays within half an LSB.
     transient : int
-        Samples at the beginning of this run that show a start from zero.
+        Samples at the beginning of this run that the hardware flags as settling.
     """
 
     true_error: ErrorStatistics | None
@@ -62,7 +62,7 @@ def behaviour(evidence: Evidence) -> Behaviour:
         step=step,
         settling=None if step is None else step.samples_to(SETTLED) / step.sample_rate,
         settling_to_lsb=None if step is None else step.samples_to(evidence.lsb / 2 / span) / step.sample_rate,
-        transient=0 if evidence.settling is None else min(evidence.settling.samples, len(evidence.time)),
+        transient=_transient(evidence),
     )
 
 
@@ -78,13 +78,19 @@ def true_error(evidence: Evidence) -> Any:
 def readings_of(evidence: Evidence) -> Mask | None:
     """Return which samples count against the true value; None for all.
 
-    Those that the trace marks, else all that do not show the start.
+    Those that the trace marks, else all that the hardware does not flag as settling.
     """
-    if evidence.reading is not None or evidence.settling is None or evidence.truth is None:
+    if evidence.reading is not None or evidence.unsettled is None:
         return evidence.reading  # readings are marked where a scenario holds them settled
-    counted = np.ones(evidence.truth.shape, dtype=np.bool_)
-    counted[: evidence.settling.samples] = False
-    return counted
+    return ~evidence.unsettled
+
+
+def _transient(evidence: Evidence) -> int:
+    """Count the samples before the first one that is settled in all channels."""
+    if evidence.unsettled is None:
+        return 0
+    flagged = evidence.unsettled.reshape(len(evidence.time), -1).any(axis=1)
+    return int(np.argmin(np.append(flagged, False)))
 
 
 def behaviour_entry(found: Behaviour) -> dict[str, Any]:

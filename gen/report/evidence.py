@@ -102,6 +102,8 @@ class Evidence:
         One for each section, in `unit`.
     settling : SettlingFacts or None
         Samples that show the start of the filter from zero; None if it starts otherwise.
+    unsettled : ndarray of bool or None
+        The samples that the hardware flagged as such; None if it has no flag for that.
     uncertainty : Mapping or None
         The uncertainty budget of a reading, as `sosmith.gen.instrument.uncertainty_budget.budget_json` has it; None if
         nothing is known of what the calibration is worth.
@@ -160,6 +162,7 @@ class Evidence:
     recursions: Sequence[Recursion] = ()
     limit_cycles: Sequence[LimitCycleFacts] = ()
     settling: SettlingFacts | None = None
+    unsettled: Mask | None = None
     uncertainty: Mapping[str, Any] | None = None
     shown_channel: int | None = None
     filter: FilterFacts | None = None
@@ -183,7 +186,7 @@ class Evidence:
             raise ValueError(f"hardware must have the shape (n,) or (n, channels) with n >= 1, not {shape!r}")
         if np.shape(self.time) != shape[:1]:
             raise ValueError(f"time must have the shape {shape[:1]!r}, not {np.shape(self.time)!r}")
-        for name in ("golden", "truth", "reading", "unfiltered"):
+        for name in ("golden", "truth", "reading", "unfiltered", "unsettled"):
             values = getattr(self, name)
             if values is not None and np.shape(values) != shape:
                 raise ValueError(f"{name} must have the shape {shape!r}, not {np.shape(values)!r}")
@@ -205,7 +208,7 @@ class Evidence:
         """Return the same with arrays of the shape (n,), those of one channel."""
         if self.error.ndim == 1:
             return self
-        names = ("golden", "hardware", "truth", "reading", "unfiltered")
+        names = ("golden", "hardware", "truth", "reading", "unfiltered", "unsettled")
         arrays = {name: getattr(self, name) for name in names}
         columns: dict[str, Any] = {name: None if array is None else array[:, channel] for name, array in arrays.items()}
         return replace(self, shown_channel=channel if self.channels > 1 else None, **columns)

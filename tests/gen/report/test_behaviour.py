@@ -120,13 +120,18 @@ def test_settling_is_told_to_one_percent_and_to_half_a_step_of_the_output() -> N
     assert summarise(evidence(filter=unstable))["settling"] is None
 
 
-def test_the_transient_is_the_proven_settling() -> None:
-    run = evidence(settling=SettlingFacts(samples=1250, seconds=12.5, limit=LSB / 2))
-    assert behaviour(run).transient == 1250
+def test_the_transient_is_what_the_hardware_flags_at_the_beginning() -> None:
     assert behaviour(evidence()).transient == 0
-    ones = np.ones(3)
-    short = plain(filter=facts(), time=np.arange(3.0), golden=ones, hardware=ones, settling=run.settling)
-    assert behaviour(short).transient == 3
+    samples = np.arange(len(evidence().time))
+    assert behaviour(evidence(unsettled=samples < 1250)).transient == 1250
+    assert behaviour(evidence(unsettled=(samples < 1250) | (samples == 2000))).transient == 1250
+    assert behaviour(evidence(unsettled=samples >= 0)).transient == len(samples)
+    ones = np.ones((3, 2))
+    several = plain(
+        filter=facts(), channels=2, time=np.arange(3.0), golden=ones, hardware=ones,
+        unsettled=np.array([[True, True], [False, True], [False, False]]),
+    )  # fmt: skip
+    assert behaviour(several).transient == 2
 
 
 # the page

@@ -279,7 +279,7 @@ def test_accuracy_leaves_out_the_settling_of_a_start_from_zero() -> None:
     ones = np.ones(4)
     run = evidence(
         time=np.arange(4.0), golden=ones, hardware=np.array([9.0, 9.0, 1.01, 0.99]), truth=ones,
-        unfiltered=1.2 * ones, reading=None, settling=settling,
+        unfiltered=1.2 * ones, reading=None, settling=settling, unsettled=np.arange(4) < 2,
     )  # fmt: skip
     summary = summarise(run)
     assert summary["accuracy_percent"] == pytest.approx({"unfiltered": 80.0, "golden": 100.0, "hardware": 99.0})
@@ -296,7 +296,7 @@ def test_accuracy_leaves_out_the_settling_of_a_start_from_zero() -> None:
         {"truth": None},
         {"truth": np.zeros(3000)},
         {"reading": np.zeros(3000, dtype=bool)},
-        {"reading": None, "settling": SettlingFacts(samples=3000, seconds=30.0, limit=LSB / 2)},
+        {"reading": None, "unsettled": np.ones(3000, dtype=bool)},
     ],
 )
 def test_accuracy_is_null_where_it_has_no_meaning(changes: dict[str, Any]) -> None:

@@ -6,11 +6,13 @@ from dataclasses import dataclass, replace
 from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 from unittest.mock import patch
 
 import numpy as np
 import numpy.typing as npt
 import pytest
+from tests.gen.designs import EXAMPLES
 from tests.gen.verifier.small_specifications import STEADY_INSTRUMENT
 from tests.sim.stream.restarts import Outcome, run
 
@@ -18,7 +20,8 @@ from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.filter.design import design
 from sosmith.gen.proof.settling import SETTLED
 from sosmith.gen.reload.reload import OtherSet, other_set
-from sosmith.gen.specification.specification import from_tree
+from sosmith.gen.specification.specification import from_tree, load
+from sosmith.gen.specification.wear_limits import WearSpec
 from sosmith.model.arrays import Codes
 from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.dataflow.datapath import Datapath
@@ -51,25 +54,25 @@ class Case:
         return calibrated(rows, made.datapath.inputs, made.polynomial).reshape(self.codes.shape[:-1])
 
 
-def core(architecture: str, start: str, **changes: object) -> CoreDesign:
-    order, cutoff, channels = (changes.pop(name, 1) for name in ("order", "cutoff", "channels"))
+def core(architecture: str, start: str, order: int = 1, cutoff: int = 20, **changes: Any) -> CoreDesign:
+    """Design the small instrument with a filter, and changes of the hardware or of `channels`."""
     spec = from_tree(tomllib.loads(TEXT, parse_float=Decimal), Path("small.toml"))
-    hardware = replace(
-        spec.hardware, architecture=architecture, start=start, reload=True, clock=Fraction(10**9), **changes
-    )
-    wanted = replace(spec.filter, order=order, cutoff=(Fraction(cutoff),))
-    return design_core(replace(spec, filter=wanted, channels=channels, hardware=hardware))
+    assert spec.filter is not None
+    wanted, channels = replace(spec.filter, order=order, cutoff=(Fraction(cutoff),)), changes.pop("channels", 1)
+    hardware = replace(spec.hardware, architecture=architecture, start=start, reload=True, clock=Fraction(10**9))
+    return design_core(replace(spec, filter=wanted, channels=channels, hardware=replace(hardware, **changes)))
 
 
 def drawn(architecture: str, start: str, chance: random.Random) -> CoreDesign:
     """Design a core with a random filter, realization, number of channels and protection."""
+    folds = ["df1", "df1_ef1", "df1_ef2", "df2t"]
     return core(
         architecture,
         start,
         order=chance.randint(1, 3),
         cutoff=chance.randint(12, 30),
         channels=chance.choice((1, 1, 2, 3)),
-        realization=chance.choice(("df1", "df1_ef1", "df1_ef2", "df2t", "normal")),
+        realization=chance.choice([*folds, "normal"] if architecture == "parallel" else folds),
         protect=chance.choice(("none", "none", "detect", "correct")),
     )
 
@@ -108,8 +111,8 @@ def check_beats(found: Case, outcome: Outcome) -> None:
     """Each result is that of the integer model, from reset on, with the set and the samples after its start."""
     datapaths = [found.made.datapath, *(other.quantized.datapath for other in found.sets)]
     output, channels = found.made.datapath.output, found.made.architecture.channels
-    for load, datapath in enumerate(datapaths, start=-1):
-        here = outcome.loads[outcome.start] == load
+    for number, datapath in enumerate(datapaths, start=-1):
+        here = outcome.loads[outcome.start] == number
         length = int(outcome.index[here].max()) + 1
         codes = np.broadcast_to(
             found.codes.reshape(1, RESETS * channels, -1), (length, RESETS * channels, found.codes.shape[-1])
@@ -124,9 +127,9 @@ def false_flags(found: Case, outcome: Outcome) -> int:
     """Count the results with a false flag of wear, and those without a true one after the stated settling time."""
     settled = found.made.quantized.settling
     wrong = 0
-    for load in range(-1, len(found.sets)):
-        here = outcome.loads[outcome.start] == load
-        values = found.values(load)[outcome.resets[outcome.start[here]] % RESETS, outcome.channel[here]]
+    for number in range(-1, len(found.sets)):
+        here = outcome.loads[outcome.start] == number
+        values = found.values(number)[outcome.resets[outcome.start[here]] % RESETS, outcome.channel[here]]
         for flag, limit in zip(FLAGS, LIMITS, strict=True):
             raised = (outcome.status[here] >> flag & 1).astype(bool)
             wrong += int(np.count_nonzero(raised & (values < limit)))  # false at any time
@@ -136,7 +139,7 @@ def false_flags(found: Case, outcome: Outcome) -> int:
 
 @pytest.mark.parametrize("start", ["steady", pytest.param("zero", marks=pytest.mark.slow)])
 def test_a_few_restarts(start: str, tmp_path: Path) -> None:
-    found = case(core("parallel", start, cutoff=20), random.Random(1))
+    found = case(core("parallel", start), random.Random(1))
     outcome = run(tmp_path, found.made, found.sets, 40, found.codes, 1)
     check_beats(found, outcome)
     assert false_flags(found, outcome) == 0
@@ -147,7 +150,7 @@ def test_a_few_restarts(start: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("architecture", ["parallel", "folded", "serial"])
 def test_a_swap_that_keeps_the_states_raises_false_flags(architecture: str, tmp_path: Path) -> None:
     """Break the core: what is loaded takes over at once, and the filter answers the step of the calibration."""
-    found = case(core(architecture, "steady", order=2, cutoff=20), random.Random(1))
+    found = case(core(architecture, "steady", order=2), random.Random(1))
     with patch.object(Datapath, "restarts", new=False):
         outcome = run(tmp_path, found.made, found.sets, 200, found.codes, 1)
     assert false_flags(found, outcome) > 0
@@ -187,3 +190,18 @@ def test_ten_thousand_restarts_of_random_cores(architecture: str, start: str, tm
     assert starts >= STARTS
     assert reloads > STARTS // 2
     assert judged > STARTS
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("start", ["steady", "zero"])
+def test_the_locomotive_restarts(start: str, tmp_path: Path) -> None:
+    """Its filter takes thousands of samples to settle."""
+    spec = load(EXAMPLES / "flange_wear_locomotive.toml")
+    limits = WearSpec(initial=(Fraction(4),), warning=Fraction("1.4"), limit=Fraction("1.8"))
+    hardware = replace(spec.hardware, architecture="parallel", realization="df1_ef2", reload=True, start=start)
+    found = case(design_core(replace(spec, wear=limits, hardware=hardware)), random.Random(3))
+    outcome = run(tmp_path, found.made, found.sets, 100, found.codes, 3)
+    check_beats(found, outcome)
+    assert false_flags(found, outcome) == 0
+    print(start, len(outcome.resets), outcome.reloads, len(outcome.start), found.made.quantized.settling)
+    assert np.count_nonzero(outcome.index >= found.made.quantized.settling) > 100

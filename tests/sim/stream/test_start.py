@@ -32,7 +32,7 @@ def made_in(architecture: str, start: str) -> CoreDesign:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("architecture", "start"),
-    [("parallel", "steady"), ("folded", "steady"), ("serial", "steady"), ("parallel", "zero"), ("folded", "zero")],
+    [(architecture, start) for start in ("steady", "zero") for architecture in ("parallel", "folded", "serial")],
 )
 def test_flags_of_wear_are_right_once_settled(architecture: str, start: str, tmp_path: Path) -> None:
     """At once behind a steady start; from zero, once the length has passed that the manifest states."""
@@ -57,7 +57,9 @@ def test_flags_of_wear_are_right_once_settled(architecture: str, start: str, tmp
     status = datapath.compute_status(np.broadcast_to(constant, (samples, *constant.shape)))
     warned = (status >> Flag.WEAR_WARNING & 1).astype(bool)
     assert not warned[:settled].any()
-    assert np.array_equal(status >> Flag.SETTLING & 1, np.tile(np.arange(samples)[:, None] < settled, (1, CHANNELS)))
+    unsettled = np.tile(np.arange(samples)[:, None] < settled, (1, CHANNELS))
+    assert np.array_equal(status >> Flag.SETTLING & 1, unsettled)
+    assert np.array_equal(evidence.unsettled, unsettled) if settled else evidence.unsettled is None
     right = warned == (values > WARNING)
     assert right[settled:].all()
     assert right[:settled].all() == (start == "steady")
