@@ -55,6 +55,8 @@ class StreamRules(Proof):
         self.source_waits = source_waits
         self.excused: Value = Const(0, 1)
         """Whether the output may be any, as a flag beside it says."""
+        self.cleared: Value = Const(0, 1)
+        """Whether the core begins anew at this clock, but for a reset."""
         self.picks = self.free(1, "picks")
 
     def state(self, m: Module) -> None:
@@ -94,7 +96,7 @@ class StreamRules(Proof):
             self._state_order(m, (taken, given), count, d.s_axis_tdest, d.m_axis_tdest)
         elif self.datapath is not None:
             code = d.s_axis_tdata[: self.datapath.inputs[0].bits].as_signed()
-            result = reference(m, self.datapath, code, taken, self.reset)
+            result = reference(m, self.datapath, code, taken, self.reset | self.cleared)
             self._state_order(m, (taken, given), count, result, d.m_axis_tdata.as_signed())
 
     def _assume_source(self, m: Module) -> None:

@@ -164,13 +164,13 @@ STARTS, DRAWS = 10_000, 4
 @pytest.mark.parametrize("start", ["steady", "zero"])
 @pytest.mark.parametrize("architecture", ["parallel", "folded", "serial"])
 def test_ten_thousand_restarts_of_random_cores(architecture: str, start: str, tmp_path: Path) -> None:
-    chance = random.Random(2)
+    chance = random.Random(f"{architecture}, {start}")
     starts = reloads = judged = 0
     for draw in range(DRAWS):
         found = case(drawn(architecture, start, chance), chance)
         folder = tmp_path / str(draw)
         folder.mkdir()
-        outcome = run(folder, found.made, found.sets, STARTS // DRAWS + 50, found.codes, draw)
+        outcome = run(folder, found.made, found.sets, STARTS // DRAWS + 100, found.codes, draw)
         check_beats(found, outcome)
         assert false_flags(found, outcome) == 0
         starts += len(outcome.resets)
