@@ -138,7 +138,7 @@ class Builder:
             objects = self._emptied()
             command = ["verilator", "-cc", "-Mdir", str(objects), "--prefix", "Vtop", "--top-module", top]
             self._run([*command, *_ARGUMENTS, str(source)], objects)
-            sources = [*sorted(objects.glob("Vtop*.cpp")), main]
+            sources = _together([*sorted(objects.glob("Vtop*.cpp")), main], objects)
             compiled = self._compile(sources, [*_flags(waves=False), f"-I{objects}", f"-I{header.parent}"], objects)
             names = _library(waves=False)
             library_key = self._library_key(names, _flags(waves=False))
@@ -166,11 +166,7 @@ class Builder:
         self._run(command, objects)
         classes = (objects / "Vtop_classes.mk").read_text(encoding="utf-8")
         names = sorted({*_library(waves=model.waves), *re.findall(r"^\s+(verilated\w*) \\", classes, re.MULTILINE)})
-        sources = [*sorted(objects.glob("Vtop*.cpp")), _MAIN]
-        if sum(path.stat().st_size for path in sources) < _ONE_FILE:  # the headers are what takes time
-            together = objects / "together.cpp"
-            together.write_text("".join(f'#include "{path}"\n' for path in sources), encoding="utf-8")
-            sources = [together]
+        sources = _together([*sorted(objects.glob("Vtop*.cpp")), _MAIN], objects)
         compiled = self._compile(sources, [*flags, f"-I{objects}"], objects)
         libraries = cocotb_tools.config.libs_dir
         plain = _flags(waves=model.waves)
@@ -204,6 +200,15 @@ class Builder:
 
     def _output(self, *command: str) -> str:
         return subprocess.run(command, env=self._environment, check=True, capture_output=True, text=True).stdout
+
+
+def _together(sources: list[Path], folder: Path) -> list[Path]:
+    """Return one file in place of several if they are short: their headers are what takes time."""
+    if sum(path.stat().st_size for path in sources) >= _ONE_FILE:
+        return sources
+    together = folder / "together.cpp"
+    together.write_text("".join(f'#include "{path.resolve()}"\n' for path in sources), encoding="utf-8")
+    return [together]
 
 
 def _library(*, waves: bool) -> list[str]:
