@@ -6,7 +6,6 @@ import textwrap
 from collections.abc import Sequence
 from typing import Any
 
-from examples.wear_campaign.methods import RATE
 from examples.wear_campaign.methods_document import SENSORS, section
 from examples.wear_campaign.pictures import stated
 from examples.wear_campaign.week import MAX_ERROR, SET_ERROR
@@ -337,19 +336,18 @@ def _reloads(found: list[dict[str, Any]], settings: dict[str, Any]) -> str:
             f"{one['proven']:,}",
             f"{one['mornings'] - one['proven']:,}",
             "-" if one["bound"] is None else f"{1000 * one['bound']:.3f}",
-            "-" if one["samples"] is None else f"{one['samples'] / RATE:.1f}",
         ]
         for one in found
     ]
-    heads = ["true sensor", "mornings", "proven", "refused", "largest bound, um", "longest transient, s"]
+    heads = ["true sensor", "mornings", "proven", "refused", "largest bound, um"]
     reasons = sorted({reason for one in found for reason in one["kept"]})
     lines = [
         "### Every reload of every week",
         f"The same for the calibrations by `bayes`, of {settings['seeds']} weeks with each true sensor. The hardware "
         f"is designed for equation 5a with at most {1000 * MAX_ERROR:g} um of error; a set that is loaded may have "
-        f"{1000 * float(SET_ERROR):g} um. Each swap is proven from the set that is active: that nothing wraps, for "
-        "any readings before and after, and when the set's own bound holds. If a set or its swap is refused, or there "
-        "is no fit, the active set stays.",
+        f"{1000 * float(SET_ERROR):g} um. The core judges wear, so it restarts with a set, in the steady state of its "
+        "next sample: the set's own bound holds from then on, whatever was active before. If a set is refused, or "
+        "there is no fit, the active set stays.",
         _table(heads, rows),
         "None was refused." if not reasons else "Refused:\n\n" + "\n".join(f"- {reason}" for reason in reasons),
     ]

@@ -22,7 +22,7 @@ from sosmith.sim.simulation import Progress
 def one_week(core: CoreDesign, scenario: ScenarioFile, seed: int) -> list[dict[str, Any]]:
     """Return what comes of each morning's reload in a week, in turn.
 
-    Each has a `verdict`: ``proven``, with the bound in mm and the samples until it holds; ``refused``, with the reason,
+    Each has a `verdict`: ``proven``, with the bound in mm; ``refused``, with the reason,
     and ``no fit``, where no polynomial was made. After the latter two the hardware keeps its active set, and the next
     swap starts from that.
     """
@@ -41,14 +41,14 @@ def one_week(core: CoreDesign, scenario: ScenarioFile, seed: int) -> list[dict[s
         else:
             active = swap.made
             bound = round(float(active.quantized.bound * lsb), 9)
-            mornings.append({"verdict": "proven", "bound": bound, "samples": swap.samples})
+            mornings.append({"verdict": "proven", "bound": bound})
     return mornings
 
 
 def all_weeks(
     settings: dict[str, Any], scenario: ScenarioFile, filter_table: str, folder: Path, progress: Progress
 ) -> list[dict[str, Any]]:
-    """Return the counts of all weeks for each true sensor, with the largest bound in mm and the longest transient."""
+    """Return the counts of all weeks for each true sensor, with the largest bound in mm."""
     own = settings["week"]
     wear = hardware.Wear(warning=own["warning"], limit=own["limit"])
     options: dict[str, Any] = {"wear": wear, "reload": True, "max_error": MAX_ERROR}
@@ -72,6 +72,5 @@ def counted(mornings: list[dict[str, Any]]) -> dict[str, Any]:
         "mornings": len(mornings),
         "proven": len(proven),
         "bound": max((one["bound"] for one in proven), default=None),
-        "samples": max((one["samples"] for one in proven), default=None),
         "kept": [f"{one['verdict']}: {one['reason']}" for one in mornings if one["verdict"] != "proven"],
     }

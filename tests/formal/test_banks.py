@@ -70,7 +70,7 @@ class OneBank(Proof):
 
 
 def test_a_sample_in_work_keeps_its_bank(tmp_path: Path) -> None:
-    assert prove(OneBank(broken(folded, "port.may_swap.eq(1)", "port.may_swap.eq(1)")), tmp_path) == "PASS"
+    assert prove(OneBank(broken(folded, "kept.eq(port.bank)", "kept.eq(port.bank)")), tmp_path) == "PASS"
 
 
 @pytest.mark.parametrize(

@@ -176,17 +176,6 @@ def test_ten_thousand_restarts_of_random_cores(architecture: str, start: str, tm
         starts += len(outcome.resets)
         reloads += outcome.reloads
         judged += int(np.count_nonzero(outcome.index >= found.made.quantized.settling))
-        print(
-            architecture,
-            start,
-            found.made.quantized.realization,
-            found.made.architecture.protect,
-            found.made.architecture.channels,
-            len(outcome.resets),
-            outcome.reloads,
-            len(outcome.start),
-            found.made.quantized.settling,
-        )
     assert starts >= STARTS
     assert reloads > STARTS // 2
     assert judged > STARTS
@@ -203,5 +192,4 @@ def test_the_locomotive_restarts(start: str, tmp_path: Path) -> None:
     outcome = run(tmp_path, found.made, found.sets, 100, found.codes, 3)
     check_beats(found, outcome)
     assert false_flags(found, outcome) == 0
-    print(start, len(outcome.resets), outcome.reloads, len(outcome.start), found.made.quantized.settling)
     assert np.count_nonzero(outcome.index >= found.made.quantized.settling) > 100
