@@ -18,7 +18,7 @@ from sosmith.gen.core import CoreDesign
 from sosmith.gen.output.verilog import to_rtlil, to_verilog
 from sosmith.gen.reload.register_writes import register_writes
 from sosmith.gen.reload.reload import OtherSet
-from sosmith.hdl.axi_stream import fields
+from sosmith.hdl.plan.streams import fields
 from sosmith.model.arrays import Codes
 from sosmith.sim.simulators import find_simulator
 from sosmith.sim.verilated_model import Builder
