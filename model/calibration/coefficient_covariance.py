@@ -97,7 +97,7 @@ def of_bayes(measurements: Measurements, made: BayesianFit) -> CoefficientUncert
     The curve of the day is projected on the terms of the polynomial, by least squares over the covered region: the
     covariance is that of the projection about the coefficients, and the systematic error, in the mean over the region,
     the rest, which includes that of a day without measurements. Both variances are uncertain over the pairs of
-    scatters; `student` makes of each a standard uncertainty with degrees of freedom.
+    scatters, weighted as for intervals; `student` makes of each a standard uncertainty with degrees of freedom.
     """
     posterior, polynomial = made.posterior, made.fit.polynomial
     lengths = tuple(map(len, polynomial.coefficients))
@@ -108,7 +108,7 @@ def of_bayes(measurements: Measurements, made: BayesianFit) -> CoefficientUncert
     projection = np.linalg.pinv((x / scale[:, None]).T) / scale[:, None]
     mean, of_curve, of_day = posterior.predicted_parts(V, T)
     off = mean - polynomial(V, T)[:, None]
-    weight = posterior.scatters.weight
+    weight = posterior.scatters.of_intervals
     covariance = np.zeros((len(x), len(x)))
     inside, outside = np.zeros(len(weight)), np.zeros(len(weight))
     for k in range(len(weight)):

@@ -158,7 +158,7 @@ def of_posterior(measurements: Measurements, made: BayesianFit) -> Uncertainty:
     def standard_error(V: Values, T: Values) -> Values:
         mean, variance = posterior.predicted(V, T)
         off = mean - polynomial(V, T)[:, None]
-        return np.asarray(np.sqrt(posterior.scatters.mean_of(variance + off**2)))
+        return np.asarray(np.sqrt(posterior.scatters.variance_of(variance + off**2)))
 
     def half_width(V: Values, T: Values) -> Values:
         return posterior.half_width(V, T, polynomial(V, T), SHARE)
@@ -190,7 +190,7 @@ def _predicted(made: BayesianFit) -> CrossValidation | None:
         centre = at.mean_of(mean)
         variance = dot(a[..., None], spread) + noise
         off.append(rows.r[here] - centre)
-        allowed.append(mixture_half_width(mean - centre[:, None], variance, at.weight, SHARE))
+        allowed.append(mixture_half_width(mean - centre[:, None], variance, at.of_intervals, SHARE))
     every = np.concatenate(off)
     inside = float(np.mean(np.abs(every) <= np.concatenate(allowed)))
     return CrossValidation(root_mean_square(every), inside, len(every))

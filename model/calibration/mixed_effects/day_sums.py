@@ -86,6 +86,25 @@ class DaySums:
             root=Scaled(mantissa, exponent),
         )
 
+    def fisher(self, rho: Values) -> Values:
+        """Return how much the measurements can tell of both standard deviations, for each ratio; shape (ratios,).
+
+        It is the determinant of Fisher's information about their logarithms, the deviations being known, divided by 4.
+        With the eigenvalues w of ``rho H H' / C``, from 0 for what is all scatter to 1 for what is all systematic, the
+        information is ``2 sum w**2`` of the systematic error, ``2 sum (1 - w)**2`` of the scatter, and
+        ``2 sum w (1 - w)`` of both, summed over the measurements. 0 without a systematic error.
+        """
+        lower = cholesky(identity(len(self.hh), (len(self.rr), len(rho))) + self.hh[..., None] * rho)
+        shares = solved(lower, transposed(solved(lower, self.hh[..., None] * rho)))
+        of_day, squared = np.zeros(shares.shape[2:]), np.zeros(shares.shape[2:])
+        for k in range(len(shares)):
+            of_day = of_day + shares[k, k]
+            squared = squared + dot(shares[k], shares[k])
+        first, second, count = np.zeros(len(rho)), np.zeros(len(rho)), 0.0
+        for day in range(len(self.rr)):
+            first, second, count = first + of_day[day], second + squared[day], count + float(self.count[day])
+        return np.asarray(second * (count - 2.0 * first + second) - (first - second) ** 2)
+
     def only(self, day: int) -> DaySums:
         """Return the sums of one day, with an axis of length 1 for the day."""
         at = slice(day, day + 1)

@@ -5,6 +5,13 @@ type's tolerances, and walk from day to day; s is a Gaussian process over the cl
 of a single measurement. Given the standard deviations of s and e, everything is normal and the posterior follows from
 a Kalman filter over the days. The two standard deviations are integrated over a grid, each point weighted by its
 marginal likelihood (and by the type's expectation of s), so that few days leave them as uncertain as they are.
+
+The grid is geometric: every order of magnitude is as likely as the next, also those of s that are lost in the scatter.
+Intervals made so hold their share on average over the sensors of a type, but less for a sensor whose days err by more
+than its type says. Intervals are therefore made with Jeffreys' prior, the root of the determinant of Fisher's
+information, which comes nearest to the share for every single sensor (Welch and Peers, J. R. Stat. Soc. B 25, 1963);
+what the type says of s counts as an earlier estimate of it. Where few measurements cannot tell s from none, such
+intervals are wide. The curve itself is the posterior mean without Jeffreys' prior.
 """
 
 from __future__ import annotations
@@ -109,22 +116,29 @@ class Scatters:
     ratio : ndarray
         Systematic error divided by the scatter.
     weight : ndarray
-        Posterior probability; the sum is 1.
+        Posterior probability, of which the curve is made; the sum is 1.
+    of_intervals : ndarray
+        Posterior probability with Jeffreys' prior, of which intervals are made; the sum is 1.
     """
 
     scatter: Values
     ratio: Values
     weight: Values
+    of_intervals: Values
 
     @property
     def likeliest(self) -> Scatters:
         """The pair of the largest weight alone."""
         best = int(np.argmax(self.weight))
-        return Scatters(self.scatter[best : best + 1], self.ratio[best : best + 1], np.ones(1))
+        return Scatters(self.scatter[best : best + 1], self.ratio[best : best + 1], np.ones(1), np.ones(1))
 
     def mean_of(self, values: Values) -> Values:
         """Return the posterior mean of values whose last axis is the pair."""
-        return dot(np.moveaxis(values, -1, 0), np.expand_dims(self.weight, tuple(range(1, values.ndim))))
+        return _weighted(values, self.weight)
+
+    def variance_of(self, values: Values) -> Values:
+        """Return the posterior mean, as intervals have it, of variances whose last axis is the pair."""
+        return _weighted(values, self.of_intervals)
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,7 +157,8 @@ class Model:
     def scatters(self) -> Scatters:
         """Return the pairs of scatters that the measurements leave possible: a coarse grid, then a fine one there."""
         coarse = self.weighed(SCATTERS, RATIOS)
-        return self.weighed(_refined(coarse.scatter, SCATTERS), _refined(coarse.ratio, RATIOS))
+        likely = coarse.weight > 0
+        return self.weighed(_refined(coarse.scatter[likely], SCATTERS), _refined(coarse.ratio[likely], RATIOS))
 
     def weighed(self, scatters: Values, ratios: Values) -> Scatters:
         """Return the pairs on a grid that are not `NEGLIGIBLE`."""
@@ -168,11 +183,13 @@ class Model:
                 strict=True,
             )
         ]
-        highest = max(logarithms)
-        weights = np.array([float((one - highest).exp()) for one in logarithms]).reshape(stack)
-        at_scatter, at_ratio = np.nonzero(weights >= NEGLIGIBLE)
-        kept = weights[at_scatter, at_ratio]
-        return Scatters(scatters[at_scatter], ratios[at_ratio], kept / math.fsum(kept.tolist()))
+        weight = of_intervals = _probabilities(logarithms)
+        told = self.sums.fisher(ratios**2).tolist()
+        if all(one > 0 for one in told):  # else there is no systematic error to be told
+            jeffreys = [Decimal(one).ln() / 2 for one in told]
+            of_intervals = _probabilities([a + b for a, b in zip(logarithms, jeffreys * len(scatters), strict=True)])
+        kept = np.flatnonzero(weight + of_intervals)
+        return Scatters(scatters[kept // len(ratios)], ratios[kept % len(ratios)], weight[kept], of_intervals[kept])
 
     def _expected(self, systematic: float) -> Decimal:
         """Return the logarithm of the prior of the systematic error, up to a constant; the smallest stands for none."""
@@ -330,8 +347,20 @@ class Posterior:
         """
         mean, variance = self.predicted(voltage, temperature)
         return mixture_half_width(
-            mean - centre[:, None], variance + scatter * self.scatters.scatter**2, self.scatters.weight, share
+            mean - centre[:, None], variance + scatter * self.scatters.scatter**2, self.scatters.of_intervals, share
         )
+
+
+def _weighted(values: Values, weight: Values) -> Values:
+    return dot(np.moveaxis(values, -1, 0), np.expand_dims(weight, tuple(range(1, values.ndim))))
+
+
+def _probabilities(logarithms: list[Decimal]) -> Values:
+    """Return probabilities from their logarithms, which lack a constant; 0 for what is `NEGLIGIBLE`."""
+    highest = max(logarithms)
+    found = np.array([float((one - highest).exp()) for one in logarithms])
+    found[found < NEGLIGIBLE] = 0.0
+    return found / math.fsum(found.tolist())
 
 
 def _refined(kept: Values, grid: Values) -> Values:

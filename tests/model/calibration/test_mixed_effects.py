@@ -39,7 +39,7 @@ class Case:
             days=DAYS,
         )
         self.model = Model.of(TYPE, self.rows, np.ones(count))
-        self.one = Scatters(np.array([SCATTER]), np.array([RATIO]), np.ones(1))
+        self.one = Scatters(np.array([SCATTER]), np.array([RATIO]), np.ones(1), np.ones(1))
 
     def walk(self, days: Values, others: Values) -> Values:
         """Covariance of the deviations of days with those of others, shape (5, len(days), len(others))."""
@@ -92,6 +92,54 @@ def test_pairs_of_scatters_are_weighted_by_their_marginal_likelihood(case: Case)
     expected = np.exp(dense - dense.max())
     assert len(found.weight) > 2
     assert found.weight == pytest.approx(expected / expected.sum(), rel=1e-9)
+
+
+def test_intervals_are_weighted_with_jeffreys_prior(case: Case) -> None:
+    """The root of the determinant of Fisher's information about the logarithms of scatter and systematic error."""
+    found = case.model.weighed(np.array([0.2, 0.3, 0.5]), np.array([0.3, 0.6, 1.2]))
+    roots = []
+    for scatter, ratio in zip(found.scatter, found.ratio, strict=True):
+        same = np.equal.outer(case.day, case.day)
+        by_logarithm = (
+            2 * scatter**2 * np.eye(len(case.day)),
+            2 * (scatter * ratio) ** 2 * (case.rows.h.T @ case.rows.h) * same,
+        )
+        inverse = np.linalg.inv(sum(by_logarithm) / 2)
+        fisher = [[np.trace(inverse @ a @ inverse @ b) / 2 for a in by_logarithm] for b in by_logarithm]
+        roots.append(math.sqrt(np.linalg.det(fisher)))
+    expected = found.weight * roots
+    assert len(expected) > 4
+    assert np.ptp(roots) > 0.5 * max(roots)
+    assert found.of_intervals == pytest.approx(expected / expected.sum(), rel=1e-9)
+
+
+DAY_ERROR = 0.2
+"""Systematic error of a day in mm rms: twice what the type expects."""
+
+
+@pytest.mark.slow
+def test_intervals_hold_their_share_for_a_sensor_worse_than_its_type() -> None:
+    """Everything is as the model has it, so that the share that the intervals hold on a new day is known exactly."""
+    days, each, points = 6, 15, 5
+    V_now, T_now = np.linspace(1.0, 9.0, points), np.full(points, 60.0)
+    curves, shares = SystematicCurves(1.0, 11.0, TYPE.correlation), []
+    for seed in range(60):
+        generator = np.random.default_rng(seed)
+        V, T = generator.uniform(0.5, 9.5, days * each), generator.uniform(20.0, 98.0, days * each)
+        day = np.repeat(np.arange(days), each)
+        h, a = curves.columns(np.clip(TYPE.polynomial()(V, T), 1.0, 11.0)), TYPE.columns(V, T)
+        steps = generator.normal(size=(days + 1, 5)) * np.sqrt([np.ones(5), *[TYPE.drifts] * days])
+        deviations = np.cumsum(steps, axis=0)
+        weights = DAY_ERROR * generator.normal(size=(days, curves.count))
+        r = np.sum(a.T * deviations[day], axis=1) + np.sum(h.T * weights[day], axis=1)
+        rows = Rows(a, h, r + generator.normal(0.0, 0.45, len(r)), day, tuple(range(days)))
+        model = Model.of(TYPE, rows, np.ones(len(r)))
+        posterior = model.posterior(model.scatters(), curves, days)
+        centre = posterior.curve(V_now, T_now)
+        off = centre - TYPE.polynomial()(V_now, T_now) - TYPE.columns(V_now, T_now).T @ deviations[days]
+        half = posterior.half_width(V_now, T_now, centre, 0.95)
+        shares.append(np.mean(stats.norm.cdf((half - off) / DAY_ERROR) - stats.norm.cdf((-half - off) / DAY_ERROR)))
+    assert 0.93 < np.mean(shares) < 0.97
 
 
 def test_residuals_are_those_of_the_smoothed_days(case: Case) -> None:

@@ -40,10 +40,9 @@ def test_bayesian_intervals_hold_the_clearance_of_readings_on_another_day() -> N
         rows = measured(5, 12, systematic=0.15, seed=seed)
         made = bayesian_fit(rows, TYPE, FIRST + 5, RANGES)
         found = of_posterior(rows, made)
-        phase = np.random.default_rng([seed, 1]).uniform(0, 2 * np.pi)
-        truth = TRUE(V, T)
-        read = truth + np.sqrt(2) * 0.15 * np.sin(2 * np.pi * truth / 8.0 + phase)
-        off = made.fit.polynomial(V, T) + (read - truth) - truth
+        phases = np.random.default_rng([seed, 1]).uniform(0, 2 * np.pi, (50, 1))
+        of_day = np.sqrt(2) * 0.15 * np.sin(2 * np.pi * TRUE(V, T) / 8.0 + phases)
+        off = made.fit.polynomial(V, T) + of_day - TRUE(V, T)
         inside.append(np.abs(off) <= found.half_width(V, T))
         assert found.over_days is not None
         over_days.append(found.over_days.inside)
