@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import datetime
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -144,16 +144,15 @@ def until(measurements: Measurements, date: int) -> Measurements:
     return Measurements(m.clearance[kept], m.voltage[kept], m.temperature[kept], m.source, days)
 
 
-def judged(made: Made, trace: Trace, core: CoreDesign) -> dict[str, float]:
+def judged(made: Made, trace: Trace, core: CoreDesign, others: Sequence[Trace] = ()) -> dict[str, float]:
     """Return the accuracy in per cent; of the intervals the share that hold the true clearance, and half-widths in mm.
 
-    Both are those of the whole budget and, as ``calibration ...``, those of the calibration alone; with the standard
-    uncertainty in mm that each source of the budget has on average, as ``PART`` and its name.
+    The intervals are held against the trace and `others`; their figures are means over all of these. They are those of
+    the whole budget and, as ``calibration ...``, those of the calibration alone; with the standard uncertainty in mm
+    that each source of the budget has on average, as ``PART`` and its name.
     """
-    bench = bench_of(core)
-    V, T = (port.decode(trace.codes[:, k]) for k, port in enumerate(bench.ports))
     quantized, reading = core.quantized, trace.reading
-    clearance = filtered(made.curve(V, T), quantized.filter.sos, bench.output, steady=quantized.steady)
+    _, _, clearance = _measured(made, trace, core)
     found = {
         "accuracy": accuracy_percent(clearance, trace.truth, reading),
         "order": float(made.order),
@@ -161,9 +160,6 @@ def judged(made: Made, trace: Trace, core: CoreDesign) -> dict[str, float]:
     }
     if made.worth is None:
         return found
-    some = np.flatnonzero(reading)
-    some = some[:: max(len(some) // HELD, 1)]
-    off, V, T = np.abs(clearance - trace.truth)[some], V[some], T[some]
     assert isinstance(made.curve, Polynomial), "what says its worth is a polynomial"
     instrument = Instrument(
         spec=core.spec,
@@ -172,20 +168,50 @@ def judged(made: Made, trace: Trace, core: CoreDesign) -> dict[str, float]:
         ideal=quantized.filter,
         bound=float(core.spec.max_error),
     )
-    budget = instrument.budget(V, T)
-    for name, half in (("", budget.expanded), ("calibration ", made.worth.interval(V, T))):
-        found[f"{name}inside"] = float(np.mean(off <= half))
-        found[f"{name}half_width"] = float(half.mean())
-    return found | {f"{PART}{one.source}": float(one.contribution.mean()) for one in budget.contributions}
+    held: dict[str, list[float]] = {}
+    for one in (trace, *others):
+        V, T, clearance = _measured(made, one, core)
+        some = np.flatnonzero(one.reading)
+        some = some[:: max(len(some) // HELD, 1)]
+        off, V, T = np.abs(clearance - one.truth)[some], V[some], T[some]
+        budget = instrument.budget(V, T)
+        for name, half in (("", budget.expanded), ("calibration ", made.worth.interval(V, T))):
+            held.setdefault(f"{name}inside", []).append(float(np.mean(off <= half)))
+            held.setdefault(f"{name}half_width", []).append(float(half.mean()))
+        for source in budget.contributions:
+            held.setdefault(f"{PART}{source.source}", []).append(float(source.contribution.mean()))
+    return found | {figure: float(np.mean(values)) for figure, values in held.items()}
 
 
-def on_the_bench(scenario: ScenarioFile, core: CoreDesign, seed: int) -> Iterator[tuple[str, dict[str, float]]]:
-    """Yield each method's figures for one run."""
+def _measured(made: Made, trace: Trace, core: CoreDesign) -> tuple[Values, Values, Values]:
+    """Return voltage in V, temperature in degC and filtered clearance in mm of a trace."""
+    bench = bench_of(core)
+    V, T = (port.decode(trace.codes[:, k]) for k, port in enumerate(bench.ports))
+    steady = core.quantized.steady
+    return V, T, filtered(made.curve(V, T), core.quantized.filter.sos, bench.output, steady=steady)
+
+
+def on_day(scenario: ScenarioFile, day: float) -> ScenarioFile:
+    """Return a scenario of one excerpt with the run on another day."""
+    (excerpt,) = scenario.document.excerpt
+    moved = (excerpt.model_copy(update={"day": day}),)
+    return replace(scenario, document=scenario.document.model_copy(update={"excerpt": moved}))
+
+
+def on_the_bench(
+    scenario: ScenarioFile, core: CoreDesign, seed: int, days: int = 1
+) -> Iterator[tuple[str, dict[str, float]]]:
+    """Yield each method's figures for one run.
+
+    Intervals are held against `days` runs: on the day of the run, and on as many of the days after it instead. The
+    sensors of the bench do not age, so that these days differ by their systematic errors and noise only.
+    """
     (excerpt,) = scenario.document.excerpt
     date = scenario.document.start.toordinal() + int(excerpt.day)
     rows, trace = measured(scenario, seed), emulate_file(scenario, bench_of(core), seed=seed)
+    later = [emulate_file(on_day(scenario, excerpt.day + k), bench_of(core), seed=seed) for k in range(1, days)]
     for name, method in METHODS.items():
-        yield name, judged(method(rows, date), trace, core)
+        yield name, judged(method(rows, date), trace, core, later)
     for name, curve in ceilings(scenario, trace, seed).items():
         yield name, judged(Made(curve, 2), trace, core)
 
@@ -235,8 +261,10 @@ def cases(settings: dict[str, Any], scenarios: dict[str, ScenarioFile], filter_t
     own, all_seeds = settings["methods"], settings["seeds"]
     some_seeds = min(all_seeds, own["variant_seeds"])
 
-    def bench_case(name: str, sensor: str, scenario: ScenarioFile, seeds: int = all_seeds) -> Case:
-        return Case(name, sensor, seeds, lambda seed: on_the_bench(with_sensor(scenario, sensor), bench, seed))
+    def bench_case(
+        name: str, sensor: str, scenario: ScenarioFile, seeds: int = all_seeds, days: int = own["interval_days"]
+    ) -> Case:
+        return Case(name, sensor, seeds, lambda seed: on_the_bench(with_sensor(scenario, sensor), bench, seed, days))
 
     def week_case(
         name: str, sensor: str, scenario: ScenarioFile, seeds: int = all_seeds, outliers: float = 0.0
@@ -252,7 +280,7 @@ def cases(settings: dict[str, Any], scenarios: dict[str, ScenarioFile], filter_t
             table, (excerpt,) = scenarios[name].document.calibration, scenarios[name].document.excerpt
             assert table is not None, "the scenario has measurements"
             same_day = with_calibration(scenarios[name], days=(*table.days, excerpt.day))
-            found.append(bench_case(f"{name}, same day", sensor, same_day, some_seeds))
+            found.append(bench_case(f"{name}, same day", sensor, same_day, some_seeds, 1))
     first = own["sensors"][0]
     near = with_calibration(scenarios[week_name], clearances=tuple(own["near"]))
     found.append(week_case(f"{week_name}, near", first, near, some_seeds))

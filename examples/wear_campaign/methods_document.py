@@ -182,8 +182,9 @@ def _intervals(mains: list[dict[str, Any]], settings: dict[str, Any]) -> list[st
         f"{min(inside):.1f} to {max(inside):.1f} % of the filtered readings' true clearances; the interval of the "
         f"calibration alone {min(alone):.1f} to {max(alone):.1f} %; the budget with a calibration by the paper's rule, "
         f"which knows nothing of the days' errors, {min(paper):.1f} to {max(paper):.1f} %. All readings of a bench run "
-        "share one systematic error: such a share is known to a few points only, as its standard error over the seeds "
-        "says.",
+        "share one systematic error. So that a single day's luck does not decide, the intervals of each seed's "
+        f"calibration are held against {settings['methods']['interval_days']} such runs, each on another day. +- is "
+        "the standard error over the seeds.",
         table(
             [
                 "run",

@@ -12,14 +12,16 @@ from typing import Any
 import numpy as np
 import pytest
 from examples.wear_campaign import bench, campaign, hardware, methods, reloads, ride, week
+from examples.wear_campaign.bench import PAPER_FILTER
 from examples.wear_campaign.document import document
 from examples.wear_campaign.spread import spread
 from scipy import signal
 
 from sosmith.gen.reload.reload import check_swap
 from sosmith.gen.specification.specification import load
+from sosmith.gen.stimuli import bench_of
 from sosmith.model.calibration.polynomial import EQUATION_5A
-from sosmith.model.scenarios.file import load_scenario
+from sosmith.model.scenarios.file import emulate_file, load_scenario
 
 ROOT = Path(__file__).parents[2]
 HERE = ROOT / "examples" / "wear_campaign"
@@ -82,6 +84,22 @@ def test_methods_give_the_recorded_figures_again(number: int, tmp_path: Path) ->
     for method, figures in made["methods"].items():
         for figure, values in figures.items():
             assert values == pytest.approx(recorded["methods"][method][figure][:2], abs=2e-4), (method, figure)
+
+
+def test_intervals_are_held_against_every_day(tmp_path: Path) -> None:
+    settings = tomllib.loads((HERE / "campaign.toml").read_text(encoding="utf-8"))
+    stated = hardware.uncertainty_table(settings["bench"]["uncertainty"])
+    calibration = hardware.calibration_table(EQUATION_5A)
+    core = hardware.instrument(tmp_path, "bench", 6.0, calibration, PAPER_FILTER, uncertainty=stated)
+    scenario = load_scenario(campaign.SCENARIOS / "bench_43_50.toml")
+    made = methods.by_bayes(methods.measured(scenario, 1), scenario.document.start.toordinal() + 10)
+    days = [emulate_file(methods.on_day(scenario, day), bench_of(core), seed=1) for day in range(10, 16)]
+    assert np.array_equal(days[0].truth, days[1].truth)
+    alone = [methods.judged(made, day, core) for day in days]
+    every = methods.judged(made, days[0], core, days[1:])
+    assert len({one["inside"] for one in alone}) > 1
+    assert every["inside"] == pytest.approx(np.mean([one["inside"] for one in alone]))
+    assert every["accuracy"] == alone[0]["accuracy"]
 
 
 def test_outliers_are_as_many_as_stated() -> None:
