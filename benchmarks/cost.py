@@ -35,7 +35,7 @@ from sosmith.gen.architecture import Architecture, blocks_for, objective_of
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.output.verilog import converted, to_rtlil, to_verilog
 from sosmith.gen.picture import settled
-from sosmith.gen.specification.specification import load
+from sosmith.gen.specification.specification import from_text, load
 from sosmith.gen.word_lengths.objective import Objective
 from sosmith.model.dataflow.protection import PROTECTIONS
 
@@ -63,34 +63,41 @@ class Core:
     example : str
         Name of its specification.
     architecture : str
-        One of `ARCHITECTURES`.
+        One of `ARCHITECTURES`, or "online".
     channels : int
         Number of channels.
     protect : str
         One of `sosmith.model.dataflow.protection.PROTECTIONS`.
+    bits : int
+        Bits of input and output; 0 for those of the example.
     """
 
     example: str
     architecture: str
     channels: int = 1
     protect: str = "none"
+    bits: int = 0
 
     @property
     def key(self) -> str:
         """Key in the record."""
         guarded = "" if self.protect == "none" else f" {self.protect}"
-        return f"{self.example} {self.architecture} {self.channels}{guarded}"
+        wide = f" {self.bits} bits" if self.bits else ""
+        return f"{self.example} {self.architecture} {self.channels}{guarded}{wide}"
 
     @property
     def label(self) -> str:
         """Name in tables and messages."""
         several = f", {self.channels} channels" if self.channels > 1 else ""
         guarded = "" if self.protect == "none" else f", protect = {self.protect}"
-        return f"{self.example} {self.architecture}{several}{guarded}"
+        wide = f", {self.bits} bits" if self.bits else ""
+        return f"{self.example} {self.architecture}{several}{guarded}{wide}"
 
     @property
     def targets(self) -> list[str]:
         """Targets on which it is measured."""
+        if self.bits or self.architecture == "online":
+            return ["hx8k", "ecp5"]
         wanted = [key for key in TARGETS if key != _SMALLEST or self.architecture == "serial"]
         if self.protect == "none":
             return wanted
@@ -115,6 +122,12 @@ PROTECTED = tuple(
 )
 """Cores whose memories and states are protected."""
 
+ONLINE = (
+    Core("audio_lowpass", "online"),
+    *(Core("audio_lowpass", architecture, bits=24) for architecture in (*ARCHITECTURES, "online")),
+)
+"""Sections in on-line arithmetic, and what they are compared with for longer words."""
+
 CORES = (
     *(
         replace(core, channels=channels)
@@ -122,6 +135,7 @@ CORES = (
         for channels in sorted({*CHANNELS, *core.extra_channels})
     ),
     *PROTECTED,
+    *ONLINE,
 )
 
 Job = tuple[Core, str]
@@ -135,7 +149,7 @@ def jobs() -> list[Job]:
     def rank(job: Job) -> int:
         core, key = job
         hopeless = core.architecture == "parallel" and TARGETS[key].device.family == "ice40"
-        return 0 if job in wanted or core in PROTECTED else 1 + (core.channels > 1) + 2 * hopeless
+        return 0 if job in wanted or core in {*PROTECTED, *ONLINE} else 1 + (core.channels > 1) + 2 * hopeless
 
     return sorted(((core, key) for core in CORES for key in core.targets), key=rank)
 
@@ -147,9 +161,12 @@ def objective_on(architecture: str, key: str) -> Objective:
 
 
 @cache
-def design(example: str, architecture: str, objective: Objective) -> CoreDesign:
+def design(example: str, architecture: str, objective: Objective, bits: int = 0) -> CoreDesign:
     """Design an example in an architecture, for one channel; the datapath is the same for more."""
-    spec = load(ROOT / "examples" / f"{example}.toml")
+    path = ROOT / "examples" / f"{example}.toml"
+    spec = load(path)
+    if bits:
+        spec = from_text(spec.text.replace("bits = 16", f"bits = {bits}"), path)
     wanted = replace(spec, hardware=replace(spec.hardware, architecture=architecture))
     first = next(target for key, target in TARGETS.items() if objective_on(architecture, key) == objective)
     return design_core(wanted, core=EXAMPLES[example], board=first)
@@ -157,13 +174,14 @@ def design(example: str, architecture: str, objective: Objective) -> CoreDesign:
 
 def architecture_on(core: Core, key: str) -> Architecture:
     """Return the architecture of a core as it is designed for a target."""
-    made = design(core.example, core.architecture, objective_on(core.architecture, key)).architecture
+    made = design(core.example, core.architecture, objective_on(core.architecture, key), core.bits).architecture
     return replace(made, channels=core.channels, protect=core.protect, blocks=blocks_for(None, TARGETS[key]))
 
 
 def realization_on(core: Core, key: str) -> str:
     """Return the realization of a core on a target."""
-    return design(core.example, core.architecture, objective_on(core.architecture, key)).quantized.realization
+    objective = objective_on(core.architecture, key)
+    return design(core.example, core.architecture, objective, core.bits).quantized.realization
 
 
 @cache
@@ -238,7 +256,7 @@ def measure(processes: int) -> None:
     RECORD.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
     for core, key in jobs():
         targets = targets_in(record, core)
-        if key in targets and not targets[key]["earlier"]:
+        if key in targets and not targets[key]["earlier"] and has_all_seeds(targets[key]):
             continue
         with tempfile.TemporaryDirectory() as scratch:
             cells = synthesized(core, key, Path(scratch))
@@ -251,6 +269,11 @@ def measure(processes: int) -> None:
                 **placed(Path(scratch), key, cells, processes),
             }
         RECORD.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+
+
+def has_all_seeds(figures: Figures) -> bool:
+    """Whether a core was placed with every seed, or cannot be placed."""
+    return bool(figures["refusal"]) or len(figures["fmax"]) == len(SEEDS)
 
 
 def placed(folder: Path, key: str, cells: dict[str, int], processes: int) -> Figures:
@@ -308,12 +331,12 @@ def fmax(figures: Figures) -> float:
 
 
 def recorded(record: Figures, keys: Iterable[str]) -> Iterable[tuple[Core, str, Figures]]:
-    """Return all figures of some targets, each with its core and target, but those of protected cores."""
+    """Return all figures of some targets, each with its core and target; not those that have tables of their own."""
     return [
         (core, key, targets_in(record, core)[key])
         for core in CORES
         for key in keys
-        if core not in PROTECTED and key in targets_in(record, core)
+        if core not in {*PROTECTED, *ONLINE} and key in targets_in(record, core)
     ]
 
 
@@ -337,6 +360,39 @@ def protection_table(record: Figures) -> str:
                     f"| {bare.label} | {core.protect} | {title(TARGETS[key])} | {logic:,} | {area['flip_flops']:,} "
                     f"| {area['rams']} | {fmax(figures):.1f} | {more} | {slower} |"
                 )
+    return "\n".join(lines)
+
+
+def online_table(record: Figures) -> str:
+    """Return a Markdown table of the cores in on-line arithmetic beside those in the other architectures."""
+    columns = (
+        *("bits", "architecture", "target", "LC, or TRELLIS_COMB", "FF", "multipliers", "seeds"),
+        *("fmax, MHz (lowest to highest)", "clocks per sample", "samples per second"),
+        "logic for a million samples per second",
+    )
+    lines = [f"| {' | '.join(columns)} |", "|---" * len(columns) + "|"]
+    for bits in (0, 24):
+        for key in ONLINE[0].targets:
+            for architecture in (*ARCHITECTURES, "online"):
+                core = Core("audio_lowpass", architecture, bits=bits)
+                figures = targets_in(record, core).get(key)
+                if figures is None or figures["refusal"]:
+                    continue
+                area, rate = figures["area"], fmax(figures) / figures["cycles"]
+                row = [
+                    str(bits or 16),
+                    architecture,
+                    title(TARGETS[key]),
+                    f"{figures['cells']:,}",
+                    f"{area['flip_flops']:,}",
+                    str(area["multipliers"]),
+                    str(len(figures["fmax"])),
+                    f"{fmax(figures):.1f} ({min(figures['fmax']):.1f} to {max(figures['fmax']):.1f})",
+                    f"{figures['cycles']:,}",
+                    f"{1e6 * rate:,.0f}",
+                    f"{figures['cells'] / rate:,.0f}",
+                ]
+                lines.append(f"| {' | '.join(row)} |")
     return "\n".join(lines)
 
 
@@ -658,6 +714,16 @@ The slowest path between registers, for the median seed; registers have the name
 
 In the parallel architecture a section closes its recursion within one clock: sums, multiplication and state follow one
 another without a register. With several channels the loop is pipelined across them.
+
+## Digit by digit
+
+The online architecture ([online.md](online.md)) beside the others: audio_lowpass, one channel, with 16 bits in and out
+and with 24. A sample takes as many clocks with 24 bits as with 16.
+
+{online_table(record)}
+
+It does not win: a carry chain of an FPGA is faster than the steps that it would save, and the units of a section that
+work side by side take more logic than one set of multipliers.
 
 ## Protection
 

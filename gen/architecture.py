@@ -1,4 +1,4 @@
-"""Hardware architectures of a datapath: all operations in parallel, or one unit shared by all of them."""
+"""Hardware architectures of a datapath: all operations in parallel, one unit shared by all, or digit by digit."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, NamedTuple
 from sosmith.gen.fpga.boards import Board
 from sosmith.gen.word_lengths.cost import MULTIPLIER_BITS, Cost, cost_of, products_from_adders
 from sosmith.gen.word_lengths.objective import FEW_ADDERS, SMALL_AREA, Objective, ShortProgram, unsuitable
-from sosmith.hdl.plan import folded_clocks, parallel_clocks
+from sosmith.gen.word_lengths.online_units import OnlineUnits, online_cost, unsuitable_online
+from sosmith.hdl.plan import folded_clocks, online_clocks, parallel_clocks
 from sosmith.hdl.plan.instructions import instruction_bits
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.folding import FoldingError, program
@@ -21,6 +22,7 @@ from sosmith.model.dataflow.program import Program
 from sosmith.model.errors import ShortfallError
 from sosmith.model.reload.constants import with_room
 from sosmith.model.reload.registers import BITS
+from sosmith.model.sections.online import OnlineError, OnlineSchedule
 
 if TYPE_CHECKING:
     from amaranth.lib.wiring import Component
@@ -56,7 +58,8 @@ class Architecture:
     ----------
     name : str
         "parallel": every operation has its own hardware. "folded": one multiplier and one accumulator run a program.
-        "serial": the same without a multiplier block.
+        "serial": the same without a multiplier block. "online": sections work on signed digits, the most significant
+        first.
     datapath : Datapath
         The datapath.
     channels : int
@@ -92,19 +95,35 @@ class Architecture:
 
     @property
     def cost(self) -> Cost:
-        """Operators of the parallel architecture, before synthesis."""
-        return cost_of(self.datapath, self.adders)
+        """Operators of the online architecture, or else of the parallel one, before synthesis."""
+        return cost_of(self.datapath, self.adders) if self.online is None else online_cost(self.datapath)
+
+    @cached_property
+    def online(self) -> OnlineSchedule | None:
+        """Clocks of the units in the online architecture; None in the others.
+
+        Raises
+        ------
+        ShortfallError
+            If a section is not one for on-line arithmetic.
+        """
+        if self.name != "online":
+            return None
+        try:
+            return online_clocks.schedule_of(self.datapath)
+        except OnlineError as error:
+            raise ShortfallError(unsuitable_online(error)) from None
 
     @cached_property
     def program(self) -> Program | None:
-        """Program of the shared unit; None in the parallel architecture.
+        """Program of the shared unit; None in the parallel and the online architecture.
 
         Raises
         ------
         ShortfallError
             If the datapath cannot be folded.
         """
-        if self.name == "parallel":
+        if self.name in {"parallel", "online"}:
             return None
         try:
             made = program(self.datapath, self.digit_bits, spare_words=SPARE_WORDS * self.reload)
@@ -152,6 +171,8 @@ class Architecture:
     @property
     def latency_cycles(self) -> int:
         """Clocks from the edge that accepts a sample to the edge that can output it; an upper limit in serial."""
+        if self.online is not None:
+            return online_clocks.latency_cycles(self.datapath)
         if self.program is None:
             return parallel_clocks.latency_cycles(self.built, self.channels, protect=self.protect)
         return folded_clocks.latency_cycles(self.program, serial=self.name == "serial", protect=self.protect)
@@ -166,6 +187,8 @@ class Architecture:
     @property
     def cycles_per_sample(self) -> int:
         """Clocks between samples at the highest rate; an upper limit in serial."""
+        if self.online is not None:
+            return self.online.interval
         if self.program is None:
             return 1
         return folded_clocks.cycles_per_sample(
@@ -180,7 +203,10 @@ class Architecture:
         """Make the hardware; the top module has the name of the datapath."""
         from sosmith.hdl.core import Core  # only what makes hardware loads Amaranth
         from sosmith.hdl.folded import FoldedCore
+        from sosmith.hdl.online.core import OnlineCore
 
+        if self.online is not None:
+            return OnlineCore(self.datapath)
         if self.program is None:
             return Core(
                 self.built, self.channels, fingerprint=self.fingerprint, protect=self.protect, adders=self.adders
@@ -297,6 +323,8 @@ def objective_of(name: str, board: Board | None, *, adders: bool = False) -> Obj
 
     `adders` says that no product by a constant may take a multiplier block in the parallel one.
     """
+    if name == "online":
+        return OnlineUnits()
     if name != "parallel":
         return ShortProgram(name, digit_bits_on(board, name))
     return FEW_ADDERS if adders else SMALL_AREA
@@ -326,7 +354,7 @@ def reason_for(architecture: Architecture, budget: Budget, *, asked: bool, board
         there = f"{board.device.multipliers} multipliers" if board.device.multipliers else "no multipliers"
         smallest += f" on {board.name}, whose {board.device.title} has {there}"
     why = "asked for in the specification" if asked else refused or smallest
-    if architecture.program is None:
+    if architecture.name == "parallel":
         return f"{name}: {why}{_made_of_adders(architecture)}"
     return f"{name}: {why}; takes {needed:,} of {budget.cycles:,} clocks a sample"
 

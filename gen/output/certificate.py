@@ -21,6 +21,7 @@ from sosmith.gen.proof.cascade_proof import (
     through,
 )
 from sosmith.gen.proof.linear_model import linear_models
+from sosmith.gen.proof.online import prove_residuals
 from sosmith.gen.proof.peak_gain import Drive, difference, extent
 from sosmith.gen.proof.response import IMPULSE, Response
 from sosmith.gen.verifier.certificate_file import (
@@ -32,6 +33,8 @@ from sosmith.gen.verifier.certificate_file import (
     GainEntry,
     IdealEntry,
     NodeEntry,
+    OnlineEntry,
+    OnlineSectionEntry,
     Operation,
     PortEntry,
     SectionEntry,
@@ -46,6 +49,7 @@ from sosmith.model.dataflow.graph import Node
 from sosmith.model.errors import SpecificationError
 from sosmith.model.port import Port
 from sosmith.model.sections.horner import HornerStep
+from sosmith.model.sections.online import OnlineSchedule
 from sosmith.model.sections.output import OutputStage
 from sosmith.model.sections.start import StartStage
 
@@ -59,7 +63,12 @@ _ACCURACY = 128
 """Bits to which claims are computed, so that two methods round to the same value on the grid."""
 
 
-def certificate(quantized: Quantized, max_error: Fraction, about: AboutEntry | None = None) -> Certificate:
+def certificate(
+    quantized: Quantized,
+    max_error: Fraction,
+    about: AboutEntry | None = None,
+    online: OnlineSchedule | None = None,
+) -> Certificate:
     """Certify a design.
 
     Parameters
@@ -70,6 +79,8 @@ def certificate(quantized: Quantized, max_error: Fraction, about: AboutEntry | N
         The specified limit, in the unit of the output.
     about : AboutEntry or None
         Specification and files, from the function `about`.
+    online : OnlineSchedule or None
+        Units of sections that work in on-line arithmetic.
 
     Raises
     ------
@@ -91,7 +102,7 @@ def certificate(quantized: Quantized, max_error: Fraction, about: AboutEntry | N
             start="steady" if quantized.steady else None,
         ),
         stages=tuple(_stage(stage) for stage in datapath.stages),
-        claims=_claims(quantized, sections),
+        claims=_claims(quantized, sections).model_copy(update={"online": None if online is None else _units(online)}),
     )
     return sealed(made)
 
@@ -114,6 +125,25 @@ def about(design: CoreDesign, texts: Mapping[str, str]) -> AboutEntry:
         files=tuple(FileEntry(name=name, sha256=_sha256(text.encode())) for name, text in texts.items()),
         versions={"sosmith": __version__} | {tool: version(tool) for tool in _TOOLS},
         certificate="0" * 64,
+    )
+
+
+def _units(schedule: OnlineSchedule) -> OnlineEntry:
+    """Claim what is proven of the units of sections in on-line arithmetic."""
+    proven = zip(schedule.sections, prove_residuals(schedule), strict=True)
+    return OnlineEntry(
+        interval=schedule.interval,
+        units=schedule.units,
+        sections=tuple(
+            OnlineSectionEntry(
+                section=section.name,
+                delay=section.delay,
+                leading=section.leading,
+                residual_frac=section.residual_frac,
+                increment=increment,
+            )
+            for section, increment in proven
+        ),
     )
 
 

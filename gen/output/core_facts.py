@@ -242,7 +242,7 @@ class CoreFacts:
     architecture : str
         Name of the architecture.
     program : Program or None
-        Program of the folded and serial architectures; None in the parallel one.
+        Program of the folded and serial architectures; None in the others.
     reload : ReloadFacts or None
         Facts for reloading; None if the core is not reloadable.
     protect : str
@@ -264,7 +264,7 @@ class CoreFacts:
     aliasing : Aliasing or None
         Aliasing of an impulse-invariant filter; None for all others.
     cost : Cost
-        Operators of the parallel architecture.
+        Operators of the online architecture, or else of the parallel one.
     """
 
     core: str

@@ -67,7 +67,8 @@ def generated(
     }
     rest = {f"{name}.c": c_source(datapath), f"{name}.h": c_header(datapath), **_register_files(design)}
     progress("certificate")
-    proven = certificate(design.quantized, design.spec.max_error, about(design, {**first, **rest}))
+    told = about(design, {**first, **rest})
+    proven = certificate(design.quantized, design.spec.max_error, told, design.architecture.online)
     return {**first, f"{name}.certificate.json": certificate_text(proven), **rest}
 
 

@@ -93,9 +93,9 @@ def hardware_cost(design: CoreDesign, netlist: Netlist | None = None) -> dict[st
     Returns
     -------
     dict
-        ``source``: "synthesis" with the counted cells of `netlist`, or "estimate" of the parallel architecture before
-        synthesis, or "program" of the folded and serial architectures. ``board``: of the netlist, else None. ``luts``
-        (LUT4), ``multiplier_blocks`` and, before synthesis, ``register_bits``; of a program ``instructions``,
+        ``source``: "synthesis" with the counted cells of `netlist`, or "estimate" of the parallel and the online one
+        before synthesis, or "program" of the folded and serial architectures. ``board``: of the netlist, else None.
+        ``luts`` (LUT4), ``multiplier_blocks`` and, before synthesis, ``register_bits``; of a program ``instructions``,
         ``memory_words`` and ``accumulator_bits``. What the source does not tell is None.
     """
     made: dict[str, Any] = dict.fromkeys(

@@ -15,7 +15,7 @@ LOSSES = {
 METHODS = ("bilinear", "impulse_invariant")
 REALIZATIONS = ("auto", "df1", "df1_ef1", "df1_ef2", "df2t", "delta", "state_space", "normal", "lattice_wdf")
 STARTS = ("steady", "zero")
-ARCHITECTURES = ("auto", "parallel", "folded", "serial")
+ARCHITECTURES = ("auto", "parallel", "folded", "serial", "online")
 
 CORES = ("instrument", "filter", "calibration")
 """What can be generated from a specification: the whole instrument, or one part."""

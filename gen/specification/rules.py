@@ -52,12 +52,27 @@ def check(document: Document) -> None:
             literal(document.hardware.clock),
             where="hardware.clock",
         )
+    _check_online(document)
     if document.hardware.reload and document.hardware.multipliers is not None:
         raise UnfitError(
             '"auto" with hardware.reload = true: adders multiply by constants that are fixed',
             literal(document.hardware.multipliers),
             where="hardware.multipliers",
         )
+
+
+def _check_online(document: Document) -> None:
+    """Check that nothing is asked of the online architecture that it does not have."""
+    if document.hardware.architecture != "online":
+        return
+    asked = {
+        "channels": (document.channels, 1),
+        "hardware.reload": (document.hardware.reload, False),
+        "hardware.protect": (document.hardware.protect, "none"),
+    }
+    for where, (found, only) in asked.items():
+        if found != only:
+            raise UnfitError(f'{literal(only)} with hardware.architecture = "online"', literal(found), where=where)
 
 
 def _check_inputs(document: Document) -> None:

@@ -99,7 +99,7 @@ class HardwareSpec:
     realization : str
         "auto" or a key of `sosmith.gen.realizations.registry.REALIZATIONS`.
     architecture : str
-        "auto", "parallel", "folded" or "serial".
+        "auto", "parallel", "folded", "serial" or "online".
     clock : Fraction
         In Hz, at least the sample rate.
     reload : bool

@@ -157,11 +157,34 @@ class GainEntry(_Part):
     recursion_gain: Rational
 
 
+class OnlineSectionEntry(_Part):
+    """Claims on the units of a section in on-line arithmetic.
+
+    The digits of its result have the weights ``2**leading`` and below. A step takes digits that are `delay` places less
+    significant than the one that it gives, and adds at most `increment` to the residual, in units of that digit. The
+    residual has `residual_frac` fraction bits.
+    """
+
+    section: Text
+    delay: Annotated[int, Field(strict=True, ge=1, le=_MAX_BITS)]
+    leading: Exponent
+    residual_frac: Annotated[int, Field(strict=True, ge=1, le=_MAX_BITS)]
+    increment: Rational
+
+
+class OnlineEntry(_Part):
+    """Claims on sections in on-line arithmetic: `units` of them take turns, each a sample, `interval` clocks apart."""
+
+    interval: Annotated[int, Field(strict=True, ge=1, le=_MAX_BITS)]
+    units: Annotated[int, Field(strict=True, ge=1, le=_MAX_BITS)]
+    sections: tuple[OnlineSectionEntry, ...]
+
+
 class ClaimsEntry(_Part):
     """Claims, in output LSBs; gains have no unit, and `peak_gain` is that of the ideal filter.
 
     `settling` is the number of samples after a start from zero that are flagged, since another past could change their
-    results by more than half an LSB; None without the flag.
+    results by more than half an LSB; None without the flag. `online` is None in the other architectures.
     """
 
     budget: dict[Text, Rational]
@@ -169,6 +192,7 @@ class ClaimsEntry(_Part):
     peak_gain: Rational | None
     sections: tuple[GainEntry, ...]
     settling: Annotated[int, Field(strict=True, ge=1, le=1 << 21)] | None = None
+    online: OnlineEntry | None = None
 
 
 class FileEntry(_Part):

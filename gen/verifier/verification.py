@@ -10,7 +10,8 @@
    (`sosmith.gen.verifier.l1_response`). Every range that a BOUND states must contain the proven range, and every
    claimed figure must equal the proven one, to the last unit of the certificate's grid.
 
-5. Where a filter starts from zero, samples may be flagged until it has settled: the counter is run, and what any other
+5. Where sections work in on-line arithmetic, the sets of their residuals are followed (`sosmith.gen.verifier.online`).
+6. Where a filter starts from zero, samples may be flagged until it has settled: the counter is run, and what any other
    past could change is followed until it has faded (`sosmith.gen.verifier.settling`).
 
 The ranges hold by induction. Unbounded integers obey the linear model exactly, with the quantizers' errors as further
@@ -31,6 +32,7 @@ from flint import fmpq, fmpq_poly
 from sosmith.gen.verifier.certificate_file import Certificate, Operation, StageEntry, on_grid
 from sosmith.gen.verifier.graph import RejectedError, Transfer, check_graph, inputs_of, label, require
 from sosmith.gen.verifier.l1_response import BITS, Inverse, UndecidedError, fraction, inverse, is_stable, response
+from sosmith.gen.verifier.online import check_online
 from sosmith.gen.verifier.piecewise import Pieces
 from sosmith.gen.verifier.polynomial import output_error, polynomial_error
 from sosmith.gen.verifier.settling import check_fading, without_counter
@@ -127,6 +129,9 @@ def _verified(certificate: Certificate, progress: Progress) -> Verdict:
     if sections:
         alone = [section_alone(stage) for stage in sections] if start is not None and start.passes else sections
         cascade = _Cascade(certificate, alone, start, progress)
+        if certificate.claims.online is not None:
+            progress("units", 0, 0)
+            check_online(certificate, alone)
         for part in budget:
             budget[part] *= cascade.peak_gain
         budget["filter coefficients"], budget["filter rounding"] = cascade.coefficients, cascade.rounding
@@ -143,6 +148,7 @@ def _verified(certificate: Certificate, progress: Progress) -> Verdict:
     else:
         _compare("peak_gain of the filter", certificate.claims.peak_gain, None)
         require(settling is None, "settling must not be claimed where there are no sections")
+        require(certificate.claims.online is None, "units must not be claimed where there are no sections")
         require(not certificate.claims.sections, "the gains of sections must not be given where there are none")
     budget["output rounding"] = rounding
     _compare_budget(certificate, budget)

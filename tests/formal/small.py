@@ -109,6 +109,8 @@ def _result(graph: Graph, node: Node, operands: list[Value]) -> Value:
     """Value of a node; all operands of a sum must have the same fraction bits."""
     if node.op is Op.ADD:
         return operands[0] + operands[1]
+    if node.op is Op.CONSTANT:
+        return Const(node.parameter)
     if node.op is Op.SUBTRACT:
         return operands[0] - operands[1]
     if node.op is Op.FLOOR:

@@ -14,6 +14,7 @@ from tests.formal.small import leaky, limiter
 from tests.formal.test_streams import DIGIT_BITS, StreamRules
 
 from sosmith.hdl import core, folded, reload
+from sosmith.hdl.plan import parallel_clocks
 from sosmith.model.dataflow.folding import program
 
 
@@ -51,7 +52,7 @@ class RestartRules(StreamRules):
             super().__init__(design, 1, datapath=made, source_waits=True)
         else:
             made = replace(leaky(), wear=((0, 1),))
-            super().__init__(module.Core(made, 1, 1), core.latency_cycles(made) + 1, datapath=made)
+            super().__init__(module.Core(made, 1, 1), parallel_clocks.latency_cycles(made) + 1, datapath=made)
         self.asks = self.free(1, "asks")
 
     def state(self, m: Module) -> None:

@@ -11,7 +11,7 @@ from sosmith.gen.report.comparison.fairness import fairness
 from sosmith.gen.report.comparison.report_file import Report, fact
 from sosmith.gen.word_lengths.cost import LUTS_OF_A_BLOCK
 
-SMALLEST_FIRST = ("serial", "folded", "parallel")
+SMALLEST_FIRST = ("serial", "folded", "parallel", "online")
 """Architectures by the hardware that they take where multiplications are many: no multiplier block, one, many."""
 
 

@@ -19,6 +19,7 @@ from sosmith.gen.verifier.generated_files import (
     check_texts,
     fixed_architecture,
 )
+from sosmith.gen.verifier.graph import RejectedError
 from sosmith.gen.verifier.parallel.check import HardwareVerdict, check_hardware
 from sosmith.gen.verifier.program.check import ProgramVerdict, check_program
 from sosmith.gen.verifier.specified.stated_specification import Agreement, check_specification
@@ -126,7 +127,7 @@ class Certificate:
             Folder with the generated files: their SHA-256 must be those in the certificate, and no byte of the
             certificate's own file may have been changed. From the SystemVerilog, the program of a folded or serial
             core, and all hardware of a parallel one, is proven to compute the certificate's graph for all inputs and
-            states; cores with loadable constants or with protection are not.
+            states; online cores, and cores with loadable constants or with protection, are not.
         rebuild : bool
             Whether to generate all files again, from `spec` or the specification's text in the certificate, and compare
             them byte for byte.
@@ -159,6 +160,8 @@ class Certificate:
             if architecture in {"folded", "serial"}:
                 progress("program", 0, 0)
                 program = check_program(text, self.entries)
+            elif architecture == "online" and self.entries.claims.online is None:
+                raise RejectedError("the certificate of an online core must claim the residuals of its units")
             elif architecture == "parallel":
                 progress("hardware", 0, 0)
                 hardware = check_hardware(text, self.entries, channels)

@@ -137,7 +137,7 @@ class Design:
 
     @property
     def architecture(self) -> str:
-        """How the hardware is organized: "parallel", "folded" or "serial"."""
+        """How the hardware is organized: "parallel", "folded", "serial" or "online"."""
         return self.core.architecture.name
 
     @property
@@ -216,7 +216,8 @@ class Design:
         from sosmith.gen.output.certificate import about, certificate
         from sosmith.interface.certificate import Certificate
 
-        return Certificate(certificate(self.core.quantized, self.core.spec.max_error, about(self.core, {})))
+        core = self.core
+        return Certificate(certificate(core.quantized, core.spec.max_error, about(core, {}), core.architecture.online))
 
     def verify(self, progress: Progress = lambda step, done, total: None) -> Proof:
         """Prove the certificate, as `Certificate.verify` does."""

@@ -799,7 +799,25 @@ BAD = [
         "unknown architecture",
         CLOCK,
         CLOCK + '\narchitecture = "systolic"',
-        "hardware.architecture must be one of auto, parallel, folded, serial, not 'systolic'",
+        "hardware.architecture must be one of auto, parallel, folded, serial, online, not 'systolic'",
+    ),
+    (
+        "several channels digit by digit",
+        BASE,
+        BASE.replace(RATE, RATE + "\nchannels = 2").replace(CLOCK, CLOCK + '\narchitecture = "online"'),
+        'channels must be 1 with hardware.architecture = "online", not 2',
+    ),
+    (
+        "constants loaded digit by digit",
+        CLOCK,
+        CLOCK + '\narchitecture = "online"\nreload = true',
+        'hardware.reload must be false with hardware.architecture = "online", not true',
+    ),
+    (
+        "protection digit by digit",
+        CLOCK,
+        CLOCK + '\narchitecture = "online"\nprotect = "detect"',
+        "hardware.protect must be 'none' with hardware.architecture = \"online\", not 'detect'",
     ),
     (
         "reload is a text",

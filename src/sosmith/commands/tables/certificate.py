@@ -36,8 +36,15 @@ def print_proof(certificate: Certificate, proof: Proof) -> None:
             f"later, in {found.registers} registers, {found.states} of them states: for all inputs, stalls and resets, "
             "but for the flags outside_calibration, wear_warning and wear_critical"
         )
+    online = certificate.claims.online
+    if online is not None:
+        console.print(
+            f"[bold green]units[/]: {online.units} for each of {len(online.sections)} sections, a sample every "
+            f"{online.interval} clocks; no residual leaves its range, whatever the digits are"
+        )
     if proof.files and proof.program is None and proof.hardware is None:
-        console.print("not read: the SystemVerilog, as that of a core with loadable constants or with protection")
+        what = "an online core" if online is not None else "a core with loadable constants or with protection"
+        console.print(f"not read: the SystemVerilog, as that of {what}")
     if proof.rebuilt:
         console.print(f"[bold green]rebuilt[/]: {proof.rebuilt} files, the same byte for byte")
 

@@ -1,0 +1,1 @@
+"""On-line arithmetic: sections that work on signed digits, the most significant first."""
