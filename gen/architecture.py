@@ -13,9 +13,10 @@ from sosmith.gen.fpga.boards import Board
 from sosmith.gen.word_lengths.cost import MULTIPLIER_BITS, Cost, cost_of, products_from_adders
 from sosmith.gen.word_lengths.objective import FEW_ADDERS, SMALL_AREA, Objective, ShortProgram, unsuitable
 from sosmith.gen.word_lengths.online_units import OnlineUnits, online_cost, unsuitable_online
-from sosmith.hdl.plan import folded_clocks, online_clocks, parallel_clocks
+from sosmith.hdl.plan import decimator_clocks, folded_clocks, online_clocks, parallel_clocks
 from sosmith.hdl.plan.instructions import instruction_bits
 from sosmith.model.dataflow.datapath import Datapath
+from sosmith.model.dataflow.decimator import Decimator
 from sosmith.model.dataflow.folding import FoldingError, program
 from sosmith.model.dataflow.graph import Node, Op
 from sosmith.model.dataflow.program import Program
@@ -26,6 +27,9 @@ from sosmith.model.sections.online import OnlineError, OnlineSchedule
 
 if TYPE_CHECKING:
     from amaranth.lib.wiring import Component
+
+    from sosmith.hdl.core import Core
+    from sosmith.hdl.folded import FoldedCore
 
 DIGIT_BITS = 15
 """Width of a digit without a board: factors of 16 bits, a sign included, suit every multiplier block that is known."""
@@ -94,8 +98,13 @@ class Architecture:
         return products_from_adders(graphs, self.blocks.available if fixed else None, self.blocks.bits)
 
     @property
+    def decimator(self) -> Decimator | None:
+        """What stands before the datapath's first stage; None if all samples go in."""
+        return self.datapath.decimator
+
+    @property
     def cost(self) -> Cost:
-        """Operators of the online architecture, or else of the parallel one, before synthesis."""
+        """Operators of the online architecture, or else of the parallel one, before synthesis; no decimator's."""
         return cost_of(self.datapath, self.adders) if self.online is None else online_cost(self.datapath)
 
     @cached_property
@@ -126,7 +135,7 @@ class Architecture:
         if self.name in {"parallel", "online"}:
             return None
         try:
-            made = program(self.datapath, self.digit_bits, spare_words=SPARE_WORDS * self.reload)
+            made = program(self.datapath.behind_decimator, self.digit_bits, spare_words=SPARE_WORDS * self.reload)
             for digit_bits in range(self.digit_bits - 1, 0, -1):
                 if not self.reload or instruction_bits(made) <= BITS:  # one register holds an instruction
                     break
@@ -173,20 +182,43 @@ class Architecture:
         """Clocks from the edge that accepts a sample to the edge that can output it; an upper limit in serial."""
         if self.online is not None:
             return online_clocks.latency_cycles(self.datapath)
+        before = 0 if self.decimator is None else decimator_clocks.latency_cycles(self.decimator)
         if self.program is None:
-            return parallel_clocks.latency_cycles(self.built, self.channels, protect=self.protect)
-        return folded_clocks.latency_cycles(self.program, serial=self.name == "serial", protect=self.protect)
+            return before + parallel_clocks.latency_cycles(self.built, self.channels, protect=self.protect)
+        return before + folded_clocks.latency_cycles(self.program, serial=self.name == "serial", protect=self.protect)
 
     @property
     def reset_cycles(self) -> int:
-        """Clocks after a reset until the first sample is accepted, while memories are cleared."""
+        """Clocks after a reset until the first sample is accepted, while memories are cleared or a decimator fills."""
+        if self.decimator is not None:
+            return max(self._cleared_cycles, decimator_clocks.reset_cycles(self.decimator))
+        return self._cleared_cycles
+
+    @property
+    def _cleared_cycles(self) -> int:
         if self.program is None:
             return self.channels if self.channels > 1 else 0
         return folded_clocks.reset_cycles(self.program, self.channels)
 
     @property
     def cycles_per_sample(self) -> int:
-        """Clocks between samples at the highest rate; an upper limit in serial."""
+        """Clocks between samples at the highest rate; an upper limit in serial, and rounded up behind a decimator."""
+        return -(-self.cycles_per_result // (1 if self.decimator is None else self.decimator.factor))
+
+    @property
+    def cycles_per_result(self) -> int:
+        """Clocks between results at the highest rate; an upper limit in serial."""
+        behind, program = self._cycles_behind_decimator, self.program
+        if self.decimator is None:
+            return behind
+        if program is None:
+            return decimator_clocks.cycles_per_result(self.decimator)
+        overlaps = folded_clocks.overlaps(program, serial=self.name == "serial")
+        taken = folded_clocks.taken_cycles(program) if overlaps else behind
+        return max(decimator_clocks.cycles_per_result(self.decimator, taken), behind)
+
+    @property
+    def _cycles_behind_decimator(self) -> int:
         if self.online is not None:
             return self.online.interval
         if self.program is None:
@@ -201,23 +233,38 @@ class Architecture:
 
     def component(self) -> Component:
         """Make the hardware; the top module has the name of the datapath."""
+        made = self._behind_decimator()
+        if self.decimator is None:
+            return made
+        from sosmith.hdl.decimator import DecimatedCore
+
+        return DecimatedCore(self.datapath, made)
+
+    def _behind_decimator(self) -> Core | FoldedCore:
         from sosmith.hdl.core import Core  # only what makes hardware loads Amaranth
         from sosmith.hdl.folded import FoldedCore
         from sosmith.hdl.online.core import OnlineCore
 
         if self.online is not None:
             return OnlineCore(self.datapath)
+        given = self.decimator is not None
         if self.program is None:
             return Core(
-                self.built, self.channels, fingerprint=self.fingerprint, protect=self.protect, adders=self.adders
+                self.built.behind_decimator,
+                self.channels,
+                fingerprint=self.fingerprint,
+                protect=self.protect,
+                adders=self.adders,
+                rail_given=given,
             )
         return FoldedCore(
-            self.datapath,
+            self.datapath.behind_decimator,
             self.program,
             serial=self.name == "serial",
             channels=self.channels,
             fingerprint=self.fingerprint,
             protect=self.protect,
+            rail_given=given,
         )
 
 
@@ -244,6 +291,8 @@ class Budget:
         One of `sosmith.model.dataflow.protection.PROTECTIONS`.
     blocks : Blocks
         Multiplier blocks.
+    decimate : int
+        Samples for each result.
     """
 
     clock: Fraction
@@ -252,6 +301,7 @@ class Budget:
     reload: bool = False
     protect: str = "none"
     blocks: Blocks = NO_LIMIT
+    decimate: int = 1
 
     @property
     def adders(self) -> bool:
@@ -260,8 +310,8 @@ class Budget:
 
     @property
     def cycles(self) -> int:
-        """Clocks available for one sample of one channel."""
-        return int(self.clock / (self.sample_rate * self.channels))
+        """Clocks available for one result of one channel."""
+        return int(self.clock * self.decimate / (self.sample_rate * self.channels))
 
     def check(self, architecture: Architecture) -> None:
         """Check that `architecture` keeps up.
@@ -271,13 +321,14 @@ class Budget:
         ShortfallError
             If the architecture takes more clocks than available; gives the highest rate that it can achieve.
         """
-        needed = architecture.cycles_per_sample
+        needed = architecture.cycles_per_result
         if needed <= self.cycles:
             return
-        most, wanted = _told_apart(self.clock / (needed * self.channels), self.sample_rate)
+        most, wanted = _told_apart(self.clock * self.decimate / (needed * self.channels), self.sample_rate)
         many = f" with {self.channels:,} channels" if self.channels > 1 else ""
+        per = "a sample" if self.decimate == 1 else f"for {self.decimate} samples"
         raise ShortfallError(
-            f"the {architecture.name} architecture takes {needed:,} clock{'s' * (needed > 1)} a sample: at a clock of "
+            f"the {architecture.name} architecture takes {needed:,} clock{'s' * (needed > 1)} {per}: at a clock of "
             f"{float(self.clock):,.0f} Hz{many} the sample rate must be at most {most} Hz, not {wanted} Hz"
         )
 
@@ -348,7 +399,8 @@ def fitting(name: str, budget: Budget, datapath: Datapath, board: Board | None =
 
 def reason_for(architecture: Architecture, budget: Budget, *, asked: bool, board: Board | None, refused: str) -> str:
     """Explain the choice of an architecture; `refused` says why a smaller one was rejected, if one was tried."""
-    name, needed = architecture.name, architecture.cycles_per_sample
+    name, needed = architecture.name, architecture.cycles_per_result
+    per = "a sample" if budget.decimate == 1 else f"for {budget.decimate} samples"
     smallest = "the smallest that keeps up"
     if board is not None:
         there = f"{board.device.multipliers} multipliers" if board.device.multipliers else "no multipliers"
@@ -356,7 +408,7 @@ def reason_for(architecture: Architecture, budget: Budget, *, asked: bool, board
     why = "asked for in the specification" if asked else refused or smallest
     if architecture.name == "parallel":
         return f"{name}: {why}{_made_of_adders(architecture)}"
-    return f"{name}: {why}; takes {needed:,} of {budget.cycles:,} clocks a sample"
+    return f"{name}: {why}; takes {needed:,} of {budget.cycles:,} clocks {per}"
 
 
 def _made_of_adders(architecture: Architecture) -> str:

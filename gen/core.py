@@ -12,6 +12,7 @@ from sosmith.gen.fpga.boards import Board
 from sosmith.gen.realizations.registry import REALIZATIONS
 from sosmith.gen.specification.choices import CORES, ERROR_FEEDBACK
 from sosmith.gen.specification.specification import Specification
+from sosmith.gen.word_lengths.decimator import Front, front_of
 from sosmith.gen.word_lengths.other_realization import with_realization
 from sosmith.gen.word_lengths.quantize import Plan, least_size, plan, prove
 from sosmith.gen.word_lengths.quantized import Quantized
@@ -113,16 +114,19 @@ def design_core(
         progress("calibration")
     polynomial, fitted = polynomial_of(spec) if kind != "filter" else (None, None)
     progress("filter design")
-    ideal = filter_of(spec) if kind != "calibration" else None
+    front, decimates = _front(spec, kind)
+    ideal = None if kind == "calibration" else filter_of(spec) if front is None else front.filter
+    inputs = _inputs(spec, kind) if front is None else (front.decimator.output,)
+    max_error = spec.max_error if front is None else spec.max_error - front.error * spec.output.lsb
 
     @cache  # for all architectures that are tried
     def plan_of(name: str) -> Plan:
         progress(f"word lengths, {name}" if ideal is not None else "word lengths")
         return plan(
             name=spec.name,
-            inputs=_inputs(spec, kind),
+            inputs=inputs,
             output=spec.output,
-            max_error=spec.max_error,
+            max_error=max_error,
             ideal=ideal,
             polynomial=polynomial,
             realization=name,
@@ -161,7 +165,8 @@ def design_core(
         # Constants that are loaded may make the filter slower, and the count is not among them.
         spare = 3 if hardware.reload else 1
         flagged = with_settling(datapath, spare * samples_to_settle(datapath))
-        return fitting(name, budget, replace(flagged, calibrated=codes, wear=wear), board)
+        made = replace(flagged, calibrated=codes, wear=wear)
+        return fitting(name, budget, made if front is None else front.before(made), board)
 
     budget = Budget(
         clock=hardware.clock,
@@ -170,6 +175,7 @@ def design_core(
         reload=hardware.reload,
         protect=hardware.protect,
         blocks=blocks_for(hardware.multipliers, board),
+        decimate=1 if front is None else front.decimator.factor,
     )
     names = candidates(hardware.architecture, budget.blocks)
     refused = ""
@@ -186,9 +192,9 @@ def design_core(
     return CoreDesign(
         spec=spec,
         core=kind,
-        quantized=replace(quantized, datapath=architecture.datapath),
+        quantized=replace(quantized if front is None else front.counted(quantized), datapath=architecture.datapath),
         architecture=architecture,
-        reasons={"realization": reason, "architecture": why},
+        reasons={**decimates, "realization": reason, "architecture": why},
         fit=fitted,
         options={key: value for key, value in asked.items() if value is not None},
     )
@@ -204,6 +210,34 @@ def _chosen_core(spec: Specification, core: str | None) -> str:
             )
         return "filter"
     return core or "instrument"
+
+
+def _front(spec: Specification, core: str) -> tuple[Front | None, dict[str, str]]:
+    """Return the decimator before the filter, if there is one, and why."""
+    if spec.filter.decimate is None or core == "calibration":
+        return None, {}
+    if core != "filter":
+        raise SpecificationError(
+            f"{spec.path}: not yet available: the core must be filter with filter.decimate, not {core}"
+        )
+    (x,) = _inputs(spec, core)
+    front, reason = front_of(spec.filter, spec.sample_rate, x, spec.output, spec.max_error)
+    return front, {"decimation": reason}
+
+
+def refuse_decimated(design: CoreDesign, where: str) -> None:
+    """Refuse a core with a decimator `where` only others can be.
+
+    Raises
+    ------
+    SpecificationError
+        If the core has one.
+    """
+    decimator = design.datapath.decimator
+    if decimator is not None:
+        raise SpecificationError(
+            f"{design.spec.path}: not yet available: filter.decimate must be left out {where}, not {decimator.factor}"
+        )
 
 
 def _known(wanted: str) -> str:

@@ -19,14 +19,18 @@ from sosmith.model.traces.trace_file import read_traces
 
 def bench_of(design: CoreDesign, *, errors: bool = True) -> Bench:
     """Return the properties of a core that scenarios depend on; one alone needs the responses to `errors`."""
-    quantized = design.quantized
+    quantized, decimator = design.quantized, design.datapath.decimator
+    response = np.ones(1) if quantized.filter is None else quantized.filter.impulse_response
+    responses = tuple(error_responses(quantized)) if errors else ()
+    if decimator is not None:  # as the input sees them, at the higher rate
+        response, responses = decimator.before(response), tuple(map(decimator.before, responses))
     return Bench(
         ports=design.datapath.inputs,
         output=design.datapath.output,
         sample_rate=design.spec.sample_rate,
         polynomial=quantized.polynomial,
-        impulse_response=np.ones(1) if quantized.filter is None else quantized.filter.impulse_response,
-        error_responses=tuple(error_responses(quantized)) if errors else (),
+        impulse_response=response,
+        error_responses=responses,
     )
 
 

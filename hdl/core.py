@@ -47,8 +47,8 @@ from typing import NamedTuple
 from amaranth.hdl import Cat, ClockDomain, ClockSignal, Const, Module, Mux, ResetSignal, Signal, Value
 from amaranth.lib import wiring
 
-from sosmith.hdl.axi_lite import forward_slave, slave_members
 from sosmith.hdl.axi_stream import StreamBuffer, core_members, extended
+from sosmith.hdl.bus.axi_lite import forward_slave, slave_members
 from sosmith.hdl.constant_banks import NO_CONSTANTS, ConstantBanks, Pair
 from sosmith.hdl.fault_guard import FaultGuard
 from sosmith.hdl.interleaved import InterleavedStage
@@ -57,7 +57,15 @@ from sosmith.hdl.plan.parallel_clocks import depths
 from sosmith.hdl.plan.streams import channel_bits, fields, width
 from sosmith.hdl.reload import ReloadPort
 from sosmith.hdl.stage import PipelinedStage
-from sosmith.hdl.status import at_rail, flag_count, in_order, outside_calibration, with_fault, worn
+from sosmith.hdl.status import (
+    at_rail,
+    flag_count,
+    in_order,
+    members_behind_decimator,
+    outside_calibration,
+    with_fault,
+    worn,
+)
 from sosmith.model.dataflow.datapath import Datapath, Stage
 from sosmith.model.reload.constants import constants
 from sosmith.model.reload.registers import ADDRESS_BITS
@@ -124,6 +132,8 @@ class Core(wiring.Component):
         One of `sosmith.model.dataflow.protection.PROTECTIONS`.
     adders : sequence of collection of int
         Products by constants that are made of adders, by stage and node; only without a fingerprint.
+    rail_given : bool
+        Whether the flag `input_at_rail` comes with a sample, and is not read off its codes.
 
     Members
     -------
@@ -133,6 +143,8 @@ class Core(wiring.Component):
         Synchronous reset, active low.
     s_axis_tdata, s_axis_tvalid, s_axis_tready
         Input samples: one field per input port, each extended to whole bytes, the first one lowest.
+    s_axis_tuser : In(1)
+        The flag `input_at_rail` of the sample; only if it is given.
     m_axis_tdata, m_axis_tvalid, m_axis_tready
         Output samples: one field, extended likewise.
     m_axis_tuser : Out(8)
@@ -151,13 +163,17 @@ class Core(wiring.Component):
         *,
         protect: str = "none",
         adders: Sequence[Collection[int]] = (),
+        rail_given: bool = False,
     ) -> None:
         self.protect = protect
         self.adders = adders or [()] * len(datapath.stages)
         self.datapath = datapath
         self.channels = channels
         self.fingerprint = fingerprint
+        self.rail_given = rail_given
         members = core_members(datapath.inputs, datapath.output, channels)
+        if rail_given:
+            members |= members_behind_decimator(datapath)
         super().__init__(members if fingerprint is None else members | slave_members(ADDRESS_BITS))
 
     def elaborate(self, platform: object) -> Module:
@@ -185,7 +201,7 @@ class Core(wiring.Component):
         port = None
         if banks is not None:
             port = self._reload(m, banks, bank, Cat(waiting, *(component.uses for component in stages)), swap)
-        status: Value = Cat(at_rail(self.datapath.inputs, data), outside_calibration(self.datapath, data))
+        status = self._status(data)
         last, (code, *counted) = self._chain(m, stages, first, data)
         for k in range(sum(depths(self.datapath, self.channels, self.protect))):
             held = Signal(len(status), name=f"status{k + 1}", reset_less=True)
@@ -220,6 +236,11 @@ class Core(wiring.Component):
             self._report(m, guard, port, stages, valid & wear.corrected & buffer.advance)
         self._hand_out(m, buffer, valid, code, flags, channel)
         return m
+
+    def _status(self, data: Value) -> Value:
+        """Return the flags that are known with a sample as it comes in."""
+        rail = self.s_axis_tuser if self.rail_given else at_rail(self.datapath.inputs, data)
+        return Cat(rail, outside_calibration(self.datapath, data))
 
     @property
     def _restarts(self) -> bool:

@@ -67,8 +67,8 @@ from amaranth.hdl import Cat, ClockDomain, ClockSignal, Const, Module, Mux, Rese
 from amaranth.lib import wiring
 from amaranth.lib.memory import Memory
 
-from sosmith.hdl.axi_lite import forward_slave, slave_members
 from sosmith.hdl.axi_stream import core_members, extended
+from sosmith.hdl.bus.axi_lite import forward_slave, slave_members
 from sosmith.hdl.check_bits import CheckBits
 from sosmith.hdl.fault_guard import FaultGuard
 from sosmith.hdl.instruction import PipelinedInstruction
@@ -77,7 +77,7 @@ from sosmith.hdl.plan.folded_clocks import FOLDED_DEPTH, SERIAL_DEPTH, memory_de
 from sosmith.hdl.plan.instructions import address_bits, encoded, instruction_bits
 from sosmith.hdl.plan.streams import channel_bits, fields
 from sosmith.hdl.reload import ReloadPort
-from sosmith.hdl.status import at_rail, in_order, with_fault, worn
+from sosmith.hdl.status import at_rail, in_order, members_behind_decimator, with_fault, worn
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.graph import Op
 from sosmith.model.dataflow.program import (
@@ -137,6 +137,8 @@ class FoldedCore(wiring.Component):
         Fingerprint of the structure, 32 bits; None for a core whose program cannot be loaded.
     protect : str
         One of `sosmith.model.dataflow.protection.PROTECTIONS`, for all memories.
+    rail_given : bool
+        Whether the flag `input_at_rail` comes with a sample, and is not read off its codes.
 
     Members
     -------
@@ -155,6 +157,7 @@ class FoldedCore(wiring.Component):
         channels: int = 1,
         fingerprint: int | None = None,
         protect: str = "none",
+        rail_given: bool = False,
     ) -> None:
         self.datapath = datapath
         self.program = program
@@ -162,7 +165,10 @@ class FoldedCore(wiring.Component):
         self.channels = channels
         self.fingerprint = fingerprint
         self.protect = protect
+        self.rail_given = rail_given
         members = core_members(datapath.inputs, datapath.output, channels)
+        if rail_given:
+            members |= members_behind_decimator(datapath)
         super().__init__(members if fingerprint is None else members | slave_members(ADDRESS_BITS))
 
     def elaborate(self, platform: object) -> Module:
@@ -588,7 +594,8 @@ class FoldedCore(wiring.Component):
         rail = Signal(reset_less=True)
         outside = Signal(reset_less=True)
         with m.If(begins):
-            m.d.sync += [rail.eq(at_rail(self.datapath.inputs, self.s_axis_tdata)), outside.eq(0)]
+            found = self.s_axis_tuser if self.rail_given else at_rail(self.datapath.inputs, self.s_axis_tdata)
+            m.d.sync += [rail.eq(found), outside.eq(0)]
         if self.fingerprint is not None or any(i.opcode is Opcode.JUDGE for i in self.program.instructions):
             judges = last.valid & last.has(Opcode.JUDGE) & added[-1]
             if self.datapath.settles:

@@ -22,8 +22,8 @@ from amaranth.lib import wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
-from sosmith.hdl.axi_lite import SerialSlave, forward_slave, slave_members
-from sosmith.hdl.serial_crc import SerialCrc
+from sosmith.hdl.bus.axi_lite import SerialSlave, forward_slave, slave_members
+from sosmith.hdl.bus.serial_crc import SerialCrc
 from sosmith.model.reload.registers import (
     ADDRESS_BITS,
     BITS,
@@ -55,7 +55,7 @@ class ReloadPort(wiring.Component):
     A reset ends a load and drops a pending swap. It changes neither the active bank nor its version, because it could
     not restore the memories: the core goes on with the set that it has.
 
-    Latency and throughput: those of `sosmith.hdl.axi_lite.SerialSlave`.
+    Latency and throughput: those of `sosmith.hdl.bus.axi_lite.SerialSlave`.
 
     Parameters
     ----------

@@ -21,6 +21,7 @@ from typing import NamedTuple
 
 from amaranth.hdl import Cat, Const, Module, Value
 from amaranth.lib.memory import Memory
+from amaranth.lib.wiring import In, Out
 
 from sosmith.hdl.check_bits import CheckBits
 from sosmith.hdl.plan.streams import fields
@@ -59,6 +60,15 @@ def flag_count(datapath: Datapath) -> int:
     if datapath.settles:
         return Flag.SETTLING + 1
     return Flag.WEAR_CRITICAL + 1 if datapath.wear else Flag.OUTPUT_SATURATED + 1
+
+
+def members_behind_decimator(datapath: Datapath) -> dict[str, In | Out]:
+    """Return the members of a core that differ where its samples come from a decimator.
+
+    The code of a sample is as wide as it is, and the flag `input_at_rail` comes with it.
+    """
+    (port,) = datapath.inputs
+    return {"s_axis_tdata": In(port.bits), "s_axis_tuser": In(1), "m_axis_tuser": Out(flag_count(datapath))}
 
 
 def in_order(datapath: Datapath, judged: Value, saturated: Value, wear: Wear, settling: Value) -> Value:

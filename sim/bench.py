@@ -43,7 +43,7 @@ class Bench(Protocol):
         ...
 
     def run(self, sent: Beats, progress: Progress) -> BenchRun:
-        """Reset the core, send it all beats of `sent`, and receive the same number of beats.
+        """Reset the core, send it all beats of `sent`, and receive all their results.
 
         Raises
         ------

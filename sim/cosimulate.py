@@ -21,9 +21,9 @@ class CosimulationResult:
 
     Attributes
     ----------
-    codes : int64 array, shape (samples, channels, outputs)
+    codes : int64 array, shape (results, channels, outputs)
         Output codes.
-    status : uint8 array, shape (samples, channels)
+    status : uint8 array, shape (results, channels)
         Status of the outputs, 0 if the core has none.
     cycles : int
         Clocks from the end of reset to the last sample received.
@@ -80,6 +80,8 @@ def cosimulate(
     samples, channels, _ = codes.shape
     order = random_order(samples, channels, seed)
     run = bench.run(pack(codes, order, interface.inputs), progress)
+    if interface.samples_per_result > 1:
+        order = random_order(-(-samples // interface.samples_per_result), channels, seed)
     result, status = unpack(run.received, order, interface.outputs)
     return CosimulationResult(
         codes=result,

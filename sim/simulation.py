@@ -15,7 +15,7 @@ from typing import TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from sosmith.gen.core import CoreDesign
+from sosmith.gen.core import CoreDesign, refuse_decimated
 from sosmith.gen.fpga.boards import Board
 from sosmith.gen.fpga.synthesis import Netlist, synthesize
 from sosmith.gen.instrument.uncertainty_budget import budget_json, budget_of
@@ -32,7 +32,7 @@ from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.model.arrays import Codes, Values
 from sosmith.model.dataflow.status import Flag
 from sosmith.model.errors import SpecificationError
-from sosmith.model.reference.golden import calibrated, filtered
+from sosmith.model.reference.golden import calibrated, entering_filter, filtered
 from sosmith.model.text_files import write_contents, write_files
 from sosmith.model.traces.trace import Trace
 from sosmith.sim.cosimulate import CosimulationResult, cosimulate
@@ -83,6 +83,8 @@ def simulate(
     """
     started = time.monotonic()
     check_name(simulator, netlist=gates is not None)
+    if vectors is not None:
+        refuse_decimated(design, "with vectors")
     with _alone_in(directory):
         for stale in ("report.json", "report.html"):  # of a run of another core, in case this run fails
             (directory / stale).unlink(missing_ok=True)
@@ -160,13 +162,16 @@ def _evidence(
     quantized, datapath = design.quantized, design.datapath
     output = datapath.output
     codes = np.stack([trace.codes for trace in traces], axis=1)
-    expected = datapath.compute(codes)
+    expected, provenance = datapath.compute(codes), provenance_of(design, traces, netlist)
     received = result.codes[:, :, 0]
     differs = (expected != received) | (datapath.compute_status(codes) != result.status)
     wrong = np.flatnonzero(differs.any(axis=1))
-    unfiltered = np.stack([calibrated(t.codes, datapath.inputs, quantized.polynomial) for t in traces], axis=1)
     sos = None if quantized.filter is None else quantized.filter.sos
-    golden = np.stack([filtered(column, sos, output, steady=quantized.steady) for column in unfiltered.T], axis=1)
+    entering = [entering_filter(t.codes, datapath, quantized.polynomial) for t in traces]
+    golden = np.stack([filtered(column, sos, output, steady=quantized.steady) for column in entering], axis=1)
+    if datapath.decimator is not None:  # what is told of a sample is told of those that bring a result
+        traces = [trace.every(datapath.decimator.factor) for trace in traces]
+    unfiltered = np.stack([calibrated(t.codes, datapath.inputs, quantized.polynomial) for t in traces], axis=1)
     trace, worth = traces[0], budget_of(design)
     low, high = output.decode(np.array([output.lowest, output.highest]))
     evidence = Evidence(
@@ -212,8 +217,9 @@ def _evidence(
         unsettled=(result.status >> Flag.SETTLING & 1).astype(np.bool_) if datapath.settles else None,
         uncertainty=None if worth is None else budget_json(worth),
         filter=filter_facts(quantized),
+        decimation=facts.decimation,
         alternatives=_alternatives(quantized, codes, golden),
-        provenance=provenance_of(design, traces, netlist),
+        provenance=provenance,
         specification=design.spec.path.name,
     )
     return evidence.of_channel(0) if len(traces) == 1 else evidence

@@ -73,7 +73,7 @@ class SimulatorBench:
         return self.simulator
 
     def run(self, sent: Beats, progress: Progress) -> BenchRun:
-        """Reset the core, send it all beats of `sent`, and receive the same number of beats.
+        """Reset the core, send it all beats of `sent`, and receive all their results.
 
         Raises
         ------
@@ -89,7 +89,7 @@ class SimulatorBench:
             self._write_job(plain, tool)
             sent.save(plain / "sent.npy")
             self.announce(self._building(plain, tool))
-            _run(plain, tool, len(sent), progress)
+            _run(plain, tool, -(-len(sent) // self.interface.samples_per_result), progress)
         outcome = json.loads((folder / "result.json").read_text(encoding="utf-8"))
         if outcome["failure"] is not None:
             raise ShortfallError(f"{self.interface.name} in {self.simulator}: {outcome['failure']}")
@@ -135,6 +135,7 @@ class SimulatorBench:
             "compiled": self.compiled and self.simulator != "icarus" and not self.waves,
             "latency_cycles": self.interface.latency_cycles,
             "reset_cycles": self.interface.reset_cycles,
+            "samples_per_result": self.interface.samples_per_result,
         }
         (folder / "core.sv").write_bytes(self.source.read_bytes())
         (folder / "job.json").write_text(json.dumps(job), encoding="utf-8")

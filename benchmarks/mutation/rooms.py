@@ -115,6 +115,7 @@ ROOMS = {
         files=(
             "hdl/[!fi]*.py",
             "hdl/fault_guard.py",
+            "hdl/bus/serial_crc.py",
             "hdl/interleaved.py",
             "hdl/plan/[!fi]*.py",
             "hdl/plan/interleaving.py",

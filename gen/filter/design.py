@@ -73,6 +73,8 @@ class Filter:
         filter far more accurately than that of `rows`: proofs compare with it.
     aliasing : Aliasing or None
         Deviation of an impulse-invariant filter from its analog model; None for all others.
+    decimated : int
+        Factor of the decimator in front, which hands on samples at `sample_rate`; 1 without one.
     """
 
     sample_rate: float
@@ -87,6 +89,7 @@ class Filter:
     rows: tuple[Row, ...]
     exact: tuple[Exact, ...]
     aliasing: Aliasing | None = None
+    decimated: int = 1
 
     @property
     def sos(self) -> Array:
@@ -121,13 +124,14 @@ class Filter:
 
     @property
     def describe(self) -> str:
-        """One-line description: family, kind, order, cutoff, sample rate, and the method if it is not the default."""
+        """One-line description: family, kind, order, cutoff, sample rate, and what else is not the default."""
         if self.cutoff is None:
             return f"{len(self.rows)} given section{'s' * (len(self.rows) > 1)} at {self.sample_rate:g} Hz"
         edges = " to ".join(f"{edge:.6g}" for edge in self.cutoff)
         method = "" if self.aliasing is None else ", impulse-invariant"
         filter_ = f"{self.family.capitalize()} {self.kind}, order {self.order}"
-        return f"{filter_}, {edges} Hz at {self.sample_rate:g} Hz{method}"
+        decimated = f", decimated by {self.decimated}" if self.decimated > 1 else ""
+        return f"{filter_}, {edges} Hz at {self.sample_rate:g} Hz{method}{decimated}"
 
 
 def impulse_response(sos: Array) -> Array:

@@ -29,6 +29,7 @@ from sosmith.gen.verifier.certificate_file import (
     AboutEntry,
     Certificate,
     ClaimsEntry,
+    DecimationEntry,
     FileEntry,
     GainEntry,
     IdealEntry,
@@ -43,7 +44,7 @@ from sosmith.gen.verifier.certificate_file import (
     sealed,
 )
 from sosmith.gen.version import __version__
-from sosmith.gen.word_lengths.quantized import START, Quantized
+from sosmith.gen.word_lengths.quantized import DECIMATION, START, Quantized
 from sosmith.model.dataflow.datapath import Stage
 from sosmith.model.dataflow.graph import Node
 from sosmith.model.errors import SpecificationError
@@ -101,10 +102,26 @@ def certificate(
             sections=tuple(SectionEntry(numerator=b, denominator=a) for b, a in sections),
             start="steady" if quantized.steady else None,
         ),
+        decimation=_decimation(quantized),
         stages=tuple(_stage(stage) for stage in datapath.stages),
         claims=_claims(quantized, sections).model_copy(update={"online": None if online is None else _units(online)}),
     )
     return sealed(made)
+
+
+def _decimation(quantized: Quantized) -> DecimationEntry | None:
+    decimator, found = quantized.datapath.decimator, quantized.decimation
+    if decimator is None or found is None:
+        return None
+    return DecimationEntry(
+        factor=decimator.factor,
+        stages=decimator.stages,
+        width=decimator.width,
+        dropped=decimator.dropped,
+        correction=found.correction,
+        edge=found.edge / found.sample_rate,
+        aliasing=tuple(map(on_grid, found.aliasing)),
+    )
 
 
 def about(design: CoreDesign, texts: Mapping[str, str]) -> AboutEntry:
@@ -195,6 +212,9 @@ def _claims(quantized: Quantized, ideal: Sequence[TransferFunction]) -> ClaimsEn
         budget["filter coefficients"], budget["filter rounding"] = closer.coefficients, closer.rounding
         for part in budget.keys() & {"calibration", "input scaling"}:
             budget[part] = quantized.input_error * gain
+        decimator = quantized.datapath.decimator
+        if DECIMATION in budget and decimator is not None:
+            budget[DECIMATION] = decimator.rounding / quantized.datapath.output.lsb * gain
         if quantized.steady:
             budget[START] = on_grid(budget[START])
         sections = tuple(_gains(s.name, m) for s, m in zip(quantized.sections, models, strict=True))

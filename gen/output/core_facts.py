@@ -9,6 +9,7 @@ from typing import Any
 
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.filter.impulse_invariance import Aliasing
+from sosmith.gen.output.decimation_facts import DecimationFacts, decimation_facts
 from sosmith.gen.proof.limit_cycles import limit_cycles, recursions
 from sosmith.gen.proof.linear_model import linear_model
 from sosmith.gen.proof.settling import SETTLED
@@ -64,6 +65,8 @@ class InterfaceFacts:
         Clocks after a reset until the first sample is accepted.
     latency_cycles : int
         Largest number of clocks from the edge that accepts a sample to the edge that can output its result.
+    samples_per_result : int
+        Samples of a channel for each result; the first sample brings one, and then every so many of them.
     """
 
     name: str
@@ -71,6 +74,7 @@ class InterfaceFacts:
     outputs: StreamFacts
     reset_cycles: int
     latency_cycles: int
+    samples_per_result: int = 1
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -230,7 +234,7 @@ class CoreFacts:
     interface : InterfaceFacts
         Streams and clocks.
     cycles_per_sample : int
-        Largest number of clocks between samples at the highest rate.
+        Largest number of clocks between samples at the highest rate; with a decimator on average, rounded up.
     wear : tuple of WearFacts or None
         One for all channels, or one for each; None without wear limits.
     realization : str or None
@@ -263,6 +267,8 @@ class CoreFacts:
         One for each of `sections`.
     aliasing : Aliasing or None
         Aliasing of an impulse-invariant filter; None for all others.
+    decimation : DecimationFacts or None
+        The decimator before the filter; None without one.
     cost : Cost
         Operators of the online architecture, or else of the parallel one.
     """
@@ -288,6 +294,7 @@ class CoreFacts:
     unit: str
     limit_cycles: tuple[LimitCycleFacts, ...]
     aliasing: Aliasing | None
+    decimation: DecimationFacts | None
     cost: Cost
 
     @property
@@ -323,6 +330,7 @@ def core_facts(design: CoreDesign) -> CoreFacts:
         unit=output.unit,
         limit_cycles=tuple(_limit_cycles(name, graph, output) for name, graph in parts),
         aliasing=None if quantized.filter is None else quantized.filter.aliasing,
+        decimation=decimation_facts(design),
         cost=architecture.cost,
     )
 
@@ -337,6 +345,7 @@ def interface_facts(design: CoreDesign) -> InterfaceFacts:
         outputs=StreamFacts(fields=fields((datapath.output,)), dest_width=width, flags=flags),
         reset_cycles=design.architecture.reset_cycles,
         latency_cycles=design.architecture.latency_cycles,
+        samples_per_result=1 if datapath.decimator is None else datapath.decimator.factor,
     )
 
 

@@ -58,7 +58,10 @@ def _title(design: CoreDesign, facts: CoreFacts) -> str:
     (output,) = facts.interface.outputs.fields
     made = " ".join(filter(None, (facts.architecture, facts.realization)))
     channels = "1 channel" if facts.channels == 1 else f"{facts.channels} channels"
-    return f"{inputs} to {output.port.name}, {channels} at {float(design.spec.sample_rate):g} Hz, {made}"
+    rate = f"{float(design.spec.sample_rate):g} Hz"
+    if facts.decimation is not None:
+        rate += f", decimated by {facts.decimation.factor}"
+    return f"{inputs} to {output.port.name}, {channels} at {rate}, {made}"
 
 
 def _promise(facts: CoreFacts) -> Sequence[str]:
@@ -72,12 +75,16 @@ def _promise(facts: CoreFacts) -> Sequence[str]:
 
 def _timing(design: CoreDesign, facts: CoreFacts) -> Sequence[str]:
     every = "clock" if facts.cycles_per_sample == 1 else f"{facts.cycles_per_sample} clocks"
+    taken, its = f"A sample is taken every {every} at best", "its sample"
+    if facts.decimation is not None:
+        found = facts.decimation
+        taken = f"{found.factor} samples are taken every {found.cycles_per_result} clocks at best"
+        its = "the last of its samples"
     ready = facts.interface.reset_cycles
     first = f", the first {ready} clocks after reset" if ready else ""
     return (
-        f"Clock: {float(design.spec.hardware.clock) / 1e6:g} MHz in the specification. "
-        f"A sample is taken every {every} at best{first}.",
-        f"A result leaves at most {facts.interface.latency_cycles} clocks after its sample, if it need not wait.",
+        f"Clock: {float(design.spec.hardware.clock) / 1e6:g} MHz in the specification. {taken}{first}.",
+        f"A result leaves at most {facts.interface.latency_cycles} clocks after {its}, if it need not wait.",
     )
 
 

@@ -6,6 +6,7 @@ from dataclasses import asdict
 from typing import Any
 
 from sosmith.gen.output.core_facts import CoreFacts, LimitCycleFacts, SectionFacts, StreamFacts
+from sosmith.gen.output.decimation_facts import DecimationFacts
 from sosmith.gen.version import __version__
 from sosmith.model.dataflow.program import Program
 from sosmith.model.dataflow.status import STATUS_BITS
@@ -41,6 +42,7 @@ def manifest(facts: CoreFacts) -> dict[str, Any]:
         "error_unit": facts.unit,
         "limit_cycles": [limit_cycle_entry(found) for found in facts.limit_cycles],
         "aliasing": None if facts.aliasing is None else _entry(facts.aliasing),
+        "decimation": None if facts.decimation is None else _decimation(facts.decimation),
         "cost": {
             "multipliers": [list(size) for size in facts.cost.multipliers],
             "adder_bits": facts.cost.adder_bits,
@@ -53,6 +55,10 @@ def limit_cycle_entry(found: LimitCycleFacts) -> dict[str, Any]:
     """Return the facts about a section's limit cycles as JSON values; the weights are rationals as strings."""
     weights = None if found.lyapunov is None else [str(weight) for weight in found.lyapunov]
     return _entry(found) | {"lyapunov": weights}
+
+
+def _decimation(facts: DecimationFacts) -> dict[str, Any]:
+    return _entry(facts) | {"aliasing": [_entry(band) for band in facts.aliasing]}
 
 
 def _entry(facts: Any) -> dict[str, Any]:

@@ -9,8 +9,8 @@ from amaranth.lib.wiring import Out
 
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.output.core_facts import InterfaceFacts
-from sosmith.hdl.axi_lite import slave_members
 from sosmith.hdl.axi_stream import core_members
+from sosmith.hdl.bus.axi_lite import slave_members
 from sosmith.model.reload.registers import ADDRESS_BITS
 
 

@@ -54,6 +54,8 @@ def behaviour(evidence: Evidence) -> Behaviour:
     facts, span = evidence.filter, evidence.high - evidence.low
     step = None if facts is None else _step(facts, evidence.lsb, span)
     delay = None if facts is None else _delay(facts)
+    if delay is not None and evidence.decimation is not None:
+        delay = evidence.decimation.delay, delay[1]  # of decimator and filter, at zero frequency as the filter's own
     return Behaviour(
         true_error=None if error is None else error_statistics(error),
         readings=0 if error is None else error.size,

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from sosmith.gen.filter.response import FilterFacts
 from sosmith.gen.fpga.synthesis import Netlist
 from sosmith.gen.output.core_facts import LimitCycleFacts, NodeFormat, SectionFacts, SettlingFacts
+from sosmith.gen.output.decimation_facts import DecimationFacts
 from sosmith.gen.report.provenance import Provenance
 from sosmith.gen.report.recursion import Recursion
 
@@ -111,6 +112,8 @@ class Evidence:
         Channel that the sample arrays are of, where they are of one of several.
     filter : FilterFacts or None
         None for a core without a filter.
+    decimation : DecimationFacts or None
+        The decimator before the filter; None without one.
     alternatives : sequence of Alternative
         Other realizations at the same word lengths, possibly none.
     provenance : Provenance or None
@@ -166,6 +169,7 @@ class Evidence:
     uncertainty: Mapping[str, Any] | None = None
     shown_channel: int | None = None
     filter: FilterFacts | None = None
+    decimation: DecimationFacts | None = None
     gates: Netlist | None = None
     alternatives: Sequence[Alternative] = ()
     provenance: Provenance | None = None

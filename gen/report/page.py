@@ -12,6 +12,7 @@ from typing import Any
 from sosmith.gen.filter.response import FilterFacts
 from sosmith.gen.filter.step_response import SETTLED, StepResponse
 from sosmith.gen.fpga.synthesis import Netlist
+from sosmith.gen.output.decimation_facts import DecimationFacts
 from sosmith.gen.quantity import LEAST_PART, count, decibels, duration, plain_number, quantity, scale, unit_symbol
 from sosmith.gen.report import plots
 from sosmith.gen.report.behaviour import behaviour
@@ -271,6 +272,31 @@ def _limit_cycles_table(evidence: Evidence) -> Table:
     return Table(head=head, rows=rows, numbers=range(1, 6))
 
 
+_BANDS = 8
+"""Bands of a decimator that are told one by one; the gain falls from band to band."""
+
+
+def _decimation_table(found: DecimationFacts) -> Table:
+    """Tell what folds into the pass band from each band around a multiple of the lower rate."""
+    shown, others = found.aliasing[:_BANDS], found.aliasing[_BANDS:]
+    rows = [(f"{_hertz((band.low,))} to {_hertz((band.high,))}", decibels(band.gain_db)) for band in shown]
+    if others:
+        most = max(band.gain_db for band in others)
+        rows.append((f"{len(others)} more, up to {_hertz((others[-1].high,))}", decibels(most)))
+    return Table(head=("from", "gain at most"), rows=rows, numbers=(1,))
+
+
+def _decimation_caption(found: DecimationFacts, unit: str) -> str:
+    worst, rate = amount(found.worst_aliasing, unit), _hertz((found.sample_rate,))
+    return (
+        f"{found.factor} samples make one result, by {count(found.stages, 'stage')} of integrators and combs of "
+        f"{found.width} bits, and the filter works at {rate}. A sine over the whole range of the input in one of these "
+        f"bands comes out in the pass band with an amplitude of at most {worst}. In the pass band the gain is within "
+        f"{plain_number(found.deviation_db)} dB of that without a decimator, and decimator and filter together delay "
+        f"by {amount(found.delay, 's')}."
+    )
+
+
 def _hertz(edges: Sequence[float]) -> str:
     """Frequencies as they were asked for, to seven digits, without trailing zeros."""
     scaled = [(edge, *scale(edge, "Hz")) for edge in edges]
@@ -448,6 +474,9 @@ def render_page(evidence: Evidence, summary: Summary) -> str:
         parts |= _filter_figures(shown.filter)
         parts["step"] = None if found.step is None else _step_figure(found.step)
         parts["response"] = _response_table(shown.filter, summary["frequency_response"])
+    if evidence.decimation is not None:
+        parts["decimation"] = _decimation_table(evidence.decimation)
+        parts["decimation_caption"] = _decimation_caption(evidence.decimation, evidence.unit)
     return render(
         "sosmith.gen.report",
         "report.html.jinja",

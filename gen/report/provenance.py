@@ -73,8 +73,14 @@ def reference_digest(design: CoreDesign) -> str:
             "range": [str(output.zero + output.lsb * code) for code in (output.lowest, output.highest + 1)],
             "unit": output.unit,
             "channels": design.spec.channels,
+            **_decimation(design),
         }
     )
+
+
+def _decimation(design: CoreDesign) -> dict[str, Any]:
+    decimator = design.datapath.decimator
+    return {} if decimator is None else {"decimation": [decimator.factor, decimator.stages]}
 
 
 def trace_digest(traces: Sequence[Trace]) -> str:

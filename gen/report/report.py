@@ -89,7 +89,8 @@ def summarise(evidence: Evidence) -> dict[str, Any]:
         this run, waiting included), ``start_up.{samples,seconds,limit}`` (None unless the filter starts from zero;
         ``accuracy_percent`` and ``true_error`` leave these samples out, unless the trace marks its readings),
         ``uncertainty`` (the budget of a reading in the terms of the GUM, at the point where it is largest; None if
-        nothing is known of what the calibration is worth), ``alternatives``, ``limit_cycles``, ``tools``,
+        nothing is known of what the calibration is worth), ``decimation`` (factor, stages, delay, and what folds into
+        the pass band; None without a decimator), ``alternatives``, ``limit_cycles``, ``tools``,
         ``sosmith_version``, ``date`` (as given by the user, else None), ``files`` (SHA-256 of each generated file),
         ``true_error.{max_abs,rms,mean,readings}`` (hardware against the true value at the readings),
         ``delay.{seconds,frequency}`` (group delay, and where it is taken), ``settling.{seconds,half_lsb_seconds,
@@ -141,6 +142,7 @@ def summarise(evidence: Evidence) -> dict[str, Any]:
         "range": [evidence.low, evidence.high],
         "sqnr_db": sqnr_db(evidence.golden, evidence.error),
         "frequency_response": _response_summary(measures),
+        "decimation": None if evidence.decimation is None else asdict(evidence.decimation),
         "accuracy_percent": _accuracy(evidence),
         "uncertainty": evidence.uncertainty,
         "start_up": None if evidence.settling is None else asdict(evidence.settling),

@@ -110,7 +110,8 @@ def _delay(evidence: Evidence, found: Behaviour) -> Tile | None:
     clocks = f"{count(evidence.latency_cycles, 'clock cycle')} from input to output"
     if found.delay is None or found.delay_hz is None or evidence.filter is None:
         return Tile("Delay", count(evidence.latency_cycles, "clock cycle"), ["from input to output; no filter"])
-    samples = f"{plain_number(found.delay * evidence.filter.sample_rate)} samples"
+    rate = evidence.filter.sample_rate * (1 if evidence.decimation is None else evidence.decimation.factor)
+    samples = f"{plain_number(found.delay * rate)} samples"
     where = "of slow changes" if found.delay_hz == 0 else f"at {amount(found.delay_hz, 'Hz')}"
     return Tile("Delay", amount(found.delay, "s"), [f"{where}: {samples}; the hardware takes {clocks}"])
 

@@ -3,6 +3,8 @@
 Those of `hardware.protect` are in `sosmith.model.dataflow.protection`.
 """
 
+from fractions import Fraction
+
 FAMILIES = ("butterworth", "chebyshev1", "chebyshev2", "elliptic", "bessel")
 KINDS = ("lowpass", "highpass", "bandpass", "bandstop")
 LOSSES = {
@@ -25,3 +27,12 @@ ERROR_FEEDBACK = ("df1", "df1_ef1", "df1_ef2")
 
 CALIBRATION_INPUTS = ("voltage", "temperature")
 """Inputs of the calibration polynomial, in the order of its indices."""
+
+AUTO = "auto"
+"""Value of `filter.decimate` that leaves the factor to the design."""
+
+MAX_DECIMATION = 1024
+"""Largest factor by which samples are decimated before a filter; all are powers of two."""
+
+MAX_RATIO = Fraction(1, 4)
+"""Largest cutoff behind a decimator, as a share of the lower sample rate."""

@@ -9,7 +9,7 @@ import math
 from collections.abc import Sequence
 from fractions import Fraction
 
-from sosmith.gen.specification.choices import CALIBRATION_INPUTS, FAMILIES, KINDS, LOSSES
+from sosmith.gen.specification.choices import AUTO, CALIBRATION_INPUTS, FAMILIES, KINDS, LOSSES, MAX_RATIO
 from sosmith.gen.specification.schema import MAX_ORDER, Document, FilterTable, InputTable
 from sosmith.gen.specification.uncertainty import check_coefficients
 from sosmith.gen.specification.values import UnfitError, identifier, key_text, listed, literal, one_of
@@ -43,6 +43,7 @@ def check(document: Document) -> None:
     _check_calibration(document)
     _check_uncertainty(document)
     _check_filter(document.filter, document.sample_rate)
+    _check_decimation(document)
     _check_output(document)
     _check_wear(document)
     _check_converters(document)
@@ -304,6 +305,45 @@ def _relation(kind: str, passband: Sequence[Fraction], stopband: Sequence[Fracti
             return "inside", stopband[0] < passband[0] and passband[1] < stopband[1]
         case _:
             return "around", passband[0] < stopband[0] and stopband[1] < passband[1]
+
+
+def _check_decimation(document: Document) -> None:
+    """Check that what else is asked for is there behind a decimator."""
+    table, hardware = document.filter, document.hardware
+    if table.decimate is None:
+        return
+    found, where = literal(table.decimate), "filter.decimate"
+    if table.order is None or table.cutoff is None:
+        raise UnfitError("left out unless the filter is given by order and cutoff", found, where=where, later=True)
+    if table.kind != "lowpass":
+        raise UnfitError(f"left out for {table.kind}, whose pass band would alias", found, where=where)
+    if table.method == "impulse_invariant":
+        raise UnfitError("left out with impulse_invariant", found, where=where, later=True)
+    most = MAX_RATIO * document.sample_rate / table.cutoff[0]
+    factor = 2 if table.decimate == AUTO else int(table.decimate)
+    if factor > most:
+        raise UnfitError(
+            f"at most {math.floor(most)}, so that the cutoff is at most {MAX_RATIO} of the lower sample rate"
+            if most >= 2
+            else f"left out, as the cutoff would be more than {MAX_RATIO} of the lower sample rate",
+            found,
+            where=where,
+        )
+    beside: tuple[tuple[str, object, object], ...] = (
+        ("channels", document.channels, 1),
+        ("hardware.reload", hardware.reload, False),
+        ("hardware.protect", hardware.protect, "none"),
+        ("hardware.start", hardware.start, "steady"),
+    )
+    for key, value, only in beside:
+        if value != only:
+            raise UnfitError(f"{literal(only)} with filter.decimate", literal(value), where=key, later=True)
+    if hardware.architecture == "online":
+        others = 'one of "auto", "folded", "serial", "parallel" with filter.decimate'
+        raise UnfitError(others, literal("online"), where="hardware.architecture", later=True)
+    if document.converter:
+        tables = ", ".join(map(literal, document.converter))
+        raise UnfitError("left out with filter.decimate", tables, where="converter", later=True)
 
 
 def _check_output(document: Document) -> None:

@@ -8,12 +8,21 @@ from __future__ import annotations
 
 from fractions import Fraction
 from functools import partial
-from typing import Annotated, Any
+from typing import Annotated, Any, cast
 
 from pydantic import BaseModel, ConfigDict, Field, PlainValidator, ValidationError
 from pydantic_core import ErrorDetails
 
-from sosmith.gen.specification.choices import ARCHITECTURES, FAMILIES, KINDS, METHODS, REALIZATIONS, STARTS
+from sosmith.gen.specification.choices import (
+    ARCHITECTURES,
+    AUTO,
+    FAMILIES,
+    KINDS,
+    MAX_DECIMATION,
+    METHODS,
+    REALIZATIONS,
+    STARTS,
+)
 from sosmith.gen.specification.values import (
     ABOVE_ZERO,
     IDENTIFIER,
@@ -77,6 +86,14 @@ def read_multipliers(value: object) -> int | None:
     if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= MAX_MULTIPLIERS:
         raise UnfitError(f'"auto", or a whole number from 0 to {MAX_MULTIPLIERS}', literal(value))
     return value
+
+
+def read_decimate(value: object) -> int | str:
+    """Read a factor of decimation, or "auto"."""
+    is_power = isinstance(value, int) and not isinstance(value, bool) and value > 1 and not value & (value - 1)
+    if value == AUTO or (is_power and cast("int", value) <= MAX_DECIMATION):
+        return cast("int | str", value)
+    raise UnfitError(f'"auto", or a power of two from 2 to {MAX_DECIMATION}', literal(value))
 
 
 class Table(BaseModel):
@@ -156,6 +173,7 @@ class FilterTable(Table):
         PlainValidator(list_of(list_of(number, 6, 6), 1, MAX_ORDER // 2, "rows [b0, b1, b2, 1.0, a1, a2]")),
     ] = None
     sos_file: Annotated[str | None, PlainValidator(file_name)] = None
+    decimate: Annotated[int | str | None, PlainValidator(read_decimate)] = None
 
 
 class WearTable(Table):

@@ -73,6 +73,8 @@ class FilterSpec:
     sos : tuple of tuples of Fraction or None
         1 to 10 stable rows (b0, b1, b2, a0, a1, a2) with a0 = 1 and the sign convention of scipy; of the
         specification or of its `sos_file`.
+    decimate : int, "auto" or None
+        Factor of the decimator before a low-pass filter by order and cutoff, a power of two; None without one.
     origin : str
         How `sos_file` was read, a sentence; empty without one.
     """
@@ -88,6 +90,7 @@ class FilterSpec:
     stopband_loss: Fraction | None
     sos: tuple[tuple[Fraction, ...], ...] | None
     origin: str = ""
+    decimate: int | str | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -321,4 +324,5 @@ def _filter(path: Path, table: FilterTable) -> FilterSpec:
         stopband_loss=table.stopband_loss,
         sos=sections,
         origin=origin,
+        decimate=table.decimate,
     )

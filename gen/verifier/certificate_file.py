@@ -149,6 +149,24 @@ class IdealEntry(_Part):
     start: Literal["steady"] | None = None
 
 
+class DecimationEntry(_Part):
+    """A CIC filter before the stages, which hands on every `factor`-th sample.
+
+    `stages` integrators and combs of `width` bits; the rounding to nearest behind them drops `dropped` bits. The first
+    result is that of the first sample, as if that had been there for ever. `correction` is the weight g of the ideal
+    section ``1 + g - g / z``, the last one. `edge` is the upper edge of the pass band, in units of the rate of the
+    input, and `aliasing` bounds the gain of what folds into it from around each multiple of the lower rate.
+    """
+
+    factor: Annotated[int, Field(strict=True, ge=2, le=1 << 10)]
+    stages: Annotated[int, Field(strict=True, ge=1, le=16)]
+    width: Annotated[int, Field(strict=True, ge=2, le=256)]
+    dropped: Annotated[int, Field(strict=True, ge=0, le=256)]
+    correction: Rational
+    edge: Rational
+    aliasing: Annotated[tuple[Rational, ...], Field(max_length=1 << 9)]
+
+
 class GainEntry(_Part):
     """Worst-case peak gains of a section as built: of the whole section, and of its recursion 1/A alone."""
 
@@ -230,6 +248,7 @@ class Certificate(_Part):
     output: PortEntry
     max_error: Rational
     ideal: IdealEntry
+    decimation: DecimationEntry | None = None
     stages: Annotated[tuple[StageEntry, ...], Field(min_length=1, max_length=256)]
     claims: ClaimsEntry
 

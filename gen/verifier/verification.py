@@ -14,6 +14,9 @@
 6. Where a filter starts from zero, samples may be flagged until it has settled: the counter is run, and what any other
    past could change is followed until it has faded (`sosmith.gen.verifier.settling`).
 
+6. A decimator before the stages is exact but for one rounding (`sosmith.gen.verifier.decimation`). All else is proven
+   of what is behind it.
+
 The ranges hold by induction. Unbounded integers obey the linear model exactly, with the quantizers' errors as further
 inputs. The limits from the linear model therefore hold at every sample, and signals with these ranges never overflow.
 """
@@ -30,6 +33,7 @@ from math import lcm, prod
 from flint import fmpq, fmpq_poly
 
 from sosmith.gen.verifier.certificate_file import Certificate, Operation, StageEntry, on_grid
+from sosmith.gen.verifier.decimation import at_lower_rate, rounding
 from sosmith.gen.verifier.graph import RejectedError, Transfer, check_graph, inputs_of, label, require
 from sosmith.gen.verifier.l1_response import BITS, Inverse, UndecidedError, fraction, inverse, is_stable, response
 from sosmith.gen.verifier.online import check_online
@@ -104,6 +108,8 @@ def verify(certificate: Certificate, progress: Progress = lambda step, done, tot
 
 def _verified(certificate: Certificate, progress: Progress) -> Verdict:
     progress("graphs", 0, 0)
+    rounded = rounding(certificate)
+    certificate = at_lower_rate(certificate)
     stages = certificate.stages
     for stage in stages:
         check_graph(stage)
@@ -123,7 +129,7 @@ def _verified(certificate: Certificate, progress: Progress) -> Verdict:
     )
     start = _start(certificate, starts)
     settling = certificate.claims.settling
-    rounding, added = output_error(certificate, without_counter(last[0], settling))
+    last_rounding, added = output_error(certificate, without_counter(last[0], settling))
     require(start is not None or not added, "the output stage must add nothing where no first sample is passed to it")
     ranges, margin = 0, Fraction(0)
     if sections:
@@ -134,6 +140,8 @@ def _verified(certificate: Certificate, progress: Progress) -> Verdict:
             check_online(certificate, alone)
         for part in budget:
             budget[part] *= cascade.peak_gain
+        if rounded:
+            budget["decimation"] = rounded * cascade.peak_gain
         budget["filter coefficients"], budget["filter rounding"] = cascade.coefficients, cascade.rounding
         ranges, margin = cascade.ranges, cascade.margin
         if settling is not None:
@@ -150,7 +158,7 @@ def _verified(certificate: Certificate, progress: Progress) -> Verdict:
         require(settling is None, "settling must not be claimed where there are no sections")
         require(certificate.claims.online is None, "units must not be claimed where there are no sections")
         require(not certificate.claims.sections, "the gains of sections must not be given where there are none")
-    budget["output rounding"] = rounding
+    budget["output rounding"] = last_rounding
     _compare_budget(certificate, budget)
     return Verdict(budget, sum(len(stage.nodes) for stage in stages), ranges, margin)
 

@@ -11,6 +11,7 @@ from typing import cast
 import numpy as np
 import numpy.typing as npt
 
+from sosmith.gen.filter.decimation import Decimation
 from sosmith.gen.filter.design import Filter
 from sosmith.gen.proof.cascade_proof import CascadeProof
 from sosmith.gen.proof.linear_model import linear_models
@@ -26,6 +27,9 @@ from sosmith.model.sections.output import Held, OutputStage
 from sosmith.model.sections.start import PassingStage, StartStage
 
 Array = npt.NDArray[np.float64]
+
+DECIMATION = "decimation"
+"""The part of the budget that is the rounding behind a decimator."""
 
 START = "start"
 """The part of the budget that is the error of what starts a filter from its first sample."""
@@ -51,6 +55,8 @@ class Quantized:
         Bound on the error of the input stage, at the filter's input, in output LSBs; exact.
     proof : CascadeProof or None
         The proof of the sections; None without a filter.
+    decimation : Decimation or None
+        How samples are decimated before the filter; None if all go in.
     """
 
     datapath: Datapath
@@ -60,6 +66,7 @@ class Quantized:
     budget: dict[str, Fraction]
     input_error: Fraction
     proof: CascadeProof | None
+    decimation: Decimation | None = None
 
     @property
     def bound(self) -> Fraction:

@@ -19,7 +19,7 @@ from amaranth.hdl import Cat, Module, Mux, Signal
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
-from sosmith.hdl.serial_crc import SerialCrc
+from sosmith.hdl.bus.serial_crc import SerialCrc
 
 
 class CheckedBytes(wiring.Component):

@@ -32,7 +32,7 @@ from amaranth.lib import wiring
 from amaranth.lib.memory import Memory, ReadPort
 from amaranth.lib.wiring import In, Out
 
-from sosmith.hdl.axi_lite import slave_members
+from sosmith.hdl.bus.axi_lite import slave_members
 from sosmith.hdl.bus.checked_bytes import CheckedBytes
 from sosmith.hdl.bus.frame_receiver import BLOCK_RAM, LENGTH_ADDRESS
 from sosmith.model.dataflow.status import STATUS_BITS

@@ -14,6 +14,12 @@ def latency_cycles(program: Program, *, serial: bool, protect: str = "none") -> 
     return late + (program.serial_cycles + SERIAL_DEPTH if serial else len(program.instructions) + FOLDED_DEPTH)
 
 
+def taken_cycles(program: Program) -> int:
+    """Clocks from the edge that finds a sample to the one that accepts it, at most, in a folded core that overlaps."""
+    takes = [number for number, instruction in enumerate(program.instructions) if instruction.opcode is Opcode.TAKE]
+    return takes[-1] + FOLDED_DEPTH
+
+
 def overlaps(program: Program, *, serial: bool, channels: int = 1, reload: bool = False, protect: str = "none") -> bool:
     """Whether a sample is begun while the last instructions of the one before are still in the pipeline.
 

@@ -22,6 +22,7 @@ _WIDEST = 128
 
 def c_header(datapath: Datapath) -> str:
     """Return the text of ``<name>.h``."""
+    decimator, datapath = datapath.decimator, datapath.behind_decimator
     ports = (
         f"{port.name}_code: {port.lowest} .. {port.highest}, value = {float(port.zero)!r} + "
         f"{float(port.lsb)!r} * code {port.unit.replace('*/', '* /')}".rstrip()
@@ -38,11 +39,14 @@ def c_header(datapath: Datapath) -> str:
         parameters=_parameters(datapath),
         wear=datapath.wear,
         channels=len(datapath.wear) if _takes_channel(datapath) else 0,
+        decimator=decimator,
     )
 
 
 def c_source(datapath: Datapath) -> str:
     """Return the text of ``<name>.c``.
+
+    Behind a decimator, the functions of the datapath work at the lower rate, and one more takes samples at the higher.
 
     Without status, each stage works one sample behind the stage before it, as in a pipeline: then none waits for
     another, which a processor hides only where its window of instructions is long enough for the whole chain.
@@ -52,6 +56,7 @@ def c_source(datapath: Datapath) -> str:
     ValueError
         If a value inside is wider than 128 bits.
     """
+    decimator, datapath = datapath.decimator, datapath.behind_decimator
     count = len(datapath.inputs)
     names = [f"{port.name}_code" for port in datapath.inputs]
     codes = [f"in[(n * channels + c) * {count} + {i}]" for i in range(count)]
@@ -72,6 +77,8 @@ def c_source(datapath: Datapath) -> str:
         wear=datapath.wear,
         limits=", ".join(f"{{{warning}, {critical}}}" for warning, critical in datapath.wear),
         wear_flags=" | ".join(f"(code >= limit[{k}]) << {flag.value}" for k, flag in judged),
+        decimator=decimator,
+        rail=f"{1 << Flag.INPUT_AT_RAIL:#04x}",
     )
 
 

@@ -6,7 +6,7 @@ This object is the one source of truth: the software (`Datapath.compute`), the C
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -14,7 +14,9 @@ import numpy.typing as npt
 
 from sosmith.model.arrays import Codes
 from sosmith.model.dataflow.compiled import block_for
+from sosmith.model.dataflow.decimator import Decimator
 from sosmith.model.dataflow.graph import Graph
+from sosmith.model.dataflow.status import Flag
 from sosmith.model.port import Port
 
 
@@ -43,7 +45,7 @@ class Datapath:
     name : str
         Name of the core.
     inputs : tuple of Port
-        Input quantities, in the order of the first stage's inputs.
+        Input quantities, in the order of the first stage's inputs; with a decimator the one that it takes.
     output : Port
         Output quantity.
     stages : tuple of Stage
@@ -53,6 +55,8 @@ class Datapath:
     wear : tuple of (int, int)
         Lowest output codes at which the wear is a warning, and at which it is critical: one pair for all channels, or
         one for each; empty if wear is not judged.
+    decimator : Decimator or None
+        What stands before the first stage and hands on one sample out of several; None if all go in.
     """
 
     name: str
@@ -61,12 +65,15 @@ class Datapath:
     stages: tuple[Stage, ...]
     calibrated: tuple[tuple[int, int], ...] = ()
     wear: tuple[tuple[int, int], ...] = ()
+    decimator: Decimator | None = None
 
     def __post_init__(self) -> None:
         if not self.calibrated:
             object.__setattr__(self, "calibrated", tuple((port.lowest, port.highest) for port in self.inputs))
         first, last = self.stages[0].graph, self.stages[-1].graph
-        ports = [(port.lowest, port.highest) for port in self.inputs]
+        if self.decimator is not None and self.inputs != (self.decimator.input,):
+            raise ValueError(f"inputs must be what the decimator takes, {self.decimator.input}, not {self.inputs}")
+        ports = [(port.lowest, port.highest) for port in self.entry]
         expected = [(first.nodes[i].low, first.nodes[i].high) for i in first.inputs]
         if ports != expected:
             raise ValueError(f"input ports must have the ranges {expected}, not {ports}")
@@ -83,6 +90,22 @@ class Datapath:
                     f"wear must be codes that rise within {self.output.lowest + 1}..{self.output.highest}, "
                     f"not {warning}, {critical}"
                 )
+
+    @property
+    def entry(self) -> tuple[Port, ...]:
+        """The quantities that the first stage takes: `inputs`, or what the decimator makes of them."""
+        return self.inputs if self.decimator is None else (self.decimator.output,)
+
+    @property
+    def behind_decimator(self) -> Datapath:
+        """The datapath at the lower rate, without the decimator; itself if it has none."""
+        if self.decimator is None:
+            return self
+        return replace(self, inputs=self.entry, calibrated=(), decimator=None)
+
+    def results(self, samples: int) -> int:
+        """Count the results of so many samples of a channel."""
+        return samples if self.decimator is None else self.decimator.count(samples)
 
     @property
     def settles(self) -> bool:
@@ -110,7 +133,7 @@ class Datapath:
         Returns
         -------
         int64 array, shape (samples,) or (samples, channels)
-            Output codes.
+            Output codes; behind a decimator, as many as `results` says.
 
         Raises
         ------
@@ -120,8 +143,8 @@ class Datapath:
             If no C compiler is found.
         """
         checked = self._checked(codes)
-        block = checked[:, np.newaxis, :] if checked.ndim == 2 else checked
-        result, _ = block_for(self, block.shape[0] * block.shape[1])(block)
+        block = self._entering(checked[:, np.newaxis, :] if checked.ndim == 2 else checked)
+        result, _ = block_for(self.behind_decimator, block.shape[0] * block.shape[1])(block)
         return result[:, 0] if checked.ndim == 2 else result
 
     def compute_status(self, codes: Codes) -> npt.NDArray[np.uint8]:
@@ -136,7 +159,13 @@ class Datapath:
             raise ValueError(
                 f"codes must be of {len(self.wear)} channels, for each of which wear is judged, not {block.shape[1]}"
             )
-        _, status = block_for(self, block.shape[0] * block.shape[1])(block, with_status=True)
+        entering = self._entering(block)
+        behind = block_for(self.behind_decimator, entering.shape[0] * entering.shape[1])
+        _, status = behind(entering, with_status=True)
+        if self.decimator is not None:
+            rails = np.stack([self.decimator.at_rail(block[:, k, 0]) for k in range(block.shape[1])], axis=1)
+            status &= ~np.uint8(1 << Flag.INPUT_AT_RAIL)
+            status[rails] |= 1 << Flag.INPUT_AT_RAIL
         return status[:, 0] if checked.ndim == 2 else status
 
     def compute_exact(self, codes: Codes) -> list[int]:
@@ -149,12 +178,19 @@ class Datapath:
         """
         states = [stage.graph.reset() for stage in self.stages]
         results = []
-        for sample in self._checked(codes).tolist():
+        for sample in self._entering(self._checked(codes)[:, np.newaxis, :])[:, 0].tolist():
             wires = sample
             for stage, state in zip(self.stages, states, strict=True):
                 wires = stage.graph.step(wires, state)
             results.append(wires[0])
         return results
+
+    def _entering(self, block: Codes) -> Codes:
+        """Codes that the first stage takes, for input codes of shape (samples, channels, inputs)."""
+        if self.decimator is None:
+            return block
+        columns = [self.decimator.compute(block[:, k, 0]) for k in range(block.shape[1])]
+        return np.stack(columns, axis=1)[:, :, np.newaxis]
 
     def _checked(self, codes: Codes) -> Codes:
         array = np.asarray(codes)

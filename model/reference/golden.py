@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from sosmith.model.arithmetic.recursive_filters import sosfilt
 from sosmith.model.arrays import Codes, Values
 from sosmith.model.calibration.polynomial import Polynomial
+from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.port import Port
 
 
@@ -26,6 +28,27 @@ def calibrated(codes: Codes, inputs: Sequence[Port], polynomial: Polynomial | No
     """
     physical = [port.decode(codes[:, index]) for index, port in enumerate(inputs)]
     return physical[0] if polynomial is None else polynomial(*physical)
+
+
+def entering_filter(codes: Codes, datapath: Datapath, polynomial: Polynomial | None) -> Values:
+    """Return the physical values that the filter takes: those of `calibrated`, or what a decimator makes of them.
+
+    The decimator computes in integers, and is exact before its rounding; only their conversion is in double precision.
+
+    Parameters
+    ----------
+    codes : int64 array, shape (samples, inputs)
+        Input codes.
+    datapath : Datapath
+        Whose inputs and decimator count.
+    polynomial : Polynomial or None
+        As for `calibrated`.
+    """
+    decimator = datapath.decimator
+    if decimator is None:
+        return calibrated(codes, datapath.inputs, polynomial)
+    unrounded = replace(decimator, dropped=0)
+    return float(unrounded.input.zero) + float(unrounded.lsb) * unrounded.compute(codes[:, 0]).astype(np.float64)
 
 
 def filtered(values: Values, sos: Values | None, output: Port, *, steady: bool = False) -> Values:

@@ -93,6 +93,16 @@ class Trace:
             reading=None if self.reading is None else self.reading[source],
         )
 
+    def every(self, count: int) -> Trace:
+        """Return the trace with one sample out of `count`, the first among them."""
+        return replace(
+            self,
+            sample_rate=self.sample_rate / count,
+            codes=self.codes[::count],
+            truth=None if self.truth is None else self.truth[::count],
+            reading=None if self.reading is None else self.reading[::count],
+        )
+
     def values(self) -> Values:
         """Return the physical values of the codes in the ports' units, shape (n, n_inputs)."""
         decoded = [port.decode(column) for port, column in zip(self.ports, self.codes.T, strict=True)]

@@ -18,7 +18,7 @@ from sosmith.gen.report.provenance import provenance_of
 from sosmith.gen.stimuli import default_scenario, traces_for
 from sosmith.model.errors import ShortfallError, SpecificationError
 from sosmith.model.reference.accuracy import error_statistics, sqnr_db
-from sosmith.model.reference.golden import calibrated, filtered
+from sosmith.model.reference.golden import entering_filter, filtered
 from sosmith.model.traces.trace import Trace
 from sosmith.sim.exploration.grid import Task
 from sosmith.sim.exploration.synthesis import synthesized
@@ -67,7 +67,7 @@ def _measured(design: CoreDesign, traces: tuple[Trace, ...], task: Task) -> Poin
     sos = None if quantized.filter is None else quantized.filter.sos
     golden = np.stack(
         [
-            filtered(calibrated(t.codes, datapath.inputs, quantized.polynomial), sos, output, steady=quantized.steady)
+            filtered(entering_filter(t.codes, datapath, quantized.polynomial), sos, output, steady=quantized.steady)
             for t in traces
         ],
         axis=1,

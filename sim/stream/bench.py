@@ -19,7 +19,7 @@ from sosmith.sim.beats import Beats
 from sosmith.sim.stream import compiled_loop
 from sosmith.sim.stream.bursts import Pace
 from sosmith.sim.stream.pins import Pins
-from sosmith.sim.stream.rules import BUSY, PROBED_SHARE, SILENCE, ProtocolError, Word, followed, hung, moved
+from sosmith.sim.stream.rules import BUSY, PROBED_SHARE, SILENCE, ProtocolError, Word, followed, hung, moved, too_many
 
 _PROGRESS_EVERY = 4096  # clocks
 
@@ -35,14 +35,19 @@ class StreamBench:
         self.clocks = 0
         self.count = 0
         self.patience = self.config["latency_cycles"] + self.config["reset_cycles"]
-        self._received = Beats.zeros(len(self.words))
+        self._received = Beats.zeros(self.results(len(self.words)))
         self._outputs = [(name, f"m_axis_{name}") for name in ("tdest", "tdata", "tuser") if self.has(name)]
+        self._expected = 0
         self._shown = 0
 
     @property
     def received(self) -> Beats:
         """What has come out since the counting began."""
         return self._received.first(self.count)
+
+    def results(self, samples: int) -> int:
+        """Count the results of so many samples: one for the first, and one for each further group of them."""
+        return -(-samples // int(self.config["samples_per_result"]))
 
     def has(self, name: str) -> bool:
         """Whether the streams have the optional signal `name`."""
@@ -121,15 +126,16 @@ class StreamBench:
         await pins.settle()
 
     async def stream(self, beats: Beats, *, probe: bool) -> None:
-        """Send `beats` at a random pace and receive the same number, checking every clock."""
+        """Send `beats` at a random pace and receive all their results, checking every clock."""
         pins, words = self.pins, _words(beats)
+        self._expected = self.results(len(words))
         source = random.Random(self.config["seed"])
         idle, stall = Pace(source, self.config["idle"]), Pace(source, self.config["stall"])
         sent, offered, silence = 0, False, 0
         was_ready: bool | None = None
         was_offered: bool | None = None
         held: Word | None = None  # the word that the core offers and the bench has not accepted
-        while self.count < len(words):
+        while sent < len(words) or self.count < self._expected:
             if not offered:
                 offered = sent < len(words) and next(idle)
                 if offered or offered != was_offered:
@@ -183,7 +189,9 @@ class StreamBench:
         self.offer(None)
 
     def keep(self, word: Word) -> None:
-        """Store a word that has come out."""
+        """Store a word that has come out; there must be no more than are expected."""
+        if self.count == self._expected:
+            raise too_many(self.count)
         for name, value in word._asdict().items():
             getattr(self._received, name)[self.count] = value
         self.count += 1
@@ -194,7 +202,7 @@ class StreamBench:
         for _ in range(self.config["latency_cycles"] + 64):
             await self.clock()
             if self.bit("m_axis_tvalid"):
-                raise ProtocolError(f"{self.count} samples must come out, not more")
+                raise too_many(self.count)
 
     def report(self, done: int) -> None:
         """Write the number of samples for the parent process to show."""
@@ -229,7 +237,7 @@ async def run_bench(bench: StreamBench) -> float:
         await bench.stream(bench.words, probe=False)
     clocks, seconds = bench.clocks, time.process_time() - started
     await bench.nothing_more_comes()
-    if not bench.received.first(len(first)).same_as(again):
+    if not bench.received.first(len(again)).same_as(again):
         raise ProtocolError("the first results after a reset must not depend on what came before it")
     bench.clocks = clocks
     return seconds

@@ -8,10 +8,10 @@ from collections.abc import Callable
 
 from sosmith.sim.beats import Beats
 from sosmith.sim.stream.bursts import Pace
-from sosmith.sim.stream.rules import BUSY, PROBED_SHARE, SILENCE, ProtocolError, Word, followed, hung, moved
+from sosmith.sim.stream.rules import BUSY, PROBED_SHARE, SILENCE, ProtocolError, Word, followed, hung, moved, too_many
 
 _BLOCK = 1 << 17  # clocks between two reports of progress: some tens of milliseconds
-_GOES_ON, _DONE, _FOLLOWED, _MOVED, _HUNG = range(5)
+_GOES_ON, _DONE, _FOLLOWED, _MOVED, _HUNG, _TOO_MANY = range(6)
 
 
 class _Pace(ctypes.Structure):
@@ -37,6 +37,7 @@ class _Stream(ctypes.Structure):
         ("sent_tdest", ctypes.c_void_p),
         ("sent_tdata", ctypes.c_void_p),
         ("to_send", ctypes.c_uint64),
+        ("to_receive", ctypes.c_uint64),
         ("received_tdest", ctypes.c_void_p),
         ("received_tdata", ctypes.c_void_p),
         ("received_tuser", ctypes.c_void_p),
@@ -71,7 +72,7 @@ def stream(
     patience: int,
     progress: Callable[[int], None],
 ) -> tuple[int, int, ProtocolError | None]:
-    """Send `words` at a random pace and receive the same number, checking every clock.
+    """Send `words` at a random pace and receive all their results, checking every clock.
 
     To be called while the clock is low and all inputs have settled.
 
@@ -82,7 +83,7 @@ def stream(
     words : Beats
         What to send.
     received : Beats
-        Arrays of the same length, to be filled with what comes out.
+        Arrays as long as there are results, to be filled with what comes out.
     seed, idle, stall
         The random pace, as in `sosmith.sim.stream.bursts`.
     patience : int
@@ -108,6 +109,7 @@ def stream(
         sent_tdest=words.tdest.ctypes.data,
         sent_tdata=words.tdata.ctypes.data,
         to_send=len(words),
+        to_receive=len(received),
         received_tdest=received.tdest.ctypes.data,
         received_tdata=received.tdata.ctypes.data,
         received_tuser=received.tuser.ctypes.data,
@@ -132,4 +134,6 @@ def _error(outcome: int, state: _Stream) -> ProtocolError | None:
         return followed(state.clocks)
     if outcome == _MOVED:
         return moved(state.held.value(), state.word.value() if state.word_valid else None, state.received)
+    if outcome == _TOO_MANY:
+        return too_many(state.received)
     return hung(state.silence, state.sent, state.received)

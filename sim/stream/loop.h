@@ -25,7 +25,7 @@ void set_input_valid(bool value);
 void set_output_ready(bool value);
 void set_input(uint64_t tdest, uint64_t tdata);
 
-enum Outcome : int32_t { GOES_ON, DONE, FOLLOWED, MOVED, HUNG };
+enum Outcome : int32_t { GOES_ON, DONE, FOLLOWED, MOVED, HUNG, TOO_MANY };
 
 struct Pace {
     double waiting, spread, share;
@@ -37,7 +37,7 @@ struct Stream {
     // What is sent, and room for what is received.
     const int64_t *sent_tdest;
     const uint64_t *sent_tdata;
-    uint64_t to_send;
+    uint64_t to_send, to_receive;
     int64_t *received_tdest;
     uint64_t *received_tdata;
     uint8_t *received_tuser;
@@ -140,7 +140,7 @@ extern "C" int32_t sosmith_stream(Stream *stream, uint64_t clocks) {
     Stream &s = *stream;
     const uint64_t stop = s.clocks + clocks;
     Outcome outcome = DONE;
-    while (s.received < s.to_send) {
+    while (s.sent < s.to_send || s.received < s.to_receive) {
         if (s.clocks >= stop) {
             outcome = GOES_ON;
             break;
@@ -170,6 +170,10 @@ extern "C" int32_t sosmith_stream(Stream *stream, uint64_t clocks) {
         s.held_valid = valid && !ready;
         s.held = word;
         if (valid && ready) {
+            if (s.received == s.to_receive) {
+                outcome = TOO_MANY;
+                break;
+            }
             s.received_tdest[s.received] = word.tdest;
             s.received_tdata[s.received] = word.tdata;
             s.received_tuser[s.received] = word.tuser;

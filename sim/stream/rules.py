@@ -48,3 +48,8 @@ def hung(silence: int, sent: int, received: int) -> ProtocolError:
     return ProtocolError(
         f"a sample must move at least every {silence - 1} clocks: {sent} went in and {received} came out before it hung"
     )
+
+
+def too_many(received: int) -> ProtocolError:
+    """Make the error of a core that offers more results than there are."""
+    return ProtocolError(f"{received} samples must come out, not more")

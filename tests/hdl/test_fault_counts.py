@@ -8,10 +8,10 @@ from tests.formal.small import leaky
 from tests.hdl.axi_lite_bench import OKAY, SLVERR
 from tests.hdl.test_reload import Bench, benched, crc_of
 
-from sosmith.hdl.axi_lite import SerialSlave
+from sosmith.hdl.bus.axi_lite import SerialSlave
+from sosmith.hdl.bus.serial_crc import SerialCrc
 from sosmith.hdl.interleaved import InterleavedStage
 from sosmith.hdl.reload import ReloadPort
-from sosmith.hdl.serial_crc import SerialCrc
 from sosmith.model.reload.registers import CRC, DATA, FAULTS, VERSION
 
 

@@ -313,10 +313,10 @@ def test_the_port(scenario: Scenario) -> None:
 
 
 MUTANTS: dict[str, tuple[Scenario, str, str, str]] = {
-    "another polynomial": (a_good_load_becomes_active, "serial_crc", "0xEDB88320", "0xEDB88321"),
+    "another polynomial": (a_good_load_becomes_active, "bus/serial_crc", "0xEDB88320", "0xEDB88321"),
     "a CRC goes on from the load before": (
         a_good_load_becomes_active,
-        "serial_crc",
+        "bus/serial_crc",
         "with m.If(self.i_clear)",
         "with m.If(0)",
     ),
@@ -427,14 +427,14 @@ MUTANTS: dict[str, tuple[Scenario, str, str, str]] = {
 }
 """For each the scenario that must notice it, the module, and what is replaced by what."""
 
-USED_BY = {"serial_crc": (reload, "SerialCrc"), "axi_lite": (reload, "SerialSlave")}
+USED_BY = {"bus/serial_crc": (reload, "SerialCrc"), "axi_lite": (reload, "SerialSlave")}
 """Where the components of a module are looked up; the port itself here."""
 
 
 @pytest.mark.parametrize("mutant", MUTANTS.values(), ids=list(MUTANTS))
 def test_a_broken_port_is_noticed(mutant: tuple[Scenario, str, str, str], monkeypatch: pytest.MonkeyPatch) -> None:
     scenario, name, old, new = mutant
-    path = Path(reload.__file__).with_name(f"{name}.py")
+    path = Path(reload.__file__).parent / f"{name}.py"
     source = path.read_text(encoding="utf-8")
     assert source.count(old) == 1
     broken = types.ModuleType(f"sosmith.hdl.{name}")

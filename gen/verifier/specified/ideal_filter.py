@@ -34,9 +34,13 @@ class TransferFunction(NamedTuple):
 
 @dataclass(frozen=True)
 class StatedFilter:
-    """The filter that a specification states, at any precision."""
+    """The filter that a specification states, at any precision.
+
+    Behind a decimator whose droop it corrects, it has the factor ``1 + g - g w`` as well, with g the `correction`.
+    """
 
     table: FilterTable
+    correction: Fraction = Fraction(0)
 
     def at(self, bits: int) -> TransferFunction:
         """Enclose the transfer function in ball arithmetic of `bits` bits.
@@ -49,12 +53,19 @@ class StatedFilter:
             If no supported order meets the stated edges and losses.
         """
         with ctx.workprec(bits):
-            if self.table.rows:
-                return _product(self.table.rows)
-            if self.table.method == "impulse_invariant":
-                return _impulse_invariant(self._prototype(self.table.order or 0), self.table.cutoff[0])
-            order, band = self._order_and_band()
-            return _bilinear(self._prototype(order), self.table.kind, band)
+            stated = self._transfer_function()
+            return stated._replace(
+                numerator=stated.numerator * arb_poly([ball(1 + self.correction), ball(-self.correction)])
+            )
+
+    def _transfer_function(self) -> TransferFunction:
+        """Return what the table itself states, at the present precision."""
+        if self.table.rows:
+            return _product(self.table.rows)
+        if self.table.method == "impulse_invariant":
+            return _impulse_invariant(self._prototype(self.table.order or 0), self.table.cutoff[0])
+        order, band = self._order_and_band()
+        return _bilinear(self._prototype(order), self.table.kind, band)
 
     def _prototype(self, order: int) -> AnalogPrototype:
         losses = self.table.losses
@@ -80,7 +91,9 @@ class StatedFilter:
         return order, band._replace(width=band.width * edge if falling else band.width / edge)
 
 
-def stated_filter(table: Mapping[str, object], sample_rate: Fraction) -> StatedFilter:
+def stated_filter(
+    table: Mapping[str, object], sample_rate: Fraction, correction: Fraction = Fraction(0)
+) -> StatedFilter:
     """Read the `[filter]` table of a specification.
 
     Parameters
@@ -89,6 +102,8 @@ def stated_filter(table: Mapping[str, object], sample_rate: Fraction) -> StatedF
         Keys as in the file; numbers are int, Fraction or Decimal and are taken exactly, frequencies are in Hz.
     sample_rate : Fraction
         In Hz, above 0.
+    correction : Fraction
+        Weight of the correction of a decimator's droop; 0 without one.
 
     Raises
     ------
@@ -104,7 +119,7 @@ def stated_filter(table: Mapping[str, object], sample_rate: Fraction) -> StatedF
     >>> numerator[0].contains(0.5), numerator[1].contains(0.5), denominator[1].contains(0)
     (True, True, True)
     """
-    return StatedFilter(read_filter_table(table, sample_rate))
+    return StatedFilter(read_filter_table(table, sample_rate), correction)
 
 
 # Analog frequencies.

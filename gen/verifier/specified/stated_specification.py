@@ -115,11 +115,18 @@ def _checked(certificate: Certificate, tree: Mapping[str, Any], margin: Fraction
 
 
 def _filter_distance(certificate: Certificate, tree: Mapping[str, Any], margin: Fraction, folder: Path) -> Fraction:
-    table = dict(tree["filter"])
+    table, rate = dict(tree["filter"]), _number(tree["sample_rate"])
+    decimates, entry = table.pop("decimate", None), certificate.decimation
+    correction = Fraction(0)
+    if decimates != "auto":
+        _equal("the factor of the decimator", 1 if entry is None else entry.factor, decimates or 1)
+    if entry is not None:
+        _equal("the edge of the pass band", entry.edge, _number(table["cutoff"]) / rate)
+        rate, correction = rate / entry.factor, entry.correction
     if "sos_file" in table:
         table["sos"] = sections_in(folder / table.pop("sos_file"))
     try:
-        apart = distance(stated_filter(table, _number(tree["sample_rate"])), certificate.ideal.sections)
+        apart = distance(stated_filter(table, rate, correction), certificate.ideal.sections)
     except UndecidedError as error:
         raise RejectedError(f"the filter could not be compared with the specified one: {error}") from None
     require(

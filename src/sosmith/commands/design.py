@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from os.path import commonpath
 from pathlib import Path
 
@@ -110,7 +111,8 @@ def design_command(
         from sosmith.gen.instrument.uncertainty_budget import budget_json
 
         worth = None if made.uncertainty is None else budget_json(made.uncertainty)
-        shown = made.manifest | {"uncertainty": worth}
+        beside = {name: asdict(costs) for name, costs in made.rate_costs.items()}
+        shown = made.manifest | {"uncertainty": worth} | ({"rate_costs": beside} if beside else {})
         print_json(shown if cost is None else shown | {"board": cost})
     else:
         from sosmith.commands.tables.design import print_design

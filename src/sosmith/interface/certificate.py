@@ -10,6 +10,7 @@ from pathlib import Path
 from sosmith.gen.specification.specification import from_text, load
 from sosmith.gen.verifier.certificate_file import Certificate as Entries
 from sosmith.gen.verifier.certificate_file import certificate_text, read_certificate
+from sosmith.gen.verifier.decimation import at_lower_rate, behind_decimator
 from sosmith.gen.verifier.generated_files import (
     about_of,
     check_files,
@@ -127,7 +128,8 @@ class Certificate:
             Folder with the generated files: their SHA-256 must be those in the certificate, and no byte of the
             certificate's own file may have been changed. From the SystemVerilog, the program of a folded or serial
             core, and all hardware of a parallel one, is proven to compute the certificate's graph for all inputs and
-            states; online cores, and cores with loadable constants or with protection, are not.
+            states; online cores, and cores with loadable constants or with protection, are not, nor is a decimator, or
+            a parallel core behind one.
         rebuild : bool
             Whether to generate all files again, from `spec` or the specification's text in the certificate, and compare
             them byte for byte.
@@ -159,10 +161,10 @@ class Certificate:
             text = (folder / f"{self.name}.sv").read_text(encoding="utf-8")
             if architecture in {"folded", "serial"}:
                 progress("program", 0, 0)
-                program = check_program(text, self.entries)
+                program = check_program(behind_decimator(text, self.entries), at_lower_rate(self.entries))
             elif architecture == "online" and self.entries.claims.online is None:
                 raise RejectedError("the certificate of an online core must claim the residuals of its units")
-            elif architecture == "parallel":
+            elif architecture == "parallel" and self.entries.decimation is None:
                 progress("hardware", 0, 0)
                 hardware = check_hardware(text, self.entries, channels)
         if rebuild:

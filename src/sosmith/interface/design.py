@@ -25,10 +25,11 @@ from sosmith.interface.quantity import Quantity
 from sosmith.interface.specification import Specification, specification_of
 from sosmith.interface.trace import Trace
 from sosmith.model.errors import SpecificationError
-from sosmith.model.reference.golden import calibrated, filtered
+from sosmith.model.reference.golden import entering_filter, filtered
 
 if TYPE_CHECKING:
     from sosmith.gen.instrument.uncertainty_budget import InstrumentBudget
+    from sosmith.gen.output.decimation_facts import RateCosts
     from sosmith.host.board import Board
     from sosmith.interface.build import Build
     from sosmith.interface.certificate import Certificate, Progress, Proof
@@ -200,6 +201,18 @@ class Design:
             for section in self.facts.sections
         )
 
+    @cached_property
+    def rate_costs(self) -> dict[str, RateCosts]:
+        """What the filter costs "decimated", and the same filter "direct", without a decimator; empty without one.
+
+        The second is designed for the comparison.
+        """
+        from sosmith.gen.output.decimation_facts import direct_design, rate_costs
+
+        if self.core.datapath.decimator is None:
+            return {}
+        return {"decimated": rate_costs(self.core), "direct": rate_costs(direct_design(self.core))}
+
     @property
     def cost(self) -> Cost:
         """Estimates before synthesis, for the parallel architecture: `multipliers`, `adder_bits`, `luts`, ..."""
@@ -226,7 +239,8 @@ class Design:
     def frequency_response(self, f: npt.ArrayLike, *, ideal: bool = False) -> npt.NDArray[np.complex128]:
         """Return the complex gain of the filter at the frequencies `f` in Hz, an array of the same shape.
 
-        The default is the gain with the integer coefficients; with `ideal`, it is the gain without any rounding.
+        The default is the gain with the integer coefficients; with `ideal`, it is the gain without any rounding. With a
+        decimator, it is the gain from a sine at the input to what it makes of it at the output, folded or not.
 
         Raises
         ------
@@ -236,7 +250,10 @@ class Design:
         if not self.core.quantized.sections:
             raise SpecificationError("the design must have a filter for a frequency response, not only a calibration")
         frequencies = np.asarray(f, dtype=np.float64)
-        return complex_response(self.sos if ideal else self.quantized_sos, frequencies, self.specification.sample_rate)
+        sos, decimation = self.sos if ideal else self.quantized_sos, self.core.quantized.decimation
+        if decimation is None:
+            return complex_response(sos, frequencies, self.specification.sample_rate)
+        return decimation.response(frequencies) * complex_response(sos, frequencies, float(decimation.rate))
 
     def run(self, **inputs: npt.ArrayLike) -> Floats:
         """Compute the output of the hardware for `inputs` bit for bit, starting from reset.
@@ -280,14 +297,14 @@ class Design:
         block = codes.reshape(len(codes), -1, codes.shape[-1])
         columns = [
             filtered(
-                calibrated(block[:, k], datapath.inputs, quantized.polynomial),
+                entering_filter(block[:, k], datapath, quantized.polynomial),
                 sos,
                 datapath.output,
                 steady=quantized.steady,
             )
             for k in range(block.shape[1])
         ]
-        return np.stack(columns, axis=1).reshape(codes.shape[:-1])
+        return np.stack(columns, axis=1).reshape(-1, *codes.shape[1:-1])
 
     @property
     def scenarios(self) -> dict[str, str]:

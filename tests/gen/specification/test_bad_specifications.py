@@ -56,6 +56,8 @@ TEMP = BASE[BASE.index("[input.temperature]") : BASE.index("[calibration]")]
 KO = f"{KIND}\n{OC}"
 ADC = "\n[converter.voltage]\ndevice = 'mcp3204'\nrange = {}"
 THERMOCOUPLE = "\n[converter.temperature]\ndevice = 'max31855'"
+DECIMATED = "\n# decimated\n"
+"""Stands for `filter.decimate`, which is in another table."""
 EDGES = "passband_edge = {}\nstopband_edge = {}\npassband_loss = {}\nstopband_loss = {}"
 
 # Phrases that stand in several sentences.
@@ -65,7 +67,7 @@ TABLES = (
 )
 FILTER_KEYS = (
     "one of the keys family, kind, method, order, cutoff, passband_edge, stopband_edge, passband_loss,"
-    " stopband_loss, sos, sos_file, not an unknown one"
+    " stopband_loss, sos, sos_file, decimate, not an unknown one"
 )
 IDENTIFIER = "a Verilog identifier of at most 64 letters, digits and underscores"
 IN_PROPORTION = "a number of at most 50 digits, zero or from 1e-30 to below 1e30 in size"
@@ -458,6 +460,85 @@ BAD = [
         KIND,
         KIND + '\nmethod = "matched_z"',
         "filter.method must be one of bilinear, impulse_invariant, not 'matched_z'",
+    ),
+    (
+        "a factor that is no power of two",
+        ORD,
+        f"{ORD}\ndecimate = 12",
+        'filter.decimate must be "auto", or a power of two from 2 to 1024, not 12',
+    ),
+    (
+        "a word for a factor",
+        ORD,
+        f'{ORD}\ndecimate = "most"',
+        "filter.decimate must be \"auto\", or a power of two from 2 to 1024, not 'most'",
+    ),
+    (
+        "decimation to below four times the cutoff",
+        ORD,
+        f"{ORD}\ndecimate = 4",
+        "filter.decimate must be at most 2, so that the cutoff is at most 1/4 of the lower sample rate, not 4",
+    ),
+    (
+        "a cutoff too high for any decimation",
+        OC,
+        'order = 7\ncutoff = 20.0\ndecimate = "auto"',
+        "filter.decimate must be left out, as the cutoff would be more than 1/4 of the lower sample rate, not 'auto'",
+    ),
+    (
+        "decimation before a high-pass",
+        KO,
+        f'kind = "highpass"\n{OC}\ndecimate = 2',
+        "filter.decimate must be left out for highpass, whose pass band would alias, not 2",
+    ),
+    (
+        "decimation with impulse invariance",
+        KO,
+        f'{KO}\nmethod = "impulse_invariant"\ndecimate = 2',
+        "not yet available: filter.decimate must be left out with impulse_invariant, not 2",
+    ),
+    (
+        "decimation of a filter by its edges",
+        OC,
+        EDGES.format(10.0, 45.0, 0.02, 60.0) + "\ndecimate = 2",
+        "not yet available: filter.decimate must be left out unless the filter is given by order and cutoff, not 2",
+    ),
+    (
+        "decimation of several channels",
+        f"{RATE}\n",
+        f"{RATE}\nchannels = 3\n{DECIMATED}",
+        "not yet available: channels must be 1 with filter.decimate, not 3",
+    ),
+    (
+        "decimation with constants to be loaded",
+        CLOCK,
+        f"{CLOCK}\nreload = true\n{DECIMATED}",
+        "not yet available: hardware.reload must be false with filter.decimate, not true",
+    ),
+    (
+        "decimation with protection",
+        CLOCK,
+        f'{CLOCK}\nprotect = "detect"\n{DECIMATED}',
+        "not yet available: hardware.protect must be 'none' with filter.decimate, not 'detect'",
+    ),
+    (
+        "decimation from a start at zero",
+        CLOCK,
+        f'{CLOCK}\nstart = "zero"\n{DECIMATED}',
+        "not yet available: hardware.start must be 'steady' with filter.decimate, not 'zero'",
+    ),
+    (
+        "decimation before on-line arithmetic",
+        CLOCK,
+        f'{CLOCK}\narchitecture = "online"\n{DECIMATED}',
+        'not yet available: hardware.architecture must be one of "auto", "folded", "serial", "parallel" with '
+        "filter.decimate, not 'online'",
+    ),
+    (
+        "decimation of converters",
+        CLOCK,
+        f"{CLOCK}\n{DECIMATED}" + ADC.format("[0.0, 10.0]") + THERMOCOUPLE,
+        "not yet available: converter must be left out with filter.decimate, not 'voltage', 'temperature'",
     ),
     ("order zero", ORD, "order = 0", "filter.order must be a whole number from 1 to 20, not 0"),
     ("order 21", ORD, "order = 21", "filter.order must be a whole number from 1 to 20, not 21"),
@@ -1002,7 +1083,10 @@ def test_a_bad_specification_is_refused_in_one_sentence(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert BASE.count(old) == 1
-    Path("spec.toml").write_text(BASE.replace(old, new), encoding="utf-8")
+    text = BASE.replace(old, new)
+    if DECIMATED in text:
+        text = text.replace(ORD, f"{ORD}\ndecimate = 2")
+    Path("spec.toml").write_text(text, encoding="utf-8")
     with pytest.raises(SpecificationError, match=f"^{re.escape(f'spec.toml: {sentence}')}$"):
         load(Path("spec.toml"))
 

@@ -61,6 +61,7 @@ def cases() -> list[dict[str, Any]]:
                 "stall": stall,
                 "latency_cycles": patience,
                 "reset_cycles": 0,
+                "samples_per_result": 1,
             },
         }
         for fault in FAULTS

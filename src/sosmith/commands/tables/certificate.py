@@ -44,7 +44,8 @@ def print_proof(certificate: Certificate, proof: Proof) -> None:
         )
     if proof.files and proof.program is None and proof.hardware is None:
         what = "an online core" if online is not None else "a core with loadable constants or with protection"
-        console.print(f"not read: the SystemVerilog, as that of {what}")
+        other = ", or in parallel behind a decimator" if certificate.decimation is not None else ""
+        console.print(f"not read: the SystemVerilog, as that of {what}{other}")
     if proof.rebuilt:
         console.print(f"[bold green]rebuilt[/]: {proof.rebuilt} files, the same byte for byte")
 

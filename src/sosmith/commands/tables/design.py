@@ -14,7 +14,8 @@ from sosmith.commands.tables.console import TableConsole, new_table
 from sosmith.gen.architecture import Architecture
 from sosmith.gen.instrument.uncertainty_budget import InstrumentBudget
 from sosmith.gen.output.core_facts import LimitCycleFacts
-from sosmith.gen.quantity import LEAST_PART
+from sosmith.gen.output.decimation_facts import RateCosts
+from sosmith.gen.quantity import LEAST_PART, quantity
 from sosmith.gen.specification.specification import Specification
 from sosmith.gen.specification.wear_limits import WearSpec
 from sosmith.interface.design import Design
@@ -40,6 +41,7 @@ def print_design(design: Design, *, details: bool = False) -> None:
         if aliasing is not None:
             deviation, dc = 100 * aliasing.max_deviation, 100 * aliasing.dc_error
             overview.add_row("aliasing", f"at most {deviation:.3g} % of the gain, {dc:.3g} % at zero frequency")
+    _add_decimation(overview, design)
     _add_calibration(overview, design)
     for subject, reason in made.reasons.items():
         overview.add_row(subject, reason)
@@ -52,6 +54,8 @@ def print_design(design: Design, *, details: bool = False) -> None:
         overview.add_row("channels", f"{made.spec.channels:,}, each at {float(made.spec.sample_rate):,.6g} Hz")
     console.print(overview)
     print_budget(console, design.budget, datapath.output.lsb, design.specification.max_error)
+    if design.facts.decimation is not None:
+        _print_rates(console, design.rate_costs, datapath.output.unit)
     if not details:
         return
     if design.uncertainty is not None:
@@ -65,6 +69,37 @@ def print_design(design: Design, *, details: bool = False) -> None:
         console.print(sections)
         _print_limit_cycles(console, design.facts.limit_cycles, lsb)
     _print_schedule(console, made.architecture.program)
+
+
+def _add_decimation(overview: Table, design: Design) -> None:
+    """Say what stands before the filter, and what it lets through."""
+    found = design.facts.decimation
+    if found is None:
+        return
+    unit = design.core.datapath.output.unit
+    overview.add_row(
+        "decimator",
+        f"{found.stages} integrators and combs of {found.width} bits, {found.width - found.dropped} bits leave, at "
+        f"{found.sample_rate:,.6g} Hz",
+    )
+    most = max(band.gain_db for band in found.aliasing)
+    overview.add_row(
+        "aliasing into the pass band",
+        f"at most {most:.1f} dB, {quantity(found.worst_aliasing, unit)} of a sine over the whole range of the input",
+    )
+    overview.add_row("gain in the pass band", f"within {found.deviation_db:.2g} dB of that without a decimator")
+
+
+def _print_rates(console: Console, costs: Mapping[str, RateCosts], unit: str) -> None:
+    table = new_table("The same filter without a decimator", ["", *costs])
+    table.add_row("architecture", *(each.architecture for each in costs.values()))
+    table.add_row("clocks a sample", *(f"{each.clocks_per_sample:,.4g}" for each in costs.values()))
+    memories = ("none" if each.memory_bits is None else f"{each.memory_bits:,} bits" for each in costs.values())
+    table.add_row("memory", *memories)
+    table.add_row("registers of the decimator", *(f"{each.decimator_bits:,} bits" for each in costs.values()))
+    table.add_row("error bound", *(escape(quantity(each.bound, unit)) for each in costs.values()))
+    table.add_row("delay", *(quantity(each.delay, "s") for each in costs.values()))
+    console.print(table)
 
 
 def _add_calibration(overview: Table, design: Design) -> None:

@@ -1,0 +1,129 @@
+"""Regenerates the tables of docs/rates.md: `python -m benchmarks.rates`.
+
+With `--check` nothing is written; the exit status tells whether the document is up to date.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+
+from sosmith.gen.core import CoreDesign, design_core
+from sosmith.gen.filter.decimation import choose
+from sosmith.gen.output.decimation_facts import decimation_facts, rate_costs
+from sosmith.gen.quantity import quantity
+from sosmith.gen.specification.specification import FilterSpec, load
+
+ROOT = Path(__file__).resolve().parent.parent
+DOCUMENT = ROOT / "docs" / "rates.md"
+LOCOMOTIVE = ROOT / "examples" / "flange_wear_locomotive.toml"
+FACTORS = (None, 2, 4, 8, 16, 32, 64, "auto")
+
+ORDERS = (1, 2, 3, 5, 7, 10)
+RATIOS = tuple(Fraction(1, count) for count in (30, 50, 100, 200, 400, 1000))
+
+_CHOICES = re.compile(r"(?<=<!-- choices -->\n).*?(?=<!-- end of choices -->)", re.DOTALL)
+_TABLES = re.compile(r"(?<=<!-- factors -->\n).*?(?=<!-- end of factors -->)", re.DOTALL)
+_BANDS = re.compile(r"(?<=<!-- bands -->\n).*?(?=<!-- end of bands -->)", re.DOTALL)
+
+
+def locomotive(decimate: int | str | None) -> CoreDesign:
+    """Design the locomotive's filter alone, with a decimator before it."""
+    spec = load(LOCOMOTIVE)
+    return design_core(replace(spec, filter=replace(spec.filter, decimate=decimate)), core="filter")
+
+
+def factor_table() -> str:
+    """Return what each factor costs."""
+    head = (
+        "decimate",
+        "clocks a sample",
+        "memory, bits",
+        "registers of the decimator, bits",
+        "error bound",
+        "delay",
+        "aliasing",
+        "gain",
+    )
+    rows = [head, tuple("---" for _ in head)]
+    direct = rate_costs(locomotive(None))
+    for factor in FACTORS:
+        made = locomotive(factor)
+        costs, found = rate_costs(made), decimation_facts(made)
+        longer = 100 * (costs.delay / direct.delay - 1)
+        aliasing, gain = "-", "-"
+        if found is not None:
+            aliasing = f"{max(band.gain_db for band in found.aliasing):.0f} dB, {found.stages} stages"
+            gain = f"within {found.deviation_db:.2g} dB"
+        chosen = f'"auto", {"none" if found is None else found.factor}' if factor == "auto" else str(factor or "-")
+        rows.append(
+            (
+                chosen,
+                f"{costs.clocks_per_sample:.4g}",
+                f"{costs.memory_bits:,}",
+                f"{costs.decimator_bits:,}",
+                quantity(costs.bound, made.datapath.output.unit),
+                f"{quantity(costs.delay, 's')}, {longer:+.1f} %",
+                aliasing,
+                gain,
+            )
+        )
+    return "".join(f"| {' | '.join(row)} |\n" for row in rows)
+
+
+def band_table() -> str:
+    """Return what folds into the pass band from each band, with the factor of "auto"."""
+    found = decimation_facts(locomotive("auto"))
+    assert found is not None
+    rows = ["| from | gain at most |\n", "| --- | --- |\n"]
+    rows += [f"| {band.low:.6g} to {band.high:.6g} Hz | {band.gain_db:.2f} dB |\n" for band in found.aliasing]
+    return "".join(rows)
+
+
+def choice_table() -> str:
+    """Return the factor and the stages that "auto" takes, by order and cutoff."""
+    rows = [f"| cutoff over sample rate | {' | '.join(f'order {order}' for order in ORDERS)} |\n"]
+    rows.append(f"| --- |{' --- |' * len(ORDERS)}\n")
+    for ratio in RATIOS:
+        found = [choose(butterworth(order, ratio), Fraction(1), Fraction(1, 2**15), 16)[0] for order in ORDERS]
+        cells = ("none" if each is None else f"{each.factor}, {each.stages} stages" for each in found)
+        rows.append(f"| 1/{ratio.denominator} | {' | '.join(cells)} |\n")
+    return "".join(rows)
+
+
+def butterworth(order: int, ratio: Fraction) -> FilterSpec:
+    """Return a filter with its cutoff at `ratio` of the sample rate."""
+    return FilterSpec(
+        family="butterworth",
+        kind="lowpass",
+        method="bilinear",
+        order=order,
+        cutoff=(ratio,),
+        passband_edge=None,
+        stopband_edge=None,
+        passband_loss=None,
+        stopband_loss=None,
+        sos=None,
+        decimate="auto",
+    )
+
+
+def with_choices(text: str) -> str:
+    """Return the document's `text` with the table of choices as it is now."""
+    return _CHOICES.sub(lambda _: choice_table(), text)
+
+
+def document() -> str:
+    """Return the document with the tables as they are now."""
+    text = DOCUMENT.read_text(encoding="utf-8")
+    return with_choices(_BANDS.sub(lambda _: band_table(), _TABLES.sub(lambda _: factor_table(), text)))
+
+
+if __name__ == "__main__":
+    made = document()
+    if sys.argv[1:] == ["--check"]:
+        sys.exit(made != DOCUMENT.read_text(encoding="utf-8"))
+    DOCUMENT.write_text(made, encoding="utf-8")

@@ -1,0 +1,160 @@
+"""Facts about a decimator before a filter, for manifest, report and tables, and about the filter without one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from sosmith.gen.core import CoreDesign, design_core
+from sosmith.gen.filter.decimation import group_delay, nearest_db
+from sosmith.gen.filter.design import design
+from sosmith.gen.fpga.boards import find_board
+
+
+@dataclass(frozen=True, kw_only=True)
+class AliasingFacts:
+    """What folds into the pass band from around one multiple of the lower rate, both sides of it.
+
+    Attributes
+    ----------
+    low, high : float
+        Ends of the band in Hz.
+    gain_db : float
+        Bound on the gain in the band, proven.
+    """
+
+    low: float
+    high: float
+    gain_db: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class DecimationFacts:
+    """A decimator before a filter.
+
+    Attributes
+    ----------
+    factor, stages : int
+        Samples for each result, and pairs of integrator and comb.
+    width, dropped : int
+        Bits of each integrator and comb, and of these, how many the rounding behind them drops.
+    sample_rate : float
+        Rate of the results, in Hz.
+    correction : float
+        Weight g of ``1 + g - g / z``, which corrects the droop in the pass band.
+    cycles_per_result : int
+        Clocks between results at the highest rate.
+    deviation_db : float
+        Largest deviation of the gain in the pass band from that of the filter without a decimator.
+    delay : float
+        Group delay of decimator and filter at zero frequency, in s.
+    aliasing : tuple of AliasingFacts
+        Bands that fold into the pass band, the lowest first.
+    worst_aliasing : float
+        Largest amplitude at the output of a sine in any of these bands that fills the range of the input, in the
+        output's unit.
+    """
+
+    factor: int
+    stages: int
+    width: int
+    dropped: int
+    sample_rate: float
+    correction: float
+    cycles_per_result: int
+    deviation_db: float
+    delay: float
+    aliasing: tuple[AliasingFacts, ...]
+    worst_aliasing: float
+
+
+def decimation_facts(made: CoreDesign) -> DecimationFacts | None:
+    """Collect the facts about the decimator of a core; None for a core without one."""
+    found, decimator, filter_ = made.quantized.decimation, made.datapath.decimator, made.quantized.filter
+    if found is None or decimator is None or filter_ is None:
+        return None
+    gains = found.aliasing
+    x = decimator.input
+    return DecimationFacts(
+        factor=decimator.factor,
+        stages=decimator.stages,
+        width=decimator.width,
+        dropped=decimator.dropped,
+        sample_rate=float(found.rate),
+        correction=float(found.correction),
+        cycles_per_result=made.architecture.cycles_per_result,
+        deviation_db=found.deviation(filter_, design(made.spec.filter, made.spec.sample_rate)),
+        delay=float(found.delay(filter_)),
+        aliasing=tuple(
+            AliasingFacts(
+                low=float(band * found.rate - found.edge),
+                high=float(min(band * found.rate + found.edge, found.sample_rate / 2)),
+                gain_db=nearest_db(gain),
+            )
+            for band, gain in enumerate(gains, start=1)
+        ),
+        worst_aliasing=float(max(gains) * x.lsb * (x.highest - x.lowest) / 2),
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class RateCosts:
+    """What a core costs that filters at some rate.
+
+    Attributes
+    ----------
+    clocks_per_sample : float
+        Clocks that each sample of the input takes, on average, at the highest rate.
+    memory_bits : int or None
+        Bits of memory; None in the parallel architecture.
+    decimator_bits : int
+        Bits of the decimator's registers, without its control.
+    bound : float
+        Proven bound on the error, in the output's unit.
+    delay : float
+        Group delay at zero frequency, in s.
+    architecture : str
+        Name of the architecture.
+    """
+
+    clocks_per_sample: float
+    memory_bits: int | None
+    decimator_bits: int
+    bound: float
+    delay: float
+    architecture: str
+
+
+def rate_costs(made: CoreDesign) -> RateCosts:
+    """Return what a core with a filter costs."""
+    quantized, architecture = made.quantized, made.architecture
+    filter_, found, factor = quantized.filter, quantized.decimation, 1
+    program, decimator = architecture.program, made.datapath.decimator
+    assert filter_ is not None
+    delay = group_delay(filter_.exact) / made.spec.sample_rate
+    if found is not None:
+        delay, factor = found.delay(filter_), found.factor
+    return RateCosts(
+        clocks_per_sample=architecture.cycles_per_result / factor,
+        memory_bits=None if program is None else program.words * (program.digit_bits + 1),
+        decimator_bits=0 if decimator is None else decimator.register_bits,
+        bound=float(quantized.bound * made.datapath.output.lsb),
+        delay=float(delay),
+        architecture=architecture.name,
+    )
+
+
+def direct_design(made: CoreDesign) -> CoreDesign:
+    """Design the same core without a decimator.
+
+    Raises
+    ------
+    ShortfallError
+        If no formats meet the specification.
+    """
+    spec, options = made.spec, made.options
+    return design_core(
+        replace(spec, filter=replace(spec.filter, decimate=None)),
+        core=made.core,
+        realization=options.get("realization"),
+        board=find_board(options["board"]) if "board" in options else None,
+    )

@@ -1,0 +1,192 @@
+"""A core behind a decimator: a CIC filter that hands on one sample out of R, and the core that takes it.
+
+N integrators and N combs of `width` bits, one adder each, with a register behind every one of them::
+
+    s_axis --> [+ sum1] --> .. N .. --> [+ sumN] --> [- comb1] --> .. N .. --> [- combN] --> + --> [o_data] --> core
+     bits   |    width                    width        width                     width      half    width - dropped
+            |                                                                                         |
+            +--> at_rail --> [rail], of any sample since the last result ---------------------------> s_axis_tuser
+
+    clock of the edge        0         1     ..    N-1           N        ..      2N-1        2N
+    register                sum1      sum2   ..    sumN       difference1 ..  differenceN    o_data, o_valid
+
+Each stage holds what belongs to one sample, and has a valid bit; the combs move with every R-th sample only. All sums
+are modulo ``2**width``, see `sosmith.model.dataflow.decimator`.
+
+The first sample after a reset is offered for ``N R`` clocks before it is accepted, and goes in at each of them: after
+that the filter is as if it had been there for ever. Nothing that the sums or combs held before counts any more.
+
+A sample that completes a result is not accepted before the core has taken the result before; all others are, one a
+clock. `s_axis_tready` comes from registers only.
+"""
+
+from __future__ import annotations
+
+from amaranth.hdl import ClockDomain, ClockSignal, DomainRenamer, Module, ResetSignal, Signal, Value
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
+
+from sosmith.hdl.axi_stream import core_members, extended
+from sosmith.hdl.core import Core
+from sosmith.hdl.folded import FoldedCore
+from sosmith.hdl.plan.streams import fields, width
+from sosmith.hdl.status import at_rail
+from sosmith.model.dataflow.datapath import Datapath
+from sosmith.model.dataflow.decimator import Decimator
+
+
+class CicDecimator(wiring.Component):
+    """A CIC filter between two streams.
+
+    Latency and throughput: those of `sosmith.hdl.plan.decimator_clocks`; one sample a clock between results.
+
+    Parameters
+    ----------
+    decimator : Decimator
+        What it computes.
+
+    Members
+    -------
+    i_data, i_valid, i_ready
+        Samples at the higher rate, by the rules of AXI4-Stream; `i_data` is as wide as on a core's stream.
+    o_data, o_rail, o_valid, o_ready
+        Results: the code of `decimator.output`, and whether a sample since the result before was at the end of its
+        range.
+    """
+
+    def __init__(self, decimator: Decimator) -> None:
+        self.decimator = decimator
+        super().__init__(
+            {
+                "i_data": In(width([decimator.input])),
+                "i_valid": In(1),
+                "i_ready": Out(1),
+                "o_data": Out(decimator.output.bits),
+                "o_rail": Out(1),
+                "o_valid": Out(1),
+                "o_ready": In(1),
+            }
+        )
+
+    def elaborate(self, platform: object) -> Module:
+        """Build control, integrators and combs."""
+        m = Module()
+        made = self.decimator
+        phase = Signal(range(made.factor))
+        filling = Signal(init=1)
+        filled = Signal(range(made.stages + 1))
+        waiting = Signal()
+        completes = Signal()
+        enters = Signal()
+        m.d.comb += [
+            completes.eq(~phase.any()),
+            self.i_ready.eq(~filling & ~(waiting & completes)),
+            enters.eq(self.i_valid & (filling | self.i_ready)),
+        ]
+        with m.If(enters):
+            m.d.sync += phase.eq(phase + 1)  # the factor is a power of two
+            with m.If(phase.all()):
+                m.d.sync += filled.eq(filled + 1)
+                with m.If(filled == made.stages - 1):
+                    m.d.sync += filling.eq(0)
+        with m.If(enters & completes & ~filling):
+            m.d.sync += waiting.eq(1)
+        with m.Elif(self.o_valid & self.o_ready):
+            m.d.sync += waiting.eq(0)
+        self._flag_rails(m, enters & ~filling, completes)
+        value, moves, counts = self._filter(m, enters, completes, ~filling)
+        with m.If(moves & counts):
+            m.d.sync += [self.o_data.eq((value + (1 << made.dropped >> 1)) >> made.dropped), self.o_valid.eq(1)]
+        with m.Elif(self.o_ready):
+            m.d.sync += self.o_valid.eq(0)
+        return m
+
+    def _flag_rails(self, m: Module, accepted: Value, completes: Value) -> None:
+        """Hold whether any sample of a result is at the end of the range, from the last of them on."""
+        found = at_rail([self.decimator.input], self.i_data)
+        rail = Signal()
+        with m.If(accepted):
+            m.d.sync += rail.eq((rail | found) & ~completes)
+            with m.If(completes):
+                m.d.sync += self.o_rail.eq(rail | found)
+
+    def _filter(self, m: Module, enters: Value, completes: Value, counts: Value) -> tuple[Value, Value, Value]:
+        """Integrate and comb; return the difference behind the last comb, whether it is new, and whether it counts."""
+        made = self.decimator
+        (field,) = fields([made.input])
+        code = self.i_data[field.offset : field.offset + made.input.bits]
+        value: Value = Signal(made.width, name="code")
+        m.d.comb += value.eq(extended(code.as_signed() if made.input.signed else code, made.width))
+        valid, last, real = enters, completes, counts
+        for k in range(1, made.stages + 1):
+            total = Signal(made.width, name=f"sum{k}", reset_less=True)
+            with m.If(valid):
+                m.d.sync += total.eq(total + value)
+            value = total
+            valid, last, real = self._later(m, f"integrator{k}", valid, last, real)
+        moves = valid & last
+        for k in range(1, made.stages + 1):
+            before = Signal(made.width, name=f"comb{k}", reset_less=True)
+            difference = Signal(made.width, name=f"difference{k}", reset_less=True)
+            with m.If(moves):
+                m.d.sync += [difference.eq(value - before), before.eq(value)]
+            value = difference
+            moves, real = self._later(m, f"comb{k}", moves, real)
+        return value, moves, real
+
+    def _later(self, m: Module, name: str, valid: Value, *others: Value) -> tuple[Value, ...]:
+        """Return bits of the control a clock later; the first, the valid bit, is 0 from a reset on."""
+        held = [Signal(1, name=f"{name}_control{k}", reset_less=k > 0) for k in range(1 + len(others))]
+        m.d.sync += [register.eq(bit) for register, bit in zip(held, (valid, *others), strict=True)]
+        return tuple(held)
+
+
+class DecimatedCore(wiring.Component):
+    """A core with a decimator before it.
+
+    Latency: that of the decimator and that of the core. Throughput: one sample a clock as long as the core keeps up
+    with one result for each R of them.
+
+    Parameters
+    ----------
+    datapath : Datapath
+        With a decimator; its name is that of the top module.
+    core : Core or FoldedCore
+        The core for `datapath.behind_decimator`, which takes the flag `input_at_rail` from `s_axis_tuser`.
+
+    Members
+    -------
+    aclk, aresetn, s_axis_*, m_axis_*
+        As in `sosmith.hdl.core.Core`.
+    """
+
+    def __init__(self, datapath: Datapath, core: Core | FoldedCore) -> None:
+        self.datapath = datapath
+        self.core = core
+        super().__init__(core_members(datapath.inputs, datapath.output))
+
+    def elaborate(self, platform: object) -> Module:
+        """Connect decimator and core."""
+        m = Module()
+        assert self.datapath.decimator is not None
+        m.domains.front = ClockDomain(local=True)  # the core has its own domain `sync`
+        m.d.comb += [ClockSignal("front").eq(self.aclk), ResetSignal("front").eq(~self.aresetn)]
+        decimator, core = CicDecimator(self.datapath.decimator), self.core
+        m.submodules.decimator = DomainRenamer("front")(decimator)
+        m.submodules.behind = core
+        m.d.comb += [
+            decimator.i_data.eq(self.s_axis_tdata),
+            decimator.i_valid.eq(self.s_axis_tvalid),
+            self.s_axis_tready.eq(decimator.i_ready),
+            core.aclk.eq(self.aclk),
+            core.aresetn.eq(self.aresetn),
+            core.s_axis_tdata.eq(decimator.o_data),
+            core.s_axis_tuser.eq(decimator.o_rail),
+            core.s_axis_tvalid.eq(decimator.o_valid),
+            decimator.o_ready.eq(core.s_axis_tready),
+            self.m_axis_tdata.eq(core.m_axis_tdata),
+            self.m_axis_tuser.eq(core.m_axis_tuser),
+            self.m_axis_tvalid.eq(core.m_axis_tvalid),
+            core.m_axis_tready.eq(self.m_axis_tready),
+        ]
+        return m

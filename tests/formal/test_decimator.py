@@ -1,0 +1,130 @@
+"""The decimator, proven: each result is the moving sum of its samples, at any pace, after any reset, from any state."""
+
+from fractions import Fraction
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+from amaranth.hdl import Assert, Assume, Cat, Module, Signal, Value, signed
+from tests.formal.prover import Proof, broken, combinational_outputs, prove
+
+from sosmith.hdl import decimator as hardware
+from sosmith.hdl.plan.decimator_clocks import latency_cycles
+from sosmith.model.dataflow.decimator import Decimator
+from sosmith.model.port import Port
+
+
+class MovingSums(Proof):
+    """What has to hold on the faces of a decimator.
+
+    - The output is not valid after a reset; once it is valid, it and all that goes with it stay until they are taken.
+    - There is no result without its sample, and no sample of a next one before the result is taken.
+    - With `values`, each result is the weighted sum of the last samples, the first one standing for all before it, and
+      rounded.
+    - Its flag tells of an end of the range since the result before.
+    - While the sink is ready, a result is not longer away than is stated.
+    """
+
+    def __init__(self, made: Decimator, module: ModuleType, *, values: bool) -> None:
+        super().__init__(module.CicDecimator(made))
+        self.made = made
+        self.values = values
+
+    def state(self, m: Module) -> None:
+        """State the rules."""
+        d, made = self.design, self.made
+        offers, before = Signal(), Signal(len(d.i_data))
+        m.d.proof += [offers.eq(d.i_valid & ~d.i_ready & ~self.reset), before.eq(d.i_data)]
+        with m.If(offers):
+            m.d.comb += Assume(d.i_valid & (d.i_data == before))
+        taken, given = d.i_valid & d.i_ready, d.o_valid & d.o_ready
+        code = d.i_data[: made.input.bits].as_signed()
+        stalled, payload, held = Signal(), Cat(d.o_data, d.o_rail), Signal(len(d.o_data) + 1)
+        was_reset, pending, waited = Signal(), Signal(), Signal(range(latency_cycles(made) + 1))
+        m.d.proof += [was_reset.eq(self.reset), stalled.eq(d.o_valid & ~d.o_ready & ~self.reset), held.eq(payload)]
+        expected, rail, completes = self._expected(m, taken, code)
+        with m.If(self.reset | given):
+            m.d.proof += pending.eq(0)
+        with m.If(~self.reset & completes):
+            m.d.proof += pending.eq(1)
+        m.d.proof += waited.eq(0)
+        with m.If(pending & ~given & d.o_ready & ~self.reset):
+            m.d.proof += waited.eq(waited + 1)
+        with m.If(self.started):
+            with m.If(was_reset):
+                m.d.comb += Assert(~d.o_valid)
+            with m.If(stalled):
+                m.d.comb += [Assert(d.o_valid), Assert(payload == held)]
+            with m.If(d.o_valid):
+                m.d.comb += [Assert(pending), Assert(d.o_rail == rail)]
+                if self.values:
+                    m.d.comb += Assert(d.o_data == expected)
+            with m.If(completes):
+                m.d.comb += Assert(~pending)
+            m.d.comb += Assert(waited < latency_cycles(made))
+
+    def _expected(self, m: Module, taken: Value, code: Value) -> tuple[Value, Value, Value]:
+        """Return what the last result must be, its flag, and whether its last sample is taken now."""
+        made = self.made
+        taps = made.impulse_response
+        begun, phase = Signal(), Signal(range(made.factor))
+        history = [Signal(signed(made.input.bits), name=f"history{k}") for k in range(len(taps) - 1)]
+        samples = [code, *history]
+        first = [code] * len(taps)
+        total = Signal(signed(made.width + 1))
+        m.d.comb += total.eq(sum(t * x for t, x in zip(taps, samples, strict=True)))
+        with m.If(~begun):
+            m.d.comb += total.eq(sum(t * x for t, x in zip(taps, first, strict=True)))
+        at_end = (code == made.input.lowest) | (code == made.input.highest)
+        expected, seen, rail = Signal(made.width - made.dropped), Signal(), Signal()
+        completes = Signal()
+        m.d.comb += completes.eq(taken & (phase == 0))
+        with m.If(self.reset):
+            m.d.proof += [begun.eq(0), phase.eq(0), seen.eq(0)]
+        with m.Elif(taken):
+            m.d.proof += [begun.eq(1), phase.eq(phase + 1), seen.eq(seen | at_end)]
+            with m.If(begun):
+                m.d.proof += [register.eq(value) for register, value in zip(history, samples, strict=False)]
+            with m.Else():
+                m.d.proof += [register.eq(code) for register in history]
+            with m.If(completes):
+                m.d.proof += [
+                    expected.eq((total + (1 << made.dropped >> 1)) >> made.dropped),
+                    rail.eq(seen | at_end),
+                    seen.eq(0),
+                ]
+        return expected, rail, completes
+
+
+def small(factor: int = 2, stages: int = 1, dropped: int = 1) -> Decimator:
+    port = Port(name="x", bits=2, signed=True, lsb=Fraction(1), zero=Fraction(0))
+    return Decimator(input=port, factor=factor, stages=stages, dropped=dropped)
+
+
+@pytest.mark.parametrize("dropped", [0, 1])
+def test_results_are_moving_sums(dropped: int, tmp_path: Path) -> None:
+    assert prove(MovingSums(small(dropped=dropped), hardware, values=True), tmp_path) == "PASS"
+
+
+@pytest.mark.parametrize(("factor", "stages"), [(2, 3), (4, 2)])
+def test_no_result_is_lost_or_changed_on_its_way(factor: int, stages: int, tmp_path: Path) -> None:
+    assert prove(MovingSums(small(factor, stages), hardware, values=False), tmp_path) == "PASS"
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ("before.eq(value)", "before.eq(difference)"),  # a comb of another delay
+        ("total = Signal(made.width,", "total = Signal(made.width - 1,"),  # a register a bit short
+        ("(1 << made.dropped >> 1)", "0"),  # rounded down
+        ("filling = Signal(init=1)", "filling = Signal()"),  # a first sample that is there once only
+        ("waiting & completes", "0"),  # a result overwritten while it waits
+        ("self.o_rail.eq(rail | found)", "self.o_rail.eq(found)"),  # a rail forgotten
+    ],
+)
+def test_a_broken_decimator_is_found_out(right: str, wrong: str, tmp_path: Path) -> None:
+    assert prove(MovingSums(small(), broken(hardware, right, wrong), values=True), tmp_path) == "FAIL"
+
+
+def test_no_output_follows_an_input_within_a_clock(tmp_path: Path) -> None:
+    assert combinational_outputs(hardware.CicDecimator(small()), tmp_path) == []

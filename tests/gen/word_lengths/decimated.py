@@ -1,0 +1,44 @@
+"""Specifications of decimated filters for the tests."""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from tests.gen.designs import EXAMPLES
+
+from sosmith.gen.core import CoreDesign, design_core
+from sosmith.gen.output.certificate import about, certificate
+from sosmith.gen.specification.specification import Specification, from_text
+from sosmith.gen.verifier.certificate_file import Certificate, certificate_text
+
+
+def locomotive_text(decimate: str = '"auto"', architecture: str = "auto") -> str:
+    """Return the locomotive's specification with a decimator before its filter."""
+    text = (EXAMPLES / "flange_wear_locomotive.toml").read_text(encoding="utf-8")
+    text = text.replace("order = 7\n", f"order = 7\ndecimate = {decimate}\n")
+    return text.replace('architecture = "auto"', f'architecture = "{architecture}"')
+
+
+def locomotive_spec(decimate: str = '"auto"', architecture: str = "auto") -> Specification:
+    """Return the same, read."""
+    return from_text(locomotive_text(decimate, architecture), Path("locomotive.toml"))
+
+
+@cache
+def locomotive(decimate: str = '"auto"', architecture: str = "auto") -> CoreDesign:
+    """Design its filter."""
+    return design_core(locomotive_spec(decimate, architecture), core="filter")
+
+
+def tree_of(made: CoreDesign) -> Any:
+    """Return the certificate of a design as it is in its file."""
+    entries = certificate(made.quantized, made.spec.max_error, about(made, {}))
+    return json.loads(certificate_text(entries))
+
+
+def read(tree: Any) -> Certificate:
+    """Return the certificate with this content."""
+    return Certificate.model_validate(tree)

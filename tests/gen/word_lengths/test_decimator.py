@@ -1,0 +1,168 @@
+"""A decimated filter from specification to proof: what it costs beside the direct one, and where it is refused."""
+
+import re
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.gen.word_lengths.decimated import locomotive, locomotive_spec
+
+from sosmith.gen.core import design_core, refuse_decimated
+from sosmith.gen.output.core_facts import core_facts
+from sosmith.gen.output.decimation_facts import direct_design, rate_costs
+from sosmith.gen.output.manifest import manifest
+from sosmith.gen.output.packages.package import packed
+from sosmith.gen.stimuli import traces_for
+from sosmith.gen.word_lengths.decimator import front_of
+from sosmith.gen.word_lengths.quantized import DECIMATION
+from sosmith.interface.design import Design
+from sosmith.model.errors import ShortfallError, SpecificationError
+from sosmith.model.port import Port
+from sosmith.model.reference.golden import entering_filter, filtered
+
+
+def test_the_locomotive_costs_less_than_without() -> None:
+    """The same proven millimetres with fewer clocks and less memory, and a delay at most a tenth longer."""
+    made = locomotive()
+    direct = direct_design(made)
+    ours, theirs = rate_costs(made), rate_costs(direct)
+    assert direct.datapath.decimator is None
+    assert ours.architecture == theirs.architecture == "folded"
+    assert made.quantized.bound * made.datapath.output.lsb <= made.spec.max_error
+    assert ours.bound <= theirs.bound <= float(made.spec.max_error)
+    assert ours.clocks_per_sample * 10 < theirs.clocks_per_sample
+    assert ours.memory_bits is not None
+    assert theirs.memory_bits is not None
+    assert ours.memory_bits + ours.decimator_bits < theirs.memory_bits
+    assert ours.delay <= 1.1 * theirs.delay
+    assert theirs.clocks_per_sample == direct.architecture.cycles_per_sample
+
+
+def test_the_decimator_is_a_row_of_the_budget() -> None:
+    made = locomotive()
+    decimator, output = made.datapath.decimator, made.datapath.output
+    assert decimator is not None
+    share = made.quantized.budget[DECIMATION]
+    assert decimator.rounding / output.lsb < share < 2 * decimator.rounding / output.lsb
+    assert share <= (made.spec.max_error / output.lsb - Fraction(1, 2)) / 32
+    assert made.quantized.bound == sum(made.quantized.budget.values())
+
+
+def test_facts_for_programs() -> None:
+    made = locomotive()
+    tree = manifest(core_facts(made))
+    found = tree["decimation"]
+    clocks = made.architecture.cycles_per_result
+    assert (found["factor"], found["stages"], found["width"], found["dropped"]) == (16, 4, 32, 10)
+    assert found["cycles_per_result"] == clocks
+    assert tree["cycles_per_sample"] == -(-clocks // 16)
+    assert [(band["low"], band["high"]) for band in found["aliasing"][:2]] == [
+        pytest.approx((6.25 * k - 0.2587802, 6.25 * k + 0.2587802)) for k in (1, 2)
+    ]
+    assert found["aliasing"][-1]["high"] == 50
+    assert max(band["gain_db"] for band in found["aliasing"]) == pytest.approx(-109.06, abs=0.01)
+    assert found["worst_aliasing"] <= float(made.spec.max_error)
+    assert made.reasons["architecture"] == (
+        f"folded: the smallest that keeps up; takes {clocks} of 1,920,000 clocks for 16 samples"
+    )
+
+
+@pytest.mark.parametrize("scenario", ["worst_case", "worst_case_errors", "noise"])
+def test_no_input_exceeds_the_bound(scenario: str) -> None:
+    made = locomotive()
+    quantized, datapath = made.quantized, made.datapath
+    assert quantized.filter is not None
+    (trace,) = traces_for(made, scenario, seed=1)
+    exact = filtered(
+        entering_filter(trace.codes, datapath, None), quantized.filter.sos, datapath.output, steady=quantized.steady
+    )
+    error = np.abs(datapath.output.decode(datapath.compute(trace.codes)) - exact).max()
+    bound = float(quantized.bound * datapath.output.lsb)
+    assert 0.5 * bound < error <= bound
+
+
+def test_a_constant_is_there_from_the_first_result_on() -> None:
+    datapath = locomotive().datapath
+    codes = np.full((100, 1), 12345)
+    assert datapath.compute(codes).tolist() == [12345] * 7
+
+
+def test_the_response_from_the_input_on() -> None:
+    """A sine at the input, folded or not, comes out with the gain that is told."""
+    design = Design(locomotive())
+    port, output = design.core.datapath.inputs[0], design.core.datapath.output
+    frequencies = np.array([0.1, 0.25, 1.0, 6.25 - 0.2])
+    gains = abs(design.frequency_response(frequencies))
+    assert gains[0] == pytest.approx(1, abs=0.001)
+    assert gains[1] == pytest.approx((1 + (0.25 / 0.2587802) ** 14) ** -0.5, abs=1e-3)
+    time = np.arange(40_000) / 100
+    sine = port.decode(port.encode(8 + 7.9 * np.sin(2 * np.pi * frequencies[1] * time)))
+    result = design.run(clearance_in=sine)[1000:]
+    assert len(result) == 1500
+    assert (result.max() - result.min()) / 2 / 7.9 == pytest.approx(gains[1], abs=2e-3)
+    assert gains[3] < float(design.core.spec.max_error / output.lsb) / 2**15
+
+
+def test_what_is_not_worth_it_is_not_decimated() -> None:
+    spec = locomotive_spec()
+    wanted = replace(spec, filter=replace(spec.filter, order=2, cutoff=(Fraction(20),)))
+    made = design_core(wanted, core="filter")
+    assert made.datapath.decimator is None
+    assert made.reasons["decimation"] == (
+        "none: no power of two has a delay at most 10 % longer and a gain within 0.1 dB"
+    )
+    assert made.quantized.bound == direct_design(made).quantized.bound
+    assert manifest(core_facts(made))["decimation"] is None
+    assert Design(made).rate_costs == {}
+
+
+def refused(sentence: str, error: type[Exception] = SpecificationError) -> pytest.RaisesExc[Exception]:
+    return pytest.raises(error, match=f"^{re.escape(sentence)}$")
+
+
+def test_an_instrument_is_refused() -> None:
+    sentence = "locomotive.toml: not yet available: the core must be filter with filter.decimate, not instrument"
+    with refused(sentence):
+        design_core(locomotive_spec())
+    assert design_core(locomotive_spec(), core="calibration").datapath.decimator is None
+
+
+def test_packages_and_boards_are_refused(tmp_path: Path) -> None:
+    made = locomotive()
+    with refused("locomotive.toml: not yet available: filter.decimate must be left out in a package, not 16"):
+        packed(made)
+    with refused("locomotive.toml: not yet available: filter.decimate must be left out on a board, not 16"):
+        Design(made).build("icebreaker", folder=tmp_path)
+    with refused("locomotive.toml: not yet available: filter.decimate must be left out on a board, not 16"):
+        Design(made).board()
+    with refused("locomotive.toml: not yet available: filter.decimate must be left out with vectors, not 16"):
+        Design(made).simulate(folder=tmp_path, vectors=tmp_path / "vectors.csv")
+    refuse_decimated(direct_design(made), "anywhere")
+
+
+def test_an_input_as_wide_as_can_be() -> None:
+    spec = locomotive_spec("16")
+    x = Port.from_range("x", 32, Fraction(0), Fraction(16))
+    front, _ = front_of(spec.filter, spec.sample_rate, x, spec.output, spec.max_error)
+    assert front is not None
+    assert front.decimator.output.bits == 32
+    sharp = Port.from_range("y", 32, Fraction(0), Fraction(16))
+    sentence = (
+        "the rounding behind the decimator must take at most half of the error allowed, not 0.791 output LSB with "
+        "32 bits: raise output.max_error or output.bits"
+    )
+    with refused(sentence, ShortfallError):
+        front_of(spec.filter, spec.sample_rate, x, sharp, Fraction(16, 2**32))
+
+
+def test_a_clock_that_is_too_slow() -> None:
+    spec = locomotive_spec("16", "folded")
+    slow = replace(spec, hardware=replace(spec.hardware, clock=Fraction(500), realization="df2t"))
+    sentence = (
+        "the folded architecture takes 123 clocks for 16 samples: at a clock of 500 Hz the sample rate must be at most "
+        "65.0406 Hz, not 100 Hz"
+    )
+    with refused(sentence, ShortfallError):
+        design_core(slow, core="filter")

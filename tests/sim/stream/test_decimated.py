@@ -1,0 +1,153 @@
+"""Decimated filters in simulation, result for result the integer model; and forty random ones, each proven twice.
+
+`./run test --slow` runs all random designs; the fast tests take none of them, but the locomotive's filter.
+"""
+
+import random
+import re
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.gen.word_lengths.decimated import locomotive, read, tree_of
+from tests.sim.lint import icarus_check, lint
+
+from sosmith.gen.core import CoreDesign, design_core
+from sosmith.gen.output.generate import generate
+from sosmith.gen.report.report import write_report
+from sosmith.gen.stimuli import bench_of, traces_for
+from sosmith.gen.verifier.specified.stated_specification import check_specification
+from sosmith.gen.verifier.verification import verify
+from sosmith.interface.specification import Specification
+from sosmith.model.reference.golden import entering_filter, filtered
+from sosmith.model.scenarios.worst_case_inputs import sign_matched
+from sosmith.model.traces.trace import Trace
+from sosmith.sim.simulation import simulate
+
+
+def samples_of(made: CoreDesign, count: int) -> Trace:
+    """Return noise, both ends of the range, and a constant, which the filter settles on."""
+    (trace,) = traces_for(made, "noise", seed=3)
+    port = made.datapath.inputs[0]
+    codes = np.resize(trace.codes, (count, 1)).copy()
+    codes[count // 3 : count // 2] = port.highest
+    codes[count // 2 : count * 2 // 3] = port.lowest
+    codes[-count // 8 :] = port.highest // 3
+    return replace(trace, codes=codes, truth=None, reading=None)
+
+
+@pytest.mark.parametrize(
+    ("architecture", "simulator"), [("folded", "icarus"), ("parallel", "verilator"), ("serial", "cxxrtl")]
+)
+def test_hardware_equals_the_integer_model(architecture: str, simulator: str, tmp_path: Path) -> None:
+    made = locomotive(architecture=architecture)
+    evidence = simulate(made, [samples_of(made, 900)], tmp_path, seed=5, simulator=simulator)
+    assert evidence.mismatches == 0
+    assert evidence.samples == len(evidence.time) == 57
+    assert evidence.time[1] == 0.16
+    summary = write_report(evidence, tmp_path)
+    assert summary["passed"]
+    assert summary["decimation"]["factor"] == 16
+    assert summary["delay"]["seconds"] == pytest.approx(3.006, abs=0.001)
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "What folds into the pass band" in page
+    assert "49.74122 Hz to 50 Hz" in page
+
+
+def test_results_come_at_the_rate_that_is_stated(tmp_path: Path) -> None:
+    made = locomotive(architecture="folded")
+    stated, decimator = made.architecture, made.datapath.decimator
+    assert decimator is not None
+    evidence = simulate(made, [samples_of(made, 801)], tmp_path, seed=1, idle=0.0, stall=0.0)
+    assert evidence.samples == 51
+    # The first sample is offered while the decimator fills; then results come one after the other.
+    assert evidence.cycles == decimator.warm_up + 1 + stated.cycles_per_result * 50 + stated.latency_cycles
+
+
+FAMILIES = ("butterworth", "chebyshev1", "chebyshev2", "elliptic", "bessel")
+DESIGNS = 40
+
+
+def random_tree(number: int) -> dict[str, Any]:
+    """Draw a specification: family, order, cutoff, factor, formats and architecture."""
+    draw = random.Random(f"decimated {number}")
+    family = FAMILIES[number % len(FAMILIES)]
+    factor = 2 ** draw.randint(1, 6)
+    # The cutoff lies from a fortieth to a tenth of the lower rate.
+    cutoff = 1000 / factor / 40 * 4 ** draw.random()
+    bits, out = draw.randint(8, 18), draw.randint(8, 18)
+    span = draw.choice([1.0, 1.0, 10.0, 3.3])
+    signed = draw.random() < 0.5
+    table: dict[str, Any] = {
+        "family": family,
+        "kind": "lowpass",
+        "order": draw.randint(1, 7),
+        "cutoff": float(f"{cutoff:.4g}"),
+        "decimate": "auto" if number % 5 == 4 else factor,
+    }
+    losses = {"chebyshev1": ("passband_loss",), "chebyshev2": ("stopband_loss",)}
+    for key in losses.get(family, ("passband_loss", "stopband_loss") if family == "elliptic" else ()):
+        table[key] = 0.5 if key == "passband_loss" else 50
+    if family in {"chebyshev2", "elliptic"}:
+        table["order"] = max(2, table["order"])
+    ends = [-span, span] if signed else [0.0, span]
+    return {
+        "name": f"decimated{number}",
+        "sample_rate": 1000,
+        "input": {"x": {"bits": bits, "range": ends, "signed": signed}},
+        "filter": table,
+        "output": {"bits": out, "range": [-2.0 * span, 2.0 * span], "signed": True, "max_error": "faithful"},
+        "hardware": {"architecture": ("folded", "folded", "parallel", "serial")[number % 4], "clock": 20_000_000},
+    }
+
+
+def worst_cases(made: CoreDesign) -> Iterator[np.ndarray]:
+    """Yield codes at random, and those that maximize the result and what each quantizer adds to it."""
+    (port,) = made.datapath.inputs
+    yield np.random.default_rng(7).integers(port.lowest, port.highest + 1, 100_000)
+    bench = bench_of(made)
+    for response in (bench.impulse_response, *bench.error_responses):
+        yield np.where(sign_matched(response), port.highest, port.lowest)
+    yield np.repeat([1, port.highest // 3, port.highest, port.lowest, 5], len(bench.impulse_response))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", range(DESIGNS))
+def test_random_designs(number: int, tmp_path: Path) -> None:
+    """No input exceeds the bound, no result differs, and the other method proves the same."""
+    spec = Specification.load(random_tree(number)).checked
+    made = design_core(spec)
+    quantized, datapath = made.quantized, made.datapath
+    assert datapath.decimator is not None
+    assert quantized.filter is not None
+    bound = float(quantized.bound)
+    for codes in worst_cases(made):
+        column = codes.reshape(-1, 1)
+        entering = entering_filter(column, datapath, None)
+        exact = filtered(entering, quantized.filter.sos, datapath.output, steady=quantized.steady)
+        error = np.abs(datapath.output.decode(datapath.compute(column)) - exact).max() / float(datapath.output.lsb)
+        assert error <= bound + 1e-6
+    certificate = read(tree_of(made))
+    verdict = verify(certificate)
+    assert verdict.bound * datapath.output.lsb <= spec.max_error
+    check_specification(certificate, spec.text, verdict.margin)
+    count = 60 * datapath.decimator.factor + number % 7
+    evidence = simulate(made, [samples_of(made, count)], tmp_path, seed=number)
+    assert evidence.mismatches == 0
+    assert evidence.samples == datapath.results(count)
+
+
+@pytest.mark.parametrize("architecture", ["folded", "parallel"])
+def test_tools_read_the_text_without_a_warning(architecture: str, tmp_path: Path) -> None:
+    made = locomotive(architecture=architecture)
+    generate(made, tmp_path)
+    text = tmp_path / f"{made.spec.name}.sv"
+    assert lint(text, made.spec.name, tmp_path / "lint") == []
+    assert icarus_check(text, made.spec.name) == []
+    assert re.findall(r"^module (\w+)\(", text.read_text(encoding="utf-8"), re.MULTILINE)[:2] == [
+        made.spec.name,
+        f"{made.spec.name}_behind",
+    ]
