@@ -725,8 +725,8 @@ table says.
 
 It stands between the others: for its samples per second it takes far less logic than serial, on the HX8K less than
 folded too, and several times as much as parallel. A carry chain of an FPGA is faster than the steps that it saves,
-and the units of a section that work side by side take more logic than one set of multipliers. No choice by `auto`
-falls on it.
+and the units of a section that work side by side take more logic than one set of multipliers. No choice by `auto` falls
+on it.
 
 ## Protection
 
