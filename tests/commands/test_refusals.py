@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from tests.commands.command_line import INSTRUMENT, Command, refused
-from tests.gen.specification.test_bad_specifications import BAD, BASE
+from tests.gen.specification.test_bad_specifications import BAD, with_fault
 
 USAGE = {
     "no command": ((), "Usage: sosmith [OPTIONS] COMMAND [ARGS]..."),
@@ -154,7 +154,7 @@ def test_what_does_not_fit_is_refused(arguments: tuple[str, ...], message: str, 
 
 @pytest.mark.parametrize(("old", "new", "sentence"), [pytest.param(*case, id=subject) for subject, *case in BAD])
 def test_a_bad_specification_ends_with_one_sentence(old: str, new: str, sentence: str, sosmith: Command) -> None:
-    Path("spec.toml").write_text(BASE.replace(old, new), encoding="utf-8")
+    Path("spec.toml").write_text(with_fault(old, new), encoding="utf-8")
     refused(sosmith("generate", "spec.toml", "-o", "out"), f"spec.toml: {sentence}")
 
 

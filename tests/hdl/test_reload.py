@@ -389,45 +389,45 @@ MUTANTS: dict[str, tuple[Scenario, str, str, str]] = {
     ),
     "single bytes are written": (
         a_load_broken_off_never_becomes_active,
-        "axi_lite",
+        "bus/axi_lite",
         "partial.eq(~self.s_axil_wstrb.all())",
         "partial.eq(0)",
     ),
     "an unaligned write is refused": (
         the_lowest_address_bits_are_ignored,
-        "axi_lite",
+        "bus/axi_lite",
         "partial.eq(~self.s_axil_wstrb.all())",
         "partial.eq(~self.s_axil_wstrb.all() | self.s_axil_awaddr[:2].any())",
     ),
     "an unaligned part of a word is written": (
         the_lowest_address_bits_are_ignored,
-        "axi_lite",
+        "bus/axi_lite",
         "partial.eq(~self.s_axil_wstrb.all())",
         "partial.eq(~self.s_axil_wstrb.all() & ~self.s_axil_awaddr[:2].any())",
     ),
     "an unaligned read is of another word": (
         the_lowest_address_bits_are_ignored,
-        "axi_lite",
+        "bus/axi_lite",
         "index.eq(self.s_axil_araddr[2:])",
         "index.eq(self.s_axil_araddr[2:] + self.s_axil_araddr[:2].any())",
     ),
     "an answer does not wait": (
         a_refused_read_breaks_nothing,
-        "axi_lite",
+        "bus/axi_lite",
         "self.s_axil_bready, self.s_axil_rready",
         "self.s_axil_bready, 1",
     ),
     "ready follows valid": (
         a_good_load_becomes_active,
-        "axi_lite",
+        "bus/axi_lite",
         "arready.eq(idle & ~writes)",
         "arready.eq(self.s_axil_arvalid & idle & ~writes)",
     ),
-    "refusals are not told": (a_refused_read_breaks_nothing, "axi_lite", "failed.eq(refused)", "failed.eq(0)"),
+    "refusals are not told": (a_refused_read_breaks_nothing, "bus/axi_lite", "failed.eq(refused)", "failed.eq(0)"),
 }
 """For each the scenario that must notice it, the module, and what is replaced by what."""
 
-USED_BY = {"bus/serial_crc": (reload, "SerialCrc"), "axi_lite": (reload, "SerialSlave")}
+USED_BY = {"bus/serial_crc": (reload, "SerialCrc"), "bus/axi_lite": (reload, "SerialSlave")}
 """Where the components of a module are looked up; the port itself here."""
 
 

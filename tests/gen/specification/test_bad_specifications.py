@@ -1077,16 +1077,19 @@ BAD = [
 ]
 
 
+def with_fault(old: str, new: str) -> str:
+    """Return the good specification with `new` in place of `old`, which must be there once."""
+    assert BASE.count(old) == 1
+    text = BASE.replace(old, new)
+    return text.replace(ORD, f"{ORD}\ndecimate = 2") if DECIMATED in text else text
+
+
 @pytest.mark.parametrize(("old", "new", "sentence"), [pytest.param(*case, id=subject) for subject, *case in BAD])
 def test_a_bad_specification_is_refused_in_one_sentence(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, old: str, new: str, sentence: str
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert BASE.count(old) == 1
-    text = BASE.replace(old, new)
-    if DECIMATED in text:
-        text = text.replace(ORD, f"{ORD}\ndecimate = 2")
-    Path("spec.toml").write_text(text, encoding="utf-8")
+    Path("spec.toml").write_text(with_fault(old, new), encoding="utf-8")
     with pytest.raises(SpecificationError, match=f"^{re.escape(f'spec.toml: {sentence}')}$"):
         load(Path("spec.toml"))
 
