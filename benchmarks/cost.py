@@ -70,6 +70,8 @@ class Core:
         One of `sosmith.model.dataflow.protection.PROTECTIONS`.
     bits : int
         Bits of input and output; 0 for those of the example.
+    realization : str
+        Structure of the filter sections; empty for the one that is chosen.
     """
 
     example: str
@@ -77,13 +79,15 @@ class Core:
     channels: int = 1
     protect: str = "none"
     bits: int = 0
+    realization: str = ""
 
     @property
     def key(self) -> str:
         """Key in the record."""
         guarded = "" if self.protect == "none" else f" {self.protect}"
         wide = f" {self.bits} bits" if self.bits else ""
-        return f"{self.example} {self.architecture} {self.channels}{guarded}{wide}"
+        chosen = f" {self.realization}" if self.realization else ""
+        return f"{self.example} {self.architecture} {self.channels}{guarded}{wide}{chosen}"
 
     @property
     def label(self) -> str:
@@ -91,11 +95,14 @@ class Core:
         several = f", {self.channels} channels" if self.channels > 1 else ""
         guarded = "" if self.protect == "none" else f", protect = {self.protect}"
         wide = f", {self.bits} bits" if self.bits else ""
-        return f"{self.example} {self.architecture}{several}{guarded}{wide}"
+        chosen = f", {self.realization}" if self.realization else ""
+        return f"{self.example} {self.architecture}{several}{guarded}{wide}{chosen}"
 
     @property
     def targets(self) -> list[str]:
         """Targets on which it is measured."""
+        if self.realization:
+            return ["ecp5"]
         if self.bits or self.architecture == "online":
             return ["hx8k", "ecp5"]
         wanted = [key for key in TARGETS if key != _SMALLEST or self.architecture == "serial"]
@@ -128,6 +135,11 @@ ONLINE = (
 )
 """Sections in on-line arithmetic, and what they are compared with for longer words."""
 
+REALIZED = tuple(
+    Core("audio_lowpass", "parallel", realization=name) for name in ("df1", "df2t", "df1_ef2", "state_space")
+)
+"""The state space beside direct sections, as Hourani compared them."""
+
 CORES = (
     *(
         replace(core, channels=channels)
@@ -136,6 +148,7 @@ CORES = (
     ),
     *PROTECTED,
     *ONLINE,
+    *REALIZED,
 )
 
 Job = tuple[Core, str]
@@ -149,7 +162,9 @@ def jobs() -> list[Job]:
     def rank(job: Job) -> int:
         core, key = job
         hopeless = core.architecture == "parallel" and TARGETS[key].device.family == "ice40"
-        return 0 if job in wanted or core in {*PROTECTED, *ONLINE} else 1 + (core.channels > 1) + 2 * hopeless
+        return (
+            0 if job in wanted or core in {*PROTECTED, *ONLINE, *REALIZED} else 1 + (core.channels > 1) + 2 * hopeless
+        )
 
     return sorted(((core, key) for core in CORES for key in core.targets), key=rank)
 
@@ -161,7 +176,7 @@ def objective_on(architecture: str, key: str) -> Objective:
 
 
 @cache
-def design(example: str, architecture: str, objective: Objective, bits: int = 0) -> CoreDesign:
+def design(example: str, architecture: str, objective: Objective, bits: int = 0, realization: str = "") -> CoreDesign:
     """Design an example in an architecture, for one channel; the datapath is the same for more."""
     path = ROOT / "examples" / f"{example}.toml"
     spec = load(path)
@@ -169,19 +184,24 @@ def design(example: str, architecture: str, objective: Objective, bits: int = 0)
         spec = from_text(spec.text.replace("bits = 16", f"bits = {bits}"), path)
     wanted = replace(spec, hardware=replace(spec.hardware, architecture=architecture))
     first = next(target for key, target in TARGETS.items() if objective_on(architecture, key) == objective)
-    return design_core(wanted, core=EXAMPLES[example], board=first)
+    return design_core(wanted, core=EXAMPLES[example], realization=realization or None, board=first)
+
+
+def design_on(core: Core, key: str) -> CoreDesign:
+    """Return the design of a core, for one channel, as it is made for a target."""
+    objective = objective_on(core.architecture, key)
+    return design(core.example, core.architecture, objective, core.bits, core.realization)
 
 
 def architecture_on(core: Core, key: str) -> Architecture:
     """Return the architecture of a core as it is designed for a target."""
-    made = design(core.example, core.architecture, objective_on(core.architecture, key), core.bits).architecture
+    made = design_on(core, key).architecture
     return replace(made, channels=core.channels, protect=core.protect, blocks=blocks_for(None, TARGETS[key]))
 
 
 def realization_on(core: Core, key: str) -> str:
     """Return the realization of a core on a target."""
-    objective = objective_on(core.architecture, key)
-    return design(core.example, core.architecture, objective, core.bits).quantized.realization
+    return design_on(core, key).quantized.realization
 
 
 @cache
@@ -336,7 +356,7 @@ def recorded(record: Figures, keys: Iterable[str]) -> Iterable[tuple[Core, str, 
         (core, key, targets_in(record, core)[key])
         for core in CORES
         for key in keys
-        if core not in {*PROTECTED, *ONLINE} and key in targets_in(record, core)
+        if core not in {*PROTECTED, *ONLINE, *REALIZED} and key in targets_in(record, core)
     ]
 
 
@@ -361,6 +381,34 @@ def protection_table(record: Figures) -> str:
                     f"| {area['rams']} | {fmax(figures):.1f} | {more} | {slower} |"
                 )
     return "\n".join(lines)
+
+
+def realized_table(record: Figures) -> str:
+    """Return a Markdown table of the state space beside direct sections."""
+    columns = (
+        *("realization", "multipliers", "LUT4 alone", "all LUT4", "FF", "fmax, MHz (lowest to highest)"),
+        *("clocks per sample", "samples per second"),
+    )
+    lines = [f"| {' | '.join(columns)} |", "|---" * len(columns) + "|"]
+    for core in REALIZED:
+        for figures in targets_in(record, core).values():
+            area = figures["area"]
+            row = [
+                core.realization,
+                str(area["multipliers"]),
+                f"{area['luts']:,}",
+                f"{area['all_luts']:,}",
+                f"{area['flip_flops']:,}",
+                f"{fmax(figures):.1f} ({min(figures['fmax']):.1f} to {max(figures['fmax']):.1f})",
+                str(figures["cycles"]),
+                f"{1e6 * fmax(figures) / figures['cycles']:,.0f}",
+            ]
+            lines.append(f"| {' | '.join(row)} |")
+    speed = {core.realization: fmax(targets_in(record, core)["ecp5"]) for core in REALIZED}
+    beside = [
+        f"{speed['state_space'] / speed[name]:.2f} times that of {name}" for name in speed if name != "state_space"
+    ]
+    return "\n".join(lines) + f"\n\nThe rate of state_space is {', '.join(beside)}."
 
 
 def online_table(record: Figures) -> str:
@@ -727,6 +775,14 @@ It stands between the others: for its samples per second it takes far less logic
 folded too, and several times as much as parallel. A carry chain of an FPGA is faster than the steps that it saves,
 and the units of a section that work side by side take more logic than one set of multipliers. No choice by `auto` falls
 on it.
+
+## State space beside direct sections
+
+Hourani and others report twice the throughput for second-order sections in state space, on a Spartan-3, with nine
+multipliers instead of five. In both loops stands one multiplication and about two additions. Here is audio_lowpass in
+the parallel architecture on the ECP5, each realization with the word lengths that the same allowed error takes:
+
+{realized_table(record)}
 
 ## Protection
 
