@@ -113,7 +113,7 @@ def test_the_document_is_what_the_recorded_figures_give() -> None:
 
 def test_every_example_is_measured_in_every_architecture() -> None:
     assert {path.stem for path in (cost.ROOT / "examples").glob("*.toml")} == cost.EXAMPLES.keys()
-    assert len(cost.CORES) == 3 * 3 * 3 + 1 + len(cost.PROTECTED) + len(cost.ONLINE)
+    assert len(cost.CORES) == 3 * 3 * 3 + 1 + len(cost.PROTECTED) + len(cost.ONLINE) + len(cost.REALIZED)
     listed = cost.jobs()
     assert len(listed) == len(set(listed)) == sum(len(core.targets) for core in cost.CORES)
     of_goals = {(core, goal.target) for goal in cost.GOALS for core in (goal.core, goal.base) if core is not None}
