@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -43,6 +43,18 @@ class Pace:
     idle: float = 0.3
     stall: float = 0.3
     withdraw: float = 0.0
+
+
+def simulate(dut: Any, testbench: Callable[[Any], Awaitable[None]]) -> None:
+    """Run a core with one testbench, in the clock domain `bench`."""
+    m = Module()
+    m.domains.bench = ClockDomain(reset_less=True)
+    m.submodules.core = dut
+    m.d.comb += dut.aclk.eq(ClockSignal("bench"))
+    simulator = Simulator(m)
+    simulator.add_clock(1e-6, domain="bench")
+    simulator.add_testbench(testbench)
+    simulator.run()
 
 
 def run_core(architecture: Architecture, samples: Sequence[tuple[int, Sequence[int]]], pace: Pace) -> list[Result]:
@@ -91,12 +103,5 @@ def run_core(architecture: Architecture, samples: Sequence[tuple[int, Sequence[i
             assert waited < _PATIENCE, f"the core hangs after {len(results)} results"
             await ctx.tick("bench")
 
-    m = Module()
-    m.domains.bench = ClockDomain(reset_less=True)
-    m.submodules.core = dut
-    m.d.comb += dut.aclk.eq(ClockSignal("bench"))
-    simulator = Simulator(m)
-    simulator.add_clock(1e-6, domain="bench")
-    simulator.add_testbench(bench)
-    simulator.run()
+    simulate(dut, bench)
     return results

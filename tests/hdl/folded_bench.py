@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Awaitable, Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
-from amaranth.hdl import ClockDomain, ClockSignal, Module
-from amaranth.sim import Simulator
+from amaranth.hdl import Module
 from tests.hdl.axi_lite_bench import OKAY
 
 from sosmith.hdl.folded import FoldedCore
@@ -211,15 +210,3 @@ class Probed(FoldedCore):
         """Turn over some bits of a word."""
         word = self.memory(name)[address]
         ctx.set(word, ctx.get(word) ^ sum(1 << bit for bit in bits))
-
-
-def simulate(dut: Probed, testbench: Callable[[Any], Awaitable[None]]) -> None:
-    """Run a core with one testbench."""
-    m = Module()
-    m.domains.bench = ClockDomain(reset_less=True)
-    m.submodules.core = dut
-    m.d.comb += dut.aclk.eq(ClockSignal("bench"))
-    simulator = Simulator(m)
-    simulator.add_clock(1e-6, domain="bench")
-    simulator.add_testbench(testbench)
-    simulator.run()

@@ -10,7 +10,8 @@ from typing import Any
 
 import pytest
 from tests.formal.small import leaky, limiter
-from tests.hdl.folded_bench import Line, Model, Probed, Result, Sample, simulate
+from tests.hdl.core_bench import simulate
+from tests.hdl.folded_bench import Line, Model, Probed, Result, Sample
 from tests.hdl.test_reload import crc_of
 
 from sosmith.hdl.plan import folded_clocks

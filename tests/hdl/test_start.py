@@ -8,10 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from amaranth.hdl import ClockDomain, ClockSignal, Module
-from amaranth.sim import Simulator
 from tests.gen.word_lengths.test_quantize import butterworth, plain
-from tests.hdl.core_bench import Pace, run_core
+from tests.hdl.core_bench import Pace, run_core, simulate
 from tests.hdl.stage_bench import run
 
 from sosmith.gen.architecture import Architecture
@@ -85,12 +83,5 @@ def test_every_reset_begins_with_a_new_first_sample(architecture: str) -> None:
                 await ctx.tick("bench")
             results.append(found)
 
-    m = Module()
-    m.domains.bench = ClockDomain(reset_less=True)
-    m.submodules.core = dut
-    m.d.comb += dut.aclk.eq(ClockSignal("bench"))
-    simulator = Simulator(m)
-    simulator.add_clock(1e-6, domain="bench")
-    simulator.add_testbench(bench)
-    simulator.run()
+    simulate(dut, bench)
     assert results == [datapath().compute_exact(np.array(codes)) for codes in runs]

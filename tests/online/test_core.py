@@ -8,11 +8,9 @@ from types import ModuleType
 from typing import Any
 
 import pytest
-from amaranth.hdl import ClockDomain, ClockSignal, Module
-from amaranth.sim import Simulator
 from tests.formal.prover import broken
 from tests.gen.designs import EXAMPLES
-from tests.hdl.core_bench import Pace, run_core
+from tests.hdl.core_bench import Pace, run_core, simulate
 
 from sosmith.gen.architecture import Architecture
 from sosmith.gen.core import design_core
@@ -101,19 +99,8 @@ def clocks(dut: Any, count: int) -> tuple[list[int], list[int]]:
             await ctx.tick("bench")
             clock += 1
 
-    _simulate(dut, bench)
+    simulate(dut, bench)
     return accepted, left
-
-
-def _simulate(dut: Any, bench: Any) -> None:
-    m = Module()
-    m.domains.bench = ClockDomain(reset_less=True)
-    m.submodules.core = dut
-    m.d.comb += dut.aclk.eq(ClockSignal("bench"))
-    simulator = Simulator(m)
-    simulator.add_clock(1e-6, domain="bench")
-    simulator.add_testbench(bench)
-    simulator.run()
 
 
 def after_reset(dut: Any, codes: list[list[int]], clock: int) -> list[int]:
@@ -139,7 +126,7 @@ def after_reset(dut: Any, codes: list[list[int]], clock: int) -> list[int]:
                 results.append(code - (code >> 15 << 16))
             await ctx.tick("bench")
 
-    _simulate(dut, bench)
+    simulate(dut, bench)
     return results
 
 
