@@ -25,16 +25,16 @@ from sosmith.model.dataflow.status import STATUS_BITS
 from sosmith.model.port import Port
 
 
-def core_members(inputs: Sequence[Port], output: Port, channels: int = 1) -> dict[str, In | Out]:
-    """Return the members of a core: clock, reset and the two streams."""
+def core_members(inputs: Sequence[Port], output: Port, channels: int = 1, *, lanes: int = 1) -> dict[str, In | Out]:
+    """Return the members of a core: clock, reset and the two streams, whose beats hold `lanes` samples."""
     members: dict[str, In | Out] = {
         "aclk": In(1),
         "aresetn": In(1),
-        "s_axis_tdata": In(width(inputs)),
+        "s_axis_tdata": In(width(inputs) * lanes),
         "s_axis_tvalid": In(1),
         "s_axis_tready": Out(1),
-        "m_axis_tdata": Out(width([output])),
-        "m_axis_tuser": Out(STATUS_BITS),
+        "m_axis_tdata": Out(width([output]) * lanes),
+        "m_axis_tuser": Out(STATUS_BITS * lanes),
         "m_axis_tvalid": Out(1),
         "m_axis_tready": In(1),
     }

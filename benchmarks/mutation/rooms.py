@@ -116,7 +116,7 @@ ROOMS = {
             "hdl/[!fi]*.py",
             "hdl/fault_guard.py",
             "hdl/bus/serial_crc.py",
-            "hdl/interleaved.py",
+            "hdl/stages/interleaved.py",
             "hdl/plan/[!fi]*.py",
             "hdl/plan/interleaving.py",
         ),

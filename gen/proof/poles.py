@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from fractions import Fraction
 
+from flint import fmpz
+
 Coefficients = tuple[Fraction, ...]
 """Of a polynomial in ``w = z**-1``, dyadic, the constant term first."""
 
@@ -17,14 +19,22 @@ def pole_radii(denominator: Coefficients) -> list[Fraction]:
     Raises
     ------
     ValueError
-        If the degree exceeds 2.
+        If it is not of degree 1 or 2 in w, or in a power of w.
     """
+    step = math.gcd(*(k for k, value in enumerate(denominator) if value)) or 1
+    radii = _radii(denominator[::step])
+    return radii if step == 1 else [_root_above(radius, step) for radius in radii for _ in range(step)]
+
+
+def _radii(denominator: Coefficients) -> list[Fraction]:
     if len(denominator) == 1:
         return []
     if len(denominator) == 2:
         return [abs(denominator[1])]
     if len(denominator) > 3:
-        raise ValueError(f"denominator must have a degree of at most 2, not {len(denominator) - 1}")
+        raise ValueError(
+            f"denominator must be of degree 1 or 2 in w or in a power of w, not of degree {len(denominator) - 1}"
+        )
     _, a1, a2 = denominator
     discriminant = a1 * a1 - 4 * a2
     if discriminant < 0:
@@ -34,8 +44,8 @@ def pole_radii(denominator: Coefficients) -> list[Fraction]:
     return [(abs(a1) + root) / 2, max(abs(abs(a1) - root), abs(abs(a1) - least)) / 2]
 
 
-def _root_above(value: Fraction) -> Fraction:
-    """Square root rounded up to a multiple of ``2**-80``."""
-    scaled = -(-value.numerator * (1 << (2 * _ROOT_BITS)) // value.denominator)
-    root = math.isqrt(scaled)
-    return Fraction(root + (root * root < scaled), 1 << _ROOT_BITS)
+def _root_above(value: Fraction, degree: int = 2) -> Fraction:
+    """Root of a degree, rounded up to a multiple of ``2**-80``."""
+    scaled = -(-value.numerator * (1 << (degree * _ROOT_BITS)) // value.denominator)
+    root = int(fmpz(scaled).root(degree))
+    return Fraction(root + (root**degree < scaled), 1 << _ROOT_BITS)

@@ -125,6 +125,15 @@ def _second_order(row: Row, side: int) -> tuple[list[_Term], tuple[int, int]]:
     return [*terms, *_numerator(b0, b1, b2, scale)], integer_part
 
 
+def numerator_terms(row: Row) -> list[_Term]:
+    """Products of a section's numerator on its own, of whatever order, as few as its symmetry allows."""
+    b0, b1, b2 = row[:3]
+    for ratio in (1, -1):
+        if b2 == 0 and b0 and abs(b1 - ratio * b0) <= _EQUAL * abs(b0):
+            return [("b0", b0, (1, ratio, 0), (0, 0), 0)]
+    return _numerator(b0, b1, b2, max(abs(b0), abs(b1), abs(b2)))
+
+
 def _numerator(b0: float, b1: float, b2: float, scale: float) -> list[_Term]:
     """Products of a numerator on its own, as few as its symmetry allows."""
     for sign in (1, -1):

@@ -38,13 +38,14 @@ def effective_sections(stages: Sequence[StageModel]) -> Array:
     -------
     float array, shape (sections, 6)
     """
-    if all(len(stage) == 1 for stage in stages):
+    if all(len(stage) == 1 and _is_small(stage[0]) for stage in stages):
         rows = [[*_padded(model.transfer), *_padded(model.denominator)] for (model,) in stages]
         return np.array(rows, dtype=np.float64).reshape(-1, 6)
     wires: list[_Wire] = [(fmpq_poly([1]), ())]
     for stage in stages:
         wires = [_through(model, wires) for model in stage]
-    ((numerator, denominators),) = wires
+    ((numerator, whole),) = wires
+    denominators = [factor for denominator in whole for factor in _split(denominator)]
     factors, gain = _factors(numerator)
     one = (Fraction(1),)
     pairs = list(zip_longest(factors, denominators, fillvalue=one)) or [(one, one)]
@@ -53,6 +54,16 @@ def effective_sections(stages: Sequence[StageModel]) -> Array:
     result = np.array(rows)
     result[0, :3] *= np.sign(gain)
     return result
+
+
+def _is_small(model: LinearModel) -> bool:
+    """Whether it is a second-order section at most."""
+    return max(len(model.transfer), len(model.denominator)) <= 3
+
+
+def _split(denominator: Polynomial) -> list[tuple[Fraction, ...] | tuple[float, ...]]:
+    """Factors of degree at most 2 of a denominator, which is its own if it has no higher one."""
+    return [denominator] if len(denominator) <= 3 else [*_factors(_poly(denominator))[0]]
 
 
 def _through(model: LinearModel, wires: Sequence[_Wire]) -> _Wire:

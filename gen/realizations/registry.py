@@ -11,6 +11,7 @@ from typing import Any, Protocol
 
 from sosmith.gen.realizations.direct_form import direct_form
 from sosmith.gen.realizations.lattice import Part, lattice_parts, lattice_stage
+from sosmith.gen.realizations.look_ahead import look_ahead
 from sosmith.gen.realizations.section_format import WIDE, SectionFormat
 from sosmith.gen.realizations.state_space import StateDesign, minimum_noise, normal, state_space
 from sosmith.gen.realizations.transposed import transposed_form
@@ -116,6 +117,22 @@ def _state_space(
     return build
 
 
+def _look_ahead(doublings: int) -> Callable[[Row, SectionFormat, str], Section]:
+    def build(row: Row, form: SectionFormat, name: str) -> Section:
+        return look_ahead(
+            row,
+            name=name,
+            doublings=doublings,
+            rounding=form.rounding,
+            x=form.x,
+            fracs=form.fracs,
+            ranges=form.ranges,
+            wide=(-WIDE, WIDE),
+        )
+
+    return build
+
+
 def _lattice(part: Part, form: SectionFormat, name: str) -> Section:
     return lattice_stage(
         part,
@@ -157,7 +174,25 @@ REALIZATIONS: dict[str, Realization] = {
         ),
     )
 }
-"""All realizations, by name, in the order in which lists show them."""
+"""All realizations that a specification can name, by name, in the order in which lists show them."""
+
+LOOK_AHEAD: dict[int, Realization] = {
+    1 << doublings: Realization(
+        name=f"look_ahead_{1 << doublings}",
+        title=f"direct form with scattered look-ahead over {1 << doublings} samples",
+        build=_look_ahead(doublings),
+    )
+    for doublings in range(1, 5)
+}
+"""Realizations of pipelines with look-ahead, by the samples that their recursions go back at once."""
+
+_KNOWN = REALIZATIONS | {realization.name: realization for realization in LOOK_AHEAD.values()}
+
+
+def realization_of(name: str) -> Realization:
+    """Return the realization with a name, be it one that a specification can name or one with look-ahead."""
+    return _KNOWN[name]
+
 
 CASCADES = tuple(name for name, realization in REALIZATIONS.items() if realization.cascade)
 """Names of the realizations whose stages are the ideal sections."""

@@ -12,14 +12,14 @@ from sosmith.gen.filter.design import Filter
 from sosmith.gen.proof.cascade_proof import CascadeProof, StageModel, prove_cascade
 from sosmith.gen.proof.linear_model import linear_models
 from sosmith.gen.proof.peak_gain import Extent
-from sosmith.gen.realizations.registry import REALIZATIONS, Section
+from sosmith.gen.realizations.registry import Section, realization_of
 from sosmith.gen.realizations.section_format import SectionFormat, unknown_range
 from sosmith.model.dataflow.graph import Range
 
 
 def parts_of(ideal: Filter, realization: str) -> Sequence[Any]:
     """Return the parts that the realization makes its stages from, one for each stage."""
-    return REALIZATIONS[realization].parts(ideal.rows)
+    return realization_of(realization).parts(ideal.rows)
 
 
 def unquantized(ideal: Filter, realization: str, bits: int) -> list[StageModel]:
@@ -47,7 +47,7 @@ def cascade(
 
 def stages_of(ideal: Filter, realization: str, formats: Sequence[SectionFormat], x: Range) -> list[Section]:
     """Build the stages in order, each for the output range of the previous one."""
-    build = REALIZATIONS[realization].build
+    build = realization_of(realization).build
     first, beside = x, list[Range]()
     stages: list[Section] = []
     for k, (part, form) in enumerate(zip(parts_of(ideal, realization), formats, strict=True)):

@@ -59,7 +59,8 @@ class NoisySection:
     Attributes
     ----------
     numerator, denominator : tuple of float
-        Transfer function; the denominator begins with 1 and has a degree of at most 2.
+        Transfer function; the denominator begins with 1 and has a degree of at most 2, or that in a
+        power of w.
     noise : tuple of tuple of float
         Numerator from each error to the section's output, over the same denominator.
     """
@@ -168,8 +169,12 @@ _Placed = tuple[int, int]
 
 def _length(sections: Sequence[NoisySection]) -> int:
     """Length of the spectra: eight times that of the responses, which resolves resonance peaks to 0.1 %."""
-    rows = [[1.0, 0.0, 0.0, *s.denominator, *[0.0] * (3 - len(s.denominator))] for s in sections]
-    return 1 << (8 * estimated_length(np.array(rows)) - 1).bit_length()
+    found = 0
+    for section in sections:
+        step = math.gcd(*(k for k, value in enumerate(section.denominator) if value)) or 1
+        poles = [*section.denominator[::step], 0.0, 0.0][:3]
+        found = max(found, step * estimated_length(np.array([[1.0, 0.0, 0.0, *poles]])))
+    return 1 << (8 * found - 1).bit_length()
 
 
 def _feasible(sections: Sequence[NoisySection], *, pairing: bool) -> bool:

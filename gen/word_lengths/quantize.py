@@ -17,7 +17,7 @@ from typing import cast
 
 from sosmith.gen.filter.design import Filter
 from sosmith.gen.proof.cascade_proof import CascadeProof, ideal_gain
-from sosmith.gen.realizations.registry import REALIZATIONS, Section
+from sosmith.gen.realizations.registry import Section, realization_of
 from sosmith.gen.realizations.section_format import SectionFormat, unknown_range
 from sosmith.gen.word_lengths.bit_limits import MAX_BITS
 from sosmith.gen.word_lengths.cascade import cascade, parts_of, stages_of, unquantized
@@ -134,7 +134,7 @@ def plan(
     polynomial : Polynomial or None
         Calibration polynomial in physical units; None for a filter core.
     realization : str
-        A key of `REALIZATIONS`.
+        Its name, known to `sosmith.gen.realizations.registry.realization_of`.
     steady : bool
         Whether a filter starts from the steady state of its first sample, and not from zero.
 
@@ -153,7 +153,7 @@ def plan(
     if steady:
         before = tuple(starting(stage, gain_at_zero(cast("Filter", ideal)), share) for stage in before)
     search, start = None, None
-    if ideal is not None and REALIZATIONS[realization].cascade:
+    if ideal is not None and realization_of(realization).cascade:
         ideal = _ordered(ideal, realization)
         search = Search(ideal.rows, realization, before, gain, steady=steady)
         start = search.start(float(share), MAX_BITS)

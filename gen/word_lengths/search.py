@@ -27,7 +27,7 @@ import numpy.typing as npt
 from sosmith.gen.filter.design import estimated_length
 from sosmith.gen.proof.linear_model import Source, linear_model, quantizers, transfer_function
 from sosmith.gen.realizations.coefficients import lowest_terms, round_significant
-from sosmith.gen.realizations.registry import REALIZATIONS, Section
+from sosmith.gen.realizations.registry import Section, realization_of
 from sosmith.gen.realizations.section_format import SectionFormat, unknown_range
 from sosmith.gen.word_lengths.bit_limits import MIN_BITS
 from sosmith.gen.word_lengths.cost import MULTIPLIER_BITS
@@ -93,7 +93,7 @@ class Search:
     rows : sequence of sequence of float
         b0, b1, b2, 1, a1, a2 of each section.
     realization : str
-        A key of `REALIZATIONS`.
+        Its name, known to `sosmith.gen.realizations.registry.realization_of`.
     input_stages : sequence of InputStage
         Possible input stages, each a little coarser than the previous one.
     gain : Fraction
@@ -119,7 +119,7 @@ class Search:
         *,
         steady: bool = False,
     ) -> None:
-        self._build = REALIZATIONS[realization].build
+        self._build = realization_of(realization).build
         self._rows = rows
         self._input_stages = input_stages
         self._gain = gain
@@ -455,7 +455,7 @@ def _exact(
     row: Sequence[float], realization: str, coefficients: Mapping[str, tuple[int, int]] | None = None
 ) -> Section:
     """Build a section with exact coefficients, except for those given, in which every quantizer drops bits."""
-    build = REALIZATIONS[realization].build
+    build = realization_of(realization).build
     # An operand has bits to drop only if its terms have fraction bits: those of the input, too, as b0's has no others.
     formats = SectionFormat(coefficient_bits=_EXACT_BITS, coefficients=coefficients or {}, x=unknown_range(1))
     section = build(row, formats, "section")

@@ -24,7 +24,7 @@ from sosmith.hdl.pipelined_logic import shape_of
 from sosmith.hdl.plan.online_clocks import schedule_of
 from sosmith.hdl.plan.pipeline import pipeline_depth
 from sosmith.hdl.plan.streams import fields, width
-from sosmith.hdl.stage import PipelinedStage
+from sosmith.hdl.stages.pipelined import PipelinedStage
 from sosmith.hdl.status import at_rail, flag_count, in_order, outside_calibration, worn
 from sosmith.model.dataflow.datapath import Datapath, Stage
 from sosmith.model.sections.online import sections_of

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from sosmith.hdl.plan.pipeline import NO_LOGIC
 from sosmith.model.dataflow.graph import Graph, Node, Op
 
-_ADDITION, _MULTIPLICATION, _PARTIAL_PRODUCT = 5, 12, 2
+ADDITION, _MULTIPLICATION, _PARTIAL_PRODUCT = 5, 12, 2
 """Delays of operations, in units of about half a nanosecond of an ECP5; a product of several multiplier blocks takes
 more, because its partial products are added up."""
 
@@ -64,7 +64,7 @@ def schedule(graph: Graph, channels: int, *, rewrites: bool = False) -> Schedule
     rewrites : bool
         Whether a state may have to be written as it was read, which takes until it has been read.
     """
-    least = max((_time(graph, node) for node in graph.nodes), default=0)
+    least = max((operation_time(graph, node) for node in graph.nodes), default=0)
     reading = 1 if channels <= _MAX_LUT_RAM_CHANNELS else 2
     tried = (_spread(graph, period, reading, rewrites) for period in itertools.count(max(least, 1)))
     return next(found for found in tried if found.distance <= channels)
@@ -85,7 +85,7 @@ def _spread(graph: Graph, period: int, reading: int, rewrites: bool) -> Schedule
             early.append((reading, 0))  # the memory is addressed in pipeline stage 0
         else:
             stage, time = max(early[i] for i in node.operands)
-            took = _time(graph, node)
+            took = operation_time(graph, node)
             early.append((stage, time + took) if time + took <= period else (stage + 1, took))
     sources = [nodes[i].operands[0] for i in graph.delays]
     behind = reading - 1  # pipeline stages from a state's next value to the port of its memory
@@ -97,7 +97,7 @@ def _spread(graph: Graph, period: int, reading: int, rewrites: bool) -> Schedule
         if index in sources and node.op is not Op.DELAY:
             late[index] = min(late[index], (early[index][0], period))
         stage, time = late[index]
-        took = _time(graph, node)
+        took = operation_time(graph, node)
         start = (stage, time - took) if time >= took else (stage - 1, period - took)
         stages[index] = start[0]
         if node.op is not Op.DELAY:
@@ -112,8 +112,10 @@ def _spread(graph: Graph, period: int, reading: int, rewrites: bool) -> Schedule
     return Schedule(tuple(stages), writes, reading, depth)
 
 
-def _time(graph: Graph, node: Node) -> int:
-    """Delay of a node in the unit of `_ADDITION`."""
+def operation_time(graph: Graph, node: Node, *, powers: bool = False) -> int:
+    """Delay of a node in the unit of `ADDITION`; `powers` says that a product by a power of two takes none."""
+    if powers and node.op is Op.SCALE and node.parameter > 0 and not node.parameter & (node.parameter - 1):
+        return 0
     if node.op in NO_LOGIC:
         return 0
     if node.op in {Op.SCALE, Op.MULTIPLY} and not graph.is_gate(node):
@@ -123,4 +125,4 @@ def _time(graph: Graph, node: Node) -> int:
         signed = any(sign for _, sign in operands)  # a block takes both operands signed or neither
         several = any(bits + (signed and not sign) > _BLOCK_BITS for bits, sign in operands)
         return _MULTIPLICATION + several * _PARTIAL_PRODUCT
-    return _ADDITION
+    return ADDITION

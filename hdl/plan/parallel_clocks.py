@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from sosmith.hdl.plan.interleaving import schedule
+from sosmith.hdl.plan.look_ahead import plans
 from sosmith.hdl.plan.pipeline import pipeline_depth
+from sosmith.hdl.plan.unfolding import unfolded_stages
 from sosmith.model.dataflow.datapath import Datapath
 
 
@@ -18,3 +20,16 @@ def depths(datapath: Datapath, channels: int, protect: str) -> list[int]:
         return [pipeline_depth(stage.graph) for stage in datapath.stages]
     rewrites = protect != "none"
     return [schedule(stage.graph, channels, rewrites=rewrites).depth for stage in datapath.stages]
+
+
+def block_latency_cycles(datapath: Datapath, lanes: int, *, look_ahead: bool) -> int:
+    """Clocks from the edge that accepts a beat to the edge that can hand its results on, without a stall."""
+    return sum(block_depths(datapath, lanes, look_ahead=look_ahead)) + 1
+
+
+def block_depths(datapath: Datapath, lanes: int, *, look_ahead: bool) -> list[int]:
+    """Return the number of pipeline stages of each stage with several samples a clock, or with look-ahead."""
+    stages = unfolded_stages(datapath, lanes)
+    if look_ahead:
+        return [plan.depth for plan in plans(stages)]
+    return [pipeline_depth(stage.graph) for stage in stages]

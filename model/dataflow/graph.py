@@ -352,6 +352,13 @@ class GraphBuilder:
         """Add a state that starts at zero; `connect` gives it its next value."""
         return self._append(Node(Op.DELAY, (-1,), frac, min(low, 0), max(high, 0), name=name))
 
+    def copied(self, node: Node, operands: Sequence[Wire]) -> Wire:
+        """Add a node of another graph with its range and name as they are; a DELAY is yet to be connected."""
+        wire = self._append(node._replace(operands=(-1,) if node.op is Op.DELAY else tuple(operands)))
+        if node.op is Op.INPUT:
+            self._inputs.append(wire)
+        return wire
+
     def connect(self, delay: Wire, source: Wire) -> None:
         """Make `source` at this sample the value of `delay` at the next.
 

@@ -25,7 +25,7 @@ class Quantizers(Proof):
     Parameters
     ----------
     module : ModuleType
-        `sosmith.hdl.stage`, or one on broken logic.
+        `sosmith.hdl.stages.pipelined`, or one on broken logic.
     low, high : int
         Range of the input code, which the stage before keeps.
     drop : int

@@ -43,7 +43,7 @@ class OneUpset(StreamRules):
         self.upset, self.upsets = Signal(STATE_BITS), upsets
         parts: Any = broken(stage, LAST, UPSET + LAST, *in_stage)
         parts.UPSET, parts.Mux = self.upset, Mux
-        whole: Any = broken(core, "from sosmith.hdl.stage import PipelinedStage\n", "", *in_core)
+        whole: Any = broken(core, "from sosmith.hdl.stages.pipelined import PipelinedStage\n", "", *in_core)
         whole.PipelinedStage = parts.PipelinedStage
         design = whole.Core(leaky(), protect="detect")
         super().__init__(design, parallel_clocks.latency_cycles(leaky()) + 1, datapath=leaky())

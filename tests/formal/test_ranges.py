@@ -13,7 +13,7 @@ from tests.gen.proven_stages import Ranges, proven_cascade
 from sosmith.gen.realizations.section_format import WIDE
 from sosmith.hdl.pipelined_logic import unique_names
 from sosmith.hdl.plan.pipeline import pipeline_stages
-from sosmith.hdl.stage import PipelinedStage
+from sosmith.hdl.stages.pipelined import PipelinedStage
 from sosmith.model.dataflow.datapath import Stage
 from sosmith.model.dataflow.graph import Op, Range
 from sosmith.model.sections.direct_form import DirectForm1, Product

@@ -5,7 +5,7 @@ from typing import Any
 
 from amaranth.sim import Simulator
 
-from sosmith.hdl.stage import PipelinedStage
+from sosmith.hdl.stages.pipelined import PipelinedStage
 from sosmith.model.dataflow.datapath import Stage
 
 

@@ -14,7 +14,7 @@ from tests.hdl.core_bench import Pace, run_core
 from sosmith.gen.architecture import Architecture
 from sosmith.hdl import interleaved
 from sosmith.hdl.check_bits import CheckBits, Read
-from sosmith.hdl.interleaved import InterleavedStage
+from sosmith.hdl.stages.interleaved import InterleavedStage
 from sosmith.hdl.plan.interleaving import schedule
 from sosmith.model.dataflow.graph import Graph, GraphBuilder, Op
 

@@ -121,8 +121,8 @@ class PipelinedStage(wiring.Component):
         Output codes, in the order of the graph's outputs; defined while `o_valid` is high.
     o_valid : Out(1)
         Whether the outputs hold a sample.
-    o_saturated : Out(1)
-        Whether the output had to be limited to its range.
+    o_saturated : Out(max(1, limited outputs))
+        Whether each output that is limited to its range had to be.
     i_fault, o_fault : In(1), Out(1)
         Whether a wrong bit was found for the sample at the inputs, and for the one at the outputs; only with parity.
     clear : In(1)
@@ -151,7 +151,9 @@ class PipelinedStage(wiring.Component):
             members |= {"i_fault": In(1), "o_fault": Out(1)}
         if parity or clears:
             members |= {"clear": In(1)}
-        super().__init__({**members, "i_valid": In(1), "advance": In(1), "o_valid": Out(1), "o_saturated": Out(1)})
+        limited = sum(graph.nodes[i].op is Op.CLAMP for i in graph.outputs)
+        members |= {"i_valid": In(1), "advance": In(1), "o_valid": Out(1), "o_saturated": Out(max(1, limited))}
+        super().__init__(members)
 
     def elaborate(self, platform: object) -> Module:
         """Build the logic."""
@@ -182,6 +184,7 @@ class PipelinedStage(wiring.Component):
             with m.If(self.clear):
                 m.d.sync += [wires[i].eq(0) for i in graph.delays]
         last = len(takes) - 1
+        saturated = iter(self.o_saturated)
         for k, i in enumerate(graph.outputs):
             output = getattr(self, f"o{k}")
             held = _held(graph, i, wires) if stages[i] == last else None
@@ -193,7 +196,7 @@ class PipelinedStage(wiring.Component):
                 loads = [register.eq(at(i, last))]
                 if graph.nodes[i].op is Op.CLAMP:
                     outside = limits(graph.nodes[i], at(graph.nodes[i].operands[0], last))
-                    loads.append(self.o_saturated.eq(Cat(*outside).any()))
+                    loads.append(next(saturated).eq(Cat(*outside).any()))
                 with m.If(takes[last]):
                     m.d.sync += loads
         return m

@@ -5,7 +5,7 @@ others follow, so that the recursion may take several clocks. `schedule` spreads
 makes these as short as it can while the same channel may still come again once every other one has had its turn. A
 memory is addressed a pipeline stage before its state is used, and written once the next value is there.
 
-As an example, the recursion of `sosmith.hdl.stage`, ``v(n) = x(n) + x(n-1) - floor(v(n-2) / 4) + floor(v(n-1) / 2)``,
+As an example, the recursion of `sosmith.hdl.stages.pipelined`, ``v(n) = x(n) + x(n-1) - floor(v(n-2) / 4) + floor(v(n-1) / 2)``,
 for 3 channels, with widths in bits::
 
     stage 0             stage 1                  stage 2                   stage 3
@@ -94,7 +94,7 @@ class InterleavedStage(wiring.Component):
     i_channel : In(channel_bits)
         Number of its channel.
     i_bank, o_bank, uses : In(1), Out(1), Out(2)
-        As in `sosmith.hdl.stage.PipelinedStage`.
+        As in `sosmith.hdl.stages.pipelined.PipelinedStage`.
     advance : In(1)
         Whether the pipeline moves at this clock.
     clear, clear_channel : In(1), In(channel_bits)

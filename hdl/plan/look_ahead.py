@@ -1,0 +1,237 @@
+"""Pipeline stages of a pipeline with look-ahead: loops that go back several samples take turns with themselves.
+
+A loop that uses only values of T, 2T, .. samples ago is T loops that never meet: samples 0, T, 2T, .. are one, samples
+1, T + 1, .. another. Their states lie in a memory of T words, and a sample finds those of its turn there, as the
+samples of T channels do (`sosmith.hdl.plan.interleaving`). The loop then has T clocks. What no loop reaches has as many
+pipeline stages as it likes; its delays are registers that move with every sample.
+
+Products by constants are sums (`sosmith.hdl.plan.constant_products`), between which pipeline stages may end. All stages
+of a core get pipeline stages of the time that its slowest loop needs: shorter ones would take registers for nothing.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+from sosmith.hdl.plan.constant_products import with_sums
+from sosmith.hdl.plan.interleaving import ADDITION, operation_time
+from sosmith.hdl.plan.pipeline import NO_LOGIC
+from sosmith.hdl.plan.reassociation import reassociated
+from sosmith.model.dataflow.datapath import Stage
+from sosmith.model.dataflow.graph import Graph, GraphBuilder, Node, Op, Wire
+
+_UNIT, _BESIDE = 0.5e-9, 4.6e-9
+"""Time of a unit of `sosmith.hdl.plan.interleaving.operation_time`, and what a clock takes besides: registers, wires
+and the first bit of a carry chain, in seconds. Both by placed cores of audio_lowpass with look-ahead over 4 and over 8
+samples on an ECP5 of speed grade 6."""
+
+
+@dataclass(frozen=True)
+class TurnPlan:
+    """Pipeline stages of one stage.
+
+    Attributes
+    ----------
+    graph : Graph
+        What is computed: the stage's graph with sums for products, and one DELAY for each T samples of a loop's past.
+    turns : int
+        Number T of samples that take turns; 1 if a loop goes back one sample.
+    loops : frozenset of int
+        The DELAYs of loops.
+    pipeline_stages : tuple of int
+        Pipeline stage of each node. That of a loop's DELAY is the one in which its value is there; in a memory, it is
+        addressed one before.
+    writes : dict of int to int
+        Pipeline stage in which each loop's DELAY is written.
+    depth : int
+        Number of pipeline stages.
+    """
+
+    graph: Graph
+    turns: int
+    loops: frozenset[int]
+    pipeline_stages: tuple[int, ...]
+    writes: dict[int, int]
+    depth: int
+
+    @property
+    def distance(self) -> int:
+        """Least number of samples from one to the next that uses its states."""
+        reading = _reading(self.turns)
+        return max((end - self.pipeline_stages[i] + reading + 1 for i, end in self.writes.items()), default=1)
+
+
+def plans(stages: Sequence[Stage]) -> tuple[TurnPlan, ...]:
+    """Plan the pipeline stages of all stages of a core."""
+    return _plans(tuple(stage.graph for stage in stages))
+
+
+def period(stages: Sequence[Stage]) -> int:
+    """Return the time of the pipeline stages in `plans`, in units of `operation_time`."""
+    return _period(tuple(stage.graph for stage in stages))
+
+
+def clock_estimate(stages: Sequence[Stage]) -> float:
+    """Estimate the clock of a core with such pipeline stages on an ECP5, in Hz."""
+    return 1 / (_BESIDE + _UNIT * period(stages))
+
+
+@lru_cache(maxsize=16)
+def _plans(graphs: tuple[Graph, ...]) -> tuple[TurnPlan, ...]:
+    longest = _period(graphs)
+    return tuple(_spread(*_turned(graph), longest) for graph in graphs)
+
+
+@lru_cache(maxsize=16)
+def _period(graphs: tuple[Graph, ...]) -> int:
+    longest = ADDITION
+    for graph in graphs:
+        turned, turns, loops = _turned(graph)
+        if loops:
+            tried = itertools.count(longest)
+            longest = next(time for time in tried if _spread(turned, turns, loops, time).distance <= turns)
+    return longest
+
+
+def _reading(turns: int) -> int:
+    """Pipeline stages from the one that addresses a memory to the one that has the state; a register has none."""
+    return 1 if turns > 1 else 0
+
+
+@lru_cache(maxsize=64)
+def _turned(graph: Graph) -> tuple[Graph, int, frozenset[int]]:
+    """Return a graph with sums, whose loops have one DELAY for all samples that take turns; their number; the DELAYs.
+
+    Its nodes are in the order of computation also where they depend on a DELAY of no loop.
+    """
+    graph = with_sums(reassociated(graph))
+    nodes, loops = graph.nodes, _loop_delays(graph)
+    roots = {i: _undelayed(graph, i) for i in loops}
+    used = {i for index, node in enumerate(nodes) if index not in loops for i in node.operands} | {*graph.outputs}
+    turns = math.gcd(*(roots[i][1] for i in loops & used))
+    kept = {i for i in loops if roots[i][1] % max(turns, 1) == 0}
+    last = max((roots[i][1] for i in loops & used), default=0)
+    g = GraphBuilder()
+    wires: dict[int, Wire] = {}
+    for index in _in_order(graph, loops):
+        node = nodes[index]
+        if index in kept and roots[index][1] <= last:
+            wires[index] = g.copied(node, [])
+        elif index not in loops and node.op is not Op.DELAY:
+            wires[index] = g.copied(node, [wires[i] for i in node.operands])
+        elif index not in loops:
+            wires[index] = g.copied(node, [])
+            g.connect(wires[index], wires[node.operands[0]])
+    states = [i for i in sorted(kept) if i in wires]
+    for i in states:
+        root, delay = roots[i]
+        before = next((k for k in states if roots[k] == (root, delay - turns)), root)
+        g.connect(wires[i], wires[before])
+    return g.build([wires[i] for i in graph.outputs]), max(turns, 1), frozenset(int(wires[i]) for i in states)
+
+
+def _undelayed(graph: Graph, index: int) -> tuple[int, int]:
+    """Node that `index` is a delayed copy of, and the delay in samples."""
+    delay = 0
+    while graph.nodes[index].op is Op.DELAY:
+        index, delay = graph.nodes[index].operands[0], delay + 1
+    return index, delay
+
+
+def _loop_delays(graph: Graph) -> frozenset[int]:
+    """Return the DELAYs that depend on themselves."""
+    found = set()
+    users: dict[int, list[int]] = {}
+    for index, node in enumerate(graph.nodes):
+        for i in node.operands:
+            users.setdefault(i, []).append(index)
+    for delay in graph.delays:
+        reached, pending = set[int](), [delay]
+        while pending:
+            new = set(users.get(pending.pop(), ())) - reached
+            reached |= new
+            pending += new
+        if delay in reached:
+            found.add(delay)
+    return frozenset(found)
+
+
+def _in_order(graph: Graph, loops: frozenset[int]) -> list[int]:
+    """Return the nodes in an order in which each follows its operands; loops begin at their DELAYs."""
+    order = [*graph.inputs]  # the ports stay in their order
+    placed = set(order)
+    for start in range(len(graph.nodes)):
+        pending = [start]
+        while pending:
+            index = pending[-1]
+            operands = () if index in loops else graph.nodes[index].operands
+            missing = [i for i in operands if i not in placed]
+            if missing and index not in placed:
+                pending += missing
+                continue
+            pending.pop()
+            if index not in placed:
+                placed.add(index)
+                order.append(index)
+    return order
+
+
+_Moment = tuple[int, int]
+"""Pipeline stage, and time within it."""
+
+
+def _spread(graph: Graph, turns: int, loops: frozenset[int], longest: int) -> TurnPlan:
+    """Plan with pipeline stages of the time `longest`; an operation that takes longer has one of its own.
+
+    As `sosmith.hdl.plan.interleaving.schedule`, it finds the earliest moment of each value first, and then computes
+    each as late as the outputs and the states' next values allow. The pipeline stage of a delay in no loop is that of
+    what it delays.
+    """
+    nodes, reading = graph.nodes, _reading(turns)
+    times = [min(operation_time(graph, node, powers=True), longest) for node in nodes]
+    early: list[_Moment] = []
+    for index, node in enumerate(nodes):
+        if node.op in {Op.INPUT, Op.CONSTANT}:
+            early.append((0, 0))
+        elif index in loops:
+            early.append((reading, 0))
+        else:
+            stage, time = max(early[i] for i in node.operands)
+            took = times[index]
+            early.append((stage, time + took) if time + took <= longest else (stage + 1, took))
+    sources = {nodes[i].operands[0] for i in loops}
+    depth = max(stage for stage, _ in early) + 1
+    late: list[_Moment] = [(depth - 1, longest)] * len(nodes)
+    planned = [0] * len(nodes)
+    for index in reversed(range(len(nodes))):
+        node = nodes[index]
+        if index in sources and index not in loops:
+            late[index] = min(late[index], (early[index][0], longest))
+        stage, time = late[index]
+        took = times[index]
+        start = (stage, time - took) if time >= took else (stage - 1, longest - took)
+        planned[index] = start[0]
+        if index not in loops:
+            for i in node.operands:
+                late[i] = min(late[i], start)
+    for index, node in enumerate(nodes):
+        if node.op in {Op.INPUT, Op.CONSTANT}:
+            planned[index] = 0
+        elif index not in loops and _is_wire(node):  # bits are dropped as early as possible, before they take registers
+            planned[index] = planned[node.operands[0]]
+    if turns == 1:
+        # A register is used and written in the same pipeline stage, with everything between.
+        for _ in loops:
+            for i in loops:
+                planned[i] = max(planned[i], planned[nodes[i].operands[0]])
+    writes = {i: max(planned[nodes[i].operands[0]], planned[i]) for i in loops}
+    return TurnPlan(graph, turns, loops, tuple(planned), writes, depth)
+
+
+def _is_wire(node: Node) -> bool:
+    """Whether a node takes no logic; a DELAY in no loop is a register that holds what it delays, beside it."""
+    return node.op in NO_LOGIC

@@ -1,0 +1,1 @@
+"""Stages of a datapath in the parallel architecture: each as pipelined hardware."""
