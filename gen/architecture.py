@@ -10,15 +10,16 @@ from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 from sosmith.gen.fpga.boards import Board
-from sosmith.gen.word_lengths.cost import MULTIPLIER_BITS, Cost, cost_of, products_from_adders
+from sosmith.gen.word_lengths.cost import MULTIPLIER_BITS, Cost, cost_of_graphs, products_from_adders, scalings
 from sosmith.gen.word_lengths.objective import FEW_ADDERS, SMALL_AREA, Objective, ShortProgram, unsuitable
 from sosmith.gen.word_lengths.online_units import OnlineUnits, online_cost, unsuitable_online
 from sosmith.hdl.plan import decimator_clocks, folded_clocks, online_clocks, parallel_clocks
 from sosmith.hdl.plan.instructions import instruction_bits
+from sosmith.hdl.plan.unfolding import unfolded_stages
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.decimator import Decimator
 from sosmith.model.dataflow.folding import FoldingError, program
-from sosmith.model.dataflow.graph import Node, Op
+from sosmith.model.dataflow.graph import Graph, Node, Op
 from sosmith.model.dataflow.program import Program
 from sosmith.model.errors import ShortfallError
 from sosmith.model.reload.constants import with_room
@@ -28,6 +29,7 @@ from sosmith.model.sections.online import OnlineError, OnlineSchedule
 if TYPE_CHECKING:
     from amaranth.lib.wiring import Component
 
+    from sosmith.hdl.block_core import BlockCore
     from sosmith.hdl.core import Core
     from sosmith.hdl.folded import FoldedCore
 
@@ -77,6 +79,11 @@ class Architecture:
         a register to be loadable.
     blocks : Blocks
         Multiplier blocks that there are for the products of the parallel architecture.
+    samples_per_clock : int
+        Samples in a beat of the streams; more than one in the parallel architecture only.
+    look_ahead : bool
+        Whether the loops of the parallel architecture, which go back several samples, are pipelined through those
+        between. All products by constants are then made of adders.
     """
 
     name: str
@@ -86,16 +93,29 @@ class Architecture:
     protect: str = "none"
     digit_bits: int = DIGIT_BITS
     blocks: Blocks = NO_LIMIT
+    samples_per_clock: int = 1
+    look_ahead: bool = False
+
+    @property
+    def _is_block(self) -> bool:
+        """Whether the hardware is a `sosmith.hdl.block_core.BlockCore`."""
+        return self.look_ahead or self.samples_per_clock > 1
+
+    @cached_property
+    def _graphs(self) -> list[Graph]:
+        """What the stages of the parallel hardware compute at a clock."""
+        return [stage.graph for stage in unfolded_stages(self.datapath, self.samples_per_clock)]
 
     @cached_property
     def adders(self) -> tuple[frozenset[int], ...]:
         """Products by constants that are made of adders, by stage: for which there are no multiplier blocks left.
 
-        None of them if the constants can be loaded, and in the other architectures.
+        With several samples a clock, those of the unfolded stages. None of them if the constants can be loaded, and in the other architectures.
         """
-        graphs = [stage.graph for stage in self.datapath.stages]
+        if self.look_ahead:
+            return tuple(map(scalings, self._graphs))
         fixed = self.name == "parallel" and not self.reload
-        return products_from_adders(graphs, self.blocks.available if fixed else None, self.blocks.bits)
+        return products_from_adders(self._graphs, self.blocks.available if fixed else None, self.blocks.bits)
 
     @property
     def decimator(self) -> Decimator | None:
@@ -105,7 +125,7 @@ class Architecture:
     @property
     def cost(self) -> Cost:
         """Operators of the online architecture, or else of the parallel one, before synthesis; no decimator's."""
-        return cost_of(self.datapath, self.adders) if self.online is None else online_cost(self.datapath)
+        return cost_of_graphs(self._graphs, self.adders) if self.online is None else online_cost(self.datapath)
 
     @cached_property
     def online(self) -> OnlineSchedule | None:
@@ -182,10 +202,19 @@ class Architecture:
         """Clocks from the edge that accepts a sample to the edge that can output it; an upper limit in serial."""
         if self.online is not None:
             return online_clocks.latency_cycles(self.datapath)
+        if self._is_block:
+            lanes = self.samples_per_clock
+            return parallel_clocks.block_latency_cycles(self.datapath, lanes, look_ahead=self.look_ahead)
         before = 0 if self.decimator is None else decimator_clocks.latency_cycles(self.decimator)
         if self.program is None:
             return before + parallel_clocks.latency_cycles(self.built, self.channels, protect=self.protect)
         return before + folded_clocks.latency_cycles(self.program, serial=self.name == "serial", protect=self.protect)
+
+    @property
+    def clock_estimate(self) -> float:
+        """Estimate of the highest clock of the parallel architecture for one channel, on an ECP5, in Hz."""
+        lanes = self.samples_per_clock
+        return parallel_clocks.clock_estimate(self.datapath, lanes, look_ahead=self.look_ahead)
 
     @property
     def reset_cycles(self) -> int:
@@ -202,7 +231,10 @@ class Architecture:
 
     @property
     def cycles_per_sample(self) -> int:
-        """Clocks between samples at the highest rate; an upper limit in serial, and rounded up behind a decimator."""
+        """Clocks between samples at the highest rate, an upper limit in serial.
+
+        Rounded up behind a decimator, and with several samples a clock.
+        """
         return -(-self.cycles_per_result // (1 if self.decimator is None else self.decimator.factor))
 
     @property
@@ -240,13 +272,17 @@ class Architecture:
 
         return DecimatedCore(self.datapath, made)
 
-    def _behind_decimator(self) -> Core | FoldedCore:
+    def _behind_decimator(self) -> BlockCore | Core | FoldedCore:
+        from sosmith.hdl.block_core import BlockCore
         from sosmith.hdl.core import Core  # only what makes hardware loads Amaranth
         from sosmith.hdl.folded import FoldedCore
         from sosmith.hdl.online.core import OnlineCore
 
         if self.online is not None:
             return OnlineCore(self.datapath)
+        if self._is_block:
+            adders = () if self.look_ahead else self.adders
+            return BlockCore(self.datapath, self.samples_per_clock, look_ahead=self.look_ahead, adders=adders)
         given = self.decimator is not None
         if self.program is None:
             return Core(
@@ -293,6 +329,8 @@ class Budget:
         Multiplier blocks.
     decimate : int
         Samples for each result.
+    samples_per_clock : int
+        Samples in a beat of the streams.
     """
 
     clock: Fraction
@@ -302,6 +340,7 @@ class Budget:
     protect: str = "none"
     blocks: Blocks = NO_LIMIT
     decimate: int = 1
+    samples_per_clock: int = 1
 
     @property
     def adders(self) -> bool:
@@ -310,8 +349,13 @@ class Budget:
 
     @property
     def cycles(self) -> int:
-        """Clocks available for one result of one channel."""
-        return int(self.clock * self.decimate / (self.sample_rate * self.channels))
+        """Clocks available for one result of one channel, or for one beat of them."""
+        return int(self.clock * self._at_once / (self.sample_rate * self.channels))
+
+    @property
+    def _at_once(self) -> int:
+        """Samples that a result, or a beat of them, stands for."""
+        return self.decimate * self.samples_per_clock
 
     def check(self, architecture: Architecture) -> None:
         """Check that `architecture` keeps up.
@@ -324,9 +368,9 @@ class Budget:
         needed = architecture.cycles_per_result
         if needed <= self.cycles:
             return
-        most, wanted = _told_apart(self.clock * self.decimate / (needed * self.channels), self.sample_rate)
+        most, wanted = _told_apart(self.clock * self._at_once / (needed * self.channels), self.sample_rate)
         many = f" with {self.channels:,} channels" if self.channels > 1 else ""
-        per = "a sample" if self.decimate == 1 else f"for {self.decimate} samples"
+        per = "a sample" if self._at_once == 1 else f"for {self._at_once} samples"
         raise ShortfallError(
             f"the {architecture.name} architecture takes {needed:,} clock{'s' * (needed > 1)} {per}: at a clock of "
             f"{float(self.clock):,.0f} Hz{many} the sample rate must be at most {most} Hz, not {wanted} Hz"
@@ -381,7 +425,9 @@ def objective_of(name: str, board: Board | None, *, adders: bool = False) -> Obj
     return FEW_ADDERS if adders else SMALL_AREA
 
 
-def fitting(name: str, budget: Budget, datapath: Datapath, board: Board | None = None) -> Architecture:
+def fitting(
+    name: str, budget: Budget, datapath: Datapath, board: Board | None = None, *, look_ahead: bool = False
+) -> Architecture:
     """Return the architecture `name` of `datapath`, for a board if there is one.
 
     Raises
@@ -391,7 +437,15 @@ def fitting(name: str, budget: Budget, datapath: Datapath, board: Board | None =
     """
     digit_bits = digit_bits_on(board, name)
     architecture = Architecture(
-        name, datapath, budget.channels, budget.reload, budget.protect, digit_bits, budget.blocks
+        name,
+        datapath,
+        budget.channels,
+        budget.reload,
+        budget.protect,
+        digit_bits,
+        budget.blocks,
+        budget.samples_per_clock,
+        look_ahead,
     )
     budget.check(architecture)
     return architecture
@@ -407,7 +461,9 @@ def reason_for(architecture: Architecture, budget: Budget, *, asked: bool, board
         smallest += f" on {board.name}, whose {board.device.title} has {there}"
     why = "asked for in the specification" if asked else refused or smallest
     if architecture.name == "parallel":
-        return f"{name}: {why}{_made_of_adders(architecture)}"
+        lanes = architecture.samples_per_clock
+        several = f", {lanes} samples a clock" if lanes > 1 else ""
+        return f"{name}: {why}{several}{_made_of_adders(architecture)}"
     return f"{name}: {why}; takes {needed:,} of {budget.cycles:,} clocks {per}"
 
 
@@ -416,5 +472,7 @@ def _made_of_adders(architecture: Architecture) -> str:
     count, there = sum(map(len, architecture.adders)), architecture.blocks.available
     if not count:
         return ""
+    if architecture.look_ahead:
+        return f"; its {count} product{'s' * (count > 1)} by constants made of adders, with registers between them"
     blocks = "without multiplier blocks" if not there else f"with at most {there} multiplier blocks"
     return f"; {blocks}, {count} product{'s' * (count > 1)} by constants made of adders"

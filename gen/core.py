@@ -9,10 +9,11 @@ from functools import cache, partial
 from sosmith.gen.architecture import Architecture, Budget, blocks_for, candidates, fitting, objective_of, reason_for
 from sosmith.gen.filter.design import Filter, design
 from sosmith.gen.fpga.boards import Board
-from sosmith.gen.realizations.registry import REALIZATIONS
+from sosmith.gen.realizations.registry import LOOK_AHEAD, REALIZATIONS
 from sosmith.gen.specification.choices import CORES, ERROR_FEEDBACK
 from sosmith.gen.specification.specification import Specification
 from sosmith.gen.word_lengths.decimator import Front, front_of
+from sosmith.gen.word_lengths.objective import FEW_ADDERS
 from sosmith.gen.word_lengths.other_realization import with_realization
 from sosmith.gen.word_lengths.quantize import Plan, least_size, plan, prove
 from sosmith.gen.word_lengths.quantized import Quantized
@@ -137,7 +138,7 @@ def design_core(
         """Choose the realization and its word lengths for an architecture."""
         if ideal is None:
             return prove(plan_of(next(iter(REALIZATIONS)))), "none: a calibration has no filter sections"
-        objective = objective_of(architecture, board, adders=budget.adders)
+        objective = objective_of(architecture, board, adders=budget.adders or looks_ahead)
         selection = Selection(
             lambda name: plan_of(name).under(objective),
             lambda name: least_size(ideal, name, objective),
@@ -157,6 +158,11 @@ def design_core(
         return selection.proven(wanted), f"{wanted}: asked for {source}"
 
     hardware = spec.hardware
+    looks_ahead = hardware.pipeline == "look-ahead"
+    if looks_ahead and (wanted != AUTO or widths_of is not None):
+        raise SpecificationError(
+            f'the realization must be auto with hardware.pipeline = "look-ahead", not {widths_of or wanted}'
+        )
 
     def in_hardware(name: str, datapath: Datapath) -> Architecture:
         """Architecture with what costs a program instructions: the calibrated range, limits of wear, and settling."""
@@ -166,7 +172,8 @@ def design_core(
         spare = 3 if hardware.reload else 1
         flagged = with_settling(datapath, spare * samples_to_settle(datapath))
         made = replace(flagged, calibrated=codes, wear=wear)
-        return fitting(name, budget, made if front is None else front.before(made), board)
+        made = made if front is None else front.before(made)
+        return fitting(name, budget, made, board, look_ahead=looks_ahead)
 
     budget = Budget(
         clock=hardware.clock,
@@ -176,19 +183,30 @@ def design_core(
         protect=hardware.protect,
         blocks=blocks_for(hardware.multipliers, board),
         decimate=1 if front is None else front.decimator.factor,
+        samples_per_clock=hardware.samples_per_clock,
     )
     names = candidates(hardware.architecture, budget.blocks)
+    if looks_ahead or hardware.samples_per_clock > 1:
+        names = ("parallel",)
     refused = ""
     for name in names:
         try:
+            if looks_ahead and ideal is not None:
+                quantized, reason, architecture = _looking_ahead(plan_of, in_hardware, budget)
+                break
             quantized, reason = select(name)
             architecture = in_hardware(name, quantized.datapath)
+            if name == "parallel" and hardware.pipeline == AUTO and wanted == AUTO and ideal is not None:
+                looks_ahead = _is_too_slow(architecture, budget)
+                if looks_ahead:
+                    quantized, reason, architecture = _looking_ahead(plan_of, in_hardware, budget)
             break
         except ShortfallError as error:
             if name == names[-1]:
                 raise
             refused = str(error)
-    why = reason_for(architecture, budget, asked=len(names) == 1, board=board, refused=refused)
+    asked_for = len(names) == 1 and hardware.architecture != AUTO
+    why = reason_for(architecture, budget, asked=asked_for, board=board, refused=refused)
     return CoreDesign(
         spec=spec,
         core=kind,
@@ -198,6 +216,51 @@ def design_core(
         fit=fitted,
         options={key: value for key, value in asked.items() if value is not None},
     )
+
+
+def _is_too_slow(architecture: Architecture, budget: Budget) -> bool:
+    """Whether a core that has to take a beat at each clock needs look-ahead to reach it, by the estimate for an ECP5."""
+    plain = budget.channels == 1 and not budget.reload and budget.protect == "none" and budget.decimate == 1
+    return plain and budget.cycles == 1 and architecture.clock_estimate < budget.clock
+
+
+def _looking_ahead(
+    plan_of: Callable[[str], Plan], in_hardware: Callable[[str, Datapath], Architecture], budget: Budget
+) -> tuple[Quantized, str, Architecture]:
+    """Choose how far recursions look ahead: as little as the clock allows, by the estimate for an ECP5.
+
+    Raises
+    ------
+    ShortfallError
+        If no sections with look-ahead meet the specification.
+    """
+    best: tuple[Quantized, str, Architecture] | None = None
+    refused: ShortfallError | None = None
+    for samples, realization in LOOK_AHEAD.items():
+        if samples <= budget.samples_per_clock:
+            continue
+        try:
+            quantized = prove(plan_of(realization.name).under(FEW_ADDERS).trimmed())
+        except ShortfallError as error:
+            refused = error
+            continue
+        architecture = in_hardware("parallel", quantized.datapath)
+        estimate = architecture.clock_estimate
+        reached = "reaches" if estimate >= budget.clock else "comes closest to"
+        reason = (
+            f"{realization.name}: the shortest look-ahead that {reached} a clock of {float(budget.clock) / 1e6:,.6g} "
+            f"MHz on an ECP5, by an estimate of {estimate / 1e6:.0f} MHz"
+        )
+        if best is None or estimate > best[2].clock_estimate:
+            best = quantized, reason, architecture
+        if estimate >= budget.clock:
+            break
+    if best is None:
+        raise refused or ShortfallError(
+            f"hardware.samples_per_clock must be at most {max(LOOK_AHEAD) // 2} with look-ahead, "
+            f"not {budget.samples_per_clock}"
+        )
+    return best
 
 
 def _chosen_core(spec: Specification, core: str | None) -> str:

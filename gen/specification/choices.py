@@ -1,4 +1,5 @@
-"""Valid names in a specification: families, kinds, methods, realizations, starts, architectures, cores, inputs.
+"""Valid names in a specification: families, kinds, methods, realizations, starts, architectures, pipelines, cores,
+inputs.
 
 Those of `hardware.protect` are in `sosmith.model.dataflow.protection`.
 """
@@ -18,6 +19,8 @@ METHODS = ("bilinear", "impulse_invariant")
 REALIZATIONS = ("auto", "df1", "df1_ef1", "df1_ef2", "df2t", "delta", "state_space", "normal", "lattice_wdf")
 STARTS = ("steady", "zero")
 ARCHITECTURES = ("auto", "parallel", "folded", "serial", "online")
+PIPELINES = ("auto", "plain", "look-ahead")
+SAMPLES_PER_CLOCK = (1, 2, 4, 8, 16)
 
 CORES = ("instrument", "filter", "calibration")
 """What can be generated from a specification: the whole instrument, or one part."""

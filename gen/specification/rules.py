@@ -47,13 +47,16 @@ def check(document: Document) -> None:
     _check_output(document)
     _check_wear(document)
     _check_converters(document)
-    if document.hardware.clock < document.sample_rate:
+    lanes = document.hardware.samples_per_clock
+    if document.hardware.clock * lanes < document.sample_rate:
+        share = f" divided by hardware.samples_per_clock = {lanes}" if lanes > 1 else ""
         raise UnfitError(
-            f"at least the sample_rate ({literal(document.sample_rate)} Hz)",
+            f"at least the sample_rate ({literal(document.sample_rate)} Hz){share}",
             literal(document.hardware.clock),
             where="hardware.clock",
         )
     _check_online(document)
+    _check_block(document)
     if document.hardware.reload and document.hardware.multipliers is not None:
         raise UnfitError(
             '"auto" with hardware.reload = true: adders multiply by constants that are fixed',
@@ -74,6 +77,34 @@ def _check_online(document: Document) -> None:
     for where, (found, only) in asked.items():
         if found != only:
             raise UnfitError(f'{literal(only)} with hardware.architecture = "online"', literal(found), where=where)
+
+
+def _check_block(document: Document) -> None:
+    """Check that nothing is asked of several samples a clock, or of look-ahead, that they do not have."""
+    hardware = document.hardware
+    asked: list[tuple[str, object, tuple[object, ...]]] = [
+        ("hardware.architecture", hardware.architecture, ("auto", "parallel")),
+        ("channels", document.channels, (1,)),
+        ("hardware.reload", hardware.reload, (False,)),
+        ("hardware.protect", hardware.protect, ("none",)),
+    ]
+    looks_ahead = hardware.pipeline == "look-ahead"
+    if looks_ahead:
+        asked.append(("hardware.realization", hardware.realization, ("auto",)))
+        if hardware.multipliers is not None:
+            asked.append(("hardware.multipliers", hardware.multipliers, ("auto", 0)))
+    if hardware.samples_per_clock == 1 and not looks_ahead:
+        return
+    found = 'pipeline = "look-ahead"' if looks_ahead else f"samples_per_clock = {hardware.samples_per_clock}"
+    for where, value, possible in asked:
+        if value not in possible:
+            raise UnfitError(f"{' or '.join(map(literal, possible))} with hardware.{found}", literal(value), where=where)
+    if document.filter.decimate is not None:
+        left_out = f"left out with hardware.{found}"
+        raise UnfitError(left_out, literal(document.filter.decimate), where="filter.decimate", later=True)
+    if hardware.samples_per_clock > 1 and document.converter:
+        tables = ", ".join(map(literal, document.converter))
+        raise UnfitError(f"left out with hardware.{found}", tables, where="converter", later=True)
 
 
 def _check_inputs(document: Document) -> None:

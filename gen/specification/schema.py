@@ -20,7 +20,9 @@ from sosmith.gen.specification.choices import (
     KINDS,
     MAX_DECIMATION,
     METHODS,
+    PIPELINES,
     REALIZATIONS,
+    SAMPLES_PER_CLOCK,
     STARTS,
 )
 from sosmith.gen.specification.values import (
@@ -86,6 +88,13 @@ def read_multipliers(value: object) -> int | None:
     if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= MAX_MULTIPLIERS:
         raise UnfitError(f'"auto", or a whole number from 0 to {MAX_MULTIPLIERS}', literal(value))
     return value
+
+
+def read_samples_per_clock(value: object) -> int:
+    """Read a number of samples in a beat."""
+    if isinstance(value, bool) or value not in SAMPLES_PER_CLOCK:
+        raise UnfitError(f"one of {', '.join(map(str, SAMPLES_PER_CLOCK))}", literal(value))
+    return cast("int", value)
 
 
 def read_decimate(value: object) -> int | str:
@@ -205,6 +214,8 @@ class HardwareTable(Table):
     protect: Annotated[str, PlainValidator(choice(PROTECTIONS))] = "none"
     start: Annotated[str, PlainValidator(choice(STARTS))] = "steady"
     multipliers: Annotated[int | None, PlainValidator(read_multipliers)] = None
+    pipeline: Annotated[str, PlainValidator(choice(PIPELINES))] = "auto"
+    samples_per_clock: Annotated[int, PlainValidator(read_samples_per_clock)] = 1
 
 
 class Document(Table):

@@ -114,6 +114,10 @@ class HardwareSpec:
     multipliers : int or None
         Multiplier blocks that the parallel architecture may take, where the rest is made of adders; None for as many
         as the board has, or as synthesis makes.
+    pipeline : str
+        "plain", "look-ahead", or "auto" for look-ahead only where clock and sample rate ask for it.
+    samples_per_clock : int
+        Samples in a beat of the streams, one of `sosmith.gen.specification.choices.SAMPLES_PER_CLOCK`.
     """
 
     realization: str
@@ -123,6 +127,8 @@ class HardwareSpec:
     protect: str
     start: str
     multipliers: int | None = None
+    pipeline: str = "auto"
+    samples_per_clock: int = 1
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -266,6 +272,8 @@ def _specification(path: Path, tree: dict[str, Any], document: Document) -> Spec
             protect=hardware.protect,
             start=hardware.start,
             multipliers=hardware.multipliers,
+            pipeline=hardware.pipeline,
+            samples_per_clock=hardware.samples_per_clock,
         ),
         converters=converters(inputs, document.converter),
     )

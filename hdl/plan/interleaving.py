@@ -5,15 +5,8 @@ from __future__ import annotations
 import itertools
 from dataclasses import dataclass
 
-from sosmith.hdl.plan.pipeline import NO_LOGIC
-from sosmith.model.dataflow.graph import Graph, Node, Op
-
-ADDITION, _MULTIPLICATION, _PARTIAL_PRODUCT = 5, 12, 2
-"""Delays of operations, in units of about half a nanosecond of an ECP5; a product of several multiplier blocks takes
-more, because its partial products are added up."""
-
-_BLOCK_BITS = 18
-"""Bits of each operand of a multiplier block, its sign bit included."""
+from sosmith.hdl.plan.pipeline import NO_LOGIC, operation_time
+from sosmith.model.dataflow.graph import Graph, Op
 
 _MAX_LUT_RAM_CHANNELS = 16
 """Most channels whose states lie in LUT RAM, which has 16 words in an ECP5. More take block RAM, which is slow and far
@@ -110,19 +103,3 @@ def _spread(graph: Graph, period: int, reading: int, rewrites: bool) -> Schedule
             stages[index] = stages[node.operands[0]]
     writes = {i: max(stages[nodes[i].operands[0]] + behind, stages[i] - (not rewrites)) for i in graph.delays}
     return Schedule(tuple(stages), writes, reading, depth)
-
-
-def operation_time(graph: Graph, node: Node, *, powers: bool = False) -> int:
-    """Delay of a node in the unit of `ADDITION`; `powers` says that a product by a power of two takes none."""
-    if powers and node.op is Op.SCALE and node.parameter > 0 and not node.parameter & (node.parameter - 1):
-        return 0
-    if node.op in NO_LOGIC:
-        return 0
-    if node.op in {Op.SCALE, Op.MULTIPLY} and not graph.is_gate(node):
-        operands = [(graph.nodes[i].width, graph.nodes[i].signed) for i in node.operands]
-        if node.op is Op.SCALE:
-            operands.append((abs(node.parameter).bit_length() + (node.parameter < 0), node.parameter < 0))
-        signed = any(sign for _, sign in operands)  # a block takes both operands signed or neither
-        several = any(bits + (signed and not sign) > _BLOCK_BITS for bits, sign in operands)
-        return _MULTIPLICATION + several * _PARTIAL_PRODUCT
-    return ADDITION

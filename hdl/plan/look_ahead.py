@@ -18,16 +18,10 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from sosmith.hdl.plan.constant_products import with_sums
-from sosmith.hdl.plan.interleaving import ADDITION, operation_time
-from sosmith.hdl.plan.pipeline import NO_LOGIC
+from sosmith.hdl.plan.pipeline import ADDITION, NO_LOGIC, operation_time
 from sosmith.hdl.plan.reassociation import reassociated
 from sosmith.model.dataflow.datapath import Stage
 from sosmith.model.dataflow.graph import Graph, GraphBuilder, Node, Op, Wire
-
-_UNIT, _BESIDE = 0.5e-9, 4.6e-9
-"""Time of a unit of `sosmith.hdl.plan.interleaving.operation_time`, and what a clock takes besides: registers, wires
-and the first bit of a carry chain, in seconds. Both by placed cores of audio_lowpass with look-ahead over 4 and over 8
-samples on an ECP5 of speed grade 6."""
 
 
 @dataclass(frozen=True)
@@ -73,11 +67,6 @@ def plans(stages: Sequence[Stage]) -> tuple[TurnPlan, ...]:
 def period(stages: Sequence[Stage]) -> int:
     """Return the time of the pipeline stages in `plans`, in units of `operation_time`."""
     return _period(tuple(stage.graph for stage in stages))
-
-
-def clock_estimate(stages: Sequence[Stage]) -> float:
-    """Estimate the clock of a core with such pipeline stages on an ECP5, in Hz."""
-    return 1 / (_BESIDE + _UNIT * period(stages))
 
 
 @lru_cache(maxsize=16)

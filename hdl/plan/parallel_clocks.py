@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 from sosmith.hdl.plan.interleaving import schedule
-from sosmith.hdl.plan.look_ahead import plans
-from sosmith.hdl.plan.pipeline import pipeline_depth
+from sosmith.hdl.plan.look_ahead import period, plans
+from sosmith.hdl.plan.pipeline import longest_time, pipeline_depth
 from sosmith.hdl.plan.unfolding import unfolded_stages
 from sosmith.model.dataflow.datapath import Datapath
+
+_UNIT, _BESIDE = 0.5e-9, 4.6e-9
+"""Time of a unit of `sosmith.hdl.plan.pipeline.operation_time`, and what a clock takes besides: registers, wires, and
+the first bit of a carry chain, in seconds. Both from placed cores of audio_lowpass with look-ahead over 4 and over 8
+samples, on an ECP5 of speed grade 6."""
 
 
 def latency_cycles(datapath: Datapath, channels: int = 1, *, protect: str = "none") -> int:
@@ -33,3 +38,10 @@ def block_depths(datapath: Datapath, lanes: int, *, look_ahead: bool) -> list[in
     if look_ahead:
         return [plan.depth for plan in plans(stages)]
     return [pipeline_depth(stage.graph) for stage in stages]
+
+
+def clock_estimate(datapath: Datapath, lanes: int, *, look_ahead: bool) -> float:
+    """Estimate the highest clock of a core for one channel on an ECP5, in Hz: by its slowest pipeline stage."""
+    stages = unfolded_stages(datapath, lanes)
+    longest = period(stages) if look_ahead else max(longest_time(stage.graph) for stage in stages)
+    return 1 / (_BESIDE + _UNIT * longest)

@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
-from sosmith.model.dataflow.graph import Graph, Op
+from sosmith.model.dataflow.graph import Graph, Node, Op
 
 NO_LOGIC = {Op.INPUT, Op.CONSTANT, Op.DELAY, Op.SHIFT, Op.FLOOR, Op.FRACTION, Op.BOUND}
 """Operations that are wires or registers only and take no time."""
+
+ADDITION, _MULTIPLICATION, _PARTIAL_PRODUCT = 5, 12, 2
+"""Delays of operations, in units of about half a nanosecond of an ECP5; a product of several multiplier blocks takes
+more, because its partial products are added up."""
+
+_BLOCK_BITS = 18
+"""Bits of each operand of a multiplier block, its sign bit included."""
 
 
 def pipeline_depth(graph: Graph) -> int:
@@ -80,3 +87,29 @@ def _is_older(graph: Graph, index: int) -> bool:
     """Whether a node is a delay of another delay."""
     node = graph.nodes[index]
     return node.op is Op.DELAY and graph.nodes[node.operands[0]].op is Op.DELAY
+
+
+def longest_time(graph: Graph) -> int:
+    """Return the time of the slowest of `pipeline_stages`, in units of `operation_time`."""
+    stages = pipeline_stages(graph)
+    there: list[int] = []
+    for index, node in enumerate(graph.nodes):
+        before = [there[i] for i in node.operands if node.op is not Op.DELAY and stages[i] == stages[index]]
+        there.append(max(before, default=0) + operation_time(graph, node))
+    return max(there, default=0)
+
+
+def operation_time(graph: Graph, node: Node, *, powers: bool = False) -> int:
+    """Delay of a node in the unit of `ADDITION`; `powers` says that a product by a power of two takes none."""
+    if powers and node.op is Op.SCALE and node.parameter > 0 and not node.parameter & (node.parameter - 1):
+        return 0
+    if node.op in NO_LOGIC:
+        return 0
+    if node.op in {Op.SCALE, Op.MULTIPLY} and not graph.is_gate(node):
+        operands = [(graph.nodes[i].width, graph.nodes[i].signed) for i in node.operands]
+        if node.op is Op.SCALE:
+            operands.append((abs(node.parameter).bit_length() + (node.parameter < 0), node.parameter < 0))
+        signed = any(sign for _, sign in operands)  # a block takes both operands signed or neither
+        several = any(bits + (signed and not sign) > _BLOCK_BITS for bits, sign in operands)
+        return _MULTIPLICATION + several * _PARTIAL_PRODUCT
+    return ADDITION

@@ -24,6 +24,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from sosmith.hdl.plan.reassociation import reassociated
 from sosmith.model.dataflow.datapath import Datapath, Stage
 from sosmith.model.dataflow.graph import Graph, GraphBuilder, Op, Wire
 
@@ -40,7 +41,8 @@ def unfolded_stages(datapath: Datapath, lanes: int) -> tuple[Stage, ...]:
     """Return the stages of a datapath for so many samples a clock."""
     if lanes == 1:
         return datapath.stages
-    return tuple(UnfoldedStage(stage.name, unfolded(stage.graph, lanes)) for stage in datapath.stages)
+    graphs = (reassociated(unfolded(stage.graph, lanes)) for stage in datapath.stages)
+    return tuple(UnfoldedStage(stage.name, graph) for stage, graph in zip(datapath.stages, graphs, strict=True))
 
 
 def unfolded(graph: Graph, lanes: int) -> Graph:
