@@ -303,6 +303,21 @@ def refuse_decimated(design: CoreDesign, where: str) -> None:
         )
 
 
+def refuse_several_samples(design: CoreDesign, where: str) -> None:
+    """Refuse a core whose beats hold several samples `where` only others can be.
+
+    Raises
+    ------
+    SpecificationError
+        If they do.
+    """
+    lanes = design.architecture.samples_per_clock
+    if lanes > 1:
+        raise SpecificationError(
+            f"{design.spec.path}: not yet available: hardware.samples_per_clock must be 1 {where}, not {lanes}"
+        )
+
+
 def _known(wanted: str) -> str:
     if wanted not in {AUTO, *REALIZATIONS}:
         known = (AUTO, *REALIZATIONS)

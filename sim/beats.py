@@ -1,4 +1,7 @@
-"""Transfers on an AXI4-Stream, as arrays and in a file."""
+"""Transfers on an AXI4-Stream, as arrays and in a file.
+
+A signal of up to 64 bits is a column of words; a wider one has several words for each transfer, the lowest first.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,7 @@ import numpy.typing as npt
 
 @dataclass(frozen=True, eq=False)
 class Beats:
-    """Transfers on an AXI4-Stream, in order; all arrays have shape (n,).
+    """Transfers on an AXI4-Stream, in order; all arrays have shape (n,), or (n, words) for more than 64 bits.
 
     Attributes
     ----------
@@ -20,13 +23,13 @@ class Beats:
         Channel; 0 on a stream without ``tdest``.
     tdata : ndarray of uint64
         The bus word.
-    tuser : ndarray of uint8
-        Status; 0 on a stream without ``tuser``.
+    tuser : ndarray of uint64
+        Status of each sample, a byte each; 0 on a stream without ``tuser``.
     """
 
     tdest: npt.NDArray[np.int64]
     tdata: npt.NDArray[np.uint64]
-    tuser: npt.NDArray[np.uint8]
+    tuser: npt.NDArray[np.uint64]
 
     def __len__(self) -> int:
         """Count the transfers."""
@@ -57,6 +60,30 @@ class Beats:
             return Beats(*(np.load(file) for _ in range(3)))
 
     @staticmethod
-    def zeros(count: int) -> Beats:
-        """Make `count` transfers of zeros, to be filled."""
-        return Beats(np.zeros(count, np.int64), np.zeros(count, np.uint64), np.zeros(count, np.uint8))
+    def zeros(count: int, data_bits: int = 64, user_bits: int = 64) -> Beats:
+        """Make `count` transfers of zeros, to be filled, with so many bits at most."""
+        return Beats(np.zeros(count, np.int64), _zeros(count, data_bits), _zeros(count, user_bits))
+
+    def numbers(self) -> list[tuple[int, int, int]]:
+        """Return ``tdest``, ``tdata`` and ``tuser`` of each transfer as whole numbers."""
+        return list(zip(self.tdest.tolist(), _numbers(self.tdata), _numbers(self.tuser), strict=True))
+
+    def put(self, index: int, tdest: int, tdata: int, tuser: int) -> None:
+        """Store a transfer in these arrays."""
+        self.tdest[index] = tdest
+        for column, number in ((self.tdata, tdata), (self.tuser, tuser)):
+            words = column[index : index + 1].reshape(-1)  # a view
+            words[:] = [number >> 64 * k & _WORD for k in range(len(words))]
+
+
+_WORD = (1 << 64) - 1
+
+
+def _zeros(count: int, bits: int) -> npt.NDArray[np.uint64]:
+    return np.zeros(count if bits <= 64 else (count, -(-bits // 64)), np.uint64)
+
+
+def _numbers(column: npt.NDArray[np.uint64]) -> list[int]:
+    if column.ndim == 1:
+        return column.tolist()
+    return [sum(word << 64 * k for k, word in enumerate(row)) for row in column.tolist()]

@@ -15,7 +15,7 @@ from typing import TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from sosmith.gen.core import CoreDesign, refuse_decimated
+from sosmith.gen.core import CoreDesign, refuse_decimated, refuse_several_samples
 from sosmith.gen.fpga.boards import Board
 from sosmith.gen.fpga.synthesis import Netlist, synthesize
 from sosmith.gen.instrument.uncertainty_budget import budget_json, budget_of
@@ -85,6 +85,8 @@ def simulate(
     check_name(simulator, netlist=gates is not None)
     if vectors is not None:
         refuse_decimated(design, "with vectors")
+        if vectors.suffix == ".hex":
+            refuse_several_samples(design, "with vectors in words of the bus")
     with _alone_in(directory):
         for stale in ("report.json", "report.html"):  # of a run of another core, in case this run fails
             (directory / stale).unlink(missing_ok=True)

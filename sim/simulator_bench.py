@@ -114,7 +114,7 @@ class SimulatorBench:
     def _write_job(self, folder: Path, tool: Simulator) -> None:
         for name in ("result.json", "received.npy", "progress.txt"):
             (folder / name).unlink(missing_ok=True)
-        optional = optional_signals(self.interface)
+        optional, wide = optional_signals(self.interface), _is_wide(self.interface)
         job = {
             "folder": str(folder),
             "source": str(folder / "core.sv"),
@@ -124,7 +124,7 @@ class SimulatorBench:
             "seed": self.seed,
             "waves": self.waves,
             "ports": ports_of(self.interface),
-            "signals": optional,
+            "signals": [*optional, *["wide"] * wide],
         }
         bench = {
             "tdest": "tdest" in optional,
@@ -132,10 +132,12 @@ class SimulatorBench:
             "seed": self.seed,
             "idle": self.idle,
             "stall": self.stall,
-            "compiled": self.compiled and self.simulator != "icarus" and not self.waves,
+            "compiled": self.compiled and self.simulator != "icarus" and not self.waves and not wide,
             "latency_cycles": self.interface.latency_cycles,
             "reset_cycles": self.interface.reset_cycles,
             "samples_per_result": self.interface.samples_per_result,
+            "tdata_bits": self.interface.outputs.width,
+            "tuser_bits": self.interface.outputs.user_width,
         }
         (folder / "core.sv").write_bytes(self.source.read_bytes())
         (folder / "job.json").write_text(json.dumps(job), encoding="utf-8")
@@ -171,6 +173,11 @@ def ports_of(interface: InterfaceFacts) -> list[str]:
 def optional_signals(interface: InterfaceFacts) -> list[str]:
     """Those of ``tdest`` and ``tuser`` that the output stream has."""
     return [name for name in ("tdest", "tuser") if name in _signals(interface.outputs)]
+
+
+def _is_wide(interface: InterfaceFacts) -> bool:
+    """Whether a signal of the streams has more than 64 bits, which the compiled loop cannot have."""
+    return max(interface.inputs.width, interface.outputs.width, interface.outputs.user_width) > 64
 
 
 def _signals(stream: StreamFacts) -> list[str]:

@@ -8,6 +8,7 @@ import numpy.typing as npt
 from sosmith.gen.output.core_facts import StreamFacts
 from sosmith.gen.output.vectors import words
 from sosmith.model.arrays import Codes
+from sosmith.model.dataflow.status import STATUS_BITS
 from sosmith.model.errors import ShortfallError
 from sosmith.sim.beats import Beats
 
@@ -35,12 +36,13 @@ def pack(codes: Codes, order: Order, stream: StreamFacts) -> Beats:
     codes : int64 array, shape (samples, channels, fields)
         Codes within the ranges of the ports.
     order : int64 array, shape (samples * channels,)
-        Channel of each beat; the samples of a channel keep their order.
+        Channel of each sample; the samples of a channel keep their order.
     stream : StreamFacts
-        The stream, at most 64 bits wide.
+        The stream, each of whose samples has at most 64 bits. If the last beat is not full, the last sample fills it.
     """
-    packed = words(codes[_turns(order), order], stream)
-    return Beats(order, packed, np.zeros(len(order), dtype=np.uint8))
+    packed = _joined(words(codes[_turns(order), order], stream), stream.sample_width, stream.lanes)
+    count = len(packed)
+    return Beats(order[:count], packed, np.zeros(count, dtype=np.uint64))
 
 
 def unpack(beats: Beats, order: Order, stream: StreamFacts) -> tuple[Codes, npt.NDArray[np.uint8]]:
@@ -49,27 +51,51 @@ def unpack(beats: Beats, order: Order, stream: StreamFacts) -> tuple[Codes, npt.
     Raises
     ------
     ShortfallError
-        If the number of beats or a beat's channel differs from `order`, or a field is not sign-extended to whole
+        If the number of beats or a beat's channel differs from that of `order`, or a field is not sign-extended to whole
         bytes.
     """
-    _check_channels(beats, order)
+    _check_channels(beats, order[: -(-len(order) // stream.lanes)])
+    tdata = _apart(beats.tdata, stream.sample_width, stream.lanes)[: len(order)]
+    tuser = _apart(beats.tuser, STATUS_BITS, stream.lanes)[: len(order)]
     channels = int(order.max()) + 1
     shape = (len(order) // channels, channels)
     codes = np.empty((*shape, len(stream.fields)), dtype=np.int64)
     status = np.empty(shape, dtype=np.uint8)
     for number, field in enumerate(stream.fields):
-        column = (beats.tdata >> np.uint64(field.offset) & np.uint64((1 << field.padded) - 1)).astype(np.int64)
+        column = (tdata >> np.uint64(field.offset) & np.uint64((1 << field.padded) - 1)).astype(np.int64)
         if field.port.signed:
             column = np.where(column >> (field.padded - 1), column - (1 << field.padded), column)
         wrong = np.flatnonzero((column < field.port.lowest) | (column > field.port.highest))
         if len(wrong):
-            word = int(beats.tdata[wrong[0]])
+            word = int(tdata[wrong[0]])
             raise ShortfallError(
                 f"{field.port.name} must be extended to whole bytes, not {word:#x} at sample {wrong[0]}"
             )
         codes[_turns(order), order, number] = column
-    status[_turns(order), order] = beats.tuser
+    status[_turns(order), order] = tuser
     return codes, status
+
+
+def _joined(samples: npt.NDArray[np.uint64], width: int, lanes: int) -> npt.NDArray[np.uint64]:
+    """Join the words of `lanes` samples after the other into beats, the first one lowest."""
+    if lanes == 1:
+        return samples
+    padded = np.append(samples, np.repeat(samples[-1:], -len(samples) % lanes)).astype("<u8")
+    taken = padded.view(np.uint8).reshape(-1, 8)[:, : width // 8].reshape(len(padded) // lanes, -1)
+    whole = np.pad(taken, ((0, 0), (0, -taken.shape[1] % 8)))
+    found: npt.NDArray[np.uint64] = np.ascontiguousarray(whole).view("<u8").astype(np.uint64)
+    return found[:, 0] if found.shape[1] == 1 else found
+
+
+def _apart(beats: npt.NDArray[np.uint64], width: int, lanes: int) -> npt.NDArray[np.uint64]:
+    """Take beats apart into the words of their samples."""
+    if lanes == 1:
+        return beats
+    taken = np.ascontiguousarray(beats.astype("<u8")).view(np.uint8).reshape(len(beats), -1)
+    each = taken[:, : lanes * width // 8].reshape(len(beats) * lanes, -1)
+    whole = np.pad(each, ((0, 0), (0, 8 - each.shape[1])))
+    found: npt.NDArray[np.uint64] = np.ascontiguousarray(whole).view("<u8").astype(np.uint64)[:, 0]
+    return found
 
 
 def _check_channels(beats: Beats, order: Order) -> None:

@@ -20,7 +20,7 @@ from sosmith.hdl.plan.streams import Field, dest_width, fields
 from sosmith.model.dataflow.datapath import Datapath, Stage
 from sosmith.model.dataflow.graph import Graph, Op
 from sosmith.model.dataflow.program import Program
-from sosmith.model.dataflow.status import Flag
+from sosmith.model.dataflow.status import STATUS_BITS, Flag
 from sosmith.model.port import Port
 from sosmith.model.reload.registers import INTERFACE
 from sosmith.model.sections.direct_form import DirectForm1
@@ -39,16 +39,29 @@ class StreamFacts:
         Bits of ``tdest``; 0 if there is none.
     flags : mapping of str to int
         Bit position of each flag in ``tuser``, by name; empty if there is no ``tuser``.
+    lanes : int
+        Samples of a beat, the first one lowest: `fields` and `flags` are those of one of them.
     """
 
     fields: tuple[Field, ...]
     dest_width: int = 0
     flags: Mapping[str, int] = field(default_factory=dict)
+    lanes: int = 1
+
+    @property
+    def sample_width(self) -> int:
+        """Bits of ``tdata`` for one sample."""
+        return sum(each.padded for each in self.fields)
 
     @property
     def width(self) -> int:
         """Bits of ``tdata``."""
-        return sum(each.padded for each in self.fields)
+        return self.sample_width * self.lanes
+
+    @property
+    def user_width(self) -> int:
+        """Bits of ``tuser``; 0 if there is none."""
+        return STATUS_BITS * self.lanes if self.flags else 0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -245,6 +258,8 @@ class CoreFacts:
         Settling after a start from zero; None without sections and after any other start.
     architecture : str
         Name of the architecture.
+    look_ahead : bool
+        Whether its loops are pipelined with look-ahead.
     program : Program or None
         Program of the folded and serial architectures; None in the others.
     reload : ReloadFacts or None
@@ -283,6 +298,7 @@ class CoreFacts:
     start: str | None
     settling: SettlingFacts | None
     architecture: str
+    look_ahead: bool
     program: Program | None
     reload: ReloadFacts | None
     protect: str
@@ -319,6 +335,7 @@ def core_facts(design: CoreDesign) -> CoreFacts:
         start=_start(quantized),
         settling=_settling(design),
         architecture=architecture.name,
+        look_ahead=architecture.look_ahead,
         program=architecture.program,
         reload=_reload(design),
         protect=architecture.protect,
@@ -339,10 +356,11 @@ def interface_facts(design: CoreDesign) -> InterfaceFacts:
     """Collect the facts needed to drive a core."""
     datapath, width = design.datapath, dest_width(design.spec.channels)
     flags = {flag.name.lower(): flag.value for flag in Flag}
+    lanes = design.architecture.samples_per_clock
     return InterfaceFacts(
         name=datapath.name,
-        inputs=StreamFacts(fields=fields(datapath.inputs), dest_width=width),
-        outputs=StreamFacts(fields=fields((datapath.output,)), dest_width=width, flags=flags),
+        inputs=StreamFacts(fields=fields(datapath.inputs), dest_width=width, lanes=lanes),
+        outputs=StreamFacts(fields=fields((datapath.output,)), dest_width=width, flags=flags, lanes=lanes),
         reset_cycles=design.architecture.reset_cycles,
         latency_cycles=design.architecture.latency_cycles,
         samples_per_result=1 if datapath.decimator is None else datapath.decimator.factor,

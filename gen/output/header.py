@@ -76,6 +76,9 @@ def _promise(facts: CoreFacts) -> Sequence[str]:
 def _timing(design: CoreDesign, facts: CoreFacts) -> Sequence[str]:
     every = "clock" if facts.cycles_per_sample == 1 else f"{facts.cycles_per_sample} clocks"
     taken, its = f"A sample is taken every {every} at best", "its sample"
+    lanes = facts.interface.inputs.lanes
+    if lanes > 1:
+        taken, its = f"A beat of {lanes} samples is taken every {every} at best", "its beat"
     if facts.decimation is not None:
         found = facts.decimation
         taken = f"{found.factor} samples are taken every {found.cycles_per_result} clocks at best"

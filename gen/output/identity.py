@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from typing import Literal
 
-from sosmith.gen.core import CoreDesign, refuse_decimated
+from sosmith.gen.core import CoreDesign, refuse_decimated, refuse_several_samples
 from sosmith.gen.output.core_facts import interface_facts
 from sosmith.gen.reload.register_writes import bank_size
 from sosmith.gen.version import __version__
@@ -33,6 +33,7 @@ def identity(
         Where samples come from.
     """
     refuse_decimated(design, "on a board")
+    refuse_several_samples(design, "on a board")
     datapath, fingerprint = design.datapath, design.architecture.fingerprint
     words, _ = (0, 0) if fingerprint is None else bank_size(design.architecture)
     made = Identity(

@@ -9,7 +9,6 @@ from sosmith.gen.output.core_facts import CoreFacts, LimitCycleFacts, SectionFac
 from sosmith.gen.output.decimation_facts import DecimationFacts
 from sosmith.gen.version import __version__
 from sosmith.model.dataflow.program import Program
-from sosmith.model.dataflow.status import STATUS_BITS
 
 
 def manifest(facts: CoreFacts) -> dict[str, Any]:
@@ -27,6 +26,7 @@ def manifest(facts: CoreFacts) -> dict[str, Any]:
         "latency_cycles": interface.latency_cycles,
         "cycles_per_sample": facts.cycles_per_sample,
         "realization": facts.realization,
+        **({"pipeline": "look-ahead"} if facts.look_ahead else {}),
         "start": facts.start,
         "settling": None if facts.settling is None else _entry(facts.settling),
         "architecture": facts.architecture,
@@ -68,11 +68,13 @@ def _entry(facts: Any) -> dict[str, Any]:
 
 def _stream(stream: StreamFacts) -> dict[str, Any]:
     dest = {"tdest": {"width": stream.dest_width}} if stream.dest_width else {}
-    user = {"tuser": {"width": STATUS_BITS, "flags": dict(stream.flags)}} if stream.flags else {}
+    user = {"tuser": {"width": stream.user_width, "flags": dict(stream.flags)}} if stream.flags else {}
+    several = {"samples": stream.lanes, "sample_width": stream.sample_width} if stream.lanes > 1 else {}
     return (
         dest
         | {
             "width": stream.width,
+            **several,
             "fields": [
                 {
                     "name": field.port.name,

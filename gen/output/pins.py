@@ -8,7 +8,7 @@ from amaranth.hdl import Shape
 from amaranth.lib.wiring import Out
 
 from sosmith.gen.core import CoreDesign
-from sosmith.gen.output.core_facts import InterfaceFacts
+from sosmith.gen.output.core_facts import InterfaceFacts, StreamFacts
 from sosmith.hdl.axi_stream import core_members
 from sosmith.hdl.bus.axi_lite import slave_members
 from sosmith.model.reload.registers import ADDRESS_BITS
@@ -56,7 +56,7 @@ def pins(design: CoreDesign, interface: InterfaceFacts) -> tuple[Pin, ...]:
     interface : InterfaceFacts
         Its streams.
     """
-    members = core_members(design.datapath.inputs, design.datapath.output, design.spec.channels)
+    members = core_members(design.datapath.inputs, design.datapath.output, design.spec.channels, lanes=interface.inputs.lanes)
     if design.architecture.fingerprint is not None:
         members |= slave_members(ADDRESS_BITS)
     found = [
@@ -72,12 +72,19 @@ def pins(design: CoreDesign, interface: InterfaceFacts) -> tuple[Pin, ...]:
     return tuple(sorted(found, key=lambda pin: buses.index(pin.bus)))
 
 
+def _in_lanes(stream: StreamFacts) -> list[str]:
+    """Say how the samples of a beat lie on the bus, if there are several."""
+    if stream.lanes == 1:
+        return []
+    return [f"{stream.lanes} samples of {stream.sample_width} bits, the first one lowest, each with the bits"]
+
+
 def _meaning(name: str, interface: InterfaceFacts) -> str:
     if name.startswith("s_axil"):
         return "AXI4-Lite registers"
     if name.endswith("tdata"):
         stream = interface.inputs if name.startswith("s_") else interface.outputs
-        parts = []
+        parts = _in_lanes(stream)
         for field in stream.fields:
             port = field.port
             kind = "two's complement" if port.signed else "unsigned"
@@ -86,7 +93,10 @@ def _meaning(name: str, interface: InterfaceFacts) -> str:
             parts.append(f"[{field.offset + port.bits - 1}:{field.offset}] {port.name}, {kind}, = {value}")
         return "; ".join(parts)
     if name.endswith("tuser"):
-        return "; ".join(f"[{bit}] {flag}" for flag, bit in interface.outputs.flags.items())
+        flags = [f"[{bit}] {flag}" for flag, bit in interface.outputs.flags.items()]
+        lanes = interface.outputs.lanes
+        each = [f"{lanes} bytes, a status for each sample, the first one lowest, with the bits"] if lanes > 1 else []
+        return "; ".join([*each, *flags])
     return {
         "aclk": "clock, rising edge",
         "aresetn": "synchronous reset, active low",

@@ -42,15 +42,15 @@ FORMATS = (".csv", ".npz", ".vcd", ".hex")
 
 
 def words(codes: Codes, stream: StreamFacts) -> npt.NDArray[np.uint64]:
-    """Return the bus words of `codes`, shape (n, fields): each field extended by its sign to whole bytes.
+    """Return the bus words of samples with `codes`, shape (n, fields): each field extended by its sign to whole bytes.
 
     Raises
     ------
     ValueError
-        If the stream is more than 64 bits wide.
+        If a sample is more than 64 bits wide.
     """
-    if stream.width > 64:
-        raise ValueError(f"stream must be at most 64 bits wide, not {stream.width}")
+    if stream.sample_width > 64:
+        raise ValueError(f"samples must be at most 64 bits wide, not {stream.sample_width}")
     packed = np.zeros(len(codes), dtype=np.uint64)
     for column, field in zip(codes.T, stream.fields, strict=True):
         packed |= (column.astype(np.uint64) & np.uint64((1 << field.padded) - 1)) << np.uint64(field.offset)

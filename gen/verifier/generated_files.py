@@ -103,7 +103,8 @@ def check_measurements(about: AboutEntry, path: Path) -> None:
 def fixed_architecture(path: Path) -> tuple[str | None, int]:
     """Return architecture and number of channels from the manifest at `path`, which is known to be unchanged.
 
-    The architecture is None for a core whose constants can be loaded, or whose memories and states are protected.
+    The architecture is None for a core whose constants can be loaded, whose memories and states are protected, whose
+    beats hold several samples, or whose sections look ahead.
 
     Raises
     ------
@@ -113,6 +114,7 @@ def fixed_architecture(path: Path) -> tuple[str | None, int]:
     try:
         manifest = json.loads(_content(path))
         plain = manifest["reload"] is None and manifest["protect"] == "none"
+        plain = plain and "pipeline" not in manifest and "samples" not in manifest["streams"]["m_axis"]
         return str(manifest["architecture"]) if plain else None, int(manifest["channels"])
     except (ValueError, KeyError, TypeError, AttributeError):
         raise RejectedError(f"{path} must be the manifest of a core, not another file") from None

@@ -28,7 +28,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from itertools import accumulate, zip_longest
-from math import lcm, prod
+from math import gcd, lcm, prod
 
 from flint import fmpq, fmpq_poly
 
@@ -384,10 +384,15 @@ def _combined(numerators: Sequence[fmpq_poly], way: Sequence[fmpq_poly]) -> fmpq
 
 
 class _Denominator:
-    """Sums over responses with one denominator, each computed when it is needed first, in pieces as another's."""
+    """Sums over responses with one denominator, each computed when it is needed first, in pieces as another's.
+
+    A response over a polynomial in ``w**step`` is `step` responses that take turns, each over that polynomial in w: its
+    norm is the sum of theirs.
+    """
 
     def __init__(self, polynomial: fmpq_poly, like: _Denominator | None = None) -> None:
         self.polynomial = polynomial
+        self.step = gcd(*(k for k, value in enumerate(polynomial.coeffs()) if value)) or 1
         self._like = like
 
     @cached_property
@@ -401,7 +406,7 @@ class _Denominator:
     @cached_property
     def pieces(self) -> Pieces | None:
         """Responses in pieces, if they are long."""
-        if self._short is not None:
+        if self.step > 1 or self._short is not None:
             return None
         return Pieces(self.polynomial, None if self._like is None else self._like.pieces)
 
@@ -412,9 +417,18 @@ class _Denominator:
 
     def norm(self, numerator: fmpq_poly, *, rough: bool = False) -> Fraction:
         """Upper bound of the sum of magnitudes; if `rough`, it need not be close."""
+        if self.step > 1:
+            coefficients = numerator.coeffs()
+            turns = (fmpq_poly(coefficients[k :: self.step]) for k in range(self.step))
+            return sum((self._turn.norm(turn, rough=rough) for turn in turns if turn), Fraction(0))
         if self.pieces is None:
             return response(numerator, self.inverse).gain
         return self.pieces.norm(numerator, rough=rough)
+
+    @cached_property
+    def _turn(self) -> _Denominator:
+        """The polynomial in w, if this is one in ``w**step``."""
+        return _Denominator(fmpq_poly(self.polynomial.coeffs()[:: self.step]))
 
     def total(self, numerator: fmpq_poly) -> Fraction:
         """Sum of all samples, exact."""
@@ -438,6 +452,10 @@ def _deviation(
     windows: Sequence[tuple[Fraction, Fraction]],
 ) -> Fraction:
     """Largest magnitude of one response minus that of the ideal filter, both driven by the same, within any window."""
+    if over.step > 1:
+        # Over a denominator in the same power of w, the ideal filter's responses take turns as well.
+        factor, scattered = _scattered(ideal.polynomial, over.step)
+        ideal, exact = _Denominator(scattered), exact * factor
     difference = made * ideal.polynomial - exact * over.polynomial
     size = None
     if difference and over.pieces is not None and ideal.pieces is not None:
@@ -447,6 +465,17 @@ def _deviation(
         return max(_magnitude(both, [(difference, *window)]) for window in windows)
     gain = abs(over.total(made) - ideal.total(exact))
     return max(abs(low + high) / 2 * gain + (high - low) / 2 * size for low, high in windows)
+
+
+def _scattered(polynomial: fmpq_poly, step: int) -> tuple[fmpq_poly, fmpq_poly]:
+    """Return a factor with which a polynomial becomes one in ``w**step``, and that; `step` is a power of two."""
+    if step == 1:
+        return fmpq_poly([1]), polynomial
+    mirrored = polynomial(fmpq_poly([0, -1]))
+    even = fmpq_poly((polynomial * mirrored).coeffs()[::2])  # in w**2
+    factor, made = _scattered(even, step // 2)
+    square = fmpq_poly([0, 0, 1])
+    return mirrored * factor(square), made(square)
 
 
 def _extremes(over: _Denominator, driven: Sequence[_Driven], *, rough: bool = False) -> tuple[Fraction, Fraction]:

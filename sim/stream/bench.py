@@ -35,7 +35,8 @@ class StreamBench:
         self.clocks = 0
         self.count = 0
         self.patience = self.config["latency_cycles"] + self.config["reset_cycles"]
-        self._received = Beats.zeros(self.results(len(self.words)))
+        bits = self.config["tdata_bits"], self.config["tuser_bits"]
+        self._received = Beats.zeros(self.results(len(self.words)), *bits)
         self._outputs = [(name, f"m_axis_{name}") for name in ("tdest", "tdata", "tuser") if self.has(name)]
         self._expected = 0
         self._shown = 0
@@ -192,8 +193,7 @@ class StreamBench:
         """Store a word that has come out; there must be no more than are expected."""
         if self.count == self._expected:
             raise too_many(self.count)
-        for name, value in word._asdict().items():
-            getattr(self._received, name)[self.count] = value
+        self._received.put(self.count, *word)
         self.count += 1
 
     async def nothing_more_comes(self) -> None:
@@ -210,7 +210,7 @@ class StreamBench:
 
 
 def _words(beats: Beats) -> list[Word]:
-    return [Word(*each) for each in zip(beats.tdest.tolist(), beats.tdata.tolist(), beats.tuser.tolist(), strict=True)]
+    return [Word(*each) for each in beats.numbers()]
 
 
 async def run_bench(bench: StreamBench) -> float:

@@ -1,7 +1,8 @@
 // A core as CXXRTL's model, with the loop that streams samples through it, as a library that Python loads.
 //
 // model.cc is what Yosys has written of the core, whose top module it calls "core" there. -DBENCH_TDEST and
-// -DBENCH_TUSER tell which optional signals the streams have.
+// -DBENCH_TUSER tell which optional signals the streams have, and -DBENCH_WIDE
+// that one has more than 64 bits: then nobody calls the loop.
 
 #include <cstdint>
 #include <fstream>
@@ -35,20 +36,25 @@ bool output_valid() { return core.p_m__axis__tvalid.get<bool>(); }
 void set_input_valid(bool value) { core.p_s__axis__tvalid.set(value); }
 void set_output_ready(bool value) { core.p_m__axis__tready.set(value); }
 
-void set_input([[maybe_unused]] uint64_t tdest, uint64_t tdata) {
+void set_input([[maybe_unused]] uint64_t tdest, [[maybe_unused]] uint64_t tdata) {
+#ifndef BENCH_WIDE
     core.p_s__axis__tdata.set(tdata);
 #ifdef BENCH_TDEST
     core.p_s__axis__tdest.set(tdest);
 #endif
+#endif
 }
 
 Word output() {
-    Word word{0, core.p_m__axis__tdata.get<uint64_t>(), 0};
+    Word word{0, 0, 0};
+#ifndef BENCH_WIDE
+    word.tdata = core.p_m__axis__tdata.get<uint64_t>();
 #ifdef BENCH_TDEST
     word.tdest = core.p_m__axis__tdest.get<uint64_t>();
 #endif
 #ifdef BENCH_TUSER
     word.tuser = core.p_m__axis__tuser.get<uint64_t>();
+#endif
 #endif
     return word;
 }
@@ -73,17 +79,22 @@ Waves *waves;
 
 }  // namespace
 
-// Value of a port of up to 64 bits.
-extern "C" uint64_t sosmith_read(const char *port) {
+// Bits of a port.
+extern "C" uint64_t sosmith_width(const char *port) { return item(port).width; }
+
+// 64 bits of a port, from bit 64 * word on.
+extern "C" uint64_t sosmith_read(const char *port, uint64_t word) {
     const debug_item &found = item(port);
-    return found.curr[0] | (found.width > 32 ? uint64_t{found.curr[1]} << 32 : 0);
+    const uint32_t *bits = found.curr + 2 * word;
+    return bits[0] | (found.width > 64 * word + 32 ? uint64_t{bits[1]} << 32 : 0);
 }
 
-// Set an input of up to 64 bits.
-extern "C" void sosmith_write(const char *port, uint64_t value) {
+// Set 64 bits of an input, from bit 64 * word on.
+extern "C" void sosmith_write(const char *port, uint64_t word, uint64_t value) {
     const debug_item &found = item(port);
-    found.curr[0] = static_cast<uint32_t>(value);
-    if (found.width > 32) found.curr[1] = static_cast<uint32_t>(value >> 32);
+    uint32_t *bits = found.curr + 2 * word;
+    bits[0] = static_cast<uint32_t>(value);
+    if (found.width > 64 * word + 32) bits[1] = static_cast<uint32_t>(value >> 32);
 }
 
 // Write a waveform from now on, in a file that this makes.

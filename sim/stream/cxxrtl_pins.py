@@ -26,9 +26,12 @@ class CxxrtlPins:
 
     def __init__(self, library: Path, waves: Path | None = None) -> None:
         self.library = ctypes.CDLL(str(library))
-        self.library.sosmith_read.argtypes = (ctypes.c_char_p,)
+        self.library.sosmith_width.argtypes = (ctypes.c_char_p,)
+        self.library.sosmith_width.restype = ctypes.c_uint64
+        self.library.sosmith_read.argtypes = (ctypes.c_char_p, ctypes.c_uint64)
         self.library.sosmith_read.restype = ctypes.c_uint64
-        self.library.sosmith_write.argtypes = (ctypes.c_char_p, ctypes.c_uint64)
+        self.library.sosmith_write.argtypes = (ctypes.c_char_p, ctypes.c_uint64, ctypes.c_uint64)
+        self._words: dict[str, int] = {}
         self.library.sosmith_settle.argtypes = (ctypes.c_bool, ctypes.c_uint64)
         self._now = 0  # ns; the clock falls at multiples of its period
         if waves is not None:
@@ -37,11 +40,19 @@ class CxxrtlPins:
 
     def read(self, port: str) -> int:
         """Value of a port; a model of bits has no X or Z."""
-        return int(self.library.sosmith_read(port.encode()))
+        name = port.encode()
+        return sum(int(self.library.sosmith_read(name, k)) << 64 * k for k in range(self._count(port)))
 
     def write(self, port: str, value: int) -> None:
         """Set an input."""
-        self.library.sosmith_write(port.encode(), value)
+        for k in range(self._count(port)):
+            self.library.sosmith_write(port.encode(), k, value >> 64 * k & (1 << 64) - 1)
+
+    def _count(self, port: str) -> int:
+        """Words of 64 bits that a port has."""
+        if port not in self._words:
+            self._words[port] = -(-int(self.library.sosmith_width(port.encode())) // 64)
+        return self._words[port]
 
     async def clock(self) -> None:
         """Go on to the next falling edge."""

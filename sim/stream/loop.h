@@ -40,7 +40,7 @@ struct Stream {
     uint64_t to_send, to_receive;
     int64_t *received_tdest;
     uint64_t *received_tdata;
-    uint8_t *received_tuser;
+    uint64_t *received_tuser;
     // Settings.
     uint64_t patience, silence_limit, busy;
     double probed_share;
