@@ -110,7 +110,8 @@ class Architecture:
     def adders(self) -> tuple[frozenset[int], ...]:
         """Products by constants that are made of adders, by stage: for which there are no multiplier blocks left.
 
-        With several samples a clock, those of the unfolded stages. None of them if the constants can be loaded, and in the other architectures.
+        With several samples a clock, those of the unfolded stages. None of them if the constants can be loaded, and in
+        the other architectures.
         """
         if self.look_ahead:
             return tuple(map(scalings, self._graphs))

@@ -159,12 +159,9 @@ def design_core(
 
     hardware = spec.hardware
     looks_ahead = hardware.pipeline == "look-ahead"
-    if looks_ahead and (wanted != AUTO or widths_of is not None):
-        raise SpecificationError(
-            f'the realization must be auto with hardware.pipeline = "look-ahead", not {widths_of or wanted}'
-        )
+    _check_realization(spec, wanted, widths_of)
 
-    def in_hardware(name: str, datapath: Datapath) -> Architecture:
+    def in_hardware(name: str, datapath: Datapath, *, look_ahead: bool = looks_ahead) -> Architecture:
         """Architecture with what costs a program instructions: the calibrated range, limits of wear, and settling."""
         codes = () if fitted is None else calibrated_codes(datapath.inputs, fitted)
         wear = () if spec.wear is None else spec.wear.codes(spec.output)
@@ -173,7 +170,7 @@ def design_core(
         flagged = with_settling(datapath, spare * samples_to_settle(datapath))
         made = replace(flagged, calibrated=codes, wear=wear)
         made = made if front is None else front.before(made)
-        return fitting(name, budget, made, board, look_ahead=looks_ahead)
+        return fitting(name, budget, made, board, look_ahead=look_ahead)
 
     budget = Budget(
         clock=hardware.clock,
@@ -185,26 +182,22 @@ def design_core(
         decimate=1 if front is None else front.decimator.factor,
         samples_per_clock=hardware.samples_per_clock,
     )
-    names = candidates(hardware.architecture, budget.blocks)
-    if looks_ahead or hardware.samples_per_clock > 1:
-        names = ("parallel",)
-    refused = ""
-    for name in names:
-        try:
-            if looks_ahead and ideal is not None:
-                quantized, reason, architecture = _looking_ahead(plan_of, in_hardware, budget)
-                break
-            quantized, reason = select(name)
-            architecture = in_hardware(name, quantized.datapath)
-            if name == "parallel" and hardware.pipeline == AUTO and wanted == AUTO and ideal is not None:
-                looks_ahead = _is_too_slow(architecture, budget)
-                if looks_ahead:
-                    quantized, reason, architecture = _looking_ahead(plan_of, in_hardware, budget)
-            break
-        except ShortfallError as error:
-            if name == names[-1]:
-                raise
-            refused = str(error)
+
+    def made_in(name: str) -> _Made:
+        """Choose everything for an architecture."""
+        ahead = partial(in_hardware, "parallel", look_ahead=True)
+        if looks_ahead and ideal is not None:
+            return _looking_ahead(plan_of, ahead, budget)
+        quantized, reason = select(name)
+        architecture = in_hardware(name, quantized.datapath)
+        asked = hardware.pipeline != AUTO or wanted != AUTO or ideal is None
+        if not asked and name == "parallel" and _is_too_slow(architecture, budget):
+            return _looking_ahead(plan_of, ahead, budget)
+        return quantized, reason, architecture
+
+    several = looks_ahead or hardware.samples_per_clock > 1
+    names = ("parallel",) if several else candidates(hardware.architecture, budget.blocks)
+    (quantized, reason, architecture), refused = _first_that_keeps_up(names, made_in)
     asked_for = len(names) == 1 and hardware.architecture != AUTO
     why = reason_for(architecture, budget, asked=asked_for, board=board, refused=refused)
     return CoreDesign(
@@ -218,15 +211,38 @@ def design_core(
     )
 
 
+_Made = tuple[Quantized, str, Architecture]
+"""A proven design, the reason for its realization, and its architecture."""
+
+
+def _check_realization(spec: Specification, wanted: str, widths_of: str | None) -> None:
+    """Check that no realization is asked for beside look-ahead, which has its own."""
+    if spec.hardware.pipeline == "look-ahead" and (wanted != AUTO or widths_of is not None):
+        raise SpecificationError(
+            f'the realization must be auto with hardware.pipeline = "look-ahead", not {widths_of or wanted}'
+        )
+
+
+def _first_that_keeps_up(names: Sequence[str], made_in: Callable[[str], _Made]) -> tuple[_Made, str]:
+    """Return the first design that keeps up, and why the one before did not, if there was one."""
+    refused = ""
+    for name in names[:-1]:
+        try:
+            return made_in(name), refused
+        except ShortfallError as error:
+            refused = str(error)
+    return made_in(names[-1]), refused
+
+
 def _is_too_slow(architecture: Architecture, budget: Budget) -> bool:
-    """Whether a core that has to take a beat at each clock needs look-ahead to reach it, by the estimate for an ECP5."""
+    """Whether a core that must take a beat at each clock needs look-ahead to reach it, by the estimate for an ECP5."""
     plain = budget.channels == 1 and not budget.reload and budget.protect == "none" and budget.decimate == 1
     return plain and budget.cycles == 1 and architecture.clock_estimate < budget.clock
 
 
 def _looking_ahead(
-    plan_of: Callable[[str], Plan], in_hardware: Callable[[str, Datapath], Architecture], budget: Budget
-) -> tuple[Quantized, str, Architecture]:
+    plan_of: Callable[[str], Plan], in_hardware: Callable[[Datapath], Architecture], budget: Budget
+) -> _Made:
     """Choose how far recursions look ahead: as little as the clock allows, by the estimate for an ECP5.
 
     Raises
@@ -234,7 +250,7 @@ def _looking_ahead(
     ShortfallError
         If no sections with look-ahead meet the specification.
     """
-    best: tuple[Quantized, str, Architecture] | None = None
+    best: _Made | None = None
     refused: ShortfallError | None = None
     for samples, realization in LOOK_AHEAD.items():
         if samples <= budget.samples_per_clock:
@@ -244,7 +260,7 @@ def _looking_ahead(
         except ShortfallError as error:
             refused = error
             continue
-        architecture = in_hardware("parallel", quantized.datapath)
+        architecture = in_hardware(quantized.datapath)
         estimate = architecture.clock_estimate
         reached = "reaches" if estimate >= budget.clock else "comes closest to"
         reason = (

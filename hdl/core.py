@@ -10,11 +10,11 @@ With one channel, as in the bench example of a calibration and a filter::
                                                                                            |
     s_axis_tready <--------------------------- advance <-----------------------------------+
 
-Every datapath stage has one to three pipeline stages, `sosmith.hdl.stages.pipelined`; all of them move at the clocks at which
-`advance`, which comes from a register of the output buffer, is high.
+Every datapath stage has one to three pipeline stages, `sosmith.hdl.stages.pipelined`; all of them move at the clocks at
+which `advance`, which comes from a register of the output buffer, is high.
 
-Several channels take the stages of `sosmith.hdl.stages.interleaved`, whose states lie in memories, and an input buffer, which
-holds back a sample of a channel whose last one is still in a recursion::
+Several channels take the stages of `sosmith.hdl.stages.interleaved`, whose states lie in memories, and an input buffer,
+which holds back a sample of a channel whose last one is still in a recursion::
 
     s_axis_tdata --> input_buffer ----------------> stages --> output_buffer --> m_axis_tdata
     s_axis_tdest       1 clock       |       ^                                   m_axis_tdest
@@ -51,11 +51,11 @@ from sosmith.hdl.axi_stream import StreamBuffer, core_members, extended
 from sosmith.hdl.bus.axi_lite import forward_slave, slave_members
 from sosmith.hdl.constant_banks import NO_CONSTANTS, ConstantBanks, Pair
 from sosmith.hdl.fault_guard import FaultGuard
-from sosmith.hdl.stages.interleaved import InterleavedStage
 from sosmith.hdl.pipelined_logic import banks_in_use
 from sosmith.hdl.plan.parallel_clocks import depths
 from sosmith.hdl.plan.streams import channel_bits, fields, width
 from sosmith.hdl.reload import ReloadPort
+from sosmith.hdl.stages.interleaved import InterleavedStage
 from sosmith.hdl.stages.pipelined import PipelinedStage
 from sosmith.hdl.status import (
     at_rail,

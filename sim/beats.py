@@ -84,6 +84,5 @@ def _zeros(count: int, bits: int) -> npt.NDArray[np.uint64]:
 
 
 def _numbers(column: npt.NDArray[np.uint64]) -> list[int]:
-    if column.ndim == 1:
-        return column.tolist()
-    return [sum(word << 64 * k for k, word in enumerate(row)) for row in column.tolist()]
+    rows = column.reshape(len(column), -1).tolist()
+    return [sum(int(word) << 64 * k for k, word in enumerate(row)) for row in rows]

@@ -51,8 +51,8 @@ def unpack(beats: Beats, order: Order, stream: StreamFacts) -> tuple[Codes, npt.
     Raises
     ------
     ShortfallError
-        If the number of beats or a beat's channel differs from that of `order`, or a field is not sign-extended to whole
-        bytes.
+        If the number of beats or a beat's channel differs from that of `order`, or a field is not sign-extended to
+        whole bytes.
     """
     _check_channels(beats, order[: -(-len(order) // stream.lanes)])
     tdata = _apart(beats.tdata, stream.sample_width, stream.lanes)[: len(order)]

@@ -56,7 +56,9 @@ def pins(design: CoreDesign, interface: InterfaceFacts) -> tuple[Pin, ...]:
     interface : InterfaceFacts
         Its streams.
     """
-    members = core_members(design.datapath.inputs, design.datapath.output, design.spec.channels, lanes=interface.inputs.lanes)
+    members = core_members(
+        design.datapath.inputs, design.datapath.output, design.spec.channels, lanes=interface.inputs.lanes
+    )
     if design.architecture.fingerprint is not None:
         members |= slave_members(ADDRESS_BITS)
     found = [

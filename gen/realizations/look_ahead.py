@@ -1,4 +1,4 @@
-"""Makes sections with scattered look-ahead: multiplies out the polynomials that double the distance of the recursion."""
+"""Makes sections with scattered look-ahead: the polynomials that double the distance of the recursion."""
 
 from __future__ import annotations
 

@@ -1,5 +1,4 @@
-"""Valid names in a specification: families, kinds, methods, realizations, starts, architectures, pipelines, cores,
-inputs.
+"""Valid names in a specification: of its filter, its hardware, and its cores and inputs.
 
 Those of `hardware.protect` are in `sosmith.model.dataflow.protection`.
 """

@@ -98,7 +98,9 @@ def _check_block(document: Document) -> None:
     found = 'pipeline = "look-ahead"' if looks_ahead else f"samples_per_clock = {hardware.samples_per_clock}"
     for where, value, possible in asked:
         if value not in possible:
-            raise UnfitError(f"{' or '.join(map(literal, possible))} with hardware.{found}", literal(value), where=where)
+            raise UnfitError(
+                f"{' or '.join(map(literal, possible))} with hardware.{found}", literal(value), where=where
+            )
     if document.filter.decimate is not None:
         left_out = f"left out with hardware.{found}"
         raise UnfitError(left_out, literal(document.filter.decimate), where="filter.decimate", later=True)

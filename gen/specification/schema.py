@@ -92,9 +92,9 @@ def read_multipliers(value: object) -> int | None:
 
 def read_samples_per_clock(value: object) -> int:
     """Read a number of samples in a beat."""
-    if isinstance(value, bool) or value not in SAMPLES_PER_CLOCK:
+    if isinstance(value, bool) or not isinstance(value, int) or value not in SAMPLES_PER_CLOCK:
         raise UnfitError(f"one of {', '.join(map(str, SAMPLES_PER_CLOCK))}", literal(value))
-    return cast("int", value)
+    return value
 
 
 def read_decimate(value: object) -> int | str:

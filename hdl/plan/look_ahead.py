@@ -21,7 +21,7 @@ from sosmith.hdl.plan.constant_products import with_sums
 from sosmith.hdl.plan.pipeline import ADDITION, NO_LOGIC, operation_time
 from sosmith.hdl.plan.reassociation import reassociated
 from sosmith.model.dataflow.datapath import Stage
-from sosmith.model.dataflow.graph import Graph, GraphBuilder, Node, Op, Wire
+from sosmith.model.dataflow.graph import Graph, GraphBuilder, Op, Wire
 
 
 @dataclass(frozen=True)
@@ -180,47 +180,49 @@ def _spread(graph: Graph, turns: int, loops: frozenset[int], longest: int) -> Tu
     each as late as the outputs and the states' next values allow. The pipeline stage of a delay in no loop is that of
     what it delays.
     """
-    nodes, reading = graph.nodes, _reading(turns)
+    nodes = graph.nodes
     times = [min(operation_time(graph, node, powers=True), longest) for node in nodes]
-    early: list[_Moment] = []
-    for index, node in enumerate(nodes):
-        if node.op in {Op.INPUT, Op.CONSTANT}:
-            early.append((0, 0))
-        elif index in loops:
-            early.append((reading, 0))
-        else:
-            stage, time = max(early[i] for i in node.operands)
-            took = times[index]
-            early.append((stage, time + took) if time + took <= longest else (stage + 1, took))
-    sources = {nodes[i].operands[0] for i in loops}
+    early = _earliest(graph, loops, times, longest, _reading(turns))
     depth = max(stage for stage, _ in early) + 1
-    late: list[_Moment] = [(depth - 1, longest)] * len(nodes)
-    planned = [0] * len(nodes)
-    for index in reversed(range(len(nodes))):
-        node = nodes[index]
-        if index in sources and index not in loops:
-            late[index] = min(late[index], (early[index][0], longest))
-        stage, time = late[index]
-        took = times[index]
-        start = (stage, time - took) if time >= took else (stage - 1, longest - took)
-        planned[index] = start[0]
-        if index not in loops:
-            for i in node.operands:
-                late[i] = min(late[i], start)
+    planned = _latest(graph, loops, times, longest, early, depth)
     for index, node in enumerate(nodes):
         if node.op in {Op.INPUT, Op.CONSTANT}:
             planned[index] = 0
-        elif index not in loops and _is_wire(node):  # bits are dropped as early as possible, before they take registers
+        elif index not in loops and node.op in NO_LOGIC:  # as early as possible: dropped bits take no registers
             planned[index] = planned[node.operands[0]]
-    if turns == 1:
-        # A register is used and written in the same pipeline stage, with everything between.
-        for _ in loops:
-            for i in loops:
-                planned[i] = max(planned[i], planned[nodes[i].operands[0]])
     writes = {i: max(planned[nodes[i].operands[0]], planned[i]) for i in loops}
     return TurnPlan(graph, turns, loops, tuple(planned), writes, depth)
 
 
-def _is_wire(node: Node) -> bool:
-    """Whether a node takes no logic; a DELAY in no loop is a register that holds what it delays, beside it."""
-    return node.op in NO_LOGIC
+def _earliest(graph: Graph, loops: frozenset[int], times: list[int], longest: int, reading: int) -> list[_Moment]:
+    """Return the earliest moment at which each value can be there."""
+    early: list[_Moment] = []
+    for index, node in enumerate(graph.nodes):
+        if index in loops:
+            early.append((reading, 0))
+        elif not node.operands:
+            early.append((0, 0))
+        else:
+            stage, time = max(early[i] for i in node.operands)
+            took = times[index]
+            early.append((stage, time + took) if time + took <= longest else (stage + 1, took))
+    return early
+
+
+def _latest(
+    graph: Graph, loops: frozenset[int], times: list[int], longest: int, early: list[_Moment], depth: int
+) -> list[int]:
+    """Return the latest pipeline stage in which each value can begin to be computed."""
+    nodes = graph.nodes
+    sources = {nodes[i].operands[0] for i in loops} - loops
+    late: list[_Moment] = [(depth - 1, longest)] * len(nodes)
+    planned = [0] * len(nodes)
+    for index in reversed(range(len(nodes))):
+        if index in sources:
+            late[index] = min(late[index], (early[index][0], longest))
+        (stage, time), took = late[index], times[index]
+        start = (stage, time - took) if time >= took else (stage - 1, longest - took)
+        planned[index] = start[0]
+        for i in () if index in loops else nodes[index].operands:
+            late[i] = min(late[i], start)
+    return planned

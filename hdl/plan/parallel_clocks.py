@@ -8,10 +8,11 @@ from sosmith.hdl.plan.pipeline import longest_time, pipeline_depth
 from sosmith.hdl.plan.unfolding import unfolded_stages
 from sosmith.model.dataflow.datapath import Datapath
 
-_UNIT, _BESIDE = 0.5e-9, 4.6e-9
-"""Time of a unit of `sosmith.hdl.plan.pipeline.operation_time`, and what a clock takes besides: registers, wires, and
-the first bit of a carry chain, in seconds. Both from placed cores of audio_lowpass with look-ahead over 4 and over 8
-samples, on an ECP5 of speed grade 6."""
+_UNIT, _CHAINED, _BESIDE = 0.5e-9, 0.4e-9, 3.6e-9
+"""Time of a unit of `sosmith.hdl.plan.pipeline.operation_time` in seconds, where one or two operations fill a pipeline
+stage, and where many follow each other, whose carry chains overlap; and what a clock takes besides for registers and
+wires. From placed cores on an ECP5 of speed grade 6: audio_lowpass with look-ahead over 4, 8 and 16 samples, and the
+examples and realizations in docs/cost.md."""
 
 
 def latency_cycles(datapath: Datapath, channels: int = 1, *, protect: str = "none") -> int:
@@ -43,5 +44,6 @@ def block_depths(datapath: Datapath, lanes: int, *, look_ahead: bool) -> list[in
 def clock_estimate(datapath: Datapath, lanes: int, *, look_ahead: bool) -> float:
     """Estimate the highest clock of a core for one channel on an ECP5, in Hz: by its slowest pipeline stage."""
     stages = unfolded_stages(datapath, lanes)
-    longest = period(stages) if look_ahead else max(longest_time(stage.graph) for stage in stages)
-    return 1 / (_BESIDE + _UNIT * longest)
+    if look_ahead:
+        return 1 / (_BESIDE + _UNIT * period(stages))
+    return 1 / (_BESIDE + _CHAINED * max(longest_time(stage.graph) for stage in stages))

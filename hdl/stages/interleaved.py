@@ -5,8 +5,8 @@ others follow, so that the recursion may take several clocks. `schedule` spreads
 makes these as short as it can while the same channel may still come again once every other one has had its turn. A
 memory is addressed a pipeline stage before its state is used, and written once the next value is there.
 
-As an example, the recursion of `sosmith.hdl.stages.pipelined`, ``v(n) = x(n) + x(n-1) - floor(v(n-2) / 4) + floor(v(n-1) / 2)``,
-for 3 channels, with widths in bits::
+As an example, the recursion of `sosmith.hdl.stages.pipelined`, for 3 channels, with widths in bits,
+``v(n) = x(n) + x(n-1) - floor(v(n-2) / 4) + floor(v(n-1) / 2)``::
 
     stage 0             stage 1                  stage 2                   stage 3
 

@@ -107,7 +107,8 @@ class LookAhead:
     def coefficients(self) -> dict[str, tuple[int, int]]:
         """Integer and fraction bits of every coefficient, by name."""
         taps = [tap for factor in (*self.factors, self.recursion) for tap in factor]
-        return {p.name: (p.coefficient, p.frac) for p in (*self.numerator, *taps)}
+        found = {p.name: (p.coefficient, p.frac) for p in self.numerator}
+        return found | {tap.name: (tap.coefficient, tap.frac) for tap in taps}
 
     @property
     def optional_quantizers(self) -> tuple[str, ...]:

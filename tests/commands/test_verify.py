@@ -71,14 +71,27 @@ def test_a_parallel_core(channels: int, tmp_path: Path) -> None:
     assert found["program_instructions"] is None
 
 
-@pytest.mark.parametrize("key", [{"protect": "detect"}, {"reload": True}])
-@pytest.mark.parametrize("architecture", ["folded", "parallel"])
+@pytest.mark.parametrize(
+    ("architecture", "key"),
+    [
+        *(
+            (architecture, key)
+            for architecture in ("folded", "parallel")
+            for key in ({"protect": "detect"}, {"reload": True})
+        ),
+        ("parallel", {"samples_per_clock": 2}),
+        ("parallel", {"pipeline": "look-ahead", "realization": "auto"}),
+    ],
+)
 def test_what_is_not_read_is_said(architecture: str, key: dict[str, Any], tmp_path: Path) -> None:
     spec = specified(PLAIN)
-    hardware = replace(spec.hardware, architecture=architecture, realization="df1_ef1", **key)
+    hardware = replace(spec.hardware, **{"architecture": architecture, "realization": "df1_ef1", **key})
     generate(design_core(replace(spec, hardware=hardware)), tmp_path)
     table = command.good(str(tmp_path / "plain.certificate.json"), "--files", str(tmp_path)).stdout
-    assert table.endswith("not read: the SystemVerilog, as that of a core with loadable constants or with protection\n")
+    assert table.endswith(
+        "not read: the SystemVerilog, as that of a core with loadable constants, protection, look-ahead or several "
+        "samples a clock\n"
+    )
 
 
 def test_without_anything_else_as_before(folder: Path) -> None:

@@ -39,6 +39,19 @@ def leaky() -> Datapath:
     return Datapath(name="small", inputs=(port("x", 2),), output=port("y", 3), stages=(stage,))
 
 
+def distant(turns: int) -> Datapath:
+    """Make ``y(n) = x(n) + x(n-1) - floor(y(n - turns) / 4) + floor(y(n - turns) / 2)``, limited to two bits."""
+    g = GraphBuilder()
+    x = g.input("x", *_X)
+    past = [g.delay("y1", 0, -8, 5)]
+    for k in range(2, turns + 1):
+        past.append(g.previous(past[-1], f"y{k}"))
+    early = g.subtract(g.add(x, g.previous(x, "x1")), g.floor(g.shift(past[-1], -2), 0))
+    y = g.bound(g.add(early, g.floor(g.shift(past[-1], -1), 0)), -8, 5, "y")
+    g.connect(past[0], y)
+    return _limited(g.build([y]))
+
+
 def resonator(low: int = -12, high: int = 11) -> Datapath:
     """Make ``v(n) = x(n) + x(n-1) + floor(v(n-1) / 2) - floor(v(n-2) / 4)``, limited to two bits at the output.
 
@@ -85,6 +98,34 @@ def reference(m: Module, datapath: Datapath, code: Value, take: Value, clear: Va
     for stage in datapath.stages:
         (code,) = _walk(m, stage.graph, [code], take, clear)
     return code
+
+
+def reference_of_beats(m: Module, datapath: Datapath, codes: Sequence[Value], take: Value, clear: Value) -> list[Value]:
+    """Build the same for beats of several samples, one code each: a sample finds the state that the one before left."""
+    found = list(codes)
+    for stage in datapath.stages:
+        graph, state = stage.graph, {i: Signal(shape_of(stage.graph.nodes[i])) for i in stage.graph.delays}
+        held: dict[int, Value] = dict(state)
+        for lane, code in enumerate(found):
+            wires: list[Value] = []
+            for index, node in enumerate(graph.nodes):
+                operands = [] if node.op is Op.DELAY else [wires[i] for i in node.operands]
+                value = held[index] if node.op is Op.DELAY else code
+                wires.append(Signal(shape_of(node), name=f"reference{lane}_{node.name}"))
+                m.d.comb += wires[-1].eq(_result(graph, node, operands) if operands or not _is_source(node) else value)
+            held = {i: wires[graph.nodes[i].operands[0]] for i in graph.delays}
+            (output,) = graph.outputs
+            found[lane] = wires[output]
+        for i, register in state.items():
+            with m.If(clear):
+                m.d.proof += register.eq(0)
+            with m.Elif(take):
+                m.d.proof += register.eq(held[i])
+    return found
+
+
+def _is_source(node: Node) -> bool:
+    return node.op in {Op.INPUT, Op.DELAY}
 
 
 def _walk(m: Module, graph: Graph, inputs: Sequence[Value], take: Value, clear: Value) -> list[Value]:

@@ -7,7 +7,8 @@ import pytest
 from amaranth.hdl import Assert, Assume, Const, Module, Signal, Value
 from tests.formal.prover import INDUCTION, Proof, broken, prove
 
-from sosmith.hdl import pipelined_logic, stage
+from sosmith.hdl import pipelined_logic
+from sosmith.hdl.stages import pipelined as stage
 from sosmith.model.dataflow.graph import GraphBuilder
 from sosmith.model.sections.horner import HornerStep
 

@@ -10,8 +10,9 @@ from tests.formal.prover import broken, prove
 from tests.formal.small import leaky
 from tests.formal.test_streams import StreamRules
 
-from sosmith.hdl import core, stage
+from sosmith.hdl import core
 from sosmith.hdl.plan import parallel_clocks
+from sosmith.hdl.stages import pipelined as stage
 
 Change = tuple[str, str]
 """A piece of text that is there once, and what takes its place."""

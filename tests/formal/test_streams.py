@@ -95,9 +95,13 @@ class StreamRules(Proof):
         elif hasattr(d, "s_axis_tdest"):
             self._state_order(m, (taken, given), count, d.s_axis_tdest, d.m_axis_tdest)
         elif self.datapath is not None:
-            code = d.s_axis_tdata[: self.datapath.inputs[0].bits].as_signed()
-            result = reference(m, self.datapath, code, taken, self.reset | self.cleared)
-            self._state_order(m, (taken, given), count, result, d.m_axis_tdata.as_signed())
+            self._state_order(m, (taken, given), count, *self.results(m, self.datapath, taken))
+
+    def results(self, m: Module, datapath: Datapath, taken: Value) -> tuple[Value, Value]:
+        """Return what the offered input gives, and where the output shows it."""
+        code = self.design.s_axis_tdata[: datapath.inputs[0].bits].as_signed()
+        result = reference(m, datapath, code, taken, self.reset | self.cleared)
+        return result, self.design.m_axis_tdata.as_signed()
 
     def _assume_source(self, m: Module) -> None:
         d = self.design

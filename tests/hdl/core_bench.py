@@ -11,7 +11,8 @@ from amaranth.hdl import ClockDomain, ClockSignal, Module
 from amaranth.sim import Simulator
 
 from sosmith.gen.architecture import Architecture
-from sosmith.hdl.plan.streams import fields
+from sosmith.hdl.plan.streams import fields, width
+from sosmith.model.dataflow.status import STATUS_BITS
 
 _PATIENCE = 20_000
 """Clocks without a transfer after which the core counts as hung."""
@@ -65,12 +66,14 @@ def run_core(architecture: Architecture, samples: Sequence[tuple[int, Sequence[i
     architecture : Architecture
         The core.
     samples : sequence of (int, sequence of int)
-        Channel and input codes of each sample, in the order in which they are offered.
+        Channel and input codes of each sample, in the order in which they are offered; whole beats.
     pace : Pace
         Of the handshakes.
     """
     dut: Any = architecture.component()
     ports, output = fields(architecture.datapath.inputs), architecture.datapath.output
+    lanes, size = architecture.samples_per_clock, width(architecture.datapath.inputs)
+    beats = [(samples[k][0], samples[k : k + lanes]) for k in range(0, len(samples), lanes)]
     chance = random.Random(1)
     results: list[Result] = []
 
@@ -80,10 +83,12 @@ def run_core(architecture: Architecture, samples: Sequence[tuple[int, Sequence[i
         ctx.set(dut.aresetn, 1)
         taken, waited, offers = 0, 0, False
         while len(results) < len(samples):
-            offers = taken < len(samples) and chance.random() >= (pace.withdraw if offers else pace.idle)
-            channel, codes = samples[taken] if offers else (chance.getrandbits(1), [0] * len(ports))
+            offers = taken < len(beats) and chance.random() >= (pace.withdraw if offers else pace.idle)
+            channel, beat = beats[taken] if offers else (chance.getrandbits(1), [(0, [0] * len(ports))])
             word = sum(
-                (code & ((1 << field.padded) - 1)) << field.offset for field, code in zip(ports, codes, strict=True)
+                (code & ((1 << field.padded) - 1)) << field.offset + size * lane
+                for lane, (_, codes) in enumerate(beat)
+                for field, code in zip(ports, codes, strict=True)
             )
             ctx.set(dut.s_axis_tvalid, offers)
             ctx.set(dut.s_axis_tdata, word)
@@ -94,10 +99,12 @@ def run_core(architecture: Architecture, samples: Sequence[tuple[int, Sequence[i
             if offers and ctx.get(dut.s_axis_tready):
                 taken, offers, moved = taken + 1, False, True
             if ctx.get(dut.m_axis_tvalid) and ctx.get(dut.m_axis_tready):
-                code = ctx.get(dut.m_axis_tdata) & ((1 << output.bits) - 1)
-                code -= (output.signed and code >> (output.bits - 1)) << output.bits
                 channel = ctx.get(dut.m_axis_tdest) if architecture.channels > 1 else 0
-                results.append(Result(channel, code, ctx.get(dut.m_axis_tuser)))
+                for lane in range(lanes):
+                    code = ctx.get(dut.m_axis_tdata) >> 8 * output.bytes * lane & ((1 << output.bits) - 1)
+                    code -= (output.signed and code >> (output.bits - 1)) << output.bits
+                    status = ctx.get(dut.m_axis_tuser) >> STATUS_BITS * lane & ((1 << STATUS_BITS) - 1)
+                    results.append(Result(channel, code, status))
                 moved = True
             waited = 0 if moved else waited + 1
             assert waited < _PATIENCE, f"the core hangs after {len(results)} results"

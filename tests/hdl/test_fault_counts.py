@@ -10,8 +10,8 @@ from tests.hdl.test_reload import Bench, benched, crc_of
 
 from sosmith.hdl.bus.axi_lite import SerialSlave
 from sosmith.hdl.bus.serial_crc import SerialCrc
-from sosmith.hdl.stages.interleaved import InterleavedStage
 from sosmith.hdl.reload import ReloadPort
+from sosmith.hdl.stages.interleaved import InterleavedStage
 from sosmith.model.reload.registers import CRC, DATA, FAULTS, VERSION
 
 

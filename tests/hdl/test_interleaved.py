@@ -12,10 +12,10 @@ from tests.gen.designs import example_design
 from tests.hdl.core_bench import Pace, run_core
 
 from sosmith.gen.architecture import Architecture
-from sosmith.hdl import interleaved
 from sosmith.hdl.check_bits import CheckBits, Read
-from sosmith.hdl.stages.interleaved import InterleavedStage
 from sosmith.hdl.plan.interleaving import schedule
+from sosmith.hdl.stages import interleaved
+from sosmith.hdl.stages.interleaved import InterleavedStage
 from sosmith.model.dataflow.graph import Graph, GraphBuilder, Op
 
 REALIZATIONS = ("df1_ef2", "df2t", "delta", "state_space", "normal", "lattice_wdf")

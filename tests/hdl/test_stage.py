@@ -8,7 +8,7 @@ from tests.gen.word_lengths.test_quantize import stimulus
 from tests.hdl.stage_bench import run
 
 from sosmith.gen.realizations.registry import REALIZATIONS
-from sosmith.hdl import stage as stage_module
+from sosmith.hdl.stages import pipelined as stage_module
 
 
 @pytest.mark.parametrize("realization", list(REALIZATIONS))

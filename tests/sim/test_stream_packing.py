@@ -3,6 +3,7 @@
 import re
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -35,7 +36,7 @@ class Copy:
 
     def run(self, sent: Beats, progress: Progress) -> BenchRun:
         progress(len(sent), len(sent))
-        dest, data, user = sent.tdest.copy(), sent.tdata.copy(), np.arange(len(sent)).astype(np.uint8)
+        dest, data, user = sent.tdest.copy(), sent.tdata.copy(), np.arange(len(sent)).astype(np.uint64)
         if self.damage == "channel":
             dest[5] = 1 - dest[5]
         if self.damage == "extension":
@@ -90,7 +91,37 @@ def test_a_wrong_beat_is_found(damage: str, message: str) -> None:
         cosimulate(Copy(damage), INTERFACE, codes(), seed=4)
 
 
-def test_a_stream_beyond_64_bits_is_refused() -> None:
+def test_a_sample_beyond_64_bits_is_refused() -> None:
     wide = replace(STREAM, fields=fields([port(f"x{k}", 32, signed=False) for k in range(3)]))
-    with pytest.raises(ValueError, match=re.escape("stream must be at most 64 bits wide, not 96")):
+    with pytest.raises(ValueError, match=re.escape("samples must be at most 64 bits wide, not 96")):
         pack(np.zeros((1, 1, 3), dtype=np.int64), np.array([0]), wide)
+
+
+@pytest.mark.parametrize("lanes", [2, 4, 16])
+def test_samples_of_a_beat_lie_side_by_side(lanes: int, tmp_path: Path) -> None:
+    stream = replace(STREAM, dest_width=0, lanes=lanes, flags={"fault": 6})
+    sent = codes(samples=37, channels=1)
+    order = np.zeros(len(sent), dtype=np.int64)
+    beats = pack(sent, order, stream)
+    assert len(beats) == -(-len(sent) // lanes)
+    (one,) = pack(sent[1:2], order[:1], replace(stream, lanes=1)).numbers()[:1]
+    assert beats.numbers()[0][1] >> stream.sample_width & 0xFFFF_FFFF == one[1]
+    last = beats.numbers()[-1][1]
+    assert (
+        last >> stream.sample_width * (lanes - 1)
+        == pack(sent[-1:], order[:1], replace(stream, lanes=1)).numbers()[0][1]
+    )
+    received = Beats.zeros(len(beats), stream.width, stream.user_width)
+    for index, (dest, data, _) in enumerate(beats.numbers()):
+        received.put(index, dest, data, sum((lanes * index + lane) % 256 << 8 * lane for lane in range(lanes)))
+    received.save(tmp_path / "beats")
+    found, status = unpack(Beats.load(tmp_path / "beats"), order, stream)
+    assert found.tolist() == sent.tolist()
+    assert status[:, 0].tolist() == list(range(len(sent)))
+
+
+def test_a_missing_beat_of_several_samples_is_an_error() -> None:
+    stream = replace(STREAM, dest_width=0, lanes=4)
+    beats = pack(codes(channels=1), np.zeros(20, dtype=np.int64), stream)
+    with pytest.raises(ShortfallError, match=r"^5 samples must come out, not 4$"):
+        unpack(beats.first(4), np.zeros(20, dtype=np.int64), stream)

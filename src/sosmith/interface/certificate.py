@@ -128,8 +128,8 @@ class Certificate:
             Folder with the generated files: their SHA-256 must be those in the certificate, and no byte of the
             certificate's own file may have been changed. From the SystemVerilog, the program of a folded or serial
             core, and all hardware of a parallel one, is proven to compute the certificate's graph for all inputs and
-            states; online cores, and cores with loadable constants or with protection, are not, nor is a decimator, or
-            a parallel core behind one.
+            states; online cores are not, nor cores with loadable constants, protection, look-ahead or several samples a
+            clock, nor a decimator, or a parallel core behind one.
         rebuild : bool
             Whether to generate all files again, from `spec` or the specification's text in the certificate, and compare
             them byte for byte.

@@ -62,6 +62,8 @@ def cases() -> list[dict[str, Any]]:
                 "latency_cycles": patience,
                 "reset_cycles": 0,
                 "samples_per_result": 1,
+                "tdata_bits": 64,
+                "tuser_bits": 64,
             },
         }
         for fault in FAULTS
@@ -75,7 +77,7 @@ def prepare(folder: Path) -> None:
     folder.mkdir()
     rng = np.random.default_rng(3)
     tdest, tdata = rng.integers(0, 4, SAMPLES), rng.integers(0, 2**16, SAMPLES).astype(np.uint64)
-    Beats(tdest, tdata, np.zeros(SAMPLES, np.uint8)).save(folder / "sent.npy")
+    Beats(tdest, tdata, np.zeros(SAMPLES, np.uint64)).save(folder / "sent.npy")
     (folder / "cases.json").write_text(json.dumps(cases()), encoding="utf-8")
 
 

@@ -43,7 +43,8 @@ def print_proof(certificate: Certificate, proof: Proof) -> None:
             f"{online.interval} clocks; no residual leaves its range, whatever the digits are"
         )
     if proof.files and proof.program is None and proof.hardware is None:
-        what = "an online core" if online is not None else "a core with loadable constants or with protection"
+        plain = "a core with loadable constants, protection, look-ahead or several samples a clock"
+        what = plain if online is None else "an online core"
         other = ", or in parallel behind a decimator" if certificate.decimation is not None else ""
         console.print(f"not read: the SystemVerilog, as that of {what}{other}")
     if proof.rebuilt:

@@ -1,0 +1,263 @@
+"""Look-ahead and several samples a clock: what is chosen, proven, built, and equal to the model."""
+
+import json
+import re
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from benchmarks.random_designs import random_specification
+from tests.formal.prover import broken
+from tests.gen.designs import EXAMPLES
+from tests.hdl.core_bench import Pace, run_core
+
+from sosmith.gen.core import CoreDesign, design_core, refuse_several_samples
+from sosmith.gen.output.certificate import certificate
+from sosmith.gen.output.core_facts import core_facts
+from sosmith.gen.output.manifest import manifest
+from sosmith.gen.output.pins import pins
+from sosmith.gen.realizations import look_ahead as realization
+from sosmith.gen.realizations.registry import LOOK_AHEAD, realization_of
+from sosmith.gen.realizations.section_format import SectionFormat
+from sosmith.gen.specification.specification import from_text
+from sosmith.gen.stimuli import traces_for
+from sosmith.gen.verifier import verification
+from sosmith.gen.verifier.certificate_file import Certificate, certificate_text
+from sosmith.gen.verifier.verification import verify
+from sosmith.model.errors import ShortfallError, SpecificationError
+from sosmith.model.reference.golden import calibrated, filtered
+
+DESIGNS = 40
+SAMPLES = 240
+AUDIO = (EXAMPLES / "audio_lowpass.toml").read_text(encoding="utf-8")
+
+
+def text(lanes: int = 1, *, pipeline: str = "look-ahead", clock: str = "48.0e6", base: str = AUDIO) -> str:
+    """Return a specification for several samples a clock and a pipeline."""
+    made = base.replace('architecture = "auto"', f'pipeline = "{pipeline}"\nsamples_per_clock = {lanes}')
+    assert made != base
+    return made.replace("clock = 48.0e6", f"clock = {clock}")
+
+
+@cache
+def designed(lanes: int = 1, *, pipeline: str = "look-ahead", clock: str = "48.0e6") -> CoreDesign:
+    return design_core(from_text(text(lanes, pipeline=pipeline, clock=clock), Path("audio.toml")))
+
+
+@pytest.mark.parametrize("number", [1, 2, 3, 4])
+def test_poles_of_a_section_with_look_ahead_are_powers_of_its_own(number: int) -> None:
+    row = [1.0, 2.0, 1.0, 1.0, -1.75, 0.8125]
+    *factors, (letter, last) = realization.polynomials(row, number)
+    distance = 2**number
+    assert [len(name) for name, _ in factors] == [1] * number
+    assert (letter, list(last)) == ("A", [distance, 2 * distance])
+    found = np.roots([1.0, float(last[distance]), float(last[2 * distance])])
+    wanted = np.roots(row[3:]) ** distance
+    np.testing.assert_allclose(sorted(found, key=np.imag), sorted(wanted, key=np.imag), rtol=1e-9)
+
+
+@pytest.mark.parametrize("distance", LOOK_AHEAD)
+def test_a_section_with_look_ahead_has_the_response_of_its_row(distance: int) -> None:
+    row = [0.25, 0.5, 0.25, 1.0, -1.5, 0.625]
+    section = realization_of(f"look_ahead_{distance}").build(row, SectionFormat(coefficient_bits=60), "section")
+    fine = dict.fromkeys(("v", *(f"u{k}" for k in range(distance.bit_length()))), 60)
+    form = SectionFormat(coefficient_bits=60, fracs=fine)
+    section = realization_of(f"look_ahead_{distance}").build(row, form, "section")
+    impulse = [[1 if n == 0 else 0] for n in range(40)]
+    (output,) = section.graph.output_ranges
+    found = np.array(section.graph.run(impulse))[:, 0] * 2.0**-output.frac
+    state, wanted = [0.0, 0.0], []
+    for n in range(40):
+        x = float(n == 0)
+        y = row[0] * x + state[0]
+        state = [row[1] * x - row[4] * y + state[1], row[2] * x - row[5] * y]
+        wanted.append(y)
+    np.testing.assert_allclose(found, wanted, atol=1e-14)
+
+
+def test_an_unstable_section_is_refused() -> None:
+    build = realization_of("look_ahead_2").build
+    message = r"section0 must be stable with coefficients of 12 bits: poles must lie inside the unit circle, not at .*"
+    with pytest.raises(ShortfallError, match=f"^{message}$"):
+        build([1.0, 0.0, 0.0, 1.0, -2.0, 1.0], SectionFormat(coefficient_bits=12), "section0")
+    with pytest.raises(ShortfallError, match=r"^numerator of section0 must not be zero$"):
+        build([0.0, 0.0, 0.0, 1.0, -0.5, 0.0], SectionFormat(coefficient_bits=12), "section0")
+
+
+@pytest.mark.parametrize(("clock", "distance"), [("48.0e6", 4), ("150.0e6", 8), ("400.0e6", 8)])
+def test_the_shortest_look_ahead_that_reaches_the_clock_is_chosen(clock: str, distance: int) -> None:
+    made = designed(clock=clock)
+    assert made.quantized.realization == f"look_ahead_{distance}"
+    reached = made.architecture.clock_estimate >= made.spec.hardware.clock
+    assert reached == (clock != "400.0e6")
+    verb = "reaches" if reached else "comes closest to"
+    assert f"look_ahead_{distance}: the shortest look-ahead that {verb} a clock of" in made.reasons["realization"]
+    assert re.fullmatch(
+        r"parallel: the smallest that keeps up; its \d+ products by constants made of adders, with registers between "
+        r"them",
+        made.reasons["architecture"],
+    )
+    assert made.architecture.cost.multiplications == ()
+
+
+@pytest.mark.parametrize(
+    ("clock", "rate", "chosen"), [("100e6", "90e6", True), ("100e6", "40e6", False), ("50e6", "50e6", False)]
+)
+def test_auto_looks_ahead_where_clock_and_rate_ask_for_it(clock: str, rate: str, chosen: bool) -> None:
+    fast = AUDIO.replace("sample_rate = 48000.0", f"sample_rate = {rate}").replace("clock = 48.0e6", f"clock = {clock}")
+    fast = fast.replace("cutoff = 1000.0", f"cutoff = {float(rate) / 48:.1f}")
+    made = design_core(from_text(fast.replace('architecture = "auto"', 'architecture = "parallel"'), Path("fast.toml")))
+    assert made.quantized.realization.startswith("look_ahead_") == made.architecture.look_ahead == chosen
+
+
+def test_a_realization_cannot_be_asked_for_with_look_ahead() -> None:
+    spec = from_text(text(), Path("audio.toml"))
+    message = 'the realization must be auto with hardware.pipeline = "look-ahead", not df1'
+    with pytest.raises(SpecificationError, match=f"^{re.escape(message)}$"):
+        design_core(spec, realization="df1")
+    with pytest.raises(SpecificationError, match=f"^{re.escape(message)}$"):
+        design_core(spec, widths_of="df1")
+
+
+def test_more_samples_a_clock_than_look_ahead_has_are_refused() -> None:
+    message = "hardware.samples_per_clock must be at most 8 with look-ahead, not 16"
+    with pytest.raises(ShortfallError, match=f"^{re.escape(message)}$"):
+        designed(16)
+
+
+def test_a_rate_beyond_the_samples_a_clock_is_refused() -> None:
+    slow = text(2, pipeline="plain").replace("sample_rate = 48000.0", "sample_rate = 97e6").replace("1000.0", "2e6")
+    message = (
+        "slow.toml: hardware.clock must be at least the sample_rate (97000000 Hz) divided by "
+        "hardware.samples_per_clock = 2, not 48000000"
+    )
+    with pytest.raises(SpecificationError, match=f"^{re.escape(message)}$"):
+        from_text(slow, Path("slow.toml"))
+
+
+def test_several_samples_are_refused_where_there_is_one() -> None:
+    message = "audio.toml: not yet available: hardware.samples_per_clock must be 1 on a board, not 2"
+    with pytest.raises(SpecificationError, match=f"^{re.escape(message)}$"):
+        refuse_several_samples(designed(2, pipeline="plain"), "on a board")
+    refuse_several_samples(designed(), "on a board")
+
+
+def test_manifest_and_pins_tell_how_samples_lie_in_a_beat() -> None:
+    made = designed(2, pipeline="plain")
+    facts = core_facts(made)
+    streams = manifest(facts)["streams"]
+    assert (streams["s_axis"]["width"], streams["s_axis"]["samples"], streams["s_axis"]["sample_width"]) == (32, 2, 16)
+    assert streams["m_axis"]["tuser"]["width"] == 16
+    named = {pin.name: pin for pin in pins(made, facts.interface)}
+    assert (named["s_axis_tdata"].width, named["m_axis_tdata"].width, named["m_axis_tuser"].width) == (32, 32, 16)
+    assert named["s_axis_tdata"].meaning.startswith("2 samples of 16 bits, the first one lowest, each with the bits; ")
+    assert "pipeline" not in manifest(facts)
+    plain = manifest(core_facts(designed()))
+    assert plain["pipeline"] == "look-ahead"
+    assert "samples" not in plain["streams"]["s_axis"]
+
+
+def codes_of(made: CoreDesign, count: int) -> np.ndarray:
+    """Return codes that jump between the rails, rest at one of them, and wander."""
+    rng = np.random.default_rng(5)
+    (port,) = made.datapath.inputs
+    codes = rng.integers(port.lowest, port.highest, (count, 1), endpoint=True)
+    codes[: count // 4] = port.highest
+    codes[count // 4 : count // 2 : 3] = port.lowest
+    return codes
+
+
+@pytest.mark.parametrize("pace", [Pace(), Pace(idle=0.0, stall=0.0), Pace(idle=0.6, stall=0.6, withdraw=0.3)])
+@pytest.mark.parametrize(
+    ("lanes", "pipeline", "clock"),
+    [(1, "look-ahead", "48.0e6"), (1, "look-ahead", "150.0e6"), (2, "plain", "48.0e6"), (2, "look-ahead", "100.0e6")],
+)
+def test_a_core_gives_the_codes_and_flags_of_the_model(lanes: int, pipeline: str, clock: str, pace: Pace) -> None:
+    made = designed(lanes, pipeline=pipeline, clock=clock)
+    codes = codes_of(made, SAMPLES)
+    found = run_core(made.architecture, [(0, row) for row in codes.tolist()], pace)
+    assert [beat.code for beat in found] == made.datapath.compute_exact(codes)
+    assert [beat.status for beat in found] == made.datapath.compute_status(codes).tolist()
+    assert {beat.status & 1 for beat in found} == {0, 1}
+
+
+@pytest.mark.parametrize("lanes", [2, 4])
+def test_an_instrument_takes_several_samples_a_clock(lanes: int) -> None:
+    bench = (EXAMPLES / "flange_wear_bench.toml").read_text(encoding="utf-8")
+    wide = re.sub(r"\[hardware\]", f"[hardware]\nsamples_per_clock = {lanes}", bench)
+    made = design_core(from_text(re.sub(r"reload = true", "reload = false", wide), EXAMPLES / "wide.toml"))
+    assert made.architecture.name == "parallel"
+    (trace,) = traces_for(made, "worst_case", seed=1)
+    codes = trace.codes[: 50 * lanes]
+    found = run_core(made.architecture, [(0, row) for row in codes.tolist()], Pace())
+    assert [beat.code for beat in found] == made.datapath.compute_exact(codes)
+    assert [beat.status for beat in found] == made.datapath.compute_status(codes).tolist()
+
+
+def proven(made: CoreDesign) -> Certificate:
+    return Certificate.model_validate(json.loads(certificate_text(certificate(made.quantized, made.spec.max_error))))
+
+
+def test_the_verifier_proves_look_ahead_by_its_own_method() -> None:
+    proof = proven(designed())
+    verify(proof)
+    changed = json.loads(certificate_text(certificate(designed().quantized, designed().spec.max_error)))
+    changed["claims"]["budget"]["filter coefficients"] = "1/100000"
+    with pytest.raises(ShortfallError):
+        verify(Certificate.model_validate(changed))
+
+
+def test_responses_that_take_turns_have_the_norm_of_all_of_them() -> None:
+    poly = verification.fmpq_poly
+    scattered = poly([1, 0, 0, 0, verification.fmpq(1, 2)])
+    plain = poly([1, verification.fmpq(1, 2)])
+    numerator = poly([1, 2, 3, 0, 5])
+    turns = verification._Denominator(scattered).norm(numerator)
+    apart = sum(verification._Denominator(plain).norm(part) for part in (poly([1, 5]), poly([2]), poly([3])))
+    assert turns == apart
+    factor, made = verification._scattered(poly([1, -1, verification.fmpq(1, 4)]), 8)
+    assert {k for k, value in enumerate(made.coeffs()) if value} == {0, 8, 16}
+    assert made == factor * poly([1, -1, verification.fmpq(1, 4)])
+
+
+def test_a_wrong_recursion_exceeds_its_bound(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With A(w) in place of A(-w), it is another filter, which no word lengths bring within the error allowed."""
+    wrong = broken(realization, "{1 << k: -first, 2 << k: second}", "{1 << k: first, 2 << k: second}")
+    monkeypatch.setattr(realization, "polynomials", wrong.polynomials)
+    with pytest.raises(ShortfallError, match=r"^the filter's coefficients must keep their error below "):
+        design_core(from_text(text(), Path("audio.toml")))
+
+
+def random_design(number: int, lanes: int, pipeline: str) -> CoreDesign:
+    """Design the first specification that can be met of every `DESIGNS`th seed."""
+    for seed in range(2000 + number, 20_000, DESIGNS):
+        base = random_specification(seed)[1]
+        hardware = f'pipeline = "{pipeline}"\nsamples_per_clock = {lanes}\n'
+        made = base.replace('architecture = "auto"', 'architecture = "parallel"') + hardware
+        try:
+            return design_core(from_text(made, Path("random.toml")))
+        except ShortfallError:
+            continue
+    raise AssertionError
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", range(DESIGNS))
+@pytest.mark.parametrize("pipeline", ["plain", "look-ahead"])
+def test_a_random_design_is_proven_and_equal_to_the_model(pipeline: str, number: int) -> None:
+    lanes = (2, 4, 8, 16)[number % 4] if pipeline == "plain" else (1, 2, 1, 4)[number % 4]
+    made = random_design(number, lanes, pipeline)
+    core, quantized, output = made.architecture, made.quantized, made.datapath.output
+    assert (core.samples_per_clock, core.look_ahead) == (lanes, pipeline == "look-ahead")
+    verify(proven(made))
+    (trace,) = traces_for(made, "worst_case_errors", seed=number)
+    codes = trace.codes[-len(trace.codes[: 20 * 16]) // lanes * lanes :]
+    wanted = made.datapath.compute_exact(codes)
+    found = [beat.code for beat in run_core(core, [(0, row) for row in codes.tolist()], Pace())]
+    assert found == wanted
+    assert quantized.filter is not None
+    ideal, exact = np.array(quantized.filter.sos), calibrated(codes, made.datapath.inputs, None)
+    golden = filtered(exact, ideal, output, steady=quantized.steady)
+    error = np.abs(output.decode(np.array(found)) - golden).max() / float(output.lsb)
+    assert error <= float(quantized.bound) + 1e-6

@@ -1,0 +1,108 @@
+"""Graphs made for hardware compute what the graphs do that they are made of: unfolded, reassociated, with sums."""
+
+import random
+
+import pytest
+from tests.gen.designs import parallel_design
+
+from sosmith.hdl.plan.constant_products import with_sums
+from sosmith.hdl.plan.look_ahead import period, plans
+from sosmith.hdl.plan.reassociation import reassociated
+from sosmith.hdl.plan.unfolding import unfolded
+from sosmith.model.dataflow.datapath import Stage
+from sosmith.model.dataflow.graph import Graph, GraphBuilder, Op
+from sosmith.model.sections.horner import HornerStep
+
+SAMPLES = 48
+
+
+def random_graph(seed: int) -> Graph:
+    """Make a recursion with products by constants, gates, delays and roundings; nothing in it overflows."""
+    rng = random.Random(seed)
+    g = GraphBuilder()
+    wires = [g.input("x", 2, -128, 127), g.input("z", 0, -5, 9)]
+    newest = past = g.delay("v1", 2, -4000, 4000)
+    for _ in range(rng.randint(1, 3)):
+        past = g.previous(past, "older")
+    wires.append(past)
+    for number in range(rng.randint(3, 8)):
+        a, b = rng.choice(wires), rng.choice(wires)
+        made = [
+            g.scale(a, rng.choice([-717, -75, -8, -1, 3, 20, 150, 4813]), rng.randint(0, 9)),
+            g.add(a, b),
+            g.subtract(a, g.subtract(b, past)),
+            g.previous(g.add(a, b), f"held{number}"),
+            g.multiply(a, g.constant(1, 0)),
+        ][rng.randrange(5)]
+        wires.append(g.floor(made, 2) if g[made].width > 24 else made)
+    total = g.clamp(g.floor(g.add(wires[-1], g.floor(g.shift(past, -1), 2)), 2), -4000, 4000, "v")
+    g.connect(newest, total)
+    return g.build([total, wires[-2]])
+
+
+def samples(graph: Graph, seed: int) -> list[list[int]]:
+    rng = random.Random(seed)
+    return [[rng.randint(low, high) for _, low, high in graph.input_ranges] for _ in range(SAMPLES)]
+
+
+@pytest.mark.parametrize("seed", range(25))
+def test_rewritten_graphs_give_the_same_codes(seed: int) -> None:
+    graph = random_graph(seed)
+    rows = samples(graph, seed)
+    wanted = graph.run(rows)
+    assert reassociated(graph).run(rows) == wanted
+    sums = with_sums(graph)
+    assert sums.run(rows) == wanted
+    scales = [node.parameter for node in sums.nodes if node.op is Op.SCALE]
+    assert all(value > 0 and value & (value - 1) == 0 for value in scales)
+
+
+@pytest.mark.parametrize("lanes", [2, 3, 4, 8, 16])
+@pytest.mark.parametrize("seed", range(6))
+def test_unfolded_graphs_give_the_same_codes(seed: int, lanes: int) -> None:
+    graph = random_graph(seed)
+    rows = samples(graph, seed)
+    beats = [[code for row in rows[k : k + lanes] for code in row] for k in range(0, SAMPLES, lanes)]
+    found = [code for beat in unfolded(graph, lanes).run(beats) for code in beat]
+    assert found == [code for row in graph.run(rows) for code in row]
+
+
+def test_a_start_takes_one_addition_however_many_samples_a_beat_holds() -> None:
+    start = parallel_design("audio_lowpass.toml").datapath.stages[0]
+    assert start.name == "start"
+    for lanes in (1, 2, 8):
+        graph = reassociated(unfolded(start.graph, lanes))
+        (plan,) = plans([HornerStep("start", graph)])
+        assert plan.distance == plan.turns == 1
+        assert period([HornerStep("start", graph)]) == 5
+
+
+def distant(turns: int, additions: int) -> Stage:
+    """Make a loop that goes back `turns` samples, with so many additions one after the other."""
+    g = GraphBuilder()
+    x = g.input("x", 0, 0, 1)
+    delays = [g.delay("y1", 0, -100, 100)]
+    for k in range(2, turns + 1):
+        delays.append(g.previous(delays[-1], f"y{k}"))
+    wire = delays[-1]
+    for _ in range(additions):
+        wire = g.add(wire, x)
+    y = g.clamp(wire, -100, 100)
+    g.connect(delays[0], y)
+    return HornerStep("loop", g.build([y]))
+
+
+@pytest.mark.parametrize(("turns", "additions", "wanted"), [(4, 2, 5), (4, 5, 10), (8, 5, 5), (2, 3, 20), (3, 3, 10)])
+def test_pipeline_stages_are_as_short_as_the_turns_allow(turns: int, additions: int, wanted: int) -> None:
+    """A loop of n operations, the limiter included, has turns - 1 pipeline stages: one clock goes to its memory."""
+    stage = distant(turns, additions)
+    (plan,) = plans([stage])
+    assert (plan.turns, period([stage])) == (turns, wanted)
+    assert plan.distance <= turns
+    assert sum(node.op is Op.DELAY for node in plan.graph.nodes) == 1
+
+
+def test_all_stages_take_the_time_of_the_slowest_loop() -> None:
+    slow, fast = distant(4, 5), distant(8, 5)
+    assert [plan.depth for plan in plans([slow, fast])] == [plans([slow])[0].depth, 4]
+    assert period([slow, fast]) == period([slow]) == 10
