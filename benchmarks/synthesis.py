@@ -23,7 +23,13 @@ _UTILIZATION = re.compile(r"^Info:\s+(\w+):\s+(\d+)/\s*(\d+)\s+\d+%$", re.MULTIL
 _ERROR = re.compile(r"^ERROR: (.*)$", re.MULTILINE)
 
 
-_BOARDS = {"up5k": "icebreaker", "hx8k": "ice40_hx8k_b_evn", "hx1k": "icestick", "ecp5": "ulx3s_25f"}
+_BOARDS = {
+    "up5k": "icebreaker",
+    "hx8k": "ice40_hx8k_b_evn",
+    "hx1k": "icestick",
+    "ecp5": "ulx3s_25f",
+    "ecp5_85": "ulx3s_85f",
+}
 
 TARGETS = {name: find_board(board) for name, board in _BOARDS.items()}
 """Boards whose FPGA, package and speed grade are measured, by their names in the record."""

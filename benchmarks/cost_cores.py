@@ -1,0 +1,241 @@
+"""The designs whose cost is measured, and their targets; what is recorded of them in benchmarks/cost.json."""
+
+from __future__ import annotations
+
+import statistics
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from benchmarks.synthesis import TARGETS, title
+
+from sosmith.gen.architecture import Architecture, blocks_for, objective_of
+from sosmith.gen.core import CoreDesign, design_core
+from sosmith.gen.specification.specification import from_text, load
+from sosmith.gen.word_lengths.objective import Objective
+from sosmith.model.dataflow.protection import PROTECTIONS
+
+ROOT = Path(__file__).resolve().parent.parent
+RECORD = ROOT / "benchmarks" / "cost.json"
+EXAMPLES = {"audio_lowpass": "filter", "flange_wear_bench": "instrument", "flange_wear_locomotive": "instrument"}
+ARCHITECTURES = ("parallel", "folded", "serial")
+CHANNELS = (1, 12, 64)
+SEEDS = (1, 2, 3, 4, 5)
+GROWTH = 1.05
+"""Largest allowed ratio of a figure to the recorded one."""
+
+_ORDINARY = ("up5k", "hx8k", "hx1k", "ecp5")
+"""Targets on which cores of every architecture are measured."""
+
+_SMALLEST = "hx1k"
+"""Target on which only the serial architecture is measured."""
+Figures = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Core:
+    """One of the designs.
+
+    Attributes
+    ----------
+    example : str
+        Name of its specification.
+    architecture : str
+        One of `ARCHITECTURES`, or "online".
+    channels : int
+        Number of channels.
+    protect : str
+        One of `sosmith.model.dataflow.protection.PROTECTIONS`.
+    bits : int
+        Bits of input and output; 0 for those of the example.
+    realization : str
+        Structure of the filter sections; empty for the one that is chosen.
+    lanes : int
+        Samples a clock.
+    clock : int
+        Clock in MHz that it looks ahead for; 0 without look-ahead.
+    """
+
+    example: str
+    architecture: str
+    channels: int = 1
+    protect: str = "none"
+    bits: int = 0
+    realization: str = ""
+    lanes: int = 1
+    clock: int = 0
+
+    @property
+    def key(self) -> str:
+        """Key in the record."""
+        guarded = "" if self.protect == "none" else f" {self.protect}"
+        wide = f" {self.bits} bits" if self.bits else ""
+        chosen = f" {self.realization}" if self.realization else ""
+        several = f" {self.lanes} a clock" if self.lanes > 1 else ""
+        ahead = f" look-ahead {self.clock} MHz" if self.clock else ""
+        return f"{self.example} {self.architecture} {self.channels}{guarded}{wide}{chosen}{several}{ahead}"
+
+    @property
+    def label(self) -> str:
+        """Name in tables and messages."""
+        several = f", {self.channels} channels" if self.channels > 1 else ""
+        guarded = "" if self.protect == "none" else f", protect = {self.protect}"
+        wide = f", {self.bits} bits" if self.bits else ""
+        chosen = f", {self.realization}" if self.realization else ""
+        lanes = f", {self.lanes} samples a clock" if self.lanes > 1 else ""
+        ahead = f", look-ahead for {self.clock} MHz" if self.clock else ""
+        return f"{self.example} {self.architecture}{several}{guarded}{wide}{chosen}{lanes}{ahead}"
+
+    @property
+    def targets(self) -> list[str]:
+        """Targets on which it is measured."""
+        if self.lanes > 2:
+            return ["ecp5_85"]
+        if self.realization or self.lanes > 1 or self.clock:
+            return ["ecp5"]
+        if self.bits or self.architecture == "online":
+            return ["hx8k", "ecp5"]
+        wanted = [key for key in _ORDINARY if key != _SMALLEST or self.architecture == "serial"]
+        if self.protect == "none":
+            return wanted
+        return [key for key in wanted if key == "ecp5" or (key == "up5k" and self.architecture != "parallel")]
+
+    @property
+    def extra_channels(self) -> tuple[int, ...]:
+        """Numbers of channels in addition to `CHANNELS`."""
+        return (8,) if (self.example, self.architecture) == ("audio_lowpass", "parallel") else ()
+
+
+PROTECTED = tuple(
+    Core(example, architecture, channels, protect)
+    for example, architecture, channels in (
+        ("audio_lowpass", "folded", 1),
+        ("flange_wear_locomotive", "serial", 1),
+        ("audio_lowpass", "parallel", 1),
+        ("audio_lowpass", "parallel", 12),
+    )
+    for protect in PROTECTIONS[1:]
+    if (channels, protect) != (1, "correct") or architecture != "parallel"  # registers have parity in both
+)
+"""Cores whose memories and states are protected."""
+ONLINE = (
+    Core("audio_lowpass", "online"),
+    *(Core("audio_lowpass", architecture, bits=24) for architecture in (*ARCHITECTURES, "online")),
+)
+"""Sections in on-line arithmetic, and what they are compared with for longer words."""
+REALIZED = tuple(
+    Core("audio_lowpass", "parallel", realization=name) for name in ("df1", "df2t", "df1_ef2", "state_space")
+)
+"""The state space beside direct sections, as Hourani compared them."""
+FAST = (
+    *(Core("audio_lowpass", "parallel", lanes=lanes) for lanes in (2, 4)),
+    *(Core("audio_lowpass", "parallel", clock=clock) for clock in (100, 120)),
+    *(Core("audio_lowpass", "parallel", lanes=lanes, clock=100) for lanes in (2, 4)),
+)
+"""More than a plain loop gives: several samples a clock, and look-ahead."""
+
+OF_THEIR_OWN = frozenset({*PROTECTED, *ONLINE, *REALIZED, *FAST})
+"""Cores that have tables of their own."""
+
+CORES = (
+    *(
+        replace(core, channels=channels)
+        for core in (Core(example, architecture) for example in EXAMPLES for architecture in ARCHITECTURES)
+        for channels in sorted({*CHANNELS, *core.extra_channels})
+    ),
+    *PROTECTED,
+    *ONLINE,
+    *REALIZED,
+    *FAST,
+)
+Job = tuple[Core, str]
+"""A core and its target."""
+
+
+def objective_on(architecture: str, key: str) -> Objective:
+    """Return what a core is designed for on a target: digits as wide as its multipliers take, adders without any."""
+    target = TARGETS[key]
+    return objective_of(architecture, target, adders=not target.device.multipliers)
+
+
+@cache
+def design(core: Core, objective: Objective) -> CoreDesign:
+    """Design a core for one channel and without protection; the datapath is the same for more and with it."""
+    example, architecture, bits = core.example, core.architecture, core.bits
+    path = ROOT / "examples" / f"{example}.toml"
+    spec = load(path)
+    if bits:
+        spec = from_text(spec.text.replace("bits = 16", f"bits = {bits}"), path)
+    hardware = replace(spec.hardware, architecture=architecture, samples_per_clock=core.lanes, pipeline="plain")
+    if core.clock:
+        hardware = replace(hardware, pipeline="look-ahead", clock=Fraction(core.clock * 10**6))
+    wanted = replace(spec, hardware=hardware)
+    first = next(target for key, target in TARGETS.items() if objective_on(architecture, key) == objective)
+    return design_core(wanted, core=EXAMPLES[example], realization=core.realization or None, board=first)
+
+
+def design_on(core: Core, key: str) -> CoreDesign:
+    """Return the design of a core, for one channel, as it is made for a target."""
+    objective = objective_on(core.architecture, key)
+    return design(replace(core, channels=1, protect="none"), objective)
+
+
+def architecture_on(core: Core, key: str) -> Architecture:
+    """Return the architecture of a core as it is designed for a target."""
+    made = design_on(core, key).architecture
+    return replace(made, channels=core.channels, protect=core.protect, blocks=blocks_for(None, TARGETS[key]))
+
+
+def realization_on(core: Core, key: str) -> str:
+    """Return the realization of a core on a target."""
+    return design_on(core, key).quantized.realization
+
+
+def targets_in(record: Figures, core: Core) -> dict[str, Figures]:
+    """Return the figures recorded for a core, by target."""
+    found: dict[str, Figures] = record["cores"].get(core.key, {"targets": {}})["targets"]
+    return found
+
+
+def missing(record: Figures) -> list[str]:
+    """List the cores without recorded figures, and their targets."""
+    return _listed(lambda core, key: key not in targets_in(record, core))
+
+
+def outdated(record: Figures) -> list[str]:
+    """List the cores whose recorded figures are those of an earlier version, and their targets."""
+    return _listed(lambda core, key: targets_in(record, core).get(key, {}).get("earlier", False))
+
+
+def _listed(asked: Callable[[Core, str], bool]) -> list[str]:
+    left = {core: [title(TARGETS[key]) for key in core.targets if asked(core, key)] for core in CORES}
+    return [f"{core.label} on {'; '.join(titles)}" for core, titles in left.items() if titles]
+
+
+def fmax(figures: Figures) -> float:
+    """Return the median over the seeds in MHz; 0 if the core cannot be placed."""
+    return statistics.median(figures["fmax"]) if figures["fmax"] else 0.0
+
+
+def recorded(record: Figures, keys: Iterable[str]) -> Iterable[tuple[Core, str, Figures]]:
+    """Return all figures of some targets, each with its core and target; not those that have tables of their own."""
+    return [
+        (core, key, targets_in(record, core)[key])
+        for core in CORES
+        for key in keys
+        if core not in OF_THEIR_OWN and key in targets_in(record, core)
+    ]
+
+
+def rate(core: Core, figures: Figures) -> float:
+    """Return the samples per second at the median of fmax."""
+    return 1e6 * fmax(figures) * core.lanes / figures["cycles"]
+
+
+def logic_of(key: str, figures: Figures) -> int:
+    """Return the logic cells of an iCE40, or all LUT4 of an ECP5."""
+    found: int = figures["area"]["all_luts"] if key.startswith("ecp5") else figures["cells"]
+    return found

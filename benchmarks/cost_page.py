@@ -1,0 +1,372 @@
+"""The document of costs, docs/cost.md, with its plot: made from the recorded figures only."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import replace
+
+import matplotlib
+from benchmarks.cost_cores import (
+    ARCHITECTURES,
+    CHANNELS,
+    EXAMPLES,
+    FAST,
+    GROWTH,
+    ONLINE,
+    PROTECTED,
+    REALIZED,
+    Core,
+    Figures,
+    fmax,
+    logic_of,
+    missing,
+    outdated,
+    rate,
+    recorded,
+    targets_in,
+)
+from benchmarks.cost_goals import (
+    AUDIO,
+    EIGHT,
+    goal_table,
+    tries,
+)
+from benchmarks.peers import PEERS
+from benchmarks.synthesis import GOAL, TARGETS, title
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
+
+from sosmith.gen.picture import settled
+
+
+def protection_table(record: Figures) -> str:
+    """Return a Markdown table of the protected cores beside the plain ones."""
+    lines = [
+        "| core | `protect` | target | LC, or all LUT4 | FF | RAM | fmax, MHz | logic, more | fmax, more |",
+        "|---" * 9 + "|",
+    ]
+    for bare in dict.fromkeys(replace(core, protect="none") for core in PROTECTED):
+        for key in replace(bare, protect="detect").targets:
+            base = targets_in(record, bare).get(key)
+            for core in (bare, *(core for core in PROTECTED if replace(core, protect="none") == bare)):
+                figures = targets_in(record, core).get(key)
+                if base is None or figures is None or figures["cells"] is None:
+                    continue
+                area, logic, least = figures["area"], logic_of(key, figures), logic_of(key, base)
+                more = "" if core == bare else f"{100 * (logic / least - 1):+.0f} %"
+                slower = "" if core == bare else f"{100 * (fmax(figures) / fmax(base) - 1):+.0f} %"
+                lines.append(
+                    f"| {bare.label} | {core.protect} | {title(TARGETS[key])} | {logic:,} | {area['flip_flops']:,} "
+                    f"| {area['rams']} | {fmax(figures):.1f} | {more} | {slower} |"
+                )
+    return "\n".join(lines)
+
+
+def realized_table(record: Figures) -> str:
+    """Return a Markdown table of the state space beside direct sections."""
+    columns = (
+        *("realization", "multipliers", "LUT4 alone", "all LUT4", "FF", "fmax, MHz (lowest to highest)"),
+        *("clocks per sample", "samples per second"),
+    )
+    lines = [f"| {' | '.join(columns)} |", "|---" * len(columns) + "|"]
+    for core in REALIZED:
+        for figures in targets_in(record, core).values():
+            area = figures["area"]
+            row = [
+                core.realization,
+                str(area["multipliers"]),
+                f"{area['luts']:,}",
+                f"{area['all_luts']:,}",
+                f"{area['flip_flops']:,}",
+                f"{fmax(figures):.1f} ({min(figures['fmax']):.1f} to {max(figures['fmax']):.1f})",
+                str(figures["cycles"]),
+                f"{1e6 * fmax(figures) / figures['cycles']:,.0f}",
+            ]
+            lines.append(f"| {' | '.join(row)} |")
+    speed = {core.realization: fmax(targets_in(record, core)["ecp5"]) for core in REALIZED}
+    beside = [
+        f"{speed['state_space'] / speed[name]:.2f} times that of {name}" for name in speed if name != "state_space"
+    ]
+    return "\n".join(lines) + f"\n\nThe rate of state_space is {', '.join(beside)}."
+
+
+def fast_table(record: Figures) -> str:
+    """Return a Markdown table of the cores with look-ahead, and with several samples a clock, beside the plain one."""
+    columns = (
+        *("samples a clock", "pipeline", "realization", "target", "multipliers", "LUT4 alone", "all LUT4", "FF"),
+        *("seeds", "fmax, MHz (lowest to highest)", "samples per second"),
+    )
+    lines = [f"| {' | '.join(columns)} |", "|---" * len(columns) + "|"]
+    for core in (AUDIO["parallel"], *FAST):
+        for key, figures in targets_in(record, core).items():
+            if not key.startswith("ecp5") or figures["refusal"]:
+                continue
+            area = figures["area"]
+            row = [
+                str(core.lanes),
+                f"look-ahead for {core.clock} MHz" if core.clock else "plain",
+                figures["realization"],
+                title(TARGETS[key]),
+                str(area["multipliers"]),
+                f"{area['luts']:,}",
+                f"{area['all_luts']:,}",
+                f"{area['flip_flops']:,}",
+                str(len(figures["fmax"])),
+                f"{fmax(figures):.1f} ({min(figures['fmax']):.1f} to {max(figures['fmax']):.1f})",
+                f"{rate(core, figures):,.0f}",
+            ]
+            lines.append(f"| {' | '.join(row)} |")
+    return "\n".join(lines)
+
+
+def online_table(record: Figures) -> str:
+    """Return a Markdown table of the cores in on-line arithmetic beside those in the other architectures."""
+    columns = (
+        *("bits", "architecture", "target", "LC, or TRELLIS_COMB", "FF", "multipliers", "seeds"),
+        *("fmax, MHz (lowest to highest)", "clocks per sample", "samples per second"),
+        "logic for a million samples per second",
+    )
+    lines = [f"| {' | '.join(columns)} |", "|---" * len(columns) + "|"]
+    for bits in (0, 24):
+        for key in ONLINE[0].targets:
+            for architecture in (*ARCHITECTURES, "online"):
+                core = Core("audio_lowpass", architecture, bits=bits)
+                figures = targets_in(record, core).get(key)
+                if figures is None or figures["refusal"]:
+                    continue
+                area, speed = figures["area"], rate(core, figures)
+                row = [
+                    str(bits or 16),
+                    architecture,
+                    title(TARGETS[key]),
+                    f"{figures['cells']:,}",
+                    f"{area['flip_flops']:,}",
+                    str(area["multipliers"]),
+                    str(len(figures["fmax"])),
+                    f"{fmax(figures):.1f} ({min(figures['fmax']):.1f} to {max(figures['fmax']):.1f})",
+                    f"{figures['cycles']:,}",
+                    f"{speed:,.0f}",
+                    f"{1e6 * figures['cells'] / speed:,.0f}",
+                ]
+                lines.append(f"| {' | '.join(row)} |")
+    return "\n".join(lines)
+
+
+def table(record: Figures, keys: tuple[str, ...]) -> str:
+    """Return a Markdown table of all cores on some targets of one family."""
+    ecp5 = keys == ("ecp5",)
+    cells = "LUT4 alone | all LUT4 | TRELLIS_COMB | FF | MULT18X18D | DP16KD" if ecp5 else "LC | FF | MAC16 | RAM"
+    lines = [
+        f"| core | architecture | channels | target | {cells} | fmax, MHz (lowest to highest) | clocks per sample "
+        "| samples per second |",
+        "|---" * (7 + cells.count("|") + 1) + "|",
+    ]
+    for core, key, figures in recorded(record, keys):
+        area, cycles = figures["area"], figures["cycles"]
+        logic = "-" if figures["cells"] is None else f"{figures['cells']:,}"
+        counts = [logic, f"{area['flip_flops']:,}", str(area["multipliers"]), str(area["rams"])]
+        counts = [f"{area['luts']:,}", f"{area['all_luts']:,}", *counts] if ecp5 else counts
+        row = [core.example, core.architecture, str(core.channels), title(TARGETS[key]), *counts]
+        if figures["refusal"]:
+            row += ["does not fit", f"{cycles:,}", "-"]
+        else:
+            speed = f"{fmax(figures):.1f} ({min(figures['fmax']):.1f} to {max(figures['fmax']):.1f})"
+            row += [speed, f"{cycles:,}", f"{1e6 * fmax(figures) / cycles:,.0f}"]
+        lines.append(f"| {' | '.join(row)} |")
+    return "\n".join(lines)
+
+
+def refusals(record: Figures) -> str:
+    """List what does not fit: too many cells, or the message of the tool."""
+    lines = "".join(
+        f"- {core.label} on {title(TARGETS[key])}: {figures['refusal']}.\n"
+        for core, key, figures in recorded(record, TARGETS)
+        if figures["refusal"]
+    )
+    return f"Cores that do not fit, with cells after synthesis or the placer's message:\n\n{lines}" if lines else ""
+
+
+def path_table(record: Figures) -> str:
+    """Return a Markdown table of the slowest paths on the ECP5."""
+    lines = ["| core | ns | the path, ns at each step |", "|---|---|---|"]
+    for core, _, figures in recorded(record, ["ecp5"]):
+        path = figures["path"]
+        steps = ", ".join(f"{kind} {delay:.2f}" if delay else kind for kind, delay in path)
+        lines.append(f"| {core.label} | {sum(delay for _, delay in path):.1f} | {steps} |")
+    return "\n".join(lines)
+
+
+def peer_table(record: Figures) -> str:
+    """Return a Markdown table of the audio low-pass and other projects' filters."""
+    lines = [
+        "| project | design | LUT4 alone | LUT4 with carries | FF | MULT18X18D | fmax, MHz | largest error seen, LSB |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    for architecture in ("parallel", "folded"):
+        figures = targets_in(record, AUDIO[architecture]).get("ecp5")
+        if figures is None:
+            continue
+        area = figures["area"]
+        lines.append(
+            f"| this one | {architecture} | {area['luts']:,} | {area['all_luts']:,} | {area['flip_flops']:,} "
+            f"| {area['multipliers']} | {fmax(figures):.1f} | at most 1, proven |"
+        )
+    for peer in PEERS:
+        lines.append(
+            f"| {peer.project} | {peer.what} | {peer.luts:,} | {peer.luts + 2 * peer.carries:,} "
+            f"| {peer.flip_flops:,} | {peer.multipliers} | {peer.fmax:.1f} | {peer.error} |"
+        )
+    return "\n".join(lines)
+
+
+def plot(record: Figures) -> str:
+    """Return an SVG of logic against samples per second and of logic against channels, one panel per target."""
+    colours = dict(zip(EXAMPLES, ("C0", "C1", "C2"), strict=True))
+    marks = dict(zip(ARCHITECTURES, ("o", "s", "^"), strict=True))
+    panels = ("hx8k", "up5k", "ecp5")
+    with matplotlib.rc_context({"svg.hashsalt": "sosmith", "svg.fonttype": "none"}):
+        figure = Figure(figsize=(12, 8), layout="constrained")
+        FigureCanvasSVG(figure)
+        rows = figure.subplots(2, len(panels), sharex="row", sharey=True)
+        for (rates, channels), key in zip(rows.T, panels, strict=True):
+            lines: dict[Core, list[tuple[int, int]]] = {}
+            for core, _, figures in recorded(record, [key]):
+                if figures["refusal"]:
+                    continue
+                logic = logic_of(key, figures)
+                lines.setdefault(replace(core, channels=1), []).append((core.channels, logic))
+                if core.channels == 1:
+                    rates.loglog(rate(core, figures), logic, marks[core.architecture], color=colours[core.example])
+            for core, points in lines.items():
+                style = f"{marks[core.architecture]}-"
+                channels.loglog(*zip(*points, strict=True), style, color=colours[core.example], label=core.label)
+            rates.set_title(title(TARGETS[key]))
+            rates.set_xlabel("samples per second at fmax, one channel")
+            channels.set_xlabel("channels")
+            channels.set_xticks(CHANNELS, [str(count) for count in CHANNELS])
+            channels.xaxis.minorticks_off()
+            for axes in (rates, channels):
+                axes.set_ylabel("all LUT4" if key == "ecp5" else "logic cells")
+                axes.grid(visible=True, which="both", alpha=0.3)
+        rows[0, 0].set_ylim(bottom=100)
+        handles = {
+            label: handle for axes in rows[1] for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
+        }
+        figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=3, fontsize="small")
+        text = io.StringIO()
+        figure.savefig(text, format="svg", metadata={"Date": None})
+    return settled(text.getvalue())
+
+
+def document(record: Figures) -> dict[str, str]:
+    """Return the texts of the document and its plot, by path from the root, from the recorded figures only."""
+    found = (figures for core in record["cores"].values() for figures in core["targets"].values())
+    realizations = sorted({figures["realization"] for figures in found})
+    left = "".join(f"- {core}.\n" for core in missing(record))
+    if left:
+        left = f"\nNot measured yet:\n\n{left}"
+    if earlier := "".join(f"- {core}.\n" for core in outdated(record)):
+        left += f"\nMeasured on an earlier version of the core, and not again yet:\n\n{earlier}"
+    text = f"""# What the cores cost
+
+Written by `python -m benchmarks.cost` from the figures that it records in `benchmarks/cost.json`. `--check` synthesizes
+changed cores again and fails if a figure of synthesis has grown by more than {100 * (GROWTH - 1):.0f} %.
+
+Measured are the filter core of audio_lowpass, and the whole instrument (calibration and filter) of the two other
+examples, each in all three architectures, for {", ".join(map(str, CHANNELS))} channels;
+audio_lowpass parallel for {EIGHT.channels} as well. Everything else is as specified, including the proven bound.
+The folded architecture has digits of 17 bits on the ECP5, whose multipliers have 18 bits, and of 15 elsewhere.
+Not every core reaches the sample rate of its example with that many channels: the tables give the highest rate in
+samples per second, of all channels together.
+Realization, as `auto` chooses: {", ".join(realizations)}.
+
+Tools: {", ".join(record["tools"])}.
+fmax is the median of {len(record["seeds"])} seeds, with nextpnr asked for {GOAL} MHz. Clock and reset are the only
+pins; the streams are kept, but end inside the FPGA. The pins of a package are therefore no limit here, and wires to
+them are not timed. Nothing has run on a board.
+
+How cells are counted:
+
+- LC: logic cells as placed on an iCE40, each a LUT4 with a carry and a flip-flop. MAC16 is the multiplier block, which
+  only the UP5K has; on the others, multipliers are built from logic cells.
+- LUT4 alone: the LUT4 cells of Yosys on an ECP5. All LUT4: also each carry cell, CCU2C, as two, and each LUT RAM cell,
+  TRELLIS_DPR16X4, as four. TRELLIS_COMB: LUT4 as placed, including those that only pass a signal through.
+- Multipliers, flip-flops (FF) and block RAMs (RAM of 4 kbit, DP16KD of 16 kbit) after synthesis.
+- Clocks per sample: an upper limit in the serial architecture, where the number depends on the data.
+{left}
+![logic against sample rate](images/cost.svg)
+
+## iCE40
+
+{table(record, ("up5k", "hx8k", "hx1k"))}
+
+{refusals(record)}
+## ECP5
+
+{table(record, ("ecp5",))}
+
+The slowest path between registers, for the median seed; registers have the names that Yosys gives them:
+
+{path_table(record)}
+
+In the parallel architecture a section closes its recursion within one clock: sums, multiplication and state follow one
+another without a register. With several channels the loop is pipelined across them.
+
+## Digit by digit
+
+The online architecture ([online.md](online.md)) beside the others: audio_lowpass, one channel, with 16 bits in and out
+and with 24. A sample takes as many clocks with 24 bits as with 16. Here fmax is the median of as many seeds as the
+table says.
+
+{online_table(record)}
+
+It stands between the others: for its samples per second it takes far less logic than serial, on the HX8K less than
+folded too, and several times as much as parallel. A carry chain of an FPGA is faster than the steps that it saves,
+and the units of a section that work side by side take more logic than one set of multipliers. No choice by `auto` falls
+on it.
+
+## Look-ahead, and several samples a clock
+
+audio_lowpass with loops that go back several samples at once, and with beats of several samples
+([hardware.md](hardware.md#look-ahead)). All products of look-ahead are sums with registers between them. It looks as
+far ahead as the clock asks that it is designed for, by an estimate.
+
+{fast_table(record)}
+
+Without look-ahead, the lanes of a beat wait for each other.
+
+## State space beside direct sections
+
+Hourani and others report twice the throughput for second-order sections in state space, on a Spartan-3, with nine
+multipliers instead of five. In both loops stands one multiplication and about two additions. Here is audio_lowpass in
+the parallel architecture on the ECP5, each realization with the word lengths that the same allowed error takes:
+
+{realized_table(record)}
+
+## Protection
+
+What it costs to detect a wrong bit, or to correct one and detect two, as `[hardware] protect` asks
+([hardware.md](hardware.md)):
+
+{protection_table(record)}
+
+The check bits stand between a memory and its logic, within the same clock; that is what lowers fmax.
+
+## Goals
+
+The project's own goals. Where a goal says only "LUT4", both ways of counting are shown.
+
+{goal_table(record)}
+
+What was tried for missed goals, and the obstacle:
+{tries()}
+
+## Comparison with other projects
+
+Fifth-order Butterworth low-pass at 1 kHz for 48 kHz, 16 bits in and out, on an ECP5. The others were measured for an
+ECP5-85F, out of context, with Yosys 0.70, nextpnr-ecp5 and one seed. The comparison is not like for like:
+widths, throughput and what can be changed at run time differ. LUT RAM is counted for this project only.
+
+{peer_table(record)}
+"""
+    return {"docs/cost.md": text, "docs/images/cost.svg": plot(record)}
