@@ -47,7 +47,7 @@ from sosmith.gen.output.verilog import converted, to_rtlil, to_verilog
 
 
 def jobs() -> list[Job]:
-    """List everything to measure: the fastest cores first, then those with goals, then single channels, then cores that hardly fit."""
+    """List everything to measure: the fastest cores, those with goals, single channels, those that hardly fit."""
     wanted = {(core, goal.target) for goal in GOALS for core in (goal.core, goal.base) if core is not None}
 
     def rank(job: Job) -> int:
@@ -55,7 +55,9 @@ def jobs() -> list[Job]:
         hopeless = core.architecture == "parallel" and TARGETS[key].device.family == "ice40"
         if core in FAST:
             return -1
-        return 0 if job in wanted or core in OF_THEIR_OWN else 1 + (core.channels > 1) + 2 * hopelessreturn sorted(((core, key) for core in CORES for key in core.targets), key=rank)
+        return 0 if job in wanted or core in OF_THEIR_OWN else 1 + (core.channels > 1) + 2 * hopeless
+
+    return sorted(((core, key) for core in CORES for key in core.targets), key=rank)
 
 
 @cache

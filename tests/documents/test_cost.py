@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from benchmarks import cost, synthesis
+from benchmarks import cost, cost_cores, cost_goals, cost_page, synthesis
 from benchmarks.synthesis import TARGETS, Area, Placement, place
 
 UTILIZATION = "Info: Device utilisation:\nInfo: \t         ICESTORM_LC:    1139/   5280    21%\n"
@@ -79,7 +79,7 @@ def test_the_median_of_all_seeds_is_told(monkeypatch: pytest.MonkeyPatch, tmp_pa
     monkeypatch.setattr(cost, "place", lambda folder, target, seed: placements[seed])
     found = cost.placed(tmp_path, "up5k", {"SB_LUT4": 300}, 2)
     assert found == {"cells": 400, "refusal": None, "fmax": [50.0, 70.0, 40.0, 60.0, 80.0], "path": [("wires", 60.0)]}
-    assert cost.fmax(found) == 60.0
+    assert cost_cores.fmax(found) == 60.0
 
 
 def test_a_failure_without_a_reason_is_no_refusal(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -107,57 +107,62 @@ def test_growth_is_told_beyond_five_percent() -> None:
 
 
 def test_the_document_is_what_the_recorded_figures_give() -> None:
-    for name, text in cost.document(json.loads(cost.RECORD.read_text(encoding="utf-8"))).items():
-        assert (cost.ROOT / name).read_text(encoding="utf-8") == text
+    for name, text in cost_page.document(json.loads(cost_cores.RECORD.read_text(encoding="utf-8"))).items():
+        assert (cost_cores.ROOT / name).read_text(encoding="utf-8") == text
 
 
 def test_every_example_is_measured_in_every_architecture() -> None:
-    assert {path.stem for path in (cost.ROOT / "examples").glob("*.toml")} == cost.EXAMPLES.keys()
-    assert len(cost.CORES) == 3 * 3 * 3 + 1 + len(cost.PROTECTED) + len(cost.ONLINE) + len(cost.REALIZED)
+    assert {path.stem for path in (cost_cores.ROOT / "examples").glob("*.toml")} == cost_cores.EXAMPLES.keys()
+    assert len(cost_cores.CORES) == 3 * 3 * 3 + 1 + len(cost_cores.OF_THEIR_OWN)
     listed = cost.jobs()
-    assert len(listed) == len(set(listed)) == sum(len(core.targets) for core in cost.CORES)
-    of_goals = {(core, goal.target) for goal in cost.GOALS for core in (goal.core, goal.base) if core is not None}
-    assert set(listed[: len(of_goals)]) == of_goals
+    assert len(listed) == len(set(listed)) == sum(len(core.targets) for core in cost_cores.CORES)
+    of_goals = {(core, goal.target) for goal in cost_goals.GOALS for core in (goal.core, goal.base) if core is not None}
+    ranked = [job for job in listed if job[0] not in cost_cores.OF_THEIR_OWN]
+    of_goals = {job for job in of_goals if job[0] not in cost_cores.OF_THEIR_OWN}
+    assert set(ranked[: len(of_goals)]) == of_goals
+    assert {core for core, _ in listed[: len(cost_cores.FAST)]} == set(cost_cores.FAST)
 
 
 def test_what_goals_are_about_is_recorded_and_what_is_not_is_told() -> None:
-    record = json.loads(cost.RECORD.read_text(encoding="utf-8"))
-    assert all(goal.value(record) is not None for goal in cost.GOALS)
+    record = json.loads(cost_cores.RECORD.read_text(encoding="utf-8"))
+    assert all(goal.value(record) is not None for goal in cost_goals.GOALS)
     del record["cores"]["audio_lowpass folded 1"]
     del record["cores"]["audio_lowpass serial 1"]["targets"]["up5k"]
-    told = cost.missing(record)
+    told = cost_cores.missing(record)
     assert "audio_lowpass folded on iCE40 UP5K; iCE40 HX8K; ECP5 LFE5U-25F, speed 6" in told
     assert any(line.startswith("audio_lowpass serial on iCE40 UP5K") for line in told)
-    text = cost.document(record)["docs/cost.md"]
+    text = cost_page.document(record)["docs/cost.md"]
     assert all(f"- {line}.\n" in text for line in told)
     assert "| audio_lowpass folded | ECP5 LFE5U-25F, speed 6 | fmax, MHz | at least 100 | - | not measured |" in text
 
 
 def test_figures_of_an_earlier_version_are_told() -> None:
-    record = json.loads(cost.RECORD.read_text(encoding="utf-8"))
-    core = cost.CORES[0]
+    record = json.loads(cost_cores.RECORD.read_text(encoding="utf-8"))
+    core = cost_cores.CORES[0]
     (key, *_), line = (
-        cost.targets_in(record, core),
-        f"- {core.label} on {cost.title(TARGETS[cost.CORES[0].targets[0]])}",
+        cost_cores.targets_in(record, core),
+        f"- {core.label} on {synthesis.title(TARGETS[cost_cores.CORES[0].targets[0]])}",
     )
     for earlier in (True, False):
-        cost.targets_in(record, core)[key]["earlier"] = earlier
-        told = cost.document(record)["docs/cost.md"].partition("Measured on an earlier version of the core, and not")[2]
+        cost_cores.targets_in(record, core)[key]["earlier"] = earlier
+        told = cost_page.document(record)["docs/cost.md"].partition(
+            "Measured on an earlier version of the core, and not"
+        )[2]
         assert (line in told.partition("![")[0]) is earlier
 
 
 def test_a_goal_can_be_missed() -> None:
-    record = json.loads(cost.RECORD.read_text(encoding="utf-8"))
+    record = json.loads(cost_cores.RECORD.read_text(encoding="utf-8"))
     figures = record["cores"]["flange_wear_locomotive folded 64"]["targets"]["up5k"]
     figures["cells"] = 2 * record["cores"]["flange_wear_locomotive folded 1"]["targets"]["up5k"]["cells"]
-    text = cost.goal_table(record)
+    text = cost_goals.goal_table(record)
     row = "| flange_wear_locomotive folded, 64 channels | iCE40 UP5K | LC, increase over one channel, % | at most 10 "
     assert f"{row}| 100.0 | **missed** |" in text
 
 
 def test_only_what_has_changed_is_synthesized_again(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """One core, recorded once as it is, once from another text with fewer cells."""
-    core, cells = cost.CORES[0], {"LUT4": 110, "TRELLIS_FF": 50}
+    core, cells = cost_cores.CORES[0], {"LUT4": 110, "TRELLIS_FF": 50}
     area = {"luts": 100, "all_luts": 100, "flip_flops": 50, "multipliers": 0, "rams": 0}
     entry = {"targets": {"ecp5": {"source": cost.mark("text"), "area": area}}}
     record = tmp_path / "cost.json"
@@ -182,5 +187,5 @@ def test_only_what_has_changed_is_synthesized_again(monkeypatch: pytest.MonkeyPa
 @pytest.mark.slow
 def test_no_core_has_grown() -> None:
     command = [sys.executable, "-m", "benchmarks.cost", "--check"]
-    result = subprocess.run(command, cwd=cost.ROOT, capture_output=True, text=True, check=False)
+    result = subprocess.run(command, cwd=cost_cores.ROOT, capture_output=True, text=True, check=False)
     assert (result.returncode, result.stdout) == (0, "nothing has grown\n"), result.stderr
