@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import io
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from fractions import Fraction
 from pathlib import Path
 
 import matplotlib
@@ -25,13 +26,13 @@ from sosmith.gen.realizations.noise import minimum_gain, second_order_modes
 from sosmith.gen.realizations.registry import REALIZATIONS
 from sosmith.gen.realizations.section_format import SectionFormat
 from sosmith.gen.realizations.state_space import minimum_noise
-from sosmith.gen.specification.specification import load
+from sosmith.gen.specification.specification import Specification, load
 from sosmith.gen.stimuli import traces_for
-from sosmith.gen.word_lengths.cost import LUTS_OF_A_BLOCK, cost_of
+from sosmith.gen.word_lengths.cost import LUTS_OF_A_BLOCK
 from sosmith.model.arrays import Codes
 from sosmith.model.dataflow.graph import Op
 from sosmith.model.errors import ShortfallError
-from sosmith.model.reference.golden import calibrated, filtered
+from sosmith.model.reference.golden import entering_filter, filtered
 
 ROOT = Path(__file__).resolve().parent.parent
 SPECIFICATIONS = ("audio_lowpass", "flange_wear_locomotive")
@@ -40,6 +41,8 @@ CUTOFFS = np.geomspace(5e-4, 5e-2, 41)  # over the sample rate
 SLOPES = (-30, -10, 0)  # dB per decade, drawn for reference
 COEFFICIENT_BITS = 40  # of the section that is plotted
 NOISE_SAMPLES = 200_000
+FAST = Fraction(120_000_000)
+"""Clock in Hz that sections with look-ahead are designed for."""
 SEED = 1
 
 
@@ -76,7 +79,7 @@ def measure(design: CoreDesign) -> Row:
     quantized, datapath = design.quantized, design.datapath
     assert quantized.filter is not None
     codes = stimulus(design)
-    values = calibrated(codes, datapath.inputs, None)
+    values = entering_filter(codes, datapath, None)
     golden = filtered(values, quantized.filter.sos, datapath.output, steady=quantized.steady)
     error = (datapath.output.decode(datapath.compute(codes)) - golden) / float(datapath.output.lsb)
     nodes = [node for section in quantized.sections for node in section.graph.nodes]
@@ -85,12 +88,24 @@ def measure(design: CoreDesign) -> Row:
     return Row(
         coefficient_bits=f"{min(coefficients)}..{max(coefficients)}" if coefficients else "none",
         states=f"{min(states)}..{max(states)}, {sum(states)} in all",
-        multipliers=cost_of(datapath).multiplier_sizes,
+        multipliers=design.architecture.cost.multiplier_sizes,
         bound=float(quantized.bound),
         worst=float(np.abs(error).max()),
         rms=float(np.sqrt(np.mean(error**2))),
-        area=round(cost_of(datapath).area),
+        area=round(design.architecture.cost.area),
     )
+
+
+def others(spec: Specification) -> list[tuple[str, Specification, None]]:
+    """Return other ways to compute the same filter: a name for each, and the specification that asks for it."""
+    hardware = spec.hardware
+    fast = replace(hardware, pipeline="look-ahead", clock=FAST)
+    return [
+        ("without multipliers", replace(spec, hardware=replace(hardware, multipliers=0)), None),
+        (f"look-ahead for {FAST / 10**6} MHz", replace(spec, hardware=fast), None),
+        ("on-line arithmetic", replace(spec, hardware=replace(hardware, architecture="online")), None),
+        ("decimated", replace(spec, filter=replace(spec.filter, decimate="auto")), None),
+    ]
 
 
 def table(name: str) -> str:
@@ -103,15 +118,19 @@ def table(name: str) -> str:
         "| worst found (LSB) | worst / bound | rms (LSB) | estimated area (LUT4) |",
         "|---|---|---|---|---|---|---|---|---|",
     ]
-    for realization in REALIZATIONS:
+    plain = replace(spec, hardware=replace(spec.hardware, architecture="parallel"))
+    for label, wanted, realization in (*((name, plain, name) for name in REALIZATIONS), *others(plain)):
         try:
-            design = design_core(spec, core="filter", realization=realization)
+            design = design_core(wanted, core="filter", realization=realization)
         except ShortfallError as error:
-            lines.append(f"| {realization} | refused: {error} |" + " |" * 7)
+            lines.append(f"| {label} | refused: {error} |" + " |" * 7)
+            continue
+        if wanted.filter.decimate and design.datapath.decimator is None:
             continue
         row = measure(design)
+        chosen = "" if realization else f", {design.quantized.realization}"
         lines.append(
-            f"| {realization} | {row.coefficient_bits} | {row.states} | {row.multipliers} | {row.bound:.4f} "
+            f"| {label}{chosen} | {row.coefficient_bits} | {row.states} | {row.multipliers} | {row.bound:.4f} "
             f"| {row.worst:.4f} | {100 * row.worst / row.bound:.0f} % | {row.rms:.4f} | {row.area:,} |"
         )
     return "\n".join(lines)
@@ -228,7 +247,10 @@ Written by `python -m benchmarks.numerics`; no figure is typed in. The filter co
 its specification. The bound is proven for every input. "Worst found" is the largest error of the integer model
 against the double-precision golden chain on noise, rails, a small step, and the sign-matched worst cases of the whole
 filter and of the path from every quantizer to the output. The area is estimated for an ECP5 in the parallel
-architecture, a multiplier block counted as {LUTS_OF_A_BLOCK} LUT4.
+architecture, a multiplier block counted as {LUTS_OF_A_BLOCK} LUT4. Below the realizations stand other ways to compute
+the same filter, with the realization that `auto` takes in each: products by constants made of adders; recursions over
+several samples at once, whose pipeline registers are not in the estimate; sections on signed digits; and, where `auto`
+decimates, the filter at the lower rate, against its exact multirate chain.
 
 {sections}
 

@@ -1,24 +1,35 @@
-"""Regenerates the tables of docs/rates.md: `python -m benchmarks.rates`.
+"""Regenerates the tables of docs/rates.md, and its picture from benchmarks/cost.json: `python -m benchmarks.rates`.
 
-With `--check` nothing is written; the exit status tells whether the document is up to date.
+With `--picture` it draws the picture alone. With `--check` nothing is written; the exit status tells whether the
+document is up to date.
 """
 
 from __future__ import annotations
 
+import io
+import json
 import re
 import sys
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
+import matplotlib
+from benchmarks.cost_cores import CORES, RECORD, Figures, logic_of, rate, targets_in
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
+
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.filter.decimation import choose
 from sosmith.gen.output.decimation_facts import decimation_facts, rate_costs
+from sosmith.gen.picture import settled
 from sosmith.gen.quantity import quantity
 from sosmith.gen.specification.specification import FilterSpec, load
+from sosmith.gen.word_lengths.cost import LUTS_OF_A_BLOCK
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCUMENT = ROOT / "docs" / "rates.md"
+PICTURE = ROOT / "docs" / "images" / "rates.svg"
 LOCOMOTIVE = ROOT / "examples" / "flange_wear_locomotive.toml"
 FACTORS = (None, 2, 4, 8, 16, 32, 64, "auto")
 
@@ -116,6 +127,45 @@ def with_choices(text: str) -> str:
     return _CHOICES.sub(lambda _: choice_table(), text)
 
 
+def curves(record: Figures, key: str) -> dict[str, list[tuple[float, float, str]]]:
+    """Return samples per second, area and a mark of every measured audio_lowpass with one channel, by architecture."""
+    same = {"ecp5": ("ecp5", "ecp5_85")}.get(key, (key,))
+    found: dict[str, list[tuple[float, float, str]]] = {}
+    for core in CORES:
+        if core.example != "audio_lowpass" or core.channels > 1 or core.protect != "none" or core.realization:
+            continue
+        for target, figures in targets_in(record, core).items():
+            if target not in same or figures["refusal"]:
+                continue
+            name = "parallel, look-ahead" if core.clock else core.architecture
+            mark = f"{core.lanes} a clock" if core.lanes > 1 else f"{core.bits} bits" if core.bits else ""
+            area = logic_of(target, figures) + LUTS_OF_A_BLOCK * figures["area"]["multipliers"]
+            found.setdefault(name, []).append((rate(core, figures), area, mark))
+    return {name: sorted(points) for name, points in found.items()}
+
+
+def picture(record: Figures) -> str:
+    """Return an SVG of area against samples per second, one panel for each family, one curve for each architecture."""
+    with matplotlib.rc_context({"svg.hashsalt": "sosmith", "svg.fonttype": "none"}):
+        figure = Figure(figsize=(11, 5), layout="constrained")
+        FigureCanvasSVG(figure)
+        colours = {"serial": "C2", "folded": "C1", "online": "C4", "parallel": "C0", "parallel, look-ahead": "C3"}
+        for axes, key in zip(figure.subplots(1, 2, sharey=True), ("hx8k", "ecp5"), strict=True):
+            for name, points in sorted(curves(record, key).items(), key=lambda item: list(colours).index(item[0])):
+                x, y, marks = zip(*points, strict=True)
+                axes.loglog(x, y, "o-", color=colours[name], label=name)
+                for at, height, mark in zip(x, y, marks, strict=True):
+                    axes.annotate(mark, (at, height), (4, -9), textcoords="offset points", fontsize="x-small")
+            axes.set_title("iCE40 HX8K" if key == "hx8k" else "ECP5 LFE5U-25F and -85F, speed 6")
+            axes.set_xlabel("samples per second at fmax")
+            axes.grid(visible=True, which="both", alpha=0.3)
+            axes.legend(fontsize="small", loc="upper left")
+            axes.set_ylabel(f"LUT4, a multiplier block as {LUTS_OF_A_BLOCK}" if key == "ecp5" else "logic cells")
+        text = io.StringIO()
+        figure.savefig(text, format="svg", metadata={"Date": None})
+    return settled(text.getvalue())
+
+
 def document() -> str:
     """Return the document with the tables as they are now."""
     text = DOCUMENT.read_text(encoding="utf-8")
@@ -123,7 +173,12 @@ def document() -> str:
 
 
 if __name__ == "__main__":
+    drawn = picture(json.loads(RECORD.read_text(encoding="utf-8")))
+    if sys.argv[1:] == ["--picture"]:
+        PICTURE.write_text(drawn, encoding="utf-8")
+        sys.exit()
     made = document()
     if sys.argv[1:] == ["--check"]:
-        sys.exit(made != DOCUMENT.read_text(encoding="utf-8"))
+        sys.exit((made, drawn) != (DOCUMENT.read_text(encoding="utf-8"), PICTURE.read_text(encoding="utf-8")))
     DOCUMENT.write_text(made, encoding="utf-8")
+    PICTURE.write_text(drawn, encoding="utf-8")

@@ -84,6 +84,8 @@ class Architecture:
     look_ahead : bool
         Whether the loops of the parallel architecture, which go back several samples, are pipelined through those
         between. All products by constants are then made of adders.
+    hold : bool
+        Whether each result behind a decimator is handed out once for each of its samples.
     """
 
     name: str
@@ -95,6 +97,7 @@ class Architecture:
     blocks: Blocks = NO_LIMIT
     samples_per_clock: int = 1
     look_ahead: bool = False
+    hold: bool = False
 
     @property
     def _is_block(self) -> bool:
@@ -117,6 +120,11 @@ class Architecture:
             return tuple(map(scalings, self._graphs))
         fixed = self.name == "parallel" and not self.reload
         return products_from_adders(self._graphs, self.blocks.available if fixed else None, self.blocks.bits)
+
+    @property
+    def copies_per_result(self) -> int:
+        """Times that each result is handed out."""
+        return self.decimator.factor if self.hold and self.decimator is not None else 1
 
     @property
     def decimator(self) -> Decimator | None:
@@ -206,7 +214,7 @@ class Architecture:
         if self._is_block:
             lanes = self.samples_per_clock
             return parallel_clocks.block_latency_cycles(self.datapath, lanes, look_ahead=self.look_ahead)
-        before = 0 if self.decimator is None else decimator_clocks.latency_cycles(self.decimator)
+        before = 0 if self.decimator is None else decimator_clocks.latency_cycles(self.decimator) + self.hold
         if self.program is None:
             return before + parallel_clocks.latency_cycles(self.built, self.channels, protect=self.protect)
         return before + folded_clocks.latency_cycles(self.program, serial=self.name == "serial", protect=self.protect)
@@ -271,7 +279,7 @@ class Architecture:
             return made
         from sosmith.hdl.decimator import DecimatedCore
 
-        return DecimatedCore(self.datapath, made)
+        return DecimatedCore(self.datapath, made, hold=self.hold)
 
     def _behind_decimator(self) -> BlockCore | Core | FoldedCore:
         from sosmith.hdl.block_core import BlockCore
@@ -332,6 +340,8 @@ class Budget:
         Samples for each result.
     samples_per_clock : int
         Samples in a beat of the streams.
+    hold : bool
+        Whether each result behind a decimator is handed out once for each of its samples.
     """
 
     clock: Fraction
@@ -342,6 +352,7 @@ class Budget:
     blocks: Blocks = NO_LIMIT
     decimate: int = 1
     samples_per_clock: int = 1
+    hold: bool = False
 
     @property
     def adders(self) -> bool:
@@ -447,6 +458,7 @@ def fitting(
         budget.blocks,
         budget.samples_per_clock,
         look_ahead,
+        budget.hold,
     )
     budget.check(architecture)
     return architecture

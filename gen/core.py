@@ -181,6 +181,7 @@ def design_core(
         blocks=blocks_for(hardware.multipliers, board),
         decimate=1 if front is None else front.decimator.factor,
         samples_per_clock=hardware.samples_per_clock,
+        hold=front is not None and spec.filter.hold,
     )
 
     def made_in(name: str) -> _Made:

@@ -22,7 +22,7 @@ clock. `s_axis_tready` comes from registers only.
 
 from __future__ import annotations
 
-from amaranth.hdl import ClockDomain, ClockSignal, DomainRenamer, Module, ResetSignal, Signal, Value
+from amaranth.hdl import Cat, ClockDomain, ClockSignal, DomainRenamer, Module, ResetSignal, Signal, Value
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
@@ -141,11 +141,60 @@ class CicDecimator(wiring.Component):
         return tuple(held)
 
 
-class DecimatedCore(wiring.Component):
-    """A core with a decimator before it.
+class Holder(wiring.Component):
+    """Hands out each word several times.
 
-    Latency: that of the decimator and that of the core. Throughput: one sample a clock as long as the core keeps up
-    with one result for each R of them.
+    ::
+
+        i_data --> [o_data] --> o_data        [left] counts down from copies - 1 with each word that leaves
+        i_ready <-- the register is free, or its last copy leaves at this clock
+
+    Latency: one clock. Throughput: one word for each `copies` of clocks.
+
+    Parameters
+    ----------
+    width : int
+        Width of a word, in bits.
+    copies : int
+        Times that each word is handed out, at least 2.
+
+    Members
+    -------
+    i_data, i_valid, i_ready, o_data, o_valid, o_ready
+        Words before and behind it, by the rules of AXI4-Stream.
+    """
+
+    def __init__(self, width: int, copies: int) -> None:
+        self.copies = copies
+        super().__init__(
+            {
+                "i_data": In(width),
+                "i_valid": In(1),
+                "i_ready": Out(1),
+                "o_data": Out(width),
+                "o_valid": Out(1),
+                "o_ready": In(1),
+            }
+        )
+
+    def elaborate(self, platform: object) -> Module:
+        """Build the register and its counter."""
+        m = Module()
+        left = Signal(range(self.copies), reset_less=True)
+        held = Signal(len(self.o_data), reset_less=True)
+        m.d.comb += [self.i_ready.eq(~self.o_valid | (self.o_ready & (left == 0))), self.o_data.eq(held)]
+        with m.If(self.i_ready):
+            m.d.sync += [held.eq(self.i_data), self.o_valid.eq(self.i_valid), left.eq(self.copies - 1)]
+        with m.Elif(self.o_ready):
+            m.d.sync += left.eq(left - 1)
+        return m
+
+
+class DecimatedCore(wiring.Component):
+    """A core with a decimator before it, and behind it a `Holder` if results are held.
+
+    Latency: that of the decimator and that of the core, and a clock of the holder. Throughput: one sample a clock as
+    long as the core keeps up with one result for each R of them.
 
     Parameters
     ----------
@@ -153,6 +202,8 @@ class DecimatedCore(wiring.Component):
         With a decimator; its name is that of the top module.
     core : Core or FoldedCore
         The core for `datapath.behind_decimator`, which takes the flag `input_at_rail` from `s_axis_tuser`.
+    hold : bool
+        Whether each result is handed out once for each of its samples.
 
     Members
     -------
@@ -160,8 +211,9 @@ class DecimatedCore(wiring.Component):
         As in `sosmith.hdl.core.Core`.
     """
 
-    def __init__(self, datapath: Datapath, core: Core | FoldedCore) -> None:
+    def __init__(self, datapath: Datapath, core: Core | FoldedCore, *, hold: bool = False) -> None:
         self.datapath = datapath
+        self.hold = hold
         self.core = core
         super().__init__(core_members(datapath.inputs, datapath.output))
 
@@ -184,9 +236,19 @@ class DecimatedCore(wiring.Component):
             core.s_axis_tuser.eq(decimator.o_rail),
             core.s_axis_tvalid.eq(decimator.o_valid),
             decimator.o_ready.eq(core.s_axis_tready),
-            self.m_axis_tdata.eq(core.m_axis_tdata),
-            self.m_axis_tuser.eq(core.m_axis_tuser),
-            self.m_axis_tvalid.eq(core.m_axis_tvalid),
-            core.m_axis_tready.eq(self.m_axis_tready),
+        ]
+        result: Value = Cat(core.m_axis_tdata, core.m_axis_tuser)
+        valid, ready = core.m_axis_tvalid, self.m_axis_tready
+        if self.hold:
+            holder = Holder(len(result), self.datapath.decimator.factor)
+            m.submodules.holder = DomainRenamer("front")(holder)
+            m.d.comb += [holder.i_data.eq(result), holder.i_valid.eq(valid), holder.o_ready.eq(ready)]
+            result, valid, ready = holder.o_data, holder.o_valid, holder.i_ready
+        data = len(self.m_axis_tdata)
+        m.d.comb += [
+            self.m_axis_tdata.eq(result[:data]),
+            self.m_axis_tuser.eq(result[data:]),
+            self.m_axis_tvalid.eq(valid),
+            core.m_axis_tready.eq(ready),
         ]
         return m

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from sosmith.gen.output.core_facts import InterfaceFacts
 from sosmith.model.arrays import Codes
 from sosmith.sim.bench import Bench, Progress
-from sosmith.sim.stream_packing import pack, random_order, unpack
+from sosmith.sim.stream_packing import each_once, pack, random_order, unpack
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,7 +82,7 @@ def cosimulate(
     run = bench.run(pack(codes, order, interface.inputs), progress)
     if interface.samples_per_result > 1:
         order = random_order(-(-samples // interface.samples_per_result), channels, seed)
-    result, status = unpack(run.received, order, interface.outputs)
+    result, status = unpack(each_once(run.received, interface.copies_per_result), order, interface.outputs)
     return CosimulationResult(
         codes=result,
         status=status,

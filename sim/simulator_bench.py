@@ -89,7 +89,12 @@ class SimulatorBench:
             self._write_job(plain, tool)
             sent.save(plain / "sent.npy")
             self.announce(self._building(plain, tool))
-            _run(plain, tool, -(-len(sent) // self.interface.samples_per_result), progress)
+            _run(
+                plain,
+                tool,
+                -(-len(sent) // self.interface.samples_per_result) * self.interface.copies_per_result,
+                progress,
+            )
         outcome = json.loads((folder / "result.json").read_text(encoding="utf-8"))
         if outcome["failure"] is not None:
             raise ShortfallError(f"{self.interface.name} in {self.simulator}: {outcome['failure']}")
@@ -136,6 +141,7 @@ class SimulatorBench:
             "latency_cycles": self.interface.latency_cycles,
             "reset_cycles": self.interface.reset_cycles,
             "samples_per_result": self.interface.samples_per_result,
+            "copies_per_result": self.interface.copies_per_result,
             "tdata_bits": self.interface.outputs.width,
             "tuser_bits": self.interface.outputs.user_width,
         }

@@ -76,6 +76,26 @@ def unpack(beats: Beats, order: Order, stream: StreamFacts) -> tuple[Codes, npt.
     return codes, status
 
 
+def each_once(beats: Beats, copies: int) -> Beats:
+    """Return each of the beats once that come `copies` times, one after the other.
+
+    Raises
+    ------
+    ShortfallError
+        If the number of beats is no multiple of that, or a copy differs.
+    """
+    if copies == 1:
+        return beats
+    if len(beats) % copies:
+        raise ShortfallError(f"each result must come out {copies} times, not {len(beats)} beats in all")
+    first = Beats(beats.tdest[::copies].copy(), beats.tdata[::copies].copy(), beats.tuser[::copies].copy())
+    wanted = [number for number in first.numbers() for _ in range(copies)]
+    wrong = [k for k, (number, want) in enumerate(zip(beats.numbers(), wanted, strict=True)) if number != want]
+    if wrong:
+        raise ShortfallError(f"result {wrong[0] // copies} must come out {copies} times, and changes meanwhile")
+    return first
+
+
 def _joined(samples: npt.NDArray[np.uint64], width: int, lanes: int) -> npt.NDArray[np.uint64]:
     """Join the words of `lanes` samples after the other into beats, the first one lowest."""
     if lanes == 1:

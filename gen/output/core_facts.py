@@ -80,6 +80,8 @@ class InterfaceFacts:
         Largest number of clocks from the edge that accepts a sample to the edge that can output its result.
     samples_per_result : int
         Samples of a channel for each result; the first sample brings one, and then every so many of them.
+    copies_per_result : int
+        Times that each result is handed out, one after the other.
     """
 
     name: str
@@ -88,6 +90,7 @@ class InterfaceFacts:
     reset_cycles: int
     latency_cycles: int
     samples_per_result: int = 1
+    copies_per_result: int = 1
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -364,6 +367,7 @@ def interface_facts(design: CoreDesign) -> InterfaceFacts:
         reset_cycles=design.architecture.reset_cycles,
         latency_cycles=design.architecture.latency_cycles,
         samples_per_result=1 if datapath.decimator is None else datapath.decimator.factor,
+        copies_per_result=design.architecture.copies_per_result,
     )
 
 

@@ -41,6 +41,8 @@ class DecimationFacts:
         Rate of the results, in Hz.
     correction : float
         Weight g of ``1 + g - g / z``, which corrects the droop in the pass band.
+    held : bool
+        Whether each result is handed out once for each of its samples.
     cycles_per_result : int
         Clocks between results at the highest rate.
     deviation_db : float
@@ -60,6 +62,7 @@ class DecimationFacts:
     dropped: int
     sample_rate: float
     correction: float
+    held: bool
     cycles_per_result: int
     deviation_db: float
     delay: float
@@ -81,6 +84,7 @@ def decimation_facts(made: CoreDesign) -> DecimationFacts | None:
         dropped=decimator.dropped,
         sample_rate=float(found.rate),
         correction=float(found.correction),
+        held=made.architecture.hold,
         cycles_per_result=made.architecture.cycles_per_result,
         deviation_db=found.deviation(filter_, design(made.spec.filter, made.spec.sample_rate)),
         delay=float(found.delay(filter_)),

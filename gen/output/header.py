@@ -82,6 +82,7 @@ def _timing(design: CoreDesign, facts: CoreFacts) -> Sequence[str]:
     if facts.decimation is not None:
         found = facts.decimation
         taken = f"{found.factor} samples are taken every {found.cycles_per_result} clocks at best"
+        taken += ", and a result is handed out as many times" * found.held
         its = "the last of its samples"
     ready = facts.interface.reset_cycles
     first = f", the first {ready} clocks after reset" if ready else ""

@@ -186,12 +186,11 @@ LOOK_AHEAD: dict[int, Realization] = {
 }
 """Realizations of pipelines with look-ahead, by the samples that their recursions go back at once."""
 
-_KNOWN = REALIZATIONS | {realization.name: realization for realization in LOOK_AHEAD.values()}
-
 
 def realization_of(name: str) -> Realization:
     """Return the realization with a name, be it one that a specification can name or one with look-ahead."""
-    return _KNOWN[name]
+    others = {realization.name: realization for realization in LOOK_AHEAD.values()}
+    return REALIZATIONS[name] if name in REALIZATIONS else others[name]
 
 
 CASCADES = tuple(name for name, realization in REALIZATIONS.items() if realization.cascade)

@@ -288,12 +288,13 @@ def _decimation_table(found: DecimationFacts) -> Table:
 
 def _decimation_caption(found: DecimationFacts, unit: str) -> str:
     worst, rate = amount(found.worst_aliasing, unit), _hertz((found.sample_rate,))
+    held = ", which leaves as many times" if found.held else ""
     return (
-        f"{found.factor} samples make one result, by {count(found.stages, 'stage')} of integrators and combs of "
-        f"{found.width} bits, and the filter works at {rate}. A sine over the whole range of the input in one of these "
-        f"bands comes out in the pass band with an amplitude of at most {worst}. In the pass band the gain is within "
-        f"{plain_number(found.deviation_db)} dB of that without a decimator, and decimator and filter together delay "
-        f"by {amount(found.delay, 's')}."
+        f"{found.factor} samples make one result{held}, by {count(found.stages, 'stage')} of integrators and combs "
+        f"of {found.width} bits, and the filter works at {rate}. A sine over the whole range of the input in one of "
+        f"these bands comes out in the pass band with an amplitude of at most {worst}. In the pass band the gain is "
+        f"within {plain_number(found.deviation_db)} dB of that without a decimator, and decimator and filter together "
+        f"delay by {amount(found.delay, 's')}."
     )
 
 

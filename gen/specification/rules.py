@@ -343,6 +343,8 @@ def _relation(kind: str, passband: Sequence[Fraction], stopband: Sequence[Fracti
 def _check_decimation(document: Document) -> None:
     """Check that what else is asked for is there behind a decimator."""
     table, hardware = document.filter, document.hardware
+    if table.decimate is None and table.hold:
+        raise UnfitError("false without filter.decimate, as every sample has a result", "true", where="filter.hold")
     if table.decimate is None:
         return
     found, where = literal(table.decimate), "filter.decimate"

@@ -183,6 +183,7 @@ class FilterTable(Table):
     ] = None
     sos_file: Annotated[str | None, PlainValidator(file_name)] = None
     decimate: Annotated[int | str | None, PlainValidator(read_decimate)] = None
+    hold: Annotated[bool, PlainValidator(flag)] = False
 
 
 class WearTable(Table):

@@ -75,6 +75,8 @@ class FilterSpec:
         specification or of its `sos_file`.
     decimate : int, "auto" or None
         Factor of the decimator before a low-pass filter by order and cutoff, a power of two; None without one.
+    hold : bool
+        Whether each result behind a decimator is handed out once for each of its samples, at their rate.
     origin : str
         How `sos_file` was read, a sentence; empty without one.
     """
@@ -91,6 +93,7 @@ class FilterSpec:
     sos: tuple[tuple[Fraction, ...], ...] | None
     origin: str = ""
     decimate: int | str | None = None
+    hold: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -333,4 +336,5 @@ def _filter(path: Path, table: FilterTable) -> FilterSpec:
         sos=sections,
         origin=origin,
         decimate=table.decimate,
+        hold=table.hold,
     )

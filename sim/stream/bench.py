@@ -47,8 +47,8 @@ class StreamBench:
         return self._received.first(self.count)
 
     def results(self, samples: int) -> int:
-        """Count the results of so many samples: one for the first, and one for each further group of them."""
-        return -(-samples // int(self.config["samples_per_result"]))
+        """Count what comes out for so many samples: a result for the first and each further group, and its copies."""
+        return -(-samples // int(self.config["samples_per_result"])) * int(self.config["copies_per_result"])
 
     def has(self, name: str) -> bool:
         """Whether the streams have the optional signal `name`."""

@@ -128,3 +128,51 @@ def test_a_broken_decimator_is_found_out(right: str, wrong: str, tmp_path: Path)
 
 def test_no_output_follows_an_input_within_a_clock(tmp_path: Path) -> None:
     assert combinational_outputs(hardware.CicDecimator(small()), tmp_path) == []
+
+
+class Copies(Proof):
+    """Each word that goes into a holder comes out `COPIES` times, unchanged, before the next one; none else does."""
+
+    def __init__(self, module: ModuleType) -> None:
+        super().__init__(module.Holder(2, COPIES))
+
+    def state(self, m: Module) -> None:
+        """State the rules."""
+        d = self.design
+        owed, word, was_reset = Signal(range(COPIES + 1)), Signal(len(d.i_data)), Signal()
+        taken, given = d.i_valid & d.i_ready, d.o_valid & d.o_ready
+        m.d.proof += [was_reset.eq(self.reset), owed.eq(owed - given)]
+        with m.If(taken):
+            m.d.proof += [owed.eq(COPIES), word.eq(d.i_data)]
+        with m.If(self.reset):
+            m.d.proof += owed.eq(0)
+        with m.If(self.started):
+            with m.If(was_reset):
+                m.d.comb += Assert(~d.o_valid)
+            m.d.comb += Assert(d.o_valid == (owed != 0))
+            with m.If(d.o_valid):
+                m.d.comb += Assert(d.o_data == word)
+            with m.If(taken):
+                m.d.comb += Assert((owed == 0) | ((owed == 1) & given))
+            with m.If((owed == 0) | ((owed == 1) & d.o_ready)):
+                m.d.comb += Assert(d.i_ready)
+
+
+COPIES = 4
+
+
+def test_each_result_is_handed_out_as_often_as_it_has_samples(tmp_path: Path) -> None:
+    assert prove(Copies(hardware), tmp_path) == "PASS"
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ("left.eq(self.copies - 1)", "left.eq(self.copies - 2)"),  # a copy too few
+        ("(self.o_ready & (left == 0))", "(left == 0)"),  # the last copy overwritten while it waits
+        ("with m.Elif(self.o_ready):\n            m.d.sync += left", "with m.Else():\n            m.d.sync += left"),
+        ("held.eq(self.i_data), self.o_valid.eq(self.i_valid)", "held.eq(self.i_data), self.o_valid.eq(1)"),
+    ],
+)
+def test_a_broken_holder_is_found_out(right: str, wrong: str, tmp_path: Path) -> None:
+    assert prove(Copies(broken(hardware, right, wrong)), tmp_path) == "FAIL"

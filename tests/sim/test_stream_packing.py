@@ -15,7 +15,7 @@ from sosmith.model.port import Port
 from sosmith.sim.beats import Beats
 from sosmith.sim.bench import BenchRun, Progress
 from sosmith.sim.cosimulate import cosimulate
-from sosmith.sim.stream_packing import pack, random_order, unpack
+from sosmith.sim.stream_packing import each_once, pack, random_order, unpack
 
 
 def port(name: str, bits: int, *, signed: bool) -> Port:
@@ -125,3 +125,14 @@ def test_a_missing_beat_of_several_samples_is_an_error() -> None:
     beats = pack(codes(channels=1), np.zeros(20, dtype=np.int64), stream)
     with pytest.raises(ShortfallError, match=r"^5 samples must come out, not 4$"):
         unpack(beats.first(4), np.zeros(20, dtype=np.int64), stream)
+
+
+def test_copies_are_taken_once() -> None:
+    beats = Beats(np.zeros(6, np.int64), np.repeat(np.array([7, 9], np.uint64), 3), np.zeros(6, np.uint64))
+    assert each_once(beats, 3).tdata.tolist() == [7, 9]
+    assert each_once(beats, 1) is beats
+    with pytest.raises(ShortfallError, match=r"^each result must come out 4 times, not 6 beats in all$"):
+        each_once(beats, 4)
+    beats.tuser[4] = 1
+    with pytest.raises(ShortfallError, match=r"^result 1 must come out 3 times, and changes meanwhile$"):
+        each_once(beats, 3)

@@ -67,7 +67,7 @@ TABLES = (
 )
 FILTER_KEYS = (
     "one of the keys family, kind, method, order, cutoff, passband_edge, stopband_edge, passband_loss,"
-    " stopband_loss, sos, sos_file, decimate, not an unknown one"
+    " stopband_loss, sos, sos_file, decimate, hold, not an unknown one"
 )
 IDENTIFIER = "a Verilog identifier of at most 64 letters, digits and underscores"
 IN_PROPORTION = "a number of at most 50 digits, zero or from 1e-30 to below 1e30 in size"
@@ -460,6 +460,60 @@ BAD = [
         KIND,
         KIND + '\nmethod = "matched_z"',
         "filter.method must be one of bilinear, impulse_invariant, not 'matched_z'",
+    ),
+    (
+        "results held of no decimator",
+        ORD,
+        f"{ORD}\nhold = true",
+        "filter.hold must be false without filter.decimate, as every sample has a result, not true",
+    ),
+    (
+        "three samples a clock",
+        CLOCK,
+        CLOCK + "\nsamples_per_clock = 3",
+        "hardware.samples_per_clock must be one of 1, 2, 4, 8, 16, not 3",
+    ),
+    (
+        "true samples a clock",
+        CLOCK,
+        CLOCK + "\nsamples_per_clock = true",
+        "hardware.samples_per_clock must be one of 1, 2, 4, 8, 16, not true",
+    ),
+    (
+        "unknown pipeline",
+        CLOCK,
+        CLOCK + '\npipeline = "lookahead"',
+        "hardware.pipeline must be one of auto, plain, look-ahead, not 'lookahead' (did you mean look-ahead?)",
+    ),
+    (
+        "several samples a clock folded",
+        CLOCK,
+        CLOCK + '\nsamples_per_clock = 2\narchitecture = "folded"',
+        "hardware.architecture must be 'auto' or 'parallel' with hardware.samples_per_clock = 2, not 'folded'",
+    ),
+    (
+        "several samples a clock with loadable constants",
+        CLOCK,
+        CLOCK + "\nsamples_per_clock = 2\nreload = true",
+        "hardware.reload must be false with hardware.samples_per_clock = 2, not true",
+    ),
+    (
+        "look-ahead with protection",
+        CLOCK,
+        CLOCK + '\npipeline = "look-ahead"\nprotect = "detect"',
+        "hardware.protect must be 'none' with hardware.pipeline = \"look-ahead\", not 'detect'",
+    ),
+    (
+        "look-ahead of a realization",
+        CLOCK,
+        CLOCK + '\npipeline = "look-ahead"\nrealization = "df1"',
+        "hardware.realization must be 'auto' with hardware.pipeline = \"look-ahead\", not 'df1'",
+    ),
+    (
+        "look-ahead with multipliers",
+        CLOCK,
+        CLOCK + '\npipeline = "look-ahead"\nmultipliers = 4',
+        "hardware.multipliers must be 'auto' or 0 with hardware.pipeline = \"look-ahead\", not 4",
     ),
     (
         "a factor that is no power of two",

@@ -3,6 +3,7 @@
 `./run test --slow` runs all random designs; the fast tests take none of them, but the locomotive's filter.
 """
 
+import json
 import random
 import re
 from collections.abc import Iterator
@@ -12,12 +13,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.gen.word_lengths.decimated import locomotive, read, tree_of
+from tests.gen.word_lengths.decimated import locomotive, locomotive_text, read, tree_of
 from tests.sim.lint import icarus_check, lint
 
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.output.generate import generate
 from sosmith.gen.report.report import write_report
+from sosmith.gen.specification.specification import from_text
 from sosmith.gen.stimuli import bench_of, traces_for
 from sosmith.gen.verifier.specified.stated_specification import check_specification
 from sosmith.gen.verifier.verification import verify
@@ -55,6 +57,31 @@ def test_hardware_equals_the_integer_model(architecture: str, simulator: str, tm
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "What folds into the pass band" in page
     assert "49.74122 Hz to 50 Hz" in page
+
+
+@pytest.mark.parametrize(("architecture", "simulator"), [("folded", "verilator"), ("parallel", "icarus")])
+def test_held_results_come_as_often_as_samples(architecture: str, simulator: str, tmp_path: Path) -> None:
+    text = locomotive_text(architecture=architecture).replace("order = 7\n", "order = 7\nhold = true\n")
+    made = design_core(from_text(text, Path("locomotive.toml")), core="filter")
+    bare = locomotive(architecture=architecture).architecture
+    assert (made.architecture.copies_per_result, bare.copies_per_result) == (16, 1)
+    assert made.architecture.cycles_per_result == bare.cycles_per_result
+    evidence = simulate(made, [samples_of(made, 500)], tmp_path, seed=5, simulator=simulator)
+    assert (evidence.mismatches, evidence.samples) == (0, 32)
+    manifest = json.loads((tmp_path / f"{made.spec.name}.json").read_text(encoding="utf-8"))
+    assert manifest["decimation"]["held"]
+    write_report(evidence, tmp_path)
+    assert "16 samples make one result, which leaves as many times" in (tmp_path / "report.html").read_text("utf-8")
+
+
+def test_held_results_take_no_longer(tmp_path: Path) -> None:
+    text = locomotive_text(architecture="folded").replace("order = 7\n", "order = 7\nhold = true\n")
+    made = design_core(from_text(text, Path("locomotive.toml")), core="filter")
+    stated, decimator = made.architecture, made.datapath.decimator
+    assert decimator is not None
+    evidence = simulate(made, [samples_of(made, 801)], tmp_path, seed=1, idle=0.0, stall=0.0)
+    last = stated.cycles_per_result * 50 + stated.latency_cycles + decimator.factor - 1
+    assert evidence.cycles == decimator.warm_up + 1 + last
 
 
 def test_results_come_at_the_rate_that_is_stated(tmp_path: Path) -> None:

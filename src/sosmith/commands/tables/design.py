@@ -82,6 +82,8 @@ def _add_decimation(overview: Table, design: Design) -> None:
         f"{found.stages} integrators and combs of {found.width} bits, {found.width - found.dropped} bits leave, at "
         f"{found.sample_rate:,.6g} Hz",
     )
+    if found.held:
+        overview.add_row("results", f"each {found.factor} times, at the rate of the samples")
     most = max(band.gain_db for band in found.aliasing)
     overview.add_row(
         "aliasing into the pass band",
