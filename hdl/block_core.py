@@ -32,7 +32,7 @@ from sosmith.hdl.stages.pipelined import PipelinedStage
 from sosmith.hdl.status import at_rail, flag_count, in_order, outside_calibration, worn
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.graph import Op
-from sosmith.model.dataflow.status import STATUS_BITS
+from sosmith.model.dataflow.status import STATUS_BITS, Flag
 
 
 class BlockCore(wiring.Component):
@@ -86,8 +86,8 @@ class BlockCore(wiring.Component):
         m = Module()
         m.domains.sync = ClockDomain(local=True)
         m.d.comb += [ClockSignal("sync").eq(self.aclk), ResetSignal("sync").eq(~self.aresetn)]
-        live = flag_count(self.datapath)
-        buffer = m.submodules.output_buffer = StreamBuffer((width([self.datapath.output]) + live) * self.lanes)
+        live = self._live_flags
+        buffer = m.submodules.output_buffer = StreamBuffer((width([self.datapath.output]) + len(live)) * self.lanes)
         m.d.comb += self.s_axis_tready.eq(buffer.advance)
         size = width(self.datapath.inputs)
         samples = [self.s_axis_tdata[size * k : size * (k + 1)] for k in range(self.lanes)]
@@ -95,30 +95,29 @@ class BlockCore(wiring.Component):
         codes: list[Value] = [data[f.offset : f.offset + f.port.bits] for data in samples for f in place]
         valid: Value = self.s_axis_tvalid
         components = self._components(m, buffer.advance)
-        for component in components:
+        for stage, component in zip(self.stages, components, strict=True):
             m.d.comb += [getattr(component, f"i{k}").eq(code) for k, code in enumerate(codes)]
             m.d.comb += component.i_valid.eq(valid)
             valid = component.o_valid
-            codes = [getattr(component, name) for name in component.signature.members if _is_output(name)]
-        judged: Value = Cat(
-            Cat(at_rail(self.datapath.inputs, data), outside_calibration(self.datapath, data)) for data in samples
-        )
+            codes = [getattr(component, f"o{k}") for k in range(len(stage.graph.outputs))]
+        judged: Value = Cat(self._judged(data) for data in samples)
         for k in range(sum(block_depths(self.datapath, self.lanes, look_ahead=self.look_ahead))):
             held = Signal(len(judged), name=f"status{k + 1}", reset_less=True)
             with m.If(buffer.advance):
                 m.d.sync += held.eq(judged)
             judged = held
         each, flags_each = len(codes) // self.lanes, len(judged) // self.lanes
-        limited = any(self.stages[-1].graph.nodes[i].op is Op.CLAMP for i in self.stages[-1].graph.outputs)
         saturated = components[-1].o_saturated
         results, flags = [], []
         for k in range(self.lanes):
             code, *settling = codes[each * k : each * (k + 1)]
             wear = worn(m, self.datapath, code, Const(0, 0), buffer.advance, "none")
-            own = judged[flags_each * k : flags_each * (k + 1)]
+            own = Cat(judged[flags_each * k : flags_each * (k + 1)], Const(0, 2 - flags_each))
             settles = settling[0][-1] if settling else Const(0, 0)
             results.append(extended(code, self.datapath.output.bytes * 8))
-            flags.append(in_order(self.datapath, own, saturated[k] if limited else Const(0, 1), wear, settles))
+            limited = saturated[k] if Flag.OUTPUT_SATURATED in live else Const(0, 1)
+            found = in_order(self.datapath, own, limited, wear, settles)
+            flags += [found[bit] for bit in live]
         m.d.comb += [
             buffer.i_valid.eq(valid),
             buffer.i_data.eq(Cat(*results, *flags)),
@@ -128,8 +127,30 @@ class BlockCore(wiring.Component):
         ]
         handed = buffer.o_data[len(self.m_axis_tdata) :]
         for k in range(self.lanes):
-            m.d.comb += self.m_axis_tuser[STATUS_BITS * k : STATUS_BITS * (k + 1)].eq(handed[live * k : live * (k + 1)])
+            m.d.comb += [
+                self.m_axis_tuser[STATUS_BITS * k + bit].eq(handed[len(live) * k + place])
+                for place, bit in enumerate(live)
+            ]
         return m
+
+    @property
+    def _live_flags(self) -> list[int]:
+        """Bits of the status that a sample may set: the others have no registers."""
+        inputs = zip(self.datapath.inputs, self.datapath.calibrated, strict=True)
+        never = set()
+        if all(ends == (port.lowest, port.highest) for port, ends in inputs):
+            never.add(Flag.OUTSIDE_CALIBRATION)
+        last = self.datapath.stages[-1].graph
+        if last.nodes[last.outputs[0]].op is not Op.CLAMP:
+            never.add(Flag.OUTPUT_SATURATED)
+        if not self.datapath.wear:
+            never |= {Flag.WEAR_WARNING, Flag.WEAR_CRITICAL}
+        return [bit for bit in range(flag_count(self.datapath)) if bit not in never]
+
+    def _judged(self, data: Value) -> Value:
+        """Return the flags that are known with a sample as it comes in; not the second if it never is."""
+        rail, outside = at_rail(self.datapath.inputs, data), outside_calibration(self.datapath, data)
+        return rail if isinstance(outside, Const) else Cat(rail, outside)
 
     def _components(self, m: Module, advance: Value) -> list[LookAheadStage | PipelinedStage]:
         """Make the hardware of the stages."""
@@ -146,8 +167,3 @@ class BlockCore(wiring.Component):
             m.submodules[stage.name] = component
             m.d.comb += component.advance.eq(advance)
         return made
-
-
-def _is_output(name: str) -> bool:
-    """Whether a member of a stage is one of its output codes."""
-    return name[0] == "o" and name[1:].isdecimal()

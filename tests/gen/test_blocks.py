@@ -2,13 +2,13 @@
 
 import json
 import re
-from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
 from benchmarks.random_designs import random_specification
 from tests.formal.prover import broken
+from tests.gen.blocks import AUDIO, designed, text
 from tests.gen.designs import EXAMPLES
 from tests.hdl.core_bench import Pace, run_core
 
@@ -30,19 +30,6 @@ from sosmith.model.reference.golden import calibrated, filtered
 
 DESIGNS = 40
 SAMPLES = 240
-AUDIO = (EXAMPLES / "audio_lowpass.toml").read_text(encoding="utf-8")
-
-
-def text(lanes: int = 1, *, pipeline: str = "look-ahead", clock: str = "48.0e6", base: str = AUDIO) -> str:
-    """Return a specification for several samples a clock and a pipeline."""
-    made = base.replace('architecture = "auto"', f'pipeline = "{pipeline}"\nsamples_per_clock = {lanes}')
-    assert made != base
-    return made.replace("clock = 48.0e6", f"clock = {clock}")
-
-
-@cache
-def designed(lanes: int = 1, *, pipeline: str = "look-ahead", clock: str = "48.0e6") -> CoreDesign:
-    return design_core(from_text(text(lanes, pipeline=pipeline, clock=clock), Path("audio.toml")))
 
 
 @pytest.mark.parametrize("number", [1, 2, 3, 4])
