@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from sosmith.gen.architecture import Architecture
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.fpga.synthesis import Netlist
 from sosmith.model.dataflow.c_model import c_source
@@ -33,8 +34,9 @@ class Provenance:
         Of the input codes of all channels, with the inputs' formats and the sample rate.
     datapath_sha256 : str
         Of the datapath, told as its C model, whatever its name.
-    cycles_per_sample : int
-        Largest number of clocks between samples that the hardware needs, without waiting.
+    cycles_per_sample : float
+        Largest number of clocks between samples that the hardware needs, without waiting: a whole number but where a
+        beat holds several samples.
     cost : Mapping
         As `hardware_cost` returns it.
     """
@@ -44,7 +46,7 @@ class Provenance:
     reference_sha256: str
     trace_sha256: str
     datapath_sha256: str
-    cycles_per_sample: int
+    cycles_per_sample: float
     cost: Mapping[str, Any]
 
 
@@ -56,9 +58,15 @@ def provenance_of(design: CoreDesign, traces: Sequence[Trace], netlist: Netlist 
         reference_sha256=reference_digest(design),
         trace_sha256=trace_digest(traces),
         datapath_sha256=hashlib.sha256(c_source(replace(design.datapath, name="datapath")).encode()).hexdigest(),
-        cycles_per_sample=design.architecture.cycles_per_sample,
+        cycles_per_sample=_clocks(design.architecture),
         cost=hardware_cost(design, netlist),
     )
+
+
+def _clocks(architecture: Architecture) -> float:
+    """Clocks between samples at the highest rate: a whole number but where a beat holds several."""
+    beat, lanes = architecture.cycles_per_sample, architecture.samples_per_clock
+    return beat / lanes if lanes > 1 else beat
 
 
 def reference_digest(design: CoreDesign) -> str:

@@ -20,6 +20,7 @@ from sosmith.gen.output.pins import pins
 from sosmith.gen.realizations import look_ahead as realization
 from sosmith.gen.realizations.registry import LOOK_AHEAD, realization_of
 from sosmith.gen.realizations.section_format import SectionFormat
+from sosmith.gen.report.provenance import provenance_of
 from sosmith.gen.specification.specification import from_text
 from sosmith.gen.stimuli import traces_for
 from sosmith.gen.verifier import verification
@@ -140,6 +141,8 @@ def test_manifest_and_pins_tell_how_samples_lie_in_a_beat() -> None:
     assert (named["s_axis_tdata"].width, named["m_axis_tdata"].width, named["m_axis_tuser"].width) == (32, 32, 16)
     assert named["s_axis_tdata"].meaning.startswith("2 samples of 16 bits, the first one lowest, each with the bits; ")
     assert "pipeline" not in manifest(facts)
+    (trace,) = traces_for(made, "noise", seed=1)
+    assert provenance_of(made, [trace]).cycles_per_sample == 0.5
     plain = manifest(core_facts(designed()))
     assert plain["pipeline"] == "look-ahead"
     assert "samples" not in plain["streams"]["s_axis"]

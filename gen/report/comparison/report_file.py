@@ -56,7 +56,7 @@ _KNOWN: dict[str, tuple[type, ...]] = {
     "provenance.reference_sha256": (str,),
     "provenance.trace_sha256": (str,),
     "provenance.datapath_sha256": (str,),
-    "provenance.cycles_per_sample": (int,),
+    "provenance.cycles_per_sample": _NUMBER,
     "provenance.cost": (dict,),
     "provenance.cost.source": (str,),
     "provenance.cost.board": (str, type(None)),

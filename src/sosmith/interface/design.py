@@ -160,8 +160,13 @@ class Design:
 
     @property
     def cycles_per_sample(self) -> int:
-        """Clock cycles from one input sample to the next."""
+        """Clock cycles from one input sample to the next, or from one beat of several to the next."""
         return self.core.architecture.cycles_per_sample
+
+    @property
+    def samples_per_clock(self) -> int:
+        """Samples in each beat of the streams."""
+        return self.core.architecture.samples_per_clock
 
     @cached_property
     def sos(self) -> Floats:
@@ -670,7 +675,8 @@ class Design:
 
     def _repr_html_(self) -> str:
         filter_ = self.core.quantized.filter
-        spec = self.specification
+        spec, lanes = self.specification, self.samples_per_clock
+        clocks = f"{self.cycles_per_sample:,}" if lanes == 1 else f"{self.cycles_per_sample / lanes:g}"
         rows = [
             ("filter", "none" if filter_ is None else filter_.describe),
             *self.reasons.items(),
@@ -678,7 +684,7 @@ class Design:
             ("error bound", f"{self.bound}, proven for all inputs in range; {spec.max_error} allowed"),
             *((f"of it {part}", str(value)) for part, value in self.budget.items()),
             ("latency", f"{self.latency_cycles:,} clocks"),
-            ("clocks a sample", f"{self.cycles_per_sample:,}"),
+            ("clocks a sample", clocks),
         ]
         return table_html(f"{self.name}: {self.kind}", rows)
 
