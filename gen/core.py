@@ -190,11 +190,9 @@ def design_core(
         if looks_ahead and ideal is not None:
             return _looking_ahead(plan_of, ahead, budget)
         quantized, reason = select(name)
-        architecture = in_hardware(name, quantized.datapath)
-        asked = hardware.pipeline != AUTO or wanted != AUTO or ideal is None
-        if not asked and name == "parallel" and _is_too_slow(architecture, budget):
-            return _looking_ahead(plan_of, ahead, budget)
-        return quantized, reason, architecture
+        plain = quantized, reason, in_hardware(name, quantized.datapath)
+        asked = hardware.pipeline != AUTO or wanted != AUTO or ideal is None or hardware.multipliers
+        return plain if asked or name != "parallel" else _faster(plain, plan_of, ahead, budget)
 
     several = looks_ahead or hardware.samples_per_clock > 1
     names = ("parallel",) if several else candidates(hardware.architecture, budget.blocks)
@@ -235,10 +233,25 @@ def _first_that_keeps_up(names: Sequence[str], made_in: Callable[[str], _Made]) 
     return made_in(names[-1]), refused
 
 
-def _is_too_slow(architecture: Architecture, budget: Budget) -> bool:
-    """Whether a core that must take a beat at each clock needs look-ahead to reach it, by the estimate for an ECP5."""
-    plain = budget.channels == 1 and not budget.reload and budget.protect == "none" and budget.decimate == 1
-    return plain and budget.cycles == 1 and architecture.clock_estimate < budget.clock
+def _faster(
+    plain: _Made, plan_of: Callable[[str], Plan], in_hardware: Callable[[Datapath], Architecture], budget: Budget
+) -> _Made:
+    """Return a design with look-ahead, if a core must take a beat at each clock and its plain loops are too slow.
+
+    Speeds are those of the estimate for an ECP5. The plain design stays if look-ahead cannot meet the specification, or
+    is no faster.
+    """
+    single = budget.channels == 1 and not budget.reload and budget.protect == "none" and budget.decimate == 1
+    reached = plain[2].clock_estimate
+    if not single or budget.cycles > 1 or reached >= budget.clock:
+        return plain
+    try:
+        quantized, reason, architecture = _looking_ahead(plan_of, in_hardware, budget)
+    except ShortfallError:
+        return plain
+    if architecture.clock_estimate <= reached:
+        return plain
+    return quantized, f"{reason}; plain loops reach {reached / 1e6:.0f} MHz", architecture
 
 
 def _looking_ahead(
@@ -252,31 +265,29 @@ def _looking_ahead(
         If no sections with look-ahead meet the specification.
     """
     best: _Made | None = None
-    refused: ShortfallError | None = None
+    refused = ShortfallError(f"hardware.samples_per_clock must be less than {max(LOOK_AHEAD)} with look-ahead")
     for samples, realization in LOOK_AHEAD.items():
         if samples <= budget.samples_per_clock:
             continue
+        planned = plan_of(realization.name).under(FEW_ADDERS)
         try:
-            quantized = prove(plan_of(realization.name).under(FEW_ADDERS).trimmed())
+            quantized = prove(planned if planned.is_long else planned.trimmed())
         except ShortfallError as error:
             refused = error
             continue
         architecture = in_hardware(quantized.datapath)
         estimate = architecture.clock_estimate
-        reached = "reaches" if estimate >= budget.clock else "comes closest to"
+        reached = estimate >= budget.clock
         reason = (
-            f"{realization.name}: the shortest look-ahead that {reached} a clock of {float(budget.clock) / 1e6:,.6g} "
-            f"MHz on an ECP5, by an estimate of {estimate / 1e6:.0f} MHz"
+            f"{realization.name}: {'the shortest look-ahead that reaches' if reached else 'comes closest to'} a clock "
+            f"of {float(budget.clock) / 1e6:,.6g} MHz on an ECP5, by an estimate of {estimate / 1e6:.0f} MHz"
         )
         if best is None or estimate > best[2].clock_estimate:
             best = quantized, reason, architecture
-        if estimate >= budget.clock:
+        if reached:
             break
     if best is None:
-        raise refused or ShortfallError(
-            f"hardware.samples_per_clock must be at most {max(LOOK_AHEAD) // 2} with look-ahead, "
-            f"not {budget.samples_per_clock}"
-        )
+        raise refused
     return best
 
 

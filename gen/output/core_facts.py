@@ -170,7 +170,7 @@ class SectionFacts:
         In the order of computation.
     states : mapping of str to str
         Q format of each state, by name.
-    b, a : tuple of float, length 3
+    b, a : tuple of float, length 3 or, with look-ahead, more
         Transfer function with the integer coefficients, in powers of ``z**-1``.
     input, output : str
         Q formats.
@@ -405,7 +405,9 @@ def _sections(section: Stage) -> Sequence[SectionFacts]:
 def _section(name: str, graph: Graph, feedback: tuple[int, ...] | None) -> SectionFacts:
     nodes = graph.nodes
     model = linear_model(graph)
-    b, a = (tuple([*map(float, values), 0.0, 0.0][:3]) for values in (model.transfer, model.denominator))
+    b, a = (
+        tuple([*map(float, values), 0.0, 0.0][: max(3, len(values))]) for values in (model.transfer, model.denominator)
+    )
     return SectionFacts(
         name=name,
         coefficients=tuple(

@@ -16,12 +16,16 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Sequence
+from textwrap import wrap
 
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.output.core_facts import CoreFacts, SectionFacts
 from sosmith.gen.output.pins import pins
 from sosmith.gen.version import __version__
 from sosmith.model.templates import render
+
+_LINE = 112
+"""Characters of a line, without the comment sign, for equations of many terms."""
 
 
 def with_comments(text: str, design: CoreDesign, facts: CoreFacts) -> str:
@@ -102,7 +106,9 @@ def _stage_lines(name: str, facts: CoreFacts) -> list[str]:
 
 def _section_lines(section: SectionFacts) -> list[str]:
     terms = [*_terms(section.b, "x", 1), *_terms((0.0, *section.a[1:]), "y", -1)]
-    lines = [f"{section.name}: y[n] = {' '.join(terms).removeprefix('+ ')}"]
+    equation = f"{section.name}: y[n] = {' '.join(terms).removeprefix('+ ')}"
+    # Look-ahead has some ten terms.
+    lines = wrap(equation, _LINE, subsequent_indent="  ") if len(section.b) > 3 else [equation]
     if section.coefficients:
         parts = (f"{each.name} = {each.integer} / 2**{each.frac}" for each in section.coefficients)
         lines.append(f"  {', '.join(parts)}")

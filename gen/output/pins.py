@@ -99,10 +99,11 @@ def _meaning(name: str, interface: InterfaceFacts) -> str:
         lanes = interface.outputs.lanes
         each = [f"{lanes} bytes, a status for each sample, the first one lowest, with the bits"] if lanes > 1 else []
         return "; ".join([*each, *flags])
+    lanes = interface.inputs.lanes > 1
     return {
         "aclk": "clock, rising edge",
         "aresetn": "synchronous reset, active low",
         "tdest": "channel",
-        "tvalid": "a sample is there" if name.startswith("s_") else "a result is there",
+        "tvalid": f"a {'beat' if lanes else 'sample' if name.startswith('s_') else 'result'} is there",
         "tready": "the core takes it" if name.startswith("s_") else "the receiver takes it",
     }[name.rpartition("_")[2]]

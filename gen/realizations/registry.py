@@ -15,6 +15,7 @@ from sosmith.gen.realizations.look_ahead import look_ahead
 from sosmith.gen.realizations.section_format import WIDE, SectionFormat
 from sosmith.gen.realizations.state_space import StateDesign, minimum_noise, normal, state_space
 from sosmith.gen.realizations.transposed import transposed_form
+from sosmith.gen.specification import choices
 from sosmith.model.dataflow.datapath import Stage
 
 Row = Sequence[float]
@@ -177,12 +178,12 @@ REALIZATIONS: dict[str, Realization] = {
 """All realizations that a specification can name, by name, in the order in which lists show them."""
 
 LOOK_AHEAD: dict[int, Realization] = {
-    1 << doublings: Realization(
-        name=f"look_ahead_{1 << doublings}",
-        title=f"direct form with scattered look-ahead over {1 << doublings} samples",
-        build=_look_ahead(doublings),
+    samples: Realization(
+        name=f"look_ahead_{samples}",
+        title=f"direct form with scattered look-ahead over {samples} samples",
+        build=_look_ahead(samples.bit_length() - 1),
     )
-    for doublings in range(1, 5)
+    for samples in choices.LOOK_AHEAD
 }
 """Realizations of pipelines with look-ahead, by the samples that their recursions go back at once."""
 

@@ -20,6 +20,8 @@ STARTS = ("steady", "zero")
 ARCHITECTURES = ("auto", "parallel", "folded", "serial", "online")
 PIPELINES = ("auto", "plain", "look-ahead")
 SAMPLES_PER_CLOCK = (1, 2, 4, 8, 16)
+LOOK_AHEAD = (2, 4, 8, 16)
+"""Samples over which recursions can look ahead: more than a beat holds."""
 
 CORES = ("instrument", "filter", "calibration")
 """What can be generated from a specification: the whole instrument, or one part."""

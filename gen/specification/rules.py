@@ -9,7 +9,7 @@ import math
 from collections.abc import Sequence
 from fractions import Fraction
 
-from sosmith.gen.specification.choices import AUTO, CALIBRATION_INPUTS, FAMILIES, KINDS, LOSSES, MAX_RATIO
+from sosmith.gen.specification.choices import AUTO, CALIBRATION_INPUTS, FAMILIES, KINDS, LOOK_AHEAD, LOSSES, MAX_RATIO
 from sosmith.gen.specification.schema import MAX_ORDER, Document, FilterTable, InputTable
 from sosmith.gen.specification.uncertainty import check_coefficients
 from sosmith.gen.specification.values import UnfitError, identifier, key_text, listed, literal, one_of
@@ -93,6 +93,13 @@ def _check_block(document: Document) -> None:
         asked.append(("hardware.realization", hardware.realization, ("auto",)))
         if hardware.multipliers is not None:
             asked.append(("hardware.multipliers", hardware.multipliers, ("auto", 0)))
+        most = max(LOOK_AHEAD) // 2
+        if hardware.samples_per_clock > most:
+            raise UnfitError(
+                f'at most {most} with hardware.pipeline = "look-ahead"',
+                literal(hardware.samples_per_clock),
+                where="hardware.samples_per_clock",
+            )
     if hardware.samples_per_clock == 1 and not looks_ahead:
         return
     found = 'pipeline = "look-ahead"' if looks_ahead else f"samples_per_clock = {hardware.samples_per_clock}"

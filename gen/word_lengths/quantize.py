@@ -35,6 +35,9 @@ from sosmith.model.port import Port
 _BITS_TO_ORDER = 24
 """Significant bits of the coefficients when orders of the sections are compared."""
 
+_MOST_WORK = 1_000_000
+"""Samples of all coefficients' responses together up to which formats with look-ahead are trimmed."""
+
 _ATTEMPTS = 4
 """How often formats are chosen again with estimates before exact figures are used."""
 
@@ -95,6 +98,11 @@ class Plan:
         held = None if before is None else before.held
         last, _ = output_stage(self.search.output(self.start), self.output, held)
         return self.search.size(self.start) + self.objective.of_graph(last.graph)
+
+    @property
+    def is_long(self) -> bool:
+        """Whether responses are so long, and coefficients so many, that to trim them would take minutes."""
+        return self.search is not None and self.search.work > _MOST_WORK
 
     def under(self, objective: Objective) -> Plan:
         """Return the same plan, to be trimmed for another objective."""

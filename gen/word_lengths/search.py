@@ -133,6 +133,11 @@ class Search:
         self._ranges: dict[tuple[object, ...], dict[str, tuple[int, int]]] = {}
         self._known: dict[tuple[object, ...], tuple[float, Range, dict[str, int]]] = {}
 
+    @property
+    def work(self) -> int:
+        """Samples of the responses to all coefficients together, which decide how long trimming takes."""
+        return sum(len(slope) for estimate in self._estimates for slope in estimate.slopes.values())
+
     def under(self, objective: Objective) -> Search:
         """Return the same search for another objective."""
         if objective == self._objective:

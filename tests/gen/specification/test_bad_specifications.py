@@ -510,6 +510,12 @@ BAD = [
         "hardware.realization must be 'auto' with hardware.pipeline = \"look-ahead\", not 'df1'",
     ),
     (
+        "look-ahead over no more samples than a beat",
+        CLOCK,
+        CLOCK + '\npipeline = "look-ahead"\nsamples_per_clock = 16',
+        'hardware.samples_per_clock must be at most 8 with hardware.pipeline = "look-ahead", not 16',
+    ),
+    (
         "look-ahead with multipliers",
         CLOCK,
         CLOCK + '\npipeline = "look-ahead"\nmultipliers = 4',
