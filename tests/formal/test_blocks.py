@@ -45,7 +45,6 @@ def rules(
         (limiter(), 2, False),
         (limiter(), 2, True),
         (distant(2), 1, True),
-        (distant(3), 1, True),
     ],
 )
 def test_beats_keep_the_rules_and_every_sample(datapath: Datapath, lanes: int, ahead: bool, tmp_path: Path) -> None:
@@ -53,7 +52,7 @@ def test_beats_keep_the_rules_and_every_sample(datapath: Datapath, lanes: int, a
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("turns", "lanes"), [(4, 2), (4, 1)])
+@pytest.mark.parametrize(("turns", "lanes"), [(3, 1), (4, 2), (4, 1)])
 def test_longer_turns_keep_the_rules_and_every_sample(turns: int, lanes: int, tmp_path: Path) -> None:
     assert prove(rules(distant(turns), lanes, ahead=True), tmp_path, timeout=2400) == "PASS"
 

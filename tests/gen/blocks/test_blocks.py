@@ -171,7 +171,14 @@ def codes_of(made: CoreDesign, count: int) -> np.ndarray:
     return codes
 
 
-@pytest.mark.parametrize("pace", [Pace(), Pace(idle=0.0, stall=0.0), Pace(idle=0.6, stall=0.6, withdraw=0.3)])
+@pytest.mark.parametrize(
+    "pace",
+    [
+        Pace(),
+        pytest.param(Pace(idle=0.0, stall=0.0), marks=pytest.mark.slow),
+        pytest.param(Pace(idle=0.6, stall=0.6, withdraw=0.3), marks=pytest.mark.slow),
+    ],
+)
 @pytest.mark.parametrize(
     ("lanes", "pipeline", "clock"),
     [(1, "look-ahead", "48.0e6"), (1, "look-ahead", "150.0e6"), (2, "plain", "48.0e6"), (2, "look-ahead", "100.0e6")],

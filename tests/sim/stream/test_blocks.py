@@ -30,7 +30,12 @@ def worst(made: CoreDesign, kind: str, samples: int, folder: Path, simulator: st
 
 
 @pytest.mark.parametrize(
-    ("lanes", "simulator"), [(2, "verilator"), (4, "cxxrtl"), (16, "verilator"), (16, "icarus"), (16, "cxxrtl")]
+    ("lanes", "simulator"),
+    [
+        (2, "verilator"),
+        (16, "icarus"),
+        *(pytest.param(*case, marks=pytest.mark.slow) for case in ((4, "cxxrtl"), (16, "verilator"), (16, "cxxrtl"))),
+    ],
 )
 def test_beats_of_any_width_are_simulated(lanes: int, simulator: str, tmp_path: Path) -> None:
     """16 samples of 16 bits are 256 bits, which the compiled loop does not take; the last beat is not full."""
