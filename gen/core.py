@@ -246,7 +246,7 @@ def _faster(
     if not single or budget.cycles > 1 or reached >= budget.clock:
         return plain
     try:
-        quantized, reason, architecture = _looking_ahead(plan_of, in_hardware, budget)
+        quantized, reason, architecture = _looking_ahead(plan_of, in_hardware, budget, patient=False)
     except ShortfallError:
         return plain
     if architecture.clock_estimate <= reached:
@@ -255,9 +255,15 @@ def _faster(
 
 
 def _looking_ahead(
-    plan_of: Callable[[str], Plan], in_hardware: Callable[[Datapath], Architecture], budget: Budget
+    plan_of: Callable[[str], Plan],
+    in_hardware: Callable[[Datapath], Architecture],
+    budget: Budget,
+    *,
+    patient: bool = True,
 ) -> _Made:
     """Choose how far recursions look ahead: as little as the clock allows, by the estimate for an ECP5.
+
+    If not `patient`, responses so long that their design takes minutes are refused.
 
     Raises
     ------
@@ -265,11 +271,13 @@ def _looking_ahead(
         If no sections with look-ahead meet the specification.
     """
     best: _Made | None = None
-    refused = ShortfallError(f"hardware.samples_per_clock must be less than {max(LOOK_AHEAD)} with look-ahead")
+    refused = ShortfallError("look-ahead must have more samples than a beat, and responses that are not too long")
     for samples, realization in LOOK_AHEAD.items():
         if samples <= budget.samples_per_clock:
             continue
         planned = plan_of(realization.name).under(FEW_ADDERS)
+        if planned.is_long and not patient:
+            continue
         try:
             quantized = prove(planned if planned.is_long else planned.trimmed())
         except ShortfallError as error:

@@ -17,7 +17,7 @@ from typing import cast
 
 from sosmith.gen.filter.design import Filter
 from sosmith.gen.proof.cascade_proof import CascadeProof, ideal_gain
-from sosmith.gen.realizations.registry import Section, realization_of
+from sosmith.gen.realizations.registry import REALIZATIONS, Section, realization_of
 from sosmith.gen.realizations.section_format import SectionFormat, unknown_range
 from sosmith.gen.word_lengths.bit_limits import MAX_BITS
 from sosmith.gen.word_lengths.cascade import cascade, parts_of, stages_of, unquantized
@@ -101,8 +101,9 @@ class Plan:
 
     @property
     def is_long(self) -> bool:
-        """Whether responses are so long, and coefficients so many, that to trim them would take minutes."""
-        return self.search is not None and self.search.work > _MOST_WORK
+        """Whether sections look ahead with so long responses and so many coefficients that trimming takes minutes."""
+        ahead = self.realization not in REALIZATIONS
+        return ahead and self.search is not None and self.search.work > _MOST_WORK
 
     def under(self, objective: Objective) -> Plan:
         """Return the same plan, to be trimmed for another objective."""
@@ -242,6 +243,8 @@ def prove(planned: Plan) -> Quantized:
             excess = made.bound * planned.output.lsb - planned.max_error
             if excess <= 0:
                 return made
+            if planned.is_long:
+                break
             tried = choice
             allowed -= max(2 * excess / planned.output.lsb, allowed / 64)
             choice = search.trimmed(search.start(float(planned.share), MAX_BITS) or start, float(allowed))
