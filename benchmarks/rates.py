@@ -156,6 +156,7 @@ def picture(record: Figures) -> str:
                 axes.loglog(x, y, "o-", color=colours[name], label=name)
                 for at, height, mark in zip(x, y, marks, strict=True):
                     axes.annotate(mark, (at, height), (4, -9), textcoords="offset points", fontsize="x-small")
+            axes.margins(x=0.12)
             axes.set_title("iCE40 HX8K" if key == "hx8k" else "ECP5 LFE5U-25F and -85F, speed 6")
             axes.set_xlabel("samples per second at fmax")
             axes.grid(visible=True, which="both", alpha=0.3)
