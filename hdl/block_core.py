@@ -148,9 +148,9 @@ class BlockCore(wiring.Component):
         return [bit for bit in range(flag_count(self.datapath)) if bit not in never]
 
     def _judged(self, data: Value) -> Value:
-        """Return the flags that are known with a sample as it comes in; not the second if it never is."""
+        """Return the flags that are known with a sample as it comes in; not the second if it is never set."""
         rail, outside = at_rail(self.datapath.inputs, data), outside_calibration(self.datapath, data)
-        return rail if isinstance(outside, Const) else Cat(rail, outside)
+        return Cat(rail, outside) if Flag.OUTSIDE_CALIBRATION in self._live_flags else rail
 
     def _components(self, m: Module, advance: Value) -> list[LookAheadStage | PipelinedStage]:
         """Make the hardware of the stages."""

@@ -209,7 +209,7 @@ def _source_keys(graph: Graph) -> list[_Key]:
         if node.op is Op.CONSTANT and node.parameter:
             keys[("constant", index, 0)] = None
         elif node.op in {Op.FLOOR, Op.FRACTION, Op.TRUNCATE}:
-            root, _ = _undelayed(graph, node.operands[0])
+            root, _ = graph.undelayed(node.operands[0])
             keys[(_kind(node), root, _kept(node))] = None
     return list(keys)
 
@@ -220,14 +220,6 @@ def _kind(node: Node) -> str:
 
 def _kept(node: Node) -> int:
     return node.parameter if node.op is Op.FRACTION else node.frac
-
-
-def _undelayed(graph: Graph, index: int) -> tuple[int, int]:
-    """Node that `index` is a delayed copy of, and the delay in samples."""
-    delay = 0
-    while graph.nodes[index].op is Op.DELAY:
-        index, delay = graph.nodes[index].operands[0], delay + 1
-    return index, delay
 
 
 def _range(graph: Graph, key: _Key) -> tuple[Fraction, Fraction]:
@@ -293,7 +285,7 @@ def _forms(graph: Graph) -> list[_Form]:
         elif node.op is Op.BOUND:
             form = of[0]
         else:
-            root, delay = _undelayed(graph, node.operands[0])
+            root, delay = graph.undelayed(node.operands[0])
             error = _Form({}, {((_kind(node), root, _kept(node)), delay): fmpq(1)})
             form = error if node.op is Op.FRACTION else of[0].plus(error, -1)
         forms.append(form)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from fractions import Fraction
 
 from flint import fmpz
@@ -21,9 +22,14 @@ def pole_radii(denominator: Coefficients) -> list[Fraction]:
     ValueError
         If it is not of degree 1 or 2 in w, or in a power of w.
     """
-    step = math.gcd(*(k for k, value in enumerate(denominator) if value)) or 1
+    step = power_of(denominator)
     radii = _radii(denominator[::step])
     return radii if step == 1 else [_root_above(radius, step) for radius in radii for _ in range(step)]
+
+
+def power_of(denominator: Sequence[Fraction] | Sequence[float]) -> int:
+    """Return the largest step for which a polynomial in w is one in ``w**step``; 1 for a constant."""
+    return math.gcd(*(k for k, value in enumerate(denominator) if value)) or 1
 
 
 def _radii(denominator: Coefficients) -> list[Fraction]:

@@ -28,6 +28,7 @@ import numpy.typing as npt
 
 from sosmith.gen.filter.design import estimated_length
 from sosmith.gen.proof.linear_model import LinearModel
+from sosmith.gen.proof.poles import power_of
 
 Norm = Literal["l1", "l2", "linf"]
 """Norm of an impulse response: sum of magnitudes, root of the sum of squares, largest gain over all frequencies."""
@@ -171,7 +172,7 @@ def _length(sections: Sequence[NoisySection]) -> int:
     """Length of the spectra: eight times that of the responses, which resolves resonance peaks to 0.1 %."""
     found = 0
     for section in sections:
-        step = math.gcd(*(k for k, value in enumerate(section.denominator) if value)) or 1
+        step = power_of(section.denominator)
         poles = [*section.denominator[::step], 0.0, 0.0][:3]
         found = max(found, step * estimated_length(np.array([[1.0, 0.0, 0.0, *poles]])))
     return 1 << (8 * found - 1).bit_length()

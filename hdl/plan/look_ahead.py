@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from sosmith.hdl.plan.constant_products import with_sums
-from sosmith.hdl.plan.pipeline import ADDITION, NO_LOGIC, operation_time
+from sosmith.hdl.plan.pipeline import ADDITION, NO_LOGIC, loop_delays, operation_time
 from sosmith.hdl.plan.reassociation import reassociated
 from sosmith.model.dataflow.datapath import Stage
 from sosmith.model.dataflow.graph import Graph, GraphBuilder, Op, Wire
@@ -98,8 +98,8 @@ def _turned(graph: Graph) -> tuple[Graph, int, frozenset[int]]:
     Its nodes are in the order of computation also where they depend on a DELAY of no loop.
     """
     graph = with_sums(reassociated(graph))
-    nodes, loops = graph.nodes, _loop_delays(graph)
-    roots = {i: _undelayed(graph, i) for i in loops}
+    nodes, loops = graph.nodes, loop_delays(graph)
+    roots = {i: graph.undelayed(i) for i in loops}
     used = {i for index, node in enumerate(nodes) if index not in loops for i in node.operands} | {*graph.outputs}
     turns = math.gcd(*(roots[i][1] for i in loops & used))
     kept = {i for i in loops if roots[i][1] % max(turns, 1) == 0}
@@ -121,32 +121,6 @@ def _turned(graph: Graph) -> tuple[Graph, int, frozenset[int]]:
         before = next((k for k in states if roots[k] == (root, delay - turns)), root)
         g.connect(wires[i], wires[before])
     return g.build([wires[i] for i in graph.outputs]), max(turns, 1), frozenset(int(wires[i]) for i in states)
-
-
-def _undelayed(graph: Graph, index: int) -> tuple[int, int]:
-    """Node that `index` is a delayed copy of, and the delay in samples."""
-    delay = 0
-    while graph.nodes[index].op is Op.DELAY:
-        index, delay = graph.nodes[index].operands[0], delay + 1
-    return index, delay
-
-
-def _loop_delays(graph: Graph) -> frozenset[int]:
-    """Return the DELAYs that depend on themselves."""
-    found = set()
-    users: dict[int, list[int]] = {}
-    for index, node in enumerate(graph.nodes):
-        for i in node.operands:
-            users.setdefault(i, []).append(index)
-    for delay in graph.delays:
-        reached, pending = set[int](), [delay]
-        while pending:
-            new = set(users.get(pending.pop(), ())) - reached
-            reached |= new
-            pending += new
-        if delay in reached:
-            found.add(delay)
-    return frozenset(found)
 
 
 def _in_order(graph: Graph, loops: frozenset[int]) -> list[int]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from sosmith.model.dataflow.graph import Graph, Node, Op
 
 NO_LOGIC = {Op.INPUT, Op.CONSTANT, Op.DELAY, Op.SHIFT, Op.FLOOR, Op.FRACTION, Op.BOUND}
@@ -47,20 +49,28 @@ def _needed(graph: Graph, nodes: set[int]) -> set[int]:
     return found
 
 
+def loop_delays(graph: Graph) -> frozenset[int]:
+    """Return the DELAYs that depend on themselves."""
+    return frozenset(delay for delay in graph.delays if delay in _users(graph, [delay]))
+
+
 def _recursive(graph: Graph) -> set[int]:
     """Return the nodes that depend on a state that depends on itself."""
-    sources = {delay: set[int]() for delay in graph.delays}
-    while True:
-        reached: list[set[int]] = []  # the delays that a node depends on, through any number of samples
-        for index, node in enumerate(graph.nodes):
-            own = {index} | sources[index] if node.op is Op.DELAY else set[int]()
-            reached.append(own.union(*(reached[i] for i in node.operands if node.op is not Op.DELAY)))
-        found = {delay: reached[graph.nodes[delay].operands[0]] for delay in graph.delays}
-        if found == sources:
-            break
-        sources = found
-    loop = {delay for delay in graph.delays if delay in sources[delay]}
-    return {index for index, depends in enumerate(reached) if depends & loop}
+    return _users(graph, loop_delays(graph))
+
+
+def _users(graph: Graph, nodes: Iterable[int]) -> set[int]:
+    """Return all that depends on `nodes`, through any number of samples."""
+    direct: dict[int, list[int]] = {}
+    for index, node in enumerate(graph.nodes):
+        for i in node.operands:
+            direct.setdefault(i, []).append(index)
+    found, left = set[int](), [*nodes]
+    while left:
+        new = set(direct.get(left.pop(), ())) - found
+        found |= new
+        left += new
+    return found
 
 
 def _late(graph: Graph, loop: set[int]) -> set[int]:

@@ -153,6 +153,13 @@ class Graph:
         factors = [self.nodes[i] for i in node.operands]
         return any(of.width == 1 and not of.signed and of.op is not Op.CONSTANT for of in factors)
 
+    def undelayed(self, index: int) -> tuple[int, int]:
+        """Return the node that `index` is a delayed copy of, itself if it is none, and the delay in samples."""
+        delay = 0
+        while self.nodes[index].op is Op.DELAY:
+            index, delay = self.nodes[index].operands[0], delay + 1
+        return index, delay
+
     def reset(self) -> list[int]:
         """State after reset: one zero per delay."""
         return [0] * len(self.delays)
