@@ -13,7 +13,7 @@ from sosmith.gen.realizations.direct_form import direct_form
 from sosmith.gen.realizations.lattice import Part, lattice_parts, lattice_stage
 from sosmith.gen.realizations.look_ahead import look_ahead
 from sosmith.gen.realizations.section_format import WIDE, SectionFormat
-from sosmith.gen.realizations.state_space import StateDesign, minimum_noise, normal, state_space
+from sosmith.gen.realizations.state_space import minimum_noise, normal, state_space
 from sosmith.gen.realizations.transposed import transposed_form
 from sosmith.gen.specification import choices
 from sosmith.model.dataflow.datapath import Stage
@@ -67,68 +67,19 @@ class Realization:
     cascade: bool = True
 
 
-def _direct_form(order: int) -> Callable[[Row, SectionFormat, str], Section]:
+def _section(make: Callable[..., Section], **options: Any) -> Callable[[Row, SectionFormat, str], Section]:
+    """Return the builder of a section that takes one row, from what makes it and its options."""
+
     def build(row: Row, form: SectionFormat, name: str) -> Section:
-        return direct_form(
+        return make(
             row,
             name=name,
-            feedback_order=order,
             rounding=form.rounding,
             x=form.x,
             fracs=form.fracs,
             ranges=form.ranges,
             wide=(-WIDE, WIDE),
-        )
-
-    return build
-
-
-def _transposed_form(*, delta: bool) -> Callable[[Row, SectionFormat, str], Section]:
-    def build(row: Row, form: SectionFormat, name: str) -> Section:
-        return transposed_form(
-            row,
-            name=name,
-            delta=delta,
-            rounding=form.rounding,
-            x=form.x,
-            fracs=form.fracs,
-            ranges=form.ranges,
-            wide=(-WIDE, WIDE),
-        )
-
-    return build
-
-
-def _state_space(
-    design: Callable[[Row], StateDesign], *, truncating: bool
-) -> Callable[[Row, SectionFormat, str], Section]:
-    def build(row: Row, form: SectionFormat, name: str) -> Section:
-        return state_space(
-            row,
-            name=name,
-            design=design,
-            truncating=truncating,
-            rounding=form.rounding,
-            u=form.x,
-            fracs=form.fracs,
-            ranges=form.ranges,
-            wide=(-WIDE, WIDE),
-        )
-
-    return build
-
-
-def _look_ahead(doublings: int) -> Callable[[Row, SectionFormat, str], Section]:
-    def build(row: Row, form: SectionFormat, name: str) -> Section:
-        return look_ahead(
-            row,
-            name=name,
-            doublings=doublings,
-            rounding=form.rounding,
-            x=form.x,
-            fracs=form.fracs,
-            ranges=form.ranges,
-            wide=(-WIDE, WIDE),
+            **options,
         )
 
     return build
@@ -149,22 +100,30 @@ def _lattice(part: Part, form: SectionFormat, name: str) -> Section:
 REALIZATIONS: dict[str, Realization] = {
     realization.name: realization
     for realization in (
-        Realization(name="df1", title="direct form I", build=_direct_form(0)),
-        Realization(name="df1_ef1", title="direct form I, first-order error feedback", build=_direct_form(1)),
-        Realization(name="df1_ef2", title="direct form I, second-order error feedback", build=_direct_form(2)),
-        Realization(name="df2t", title="transposed direct form II", build=_transposed_form(delta=False)),
+        Realization(name="df1", title="direct form I", build=_section(direct_form, feedback_order=0)),
         Realization(
-            name="delta", title="transposed direct form II, delta operator", build=_transposed_form(delta=True)
+            name="df1_ef1",
+            title="direct form I, first-order error feedback",
+            build=_section(direct_form, feedback_order=1),
+        ),
+        Realization(
+            name="df1_ef2",
+            title="direct form I, second-order error feedback",
+            build=_section(direct_form, feedback_order=2),
+        ),
+        Realization(name="df2t", title="transposed direct form II", build=_section(transposed_form, delta=False)),
+        Realization(
+            name="delta", title="transposed direct form II, delta operator", build=_section(transposed_form, delta=True)
         ),
         Realization(
             name="state_space",
             title="state space with minimum roundoff noise",
-            build=_state_space(minimum_noise, truncating=False),
+            build=_section(state_space, design=minimum_noise, truncating=False),
         ),
         Realization(
             name="normal",
             title="normal form with truncated magnitudes, free of limit cycles",
-            build=_state_space(normal, truncating=True),
+            build=_section(state_space, design=normal, truncating=True),
         ),
         Realization(
             name="lattice_wdf",
@@ -181,7 +140,7 @@ LOOK_AHEAD: dict[int, Realization] = {
     samples: Realization(
         name=f"look_ahead_{samples}",
         title=f"direct form with scattered look-ahead over {samples} samples",
-        build=_look_ahead(samples.bit_length() - 1),
+        build=_section(look_ahead, doublings=samples.bit_length() - 1),
     )
     for samples in choices.LOOK_AHEAD
 }

@@ -161,7 +161,7 @@ def state_space(
     design: Callable[[Row], StateDesign],
     truncating: bool,
     rounding: Rounding,
-    u: Range,
+    x: Range,
     fracs: Mapping[str, int],
     ranges: Mapping[str, tuple[int, int]],
     wide: tuple[int, int],
@@ -180,7 +180,7 @@ def state_space(
         Whether the states are truncated towards zero instead of being rounded.
     rounding : Rounding
         Rounds the coefficients.
-    u : Range
+    x : Range
         Fraction bits and range of the input's code.
     fracs : mapping of str to int
         Fraction bits kept of ``x1_sum``, ``x2_sum`` and ``y_sum``. If missing, a sum of integer multiples keeps all,
@@ -203,11 +203,11 @@ def state_space(
     b = tuple(Coefficient(*rounding(f"b{i}", value)) for i, value in enumerate(made.B, start=1))
     c = tuple(Coefficient(*rounding(f"c{i}", value)) for i, value in enumerate(made.C, start=1))
     d = Coefficient(*rounding("d", made.D))
-    x_fracs = [fracs.get(f"x{i + 1}_sum", u.frac) for i in states]
+    x_fracs = [fracs.get(f"x{i + 1}_sum", x.frac) for i in states]
     for i in [*states, *states]:  # twice, since a state that only copies another may come before it
         if f"x{i + 1}_sum" not in fracs:
-            x_fracs[i] = _exact_frac([*zip(a[i], x_fracs, strict=True), (b[i], u.frac)], u.frac)
-    y_frac = fracs.get("y_sum", _exact_frac([*zip(c, x_fracs, strict=True), (d, u.frac)], u.frac))
+            x_fracs[i] = _exact_frac([*zip(a[i], x_fracs, strict=True), (b[i], x.frac)], x.frac)
+    y_frac = fracs.get("y_sum", _exact_frac([*zip(c, x_fracs, strict=True), (d, x.frac)], x.frac))
     try:
         return StateSpace(
             name=name,
@@ -217,7 +217,7 @@ def state_space(
             c=c,
             d=d,
             truncating=truncating,
-            u=u,
+            u=x,
             x=tuple(Range(frac, *ranges.get(f"x{i}_next", wide)) for i, frac in enumerate(x_fracs, start=1)),
             y=Range(y_frac, *ranges.get("y", wide)),
         )
