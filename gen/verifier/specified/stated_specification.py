@@ -117,6 +117,7 @@ def _checked(certificate: Certificate, tree: Mapping[str, Any], margin: Fraction
 def _filter_distance(certificate: Certificate, tree: Mapping[str, Any], margin: Fraction, folder: Path) -> Fraction:
     table, rate = dict(tree["filter"]), _number(tree["sample_rate"])
     decimates, entry = table.pop("decimate", None), certificate.decimation
+    table.pop("hold", None)  # how often a result leaves, which changes none
     correction = Fraction(0)
     if decimates != "auto":
         _equal("the factor of the decimator", 1 if entry is None else entry.factor, decimates or 1)

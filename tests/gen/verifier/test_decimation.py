@@ -35,6 +35,8 @@ def test_the_locomotive_is_proven_again() -> None:
     agreement = check_specification(certificate, locomotive_text(), verdict.margin)
     assert agreement.distance is not None
     assert agreement.distance < 2**-100
+    held = locomotive_text().replace("[filter]", "[filter]\nhold = true")
+    assert check_specification(certificate, held, verdict.margin) == agreement
 
 
 @pytest.mark.parametrize("architecture", ["folded", "serial"])
