@@ -10,12 +10,12 @@ import io
 import json
 import re
 import sys
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 
 import matplotlib
-from benchmarks.cost_cores import CORES, RECORD, Figures, logic_of, rate, targets_in
+from benchmarks.cost_cores import CORES, RECORD, Core, Figures, logic_of, rate, targets_in
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
@@ -127,38 +127,89 @@ def with_choices(text: str) -> str:
     return _CHOICES.sub(lambda _: choice_table(), text)
 
 
-def curves(record: Figures, key: str) -> dict[str, list[tuple[float, float, str]]]:
-    """Return samples per second, area and a mark of every measured audio_lowpass with one channel, by architecture."""
+CURVES = {
+    "serial": "C2",
+    "folded": "C1",
+    "online": "C4",
+    "parallel": "C0",
+    "parallel, channels in turn": "C9",
+    "parallel, several a clock": "C7",
+    "parallel, look-ahead": "C3",
+}
+"""Curves of the picture, and their colours."""
+
+PLACES = {
+    "parallel, channels in turn": ("center", (0, 8)),
+    "parallel, several a clock": ("left", (6, -3)),
+    "parallel, look-ahead": ("left", (6, -3)),
+}
+"""Where the marks of curves stand that have neighbours on their left; elsewhere on the side where there is nothing."""
+
+
+@dataclass(frozen=True, order=True)
+class Point:
+    """A measured core in the picture: samples per second, area, and what tells it from others of its curve."""
+
+    rate: float
+    area: float
+    mark: str
+
+
+def curve_of(core: Core) -> tuple[str, str]:
+    """Return the curve that a core of audio_lowpass lies on, and its mark there; empty if it is on none."""
+    if core.example != "audio_lowpass" or core.protect != "none" or core.realization:
+        return "", ""
+    if core.channels > 1:
+        several = sorted(other.channels for other in CORES if replace(other, channels=core.channels) == core)[1:]
+        mark = f"{several[0]} to {several[-1]} channels" if core.channels == several[-1] else ""
+        return ("parallel, channels in turn", mark) if core.architecture == "parallel" else ("", "")
+    lanes = f"{core.lanes} a clock"
+    if core.clock:
+        # One curve over the samples of a clock; of one sample, the core that was made for the highest clock.
+        wanted = max(other.clock for other in CORES if other.lanes == core.lanes)
+        return ("parallel, look-ahead", lanes) if core.clock == wanted else ("", "")
+    if core.lanes > 1:
+        return "parallel, several a clock", lanes
+    return core.architecture, f"{core.bits or 16} bits"
+
+
+def curves(record: Figures, key: str) -> dict[str, list[Point]]:
+    """Return the measured points of each curve on a family of FPGAs, in the order of `CURVES`."""
     same = {"ecp5": ("ecp5", "ecp5_85")}.get(key, (key,))
-    found: dict[str, list[tuple[float, float, str]]] = {}
+    found: dict[str, list[Point]] = {name: [] for name in CURVES}
     for core in CORES:
-        if core.example != "audio_lowpass" or core.channels > 1 or core.protect != "none" or core.realization:
-            continue
+        name, mark = curve_of(core)
         for target, figures in targets_in(record, core).items():
-            if target not in same or figures["refusal"]:
-                continue
-            name = "parallel, look-ahead" if core.clock else core.architecture
-            mark = f"{core.lanes} a clock" if core.lanes > 1 else f"{core.bits} bits" if core.bits else ""
-            area = logic_of(target, figures) + LUTS_OF_A_BLOCK * figures["area"]["multipliers"]
-            found.setdefault(name, []).append((rate(core, figures), area, mark))
-    return {name: sorted(points) for name, points in found.items()}
+            if name and target in same and not figures["refusal"]:
+                area = logic_of(target, figures) + LUTS_OF_A_BLOCK * figures["area"]["multipliers"]
+                found[name].append(Point(rate(core, figures), area, mark))
+    return {name: points for name, points in found.items() if points}
 
 
 def picture(record: Figures) -> str:
     """Return an SVG of area against samples per second, one panel for each family, one curve for each architecture."""
     with matplotlib.rc_context({"svg.hashsalt": "sosmith", "svg.fonttype": "none"}):
-        figure = Figure(figsize=(11, 5), layout="constrained")
+        figure = Figure(figsize=(11, 5.5), layout="constrained")
         FigureCanvasSVG(figure)
-        colours = {"serial": "C2", "folded": "C1", "online": "C4", "parallel": "C0", "parallel, look-ahead": "C3"}
         for axes, key in zip(figure.subplots(1, 2, sharey=True), ("hx8k", "ecp5"), strict=True):
-            for name, points in sorted(curves(record, key).items(), key=lambda item: list(colours).index(item[0])):
-                x, y, marks = zip(*points, strict=True)
-                axes.loglog(x, y, "o-", color=colours[name], label=name)
-                for at, height, mark in zip(x, y, marks, strict=True):
-                    axes.annotate(mark, (at, height), (4, -9), textcoords="offset points", fontsize="x-small")
-            axes.margins(x=0.12)
+            for name, points in curves(record, key).items():
+                x, y = [point.rate for point in points], [point.area for point in points]
+                axes.loglog(x, y, "o-", color=CURVES[name], label=name)
+                for point in points:
+                    side, offset = ("right", (-6, -3)) if point.rate == min(x) else ("left", (6, -3))
+                    side, offset = PLACES.get(name, (side, offset))
+                    axes.annotate(
+                        point.mark,
+                        (point.rate, point.area),
+                        offset,
+                        ha=side,
+                        textcoords="offset points",
+                        fontsize="x-small",
+                        color=CURVES[name],
+                    )
+            axes.margins(x=0.2)
             axes.set_title("iCE40 HX8K" if key == "hx8k" else "ECP5 LFE5U-25F and -85F, speed 6")
-            axes.set_xlabel("samples per second at fmax")
+            axes.set_xlabel("samples per second at fmax, all channels together")
             axes.grid(visible=True, which="both", alpha=0.3)
             axes.legend(fontsize="small", loc="upper left")
             axes.set_ylabel(f"LUT4, a multiplier block as {LUTS_OF_A_BLOCK}" if key == "ecp5" else "logic cells")
