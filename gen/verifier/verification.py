@@ -418,15 +418,14 @@ class _Denominator:
     def norm(self, numerator: fmpq_poly, *, rough: bool = False) -> Fraction:
         """Upper bound of the sum of magnitudes; if `rough`, it need not be close."""
         if self.step > 1:
-            coefficients = numerator.coeffs()
-            turns = (fmpq_poly(coefficients[k :: self.step]) for k in range(self.step))
-            return sum((self._turn.norm(turn, rough=rough) for turn in turns if turn), Fraction(0))
+            parts = (fmpq_poly(numerator.coeffs()[k :: self.step]) for k in range(self.step))
+            return sum((self.turn.norm(part, rough=rough) for part in parts if part), Fraction(0))
         if self.pieces is None:
             return response(numerator, self.inverse).gain
         return self.pieces.norm(numerator, rough=rough)
 
     @cached_property
-    def _turn(self) -> _Denominator:
+    def turn(self) -> _Denominator:
         """The polynomial in w, if this is one in ``w**step``."""
         return _Denominator(fmpq_poly(self.polynomial.coeffs()[:: self.step]))
 
@@ -494,11 +493,21 @@ def _extremes(over: _Denominator, driven: Sequence[_Driven], *, rough: bool = Fa
     apart = [(numerator, low, high) for numerator, low, high in summed if low > 0 or high < 0]
     if not apart:
         return centre - reach, centre + reach
+    if rough and over.step > 1:
+        # No sum of all turns up to some n is beyond the sum of their own limits, and of 0 for a turn still to come.
+        limits = [_extremes(over.turn, turn, rough=True) for turn in _turns(driven, over.step)]
+        none = Fraction(0)
+        return sum((min(none, low) for low, _ in limits), none), sum((max(none, high) for _, high in limits), none)
     more = _overshoot(over, apart, summed)
     if more is None or (max(more) > reach * _NEGLIGIBLE and not rough):
         return _running_extremes(over, summed)
     above, below = more
     return centre - reach - below, centre + reach + above
+
+
+def _turns(driven: Sequence[_Driven], step: int) -> list[list[_Driven]]:
+    """Numerators of the responses that take turns over a denominator in ``w**step``, with the same drives."""
+    return [[(fmpq_poly(over.coeffs()[k::step]), low, high) for over, low, high in driven] for k in range(step)]
 
 
 def _overshoot(

@@ -2,6 +2,7 @@
 
 import json
 import re
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -229,6 +230,24 @@ def test_responses_that_take_turns_have_the_norm_of_all_of_them() -> None:
     factor, made = verification._scattered(poly([1, -1, verification.fmpq(1, 4)]), 8)
     assert {k for k, value in enumerate(made.coeffs()) if value} == {0, 8, 16}
     assert made == factor * poly([1, -1, verification.fmpq(1, 4)])
+
+
+@pytest.mark.parametrize(
+    "numerators", [([1, 1], [0]), ([3, -1, 2, 5], [1, 0, -2]), ([1, 0, 0, 0, 7], [-4, 1]), ([0, 0, 0, -1], [2, 2, 2])]
+)
+def test_rough_limits_by_turns_enclose_those_of_every_sample(numerators: tuple[list[int], list[int]]) -> None:
+    """With drives that do not contain zero, sums up to some sample may be beyond whole ones."""
+    poly, quarter = verification.fmpq_poly, verification.fmpq(1, 4)
+    over = verification._Denominator(poly([1, 0, 0, 0, -4 * quarter, 0, 0, 0, quarter]))
+    driven = [
+        (poly(numerators[0]), Fraction(1), Fraction(2)),
+        (poly(numerators[1]), Fraction(-3), Fraction(-1, 2)),
+    ]
+    low, high = verification._running_extremes(over, driven)
+    below, above = verification._extremes(over, driven, rough=True)
+    slack = Fraction(1, 2**64)  # limits of every sample are rounded
+    assert below - slack <= low < high <= above + slack
+    assert above - below <= 2 * (high - low)
 
 
 def test_a_wrong_recursion_exceeds_its_bound(monkeypatch: pytest.MonkeyPatch) -> None:
