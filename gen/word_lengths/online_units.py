@@ -22,31 +22,38 @@ from sosmith.model.sections.online import (
 
 _DIGIT_BITS = 2
 
+_CLOCKS = LOOP_CLOCKS + 4
+"""Interval of most cascades, by which the area beside the sections counts."""
+
 
 @dataclass(frozen=True)
 class OnlineUnits:
-    """Estimated area of the on-line architecture: LUT4 of the units that a section needs."""
+    """Estimated area of the on-line architecture for its rate: LUT4 of the units that a section needs, times clocks.
 
-    best = "the smallest estimated area"
+    By area alone, a section whose samples come less often would be the better one, because fewer of them overlap.
+    """
+
+    best = "the smallest estimated area for its rate"
     beyond = "more"
     unsuited = "no direct form"
     hopeless = 2.5  # as for the parallel architecture
     few_digits = False
 
     def of_graph(self, graph: Graph) -> float:
-        """Estimate the area of one stage, with as many units as the digits of its results take."""
+        """Estimate the area of one stage, with as many units as the digits of its results take, times its interval."""
         try:
             section = online_section("", graph)
         except OnlineError:
             multiplies = any(node.op is Op.SCALE for node in graph.nodes)
-            return math.inf if graph.delays and multiplies else area_of(graph)
-        units = (section.digits + section.delay) / (section.delay + LOOP_CLOCKS)
-        return units * unit_bits(section) + shared_bits(section)
+            return math.inf if graph.delays and multiplies else area_of(graph) * _CLOCKS
+        interval = section.delay + LOOP_CLOCKS
+        units = (section.digits + section.delay) / interval
+        return (units * unit_bits(section) + shared_bits(section)) * interval
 
     def of_datapath(self, datapath: Datapath) -> float:
-        """Return the area of a whole design, in LUT4."""
+        """Return the area of a whole design, in LUT4, times the clocks that a sample takes."""
         try:
-            return online_cost(datapath).luts
+            return online_cost(datapath).luts * online_schedule(datapath, 0).interval
         except OnlineError:
             return math.inf
 
@@ -66,9 +73,12 @@ class OnlineUnits:
         return 0
 
     def told(self, datapath: Datapath) -> str:
-        """Return the area in words."""
-        schedule = online_schedule(datapath, 0)
-        return f"{online_cost(datapath).luts:,} LUT4 in {schedule.units} units a section"
+        """Return the product of area and clocks in words, and what it is made of."""
+        schedule, luts = online_schedule(datapath, 0), online_cost(datapath).luts
+        return (
+            f"{luts * schedule.interval:,} LUT4 times clocks, from {luts:,} LUT4 in {schedule.units} units a section "
+            f"and {schedule.interval} clocks a sample"
+        )
 
 
 def unsuitable_online(error: OnlineError) -> str:

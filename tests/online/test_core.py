@@ -151,6 +151,21 @@ def test_what_a_reset_leaves_behind_is_found(monkeypatch: pytest.MonkeyPatch) ->
     assert any(results != datapath.compute_exact(codes) for results in found)
 
 
+@pytest.mark.parametrize("bits", [16, 24])
+def test_a_very_low_cutoff_takes_no_more_clocks(bits: int) -> None:
+    """By area alone, its sections would get inputs of more fraction bits than outputs: 9 clocks, and fewer units."""
+    spec = load(EXAMPLES / "flange_wear_locomotive.toml")
+    text = spec.text.replace("bits = 16", f"bits = {bits}").replace("0.00025 ", '"faithful" ')
+    found = from_text(text, EXAMPLES / "flange_wear_locomotive.toml")
+    hardware = replace(found.hardware, architecture="online")
+    made = design_core(replace(found, hardware=hardware), core="filter")
+    schedule = made.architecture.online
+    assert schedule is not None
+    assert schedule.interval == made.architecture.cycles_per_sample == 7
+    assert "LUT4 times clocks, from " in made.reasons["realization"]
+    assert f" in {schedule.units} units a section and 7 clocks a sample" in made.reasons["realization"]
+
+
 def test_interval_and_latency_of_a_section_do_not_depend_on_the_word_length() -> None:
     short, long = (audio("df1", bits=bits).online for bits in (16, 24))
     assert short is not None
