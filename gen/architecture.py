@@ -86,6 +86,8 @@ class Architecture:
         between. All products by constants are then made of adders.
     hold : bool
         Whether each result behind a decimator is handed out once for each of its samples.
+    ahead : Architecture or None
+        That of the calibration before a decimator; None without one.
     """
 
     name: str
@@ -98,6 +100,7 @@ class Architecture:
     samples_per_clock: int = 1
     look_ahead: bool = False
     hold: bool = False
+    ahead: Architecture | None = None
 
     @property
     def _is_block(self) -> bool:
@@ -134,7 +137,23 @@ class Architecture:
     @property
     def cost(self) -> Cost:
         """Operators of the online architecture, or else of the parallel one, before synthesis; no decimator's."""
+        if self.ahead is not None:
+            return self.ahead.cost.beside(cost_of_graphs(self._graphs, self.adders))
         return cost_of_graphs(self._graphs, self.adders) if self.online is None else online_cost(self.datapath)
+
+    @property
+    def multiplier_blocks(self) -> int:
+        """Multiplier blocks that it takes, without what stands before a decimator."""
+        if self.program is not None:
+            return int(self.name == "folded")
+        found = cost_of_graphs(self._graphs, self.adders).multiplications
+        return sum(product.blocks_of(self.blocks.bits) for product in found)
+
+    @property
+    def memory_bits(self) -> int | None:
+        """Bits of memory, with those of what stands before a decimator; None if nothing has any."""
+        programs = [each.program for each in (self.ahead, self) if each is not None and each.program is not None]
+        return sum(each.words * (each.digit_bits + 1) for each in programs) if programs else None
 
     @cached_property
     def online(self) -> OnlineSchedule | None:
@@ -215,6 +234,7 @@ class Architecture:
             lanes = self.samples_per_clock
             return parallel_clocks.block_latency_cycles(self.datapath, lanes, look_ahead=self.look_ahead)
         before = 0 if self.decimator is None else decimator_clocks.latency_cycles(self.decimator) + self.hold
+        before += 0 if self.ahead is None else self.ahead.latency_cycles
         if self.program is None:
             return before + parallel_clocks.latency_cycles(self.built, self.channels, protect=self.protect)
         return before + folded_clocks.latency_cycles(self.program, serial=self.name == "serial", protect=self.protect)
@@ -228,9 +248,12 @@ class Architecture:
     @property
     def reset_cycles(self) -> int:
         """Clocks after a reset until the first sample is accepted, while memories are cleared or a decimator fills."""
-        if self.decimator is not None:
-            return max(self._cleared_cycles, decimator_clocks.reset_cycles(self.decimator))
-        return self._cleared_cycles
+        if self.decimator is None:
+            return self._cleared_cycles
+        filled = decimator_clocks.reset_cycles(self.decimator)
+        if self.ahead is not None:  # which gives the first sample that the decimator fills with
+            filled += self.ahead.reset_cycles + self.ahead.latency_cycles + decimator_clocks.FIRST_SAMPLE
+        return max(self._cleared_cycles, filled)
 
     @property
     def _cleared_cycles(self) -> int:
@@ -252,11 +275,12 @@ class Architecture:
         behind, program = self._cycles_behind_decimator, self.program
         if self.decimator is None:
             return behind
+        each = 1 if self.ahead is None else self.ahead.cycles_per_result
         if program is None:
-            return decimator_clocks.cycles_per_result(self.decimator)
+            return decimator_clocks.cycles_per_result(self.decimator, each=each)
         overlaps = folded_clocks.overlaps(program, serial=self.name == "serial")
         taken = folded_clocks.taken_cycles(program) if overlaps else behind
-        return max(decimator_clocks.cycles_per_result(self.decimator, taken), behind)
+        return max(decimator_clocks.cycles_per_result(self.decimator, taken, each=each), behind)
 
     @property
     def _cycles_behind_decimator(self) -> int:
@@ -274,25 +298,28 @@ class Architecture:
 
     def component(self) -> Component:
         """Make the hardware; the top module has the name of the datapath."""
-        made = self._behind_decimator()
+        made = self._core()
         if self.decimator is None:
             return made
         from sosmith.hdl.decimator import DecimatedCore
 
-        return DecimatedCore(self.datapath, made, hold=self.hold)
+        ahead = None if self.ahead is None else self.ahead._core(before=True)
+        return DecimatedCore(self.datapath, made, ahead, hold=self.hold)
 
-    def _behind_decimator(self) -> BlockCore | Core | FoldedCore:
+    def _core(self, *, before: bool = False) -> BlockCore | Core | FoldedCore:
+        """Make what works on the datapath's own stages, `before` a decimator or behind it."""
         from sosmith.hdl.block_core import BlockCore
         from sosmith.hdl.core import Core  # only what makes hardware loads Amaranth
         from sosmith.hdl.folded import FoldedCore
         from sosmith.hdl.online.core import OnlineCore
+        from sosmith.hdl.status import OF_INPUT, RAIL_ALONE
 
         if self.online is not None:
             return OnlineCore(self.datapath)
         if self._is_block:
             adders = () if self.look_ahead else self.adders
             return BlockCore(self.datapath, self.samples_per_clock, look_ahead=self.look_ahead, adders=adders)
-        given = self.decimator is not None
+        given = 0 if self.decimator is None else RAIL_ALONE if self.ahead is None else OF_INPUT
         if self.program is None:
             return Core(
                 self.built.behind_decimator,
@@ -300,7 +327,8 @@ class Architecture:
                 fingerprint=self.fingerprint,
                 protect=self.protect,
                 adders=self.adders,
-                rail_given=given,
+                flags_given=given,
+                before_decimator=before,
             )
         return FoldedCore(
             self.datapath.behind_decimator,
@@ -309,7 +337,8 @@ class Architecture:
             channels=self.channels,
             fingerprint=self.fingerprint,
             protect=self.protect,
-            rail_given=given,
+            flags_given=given,
+            before_decimator=before,
         )
 
 
@@ -438,9 +467,17 @@ def objective_of(name: str, board: Board | None, *, adders: bool = False) -> Obj
 
 
 def fitting(
-    name: str, budget: Budget, datapath: Datapath, board: Board | None = None, *, look_ahead: bool = False
+    name: str,
+    budget: Budget,
+    datapath: Datapath,
+    board: Board | None = None,
+    *,
+    look_ahead: bool = False,
+    ahead: Architecture | None = None,
 ) -> Architecture:
     """Return the architecture `name` of `datapath`, for a board if there is one.
+
+    `ahead` is that of the calibration before its decimator.
 
     Raises
     ------
@@ -459,6 +496,7 @@ def fitting(
         budget.samples_per_clock,
         look_ahead,
         budget.hold,
+        ahead,
     )
     budget.check(architecture)
     return architecture

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 
-from sosmith.gen.architecture import Architecture, Budget, blocks_for, candidates, fitting, objective_of, reason_for
+from sosmith.gen.architecture import Architecture, Blocks, Budget, blocks_for, candidates, fitting, objective_of, reason_for
 from sosmith.gen.filter.design import Filter, design
 from sosmith.gen.fpga.boards import Board
 from sosmith.gen.realizations.registry import LOOK_AHEAD, REALIZATIONS
@@ -115,10 +115,11 @@ def design_core(
         progress("calibration")
     polynomial, fitted = polynomial_of(spec) if kind != "filter" else (None, None)
     progress("filter design")
-    front, decimates = _front(spec, kind)
+    front, decimates = _front(spec, kind, polynomial)
     ideal = None if kind == "calibration" else filter_of(spec) if front is None else front.filter
     inputs = _inputs(spec, kind) if front is None else (front.decimator.output,)
     max_error = spec.max_error if front is None else spec.max_error - front.error * spec.output.lsb
+    codes = () if fitted is None else calibrated_codes(_inputs(spec, kind), fitted)
 
     @cache  # for all architectures that are tried
     def plan_of(name: str) -> Plan:
@@ -129,7 +130,7 @@ def design_core(
             output=spec.output,
             max_error=max_error,
             ideal=ideal,
-            polynomial=polynomial,
+            polynomial=polynomial if front is None else None,
             realization=name,
             steady=spec.hardware.start == "steady",
         )
@@ -163,14 +164,14 @@ def design_core(
 
     def in_hardware(name: str, datapath: Datapath, *, look_ahead: bool = looks_ahead) -> Architecture:
         """Architecture with what costs a program instructions: the calibrated range, limits of wear, and settling."""
-        codes = () if fitted is None else calibrated_codes(datapath.inputs, fitted)
         wear = () if spec.wear is None else spec.wear.codes(spec.output)
         # Constants that are loaded may make the filter slower, and the count is not among them.
         spare = 3 if hardware.reload else 1
         flagged = with_settling(datapath, spare * samples_to_settle(datapath))
-        made = replace(flagged, calibrated=codes, wear=wear)
-        made = made if front is None else front.before(made)
-        return fitting(name, budget, made, board, look_ahead=look_ahead)
+        judged = replace(flagged, wear=wear)
+        if front is None:
+            return fitting(name, budget, replace(judged, calibrated=codes), board, look_ahead=look_ahead)
+        return fitting(name, budget, front.before(judged, codes), board, ahead=ahead)
 
     budget = Budget(
         clock=hardware.clock,
@@ -183,16 +184,18 @@ def design_core(
         samples_per_clock=hardware.samples_per_clock,
         hold=front is not None and spec.filter.hold,
     )
+    ahead, calibrates = _ahead(None if front is None else front.ahead(codes), hardware.architecture, budget, board)
+    budget = replace(budget, blocks=_left(budget.blocks, ahead))
 
     def made_in(name: str) -> _Made:
         """Choose everything for an architecture."""
-        ahead = partial(in_hardware, "parallel", look_ahead=True)
+        with_look_ahead = partial(in_hardware, "parallel", look_ahead=True)
         if looks_ahead and ideal is not None:
-            return _looking_ahead(plan_of, ahead, budget)
+            return _looking_ahead(plan_of, with_look_ahead, budget)
         quantized, reason = select(name)
         plain = quantized, reason, in_hardware(name, quantized.datapath)
         asked = hardware.pipeline != AUTO or wanted != AUTO or ideal is None or hardware.multipliers
-        return plain if asked or name != "parallel" else _faster(plain, plan_of, ahead, budget)
+        return plain if asked or name != "parallel" else _faster(plain, plan_of, with_look_ahead, budget)
 
     several = looks_ahead or hardware.samples_per_clock > 1
     names = ("parallel",) if several else candidates(hardware.architecture, budget.blocks)
@@ -204,7 +207,7 @@ def design_core(
         core=kind,
         quantized=replace(quantized if front is None else front.counted(quantized), datapath=architecture.datapath),
         architecture=architecture,
-        reasons={**decimates, "realization": reason, "architecture": why},
+        reasons={**decimates, "realization": reason, "architecture": why, **calibrates},
         fit=fitted,
         options={key: value for key, value in asked.items() if value is not None},
     )
@@ -311,17 +314,55 @@ def _chosen_core(spec: Specification, core: str | None) -> str:
     return core or "instrument"
 
 
-def _front(spec: Specification, core: str) -> tuple[Front | None, dict[str, str]]:
+def _front(
+    spec: Specification, core: str, polynomial: Polynomial | None
+) -> tuple[Front | None, dict[str, str]]:
     """Return the decimator before the filter, if there is one, and why."""
     if spec.filter.decimate is None or core == "calibration":
         return None, {}
-    if core != "filter":
-        raise SpecificationError(
-            f"{spec.path}: not yet available: the core must be filter with filter.decimate, not {core}"
-        )
-    (x,) = _inputs(spec, core)
-    front, reason = front_of(spec.filter, spec.sample_rate, x, spec.output, spec.max_error)
+    front, reason = front_of(
+        spec.filter,
+        spec.sample_rate,
+        _inputs(spec, core),
+        spec.output,
+        spec.max_error,
+        polynomial,
+        f"{spec.name}_ahead",
+    )
     return front, {"decimation": reason}
+
+
+def _ahead(
+    datapath: Datapath | None, wanted: str, budget: Budget, board: Board | None
+) -> tuple[Architecture | None, dict[str, str]]:
+    """Choose the architecture of the calibration before a decimator: that of the filter, or the smallest that keeps up.
+
+    Raises
+    ------
+    ShortfallError
+        If none keeps up with all samples.
+    """
+    if datapath is None:
+        return None, {}
+    each = replace(budget, decimate=1, hold=False)
+    names = candidates(wanted, budget.blocks)
+    refused = ""
+    for name in names:
+        try:
+            made = fitting(name, each, datapath, board)
+        except ShortfallError as error:
+            refused = f"before the decimator, {error}"
+        else:
+            why = reason_for(made, each, asked=wanted != AUTO, board=board, refused=refused)
+            return made, {"calibration before the decimator": why}
+    raise ShortfallError(refused)
+
+
+def _left(blocks: Blocks, ahead: Architecture | None) -> Blocks:
+    """Return the multiplier blocks that what stands before the decimator leaves."""
+    if ahead is None or blocks.available is None:
+        return blocks
+    return blocks._replace(available=max(0, blocks.available - ahead.multiplier_blocks))
 
 
 def refuse_decimated(design: CoreDesign, where: str) -> None:

@@ -53,15 +53,16 @@ from sosmith.hdl.constant_banks import NO_CONSTANTS, ConstantBanks, Pair
 from sosmith.hdl.fault_guard import FaultGuard
 from sosmith.hdl.pipelined_logic import banks_in_use
 from sosmith.hdl.plan.parallel_clocks import depths
-from sosmith.hdl.plan.streams import channel_bits, fields, width
+from sosmith.hdl.plan.streams import channel_bits, fields
 from sosmith.hdl.reload import ReloadPort
 from sosmith.hdl.stages.interleaved import InterleavedStage
 from sosmith.hdl.stages.pipelined import PipelinedStage
 from sosmith.hdl.status import (
+    OF_INPUT,
     at_rail,
     flag_count,
     in_order,
-    members_behind_decimator,
+    members_beside_decimator,
     outside_calibration,
     with_fault,
     worn,
@@ -132,8 +133,11 @@ class Core(wiring.Component):
         One of `sosmith.model.dataflow.protection.PROTECTIONS`.
     adders : sequence of collection of int
         Products by constants that are made of adders, by stage and node; only without a fingerprint.
-    rail_given : bool
-        Whether the flag `input_at_rail` comes with a sample, and is not read off its codes.
+    flags_given : int
+        How many flags of the inputs come with a sample, from a decimator, and are not read off its codes: the first of
+        `sosmith.model.dataflow.status.Flag`.
+    before_decimator : bool
+        Whether its results go to a decimator.
 
     Members
     -------
@@ -143,8 +147,8 @@ class Core(wiring.Component):
         Synchronous reset, active low.
     s_axis_tdata, s_axis_tvalid, s_axis_tready
         Input samples: one field per input port, each extended to whole bytes, the first one lowest.
-    s_axis_tuser : In(1)
-        The flag `input_at_rail` of the sample; only if it is given.
+    s_axis_tuser : In(flags_given)
+        Flags of the sample; only if they are given.
     m_axis_tdata, m_axis_tvalid, m_axis_tready
         Output samples: one field, extended likewise.
     m_axis_tuser : Out(8)
@@ -163,17 +167,17 @@ class Core(wiring.Component):
         *,
         protect: str = "none",
         adders: Sequence[Collection[int]] = (),
-        rail_given: bool = False,
+        flags_given: int = 0,
+        before_decimator: bool = False,
     ) -> None:
         self.protect = protect
         self.adders = adders or [()] * len(datapath.stages)
         self.datapath = datapath
         self.channels = channels
         self.fingerprint = fingerprint
-        self.rail_given = rail_given
+        self.flags_given = flags_given
         members = core_members(datapath.inputs, datapath.output, channels)
-        if rail_given:
-            members |= members_behind_decimator(datapath)
+        members |= members_beside_decimator(datapath, flags_given, before=before_decimator)
         super().__init__(members if fingerprint is None else members | slave_members(ADDRESS_BITS))
 
     def elaborate(self, platform: object) -> Module:
@@ -182,9 +186,9 @@ class Core(wiring.Component):
         m.domains.sync = ClockDomain(local=True)
         m.d.comb += [ClockSignal("sync").eq(self.aclk), ResetSignal("sync").eq(~self.aresetn)]
         guarded = self.protect != "none"
-        live = flag_count(self.datapath) + guarded
+        live = min(flag_count(self.datapath) + guarded, len(self.m_axis_tuser))
         buffer = m.submodules.output_buffer = StreamBuffer(
-            width([self.datapath.output]) + live + channel_bits(self.channels)
+            len(self.m_axis_tdata) + live + channel_bits(self.channels)
         )
         loadable = constants(self.datapath)
         banks = None if self.fingerprint is None else ConstantBanks(self.datapath, loadable, parity=guarded)
@@ -234,12 +238,14 @@ class Core(wiring.Component):
             m.d.comb += empty.eq(self._restart(m, reduce(or_, causes), enters, stages, buffer.advance))
         if guard is not None and port is not None:
             self._report(m, guard, port, stages, valid & wear.corrected & buffer.advance)
-        self._hand_out(m, buffer, valid, code, flags, channel)
+        self._hand_out(m, buffer, valid, code, flags if len(flags) == live else flags[:live], channel)
         return m
 
     def _status(self, data: Value) -> Value:
         """Return the flags that are known with a sample as it comes in."""
-        rail = self.s_axis_tuser if self.rail_given else at_rail(self.datapath.inputs, data)
+        if self.flags_given == OF_INPUT:
+            return self.s_axis_tuser
+        rail = self.s_axis_tuser if self.flags_given else at_rail(self.datapath.inputs, data)
         return Cat(rail, outside_calibration(self.datapath, data))
 
     @property
@@ -278,7 +284,7 @@ class Core(wiring.Component):
         self, m: Module, buffer: StreamBuffer, valid: Value, code: Value, flags: Value, channel: Value
     ) -> None:
         """Pass results through the output buffer."""
-        output = extended(code, self.datapath.output.bytes * 8)
+        output = extended(code, len(self.m_axis_tdata))
         m.d.comb += [
             buffer.i_valid.eq(valid),
             buffer.i_data.eq(Cat(output, flags, channel)),

@@ -18,6 +18,18 @@ that the filter is as if it had been there for ever. Nothing that the sums or co
 
 A sample that completes a result is not accepted before the core has taken the result before; all others are, one a
 clock. `s_axis_tready` comes from registers only.
+
+A calibration is a core of its own, ahead of all this, which works on every sample::
+
+    s_axis --> ahead (calibration) --> CIC filter --> core --> m_axis
+                      flags of the inputs: any since the last result
+
+The first sample goes into it before it is accepted, and waits behind it while the decimator fills::
+
+    s_axis_tvalid  _/~~~~~~~~~~~~~~~~~~~~~~~~~~~~~~~\_
+    [first]        ~~~~\______________________________   goes into the calibration
+    [fills]        ____/~~~~~~~~~~~~~~~~~~~~~~~~~~\____   its result is offered to the decimator
+    s_axis_tready  ______________________________/~\__   has been accepted there
 """
 
 from __future__ import annotations
@@ -30,7 +42,7 @@ from sosmith.hdl.axi_stream import core_members, extended
 from sosmith.hdl.core import Core
 from sosmith.hdl.folded import FoldedCore
 from sosmith.hdl.plan.streams import fields, width
-from sosmith.hdl.status import at_rail
+from sosmith.hdl.status import OF_INPUT, at_rail
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.decimator import Decimator
 
@@ -44,25 +56,34 @@ class CicDecimator(wiring.Component):
     ----------
     decimator : Decimator
         What it computes.
+    flags : int
+        How many flags come with a sample; 0 to find out whether it is at the end of its range.
 
     Members
     -------
     i_data, i_valid, i_ready
-        Samples at the higher rate, by the rules of AXI4-Stream; `i_data` is as wide as on a core's stream.
+        Samples at the higher rate, by the rules of AXI4-Stream; `i_data` is as wide as on a core's stream, or, with
+        flags, as the code.
+    i_flags
+        Flags of a sample; only if there are any.
     o_data, o_rail, o_valid, o_ready
         Results: the code of `decimator.output`, and whether a sample since the result before was at the end of its
         range.
+    o_flags
+        In place of `o_rail`: the flags of any sample since the result before.
     """
 
-    def __init__(self, decimator: Decimator) -> None:
+    def __init__(self, decimator: Decimator, flags: int = 0) -> None:
         self.decimator = decimator
+        self.flags = flags
+        told = {"i_flags": In(flags), "o_flags": Out(flags)} if flags else {"o_rail": Out(1)}
         super().__init__(
             {
-                "i_data": In(width([decimator.input])),
+                "i_data": In(decimator.input.bits if flags else width([decimator.input])),
                 "i_valid": In(1),
                 "i_ready": Out(1),
                 "o_data": Out(decimator.output.bits),
-                "o_rail": Out(1),
+                **told,
                 "o_valid": Out(1),
                 "o_ready": In(1),
             }
@@ -93,7 +114,10 @@ class CicDecimator(wiring.Component):
             m.d.sync += waiting.eq(1)
         with m.Elif(self.o_valid & self.o_ready):
             m.d.sync += waiting.eq(0)
-        self._flag_rails(m, enters & ~filling, completes)
+        if self.flags:
+            self._gather(m, enters & ~filling, completes)
+        else:
+            self._flag_rails(m, enters & ~filling, completes)
         value, moves, counts = self._filter(m, enters, completes, ~filling)
         with m.If(moves & counts):
             m.d.sync += [self.o_data.eq((value + (1 << made.dropped >> 1)) >> made.dropped), self.o_valid.eq(1)]
@@ -109,6 +133,14 @@ class CicDecimator(wiring.Component):
             m.d.sync += rail.eq((rail | found) & ~completes)
             with m.If(completes):
                 m.d.sync += self.o_rail.eq(rail | found)
+
+    def _gather(self, m: Module, accepted: Value, completes: Value) -> None:
+        """Hold the flags of all samples of a result, from the last of them on."""
+        found = Signal(self.flags)
+        with m.If(accepted):
+            m.d.sync += found.eq(found | self.i_flags)
+            with m.If(completes):
+                m.d.sync += [self.o_flags.eq(found | self.i_flags), found.eq(0)]
 
     def _filter(self, m: Module, enters: Value, completes: Value, counts: Value) -> tuple[Value, Value, Value]:
         """Integrate and comb; return the difference behind the last comb, whether it is new, and whether it counts."""
@@ -191,17 +223,19 @@ class Holder(wiring.Component):
 
 
 class DecimatedCore(wiring.Component):
-    """A core with a decimator before it, and behind it a `Holder` if results are held.
+    """A core with a decimator before it, ahead of that a calibration, and behind it a `Holder` if results are held.
 
-    Latency: that of the decimator and that of the core, and a clock of the holder. Throughput: one sample a clock as
-    long as the core keeps up with one result for each R of them.
+    Latency: that of each of them, and a clock of the holder. Throughput: one sample a clock, or what the calibration
+    takes, as long as the core keeps up with one result for each R of them.
 
     Parameters
     ----------
     datapath : Datapath
         With a decimator; its name is that of the top module.
     core : Core or FoldedCore
-        The core for `datapath.behind_decimator`, which takes the flag `input_at_rail` from `s_axis_tuser`.
+        The core for `datapath.behind_decimator`, which takes flags of the inputs from `s_axis_tuser`.
+    ahead : Core or FoldedCore or None
+        The core for `datapath.ahead`, whose results go to the decimator; None without one.
     hold : bool
         Whether each result is handed out once for each of its samples.
 
@@ -211,8 +245,16 @@ class DecimatedCore(wiring.Component):
         As in `sosmith.hdl.core.Core`.
     """
 
-    def __init__(self, datapath: Datapath, core: Core | FoldedCore, *, hold: bool = False) -> None:
+    def __init__(
+        self,
+        datapath: Datapath,
+        core: Core | FoldedCore,
+        ahead: Core | FoldedCore | None = None,
+        *,
+        hold: bool = False,
+    ) -> None:
         self.datapath = datapath
+        self.ahead = ahead
         self.hold = hold
         self.core = core
         super().__init__(core_members(datapath.inputs, datapath.output))
@@ -223,17 +265,25 @@ class DecimatedCore(wiring.Component):
         assert self.datapath.decimator is not None
         m.domains.front = ClockDomain(local=True)  # the core has its own domain `sync`
         m.d.comb += [ClockSignal("front").eq(self.aclk), ResetSignal("front").eq(~self.aresetn)]
-        decimator, core = CicDecimator(self.datapath.decimator), self.core
+        flags = 0 if self.ahead is None else OF_INPUT
+        decimator, core = CicDecimator(self.datapath.decimator, flags), self.core
+        if self.ahead is not None:
+            m.submodules.ahead = self.ahead
         m.submodules.decimator = DomainRenamer("front")(decimator)
         m.submodules.behind = core
+        if self.ahead is None:
+            m.d.comb += [
+                decimator.i_data.eq(self.s_axis_tdata),
+                decimator.i_valid.eq(self.s_axis_tvalid),
+                self.s_axis_tready.eq(decimator.i_ready),
+            ]
+        else:
+            self._connect_ahead(m, self.ahead, decimator)
         m.d.comb += [
-            decimator.i_data.eq(self.s_axis_tdata),
-            decimator.i_valid.eq(self.s_axis_tvalid),
-            self.s_axis_tready.eq(decimator.i_ready),
             core.aclk.eq(self.aclk),
             core.aresetn.eq(self.aresetn),
             core.s_axis_tdata.eq(decimator.o_data),
-            core.s_axis_tuser.eq(decimator.o_rail),
+            core.s_axis_tuser.eq(decimator.o_flags if flags else decimator.o_rail),
             core.s_axis_tvalid.eq(decimator.o_valid),
             decimator.o_ready.eq(core.s_axis_tready),
         ]
@@ -252,3 +302,26 @@ class DecimatedCore(wiring.Component):
             core.m_axis_tready.eq(ready),
         ]
         return m
+
+    def _connect_ahead(self, m: Module, ahead: Core | FoldedCore, decimator: CicDecimator) -> None:
+        """Let samples go through the calibration to the decimator, the first one before it is accepted."""
+        first = Signal(init=1)
+        fills = Signal()
+        filled = Signal()
+        flows = ~first & ~fills & ~filled
+        m.d.comb += [
+            ahead.aclk.eq(self.aclk),
+            ahead.aresetn.eq(self.aresetn),
+            ahead.s_axis_tdata.eq(self.s_axis_tdata),
+            ahead.s_axis_tvalid.eq(self.s_axis_tvalid & (first | flows)),
+            self.s_axis_tready.eq(filled | (flows & ahead.s_axis_tready)),
+            decimator.i_data.eq(ahead.m_axis_tdata),
+            decimator.i_flags.eq(ahead.m_axis_tuser),
+            decimator.i_valid.eq(ahead.m_axis_tvalid),
+            ahead.m_axis_tready.eq(decimator.i_ready),
+        ]
+        m.d.front += filled.eq(0)
+        with m.If(first & self.s_axis_tvalid & ahead.s_axis_tready):
+            m.d.front += [first.eq(0), fills.eq(1)]
+        with m.If(fills & ahead.m_axis_tvalid & decimator.i_ready):
+            m.d.front += [fills.eq(0), filled.eq(1)]

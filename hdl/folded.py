@@ -77,7 +77,7 @@ from sosmith.hdl.plan.folded_clocks import FOLDED_DEPTH, SERIAL_DEPTH, memory_de
 from sosmith.hdl.plan.instructions import address_bits, encoded, instruction_bits
 from sosmith.hdl.plan.streams import channel_bits, fields
 from sosmith.hdl.reload import ReloadPort
-from sosmith.hdl.status import at_rail, in_order, members_behind_decimator, with_fault, worn
+from sosmith.hdl.status import OF_INPUT, at_rail, in_order, members_beside_decimator, with_fault, worn
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.graph import Op
 from sosmith.model.dataflow.program import (
@@ -137,8 +137,10 @@ class FoldedCore(wiring.Component):
         Fingerprint of the structure, 32 bits; None for a core whose program cannot be loaded.
     protect : str
         One of `sosmith.model.dataflow.protection.PROTECTIONS`, for all memories.
-    rail_given : bool
-        Whether the flag `input_at_rail` comes with a sample, and is not read off its codes.
+    flags_given : int
+        How many flags of the inputs come with a sample, from a decimator, and are not read off its codes.
+    before_decimator : bool
+        Whether its results go to a decimator.
 
     Members
     -------
@@ -157,7 +159,8 @@ class FoldedCore(wiring.Component):
         channels: int = 1,
         fingerprint: int | None = None,
         protect: str = "none",
-        rail_given: bool = False,
+        flags_given: int = 0,
+        before_decimator: bool = False,
     ) -> None:
         self.datapath = datapath
         self.program = program
@@ -165,10 +168,9 @@ class FoldedCore(wiring.Component):
         self.channels = channels
         self.fingerprint = fingerprint
         self.protect = protect
-        self.rail_given = rail_given
+        self.flags_given = flags_given
         members = core_members(datapath.inputs, datapath.output, channels)
-        if rail_given:
-            members |= members_behind_decimator(datapath)
+        members |= members_beside_decimator(datapath, flags_given, before=before_decimator)
         super().__init__(members if fingerprint is None else members | slave_members(ADDRESS_BITS))
 
     def elaborate(self, platform: object) -> Module:
@@ -594,8 +596,9 @@ class FoldedCore(wiring.Component):
         rail = Signal(reset_less=True)
         outside = Signal(reset_less=True)
         with m.If(begins):
-            found = self.s_axis_tuser if self.rail_given else at_rail(self.datapath.inputs, self.s_axis_tdata)
-            m.d.sync += [rail.eq(found), outside.eq(0)]
+            found = self.s_axis_tuser if self.flags_given else at_rail(self.datapath.inputs, self.s_axis_tdata)
+            both = self.flags_given == OF_INPUT
+            m.d.sync += [rail.eq(found[0] if both else found), outside.eq(found[1] if both else 0)]
         if self.fingerprint is not None or any(i.opcode is Opcode.JUDGE for i in self.program.instructions):
             judges = last.valid & last.has(Opcode.JUDGE) & added[-1]
             if self.datapath.settles:
@@ -616,7 +619,7 @@ class FoldedCore(wiring.Component):
         wear = worn(m, self.datapath, code, channel, Const(1) if guard is None else ends, self.protect)
         flags = in_order(self.datapath, judged, saturated, wear, settling)
         m.d.comb += [
-            self.m_axis_tdata.eq(extended(code, self.datapath.output.bytes * 8)),
+            self.m_axis_tdata.eq(extended(code, len(self.m_axis_tdata))),
             self.m_axis_tuser.eq(flags if guard is None else with_fault(flags, guard.fault | wear.failed)),
         ]
         leaves = self.m_axis_tvalid & self.m_axis_tready

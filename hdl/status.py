@@ -62,13 +62,23 @@ def flag_count(datapath: Datapath) -> int:
     return Flag.WEAR_CRITICAL + 1 if datapath.wear else Flag.OUTPUT_SATURATED + 1
 
 
-def members_behind_decimator(datapath: Datapath) -> dict[str, In | Out]:
-    """Return the members of a core that differ where its samples come from a decimator.
+RAIL_ALONE, OF_INPUT = 1, 2
+"""Numbers of flags that come with a sample from a decimator: `input_at_rail`, or all that are told of inputs."""
 
-    The code of a sample is as wide as it is, and the flag `input_at_rail` comes with it.
+
+def members_beside_decimator(datapath: Datapath, given: int, *, before: bool) -> dict[str, In | Out]:
+    """Return the members of a core that differ where its samples come from a decimator, or its results go to one.
+
+    The code is then as wide as it is. With a sample come the flags that are `given`; with a result, `before` the
+    decimator, those of the inputs.
     """
-    (port,) = datapath.inputs
-    return {"s_axis_tdata": In(port.bits), "s_axis_tuser": In(1), "m_axis_tuser": Out(flag_count(datapath))}
+    members: dict[str, In | Out] = {}
+    if given:
+        (port,) = datapath.inputs
+        members |= {"s_axis_tdata": In(port.bits), "s_axis_tuser": In(given), "m_axis_tuser": Out(flag_count(datapath))}
+    if before:
+        members |= {"m_axis_tdata": Out(datapath.output.bits), "m_axis_tuser": Out(OF_INPUT)}
+    return members
 
 
 def in_order(datapath: Datapath, judged: Value, saturated: Value, wear: Wear, settling: Value) -> Value:

@@ -78,6 +78,14 @@ class Cost:
     adder_bits: int
     register_bits: int
 
+    def beside(self, other: Cost) -> Cost:
+        """Return the operators of both."""
+        return Cost(
+            multiplications=self.multiplications + other.multiplications,
+            adder_bits=self.adder_bits + other.adder_bits,
+            register_bits=self.register_bits + other.register_bits,
+        )
+
     @property
     def multipliers(self) -> tuple[tuple[int, int], ...]:
         """Operand widths in bits of each multiplication, data first."""

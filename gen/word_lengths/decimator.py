@@ -9,10 +9,12 @@ from fractions import Fraction
 from sosmith.gen.filter.decimation import Decimation, choose, decimated
 from sosmith.gen.filter.design import Filter
 from sosmith.gen.specification.specification import FilterSpec
+from sosmith.gen.word_lengths.ahead import calibration_ahead
 from sosmith.gen.word_lengths.quantize import gain_of
-from sosmith.gen.word_lengths.quantized import DECIMATION, Quantized
+from sosmith.gen.word_lengths.quantized import CALIBRATION, DECIMATION, Quantized
+from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.dataflow.datapath import Datapath
-from sosmith.model.dataflow.decimator import Decimator
+from sosmith.model.dataflow.decimator import MAX_WIDTH, Decimator
 from sosmith.model.errors import ShortfallError
 from sosmith.model.port import Port
 
@@ -25,10 +27,16 @@ _LARGEST_SHARE = Fraction(1, 2)
 _MAX_BITS = 32
 """Widest input of a filter."""
 
+_CALIBRATION_SHARE = Fraction(1, 4)
+"""Share of the error allowed that a calibration before the decimator takes."""
+
+_GUESSED_GAIN = 4
+"""Peak gain of a filter that is not chosen yet, to guess the width of what the calibration gives to the decimator."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Front:
-    """A decimator, the filter behind it, and why they are so.
+    """A decimator, what stands before it, the filter behind it, and why they are so.
 
     Attributes
     ----------
@@ -38,8 +46,14 @@ class Front:
         The same as integers.
     filter : Filter
         The filter at the lower rate, with the correction of the decimator's droop.
-    error : Fraction
+    output : Port
+        What leaves the filter.
+    rounding : Fraction
         Bound on what the rounding behind the decimator changes at the output, in output LSBs.
+    calibration : Quantized or None
+        What stands before the decimator; None if that takes the input itself.
+    gain : Fraction
+        Worst-case peak gain of the filter. That of the decimator is 1.
     reason : str
         A sentence.
     """
@@ -47,21 +61,61 @@ class Front:
     decimation: Decimation
     decimator: Decimator
     filter: Filter
-    error: Fraction
+    output: Port
+    rounding: Fraction
+    calibration: Quantized | None
+    gain: Fraction
     reason: str
 
-    def before(self, datapath: Datapath) -> Datapath:
-        """Return the datapath of the filter with the decimator before it."""
-        return replace(datapath, inputs=(self.decimator.input,), calibrated=(), decimator=self.decimator)
+    @property
+    def input_error(self) -> Fraction:
+        """Bound on the error of the calibration, at the filter's input as at its own output, in output LSBs."""
+        return Fraction(0) if self.calibration is None else self.calibration.bound * self._step
+
+    @property
+    def error(self) -> Fraction:
+        """Bound on what decimator and calibration change at the output, in output LSBs."""
+        return self.rounding + self.input_error * self.gain
+
+    @property
+    def _step(self) -> Fraction:
+        """LSB of what the calibration gives, in output LSBs."""
+        assert self.calibration is not None
+        return self.calibration.datapath.output.lsb / self.output.lsb
+
+    def ahead(self, calibrated: tuple[tuple[int, int], ...]) -> Datapath | None:
+        """Return the calibration before the decimator, with the codes that its measurements covered."""
+        return None if self.calibration is None else replace(self.calibration.datapath, calibrated=calibrated)
+
+    def before(self, datapath: Datapath, calibrated: tuple[tuple[int, int], ...]) -> Datapath:
+        """Return the datapath of the filter with the decimator, and the calibration if there is one, before it."""
+        ahead = self.ahead(calibrated)
+        inputs, codes = ((self.decimator.input,), ()) if ahead is None else (ahead.inputs, ahead.calibrated)
+        return replace(datapath, inputs=inputs, calibrated=codes, decimator=self.decimator, ahead=ahead)
 
     def counted(self, quantized: Quantized) -> Quantized:
-        """Return the proven filter with the decimator's part in its budget."""
-        budget = {DECIMATION: self.error, **quantized.budget} if self.error else quantized.budget
-        return replace(quantized, budget=budget, decimation=self.decimation)
+        """Return the proven filter with the parts of decimator and calibration in its budget."""
+        budget = {DECIMATION: self.rounding, **quantized.budget} if self.rounding else quantized.budget
+        if self.calibration is None:
+            return replace(quantized, budget=budget, decimation=self.decimation)
+        return replace(
+            quantized,
+            polynomial=self.calibration.polynomial,
+            budget={CALIBRATION: self.input_error * self.gain, **budget},
+            input_error=self.input_error,
+            decimation=self.decimation,
+            ahead=self.calibration,
+        )
 
 
 def front_of(
-    spec: FilterSpec, sample_rate: Fraction, x: Port, output: Port, max_error: Fraction
+    spec: FilterSpec,
+    sample_rate: Fraction,
+    inputs: tuple[Port, ...],
+    output: Port,
+    max_error: Fraction,
+    polynomial: Polynomial | None = None,
+    name: str = "calibration",
 ) -> tuple[Front | None, str]:
     """Choose the decimator before a filter.
 
@@ -71,10 +125,16 @@ def front_of(
         A low-pass filter by order and cutoff, with `decimate`.
     sample_rate : Fraction
         Of the input, in Hz.
-    x, output : Port
-        Input and output.
+    inputs : tuple of Port
+        One input, or those of the calibration.
+    output : Port
+        Output.
     max_error : Fraction
-        Error allowed, in the unit of both.
+        Error allowed, in the unit of the output.
+    polynomial : Polynomial or None
+        Calibration; None if the decimator takes the input itself, which then has the unit of the output.
+    name : str
+        Name of the core of the calibration.
 
     Returns
     -------
@@ -86,26 +146,64 @@ def front_of(
     Raises
     ------
     ShortfallError
-        If the factor that is asked for lets too much fold into the pass band, or its filter takes too many bits.
+        If the factor that is asked for lets too much fold into the pass band, its filter takes too many bits, or so
+        does the calibration.
     """
-    # A sine of the largest amplitude that the input can have, as far as it folds, must not exceed the error allowed.
-    amplitude = x.lsb * (x.highest - x.lowest) / 2
+    allowed = max_error / output.lsb - Fraction(1, 2)
+
+    def calibration(gain: Fraction) -> Quantized | None:
+        if polynomial is None:
+            return None
+        return calibration_ahead(name, inputs, polynomial, output, allowed * _CALIBRATION_SHARE / gain)
+
+    guessed = calibration(Fraction(_GUESSED_GAIN))
+    x = inputs[0] if guessed is None else guessed.datapath.output
+    # A sine of the largest amplitude that the decimator can take, as far as it folds, must not exceed the error allowed.
+    low, high = (x.lowest, x.highest) if guessed is None else guessed.datapath.result_range
+    amplitude = x.lsb * (high - low) / 2
     found, reason = choose(spec, sample_rate, max_error / amplitude, x.bits)
     if found is None:
         return None, reason
     filter_ = decimated(spec, found)
     gain = gain_of(filter_)
-    allowed = max_error / output.lsb - Fraction(1, 2)
-    whole = Decimator(input=x, factor=found.factor, stages=found.stages, dropped=0)
-    # LSBs of the output that a rounding costs which drops so many bits: halved with each bit that it keeps.
-    coarsest = gain * x.lsb / output.lsb / 2
-    kept = (math.ceil(coarsest / (allowed * _SHARE)) - 1).bit_length()
-    kept = min(kept, whole.growth, _MAX_BITS - x.bits)
-    decimator = replace(whole, dropped=whole.growth - kept)
-    error = gain * decimator.rounding / output.lsb
-    if error > allowed * _LARGEST_SHARE:
+    before = calibration(gain)
+    x = inputs[0] if before is None else before.datapath.output
+    decimator = _rounded(x, found, coarsest=gain * x.lsb / output.lsb / 2, allowed=allowed)
+    rounding = gain * decimator.rounding / output.lsb
+    if rounding > allowed * _LARGEST_SHARE:
         raise ShortfallError(
-            f"the rounding behind the decimator must take at most half of the error allowed, not {float(error):.3g} "
+            f"the rounding behind the decimator must take at most half of the error allowed, not {float(rounding):.3g} "
             f"output LSB with {decimator.output.bits} bits: raise output.max_error or output.bits"
         )
-    return Front(decimation=found, decimator=decimator, filter=filter_, error=error, reason=reason), reason
+    front = Front(
+        decimation=found,
+        decimator=decimator,
+        filter=filter_,
+        output=output,
+        rounding=rounding,
+        calibration=before,
+        gain=gain,
+        reason=reason,
+    )
+    return front, reason
+
+
+def _rounded(x: Port, found: Decimation, *, coarsest: Fraction, allowed: Fraction) -> Decimator:
+    """Return the decimator of `x` with a rounding that takes a small share of the error allowed, in output LSBs.
+
+    A rounding to the steps of `x` would take `coarsest`; that is halved with each bit that it keeps.
+
+    Raises
+    ------
+    ShortfallError
+        If its registers would be too wide.
+    """
+    width = x.bits + found.stages * (found.factor.bit_length() - 1)
+    if width > MAX_WIDTH:
+        raise ShortfallError(
+            f"the registers of the decimator must have at most {MAX_WIDTH} bits, not {width}: lower filter.decimate"
+        )
+    whole = Decimator(input=x, factor=found.factor, stages=found.stages, dropped=0)
+    kept = (math.ceil(coarsest / (allowed * _SHARE)) - 1).bit_length()
+    kept = min(kept, whole.growth, _MAX_BITS - x.bits)
+    return replace(whole, dropped=whole.growth - kept)

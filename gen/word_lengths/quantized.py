@@ -28,6 +28,9 @@ from sosmith.model.sections.start import PassingStage, StartStage
 
 Array = npt.NDArray[np.float64]
 
+CALIBRATION = "calibration"
+"""The part of the budget that is the error of the calibration."""
+
 DECIMATION = "decimation"
 """The part of the budget that is the rounding behind a decimator."""
 
@@ -57,6 +60,8 @@ class Quantized:
         The proof of the sections; None without a filter.
     decimation : Decimation or None
         How samples are decimated before the filter; None if all go in.
+    ahead : Quantized or None
+        The calibration before the decimator; None without one.
     """
 
     datapath: Datapath
@@ -67,6 +72,7 @@ class Quantized:
     input_error: Fraction
     proof: CascadeProof | None
     decimation: Decimation | None = None
+    ahead: Quantized | None = None
 
     @property
     def bound(self) -> Fraction:
@@ -116,7 +122,7 @@ def assembled(
     """Combine stages into a datapath and add up its error budget; `gain` is that of the filter, 1 without one."""
     budget: dict[str, Fraction] = {}
     if any(isinstance(stage, HornerStep) for stage in input_stage.stages):
-        budget["calibration" if polynomial is not None else "input scaling"] = input_stage.error * gain
+        budget[CALIBRATION if polynomial is not None else "input scaling"] = input_stage.error * gain
     if proof is not None:
         budget |= filter_budget(proof)
     held = None

@@ -15,6 +15,13 @@ def reset_cycles(decimator: Decimator) -> int:
     return decimator.warm_up
 
 
-def cycles_per_result(decimator: Decimator, taken: int = 0) -> int:
-    """Clocks between results at the highest rate, for a core that takes a sample `taken` clocks after it finds it."""
-    return max(decimator.factor, taken + latency_cycles(decimator) + 1)
+FIRST_SAMPLE = 1
+"""Clocks from the edge that fills the decimator to the one that accepts the first sample, where a calibration is ahead."""
+
+
+def cycles_per_result(decimator: Decimator, taken: int = 0, *, each: int = 1) -> int:
+    """Clocks between results at the highest rate, for a core that takes a sample `taken` clocks after it finds it.
+
+    `each` is the number of clocks for each sample in what stands before the decimator.
+    """
+    return max(decimator.factor * each, taken + latency_cycles(decimator) + 1)

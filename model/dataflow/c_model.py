@@ -15,6 +15,7 @@ from sosmith.model.templates import render
 
 if TYPE_CHECKING:
     from sosmith.model.dataflow.datapath import Datapath
+    from sosmith.model.port import Port
 
 _NARROW = 64
 _WIDEST = 128
@@ -22,24 +23,29 @@ _WIDEST = 128
 
 def c_header(datapath: Datapath) -> str:
     """Return the text of ``<name>.h``."""
-    decimator, datapath = datapath.decimator, datapath.behind_decimator
-    ports = (
-        f"{port.name}_code: {port.lowest} .. {port.highest}, value = {float(port.zero)!r} + "
-        f"{float(port.lsb)!r} * code {port.unit.replace('*/', '* /')}".rstrip()
-        for port in (*datapath.inputs, datapath.output)
-    )
+    whole, datapath = datapath, datapath.behind_decimator
     return render(
         __package__,
         "c_model.h.jinja",
         name=datapath.name,
-        ports=ports,
+        ports=[_told(port) for port in (*datapath.inputs, datapath.output)],
+        ahead_ports=[] if whole.ahead is None else list(map(_told, whole.ahead.inputs)),
+        taken=_parameters_of(whole),
         flags=[(f"{1 << flag:#04x}", flag.meaning) for flag in Flag],
         state_type=_type_of_states(datapath),
         states=max(state_count(datapath), 1),
         parameters=_parameters(datapath),
         wear=datapath.wear,
         channels=len(datapath.wear) if _takes_channel(datapath) else 0,
-        decimator=decimator,
+        decimator=whole.decimator,
+    )
+
+
+def _told(port: Port) -> str:
+    """Say what the code of a port means."""
+    return (
+        f"{port.name}_code: {port.lowest} .. {port.highest}, value = {float(port.zero)!r} + "
+        f"{float(port.lsb)!r} * code {port.unit.replace('*/', '* /')}".rstrip()
     )
 
 
@@ -56,7 +62,7 @@ def c_source(datapath: Datapath) -> str:
     ValueError
         If a value inside is wider than 128 bits.
     """
-    decimator, datapath = datapath.decimator, datapath.behind_decimator
+    whole, datapath = datapath, datapath.behind_decimator
     count = len(datapath.inputs)
     names = [f"{port.name}_code" for port in datapath.inputs]
     codes = [f"in[(n * channels + c) * {count} + {i}]" for i in range(count)]
@@ -77,9 +83,24 @@ def c_source(datapath: Datapath) -> str:
         wear=datapath.wear,
         limits=", ".join(f"{{{warning}, {critical}}}" for warning, critical in datapath.wear),
         wear_flags=" | ".join(f"(code >= limit[{k}]) << {flag.value}" for k, flag in judged),
-        decimator=decimator,
+        decimator=whole.decimator,
         rail=f"{1 << Flag.INPUT_AT_RAIL:#04x}",
+        of_input=f"{1 << Flag.INPUT_AT_RAIL | 1 << Flag.OUTSIDE_CALIBRATION:#04x}",
+        ahead=None if whole.ahead is None else _ahead(whole.ahead),
+        taken=_parameters_of(whole),
     )
+
+
+def _ahead(datapath: Datapath) -> dict[str, object]:
+    """Return what the text of a step of a datapath without memory takes, which stands before a decimator."""
+    return {
+        "wires": _wires(datapath),
+        "stages": _stages(datapath),
+        "parameters": _parameters_of(datapath),
+        "inputs": [f"{port.name}_code" for port in datapath.inputs],
+        "status": _status(datapath),
+        "result": _result(datapath),
+    }
 
 
 def _takes_channel(datapath: Datapath) -> bool:
@@ -89,8 +110,13 @@ def _takes_channel(datapath: Datapath) -> bool:
 
 def _parameters(datapath: Datapath) -> str:
     """Return the parameters of a step between state and status."""
-    codes = [f"int64_t {port.name}_code" for port in datapath.inputs]
-    return ", ".join(["size_t channel", *codes] if _takes_channel(datapath) else codes)
+    codes = _parameters_of(datapath)
+    return f"size_t channel, {codes}" if _takes_channel(datapath) else codes
+
+
+def _parameters_of(datapath: Datapath) -> str:
+    """Return the parameters that are the codes of the inputs."""
+    return ", ".join(f"int64_t {port.name}_code" for port in datapath.inputs)
 
 
 def state_count(datapath: Datapath) -> int:

@@ -20,6 +20,10 @@ from sosmith.model.dataflow.status import Flag
 from sosmith.model.port import Port
 
 
+_OF_INPUT = 1 << Flag.INPUT_AT_RAIL | 1 << Flag.OUTSIDE_CALIBRATION
+"""Flags that are told of the inputs."""
+
+
 class Stage(Protocol):
     """A part of a datapath: a name and a dataflow graph."""
 
@@ -45,7 +49,8 @@ class Datapath:
     name : str
         Name of the core.
     inputs : tuple of Port
-        Input quantities, in the order of the first stage's inputs; with a decimator the one that it takes.
+        Input quantities, in the order of the first stage's inputs; with a decimator the one that it takes, or those of
+        what is ahead of it.
     output : Port
         Output quantity.
     stages : tuple of Stage
@@ -57,6 +62,9 @@ class Datapath:
         one for each; empty if wear is not judged.
     decimator : Decimator or None
         What stands before the first stage and hands on one sample out of several; None if all go in.
+    ahead : Datapath or None
+        What stands before the decimator, at the rate of the input: a calibration, whose output the decimator takes. None
+        if the decimator takes the input itself.
     """
 
     name: str
@@ -66,12 +74,15 @@ class Datapath:
     calibrated: tuple[tuple[int, int], ...] = ()
     wear: tuple[tuple[int, int], ...] = ()
     decimator: Decimator | None = None
+    ahead: Datapath | None = None
 
     def __post_init__(self) -> None:
         if not self.calibrated:
             object.__setattr__(self, "calibrated", tuple((port.lowest, port.highest) for port in self.inputs))
         first, last = self.stages[0].graph, self.stages[-1].graph
-        if self.decimator is not None and self.inputs != (self.decimator.input,):
+        if self.ahead is not None:
+            self._check_ahead(self.ahead)
+        elif self.decimator is not None and self.inputs != (self.decimator.input,):
             raise ValueError(f"inputs must be what the decimator takes, {self.decimator.input}, not {self.inputs}")
         ports = [(port.lowest, port.highest) for port in self.entry]
         expected = [(first.nodes[i].low, first.nodes[i].high) for i in first.inputs]
@@ -91,6 +102,17 @@ class Datapath:
                     f"not {warning}, {critical}"
                 )
 
+    def _check_ahead(self, ahead: Datapath) -> None:
+        if self.decimator is None:
+            raise ValueError("ahead must be left out where there is no decimator")
+        if ahead.output != self.decimator.input:
+            raise ValueError(f"ahead must give what the decimator takes, {self.decimator.input}, not {ahead.output}")
+        taken = self.inputs, self.calibrated
+        if (ahead.inputs, ahead.calibrated) != taken:
+            raise ValueError(f"ahead must take the inputs, {taken}, not {(ahead.inputs, ahead.calibrated)}")
+        if ahead.decimator is not None or any(stage.graph.delays for stage in ahead.stages):
+            raise ValueError("ahead must be without memory, which one sample alone fills, and without a decimator")
+
     @property
     def entry(self) -> tuple[Port, ...]:
         """The quantities that the first stage takes: `inputs`, or what the decimator makes of them."""
@@ -101,7 +123,21 @@ class Datapath:
         """The datapath at the lower rate, without the decimator; itself if it has none."""
         if self.decimator is None:
             return self
-        return replace(self, inputs=self.entry, calibrated=(), decimator=None)
+        return replace(self, inputs=self.entry, calibrated=(), decimator=None, ahead=None)
+
+    @property
+    def result_range(self) -> tuple[int, int]:
+        """Lowest and highest code that can leave, which need not fill the output port."""
+        last = self.stages[-1].graph
+        node = last.nodes[last.outputs[0]]
+        return node.low, node.high
+
+    @property
+    def decimated_range(self) -> tuple[int, int]:
+        """Lowest and highest code that the decimator can take, or the first input where there is none."""
+        if self.ahead is not None:
+            return self.ahead.result_range
+        return self.inputs[0].lowest, self.inputs[0].highest
 
     def results(self, samples: int) -> int:
         """Count the results of so many samples of a channel."""
@@ -163,9 +199,8 @@ class Datapath:
         behind = block_for(self.behind_decimator, entering.shape[0] * entering.shape[1])
         _, status = behind(entering, with_status=True)
         if self.decimator is not None:
-            rails = np.stack([self.decimator.at_rail(block[:, k, 0]) for k in range(block.shape[1])], axis=1)
-            status &= ~np.uint8(1 << Flag.INPUT_AT_RAIL)
-            status[rails] |= 1 << Flag.INPUT_AT_RAIL
+            status &= ~np.uint8(_OF_INPUT)
+            status |= self._gathered(block, self.decimator)
         return status[:, 0] if checked.ndim == 2 else status
 
     def compute_exact(self, codes: Codes) -> list[int]:
@@ -178,18 +213,32 @@ class Datapath:
         """
         states = [stage.graph.reset() for stage in self.stages]
         results = []
-        for sample in self._entering(self._checked(codes)[:, np.newaxis, :])[:, 0].tolist():
+        taken = self._checked(codes)
+        if self.decimator is not None:
+            column = taken[:, 0] if self.ahead is None else np.array(self.ahead.compute_exact(taken), dtype=np.int64)
+            taken = self.decimator.compute(column)[:, np.newaxis]
+        for sample in taken.tolist():
             wires = sample
             for stage, state in zip(self.stages, states, strict=True):
                 wires = stage.graph.step(wires, state)
             results.append(wires[0])
         return results
 
+    def _gathered(self, block: Codes, decimator: Decimator) -> npt.NDArray[np.uint8]:
+        """Flags of the inputs, for each result, of any sample since the result before."""
+        if self.ahead is None:
+            rails = (block[:, :, 0] == decimator.input.lowest) | (block[:, :, 0] == decimator.input.highest)
+            flags = rails.astype(np.uint8) << Flag.INPUT_AT_RAIL
+        else:
+            flags = self.ahead.compute_status(block) & np.uint8(_OF_INPUT)
+        return np.stack([decimator.gathered(flags[:, k]) for k in range(block.shape[1])], axis=1)
+
     def _entering(self, block: Codes) -> Codes:
         """Codes that the first stage takes, for input codes of shape (samples, channels, inputs)."""
         if self.decimator is None:
             return block
-        columns = [self.decimator.compute(block[:, k, 0]) for k in range(block.shape[1])]
+        taken = block[:, :, 0] if self.ahead is None else self.ahead.compute(block)
+        columns = [self.decimator.compute(taken[:, k]) for k in range(block.shape[1])]
         return np.stack(columns, axis=1)[:, :, np.newaxis]
 
     def _checked(self, codes: Codes) -> Codes:

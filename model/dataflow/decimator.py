@@ -17,12 +17,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from sosmith.model.arrays import Codes, Values
 from sosmith.model.port import Port
+
+_Flags = TypeVar("_Flags", np.bool_, np.uint8)
 
 MAX_WIDTH = 63
 """Widest register of a decimator, in bits: the models in software have words of 64."""
@@ -174,8 +177,19 @@ class Decimator:
 
     def at_rail(self, codes: Codes) -> npt.NDArray[np.bool_]:
         """Whether any sample since the result before was the lowest or the highest code, for each result."""
-        if not len(codes):
-            return np.zeros(0, dtype=np.bool_)
-        last = np.arange(self.count(len(codes))) * self.factor
-        rail = (codes == self.input.lowest) | (codes == self.input.highest)
-        return np.logical_or.reduceat(rail[: last[-1] + 1], np.maximum(last - self.factor + 1, 0))
+        return self.gathered((codes == self.input.lowest) | (codes == self.input.highest))
+
+    def gathered(self, flags: npt.NDArray[_Flags]) -> npt.NDArray[_Flags]:
+        """Return, for each result, the bits set in any sample since the result before.
+
+        Parameters
+        ----------
+        flags : array of bool or of an integer type, shape (samples,)
+        """
+        if not len(flags):
+            return flags
+        last = np.arange(self.count(len(flags))) * self.factor
+        found: npt.NDArray[_Flags] = np.bitwise_or.reduceat(
+            flags[: last[-1] + 1], np.maximum(last - self.factor + 1, 0)
+        )
+        return found

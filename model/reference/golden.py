@@ -33,7 +33,9 @@ def calibrated(codes: Codes, inputs: Sequence[Port], polynomial: Polynomial | No
 def entering_filter(codes: Codes, datapath: Datapath, polynomial: Polynomial | None) -> Values:
     """Return the physical values that the filter takes: those of `calibrated`, or what a decimator makes of them.
 
-    The decimator computes in integers, and is exact before its rounding; only their conversion is in double precision.
+    A decimator of the input's codes computes in integers, and is exact before its rounding; only their conversion is in
+    double precision. Behind a calibration, which stays in front of it, it is ``((1 + 1/z) / 2)**N`` again and again,
+    each time at every other sample of the time before: no sum grows, and no difference cancels.
 
     Parameters
     ----------
@@ -47,6 +49,13 @@ def entering_filter(codes: Codes, datapath: Datapath, polynomial: Polynomial | N
     decimator = datapath.decimator
     if decimator is None:
         return calibrated(codes, datapath.inputs, polynomial)
+    if datapath.ahead is not None:
+        values = calibrated(codes, datapath.inputs, polynomial)
+        for _ in range(decimator.factor.bit_length() - 1):
+            for _ in range(decimator.stages):  # the first sample as if it had been there for ever
+                values = np.concatenate([values[:1], (values[1:] + values[:-1]) / 2])
+            values = values[::2]
+        return values
     unrounded = replace(decimator, dropped=0)
     return float(unrounded.input.zero) + float(unrounded.lsb) * unrounded.compute(codes[:, 0]).astype(np.float64)
 
