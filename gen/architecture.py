@@ -136,10 +136,15 @@ class Architecture:
 
     @property
     def cost(self) -> Cost:
-        """Operators of the online architecture, or else of the parallel one, before synthesis; no decimator's."""
-        if self.ahead is not None:
-            return self.ahead.cost.beside(cost_of_graphs(self._graphs, self.adders))
-        return cost_of_graphs(self._graphs, self.adders) if self.online is None else online_cost(self.datapath)
+        """Operators of the online architecture, or else of the parallel one, before synthesis; no decimator's.
+
+        Those of a calibration before a decimator are among them, unless that alone has a program.
+        """
+        if self.online is not None:
+            return online_cost(self.datapath)
+        own = cost_of_graphs(self._graphs, self.adders)
+        apart = self.ahead is None or (self.program is None and self.ahead.program is not None)
+        return own if self.ahead is None or apart else self.ahead.cost.beside(own)
 
     @property
     def multiplier_blocks(self) -> int:

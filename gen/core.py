@@ -6,7 +6,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 
-from sosmith.gen.architecture import Architecture, Blocks, Budget, blocks_for, candidates, fitting, objective_of, reason_for
+from sosmith.gen.architecture import (
+    Architecture,
+    Blocks,
+    Budget,
+    blocks_for,
+    candidates,
+    fitting,
+    objective_of,
+    reason_for,
+)
 from sosmith.gen.filter.design import Filter, design
 from sosmith.gen.fpga.boards import Board
 from sosmith.gen.realizations.registry import LOOK_AHEAD, REALIZATIONS
@@ -115,10 +124,9 @@ def design_core(
         progress("calibration")
     polynomial, fitted = polynomial_of(spec) if kind != "filter" else (None, None)
     progress("filter design")
-    front, decimates = _front(spec, kind, polynomial)
+    front, decimates = front_in(spec, kind, polynomial)
     ideal = None if kind == "calibration" else filter_of(spec) if front is None else front.filter
     inputs = _inputs(spec, kind) if front is None else (front.decimator.output,)
-    max_error = spec.max_error if front is None else spec.max_error - front.error * spec.output.lsb
     codes = () if fitted is None else calibrated_codes(_inputs(spec, kind), fitted)
 
     @cache  # for all architectures that are tried
@@ -128,7 +136,7 @@ def design_core(
             name=spec.name,
             inputs=inputs,
             output=spec.output,
-            max_error=max_error,
+            max_error=spec.max_error - (0 if front is None else front.error * spec.output.lsb),
             ideal=ideal,
             polynomial=polynomial if front is None else None,
             realization=name,
@@ -184,8 +192,8 @@ def design_core(
         samples_per_clock=hardware.samples_per_clock,
         hold=front is not None and spec.filter.hold,
     )
-    ahead, calibrates = _ahead(None if front is None else front.ahead(codes), hardware.architecture, budget, board)
-    budget = replace(budget, blocks=_left(budget.blocks, ahead))
+    before = None if front is None else front.ahead(codes)
+    ahead, budget, calibrates = _ahead(before, hardware.architecture, budget, board)
 
     def made_in(name: str) -> _Made:
         """Choose everything for an architecture."""
@@ -314,10 +322,14 @@ def _chosen_core(spec: Specification, core: str | None) -> str:
     return core or "instrument"
 
 
-def _front(
-    spec: Specification, core: str, polynomial: Polynomial | None
-) -> tuple[Front | None, dict[str, str]]:
-    """Return the decimator before the filter, if there is one, and why."""
+def front_in(spec: Specification, core: str, polynomial: Polynomial | None) -> tuple[Front | None, dict[str, str]]:
+    """Return what stands before the filter of a core that decimates, and why; None and nothing if all samples go in.
+
+    Raises
+    ------
+    ShortfallError
+        If the factor that is asked for lets too much fold into the pass band, or takes too many bits.
+    """
     if spec.filter.decimate is None or core == "calibration":
         return None, {}
     front, reason = front_of(
@@ -334,8 +346,10 @@ def _front(
 
 def _ahead(
     datapath: Datapath | None, wanted: str, budget: Budget, board: Board | None
-) -> tuple[Architecture | None, dict[str, str]]:
+) -> tuple[Architecture | None, Budget, dict[str, str]]:
     """Choose the architecture of the calibration before a decimator: that of the filter, or the smallest that keeps up.
+
+    Return it, the budget that it leaves for the filter, and why.
 
     Raises
     ------
@@ -343,7 +357,7 @@ def _ahead(
         If none keeps up with all samples.
     """
     if datapath is None:
-        return None, {}
+        return None, budget, {}
     each = replace(budget, decimate=1, hold=False)
     names = candidates(wanted, budget.blocks)
     refused = ""
@@ -354,13 +368,14 @@ def _ahead(
             refused = f"before the decimator, {error}"
         else:
             why = reason_for(made, each, asked=wanted != AUTO, board=board, refused=refused)
-            return made, {"calibration before the decimator": why}
+            left = replace(budget, blocks=_left(budget.blocks, made))
+            return made, left, {"calibration before the decimator": why}
     raise ShortfallError(refused)
 
 
-def _left(blocks: Blocks, ahead: Architecture | None) -> Blocks:
+def _left(blocks: Blocks, ahead: Architecture) -> Blocks:
     """Return the multiplier blocks that what stands before the decimator leaves."""
-    if ahead is None or blocks.available is None:
+    if blocks.available is None:
         return blocks
     return blocks._replace(available=max(0, blocks.available - ahead.multiplier_blocks))
 

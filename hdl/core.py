@@ -187,9 +187,7 @@ class Core(wiring.Component):
         m.d.comb += [ClockSignal("sync").eq(self.aclk), ResetSignal("sync").eq(~self.aresetn)]
         guarded = self.protect != "none"
         live = min(flag_count(self.datapath) + guarded, len(self.m_axis_tuser))
-        buffer = m.submodules.output_buffer = StreamBuffer(
-            len(self.m_axis_tdata) + live + channel_bits(self.channels)
-        )
+        buffer = m.submodules.output_buffer = StreamBuffer(len(self.m_axis_tdata) + live + channel_bits(self.channels))
         loadable = constants(self.datapath)
         banks = None if self.fingerprint is None else ConstantBanks(self.datapath, loadable, parity=guarded)
         stages = [

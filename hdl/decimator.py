@@ -1,4 +1,4 @@
-"""A core behind a decimator: a CIC filter that hands on one sample out of R, and the core that takes it.
+r"""A core behind a decimator: a CIC filter that hands on one sample out of R, and the core that takes it.
 
 N integrators and N combs of `width` bits, one adder each, with a register behind every one of them::
 

@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from sosmith.gen.core import CoreDesign, filter_of, polynomial_of
+from sosmith.gen.core import CoreDesign, filter_of, front_in, polynomial_of
 from sosmith.gen.filter.design import Filter, decay_length
 from sosmith.gen.filter.response import complex_response, group_delay
 from sosmith.gen.specification.specification import CalibrationSpec, Specification
 from sosmith.gen.specification.uncertainty import UncertaintySpec
+from sosmith.gen.word_lengths.decimator import Front
 from sosmith.model.arithmetic.recursive_filters import sosfilt
 from sosmith.model.arrays import Values
 from sosmith.model.calibration.coefficient_covariance import CoefficientUncertainty, of_least_squares
@@ -98,6 +99,8 @@ class Instrument:
         What its coefficients are worth.
     ideal : Filter or None
         The filter; None for a calibration alone.
+    front : Front or None
+        What decimates before it; None if all samples go in.
     bound : float
         Bound of the error of the arithmetic, in the output's unit.
     """
@@ -106,6 +109,7 @@ class Instrument:
     polynomial: Polynomial
     known: CoefficientUncertainty
     ideal: Filter | None
+    front: Front | None
     bound: float
 
     @property
@@ -126,7 +130,7 @@ class Instrument:
         ]
         stated = spec.uncertainty
         if stated is not None and stated.noise is not None:
-            noise = float(stated.noise) * noise_gain(self.ideal) * one
+            noise = float(stated.noise) * noise_gain(self.ideal, self.front) * one
             found.append(_of("sensor noise", "normal", noise, "V", by_voltage))
         if stated is not None and stated.temperature is not None:
             found.append(_of("thermocouple", "normal", float(stated.temperature) * one, "°C", by_temperature))
@@ -134,7 +138,7 @@ class Instrument:
             limits = of_limits(float(stated.voltage)) * one
             found.append(_of("converter of the voltage", "rectangular", limits, "V", by_voltage))
         if self.ideal is not None and stated is not None:
-            found += _of_motion(self.ideal, stated, float(spec.sample_rate), unit, one)
+            found += _of_motion(self, self.ideal, stated, one)
         for port, slope, symbol in zip(spec.inputs, (by_voltage, by_temperature), ("V", "°C"), strict=True):
             step = of_limits(float(port.lsb) / 2) * one
             found.append(_of(f"steps of the {port.name}", "rectangular", step, symbol, slope))
@@ -162,14 +166,17 @@ class Instrument:
         )
 
 
-def _of_motion(ideal: Filter, stated: UncertaintySpec, rate: float, unit: str, one: Values) -> list[Contribution]:
-    found = []
+def _of_motion(instrument: Instrument, ideal: Filter, stated: UncertaintySpec, one: Values) -> list[Contribution]:
+    found, front, unit = [], instrument.front, instrument.spec.output.unit
+    rate = float(instrument.spec.sample_rate if front is None else front.decimation.rate)
     if stated.clearance_rate is not None:
         delay = float(group_delay(ideal.sos, np.zeros(1), rate)[0])
+        delay = delay if front is None else float(front.decimation.delay(ideal))
         speed = of_limits(float(stated.clearance_rate)) * one
         found.append(_of("delay of a moving reading", "rectangular", speed, f"{unit}/s", delay * one))
     for frequency, amplitude in stated.motion:
-        (gain,) = np.abs(complex_response(ideal.sos, np.array([float(frequency)]), rate))
+        at = np.array([float(frequency)])
+        (gain,) = np.abs(complex_response(ideal.sos, at, rate)) * (1 if front is None else front.decimation.gain(at))
         rms = float(amplitude) / math.sqrt(2.0) * one
         found.append(_of(f"motion at {float(frequency):g} Hz", "arcsine", rms, unit, float(gain) * one))
     return found
@@ -192,11 +199,13 @@ def instrument_of(spec: Specification, bound: float | None = None, *, filtered: 
     known = _coefficients(spec.calibration, fitted)
     if known is None:
         return None
+    front, _ = front_in(spec, "instrument", polynomial) if filtered else (None, {})
     return Instrument(
         spec=spec,
         polynomial=polynomial,
         known=known,
-        ideal=filter_of(spec) if filtered else None,
+        ideal=None if not filtered else filter_of(spec) if front is None else front.filter,
+        front=front,
         bound=float(spec.max_error) if bound is None else bound,
     )
 
@@ -264,13 +273,17 @@ def slopes(polynomial: Polynomial, V: Values, T: Values) -> tuple[Values, Values
     return by_voltage, by_temperature
 
 
-def noise_gain(ideal: Filter | None) -> float:
-    """Return the factor by which the filter changes the standard deviation of white noise; 1 without a filter."""
+def noise_gain(ideal: Filter | None, front: Front | None = None) -> float:
+    """Return the factor by which the filter changes the standard deviation of white noise; 1 without a filter.
+
+    What decimates before it counts too.
+    """
     if ideal is None:
         return 1.0
     impulse = np.zeros(decay_length(ideal.sos))
     impulse[0] = 1.0
-    return math.sqrt(float(np.sum(sosfilt(ideal.sos, impulse) ** 2)))
+    response = sosfilt(ideal.sos, impulse)
+    return math.sqrt(float(np.sum((response if front is None else front.decimator.before(response)) ** 2)))
 
 
 def budget_json(found: InstrumentBudget) -> dict[str, Any]:

@@ -27,6 +27,7 @@ from sosmith.gen.proof.response import IMPULSE, Response
 from sosmith.gen.verifier.certificate_file import (
     FORMAT,
     AboutEntry,
+    CalibrationEntry,
     Certificate,
     ClaimsEntry,
     DecimationEntry,
@@ -121,6 +122,16 @@ def _decimation(quantized: Quantized) -> DecimationEntry | None:
         correction=found.correction,
         edge=found.edge / found.sample_rate,
         aliasing=tuple(map(on_grid, found.aliasing)),
+        calibration=None if quantized.ahead is None else _calibration(quantized.ahead),
+    )
+
+
+def _calibration(quantized: Quantized) -> CalibrationEntry:
+    datapath = quantized.datapath
+    return CalibrationEntry(
+        output=_port(datapath.output),
+        stages=tuple(_stage(stage) for stage in datapath.stages),
+        claims=_claims(quantized, ()),
     )
 
 

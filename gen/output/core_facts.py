@@ -344,7 +344,7 @@ def core_facts(design: CoreDesign) -> CoreFacts:
         protect=architecture.protect,
         reasons=design.reasons,
         sections=tuple(each for section in quantized.sections for each in _sections(section)),
-        formats=tuple(row for stage in datapath.stages for row in _formats(stage, datapath)),
+        formats=tuple(row for each in _in_order(datapath) for stage in each.stages for row in _formats(stage, each)),
         error_bound=float(quantized.bound * output.lsb),
         error_parts={part: float(value * output.lsb) for part, value in quantized.budget.items()},
         unit=output.unit,
@@ -454,10 +454,15 @@ def _reload(design: CoreDesign) -> ReloadFacts | None:
     )
 
 
+def _in_order(datapath: Datapath) -> Sequence[Datapath]:
+    """Return what stands before a decimator, if anything does, and the datapath itself."""
+    return (datapath,) if datapath.ahead is None else (datapath.ahead, datapath)
+
+
 def _formats(stage: Stage, datapath: Datapath) -> Sequence[NodeFormat]:
     """Return the formats of the named nodes of a stage.
 
-    Values inside are in output LSBs, except the polynomial's variables, which are fractions of their range.
+    Values inside are in LSBs of its output, except the polynomial's variables, which are fractions of their range.
     """
     variables = {port.name for port in datapath.inputs}
     rows = []

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
+from typing import Any
 
+from sosmith.gen.architecture import Architecture
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.filter.decimation import group_delay, nearest_db
 from sosmith.gen.filter.design import design
@@ -25,6 +27,37 @@ class AliasingFacts:
     low: float
     high: float
     gain_db: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class AheadFacts:
+    """The calibration before a decimator.
+
+    Attributes
+    ----------
+    architecture : str
+        Name of its architecture.
+    cycles_per_sample, latency_cycles : int
+        Its own clocks between samples at the highest rate, and from a sample to its result.
+    instructions : int or None
+        Of its program; None in the parallel architecture.
+    bits : int
+        Width of its result.
+    lsb, low, high : float
+        Step of its result, and its smallest and largest value, in the output's unit.
+    error : float
+        Proven bound on the error of its result, in the output's unit.
+    """
+
+    architecture: str
+    cycles_per_sample: int
+    latency_cycles: int
+    instructions: int | None
+    bits: int
+    lsb: float
+    low: float
+    high: float
+    error: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,6 +87,8 @@ class DecimationFacts:
     worst_aliasing : float
         Largest amplitude at the output of a sine in any of these bands that fills the range of the input, in the
         output's unit.
+    calibration : AheadFacts or None
+        What stands before it; None if it takes the input itself.
     """
 
     factor: int
@@ -68,6 +103,15 @@ class DecimationFacts:
     delay: float
     aliasing: tuple[AliasingFacts, ...]
     worst_aliasing: float
+    calibration: AheadFacts | None = None
+
+    @property
+    def entries(self) -> dict[str, Any]:
+        """All of it as a tree; of a calibration nothing if there is none."""
+        found = asdict(self)
+        if self.calibration is None:
+            del found["calibration"]
+        return found
 
 
 def decimation_facts(made: CoreDesign) -> DecimationFacts | None:
@@ -76,7 +120,7 @@ def decimation_facts(made: CoreDesign) -> DecimationFacts | None:
     if found is None or decimator is None or filter_ is None:
         return None
     gains = found.aliasing
-    x = decimator.input
+    x, (low, high) = decimator.input, made.datapath.decimated_range
     return DecimationFacts(
         factor=decimator.factor,
         stages=decimator.stages,
@@ -96,7 +140,27 @@ def decimation_facts(made: CoreDesign) -> DecimationFacts | None:
             )
             for band, gain in enumerate(gains, start=1)
         ),
-        worst_aliasing=float(max(gains) * x.lsb * (x.highest - x.lowest) / 2),
+        worst_aliasing=float(max(gains) * x.lsb * (high - low) / 2),
+        calibration=_ahead(made),
+    )
+
+
+def _ahead(made: CoreDesign) -> AheadFacts | None:
+    quantized, architecture = made.quantized.ahead, made.architecture.ahead
+    if quantized is None or architecture is None:
+        return None
+    port, program = quantized.datapath.output, architecture.program
+    low, high = (float(port.zero + code * port.lsb) for code in quantized.datapath.result_range)
+    return AheadFacts(
+        architecture=architecture.name,
+        cycles_per_sample=architecture.cycles_per_sample,
+        latency_cycles=architecture.latency_cycles,
+        instructions=None if program is None else len(program.instructions),
+        bits=port.bits,
+        lsb=float(port.lsb),
+        low=low,
+        high=high,
+        error=float(quantized.bound * port.lsb),
     )
 
 
@@ -107,9 +171,10 @@ class RateCosts:
     Attributes
     ----------
     clocks_per_sample : float
-        Clocks that each sample of the input takes, on average, at the highest rate.
+        Clocks that each sample of the input takes, on average, at the highest rate. A calibration before a decimator
+        works while the filter does: the slower of them counts.
     memory_bits : int or None
-        Bits of memory; None in the parallel architecture.
+        Bits of memory, with those of a calibration before a decimator; None in the parallel architecture.
     decimator_bits : int
         Bits of the decimator's registers, without its control.
     bound : float
@@ -117,7 +182,7 @@ class RateCosts:
     delay : float
         Group delay at zero frequency, in s.
     architecture : str
-        Name of the architecture.
+        Name of the architecture, that of a calibration before a decimator first if it is another one.
     """
 
     clocks_per_sample: float
@@ -132,18 +197,25 @@ def rate_costs(made: CoreDesign) -> RateCosts:
     """Return what a core with a filter costs."""
     quantized, architecture = made.quantized, made.architecture
     filter_, found, factor = quantized.filter, quantized.decimation, 1
-    program, decimator = architecture.program, made.datapath.decimator
+    decimator = made.datapath.decimator
     assert filter_ is not None
     delay = group_delay(filter_.exact) / made.spec.sample_rate
     if found is not None:
         delay, factor = found.delay(filter_), found.factor
     return RateCosts(
         clocks_per_sample=architecture.cycles_per_result / factor,
-        memory_bits=None if program is None else program.words * (program.digit_bits + 1),
+        memory_bits=architecture.memory_bits,
         decimator_bits=0 if decimator is None else decimator.register_bits,
         bound=float(quantized.bound * made.datapath.output.lsb),
         delay=float(delay),
-        architecture=architecture.name,
+        architecture=_named(architecture),
+    )
+
+
+def _named(architecture: Architecture) -> str:
+    ahead = architecture.ahead
+    return (
+        architecture.name if ahead is None or ahead.name == architecture.name else f"{ahead.name}, {architecture.name}"
     )
 
 

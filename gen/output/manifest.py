@@ -58,7 +58,7 @@ def limit_cycle_entry(found: LimitCycleFacts) -> dict[str, Any]:
 
 
 def _decimation(facts: DecimationFacts) -> dict[str, Any]:
-    return _entry(facts) | {"aliasing": [_entry(band) for band in facts.aliasing]}
+    return {name: list(value) if isinstance(value, tuple) else value for name, value in facts.entries.items()}
 
 
 def _entry(facts: Any) -> dict[str, Any]:

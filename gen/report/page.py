@@ -289,9 +289,12 @@ def _decimation_table(found: DecimationFacts) -> Table:
 def _decimation_caption(found: DecimationFacts, unit: str) -> str:
     worst, rate = amount(found.worst_aliasing, unit), _hertz((found.sample_rate,))
     held = ", which leaves as many times" if found.held else ""
+    before = found.calibration
+    calibrated = "" if before is None else f"Every sample is calibrated first, within {amount(before.error, unit)}. "
+    what = "the input" if before is None else "the calibration's result"
     return (
-        f"{found.factor} samples make one result{held}, by {count(found.stages, 'stage')} of integrators and combs "
-        f"of {found.width} bits, and the filter works at {rate}. A sine over the whole range of the input in one of "
+        f"{calibrated}{found.factor} samples make one result{held}, by {count(found.stages, 'stage')} of integrators and "
+        f"combs of {found.width} bits, and the filter works at {rate}. A sine over the whole range of {what} in one of "
         f"these bands comes out in the pass band with an amplitude of at most {worst}. In the pass band the gain is "
         f"within {plain_number(found.deviation_db)} dB of that without a decimator, and decimator and filter together "
         f"delay by {amount(found.delay, 's')}."

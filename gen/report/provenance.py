@@ -110,17 +110,19 @@ def hardware_cost(design: CoreDesign, netlist: Netlist | None = None) -> dict[st
         ``source``: "synthesis" with the counted cells of `netlist`, or "estimate" of the parallel and the online one
         before synthesis, or "program" of the folded and serial architectures. ``board``: of the netlist, else None.
         ``luts`` (LUT4), ``multiplier_blocks`` and, before synthesis, ``register_bits``; of a program ``instructions``,
-        ``memory_words`` and ``accumulator_bits``. What the source does not tell is None.
+        ``memory_words`` and ``accumulator_bits``, with those of one before a decimator. What the source does not tell
+        is None.
     """
     made: dict[str, Any] = dict.fromkeys(
         ("luts", "multiplier_blocks", "register_bits", "instructions", "memory_words", "accumulator_bits")
     )
-    program = design.architecture.program
-    if program is not None:
+    program, ahead = design.architecture.program, design.architecture.ahead
+    programs = [each for each in (program, None if ahead is None else ahead.program) if each is not None]
+    if programs:
         made |= {
-            "instructions": len(program.instructions),
-            "memory_words": program.words,
-            "accumulator_bits": program.accumulator_bits,
+            "instructions": sum(len(each.instructions) for each in programs),
+            "memory_words": sum(each.words for each in programs),
+            "accumulator_bits": sum(each.accumulator_bits for each in programs),
         }
     if netlist is not None:
         device = netlist.board.device

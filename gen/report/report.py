@@ -142,7 +142,7 @@ def summarise(evidence: Evidence) -> dict[str, Any]:
         "range": [evidence.low, evidence.high],
         "sqnr_db": sqnr_db(evidence.golden, evidence.error),
         "frequency_response": _response_summary(measures),
-        "decimation": None if evidence.decimation is None else asdict(evidence.decimation),
+        "decimation": None if evidence.decimation is None else evidence.decimation.entries,
         "accuracy_percent": _accuracy(evidence),
         "uncertainty": evidence.uncertainty,
         "start_up": None if evidence.settling is None else asdict(evidence.settling),

@@ -155,7 +155,8 @@ class DecimationEntry(_Part):
     `stages` integrators and combs of `width` bits; the rounding to nearest behind them drops `dropped` bits. The first
     result is that of the first sample, as if that had been there for ever. `correction` is the weight g of the ideal
     section ``1 + g - g / z``, the last one. `edge` is the upper edge of the pass band, in units of the rate of the
-    input, and `aliasing` bounds the gain of what folds into it from around each multiple of the lower rate.
+    input, and `aliasing` bounds the gain of what folds into it from around each multiple of the lower rate. It takes
+    the only input, or what a `calibration` makes of the inputs.
     """
 
     factor: Annotated[int, Field(strict=True, ge=2, le=1 << 10)]
@@ -165,6 +166,7 @@ class DecimationEntry(_Part):
     correction: Rational
     edge: Rational
     aliasing: Annotated[tuple[Rational, ...], Field(max_length=1 << 9)]
+    calibration: CalibrationEntry | None = None
 
 
 class GainEntry(_Part):
@@ -211,6 +213,17 @@ class ClaimsEntry(_Part):
     sections: tuple[GainEntry, ...]
     settling: Annotated[int, Field(strict=True, ge=1, le=1 << 21)] | None = None
     online: OnlineEntry | None = None
+
+
+class CalibrationEntry(_Part):
+    """A datapath that computes the ideal polynomial of the inputs for a decimator, which takes its `output`.
+
+    It limits nothing: its output holds the result for all inputs. Its claims are in LSBs of its output.
+    """
+
+    output: PortEntry
+    stages: Annotated[tuple[StageEntry, ...], Field(min_length=1, max_length=256)]
+    claims: ClaimsEntry
 
 
 class FileEntry(_Part):

@@ -10,6 +10,10 @@ For a factor R that is a power of two, the magnitude of the response is the prod
 ``|cos(2**j pi f)|**N``, f in units of the rate of the input, which equals ``|sin(pi R f) / (R sin(pi f))|**N``. In the
 band around a multiple k of the lower rate, as far as it folds into the pass band 0..F, it is largest at its lower end
 ``k / R - F``: with ``F R < 1/2`` the numerator is largest at both ends, and the denominator smallest at the lower one.
+
+A calibration before the decimator is a certificate within the certificate, for the polynomial alone. It may limit
+nothing, since the exact result is limited at the end only: then its error holds for every input, and no sum of samples
+whose weights are positive and add up to one makes it greater. The peak gain of the filter takes it to the output.
 """
 
 from __future__ import annotations
@@ -19,7 +23,15 @@ from fractions import Fraction
 
 from flint import arb, ctx, fmpq, fmpz_poly
 
-from sosmith.gen.verifier.certificate_file import Certificate, DecimationEntry, PortEntry, SectionEntry, on_grid
+from sosmith.gen.verifier.certificate_file import (
+    Certificate,
+    DecimationEntry,
+    IdealEntry,
+    Operation,
+    PortEntry,
+    SectionEntry,
+    on_grid,
+)
 from sosmith.gen.verifier.graph import require
 from sosmith.gen.verifier.l1_response import UndecidedError
 
@@ -44,17 +56,55 @@ def at_lower_rate(certificate: Certificate) -> Certificate:
     entry = certificate.decimation
     if entry is None:
         return certificate
-    require(len(certificate.inputs) == 1, f"a decimator must have one input, not {len(certificate.inputs)}")
     require(bool(certificate.ideal.sections), "a decimator must have a filter behind it")
     require(
         entry.factor & (entry.factor - 1) == 0,
         f"the factor of the decimator must be a power of two, not {entry.factor}",
     )
-    (port,) = certificate.inputs
-    code = _behind(entry, port)
+    code = _behind(entry, _taken(certificate, entry))
     _check_aliasing(entry)
     _check_correction(entry, certificate.ideal.sections[-1])
-    return certificate.model_copy(update={"inputs": (code,), "decimation": None})
+    ideal = certificate.ideal.model_copy(update={"polynomial": None})
+    return certificate.model_copy(update={"inputs": (code,), "ideal": ideal, "decimation": None})
+
+
+def calibration_alone(certificate: Certificate) -> Certificate | None:
+    """Return the certificate of the calibration before the decimator of a certificate; None if there is none.
+
+    Its error is allowed to be what it claims. Its output is in the unit and steps of its own.
+
+    Raises
+    ------
+    RejectedError
+        If it has no polynomial to compute, or limits its result.
+    """
+    entry = None if certificate.decimation is None else certificate.decimation.calibration
+    if entry is None:
+        return None
+    require(certificate.ideal.polynomial is not None, "a calibration before the decimator must have a polynomial")
+    limits = [node for stage in entry.stages for node in stage.nodes if node.op is Operation.CLAMP]
+    require(not limits, f"the calibration before the decimator must limit nothing, not by {len(limits)} nodes")
+    return Certificate(
+        format=certificate.format,
+        name=f"{certificate.name}_ahead",
+        inputs=certificate.inputs,
+        output=entry.output,
+        max_error=entry.claims.bound * entry.output.lsb,
+        ideal=IdealEntry(polynomial=certificate.ideal.polynomial, sections=()),
+        stages=entry.stages,
+        claims=entry.claims,
+    )
+
+
+def _taken(certificate: Certificate, entry: DecimationEntry) -> PortEntry:
+    """Return the port that the decimator takes."""
+    if entry.calibration is not None:
+        port, output = entry.calibration.output, certificate.output
+        require(port.unit == output.unit, f"the calibration must give {output.unit}, not {port.unit}")
+        return port
+    require(len(certificate.inputs) == 1, f"a decimator must have one input, not {len(certificate.inputs)}")
+    require(certificate.ideal.polynomial is None, "the calibration must stand before the decimator")
+    return certificate.inputs[0]
 
 
 def behind_decimator(text: str, certificate: Certificate) -> str:
@@ -65,11 +115,19 @@ def behind_decimator(text: str, certificate: Certificate) -> str:
     RejectedError
         If the text has no such module.
     """
-    if certificate.decimation is None:
-        return text
-    name = re.escape(certificate.name)
-    found = re.findall(rf"^module {name}_behind\(.*?^endmodule$", text, re.MULTILINE | re.DOTALL)
-    require(len(found) == 1, f"the core must have one module {certificate.name}_behind, not {len(found)}")
+    return text if certificate.decimation is None else module_in(text, f"{certificate.name}_behind")
+
+
+def module_in(text: str, name: str) -> str:
+    """Return the SystemVerilog of one module.
+
+    Raises
+    ------
+    RejectedError
+        If the text has no such module.
+    """
+    found = re.findall(rf"^module {re.escape(name)}\(.*?^endmodule$", text, re.MULTILINE | re.DOTALL)
+    require(len(found) == 1, f"the core must have one module {name}, not {len(found)}")
     return str(found[0])
 
 
@@ -78,7 +136,7 @@ def rounding(certificate: Certificate) -> Fraction:
     entry = certificate.decimation
     if entry is None or entry.dropped == 0:
         return Fraction(0)
-    return _step(entry, certificate.inputs[0]) / certificate.output.lsb / 2
+    return _step(entry, _taken(certificate, entry)) / certificate.output.lsb / 2
 
 
 def _step(entry: DecimationEntry, port: PortEntry) -> Fraction:

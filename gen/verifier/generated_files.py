@@ -120,6 +120,21 @@ def fixed_architecture(path: Path) -> tuple[str | None, int]:
         raise RejectedError(f"{path} must be the manifest of a core, not another file") from None
 
 
+def architecture_ahead(path: Path) -> str | None:
+    """Return the architecture of the calibration before a decimator from the manifest at `path`; None without one.
+
+    Raises
+    ------
+    RejectedError
+        If it is no manifest.
+    """
+    try:
+        found = (json.loads(_content(path))["decimation"] or {}).get("calibration")
+        return None if found is None else str(found["architecture"])
+    except (ValueError, KeyError, TypeError, AttributeError):
+        raise RejectedError(f"{path} must be the manifest of a core, not another file") from None
+
+
 def check_texts(about: AboutEntry, texts: Mapping[str, str]) -> int:
     """Check that `texts`, by the names of their files, are those written with a certificate; return their number.
 

@@ -15,7 +15,7 @@
    past could change is followed until it has faded (`sosmith.gen.verifier.settling`).
 
 6. A decimator before the stages is exact but for one rounding (`sosmith.gen.verifier.decimation`). All else is proven
-   of what is behind it.
+   of what is behind it, and, with a calibration before it, of that.
 
 The ranges hold by induction. Unbounded integers obey the linear model exactly, with the quantizers' errors as further
 inputs. The limits from the linear model therefore hold at every sample, and signals with these ranges never overflow.
@@ -33,7 +33,7 @@ from math import gcd, lcm, prod
 from flint import fmpq, fmpq_poly
 
 from sosmith.gen.verifier.certificate_file import Certificate, Operation, StageEntry, on_grid
-from sosmith.gen.verifier.decimation import at_lower_rate, rounding
+from sosmith.gen.verifier.decimation import at_lower_rate, calibration_alone, rounding
 from sosmith.gen.verifier.graph import RejectedError, Transfer, check_graph, inputs_of, label, require
 from sosmith.gen.verifier.l1_response import BITS, Inverse, UndecidedError, fraction, inverse, is_stable, response
 from sosmith.gen.verifier.online import check_online
@@ -107,6 +107,7 @@ def verify(certificate: Certificate, progress: Progress = lambda step, done, tot
 
 
 def _verified(certificate: Certificate, progress: Progress) -> Verdict:
+    budget, nodes = _before_decimator(certificate, progress)
     progress("graphs", 0, 0)
     rounded = rounding(certificate)
     certificate = at_lower_rate(certificate)
@@ -116,7 +117,6 @@ def _verified(certificate: Certificate, progress: Progress) -> Verdict:
     _check_seams(certificate)
     fore, starts, sections, last = ([stage for stage in stages if stage.role == role] for role in _ROLES)
     progress("calibration", 0, 0)
-    budget: dict[str, Fraction] = {}
     if fore:
         budget["input scaling" if certificate.ideal.polynomial is None else "calibration"] = polynomial_error(
             certificate, fore
@@ -160,7 +160,16 @@ def _verified(certificate: Certificate, progress: Progress) -> Verdict:
         require(not certificate.claims.sections, "the gains of sections must not be given where there are none")
     budget["output rounding"] = last_rounding
     _compare_budget(certificate, budget)
-    return Verdict(budget, sum(len(stage.nodes) for stage in stages), ranges, margin)
+    return Verdict(budget, nodes + sum(len(stage.nodes) for stage in stages), ranges, margin)
+
+
+def _before_decimator(certificate: Certificate, progress: Progress) -> tuple[dict[str, Fraction], int]:
+    """Prove the calibration before a decimator, if there is one; return its error in output LSBs and its nodes."""
+    ahead = calibration_alone(certificate)
+    if ahead is None:
+        return {}, 0
+    proven = _verified(ahead, progress)
+    return {"calibration": proven.bound * ahead.output.lsb / certificate.output.lsb}, proven.nodes
 
 
 def _compare(what: str, claimed: Fraction | None, proven: Fraction | None) -> None:

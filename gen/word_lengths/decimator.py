@@ -158,7 +158,7 @@ def front_of(
 
     guessed = calibration(Fraction(_GUESSED_GAIN))
     x = inputs[0] if guessed is None else guessed.datapath.output
-    # A sine of the largest amplitude that the decimator can take, as far as it folds, must not exceed the error allowed.
+    # A sine over all that the decimator can take, as far as it folds, must not exceed the error allowed.
     low, high = (x.lowest, x.highest) if guessed is None else guessed.datapath.result_range
     amplitude = x.lsb * (high - low) / 2
     found, reason = choose(spec, sample_rate, max_error / amplitude, x.bits)

@@ -16,7 +16,7 @@ def reset_cycles(decimator: Decimator) -> int:
 
 
 FIRST_SAMPLE = 1
-"""Clocks from the edge that fills the decimator to the one that accepts the first sample, where a calibration is ahead."""
+"""Clocks from the edge that fills the decimator behind a calibration to the one that accepts the first sample."""
 
 
 def cycles_per_result(decimator: Decimator, taken: int = 0, *, each: int = 1) -> int:

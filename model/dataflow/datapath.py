@@ -19,7 +19,6 @@ from sosmith.model.dataflow.graph import Graph
 from sosmith.model.dataflow.status import Flag
 from sosmith.model.port import Port
 
-
 _OF_INPUT = 1 << Flag.INPUT_AT_RAIL | 1 << Flag.OUTSIDE_CALIBRATION
 """Flags that are told of the inputs."""
 
@@ -63,8 +62,8 @@ class Datapath:
     decimator : Decimator or None
         What stands before the first stage and hands on one sample out of several; None if all go in.
     ahead : Datapath or None
-        What stands before the decimator, at the rate of the input: a calibration, whose output the decimator takes. None
-        if the decimator takes the input itself.
+        What stands before the decimator, at the rate of the input: a calibration, whose output that takes. None if it
+        takes the input itself.
     """
 
     name: str
@@ -225,10 +224,10 @@ class Datapath:
         return results
 
     def _gathered(self, block: Codes, decimator: Decimator) -> npt.NDArray[np.uint8]:
-        """Flags of the inputs, for each result, of any sample since the result before."""
+        """Gather the flags of the inputs, for each result, of any sample since the result before."""
         if self.ahead is None:
             rails = (block[:, :, 0] == decimator.input.lowest) | (block[:, :, 0] == decimator.input.highest)
-            flags = rails.astype(np.uint8) << Flag.INPUT_AT_RAIL
+            flags = rails * np.uint8(1 << Flag.INPUT_AT_RAIL)
         else:
             flags = self.ahead.compute_status(block) & np.uint8(_OF_INPUT)
         return np.stack([decimator.gathered(flags[:, k]) for k in range(block.shape[1])], axis=1)

@@ -65,6 +65,7 @@ def verify(certificate: Path, spec: Path | None, files: Path | None, rebuild: bo
                 },
                 "files_compared": proof.files,
                 "program_instructions": None if proof.program is None else proof.program.instructions,
+                **({} if proof.calibration is None else {"calibration_instructions": proof.calibration.instructions}),
                 "hardware_registers": None if proof.hardware is None else proof.hardware.registers,
                 "files_rebuilt": proof.rebuilt,
             }

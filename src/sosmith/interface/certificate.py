@@ -10,9 +10,10 @@ from pathlib import Path
 from sosmith.gen.specification.specification import from_text, load
 from sosmith.gen.verifier.certificate_file import Certificate as Entries
 from sosmith.gen.verifier.certificate_file import certificate_text, read_certificate
-from sosmith.gen.verifier.decimation import at_lower_rate, behind_decimator
+from sosmith.gen.verifier.decimation import at_lower_rate, behind_decimator, calibration_alone, module_in
 from sosmith.gen.verifier.generated_files import (
     about_of,
+    architecture_ahead,
     check_files,
     check_measurements,
     check_seal,
@@ -58,6 +59,8 @@ class Proof:
     """Number of files whose content was compared."""
     program: ProgramVerdict | None = None
     """What the check of the program in the SystemVerilog found; None if it was not checked."""
+    calibration: ProgramVerdict | None = None
+    """What the same check of a calibration before a decimator found; None without one, and if it was not checked."""
     hardware: HardwareVerdict | None = None
     """What the check of a parallel core's SystemVerilog found; None if it was not checked."""
     rebuilt: int = 0
@@ -129,7 +132,7 @@ class Certificate:
             certificate's own file may have been changed. From the SystemVerilog, the program of a folded or serial
             core, and all hardware of a parallel one, is proven to compute the certificate's graph for all inputs and
             states; online cores are not, nor cores with loadable constants, protection, look-ahead or several samples a
-            clock, nor a decimator, or a parallel core behind one.
+            clock, nor a decimator, or a parallel core beside one.
         rebuild : bool
             Whether to generate all files again, from `spec` or the specification's text in the certificate, and compare
             them byte for byte.
@@ -142,7 +145,7 @@ class Certificate:
             If a file cannot be read, or the specification is invalid.
         """
         verdict = verify(self.entries, progress)
-        agreement, program, hardware, compared, again = None, None, None, 0, 0
+        agreement, program, before, hardware, compared, again = None, None, None, None, 0, 0
         checked = None if spec is None else load(Path(fspath(spec)))
         if checked is not None:
             progress("specification", 0, 0)
@@ -167,6 +170,10 @@ class Certificate:
             elif architecture == "parallel" and self.entries.decimation is None:
                 progress("hardware", 0, 0)
                 hardware = check_hardware(text, self.entries, channels)
+            ahead = calibration_alone(self.entries)
+            if ahead is not None and architecture_ahead(folder / f"{self.name}.json") in {"folded", "serial"}:
+                progress("program of the calibration", 0, 0)
+                before = check_program(module_in(text, ahead.name), ahead)
         if rebuild:
             from sosmith.gen.output.rebuild import rebuilt
 
@@ -183,6 +190,7 @@ class Certificate:
             agreement=agreement,
             files=compared,
             program=program,
+            calibration=before,
             hardware=hardware,
             rebuilt=again,
         )

@@ -28,9 +28,9 @@ def locomotive_spec(decimate: str = '"auto"', architecture: str = "auto") -> Spe
 
 
 @cache
-def locomotive(decimate: str = '"auto"', architecture: str = "auto") -> CoreDesign:
-    """Design its filter."""
-    return design_core(locomotive_spec(decimate, architecture), core="filter")
+def locomotive(decimate: str = '"auto"', architecture: str = "auto", core: str = "filter") -> CoreDesign:
+    """Design its filter, or all of it."""
+    return design_core(locomotive_spec(decimate, architecture), core=core)
 
 
 def tree_of(made: CoreDesign) -> Any:

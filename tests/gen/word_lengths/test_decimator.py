@@ -122,10 +122,7 @@ def refused(sentence: str, error: type[Exception] = SpecificationError) -> pytes
     return pytest.raises(error, match=f"^{re.escape(sentence)}$")
 
 
-def test_an_instrument_is_refused() -> None:
-    sentence = "locomotive.toml: not yet available: the core must be filter with filter.decimate, not instrument"
-    with refused(sentence):
-        design_core(locomotive_spec())
+def test_a_calibration_alone_is_not_decimated() -> None:
     assert design_core(locomotive_spec(), core="calibration").datapath.decimator is None
 
 
@@ -145,7 +142,7 @@ def test_packages_and_boards_are_refused(tmp_path: Path) -> None:
 def test_an_input_as_wide_as_can_be() -> None:
     spec = locomotive_spec("16")
     x = Port.from_range("x", 32, Fraction(0), Fraction(16))
-    front, _ = front_of(spec.filter, spec.sample_rate, x, spec.output, spec.max_error)
+    front, _ = front_of(spec.filter, spec.sample_rate, (x,), spec.output, spec.max_error)
     assert front is not None
     assert front.decimator.output.bits == 32
     sharp = Port.from_range("y", 32, Fraction(0), Fraction(16))
@@ -154,7 +151,7 @@ def test_an_input_as_wide_as_can_be() -> None:
         "32 bits: raise output.max_error or output.bits"
     )
     with refused(sentence, ShortfallError):
-        front_of(spec.filter, spec.sample_rate, x, sharp, Fraction(16, 2**32))
+        front_of(spec.filter, spec.sample_rate, (x,), sharp, Fraction(16, 2**32))
 
 
 def test_a_clock_that_is_too_slow() -> None:

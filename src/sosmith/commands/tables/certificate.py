@@ -24,10 +24,13 @@ def print_proof(certificate: Certificate, proof: Proof) -> None:
         console.print(f"[bold green]as specified[/]: {_agreement(proof.agreement)}")
     if proof.files:
         console.print(f"[bold green]unchanged[/]: {proof.files} files and the certificate itself, by their SHA-256")
-    if proof.program is not None:
+    programs = [found.instructions for found in (proof.calibration, proof.program) if found is not None]
+    if programs:
+        both = len(programs) > 1
         console.print(
-            f"[bold green]program[/]: {proof.program.instructions} instructions in the SystemVerilog compute these "
-            "graphs, for all inputs and states; the unit that runs them is not part of it"
+            f"[bold green]program{'s' * both}[/]: {' and '.join(map(str, programs))} instructions in the SystemVerilog "
+            f"compute these graphs, for all inputs and states; the unit{'s' * both} that run{'s' * (not both)} them "
+            f"{'are' if both else 'is'} not part of it"
         )
     if proof.hardware is not None:
         found = proof.hardware
@@ -45,7 +48,7 @@ def print_proof(certificate: Certificate, proof: Proof) -> None:
     if proof.files and proof.program is None and proof.hardware is None:
         plain = "a core with loadable constants, protection, look-ahead or several samples a clock"
         what = plain if online is None else "an online core"
-        other = ", or in parallel behind a decimator" if certificate.decimation is not None else ""
+        other = ", or in parallel beside a decimator" if certificate.decimation is not None else ""
         console.print(f"not read: the SystemVerilog, as that of {what}{other}")
     if proof.rebuilt:
         console.print(f"[bold green]rebuilt[/]: {proof.rebuilt} files, the same byte for byte")

@@ -48,7 +48,7 @@ def print_design(design: Design, *, details: bool = False) -> None:
     overview.add_row("output", f"{datapath.output.bits} bits, one LSB = {lsb:.6g}{unit}")
     if made.spec.wear is not None:
         overview.add_row("wear flags", _wear_text(made.spec.wear, datapath.output))
-    for name, value in (*_hardware_rows(made.architecture), *_option_rows(made.architecture)):
+    for name, value in (*_all_hardware_rows(made.architecture), *_option_rows(made.architecture)):
         overview.add_row(name, value)
     if made.spec.channels > 1:
         overview.add_row("channels", f"{made.spec.channels:,}, each at {float(made.spec.sample_rate):,.6g} Hz")
@@ -68,7 +68,7 @@ def print_design(design: Design, *, details: bool = False) -> None:
     if design.facts.sections:
         console.print(sections)
         _print_limit_cycles(console, design.facts.limit_cycles, lsb)
-    _print_schedule(console, made.architecture.program)
+    _print_schedules(console, made.architecture)
 
 
 def _add_decimation(overview: Table, design: Design) -> None:
@@ -77,6 +77,13 @@ def _add_decimation(overview: Table, design: Design) -> None:
     if found is None:
         return
     unit = design.core.datapath.output.unit
+    before = found.calibration
+    if before is not None:
+        overview.add_row(
+            "into the decimator",
+            f"the calibration's result, {quantity(before.low, unit)} to {quantity(before.high, unit)} in {before.bits} "
+            f"bits, within {quantity(before.error, unit)}; not limited",
+        )
     overview.add_row(
         "decimator",
         f"{found.stages} integrators and combs of {found.width} bits, {found.width - found.dropped} bits leave, at "
@@ -87,7 +94,8 @@ def _add_decimation(overview: Table, design: Design) -> None:
     most = max(band.gain_db for band in found.aliasing)
     overview.add_row(
         "aliasing into the pass band",
-        f"at most {most:.1f} dB, {quantity(found.worst_aliasing, unit)} of a sine over the whole range of the input",
+        f"at most {most:.1f} dB, {quantity(found.worst_aliasing, unit)} of a sine over the whole range of "
+        f"{'the input' if before is None else 'that result'}",
     )
     overview.add_row("gain in the pass band", f"within {found.deviation_db:.2g} dB of that without a decimator")
 
@@ -143,6 +151,13 @@ def _wear_text(wear: WearSpec, output: Port) -> str:
     return escape(f"warning from {warning} on, critical from {critical} on")
 
 
+def _all_hardware_rows(architecture: Architecture) -> list[tuple[str, str]]:
+    """Return the resources of the hardware, those of a program before a decimator first."""
+    ahead = architecture.ahead
+    apart = [] if ahead is None or ahead.program is None else _hardware_rows(ahead)
+    return [*((f"{name}, calibration", value) for name, value in apart), *_hardware_rows(architecture)]
+
+
 def _hardware_rows(architecture: Architecture) -> list[tuple[str, str]]:
     """Return the resources of the hardware, before synthesis."""
     program, cost = architecture.program, architecture.cost
@@ -180,11 +195,17 @@ def _option_rows(architecture: Architecture) -> list[tuple[str, str]]:
     return rows
 
 
-def _print_schedule(console: Console, program: Program | None) -> None:
+def _print_schedules(console: Console, architecture: Architecture) -> None:
+    if architecture.ahead is not None:
+        _print_schedule(console, architecture.ahead.program, " in the calibration")
+    _print_schedule(console, architecture.program)
+
+
+def _print_schedule(console: Console, program: Program | None, where: str = "") -> None:
     if program is None:
         return
     table = new_table(
-        f"Schedule: {len(program.instructions)} instructions for each sample of each channel",
+        f"Schedule: {len(program.instructions)} instructions for each sample of each channel{where}",
         ["from", "clocks", "value", "words"],
     )
     words = {at.name: ", ".join(map(str, at.addresses)) for at in program.locations}
