@@ -33,6 +33,24 @@ def locomotive(decimate: str = '"auto"', architecture: str = "auto", core: str =
     return design_core(locomotive_spec(decimate, architecture), core=core)
 
 
+INSTRUMENT = """
+name = "slight"
+sample_rate = 100.0
+input.voltage = {{ bits = 10, range = [0.0, 10.0] }}
+input.temperature = {{ bits = 10, range = [0.0, 128.0] }}
+calibration.coefficients = [[1.16, -0.0036], [0.3672, 0.0006618], [0.05812]]
+filter = {{ family = "butterworth", kind = "lowpass", order = 2, cutoff = 1.0, decimate = 4 }}
+output = {{ bits = 10, range = [0.0, 16.0], unit = "mm", max_error = "faithful" }}
+{extra}
+"""
+
+
+@cache
+def small(extra: str = "") -> CoreDesign:
+    """Design a small instrument with a decimator; `extra` are lines of its specification."""
+    return design_core(from_text(INSTRUMENT.format(extra=extra), Path("slight.toml")))
+
+
 def tree_of(made: CoreDesign) -> Any:
     """Return the certificate of a design as it is in its file."""
     entries = certificate(made.quantized, made.spec.max_error, about(made, {}))
