@@ -293,11 +293,11 @@ def _decimation_caption(found: DecimationFacts, unit: str) -> str:
     calibrated = "" if before is None else f"Every sample is calibrated first, within {amount(before.error, unit)}. "
     what = "the input" if before is None else "the calibration's result"
     return (
-        f"{calibrated}{found.factor} samples make one result{held}, by {count(found.stages, 'stage')} of integrators and "
-        f"combs of {found.width} bits, and the filter works at {rate}. A sine over the whole range of {what} in one of "
-        f"these bands comes out in the pass band with an amplitude of at most {worst}. In the pass band the gain is "
-        f"within {plain_number(found.deviation_db)} dB of that without a decimator, and decimator and filter together "
-        f"delay by {amount(found.delay, 's')}."
+        f"{calibrated}{found.factor} samples make one result{held}, by {count(found.stages, 'stage')} of integrators "
+        f"and combs of {found.width} bits, and the filter works at {rate}. A sine over the whole range of {what} in "
+        f"one of these bands comes out in the pass band with an amplitude of at most {worst}. In the pass band the "
+        f"gain is within {plain_number(found.deviation_db)} dB of that without a decimator, and decimator and filter "
+        f"together delay by {amount(found.delay, 's')}."
     )
 
 

@@ -158,10 +158,11 @@ def front_of(
 
     guessed = calibration(Fraction(_GUESSED_GAIN))
     x = inputs[0] if guessed is None else guessed.datapath.output
-    # A sine over all that the decimator can take, as far as it folds, must not exceed the error allowed.
+    # A sine over all that the decimator can take, as far as it folds, must not exceed the error allowed. A calibration
+    # may give a constant.
     low, high = (x.lowest, x.highest) if guessed is None else guessed.datapath.result_range
     amplitude = x.lsb * (high - low) / 2
-    found, reason = choose(spec, sample_rate, max_error / amplitude, x.bits)
+    found, reason = choose(spec, sample_rate, max_error / amplitude if amplitude else Fraction(1), x.bits)
     if found is None:
         return None, reason
     filter_ = decimated(spec, found)

@@ -529,6 +529,8 @@ class _Folding:
 
     def _result(self, computed: dict[int, Sum], copies: Mapping[Digit, object]) -> Sum:
         """Return the sum that hands the result out, instead of one that stores it if nothing else needs it."""
+        if self._output not in self._forms:
+            raise FoldingError("the datapath must not give a constant to be folded")
         own = computed.get(self._output)
         needed = {digit.value for digit in copies}.union(
             *(one.sources for i, one in computed.items() if own is not one)

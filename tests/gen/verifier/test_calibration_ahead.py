@@ -110,6 +110,8 @@ def told(value: Fraction) -> str:
 OWN = Fraction(PART["claims"]["budget"]["calibration"])
 WHOLE = Fraction(TREE["claims"]["budget"]["calibration"])
 GAIN = Fraction(TREE["claims"]["peak_gain"])
+BITS, WIDTH = PART["output"]["bits"], TREE["decimation"]["width"]
+MOST = (2**BITS - 1) * 2 ** (WIDTH - BITS)
 UNIT = Fraction(1, 2**64)
 LAST = PART["stages"][-1]["nodes"][PART["stages"][-1]["outputs"][0]]
 
@@ -147,8 +149,8 @@ WRONG: list[tuple[str, Callable[[Any], None], str]] = [
     ),
     (
         "a port that is too narrow",
-        lambda tree: calibration(tree)["output"].update(bits=PART["output"]["bits"] - 1),
-        f"the output must be whole codes in 0..{2 ** (PART['output']['bits'] - 1) - 1}, not in "
+        lambda tree: calibration(tree)["output"].update(bits=BITS - 1),
+        f"the output must be whole codes in 0..{2 ** (BITS - 1) - 1}, not in "
         f"{LAST['low']}..{LAST['high']} with 0 fraction bits",
     ),
     (
@@ -188,9 +190,8 @@ WRONG: list[tuple[str, Callable[[Any], None], str]] = [
     ),
     (
         "registers a bit short",
-        lambda tree: tree["decimation"].update(width=TREE["decimation"]["width"] - 1),
-        f"the registers of the decimator must hold 0..{(2 ** PART['output']['bits'] - 1) * 4 ** TREE['decimation']['stages']}"
-        f", which {TREE['decimation']['width'] - 1} bits do not",
+        lambda tree: tree["decimation"].update(width=WIDTH - 1),
+        f"the registers of the decimator must hold 0..{MOST}, which {WIDTH - 1} bits do not",
     ),
 ]
 

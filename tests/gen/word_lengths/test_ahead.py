@@ -129,7 +129,7 @@ def test_facts_for_programs() -> None:
     assert (told["bits"], told["lsb"]) == (20, 2**-16)
     assert (told["low"], told["high"]) == pytest.approx((0.699, 11.491), abs=0.001)
     assert told["error"] <= float(made.quantized.budget[CALIBRATION] * made.datapath.output.lsb)
-    assert [row["stage"] for row in tree["formats"]][0] == "row_power1"
+    assert tree["formats"][0]["stage"] == "row_power1"
     clocks = ahead.cycles_per_sample
     assert made.reasons["calibration before the decimator"] == (
         f"folded: the smallest that keeps up; takes {clocks} of 120,000 clocks a sample"
@@ -195,8 +195,8 @@ def test_a_result_too_wide_for_a_port() -> None:
     made = calibration_ahead("wide", inputs, polynomial, output, Fraction(1, 2))
     assert made.datapath.output.bits == 31
     with refused(
-        "what the calibration gives to the decimator must have at most 32 bits, not 33: raise output.max_error or narrow "
-        "the ranges of the inputs"
+        "what the calibration gives to the decimator must have at most 32 bits, not 33: raise output.max_error or "
+        "narrow the ranges of the inputs"
     ):
         calibration_ahead("wide", inputs, polynomial, output, Fraction(1, 8))
 

@@ -27,6 +27,8 @@ from sosmith.model.dataflow.program import (
     digits_of,
 )
 from sosmith.model.dataflow.scheduling import ONE
+from sosmith.model.port import Port
+from sosmith.model.sections.horner import HornerPolynomial, Variable
 
 FOLDABLE = ("df1", "df1_ef1", "df1_ef2", "df2t", "delta", "state_space")
 WRITES = EARLY_WRITES | LATE_WRITES
@@ -143,6 +145,15 @@ def test_columns_begin_where_the_exact_sum_does(
         )
         wrong = Fraction(found, 1 << (digit_bits * below)) - slope * code - offset
         assert wrong % (2 << (digit_bits * (end - below))) == 0  # FINISH keeps one bit beyond the top digit's
+
+
+def test_a_constant_cannot_be_folded() -> None:
+    x = Port(name="x", bits=8, signed=False, lsb=Fraction(1), zero=Fraction(0))
+    variables = (Variable(name="x", bits=8),)
+    stages = HornerPolynomial(coefficients=((5,),), frac=0, variables=variables).stages
+    datapath = Datapath(name="five", inputs=(x,), output=x, stages=stages)
+    with pytest.raises(FoldingError, match=r"^the datapath must not give a constant to be folded$"):
+        program(datapath, 15)
 
 
 def test_truncation_cannot_be_folded() -> None:

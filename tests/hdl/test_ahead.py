@@ -1,0 +1,182 @@
+# amaranth: UnusedElaboratable=no
+"""Decimated instruments in Amaranth's own simulator: the model at any pace, after resets, at the clocks stated."""
+
+import random
+from dataclasses import dataclass, field, replace
+from functools import cache
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.formal.prover import broken
+from tests.gen.word_lengths.decimated import small
+from tests.hdl.core_bench import Pace, simulate
+
+from sosmith.gen.architecture import Architecture
+from sosmith.hdl import decimator as hardware
+from sosmith.hdl.plan import folded_clocks
+from sosmith.hdl.plan.streams import fields
+
+ARCHITECTURES = ("parallel", "folded", "serial")
+LIMITS = ((10, 1000), (30, 1010))
+"""Codes of voltage and temperature that the calibration's measurements covered."""
+
+
+@cache
+def made_in(name: str, before: str = "", *, hold: bool = False) -> Architecture:
+    """Return the small instrument, with measurements of its calibration, which may have another architecture."""
+    made = small(f"[hardware]\narchitecture = '{name}'\n").architecture
+    other = small(f"[hardware]\narchitecture = '{before or name}'\n").architecture.ahead
+    assert other is not None
+    ahead = replace(other, datapath=replace(other.datapath, calibrated=LIMITS))
+    return replace(
+        made, datapath=replace(made.datapath, calibrated=LIMITS, ahead=ahead.datapath), ahead=ahead, hold=hold
+    )
+
+
+def codes_for(count: int) -> np.ndarray:
+    """Return codes with a few at a rail or outside the calibration, and a constant at the end."""
+    rng = np.random.default_rng(count)
+    codes = rng.integers(100, 900, (count, 2))
+    for number in rng.integers(0, count, count // 6):
+        codes[number, rng.integers(2)] = rng.choice([0, 1023, 5, 1015])
+    codes[-count // 5 :] = [512, 700]
+    return codes
+
+
+@dataclass
+class Seen:
+    """Results with their status, and clocks since a reset at which samples were accepted and results left."""
+
+    results: list[tuple[int, int]] = field(default_factory=list)
+    accepted: list[int] = field(default_factory=list)
+    left: list[int] = field(default_factory=list)
+
+
+def run(made: Architecture, codes: np.ndarray, pace: Pace, *, restart: int = 0, every: int = 1) -> Seen:
+    """Feed a core, after a reset in which the first `restart` of the samples have gone in.
+
+    The first sample apart, a sample is not offered before `every` clocks have passed since the one before.
+    """
+    dut: Any = made.component()
+    ports, output = fields(made.datapath.inputs), made.datapath.output
+    words = [sum(int(code) << f.offset for f, code in zip(ports, row, strict=True)) for row in codes]
+    chance = random.Random(1)
+    seen = Seen()
+
+    async def feed(ctx: Any, samples: list[int], wanted: int) -> None:
+        ctx.set(dut.aresetn, 0)
+        await ctx.tick("bench").repeat(1)
+        ctx.set(dut.aresetn, 1)
+        offers, clock, held = False, 0, None
+        while len(seen.accepted) < len(samples) or len(seen.results) < wanted:
+            sent = len(seen.accepted)
+            may = not sent or clock >= seen.accepted[-1] + every
+            offers = sent < len(samples) and may and (offers or chance.random() >= pace.idle)
+            takes = chance.random() >= pace.stall
+            before = ctx.get(dut.s_axis_tready), ctx.get(dut.m_axis_tvalid)
+            ctx.set(dut.s_axis_tvalid, offers)
+            ctx.set(dut.s_axis_tdata, samples[min(sent, len(samples) - 1)])
+            ctx.set(dut.m_axis_tready, takes)
+            assert (ctx.get(dut.s_axis_tready), ctx.get(dut.m_axis_tvalid)) == before
+            found = (ctx.get(dut.m_axis_tdata) & ((1 << output.bits) - 1), ctx.get(dut.m_axis_tuser))
+            assert held is None or (before[1] and held == found)
+            held = found if before[1] and not takes else None
+            if before[1] and takes:
+                seen.results.append(found)
+                seen.left.append(clock)
+            if offers and before[0]:
+                seen.accepted.append(clock)
+                offers = False
+            await ctx.tick("bench")
+            clock += 1
+            assert clock < 60_000
+
+    async def bench(ctx: Any) -> None:
+        if restart:
+            await feed(ctx, words[:restart], 0)
+            for kept in (seen.results, seen.accepted, seen.left):
+                kept.clear()
+        await feed(ctx, words, made.datapath.results(len(words)) * made.copies_per_result)
+
+    simulate(dut, bench)
+    return seen
+
+
+def expected(made: Architecture, codes: np.ndarray) -> list[tuple[int, int]]:
+    datapath = made.datapath
+    once = zip(datapath.compute(codes).tolist(), datapath.compute_status(codes).tolist(), strict=True)
+    return [result for result in once for _ in range(made.copies_per_result)]
+
+
+@pytest.mark.parametrize(
+    ("name", "before"), [*((name, name) for name in ARCHITECTURES), ("folded", "parallel"), ("parallel", "folded")]
+)
+def test_results_equal_the_model(name: str, before: str) -> None:
+    made, codes = made_in(name, before), codes_for(38 if name == "serial" else 66)
+    wanted = expected(made, codes)
+    assert {status & 3 for _, status in wanted} == {0, 2, 3}
+    assert run(made, codes, Pace(idle=0.3, stall=0.4)).results == wanted
+
+
+@pytest.mark.parametrize("name", ["parallel", "folded"])
+def test_held_results_equal_the_model(name: str) -> None:
+    made, codes = made_in(name, hold=True), codes_for(61)
+    assert run(made, codes, Pace()).results == expected(made, codes)
+
+
+@pytest.mark.parametrize(
+    ("name", "restart"), [("parallel", 1), ("parallel", 18), ("folded", 1), ("folded", 18), ("serial", 7)]
+)
+def test_nothing_before_a_reset_counts(name: str, restart: int) -> None:
+    made, codes = made_in(name), codes_for(30)
+    assert run(made, codes, Pace(idle=0.2, stall=0.2), restart=restart).results == expected(made, codes)
+
+
+@pytest.mark.parametrize("hold", [False, True])
+@pytest.mark.parametrize(
+    ("name", "before"), [("parallel", "parallel"), ("folded", "folded"), ("folded", "parallel"), ("parallel", "folded")]
+)
+def test_its_clocks_are_those_stated(name: str, before: str, hold: bool) -> None:
+    """Without a stall: the first sample, the rate, and, of samples at an even rate, how long a result takes."""
+    made = made_in(name, before, hold=hold)
+    assert made.decimator is not None
+    seen = run(made, codes_for(61), Pace(idle=0, stall=0))
+    assert seen.accepted[0] == made.reset_cycles or (name, before) == ("folded", "parallel")  # while it still clears
+    assert seen.accepted[0] <= made.reset_cycles
+    first = seen.left[:: made.copies_per_result]
+    assert [later - earlier for earlier, later in pairwise(first)][2:] == [made.cycles_per_result] * 13
+    evenly = run(made, codes_for(61), Pace(idle=0, stall=0), every=made.cycles_per_sample)
+    last = evenly.accepted[:: made.decimator.factor]
+    waits = [left - accepted for left, accepted in zip(evenly.left[:: made.copies_per_result], last, strict=True)]
+    assert waits[0] < min(waits[1:])  # the first sample has gone through the calibration before it is accepted
+    # A folded calibration finds a sample some clocks before it accepts it.
+    early = folded_clocks.FOLDED_DEPTH if before == "folded" else 0
+    assert max(waits) == made.latency_cycles - early
+
+
+def test_a_serial_one_takes_no_longer_than_it_states() -> None:
+    made = made_in("serial")
+    seen = run(made, codes_for(25), Pace(idle=0, stall=0))
+    assert 0.7 * made.reset_cycles < seen.accepted[0] <= made.reset_cycles
+    apart = [later - earlier for earlier, later in pairwise(seen.left)]
+    assert 0.7 * made.cycles_per_result < max(apart) <= made.cycles_per_result
+
+
+BROKEN = [
+    ("the flags of the last sample alone", "found.eq(found | self.i_flags)", "found.eq(self.i_flags)"),
+    ("flags that stay", "found.eq(0)]", "found.eq(found)]"),
+    ("the first sample twice", "self.s_axis_tvalid & (first | flows)", "self.s_axis_tvalid"),
+    ("the first sample lost", "filled | (flows &", "filled | first | (flows &"),
+    ("never filled", "fills.eq(0), filled.eq(1)", "fills.eq(0), filled.eq(0)"),
+    ("no calibration's flags", "decimator.i_flags.eq(ahead.m_axis_tuser)", "decimator.i_flags.eq(0)"),
+]
+
+
+@pytest.mark.parametrize(("right", "wrong"), [pytest.param(*case, id=subject) for subject, *case in BROKEN])
+def test_what_is_broken_is_found(right: str, wrong: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    made, codes = made_in("parallel"), codes_for(60)
+    assert run(made, codes, Pace()).results == expected(made, codes)
+    monkeypatch.setattr(hardware, "DecimatedCore", broken(hardware, right, wrong).DecimatedCore)
+    assert run(made, codes, Pace()).results != expected(made, codes)

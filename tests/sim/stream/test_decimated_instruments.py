@@ -1,0 +1,220 @@
+"""Decimated instruments in simulation, result for result the integer model; and forty random ones, each proven twice.
+
+`./run test --slow` runs all random designs; the fast tests take none of them, but the locomotive's instrument.
+"""
+
+import json
+import random
+import re
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.gen.word_lengths.decimated import locomotive, locomotive_text, read, tree_of
+from tests.gen.word_lengths.multirate import worst_error
+from tests.sim.lint import icarus_check, lint
+
+from sosmith.gen.core import CoreDesign, design_core
+from sosmith.gen.output.generate import generate
+from sosmith.gen.report.report import write_report
+from sosmith.gen.specification.specification import from_text
+from sosmith.gen.stimuli import bench_of, traces_for
+from sosmith.gen.verifier.specified.stated_specification import check_specification
+from sosmith.gen.verifier.verification import verify
+from sosmith.interface.specification import Specification
+from sosmith.model.scenarios.worst_case_inputs import sign_matched
+from sosmith.model.traces.trace import Trace
+from sosmith.sim.simulation import simulate
+
+WEAR = "\n[wear]\ninitial = 4.0\nwarning = 1.4\nlimit = 1.8\n"
+
+
+def whole(architecture: str) -> CoreDesign:
+    return locomotive(architecture=architecture, core="instrument")
+
+
+def samples_of(made: CoreDesign, count: int) -> Trace:
+    """Return random codes, the ends of both ranges, and a constant, which the filter settles on."""
+    (trace,) = traces_for(made, "worst_case", seed=3)
+    codes = np.random.default_rng(count).integers(
+        [port.lowest for port in made.datapath.inputs], [port.highest + 1 for port in made.datapath.inputs], (count, 2)
+    )
+    codes[count // 3 : count // 2, 0] = made.datapath.inputs[0].highest
+    codes[count // 2 : count * 2 // 3] = [port.lowest for port in made.datapath.inputs]
+    codes[-count // 8 :] = [port.highest // 3 for port in made.datapath.inputs]
+    return replace(trace, codes=codes, truth=None, reading=None)
+
+
+@pytest.mark.parametrize(
+    ("architecture", "simulator"), [("folded", "icarus"), ("parallel", "verilator"), ("serial", "cxxrtl")]
+)
+def test_hardware_equals_the_integer_model(architecture: str, simulator: str, tmp_path: Path) -> None:
+    made = whole(architecture)
+    evidence = simulate(made, [samples_of(made, 600)], tmp_path, seed=5, simulator=simulator)
+    assert evidence.mismatches == 0
+    assert evidence.samples == len(evidence.time) == 38
+    summary = write_report(evidence, tmp_path)
+    assert summary["passed"]
+    assert summary["error"]["max_abs"] <= summary["error"]["bound"] <= 0.00025
+    assert summary["decimation"]["calibration"]["architecture"] == architecture
+    assert summary["delay"]["seconds"] == pytest.approx(3.006, abs=0.001)
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "Every sample is calibrated first, within 17.6\xa0nm. 16 samples make one result" in page
+    assert "A sine over the whole range of the calibration&#39;s result" in page
+
+
+@pytest.mark.parametrize("simulator", ["verilator", "icarus"])
+@pytest.mark.slow
+def test_the_locomotive_on_its_worst_case(simulator: str, tmp_path: Path) -> None:
+    """With random handshakes, on the inputs that maximize the result and what each quantizer adds to it."""
+    made = whole("auto")
+    for scenario in ("worst_case", "worst_case_errors"):
+        (trace,) = traces_for(made, scenario, seed=1)
+        evidence = simulate(made, [trace], tmp_path / scenario, seed=5, simulator=simulator)
+        assert evidence.mismatches == 0
+        assert worst_error(made, trace.codes) <= float(made.quantized.bound)
+        assert write_report(evidence, tmp_path / scenario)["passed"]
+
+
+def test_wear_held_and_judged(tmp_path: Path) -> None:
+    """The locomotive's readings rise over the limits of wear; each result leaves once for each of its samples."""
+    text = locomotive_text(architecture="folded").replace("order = 7\n", "order = 7\nhold = true\n") + WEAR
+    made = design_core(from_text(text, Path("locomotive.toml")))
+    (trace,) = traces_for(made, "worst_case", seed=1)
+    codes = np.repeat(np.array([[20000, 20000], [32000, 20000], [60000, 20000]]), 700, axis=0)
+    evidence = simulate(made, [replace(trace, codes=codes, truth=None, reading=None)], tmp_path, seed=2)
+    assert (evidence.mismatches, evidence.samples) == (0, 132)
+    assert {status >> 3 & 3 for status in made.datapath.compute_status(codes).tolist()} == {0, 1, 3}
+    assert json.loads((tmp_path / f"{made.spec.name}.json").read_text(encoding="utf-8"))["decimation"]["held"]
+
+
+@pytest.mark.slow
+def test_readings_are_held_against_the_truth(tmp_path: Path) -> None:
+    made = whole("folded")
+    (trace,) = traces_for(made, "wear_ramp", seed=1, seconds=40)
+    evidence = simulate(made, [trace], tmp_path, seed=2)
+    assert evidence.mismatches == 0
+    summary = write_report(evidence, tmp_path)
+    assert summary["passed"]
+    assert summary["true_error"]["readings"] > 0
+
+
+def test_results_come_at_the_rate_that_is_stated(tmp_path: Path) -> None:
+    made = whole("folded")
+    stated = made.architecture
+    evidence = simulate(made, [samples_of(made, 321)], tmp_path, seed=1, idle=0.0, stall=0.0)
+    # The last sample is found as many clocks before it is accepted as the first.
+    assert (
+        stated.cycles_per_result * 20
+        < evidence.cycles - stated.reset_cycles
+        <= (stated.cycles_per_result * 20 + stated.latency_cycles + 1)
+    )
+
+
+@pytest.mark.parametrize("architecture", ["folded", "parallel"])
+def test_tools_read_the_text_without_a_warning(architecture: str, tmp_path: Path) -> None:
+    made = whole(architecture)
+    generate(made, tmp_path)
+    text = tmp_path / f"{made.spec.name}.sv"
+    assert lint(text, made.spec.name, tmp_path / "lint") == []
+    assert icarus_check(text, made.spec.name) == []
+    modules = re.findall(r"^module (\w+)\(", text.read_text(encoding="utf-8"), re.MULTILINE)
+    assert {f"{made.spec.name}{part}" for part in ("", "_ahead", "_decimator", "_behind")} <= set(modules)
+
+
+FAMILIES = ("butterworth", "chebyshev1", "chebyshev2", "elliptic", "bessel")
+DESIGNS = 40
+
+
+def random_tree(number: int) -> dict[str, Any]:
+    """Draw a specification: polynomial, family, order, cutoff, factor, formats and architecture."""
+    draw = random.Random(f"decimated instrument {number}")
+    family = FAMILIES[number % len(FAMILIES)]
+    factor = 2 ** draw.randint(1, 6)
+    # The cutoff lies from a fortieth to a tenth of the lower rate; "auto" finds a factor where it is low.
+    cutoff = 1000 / (64 if number % 5 == 4 else factor) / 40 * 4 ** draw.random()
+    table: dict[str, Any] = {
+        "family": family,
+        "kind": "lowpass",
+        "order": draw.randint(1, 7),
+        "cutoff": float(f"{cutoff:.4g}"),
+        "decimate": "auto" if number % 5 == 4 else factor,
+    }
+    losses = {"chebyshev1": ("passband_loss",), "chebyshev2": ("stopband_loss",)}
+    for key in losses.get(family, ("passband_loss", "stopband_loss") if family == "elliptic" else ()):
+        table[key] = 0.5 if key == "passband_loss" else 50
+    if family in {"chebyshev2", "elliptic"}:
+        table["order"] = max(2, table["order"])
+    signed = draw.random() < 0.3
+    inputs = {
+        "voltage": {"bits": draw.randint(8, 16), "range": [0.0, draw.choice([5.0, 10.0])]},
+        "temperature": {
+            "bits": draw.randint(8, 16),
+            "range": [-64.0, 64.0] if signed else [draw.choice([0.0, -40.0]), 100.0],
+            "signed": signed,
+        },
+    }
+    # Each term reaches some millimetres at the end of the ranges, so that some results are limited.
+    rows = [
+        [round(draw.uniform(-8, 8) / 10**i / 100**j, 3 + i + 2 * j) for j in range(draw.randint(1, 3))]
+        for i in range(draw.randint(1 if number % 4 == 0 else 2, 4))  # a constant cannot be folded
+    ]
+    return {
+        "name": f"instrument{number}",
+        "sample_rate": 1000,
+        "input": inputs,
+        "calibration": {"coefficients": rows},
+        "filter": table,
+        "output": {
+            "bits": draw.randint(8, 18),
+            "range": [-16.0, 16.0],
+            "signed": True,
+            "unit": "mm",
+            "max_error": "faithful",
+        },
+        "hardware": {
+            "architecture": ("auto", "folded", "parallel", "serial")[number % 4],
+            "clock": draw.choice([20_000_000, 20_000_000, 40_000]) if number % 4 == 0 else 20_000_000,
+        },
+    }
+
+
+def worst_cases(made: CoreDesign) -> Iterator[np.ndarray]:
+    """Yield codes at random, and those that maximize the result and what each quantizer adds to it."""
+    ports = made.datapath.inputs
+    ends = [port.lowest for port in ports], [port.highest + 1 for port in ports]
+    rng = np.random.default_rng(7)
+    yield rng.integers(*ends, (20_000, 2))
+    bench = bench_of(made)
+    grid = rng.integers(*ends, (4000, 2))
+    assert bench.polynomial is not None
+    values = bench.polynomial(*(port.decode(grid[:, k]) for k, port in enumerate(ports)))
+    low, high = grid[np.argmin(values)], grid[np.argmax(values)]
+    for response in (bench.impulse_response, *bench.error_responses):
+        yield np.where(sign_matched(response)[:, np.newaxis], high, low)
+    yield np.repeat(rng.integers(*ends, (5, 2)), min(len(bench.impulse_response), 5000), axis=0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", range(DESIGNS))
+def test_random_designs(number: int, tmp_path: Path) -> None:
+    """No input exceeds the bound, no result differs, and the other method proves the same."""
+    spec = Specification.load(random_tree(number)).checked
+    made = design_core(spec)
+    quantized, datapath = made.quantized, made.datapath
+    assert datapath.ahead is not None
+    assert datapath.decimator is not None
+    bound = float(quantized.bound)
+    for codes in worst_cases(made):
+        assert worst_error(made, codes) <= bound
+    certificate = read(tree_of(made))
+    verdict = verify(certificate)
+    assert verdict.bound * datapath.output.lsb <= spec.max_error
+    check_specification(certificate, spec.text, verdict.margin)
+    count = 60 * datapath.decimator.factor + number % 7
+    evidence = simulate(made, [samples_of(made, count)], tmp_path, seed=number)
+    assert evidence.mismatches == 0
+    assert evidence.samples == datapath.results(count)
