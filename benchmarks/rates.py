@@ -38,13 +38,14 @@ RATIOS = tuple(Fraction(1, count) for count in (30, 50, 100, 200, 400, 1000))
 
 _CHOICES = re.compile(r"(?<=<!-- choices -->\n).*?(?=<!-- end of choices -->)", re.DOTALL)
 _TABLES = re.compile(r"(?<=<!-- factors -->\n).*?(?=<!-- end of factors -->)", re.DOTALL)
+_INSTRUMENT = re.compile(r"(?<=<!-- instrument -->\n).*?(?=<!-- end of instrument -->)", re.DOTALL)
 _BANDS = re.compile(r"(?<=<!-- bands -->\n).*?(?=<!-- end of bands -->)", re.DOTALL)
 
 
-def locomotive(decimate: int | str | None) -> CoreDesign:
-    """Design the locomotive's filter alone, with a decimator before it."""
+def locomotive(decimate: int | str | None, core: str = "filter") -> CoreDesign:
+    """Design the locomotive's filter alone, or its whole instrument, with a decimator before the filter."""
     spec = load(LOCOMOTIVE)
-    return design_core(replace(spec, filter=replace(spec.filter, decimate=decimate)), core="filter")
+    return design_core(replace(spec, filter=replace(spec.filter, decimate=decimate)), core=core)
 
 
 def factor_table() -> str:
@@ -82,6 +83,39 @@ def factor_table() -> str:
                 gain,
             )
         )
+    return "".join(f"| {' | '.join(row)} |\n" for row in rows)
+
+
+def instrument_table() -> str:
+    """Return what the filter alone and the whole instrument cost, with and without the factor of "auto"."""
+    head = (
+        "core",
+        "decimate",
+        "clocks a sample",
+        "calibration, clocks",
+        "memory, bits",
+        "registers of the decimator, bits",
+        "error bound",
+        "delay",
+    )
+    rows = [head, tuple("---" for _ in head)]
+    for core in ("filter", "instrument"):
+        for decimate in (None, "auto"):
+            made = locomotive(decimate, core)
+            costs, ahead = rate_costs(made), made.architecture.ahead
+            factor = "-" if made.datapath.decimator is None else f'"auto", {made.datapath.decimator.factor}'
+            rows.append(
+                (
+                    core,
+                    factor,
+                    f"{costs.clocks_per_sample:.4g}",
+                    "-" if ahead is None else str(ahead.cycles_per_sample),
+                    f"{costs.memory_bits:,}",
+                    f"{costs.decimator_bits:,}",
+                    quantity(costs.bound, made.datapath.output.unit),
+                    quantity(costs.delay, "s"),
+                )
+            )
     return "".join(f"| {' | '.join(row)} |\n" for row in rows)
 
 
@@ -221,7 +255,10 @@ def picture(record: Figures) -> str:
 def document() -> str:
     """Return the document with the tables as they are now."""
     text = DOCUMENT.read_text(encoding="utf-8")
-    return with_choices(_BANDS.sub(lambda _: band_table(), _TABLES.sub(lambda _: factor_table(), text)))
+    for place, table in ((_TABLES, factor_table), (_BANDS, band_table), (_INSTRUMENT, instrument_table)):
+        made = table()
+        text = place.sub(lambda _, made=made: made, text)
+    return with_choices(text)
 
 
 if __name__ == "__main__":

@@ -109,7 +109,7 @@ class Instrument:
     polynomial: Polynomial
     known: CoefficientUncertainty
     ideal: Filter | None
-    front: Front | None
+    front: Front | None = None
     bound: float
 
     @property
