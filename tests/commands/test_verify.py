@@ -14,6 +14,7 @@ from tests.commands.invocation import Invocation
 from tests.gen.designs import EXAMPLES, example_design
 from tests.gen.verifier.parallel.cores import specified
 from tests.gen.verifier.small_specifications import PLAIN
+from tests.gen.word_lengths.decimated import small
 
 from sosmith.gen.core import design_core
 from sosmith.gen.output.generate import generate
@@ -126,3 +127,15 @@ def test_a_certificate_without_a_subject_cannot_be_held_against_one(folder: Path
             *option,
             kind=ShortfallError,
         )
+
+
+def test_a_decimated_instrument_has_two_programs(tmp_path: Path) -> None:
+    generate(small(), tmp_path)
+    path = str(tmp_path / "slight.certificate.json")
+    found = json.loads(command.good(path, "--json", "--files", str(tmp_path)).stdout)
+    counts = found["calibration_instructions"], found["program_instructions"]
+    assert min(counts) > 10
+    assert (
+        f"programs: {counts[0]} and {counts[1]} instructions in the SystemVerilog compute these graphs, for all "
+        "inputs and states; the units that run them are not part of it\n"
+    ) in command.good(path, "--files", str(tmp_path)).stdout

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.gen.designs import EXAMPLES
 from tests.gen.word_lengths.decimated import INSTRUMENT, locomotive, locomotive_spec, locomotive_text, small
 from tests.gen.word_lengths.multirate import exact_results, worst_error
 
@@ -271,3 +272,21 @@ def test_another_calibration_exceeds_the_bound() -> None:
     assert other.datapath.output.lsb == ahead.output.lsb
     changed = replace(quantized, datapath=replace(datapath, ahead=ahead))
     assert worst_error(replace(made, quantized=changed), codes) > float(quantized.bound)
+
+
+def test_a_fitted_calibration_says_what_is_outside_of_it() -> None:
+    """The codes that its measurements covered are judged before the decimator, of every sample."""
+    text = re.sub(r"calibration\.coefficients = .*", 'calibration.data = "april.csv"', INSTRUMENT.format(extra=""))
+    made = design_core(from_text(text, EXAMPLES / "measurements" / "slight.toml"))
+    ahead, datapath = made.datapath.ahead, made.datapath
+    assert ahead is not None
+    assert made.architecture.ahead is not None
+    assert made.architecture.ahead.datapath == ahead
+    assert ahead.calibrated == datapath.calibrated != ((0, 1023), (0, 1023))
+    (_, highest), (_, warmest) = datapath.calibrated
+    assert highest < 1023 or warmest < 1023
+    inside = [low + 1 for low, _ in datapath.calibrated]
+    codes = np.tile(inside, (21, 1))
+    codes[6] = [highest + 1 if highest < 1023 else inside[0], warmest + 1 if warmest < 1023 else inside[1]]
+    assert (datapath.compute_status(codes) >> 1 & 1).tolist() == [0, 0, 1, 0, 0, 0]
+    assert len(datapath.behind_decimator.calibrated) == 1
