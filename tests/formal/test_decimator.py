@@ -21,25 +21,29 @@ class MovingSums(Proof):
     - There is no result without its sample, and no sample of a next one before the result is taken.
     - With `values`, each result is the weighted sum of the last samples, the first one standing for all before it, and
       rounded.
-    - Its flag tells of an end of the range since the result before.
+    - Its flag tells of an end of the range since the result before; with `flags`, they are those of any sample since.
     - While the sink is ready, a result is not longer away than is stated.
     """
 
-    def __init__(self, made: Decimator, module: ModuleType, *, values: bool) -> None:
-        super().__init__(module.CicDecimator(made))
+    def __init__(self, made: Decimator, module: ModuleType, *, values: bool, flags: int = 0) -> None:
+        super().__init__(module.CicDecimator(made, flags))
         self.made = made
+        self.flags = flags
         self.values = values
 
     def state(self, m: Module) -> None:
         """State the rules."""
         d, made = self.design, self.made
-        offers, before = Signal(), Signal(len(d.i_data))
-        m.d.proof += [offers.eq(d.i_valid & ~d.i_ready & ~self.reset), before.eq(d.i_data)]
+        offered = Cat(d.i_data, d.i_flags) if self.flags else d.i_data
+        told = d.o_flags if self.flags else d.o_rail
+        offers, before = Signal(), Signal(len(offered))
+        m.d.proof += [offers.eq(d.i_valid & ~d.i_ready & ~self.reset), before.eq(offered)]
         with m.If(offers):
-            m.d.comb += Assume(d.i_valid & (d.i_data == before))
+            m.d.comb += Assume(d.i_valid & (offered == before))
         taken, given = d.i_valid & d.i_ready, d.o_valid & d.o_ready
         code = d.i_data[: made.input.bits].as_signed()
-        stalled, payload, held = Signal(), Cat(d.o_data, d.o_rail), Signal(len(d.o_data) + 1)
+        payload = Cat(d.o_data, told)
+        stalled, held = Signal(), Signal(len(payload))
         was_reset, pending, waited = Signal(), Signal(), Signal(range(latency_cycles(made) + 1))
         m.d.proof += [was_reset.eq(self.reset), stalled.eq(d.o_valid & ~d.o_ready & ~self.reset), held.eq(payload)]
         expected, rail, completes = self._expected(m, taken, code)
@@ -56,7 +60,7 @@ class MovingSums(Proof):
             with m.If(stalled):
                 m.d.comb += [Assert(d.o_valid), Assert(payload == held)]
             with m.If(d.o_valid):
-                m.d.comb += [Assert(pending), Assert(d.o_rail == rail)]
+                m.d.comb += [Assert(pending), Assert(told == rail)]
                 if self.values:
                     m.d.comb += Assert(d.o_data == expected)
             with m.If(completes):
@@ -76,7 +80,9 @@ class MovingSums(Proof):
         with m.If(~begun):
             m.d.comb += total.eq(sum(t * x for t, x in zip(taps, first, strict=True)))
         at_end = (code == made.input.lowest) | (code == made.input.highest)
-        expected, seen, rail = Signal(made.width - made.dropped), Signal(), Signal()
+        at_end = self.design.i_flags if self.flags else at_end
+        expected = Signal(made.width - made.dropped)
+        seen, rail = Signal(len(at_end)), Signal(len(at_end))
         completes = Signal()
         m.d.comb += completes.eq(taken & (phase == 0))
         with m.If(self.reset):
@@ -109,6 +115,21 @@ def test_results_are_moving_sums(dropped: int, tmp_path: Path) -> None:
 @pytest.mark.parametrize(("factor", "stages"), [(2, 3), (4, 2)])
 def test_no_result_is_lost_or_changed_on_its_way(factor: int, stages: int, tmp_path: Path) -> None:
     assert prove(MovingSums(small(factor, stages), hardware, values=False), tmp_path) == "PASS"
+
+
+def test_flags_that_come_with_samples_are_gathered(tmp_path: Path) -> None:
+    assert prove(MovingSums(small(), hardware, values=True, flags=2), tmp_path) == "PASS"
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ("self.o_flags.eq(found | self.i_flags)", "self.o_flags.eq(found)"),  # that of the last sample forgotten
+        ("found.eq(0)]", "found.eq(self.i_flags)]"),  # told of the next result too
+    ],
+)
+def test_flags_lost_are_found_out(right: str, wrong: str, tmp_path: Path) -> None:
+    assert prove(MovingSums(small(), broken(hardware, right, wrong), values=True, flags=2), tmp_path) == "FAIL"
 
 
 @pytest.mark.parametrize(

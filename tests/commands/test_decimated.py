@@ -1,0 +1,55 @@
+"""What the commands tell of a decimated instrument."""
+
+import json
+from pathlib import Path
+
+import pytest
+from tests.commands.invocation import Invocation
+from tests.gen.word_lengths.decimated import INSTRUMENT, small
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> str:
+    target = tmp_path / "slight.toml"
+    target.write_text(INSTRUMENT.format(extra=""), encoding="utf-8")
+    return str(target)
+
+
+def test_the_design_tells_of_the_calibration(path: str) -> None:
+    made = small()
+    ahead, behind = made.architecture.ahead, made.architecture.program
+    assert ahead is not None
+    assert ahead.program is not None
+    assert behind is not None
+    clocks, result = ahead.cycles_per_sample, made.architecture.cycles_per_result
+    table = Invocation("design", columns=200).good(path, "--details").stdout
+    rows = {line.strip().split("   ")[0]: " ".join(line.split()) for line in table.splitlines() if line.strip()}
+    assert rows["into the decimator"].endswith(" in 14 bits, within 1.37 µm; not limited")
+    assert rows["calibration before the decimator"].endswith(
+        f"folded: the smallest that keeps up; takes {clocks} of 120,000 clocks a sample"
+    )
+    assert rows["architecture"].endswith("folded folded")  # of the table beside the filter without a decimator
+    assert f"takes {result} of 480,000 clocks for 4 samples" in table
+    assert rows["clocks a sample"].startswith(f"clocks a sample {max(clocks, result / 4):g} ")
+    words = ahead.program.words
+    assert rows["memory, calibration"].endswith(f"{words} words of 16 bits a channel, 0 of them states")
+    for program, where in ((ahead.program, " in the calibration"), (behind, "")):
+        assert f"Schedule: {len(program.instructions)} instructions for each sample of each channel{where}\n" in table
+
+
+def test_the_same_for_programs(path: str) -> None:
+    found = json.loads(Invocation("design").good(path, "--json").stdout)
+    assert found["decimation"]["calibration"]["instructions"] > 10
+    assert found["rate_costs"]["decimated"]["clocks_per_sample"] < found["rate_costs"]["direct"]["clocks_per_sample"]
+
+
+def test_factors_are_explored(path: str, tmp_path: Path) -> None:
+    explored = Invocation("explore").good(path, "-p", "filter.decimate=2,4", "-o", str(tmp_path / "out"), "--json")
+    found = json.loads(explored.stdout)
+    assert [point["changes"]["filter.decimate"] for point in found["points"]] == [2, 4]
+    assert all(point["passed"] for point in found["points"])
+    most = [point["cost"]["instructions"] for point in found["points"]]
+    ahead = small().architecture.ahead
+    assert ahead is not None
+    assert ahead.program is not None
+    assert min(most) > len(ahead.program.instructions)
