@@ -15,13 +15,13 @@ from typing import TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from sosmith.gen.core import CoreDesign, refuse_decimated, refuse_several_samples
+from sosmith.gen.core import CoreDesign
 from sosmith.gen.fpga.boards import Board
 from sosmith.gen.fpga.synthesis import Netlist, synthesize
 from sosmith.gen.instrument.uncertainty_budget import budget_json, budget_of
-from sosmith.gen.output.core_facts import CoreFacts, core_facts
+from sosmith.gen.output.core_facts import CoreFacts, InterfaceFacts, core_facts
 from sosmith.gen.output.generate import generate
-from sosmith.gen.output.vectors import Vectors, vector_files
+from sosmith.gen.output.vectors import Vectors, vector_files, whole_beats
 from sosmith.gen.report.evidence import Alternative, Evidence
 from sosmith.gen.report.filter_facts import filter_facts
 from sosmith.gen.report.provenance import provenance_of
@@ -83,10 +83,6 @@ def simulate(
     """
     started = time.monotonic()
     check_name(simulator, netlist=gates is not None)
-    if vectors is not None:
-        refuse_decimated(design, "with vectors")
-        if vectors.suffix == ".hex":
-            refuse_several_samples(design, "with vectors in words of the bus")
     with _alone_in(directory):
         for stale in ("report.json", "report.html"):  # of a run of another core, in case this run fails
             (directory / stale).unlink(missing_ok=True)
@@ -94,9 +90,10 @@ def simulate(
         made = generate(design, directory, lambda step: progress(f"generating {step}", 0, 0), facts=facts)
         source, build_dir, netlist = directory / f"{design.datapath.name}.sv", directory / "simulation", None
         codes = np.stack([trace.codes for trace in traces], axis=1)
+        sent = whole_beats(codes, facts.interface.inputs)
         if hardware is not None:
             result = hardware(
-                source.read_text(encoding="utf-8"), codes, lambda done, total: progress("running", done, total)
+                source.read_text(encoding="utf-8"), sent, lambda done, total: progress("running", done, total)
             )
         else:
             if gates is not None:
@@ -118,13 +115,13 @@ def simulate(
             result = cosimulate(
                 bench,
                 facts.interface,
-                codes,
+                sent,
                 seed=seed,
                 progress=lambda done, total: progress("co-simulating", done, total),
             )
     if vectors is not None:
         progress("writing the vectors", 0, 0)
-        taken = Vectors(stimuli=codes, responses=result.codes[:, :, 0], status=result.status)
+        taken = _taken(sent if vectors.suffix == ".hex" else codes, result, facts.interface)
         write_contents(vectors.parent, vector_files(vectors, taken, facts.interface, design.spec.sample_rate))
     progress("comparing", 0, 0)
     return replace(
@@ -151,6 +148,16 @@ def _alone_in(directory: Path) -> Iterator[None]:
         os.close(handle)
 
 
+def _taken(codes: Codes, result: CosimulationResult, interface: InterfaceFacts) -> Vectors:
+    """Return the vectors of a run with these samples; results are those that they bring."""
+    results, copies = -(-len(codes) // interface.samples_per_result), interface.copies_per_result
+    return Vectors(
+        stimuli=codes,
+        responses=np.repeat(result.codes[:results, :, 0], copies, axis=0),
+        status=np.repeat(result.status[:results], copies, axis=0),
+    )
+
+
 def _evidence(
     design: CoreDesign,
     facts: CoreFacts,
@@ -165,8 +172,8 @@ def _evidence(
     output = datapath.output
     codes = np.stack([trace.codes for trace in traces], axis=1)
     expected, provenance = datapath.compute(codes), provenance_of(design, traces, netlist)
-    received = result.codes[:, :, 0]
-    differs = (expected != received) | (datapath.compute_status(codes) != result.status)
+    received, status = result.codes[: len(expected), :, 0], result.status[: len(expected)]  # not what fills a beat
+    differs = (expected != received) | (datapath.compute_status(codes) != status)
     wrong = np.flatnonzero(differs.any(axis=1))
     sos = None if quantized.filter is None else quantized.filter.sos
     entering = [entering_filter(t.codes, datapath, quantized.polynomial) for t in traces]
@@ -216,7 +223,7 @@ def _evidence(
         recursions=tuple(recursion_of(section.name, section.graph) for section in quantized.sections),
         limit_cycles=facts.limit_cycles,
         settling=facts.settling,
-        unsettled=(result.status >> Flag.SETTLING & 1).astype(np.bool_) if datapath.settles else None,
+        unsettled=(status >> Flag.SETTLING & 1).astype(np.bool_) if datapath.settles else None,
         uncertainty=None if worth is None else budget_json(worth),
         filter=filter_facts(quantized),
         decimation=facts.decimation,

@@ -26,9 +26,9 @@ class Vectors:
     ----------
     stimuli : int64 array, shape (samples, channels, inputs)
         Input codes.
-    responses : int64 array, shape (samples, channels)
-        Output codes.
-    status : uint8 array, shape (samples, channels)
+    responses : int64 array, shape (results, channels)
+        Output codes, as they come out: one for each sample, or behind a decimator one for every R-th, R times if held.
+    status : uint8 array, shape (results, channels)
         Status flags of each output.
     """
 
@@ -57,32 +57,41 @@ def words(codes: Codes, stream: StreamFacts) -> npt.NDArray[np.uint64]:
     return packed
 
 
+def whole_beats(codes: Codes, stream: StreamFacts) -> Codes:
+    """Return `codes`, shape (samples, channels, inputs), with the last sample repeated until the last beat is full."""
+    filling = -len(codes) % stream.lanes
+    return np.concatenate([codes, np.repeat(codes[-1:], filling, axis=0)]) if filling else codes
+
+
 def hex_words(vectors: Vectors, interface: InterfaceFacts) -> tuple[str, str]:
     """Return stimuli and responses as two texts for ``$readmemh``, one transfer a line.
 
     The channels take turns. A line has ``tdest``, ``tuser`` and ``tdata``, as far as the stream has them, with
-    underscores between them.
+    underscores between them. Several samples of a beat share a line; their number must be a multiple of that.
     """
-    samples, channels, inputs = vectors.stimuli.shape
-    dest = np.tile(np.arange(channels), samples)
-    sent = words(vectors.stimuli.reshape(-1, inputs), interface.inputs)
+    channels = vectors.stimuli.shape[1]
+    sent = words(vectors.stimuli.reshape(-1, len(interface.inputs.fields)), interface.inputs)
     expected = words(vectors.responses.reshape(-1, 1), interface.outputs)
     status = vectors.status.reshape(-1)
-    into, out = interface.inputs, interface.outputs
     return (
-        _lines(into.dest_width, [dest], [into.width], [sent]),
-        _lines(out.dest_width, [dest], [STATUS_BITS, out.width], [status, expected]),
+        _lines(interface.inputs, channels, [(interface.inputs.sample_width, sent)]),
+        _lines(interface.outputs, channels, [(STATUS_BITS, status), (interface.outputs.sample_width, expected)]),
     )
 
 
-def _lines(
-    dest_width: int, dest: list[npt.NDArray[np.int64]], widths: list[int], columns: list[npt.NDArray[np.generic]]
-) -> str:
-    """Rows of hexadecimal numbers of `widths` bits, with the channel first where there is one."""
-    if dest_width:
-        widths, columns = [dest_width, *widths], [*dest, *columns]
-    rows = zip(*(column.tolist() for column in columns), strict=True)
-    return "".join("_".join(f"{v:0{w // 4}x}" for v, w in zip(row, widths, strict=True)) + "\n" for row in rows)
+def _lines(stream: StreamFacts, channels: int, columns: list[tuple[int, npt.NDArray[np.generic]]]) -> str:
+    """Rows of hexadecimal numbers of so many bits, with the channel first where there is one."""
+    texts = [_joined(column, width, stream.lanes) for width, column in columns]
+    if stream.dest_width:
+        dest = np.tile(np.arange(channels), len(texts[0]) // channels)
+        texts.insert(0, _joined(dest, stream.dest_width, 1))
+    return "".join("_".join(row) + "\n" for row in zip(*texts, strict=True))
+
+
+def _joined(column: npt.NDArray[np.generic], width: int, lanes: int) -> list[str]:
+    """Write numbers of `width` bits in hexadecimal, those of a beat in one text, the first of them last."""
+    digits = [f"{number:0{width // 4}x}" for number in column.tolist()]
+    return ["".join(reversed(digits[start : start + lanes])) for start in range(0, len(digits), lanes)]
 
 
 def check_format(path: Path) -> None:
@@ -103,9 +112,10 @@ def vector_files(path: Path, vectors: Vectors, interface: InterfaceFacts, sample
     Parameters
     ----------
     path : Path
-        ``.csv`` (a row for each sample of each channel, codes in decimal), ``.npz`` (the arrays of `Vectors` by their
-        names), ``.vcd`` (the codes of every channel at the times of the samples), or ``.hex`` (two files for
-        ``$readmemh``, whose names end in ``_stimuli.hex`` and ``_responses.hex``).
+        ``.csv`` (a row for each sample of each channel, codes in decimal; output and status are empty where a sample
+        brings no result), ``.npz`` (the arrays of `Vectors` by their names), ``.vcd`` (the codes of every channel at
+        the times of the samples), or ``.hex`` (two files for ``$readmemh``, whose names end in ``_stimuli.hex`` and
+        ``_responses.hex``; a beat of several samples must be full).
     vectors : Vectors
         The samples.
     interface : InterfaceFacts
@@ -142,7 +152,7 @@ def _csv(vectors: Vectors, interface: InterfaceFacts) -> str:
     text = io.StringIO()
     rows = csv.writer(text, lineterminator="\n")
     rows.writerow(["sample", "channel", *_names(interface)])
-    for n, sample in enumerate(_rows(vectors)):
+    for n, sample in enumerate(_rows(vectors, interface)):
         rows.writerows([n, channel, *row] for channel, row in enumerate(sample))
     return text.getvalue()
 
@@ -159,16 +169,22 @@ def _vcd(vectors: Vectors, interface: InterfaceFacts, sample_rate: Fraction) -> 
             ]
             for channel in range(vectors.stimuli.shape[1])
         ]
-        for n, sample in enumerate(_rows(vectors)):
+        for n, sample in enumerate(_rows(vectors, interface)):
             for row, channel in zip(sample, variables, strict=True):
                 for value, size, variable in zip(row, sizes, channel, strict=True):
-                    writer.change(variable, int(n * 10**9 / sample_rate), value % (1 << size))
-        writer.close(int(len(vectors.responses) * 10**9 / sample_rate))
+                    if value is not None:
+                        writer.change(variable, int(n * 10**9 / sample_rate), value % (1 << size))
+        writer.close(int(len(vectors.stimuli) * 10**9 / sample_rate))
     return text.getvalue()
 
 
-def _rows(vectors: Vectors) -> list[list[list[int]]]:
-    """Input codes, output code and status of each channel of each sample."""
-    results = np.stack([vectors.responses, vectors.status.astype(np.int64)], axis=2)
-    rows: list[list[list[int]]] = np.concatenate([vectors.stimuli, results], axis=2).tolist()
-    return rows
+def _rows(vectors: Vectors, interface: InterfaceFacts) -> list[list[list[int | None]]]:
+    """Input codes, output code and status of each channel of each sample; None where it brings no result."""
+    every = interface.samples_per_result // interface.copies_per_result
+    sent: list[list[list[int | None]]] = vectors.stimuli.tolist()
+    results = np.stack([vectors.responses, vectors.status.astype(np.int64)], axis=2).tolist()
+    none = [[None, None]] * vectors.stimuli.shape[1]
+    return [
+        [[*codes, *result] for codes, result in zip(sample, none if n % every else results[n // every], strict=True)]
+        for n, sample in enumerate(sent)
+    ]

@@ -1,6 +1,7 @@
 """Files of vectors: every format holds the same samples, the same bytes on every run."""
 
 import io
+import re
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -9,7 +10,8 @@ import numpy as np
 import pytest
 from tests.interface.small import filter_design, instrument_design
 
-from sosmith.gen.output.vectors import Vectors, hex_words, vector_files, words
+from sosmith.gen.output.core_facts import InterfaceFacts
+from sosmith.gen.output.vectors import Vectors, hex_words, vector_files, whole_beats, words
 from sosmith.model.errors import SpecificationError
 
 VECTORS = Vectors(
@@ -38,6 +40,75 @@ def test_one_channel_has_no_destination() -> None:
     )
     one = Vectors(stimuli=VECTORS.stimuli[:, :1], responses=VECTORS.responses[:, :1], status=VECTORS.status[:, :1])
     assert hex_words(one, alone) == ("00020001\n03ff0fff\n", "00_0005\n02_0000\n")
+
+
+def one_channel(lanes: int = 1, every: int = 1, copies: int = 1) -> InterfaceFacts:
+    """Return the streams of the plain filter with so many samples in a beat, samples of a result, and copies of it."""
+    made = filter_design().facts.interface
+    return replace(
+        made,
+        inputs=replace(made.inputs, lanes=lanes),
+        outputs=replace(made.outputs, lanes=lanes),
+        samples_per_result=every,
+        copies_per_result=copies,
+    )
+
+
+def samples(codes: list[int], results: list[int]) -> Vectors:
+    stimuli, responses = np.array(codes)[:, np.newaxis, np.newaxis], np.array(results)[:, np.newaxis]
+    return Vectors(
+        stimuli=stimuli, responses=responses, status=(np.arange(len(results)) % 4)[:, np.newaxis].astype("u1")
+    )
+
+
+def test_a_beat_is_a_line_with_its_first_sample_lowest() -> None:
+    vectors = samples([1, -2, 3, 4], [5, 6, -7, 8])
+    assert hex_words(vectors, one_channel(lanes=2)) == (
+        "fffe0001\n00040003\n",
+        "0100_00060005\n0302_0008fff9\n",
+    )
+    wide = samples([*range(16)], [*range(16)])
+    assert hex_words(wide, one_channel(lanes=16))[0] == "".join(f"{k:04x}" for k in range(15, -1, -1)) + "\n"
+
+
+def test_the_last_sample_fills_the_last_beat() -> None:
+    codes = np.array([[[1]], [[2]], [[3]]])
+    assert whole_beats(codes, one_channel(lanes=2).inputs)[:, 0, 0].tolist() == [1, 2, 3, 3]
+    assert whole_beats(codes, one_channel(lanes=16).inputs)[:, 0, 0].tolist() == [1, 2, *[3] * 14]
+    assert whole_beats(codes, one_channel().inputs) is codes
+
+
+DECIMATED = samples([1, 2, 3, 4, 5], [6, 7])
+HELD = samples([1, 2, 3, 4, 5], [6, 6, 6, 6, 7, 7, 7, 7])
+
+
+def test_rows_behind_a_decimator_are_empty_where_there_is_no_result() -> None:
+    interface = one_channel(every=4)
+    made = vector_files(Path("run.csv"), DECIMATED, interface, RATE)["run.csv"].decode()
+    assert made.splitlines()[1:] == ["0,0,1,6,0", "1,0,2,,", "2,0,3,,", "3,0,4,,", "4,0,5,7,1"]
+    assert [text.count("\n") for text in hex_words(DECIMATED, interface)] == [5, 2]
+
+
+def test_rows_with_held_results_are_full() -> None:
+    interface = one_channel(every=4, copies=4)
+    made = vector_files(Path("run.csv"), HELD, interface, RATE)["run.csv"].decode()
+    assert [row.split(",")[3] for row in made.splitlines()[1:]] == ["6", "6", "6", "6", "7"]
+    assert [text.count("\n") for text in hex_words(HELD, interface)] == [5, 8]
+
+
+def test_a_waveform_behind_a_decimator_changes_with_its_results() -> None:
+    """In a waveform a result stays until the next one in any case."""
+    made = vector_files(Path("run.vcd"), DECIMATED, one_channel(every=4), RATE)["run.vcd"].decode()
+    identifier = next(line.split()[3] for line in made.splitlines() if " y_code " in line)
+    changes = re.findall(rf"^b(\d+) {re.escape(identifier)}$|^#(\d+)$", made, re.MULTILINE)
+    times, found = 0, []
+    for value, time in changes:
+        if time:
+            times = int(time)
+        else:
+            found.append((times, int(value, 2)))
+    assert found[-2:] == [(0, 6), (40_000_000, 7)]
+    assert made.splitlines()[-1] == "#50000000"
 
 
 def test_csv_has_a_row_for_each_sample_of_each_channel() -> None:

@@ -134,8 +134,6 @@ def test_packages_and_boards_are_refused(tmp_path: Path) -> None:
         Design(made).build("icebreaker", folder=tmp_path)
     with refused("locomotive.toml: not yet available: filter.decimate must be left out on a board, not 16"):
         Design(made).board()
-    with refused("locomotive.toml: not yet available: filter.decimate must be left out with vectors, not 16"):
-        Design(made).simulate(folder=tmp_path, vectors=tmp_path / "vectors.csv")
     refuse_decimated(direct_design(made), "anywhere")
 
 

@@ -1,10 +1,10 @@
 """Look-ahead and beats of several samples in simulation: every result that of the model, and within its bound."""
 
 import json
-import re
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from tests.gen.blocks.specifications import AUDIO, designed, text
 from tests.sim.lint import icarus_check, lint
@@ -14,7 +14,6 @@ from sosmith.gen.output.generate import generate
 from sosmith.gen.report.report import write_report
 from sosmith.gen.specification.specification import from_text
 from sosmith.gen.stimuli import traces_for
-from sosmith.model.errors import SpecificationError
 from sosmith.sim.simulation import simulate
 
 SIMPLE = AUDIO.replace("order = 5", "order = 1")
@@ -64,14 +63,21 @@ def test_tools_read_the_text_without_a_warning(lanes: int, pipeline: str, tmp_pa
     assert icarus_check(path, made.spec.name) == []
 
 
-def test_vectors_of_beats_are_told_sample_by_sample(tmp_path: Path) -> None:
+def test_vectors_of_beats(tmp_path: Path) -> None:
+    """Sample by sample in CSV; in words of the bus with all that the bus had, the filling of the last beat too."""
     made = design_core(from_text(text(4, pipeline="plain", base=SIMPLE), Path("simple.toml")))
     (trace,) = traces_for(made, "noise", seed=3)
     short = replace(trace, codes=trace.codes[:30], truth=None, reading=None)
     simulate(made, [short], tmp_path, vectors=tmp_path / "some.csv")
     assert len((tmp_path / "some.csv").read_text(encoding="utf-8").splitlines()) == 31
-    message = (
-        "simple.toml: not yet available: hardware.samples_per_clock must be 1 with vectors in words of the bus, not 4"
-    )
-    with pytest.raises(SpecificationError, match=f"^{re.escape(message)}$"):
-        simulate(made, [short], tmp_path, vectors=tmp_path / "some.hex")
+    evidence = simulate(made, [short], tmp_path, vectors=tmp_path / "some.hex")
+    assert (evidence.mismatches, evidence.samples) == (0, 30)
+    filled = np.concatenate([short.codes, short.codes[-1:], short.codes[-1:]])
+    lines = (tmp_path / "some_stimuli.hex").read_text(encoding="utf-8").split()
+    sent = [line[16 - 4 * lane : 20 - 4 * lane] for line in lines for lane in (1, 2, 3, 4)]
+    assert sent == [f"{code % 65536:04x}" for code in filled[:, 0].tolist()]
+    lines = (tmp_path / "some_responses.hex").read_text(encoding="utf-8").split()
+    found = [line.split("_")[1][16 - 4 * lane : 20 - 4 * lane] for line in lines for lane in (1, 2, 3, 4)]
+    assert found == [f"{code % 65536:04x}" for code in made.datapath.compute(filled).tolist()]
+    flags = [line[8 - 2 * lane : 10 - 2 * lane] for line in lines for lane in (1, 2, 3, 4)]
+    assert flags == [f"{status:02x}" for status in made.datapath.compute_status(filled).tolist()]

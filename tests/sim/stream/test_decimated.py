@@ -74,6 +74,26 @@ def test_held_results_come_as_often_as_samples(architecture: str, simulator: str
     assert "16 samples make one result, which leaves as many times" in (tmp_path / "report.html").read_text("utf-8")
 
 
+@pytest.mark.parametrize("hold", [False, True])
+def test_vectors_have_a_result_for_every_16th_sample(hold: bool, tmp_path: Path) -> None:
+    """The last of three groups is not complete: its result is there, and as often as the others if it is held."""
+    text = locomotive_text(architecture="folded").replace("order = 7\n", f"order = 7\nhold = {str(hold).lower()}\n")
+    made = design_core(from_text(text, Path("locomotive.toml")), core="filter")
+    trace = samples_of(made, 40)
+    expected = made.datapath.compute(trace.codes).tolist()
+    assert len(expected) == 3
+    simulate(made, [trace], tmp_path, simulator="icarus", vectors=tmp_path / "some.csv")
+    rows = [row.split(",")[3] for row in (tmp_path / "some.csv").read_text(encoding="utf-8").splitlines()[1:]]
+    shown = [str(expected[n // 16]) if hold or n % 16 == 0 else "" for n in range(40)]
+    assert rows == shown
+    simulate(made, [trace], tmp_path, simulator="icarus", vectors=tmp_path / "some.hex")
+    lines = (tmp_path / "some_responses.hex").read_text(encoding="utf-8").split()
+    assert [int(line.split("_")[1], 16) for line in lines] == [
+        code for code in expected for _ in range(16 if hold else 1)
+    ]
+    assert len((tmp_path / "some_stimuli.hex").read_text(encoding="utf-8").split()) == 40
+
+
 def test_held_results_take_no_longer(tmp_path: Path) -> None:
     text = locomotive_text(architecture="folded").replace("order = 7\n", "order = 7\nhold = true\n")
     made = design_core(from_text(text, Path("locomotive.toml")), core="filter")
