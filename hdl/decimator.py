@@ -214,7 +214,7 @@ class Holder(wiring.Component):
         m = Module()
         left = Signal(range(self.copies), reset_less=True)
         held = Signal(len(self.o_data), reset_less=True)
-        m.d.comb += [self.i_ready.eq(~self.o_valid | (self.o_ready & (left == 0))), self.o_data.eq(held)]
+        m.d.comb += [self.i_ready.eq(~self.o_valid | (self.o_ready & ~left.any())), self.o_data.eq(held)]
         with m.If(self.i_ready):
             m.d.sync += [held.eq(self.i_data), self.o_valid.eq(self.i_valid), left.eq(self.copies - 1)]
         with m.Elif(self.o_ready):

@@ -7,7 +7,6 @@ from sosmith.gen.output.packages.facts import PackageFacts
 from sosmith.gen.output.packages.lint_waivers import verilator_waivers
 from sosmith.gen.output.packages.stimuli import bench_stimuli
 from sosmith.gen.output.vectors import hex_words
-from sosmith.model.dataflow.status import STATUS_BITS
 from sosmith.model.templates import render
 
 _SPARE = 64
@@ -25,20 +24,36 @@ def bench_files(design: CoreDesign, facts: PackageFacts) -> dict[str, str]:
         What its package says about it.
     """
     interface, datapath = facts.interface, design.datapath
-    stimuli = bench_stimuli(design)
+    stimuli = bench_stimuli(design, interface)
     hex_in, hex_out = hex_words(stimuli.vectors, interface)
-    into, out = interface.inputs, interface.outputs
+    into, out, lanes = interface.inputs, interface.outputs, interface.inputs.lanes
+    sent, results = hex_in.count("\n"), hex_out.count("\n")
+    # The samples of a result, one at least at two clocks.
+    gathered = 2 * interface.samples_per_result if facts.core.decimation is not None else 0
     values = {
         "name": facts.name,
         "parts": stimuli.parts,
-        "samples": stimuli.vectors.responses.size,
+        "transfers": sent,
+        "results": results,
+        "counted": "beats" if lanes > 1 else "results" if facts.core.decimation is not None else "samples",
+        "lanes": lanes,
+        "line": max(into.width, out.width + out.user_width) // 4 + 8,
+        "decimation": facts.core.decimation,
+        "copies": interface.copies_per_result,
+        "width_in": into.sample_width,
+        "width_out": out.sample_width,
         "dest": into.dest_width,
         "data_in": into.width,
         "data_out": out.width,
         "stimulus": into.dest_width + into.width,
-        "response": out.dest_width + STATUS_BITS + out.width,
+        "data_user": out.width + out.user_width,
+        "response": out.dest_width + out.user_width + out.width,
         "registers": [pin for pin in facts.pins if pin.bus == "s_axil"],
-        "patience": interface.reset_cycles + interface.latency_cycles + facts.core.cycles_per_sample + _SPARE,
+        "patience": interface.reset_cycles
+        + interface.latency_cycles
+        + facts.core.cycles_per_sample
+        + gathered
+        + _SPARE,
         "channels": facts.core.channels,
         "takes_channel": len(datapath.wear) > 1,
         "inputs": into.fields,

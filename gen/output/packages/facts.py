@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from sosmith.gen.core import CoreDesign
-from sosmith.gen.output.core_facts import CoreFacts, InterfaceFacts, core_facts
+from sosmith.gen.output.core_facts import CoreFacts, InterfaceFacts, StreamFacts, core_facts
 from sosmith.gen.output.packages.vlnv import Vlnv
 from sosmith.gen.output.pins import Pin, pins
+from sosmith.hdl.plan.streams import Field
 from sosmith.model.reload.registers import PROTECTED_REGISTERS, REGISTERS, Register
 
 
@@ -56,10 +57,25 @@ class PackageFacts:
         """What the core is, in one line."""
         core = self.core
         parts = [core.core, *([core.realization] if core.realization else []), core.architecture]
+        if core.interface.inputs.lanes > 1:
+            parts.append(f"{core.interface.inputs.lanes} samples a clock")
+        if core.decimation is not None:
+            parts.append(f"decimated by {core.decimation.factor}")
         inputs = ", ".join(field.port.name for field in core.interface.inputs.fields)
         (output,) = core.interface.outputs.fields
         error = f"error at most {core.error_bound:.6g} {core.unit}".strip()
         return f"{', '.join(parts)}: {inputs} to {output.port.name}, {error}"
+
+
+def fields_of_beat(stream: StreamFacts) -> tuple[Field, ...]:
+    """Return the fields of all samples of a beat; of several, each with the sample's number behind its name."""
+    if stream.lanes == 1:
+        return stream.fields
+    return tuple(
+        Field(replace(field.port, name=f"{field.port.name}_{lane}"), field.offset + lane * stream.sample_width)
+        for lane in range(stream.lanes)
+        for field in stream.fields
+    )
 
 
 def package_facts(design: CoreDesign, vlnv: Vlnv | None = None) -> PackageFacts:

@@ -8,7 +8,8 @@ from itertools import product
 import numpy as np
 
 from sosmith.gen.core import CoreDesign
-from sosmith.gen.output.vectors import Vectors
+from sosmith.gen.output.core_facts import InterfaceFacts
+from sosmith.gen.output.vectors import Vectors, whole_beats
 from sosmith.gen.stimuli import bench_of
 from sosmith.model.arrays import Codes, Values
 from sosmith.model.scenarios.run import Bench, Run
@@ -37,12 +38,13 @@ class Stimuli:
     parts: tuple[str, ...]
 
 
-def bench_stimuli(design: CoreDesign) -> Stimuli:
-    """Make the stimuli of a core's bench, with the responses of the integer model.
+def bench_stimuli(design: CoreDesign, interface: InterfaceFacts) -> Stimuli:
+    """Make the stimuli of a core's bench, with the responses of the integer model; `interface` are its streams.
 
     First the input that drives the output highest and lowest, by the signs of the ideal filter's impulse response; then
     the same for the path of each rounding error; then all corners of the inputs; then noise, uniform over all codes.
-    The last two reach every code of the inputs that the first two leave out. Channel k lags channel 0 by k samples.
+    The last two reach every code of the inputs that the first two leave out. Channel k lags channel 0 by k samples. The
+    last beat of several samples is filled with the last one of them.
     """
     bench, channels = bench_of(design), design.spec.channels
     most = max(_MOST // channels, 8)
@@ -54,12 +56,18 @@ def bench_stimuli(design: CoreDesign) -> Stimuli:
     ]
     first = np.concatenate([codes for _, codes, _ in pieces])
     lagging = np.maximum(np.arange(len(first))[:, np.newaxis] - np.arange(channels), 0)
-    codes = first[lagging]
+    codes = whole_beats(first[lagging], interface.inputs)
+    filling = len(codes) - len(first)
     return Stimuli(
         vectors=Vectors(
-            stimuli=codes, responses=design.datapath.compute(codes), status=design.datapath.compute_status(codes)
+            stimuli=codes,
+            responses=np.repeat(design.datapath.compute(codes), interface.copies_per_result, axis=0),
+            status=np.repeat(design.datapath.compute_status(codes), interface.copies_per_result, axis=0),
         ),
-        parts=tuple(f"{len(part)} samples: {what}{remark}" for what, part, remark in pieces),
+        parts=(
+            *(f"{len(part)} samples: {what}{remark}" for what, part, remark in pieces),
+            *[f"{filling} samples: the last one again, to fill its beat"] * (filling > 0),
+        ),
     )
 
 

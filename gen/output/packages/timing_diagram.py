@@ -11,7 +11,7 @@ from sosmith.model.text_files import to_json
 
 
 def timing_files(facts: PackageFacts) -> dict[str, str]:
-    """Return source and picture by their paths in the package: two samples in, two results out, one of them stalled."""
+    """Return source and picture by their paths in the package: two samples, or beats of them, and their results."""
     source = to_json(_diagram(facts))
     return {
         f"doc/{facts.name}_timing.json": source,
@@ -39,17 +39,49 @@ _SHARED = {
     "m_axis_tready": "1..|...|..",
     "m_axis_tdata": "x..|3x.|4x",
 }
+# Behind a decimator, with a source that waits for each result; the samples between bring none.
+_DECIMATED = {
+    "aclk": "p..|..|..|...",
+    "s_axis_tvalid": "010|..|10|...",
+    "s_axis_tready": "1..|..|..|...",
+    "s_axis_tdata": "x3x|..|4x|...",
+    "m_axis_tvalid": "0..|10|..|.10",
+    "m_axis_tready": "1..|..|..|...",
+    "m_axis_tdata": "x..|3x|..|.4x",
+}
+_HELD = {
+    "aclk": "p..|..|..|..|.",
+    "s_axis_tvalid": "010|..|10|..|.",
+    "s_axis_tready": "1..|..|..|..|.",
+    "s_axis_tdata": "x3x|..|4x|..|.",
+    "m_axis_tvalid": "0..|.1|0.|.1|0",
+    "m_axis_tready": "1..|..|..|..|.",
+    "m_axis_tdata": "x..|.3|x.|.4|x",
+}
 
 
 def _diagram(facts: PackageFacts) -> dict[str, Any]:
-    latency, spacing = facts.interface.latency_cycles, facts.core.cycles_per_sample
-    signals = []
-    for name, wave in (_PIPELINED if spacing == 1 else _SHARED).items():
-        labels = {"s_axis_tdata": ("sample 0", "sample 1"), "m_axis_tdata": ("result 0", "result 1")}.get(name)
-        signals.append({"name": name, "wave": wave} | ({} if labels is None else {"data": list(labels)}))
+    latency, spacing, lanes = facts.interface.latency_cycles, facts.core.cycles_per_sample, facts.interface.inputs.lanes
     rate = "every clock" if spacing == 1 else f"every {spacing} clocks"
+    waves = _PIPELINED if spacing == 1 else _SHARED
+    inputs, outputs = ["sample 0", "sample 1"], ["result 0", "result 1"]
+    text = f"a result {latency} clocks after its sample, a sample {rate}"
+    if lanes > 1:
+        ends = [f"{lane} to {lane + lanes - 1}" for lane in (0, lanes)]
+        inputs, outputs = ([f"{what} {numbers}" for numbers in ends] for what in ("samples", "results"))
+        text = f"{lanes} results {latency} clocks after their samples, a beat of {lanes} samples {rate}"
+    found = facts.core.decimation
+    if found is not None:
+        waves, inputs = _HELD if found.held else _DECIMATED, ["sample 0", f"sample {found.factor}"]
+        text = f"a result at most {latency} clocks after its sample, which is one of {found.factor}"
+        text += f"; each result leaves {found.factor} times" * found.held
+        outputs = [f"{result}, {found.factor} times" for result in outputs] if found.held else outputs
+    labels = {"s_axis_tdata": inputs, "m_axis_tdata": outputs}
     return {
-        "signal": signals,
-        "head": {"text": f"{facts.name}: a result {latency} clocks after its sample, a sample {rate}"},
+        "signal": [
+            {"name": name, "wave": wave} | ({"data": labels[name]} if name in labels else {})
+            for name, wave in waves.items()
+        ],
+        "head": {"text": f"{facts.name}: {text}"},
         "config": {"hscale": 2},
     }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from sosmith.gen.output.packages.facts import PackageFacts
+from sosmith.gen.output.packages.facts import PackageFacts, fields_of_beat
 from sosmith.model.templates import render
 
 _WORDS = """
@@ -37,8 +37,8 @@ def vhdl_files(facts: PackageFacts) -> dict[str, str]:
         "library": vhdl_name(f"{name}_package"),
         "entity": vhdl_name(f"{name}_instance"),
         "pins": facts.pins,
-        "inputs": [(vhdl_name(f"{field.port.name}_code"), field) for field in facts.interface.inputs.fields],
-        "outputs": [(vhdl_name(f"{field.port.name}_code"), field) for field in facts.interface.outputs.fields],
+        "inputs": [(vhdl_name(f"{field.port.name}_code"), field) for field in fields_of_beat(facts.interface.inputs)],
+        "outputs": [(vhdl_name(f"{field.port.name}_code"), field) for field in fields_of_beat(facts.interface.outputs)],
         "dest": facts.interface.inputs.dest_width,
         "width": facts.interface.inputs.width,
     }

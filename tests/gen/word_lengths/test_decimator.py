@@ -13,7 +13,6 @@ from sosmith.gen.core import design_core, refuse_decimated
 from sosmith.gen.output.core_facts import core_facts
 from sosmith.gen.output.decimation_facts import direct_design, rate_costs
 from sosmith.gen.output.manifest import manifest
-from sosmith.gen.output.packages.package import packed
 from sosmith.gen.stimuli import traces_for
 from sosmith.gen.word_lengths.decimator import front_of
 from sosmith.gen.word_lengths.quantized import DECIMATION
@@ -126,10 +125,8 @@ def test_a_calibration_alone_is_not_decimated() -> None:
     assert design_core(locomotive_spec(), core="calibration").datapath.decimator is None
 
 
-def test_packages_and_boards_are_refused(tmp_path: Path) -> None:
+def test_boards_are_refused(tmp_path: Path) -> None:
     made = locomotive()
-    with refused("locomotive.toml: not yet available: filter.decimate must be left out in a package, not 16"):
-        packed(made)
     with refused("locomotive.toml: not yet available: filter.decimate must be left out on a board, not 16"):
         Design(made).build("icebreaker", folder=tmp_path)
     with refused("locomotive.toml: not yet available: filter.decimate must be left out on a board, not 16"):

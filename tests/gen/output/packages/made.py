@@ -20,7 +20,21 @@ RELOADABLE: dict[str, Any] = {
     "output": {"bits": 12, "range": [0.0, 5.0], "unit": "V"},
     "hardware": {"realization": "df1_ef1", "architecture": "folded", "clock": 1e6, "reload": True, "protect": "detect"},
 }
-SPECIFICATIONS = {spec["name"]: spec for spec in (FILTER, INSTRUMENT, RELOADABLE)}
+WIDE: dict[str, Any] = {**FILTER, "name": "wide", "hardware": {**FILTER["hardware"], "samples_per_clock": 8}}
+"""Eight samples in a beat of 128 bits."""
+SPARSE: dict[str, Any] = {
+    **FILTER,
+    "name": "sparse",
+    "filter": {**FILTER["filter"], "cutoff": 20.0, "decimate": 4},
+    "hardware": {"architecture": "folded", "clock": 12e6},
+}
+HELD: dict[str, Any] = {
+    **SPARSE,
+    "name": "held",
+    "filter": {**SPARSE["filter"], "hold": True},
+    "hardware": {**SPARSE["hardware"], "architecture": "parallel"},
+}
+SPECIFICATIONS = {spec["name"]: spec for spec in (FILTER, INSTRUMENT, RELOADABLE, WIDE, SPARSE, HELD)}
 
 
 @cache

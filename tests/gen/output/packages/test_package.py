@@ -73,8 +73,19 @@ def test_scripts_for_vendors_tools_name_files_that_exist(tool: str, name: str) -
     assert named == {("..", "core", f"{name}.sv"), (f"{name}.{suffix}",)}
     assert {f"{tool}/{name}.{suffix}", f"core/{name}.sv"} <= texts.keys()
     assert "sosmith has not run this script" in script
-    period = {"plain": "83.333", "gauge": "83.333", "tunable": "1000.000"}[name]
+    period = "1000.000" if name == "tunable" else "83.333"
     assert f"-period {period} [get_ports aclk]" in texts[f"{tool}/{name}.{suffix}"]
+
+
+SINGLE = "its sample", ["sample 0", "sample 1", "result 0", "result 1"]
+TIMES = {
+    "plain": SINGLE,
+    "gauge": SINGLE,
+    "tunable": SINGLE,
+    "wide": ("their samples, a beat of 8", ["samples 0 to 7", "samples 8 to 15", "results 0 to 7", "results 8 to 15"]),
+    "sparse": ("its sample, which is one of 4", ["sample 0", "sample 4", "result 0", "result 1"]),
+    "held": ("its sample, which is one of 4; each", ["sample 0", "sample 4", "result 0, 4 times", "result 1, 4 times"]),
+}
 
 
 @pytest.mark.parametrize("name", SPECIFICATIONS)
@@ -82,7 +93,9 @@ def test_the_timing_diagram_shows_two_samples_and_their_results(name: str) -> No
     source = json.loads(package_of(name)[f"doc/{name}_timing.json"])
     waves = {signal["name"]: signal["wave"] for signal in source["signal"]}
     assert len({len(wave) for wave in waves.values()}) == 1
-    assert f"{design_of(name).latency_cycles} clocks after its sample" in source["head"]["text"]
+    latency, head = design_of(name).latency_cycles, source["head"]["text"]
+    words, told = TIMES[name]
+    assert f"{latency} clocks after {words}" in head
     picture = etree.fromstring(package_of(name)[f"doc/{name}_timing.svg"].encode())
     shown = {text for text in picture.itertext() if text.strip()}
-    assert {*waves, "sample 0", "sample 1", "result 0", "result 1"} <= shown
+    assert {*waves, *told} <= shown

@@ -74,6 +74,45 @@ end;
     assert (result.returncode, result.stderr) == (0, "")
 
 
+def test_samples_of_a_beat_lie_in_their_order(tmp_path: Path) -> None:
+    """The stub hands on the beat turned by one sample of 16 bits: result k is code k + 1, the last the first."""
+    at = with_stub("wide", tmp_path)
+    stub = at / "stub.vhd"
+    text = stub.read_text(encoding="utf-8")
+    turned = text.replace("s_axis_tdata(m_axis_tdata'range)", "s_axis_tdata(15 downto 0) & s_axis_tdata(127 downto 16)")
+    assert turned != text
+    stub.write_text(turned, encoding="utf-8")
+    (at / "check.vhd").write_text(
+        f"""library ieee; use ieee.std_logic_1164.all; use ieee.numeric_std.all;
+entity check is end;
+architecture a of check is
+  type codes is array (0 to 7) of signed(9 downto 0);
+  signal x, y : codes;
+begin
+  core : entity work.wide_instance port map (
+    {", ".join(f"x_{k}_code => x({k}), y_{k}_code => y({k})" for k in range(8))},
+    aclk => '0', aresetn => '1', s_axis_tvalid => '1', m_axis_tready => '1', s_axis_tready => open,
+    m_axis_tuser => open, m_axis_tvalid => open);
+  process begin
+    for k in 0 to 7 loop x(k) <= to_signed(100 * k - 350, 10); end loop;
+    wait for 1 ns;
+    for k in 0 to 7 loop
+      assert y(k) = 100 * ((k + 1) mod 8) - 350 severity failure;
+    end loop;
+    wait;
+  end process;
+end;
+""",
+        encoding="utf-8",
+    )
+    for source in ("stub.vhd", "wide_package.vhd", "wide_instance.vhd", "check.vhd"):
+        result = ghdl("-a", source, at=at)
+        assert (result.returncode, result.stderr) == (0, "")
+    ghdl("-e", "check", at=at)
+    result = ghdl("-r", "check", at=at)
+    assert (result.returncode, result.stderr) == (0, "")
+
+
 @pytest.mark.parametrize(
     ("name", "expected"),
     [

@@ -5,17 +5,20 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
-from tests.gen.output.packages.made import SPECIFICATIONS, called, design_of, unpacked
+from tests.gen.output.packages.made import called, design_of, unpacked
 
+from sosmith.gen.output.core_facts import StreamFacts
 from sosmith.gen.output.packages.facts import package_facts
 from sosmith.gen.output.pins import Pin
+from sosmith.model.port import Port
 from sosmith.model.reload.registers import MAGIC
 
 AMARANTH = """
 from amaranth.back import verilog
-from amaranth.hdl import ClockDomain, ClockSignal, Module, ResetSignal, Signal
+from amaranth.hdl import ClockDomain, ClockSignal, Module, ResetSignal, Signal, Value
 import {name}_amaranth as wrapper
 
 m, pins = Module(), {{name: Signal(width, name=name) for name, width in {pins!r}.items()}}
@@ -25,8 +28,8 @@ m.d.comb += [ClockSignal().eq(pins["aclk"]), ResetSignal().eq(~pins["aresetn"])]
 m.d.comb += [
     core.i.valid.eq(pins["s_axis_tvalid"]), core.i.payload.codes.eq(pins["s_axis_tdata"]),
     pins["s_axis_tready"].eq(core.i.ready),
-    pins["m_axis_tvalid"].eq(core.o.valid), pins["m_axis_tdata"].eq(core.o.payload.code),
-    pins["m_axis_tuser"].eq(core.o.payload.flags), core.o.ready.eq(pins["m_axis_tready"]),
+    pins["m_axis_tvalid"].eq(core.o.valid), pins["m_axis_tdata"].eq(core.o.payload.code.as_value()),
+    pins["m_axis_tuser"].eq(Value.cast(core.o.payload.flags)), core.o.ready.eq(pins["m_axis_tready"]),
 ]
 if "s_axis_tdest" in pins:
     m.d.comb += [
@@ -52,7 +55,7 @@ class Top(Module):
             pins["m_axis_tvalid"].eq(source.valid), source.ready.eq(pins["m_axis_tready"]),
             pins["m_axis_tuser"].eq(source.flags),
             *[getattr(sink, field).eq(pins["s_axis_tdata"][low:low + bits]) for field, low, bits in {inputs!r}],
-            pins["m_axis_tdata"].eq(wide(source.{output})),
+            *[pins["m_axis_tdata"][low:low + n].eq(wide(getattr(source, field))) for field, low, n in {outputs!r}],
         ]
         if "s_axis_tdest" in pins:
             self.comb += [sink.channel.eq(pins["s_axis_tdest"]), pins["m_axis_tdest"].eq(source.channel)]
@@ -70,6 +73,14 @@ def pins_of(name: str) -> tuple[Pin, ...]:
     return package_facts(design_of(name).core).pins
 
 
+def placed(stream: StreamFacts) -> list[tuple[str, int, Port]]:
+    """Return name, lowest bit and port of each quantity of a beat, samples with a number behind the name."""
+    if stream.lanes == 1:
+        return [(field.port.name, field.offset, field.port) for field in stream.fields]
+    (field,) = stream.fields
+    return [(f"{field.port.name}_{k}", 16 * k, field.port) for k in range(stream.lanes)]
+
+
 def wrapped(maker: str, name: str, folder: Path) -> str:
     """Return the Verilog that a library makes of its wrapper, with the pins of the core."""
     interface = design_of(name).facts.interface
@@ -77,8 +88,8 @@ def wrapped(maker: str, name: str, folder: Path) -> str:
         name=name,
         Name=name.capitalize(),
         pins={pin.name: pin.width for pin in pins_of(name) if pin.bus != "s_axil"},
-        inputs=[(field.port.name, field.offset, field.port.bits) for field in interface.inputs.fields],
-        output=interface.outputs.fields[0].port.name,
+        inputs=[(name, low, port.bits) for name, low, port in placed(interface.inputs)],
+        outputs=[(name, low, 8 * port.bytes) for name, low, port in placed(interface.outputs)],
     )
     result = subprocess.run(
         [sys.executable, "-c", script], cwd=folder / "python", capture_output=True, text=True, check=False
@@ -87,7 +98,7 @@ def wrapped(maker: str, name: str, folder: Path) -> str:
     return result.stdout
 
 
-@pytest.mark.parametrize("name", ["plain", "gauge"])
+@pytest.mark.parametrize("name", ["plain", "gauge", "wide", "held"])
 @pytest.mark.parametrize("maker", MAKERS)
 def test_the_bench_passes_with_the_wrapper_around_the_core(maker: str, name: str, tmp_path: Path) -> None:
     folder = unpacked(name, tmp_path)
@@ -99,7 +110,9 @@ def test_the_bench_passes_with_the_wrapper_around_the_core(maker: str, name: str
     with sv.open("a", encoding="utf-8") as file:
         file.write(wrapped(maker, name, folder))
     result = called("make", "icarus", at=folder / "bench")
-    assert re.search(r"^PASS: \d+ samples, 0 mismatches$", result.stdout, re.MULTILINE), result.stdout + result.stderr
+    assert re.search(r"^PASS: \d+ (samples|beats|results), 0 mismatches$", result.stdout, re.MULTILINE), (
+        result.stdout + result.stderr
+    )
 
 
 @pytest.mark.parametrize("maker", MAKERS)
@@ -110,11 +123,18 @@ def test_wrappers_of_a_reloadable_core_have_its_bus(maker: str, tmp_path: Path) 
         assert re.search(rf"\.{pin.name}\s*\(", text), pin.name
 
 
-def test_litex_registers_of_the_soc(tmp_path: Path) -> None:
-    folder = unpacked("gauge", tmp_path)
+@pytest.mark.parametrize(
+    ("name", "registers"),
+    [
+        ("gauge", ["channel", "count", "flags", "result", "temperature", "voltage"]),
+        ("wide", ["count", "flags", *(f"result_{k}" for k in range(8)), *(f"x_{k}" for k in range(8))]),
+    ],
+)
+def test_litex_registers_of_the_soc(name: str, registers: list[str], tmp_path: Path) -> None:
+    folder = unpacked(name, tmp_path)
     script = (
-        "from migen import ClockDomain, Module\nfrom litex.gen.fhdl.verilog import convert\nimport gauge_litex\n"
-        "core = gauge_litex.Gauge(with_csr=True)\n"
+        f"from migen import ClockDomain, Module\nfrom litex.gen.fhdl.verilog import convert\nimport {name}_litex\n"
+        f"core = {name}_litex.{name.capitalize()}(with_csr=True)\n"
         "print(*sorted(csr.name for csr in core.get_csrs()))\n"
         "core.clock_domains.cd_sys = ClockDomain('sys')\n"
         "text = str(convert(core, ios={core.cd_sys.clk, core.cd_sys.rst}))\n"
@@ -124,7 +144,7 @@ def test_litex_registers_of_the_soc(tmp_path: Path) -> None:
         [sys.executable, "-c", script], cwd=folder / "python", capture_output=True, text=True, check=False
     )
     assert result.returncode == 0, result.stderr
-    assert result.stdout.split() == ["channel", "count", "flags", "result", "temperature", "voltage"]
+    assert result.stdout.split() == registers
 
 
 RUNNER = """
@@ -150,8 +170,12 @@ async def drive(dut):
     await core.start()
     results = []
     for values in json.load(open("../../values.json")):
-        await core.send(**values)
-        results.append(await core.receive())
+        *sent, last = values if isinstance(values, list) else [values]
+        for each in sent:
+            await core.send(**each)
+        await core.send(**last)
+        found = await core.receive()
+        results += found if isinstance(found, list) else [found]
     registers = []
     if hasattr(core, "read_register"):
         registers = [await core.read_register(0), await core.write_register(0, 1), await core.write_register(16, 77)]
@@ -160,20 +184,34 @@ async def drive(dut):
 """
 
 
-@pytest.mark.parametrize("name", SPECIFICATIONS)
-def test_cocotb_drives_the_core_in_physical_units(name: str, tmp_path: Path) -> None:
-    folder, design = unpacked(name, tmp_path), design_of(name)
-    values = {
-        "plain": [{"x": x} for x in (0.5, -1.0, -1.0, 0.999)],
-        "gauge": [{"voltage": 5.0, "temperature": 20.5, "channel": c} for c in (0, 1, 0, 0, 1)],
-        "tunable": [{"x": x} for x in (2.5, 0.0, 5.0)],
-    }[name]
-    (folder / "values.json").write_text(json.dumps(values), encoding="utf-8")
+WAVE = [0.5, -1.0, -1.0, 0.999, 0.25, -0.125, 0.0, 0.75, -0.5, 1.0, 0.5, 0.5, 0.5, -0.25, 0.875, 0.375]
+SENT: dict[str, list[object]] = {
+    "plain": [{"x": x} for x in WAVE[:4]],
+    "gauge": [{"voltage": 5.0, "temperature": 20.5, "channel": c} for c in (0, 1, 0, 0, 1)],
+    "tunable": [{"x": x} for x in (2.5, 0.0, 5.0)],
+    "wide": [{"x": WAVE[:8]}, {"x": WAVE[8:]}],
+    "sparse": [{"x": WAVE[0]}, *([{"x": x} for x in WAVE[n : n + 4]] for n in (1, 5, 9))],
+    "held": [{"x": x} for x in WAVE[:6]],
+}
+"""What is sent before each result is received: a beat, or several."""
+
+
+def driven(name: str, folder: Path) -> tuple[list[tuple[int, int, float, list[str]]], list[object]]:
+    """Drive the core with its cocotb driver; return results (channel, code, value, flags) and what registers say."""
+    (folder / "values.json").write_text(json.dumps(SENT[name]), encoding="utf-8")
     (folder / "python" / "drive.py").write_text(DRIVE.format(name=name, Name=name.capitalize()), encoding="utf-8")
     result = called(sys.executable, "-c", RUNNER.format(name=name), at=folder / "python")
     assert result.returncode == 0, result.stdout + result.stderr
     assert "FAIL=0" in result.stdout, result.stdout
     results, registers = json.loads((folder / "results.json").read_text(encoding="utf-8"))
+    return results, registers
+
+
+@pytest.mark.parametrize("name", ["plain", "gauge", "tunable"])
+def test_cocotb_drives_the_core_in_physical_units(name: str, tmp_path: Path) -> None:
+    folder, design = unpacked(name, tmp_path), design_of(name)
+    results, registers = driven(name, folder)
+    values: list[Any] = SENT[name]
     for channel in range(design.specification.channels):
         given = [v for v in values if v.get("channel", 0) == channel]
         expected = design.run(**{key: [v[key] for v in given] for key in given[0] if key != "channel"})
@@ -181,3 +219,17 @@ def test_cocotb_drives_the_core_in_physical_units(name: str, tmp_path: Path) -> 
     if name == "plain":
         assert ["input_at_rail" in flags for *_, flags in results] == [False, True, True, True]
     assert registers == ([[MAGIC, True], False, True] if name == "tunable" else [])
+
+
+@pytest.mark.parametrize(("name", "samples", "copies"), [("wide", 16, 1), ("sparse", 13, 1), ("held", 6, 4)])
+def test_cocotb_gets_the_results_of_a_beat_or_of_several_samples(
+    name: str, samples: int, copies: int, tmp_path: Path
+) -> None:
+    folder, design = unpacked(name, tmp_path), design_of(name)
+    results, _ = driven(name, folder)
+    expected = design.run(x=WAVE[:samples]).repeat(copies)[: len(results)]
+    assert len(results) == {"wide": 16, "sparse": 4, "held": 6}[name]
+    assert [value for _, _, value, _ in results] == expected.tolist()
+    rails = [abs(x) >= 0.999 for x in WAVE]
+    told = {"wide": rails, "sparse": [False, True, False, True], "held": [False] * 4 + [True] * 2}[name]
+    assert ["input_at_rail" in flags for *_, flags in results] == told
