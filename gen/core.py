@@ -344,6 +344,7 @@ def front_in(spec: Specification, core: str, polynomial: Polynomial | None) -> t
     return front, {"decimation": reason}
 
 
+<<<<<<< HEAD
 def _ahead(
     datapath: Datapath | None, wanted: str, budget: Budget, board: Board | None
 ) -> tuple[Architecture | None, Budget, dict[str, str]]:
@@ -410,6 +411,8 @@ def refuse_several_samples(design: CoreDesign, where: str) -> None:
         )
 
 
+=======
+>>>>>>> d167803 (gen.output.identity, host, sim: decimated cores with held results on boards; several samples a clock are refused with the reason)
 def _known(wanted: str) -> str:
     if wanted not in {AUTO, *REALIZATIONS}:
         known = (AUTO, *REALIZATIONS)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from sosmith.gen.output.core_facts import InterfaceFacts
 from sosmith.model.arrays import Codes
+from sosmith.model.errors import ShortfallError
 from sosmith.sim.bench import Bench, Progress
 from sosmith.sim.stream_packing import each_once, pack, random_order, unpack
 
@@ -44,6 +45,26 @@ class CosimulationResult:
     cycles_per_second: float
     simulator: str
     tools: Mapping[str, str]
+
+
+def first_copies(result: CosimulationResult, copies: int) -> CosimulationResult:
+    """Return a run whose results came `copies` times, one after the other, with each of them once; the last may be cut.
+
+    Raises
+    ------
+    ShortfallError
+        If a copy differs.
+    """
+    if copies == 1:
+        return result
+    first = replace(result, codes=result.codes[::copies], status=result.status[::copies])
+    for found, once in ((result.codes, first.codes), (result.status, first.status)):
+        wrong = np.flatnonzero(
+            (found != np.repeat(once, copies, axis=0)[: len(found)]).reshape(len(found), -1).any(axis=1)
+        )
+        if len(wrong):
+            raise ShortfallError(f"result {wrong[0] // copies} must come out {copies} times, and changes meanwhile")
+    return first
 
 
 def cosimulate(

@@ -35,7 +35,7 @@ from sosmith.model.errors import SpecificationError
 from sosmith.model.reference.golden import calibrated, entering_filter, filtered
 from sosmith.model.text_files import write_contents, write_files
 from sosmith.model.traces.trace import Trace
-from sosmith.sim.cosimulate import CosimulationResult, cosimulate
+from sosmith.sim.cosimulate import CosimulationResult, cosimulate, first_copies
 from sosmith.sim.gate_level import with_cell_models
 from sosmith.sim.simulator_bench import SimulatorBench
 from sosmith.sim.simulators import check_name
@@ -92,8 +92,11 @@ def simulate(
         codes = np.stack([trace.codes for trace in traces], axis=1)
         sent = whole_beats(codes, facts.interface.inputs)
         if hardware is not None:
-            result = hardware(
-                source.read_text(encoding="utf-8"), sent, lambda done, total: progress("running", done, total)
+            result = first_copies(
+                hardware(
+                    source.read_text(encoding="utf-8"), sent, lambda done, total: progress("running", done, total)
+                ),
+                facts.interface.copies_per_result,
             )
         else:
             if gates is not None:
@@ -122,6 +125,8 @@ def simulate(
     if vectors is not None:
         progress("writing the vectors", 0, 0)
         taken = _taken(sent if vectors.suffix == ".hex" else codes, result, facts.interface)
+        if hardware is not None:  # which has a result for each sample
+            taken = replace(taken, responses=taken.responses[: len(sent)], status=taken.status[: len(sent)])
         write_contents(vectors.parent, vector_files(vectors, taken, facts.interface, design.spec.sample_rate))
     progress("comparing", 0, 0)
     return replace(

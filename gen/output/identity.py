@@ -5,10 +5,11 @@ from __future__ import annotations
 import hashlib
 from typing import Literal
 
-from sosmith.gen.core import CoreDesign, refuse_decimated, refuse_several_samples
+from sosmith.gen.core import CoreDesign
 from sosmith.gen.output.core_facts import interface_facts
 from sosmith.gen.reload.register_writes import bank_size
 from sosmith.gen.version import __version__
+from sosmith.model.errors import SpecificationError
 from sosmith.model.link.identity import CONVERTER_FLAGS, Identity, Quantity, Reload
 from sosmith.model.link.protocol import VERSION, samples_per_message
 from sosmith.model.port import Port
@@ -31,9 +32,13 @@ def identity(
         Clock of the core in Hz.
     source : str
         Where samples come from.
+
+    Raises
+    ------
+    SpecificationError
+        If beats of the core hold several samples, or there is not a result for each sample.
     """
-    refuse_decimated(design, "on a board")
-    refuse_several_samples(design, "on a board")
+    _check(design)
     datapath, fingerprint = design.datapath, design.architecture.fingerprint
     words, _ = (0, 0) if fingerprint is None else bank_size(design.architecture)
     made = Identity(
@@ -55,6 +60,21 @@ def identity(
         reload=None if fingerprint is None else Reload(design=fingerprint, words=words),
     )
     return made.model_copy(update={"samples": samples_per_message(made.sample_bytes, made.result_bytes)})
+
+
+def _check(design: CoreDesign) -> None:
+    """Check that a core takes one sample at a time, and has a result for each."""
+    lanes, decimator = design.architecture.samples_per_clock, design.datapath.decimator
+    if lanes > 1:
+        raise SpecificationError(
+            f"{design.spec.path}: hardware.samples_per_clock must be 1 on a board, whose serial line never brings "
+            f"several samples a clock, not {lanes}"
+        )
+    if decimator is not None and not design.architecture.hold:
+        raise SpecificationError(
+            f"{design.spec.path}: filter.hold must be true with filter.decimate = {decimator.factor} on a board, which "
+            "returns a result for each sample, not false"
+        )
 
 
 def _quantity(port: Port) -> Quantity:

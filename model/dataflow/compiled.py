@@ -76,6 +76,54 @@ def compile_block(datapath: Datapath, *, optimized: bool = True) -> Block:
     return _Compiled(function, state_bytes(datapath) // 8)
 
 
+_SIZE = """
+size_t {name}_decimator_bytes(void)
+{{
+    return sizeof({name}_decimator);
+}}
+"""
+_ALIGNMENT = 16
+"""That of states of 128 bits, in bytes."""
+
+
+class Pushed:
+    """A compiled datapath with a decimator, which takes one sample of one channel at a time.
+
+    Parameters
+    ----------
+    datapath : Datapath
+        What is computed.
+
+    Raises
+    ------
+    ToolError
+        If no C compiler is found or it fails.
+    """
+
+    def __init__(self, datapath: Datapath) -> None:
+        self._inputs = len(datapath.inputs)
+        source = c_source(datapath) + _SIZE.format(name=datapath.name)
+        library = _load(datapath.name, c_header(datapath), source, "-O2")
+        size = getattr(library, f"{datapath.name}_decimator_bytes")
+        size.restype, size.argtypes = ctypes.c_size_t, []
+        self._bytes: int = size()
+        self._push = getattr(library, f"{datapath.name}_push")
+        self._push.restype = ctypes.c_int
+        self._push.argtypes = [ctypes.c_void_p, *[ctypes.c_int64] * self._inputs, ctypes.c_void_p, ctypes.c_void_p]
+        self.reset()
+
+    def reset(self) -> None:
+        """Return to the state after reset."""
+        memory = np.zeros(self._bytes + _ALIGNMENT, dtype=np.uint8)
+        self._state = memory[-memory.ctypes.data % _ALIGNMENT :]
+
+    def __call__(self, codes: npt.NDArray[np.int64]) -> tuple[int, int] | None:
+        """Take the codes of one sample, shape (inputs,); return output code and status if it brings a result."""
+        result, status = ctypes.c_int64(), ctypes.c_uint8()
+        found = self._push(self._state.ctypes.data, *codes.tolist(), ctypes.byref(result), ctypes.byref(status))
+        return (result.value, status.value) if found else None
+
+
 class _Compiled:
     """The loop of a loaded C model, and the size of its state in words of 64 bits."""
 

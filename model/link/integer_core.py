@@ -4,12 +4,24 @@ from __future__ import annotations
 
 import numpy as np
 
-from sosmith.model.dataflow.compiled import compile_block
+from sosmith.model.dataflow.compiled import Pushed, compile_block
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.link.packing import bytes_of, codes_of
 
 
-class IntegerCore:
+class _NoRegisters:
+    """A core without registers."""
+
+    def read(self, address: int) -> int | None:
+        """Refuse: there are no registers."""
+        return None
+
+    def write(self, address: int, word: int) -> bool:
+        """Refuse: there are no registers."""
+        return False
+
+
+class IntegerCore(_NoRegisters):
     """A datapath with the states of its channels, fed with samples as they are on an AXI4-Stream.
 
     It has no registers.
@@ -57,10 +69,37 @@ class IntegerCore:
         columns = np.stack([results.reshape(-1)[own], status.reshape(-1)[own]], axis=1)
         return bytes_of(columns, [self._datapath.output.bytes, 1])
 
-    def read(self, address: int) -> int | None:
-        """Refuse: there are no registers."""
-        return None
 
-    def write(self, address: int, word: int) -> bool:
-        """Refuse: there are no registers."""
-        return False
+class HeldCore(_NoRegisters):
+    """A datapath with a decimator and one channel, each of whose results is handed out once for each of its samples.
+
+    Result n is copy ``n % R`` of the result that sample ``n - n % R`` has brought, and so is there as soon as sample n
+    is in. It has no registers.
+
+    Parameters
+    ----------
+    datapath : Datapath
+        What it computes.
+
+    Raises
+    ------
+    ToolError
+        If no C compiler is found.
+    """
+
+    def __init__(self, datapath: Datapath) -> None:
+        self._datapath = datapath
+        self._push = Pushed(datapath)
+        self._held = (0, 0)
+
+    def reset(self) -> None:
+        """Return to the state after reset."""
+        self._push.reset()
+
+    def feed(self, channel: int, samples: bytes) -> bytes:
+        """Return a result for each of the samples."""
+        rows = []
+        for codes in codes_of(samples, self._datapath.inputs):
+            self._held = self._push(codes) or self._held
+            rows.append(self._held)
+        return bytes_of(np.array(rows, dtype=np.int64).reshape(-1, 2), [self._datapath.output.bytes, 1])

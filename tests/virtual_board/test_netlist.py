@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests.gen.designs import EXAMPLES
+from tests.gen.output.packages.made import HELD
 from tests.host.lines import ScriptedLine
 from tests.interface.small import filter_design, instrument_design
 
@@ -166,6 +167,30 @@ def test_arbitrary_bytes_do_not_wedge_the_board(place: Path) -> None:
             assert np.array_equal(board.run_codes(codes).codes, made.datapath.compute(codes))
             board.close()
     ours.close()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["held", "held_folded"])
+def test_a_held_result_is_there_for_each_sample(name: str, place: Path) -> None:
+    """One sample a request, which waits for the result of the one before; then as many as fit, damaged ones too."""
+    spec = (
+        HELD if name == "held" else {**HELD, "name": name, "hardware": {**HELD["hardware"], "architecture": "folded"}}
+    )
+    made = sosmith.design(spec).core
+    codes = codes_for(made, 500)
+    expected, status = (np.repeat(of(codes), 4) for of in (made.datapath.compute, made.datapath.compute_status))
+    with running(netlist_of(made, place)) as port:
+        with Board(port) as board:
+            found = [board.run_codes(part) for part in (*np.split(codes[:22], 22), codes[22:])]
+        with Board(port) as board:
+            again = board.run_codes(codes[:3])
+    assert np.concatenate([results.codes for results in found]).tolist() == expected.tolist()
+    assert np.concatenate([results.status for results in found]).tolist() == status.tolist()
+    assert again.codes.tolist() == expected[:3].tolist()
+    damage = LineDamage(200, 3)
+    with running(netlist_of(made, place), damage) as port, Board(port) as board:
+        assert board.run_codes(codes).codes.tolist() == expected.tolist()
+    assert damage.count > 3
 
 
 def locomotive(channels: int) -> CoreDesign:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.output.identity import identity
 from sosmith.model.link.device import Device
-from sosmith.model.link.integer_core import IntegerCore
+from sosmith.model.link.integer_core import HeldCore, IntegerCore
 
 
 class ModelLine:
@@ -38,4 +38,6 @@ class ModelLine:
 def model_of(design: CoreDesign, verilog: str = "", *, window: int = 4, baud: int = 1_000_000) -> Device:
     """Return the model of a board with a core, whose SystemVerilog is `verilog`."""
     made = identity(design, verilog, baud=baud, clock=float(design.spec.hardware.clock))
-    return Device(made, IntegerCore(design.datapath, design.spec.channels), window=window)
+    held = design.datapath.decimator is not None
+    core = HeldCore(design.datapath) if held else IntegerCore(design.datapath, design.spec.channels)
+    return Device(made, core, window=window)

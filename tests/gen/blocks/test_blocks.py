@@ -13,9 +13,10 @@ from tests.gen.blocks.specifications import AUDIO, designed, text
 from tests.gen.designs import EXAMPLES
 from tests.hdl.core_bench import Pace, run_core
 
-from sosmith.gen.core import CoreDesign, design_core, refuse_several_samples
+from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.output.certificate import certificate
 from sosmith.gen.output.core_facts import core_facts
+from sosmith.gen.output.identity import identity
 from sosmith.gen.output.manifest import manifest
 from sosmith.gen.output.pins import pins
 from sosmith.gen.realizations import look_ahead as realization
@@ -138,11 +139,14 @@ def test_a_rate_beyond_the_samples_a_clock_is_refused() -> None:
         from_text(slow, Path("slow.toml"))
 
 
-def test_several_samples_are_refused_where_there_is_one() -> None:
-    message = "audio.toml: not yet available: hardware.samples_per_clock must be 1 on a board, not 2"
+def test_several_samples_are_refused_on_a_board() -> None:
+    message = (
+        "audio.toml: hardware.samples_per_clock must be 1 on a board, whose serial line never brings several samples a "
+        "clock, not 2"
+    )
     with pytest.raises(SpecificationError, match=f"^{re.escape(message)}$"):
-        refuse_several_samples(designed(2, pipeline="plain"), "on a board")
-    refuse_several_samples(designed(), "on a board")
+        identity(designed(2, pipeline="plain"), "", baud=1_000_000, clock=48e6)
+    assert identity(designed(), "", baud=1_000_000, clock=48e6).architecture == "parallel"
 
 
 def test_manifest_and_pins_tell_how_samples_lie_in_a_beat() -> None:

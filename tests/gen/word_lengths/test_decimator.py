@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from tests.gen.word_lengths.decimated import locomotive, locomotive_spec
 
-from sosmith.gen.core import design_core, refuse_decimated
+from sosmith.gen.core import design_core
 from sosmith.gen.output.core_facts import core_facts
 from sosmith.gen.output.decimation_facts import direct_design, rate_costs
 from sosmith.gen.output.manifest import manifest
@@ -125,13 +125,16 @@ def test_a_calibration_alone_is_not_decimated() -> None:
     assert design_core(locomotive_spec(), core="calibration").datapath.decimator is None
 
 
-def test_boards_are_refused(tmp_path: Path) -> None:
+def test_a_board_wants_a_result_for_each_sample(tmp_path: Path) -> None:
     made = locomotive()
-    with refused("locomotive.toml: not yet available: filter.decimate must be left out on a board, not 16"):
+    sentence = (
+        "locomotive.toml: filter.hold must be true with filter.decimate = 16 on a board, which returns a result for "
+        "each sample, not false"
+    )
+    with refused(sentence):
         Design(made).build("icebreaker", folder=tmp_path)
-    with refused("locomotive.toml: not yet available: filter.decimate must be left out on a board, not 16"):
+    with refused(sentence):
         Design(made).board()
-    refuse_decimated(direct_design(made), "anywhere")
 
 
 def test_an_input_as_wide_as_can_be() -> None:
