@@ -275,6 +275,16 @@ class Architecture:
         return -(-self.cycles_per_result // (1 if self.decimator is None else self.decimator.factor))
 
     @property
+    def clocks_per_sample(self) -> float:
+        """Clocks between samples at the highest rate, on average; an upper limit in serial.
+
+        A whole number but behind a decimator, and with several samples a clock.
+        """
+        share = self.samples_per_clock if self.decimator is None else self.decimator.factor
+        clocks = self.cycles_per_result
+        return clocks / share if clocks % share else clocks // share
+
+    @property
     def cycles_per_result(self) -> int:
         """Clocks between results at the highest rate; an upper limit in serial."""
         behind, program = self._cycles_behind_decimator, self.program

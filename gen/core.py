@@ -344,7 +344,6 @@ def front_in(spec: Specification, core: str, polynomial: Polynomial | None) -> t
     return front, {"decimation": reason}
 
 
-<<<<<<< HEAD
 def _ahead(
     datapath: Datapath | None, wanted: str, budget: Budget, board: Board | None
 ) -> tuple[Architecture | None, Budget, dict[str, str]]:
@@ -381,38 +380,6 @@ def _left(blocks: Blocks, ahead: Architecture) -> Blocks:
     return blocks._replace(available=max(0, blocks.available - ahead.multiplier_blocks))
 
 
-def refuse_decimated(design: CoreDesign, where: str) -> None:
-    """Refuse a core with a decimator `where` only others can be.
-
-    Raises
-    ------
-    SpecificationError
-        If the core has one.
-    """
-    decimator = design.datapath.decimator
-    if decimator is not None:
-        raise SpecificationError(
-            f"{design.spec.path}: not yet available: filter.decimate must be left out {where}, not {decimator.factor}"
-        )
-
-
-def refuse_several_samples(design: CoreDesign, where: str) -> None:
-    """Refuse a core whose beats hold several samples `where` only others can be.
-
-    Raises
-    ------
-    SpecificationError
-        If they do.
-    """
-    lanes = design.architecture.samples_per_clock
-    if lanes > 1:
-        raise SpecificationError(
-            f"{design.spec.path}: not yet available: hardware.samples_per_clock must be 1 {where}, not {lanes}"
-        )
-
-
-=======
->>>>>>> d167803 (gen.output.identity, host, sim: decimated cores with held results on boards; several samples a clock are refused with the reason)
 def _known(wanted: str) -> str:
     if wanted not in {AUTO, *REALIZATIONS}:
         known = (AUTO, *REALIZATIONS)

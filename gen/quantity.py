@@ -63,6 +63,17 @@ def plain_number(value: float, digits: int = 3) -> str:
     return f"{rounded:,.{max(digits - 1 - exponent, 0)}f}".replace("-", MINUS)
 
 
+def number(value: float) -> str:
+    """Whole number in full, any other with four significant digits.
+
+    Examples
+    --------
+    >>> number(1234567), number(0.5), number(7.6875)
+    ('1,234,567', '0.5', '7.688')
+    """
+    return f"{int(value):,}" if value == int(value) else f"{value:,.4g}"
+
+
 def scale(peak: float, unit: str, digits: int = 3) -> tuple[float, str]:
     """Choose the factor and the unit in which values up to `peak` read well.
 

@@ -211,6 +211,7 @@ def _evidence(
         mismatches=int(np.count_nonzero(differs)),
         first_mismatch=int(wrong[0]) if len(wrong) else None,
         samples=received.size,
+        taken=len(codes) * len(traces),
         channels=len(traces),
         cycles=result.cycles,
         latency_cycles=facts.interface.latency_cycles,

@@ -81,6 +81,8 @@ class Evidence:
         Samples at which hardware and integer model differ; `first_mismatch` is the first of them.
     samples, channels, cycles, latency_cycles : int
         Compared samples over all channels, channels, clock cycles of the run, cycles from input to output.
+    taken : int or None
+        Samples that went in, over all channels; None for as many as were compared. More behind a decimator.
     simulator : str
         Name of the simulator.
     gates : Netlist or None
@@ -170,6 +172,7 @@ class Evidence:
     shown_channel: int | None = None
     filter: FilterFacts | None = None
     decimation: DecimationFacts | None = None
+    taken: int | None = None
     gates: Netlist | None = None
     alternatives: Sequence[Alternative] = ()
     provenance: Provenance | None = None

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from sosmith.gen.architecture import Architecture
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.fpga.synthesis import Netlist
 from sosmith.model.dataflow.c_model import c_source
@@ -36,7 +35,7 @@ class Provenance:
         Of the datapath, told as its C model, whatever its name.
     cycles_per_sample : float
         Largest number of clocks between samples that the hardware needs, without waiting: a whole number but where a
-        beat holds several samples.
+        beat holds several samples, or behind a decimator, where it is the average.
     cost : Mapping
         As `hardware_cost` returns it.
     """
@@ -58,15 +57,9 @@ def provenance_of(design: CoreDesign, traces: Sequence[Trace], netlist: Netlist 
         reference_sha256=reference_digest(design),
         trace_sha256=trace_digest(traces),
         datapath_sha256=hashlib.sha256(c_source(replace(design.datapath, name="datapath")).encode()).hexdigest(),
-        cycles_per_sample=_clocks(design.architecture),
+        cycles_per_sample=design.architecture.clocks_per_sample,
         cost=hardware_cost(design, netlist),
     )
-
-
-def _clocks(architecture: Architecture) -> float:
-    """Clocks between samples at the highest rate: a whole number but where a beat holds several."""
-    beat, lanes = architecture.cycles_per_sample, architecture.samples_per_clock
-    return beat / lanes if lanes > 1 else beat
 
 
 def reference_digest(design: CoreDesign) -> str:
@@ -110,8 +103,8 @@ def hardware_cost(design: CoreDesign, netlist: Netlist | None = None) -> dict[st
         ``source``: "synthesis" with the counted cells of `netlist`, or "estimate" of the parallel and the online one
         before synthesis, or "program" of the folded and serial architectures. ``board``: of the netlist, else None.
         ``luts`` (LUT4), ``multiplier_blocks`` and, before synthesis, ``register_bits``; of a program ``instructions``,
-        ``memory_words`` and ``accumulator_bits``, with those of one before a decimator. What the source does not tell
-        is None.
+        ``memory_words`` and ``accumulator_bits``, with those of one before a decimator but without the decimator. What
+        the source does not tell is None.
     """
     made: dict[str, Any] = dict.fromkeys(
         ("luts", "multiplier_blocks", "register_bits", "instructions", "memory_words", "accumulator_bits")
@@ -131,7 +124,13 @@ def hardware_cost(design: CoreDesign, netlist: Netlist | None = None) -> dict[st
         return {"source": "synthesis", "board": netlist.board.name, **made}
     if program is not None:
         return {"source": "program", "board": None, **made}
-    cost = design.architecture.cost
+    cost, decimator = design.architecture.cost, design.datapath.decimator
+    if decimator is not None:
+        cost = replace(
+            cost,
+            adder_bits=cost.adder_bits + decimator.adder_bits,
+            register_bits=cost.register_bits + decimator.register_bits,
+        )
     made |= {
         "luts": cost.luts,
         "multiplier_blocks": cost.multiplier_blocks,

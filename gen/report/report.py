@@ -118,7 +118,7 @@ def summarise(evidence: Evidence) -> dict[str, Any]:
         "samples": evidence.samples,
         "channels": evidence.channels,
         "cycles": evidence.cycles,
-        "cycles_per_sample": evidence.cycles / evidence.samples,
+        "cycles_per_sample": evidence.cycles / (evidence.taken or evidence.samples),
         "latency_cycles": evidence.latency_cycles,
         "simulator": evidence.simulator,
         "gates": None if evidence.gates is None else evidence.gates.board.name,

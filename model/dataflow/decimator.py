@@ -87,6 +87,11 @@ class Decimator:
         return 3 * self.stages * self.width + self.width - self.dropped
 
     @property
+    def adder_bits(self) -> int:
+        """Result bits of its sums and differences, the rounding among them."""
+        return 2 * self.stages * self.width + (self.width if self.dropped else 0)
+
+    @property
     def lsb(self) -> Fraction:
         """Physical value of one LSB of the output."""
         return self.input.lsb * Fraction(2) ** (self.dropped - self.growth)

@@ -36,7 +36,7 @@ def evaluate(task: Task) -> Point:
         ``key`` and ``changes`` of the task; ``refused``: why there is no such design, else None. Of a design:
         ``passed``, ``shortfalls``, ``realization``, ``architecture``, ``error.{bound,max_abs,rms,unit}`` (the first
         proven for all inputs in range, the others measured on the integer model), ``sqnr_db``,
-        ``stopband_attenuation_db``, ``cycles_per_sample``, ``latency_cycles``, ``cost`` (see
+        ``stopband_attenuation_db``, ``cycles_per_sample``, ``samples_per_clock``, ``latency_cycles``, ``cost`` (see
         `sosmith.gen.report.provenance.hardware_cost`) and ``cost.{value,unit}``, its one figure,
         ``reference_sha256``, ``trace_sha256``, ``datapath_sha256``. The same for the same task, on every machine.
 
@@ -99,6 +99,7 @@ def _measured(design: CoreDesign, traces: tuple[Trace, ...], task: Task) -> Poin
         "sqnr_db": _finite(sqnr_db(golden, error)),
         "stopband_attenuation_db": None if response is None else _finite(response.stopband_attenuation_db),
         "cycles_per_sample": provenance.cycles_per_sample,
+        "samples_per_clock": design.architecture.samples_per_clock,
         "latency_cycles": design.architecture.latency_cycles,
         "cost": {"value": hardware_cost(told), "unit": cost_unit(told), **provenance.cost},
         "reference_sha256": provenance.reference_sha256,

@@ -10,8 +10,9 @@ from sosmith.sim.exploration.evaluation import Point
 def pareto_front(points: Sequence[Point]) -> list[Point]:
     """Points that pass and that no other one beats: neither dearer nor with a larger bound, and better in one of both.
 
-    Costs are compared only if they count the same and are of one architecture where they are not synthesized. Of points
-    that are equal in both, the first stays. The order is that of rising cost within each kind of cost.
+    Costs are compared only if they count the same and are of as many samples a clock, and of one architecture where
+    they are not synthesized. Of points that are equal in both, the first stays. The order is that of rising cost within
+    each kind of cost.
     """
     kinds: dict[tuple[str, str], list[Point]] = {}
     for point in points:
@@ -28,6 +29,12 @@ def pareto_front(points: Sequence[Point]) -> list[Point]:
 
 
 def cost_kind(point: Point) -> tuple[str, str]:
-    """Name what the cost counts, and the architecture if it matters to that."""
-    architecture = "" if point["cost"]["source"] == "synthesis" else point["architecture"]
-    return point["cost"]["unit"], architecture
+    """Name what the cost counts, and what else must be the same for costs to be compared: architecture and rate.
+
+    The architecture does not matter to a synthesized cost. Several samples a clock are asked for where one of them is
+    too slow, at a multiple of its cost.
+    """
+    synthesized = point["cost"]["source"] == "synthesis"
+    lanes = point.get("samples_per_clock", 1)  # points of an earlier version do not tell
+    parts = ["" if synthesized else point["architecture"], f"{lanes} samples a clock" if lanes > 1 else ""]
+    return point["cost"]["unit"], ", ".join(filter(None, parts))

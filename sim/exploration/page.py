@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
-from sosmith.gen.quantity import decibels, quantity
+from sosmith.gen.quantity import decibels, number, quantity
 from sosmith.gen.report.page import Figure
 from sosmith.gen.report.plots import COLOUR, NARROW, SERIES, WIDE, decades, draw
 from sosmith.model.templates import render
@@ -30,6 +30,7 @@ class _Line(NamedTuple):
     sqnr: str
     cost: str
     unit: str
+    clocks: str
     on_front: bool
 
 
@@ -74,6 +75,7 @@ def _line(point: Point, outcome: Outcome, numbers: dict[str, int], front: set[st
         sqnr=decibels(point["sqnr_db"]),
         cost=f"{point['cost']['value']:,.0f}",
         unit=point["cost"]["unit"].partition(",")[0],
+        clocks=number(point["cycles_per_sample"]),
         on_front=point["key"] in front,
     )
 

@@ -36,13 +36,17 @@ Parameters = Mapping[str, Values]
 
 
 def default_parameters(spec: Specification) -> dict[str, Values]:
-    """Return what is swept if nothing is asked for: realizations, architectures, word lengths by the allowed error."""
-    allowed = spec.max_error
-    return {
-        "hardware.realization": [name for name in REALIZATIONS if name != "auto"],
-        "hardware.architecture": ["parallel", "folded"],
-        "output.max_error": [float(allowed * factor) for factor in (1, 2, 4)],
-    }
+    """Return what is swept if nothing is asked for: realizations, architectures, word lengths by the allowed error.
+
+    Look-ahead has realizations of its own, and like several samples a clock one architecture.
+    """
+    allowed, looks_ahead = spec.max_error, spec.hardware.pipeline == "look-ahead"
+    parameters: dict[str, Values] = {}
+    if not looks_ahead:
+        parameters["hardware.realization"] = [name for name in REALIZATIONS if name != "auto"]
+        if spec.hardware.samples_per_clock == 1:
+            parameters["hardware.architecture"] = ["parallel", "folded"]
+    return {**parameters, "output.max_error": [float(allowed * factor) for factor in (1, 2, 4)]}
 
 
 def in_json(parameters: Parameters) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from sosmith.gen.quantity import decibels, quantity
+from sosmith.gen.quantity import decibels, number, quantity
 from sosmith.gen.report.comparison.differences import UNKNOWN
 from sosmith.gen.report.comparison.fairness import fairness
 from sosmith.gen.report.comparison.report_file import Report, fact
@@ -29,7 +29,7 @@ class _Figure:
 
 
 def _count(value: float, _unit: str) -> str:
-    return f"{value:,}"
+    return number(value)
 
 
 FIGURES: Mapping[str, _Figure] = {

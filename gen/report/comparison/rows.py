@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from sosmith.gen.quantity import decibels, plain_number, quantity
+from sosmith.gen.quantity import decibels, number, plain_number, quantity
 from sosmith.gen.report.comparison.differences import UNKNOWN
 from sosmith.gen.report.comparison.fairness import fairness, source_name
 from sosmith.gen.report.comparison.report_file import Report, fact
@@ -59,7 +59,7 @@ def _text(value: Any, _unit: str) -> str:
 
 
 def _count(value: float, _unit: str) -> str:
-    return f"{value:,}"
+    return number(value)
 
 
 def _percent(value: float, _unit: str) -> str:

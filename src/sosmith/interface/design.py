@@ -18,6 +18,7 @@ from sosmith.gen.filter.response import complex_response
 from sosmith.gen.fpga.boards import BUILDABLE, MODELLED, PROJECTS, RATE, find_board
 from sosmith.gen.output.core_facts import CoreFacts, core_facts
 from sosmith.gen.output.manifest import manifest
+from sosmith.gen.quantity import number
 from sosmith.gen.word_lengths.cost import Cost
 from sosmith.interface.inputs import codes_of, encoded, traces_of
 from sosmith.interface.notebook import table_html
@@ -675,8 +676,7 @@ class Design:
 
     def _repr_html_(self) -> str:
         filter_ = self.core.quantized.filter
-        spec, lanes = self.specification, self.samples_per_clock
-        clocks = f"{self.cycles_per_sample:,}" if lanes == 1 else f"{self.cycles_per_sample / lanes:g}"
+        spec = self.specification
         rows = [
             ("filter", "none" if filter_ is None else filter_.describe),
             *self.reasons.items(),
@@ -684,7 +684,7 @@ class Design:
             ("error bound", f"{self.bound}, proven for all inputs in range; {spec.max_error} allowed"),
             *((f"of it {part}", str(value)) for part, value in self.budget.items()),
             ("latency", f"{self.latency_cycles:,} clocks"),
-            ("clocks a sample", clocks),
+            ("clocks a sample", number(self.core.architecture.clocks_per_sample)),
         ]
         return table_html(f"{self.name}: {self.kind}", rows)
 

@@ -83,7 +83,7 @@ def prove(tell: Tell, *, text: str, path: str) -> dict[str, Any]:
         "architecture": made.architecture,
         "reasons": made.reasons,
         "latency": made.latency_cycles,
-        "cycles": made.cycles_per_sample,
+        "cycles": made.core.architecture.clocks_per_sample,
         "clock": made.specification.as_dict().get("hardware", {}).get("clock"),
         "cost": _cost(made),
         "db": _numbers(_decibels(gain / max(float(abs(ideal.frequency_response(f)).max()), 1e-12))),
@@ -108,14 +108,14 @@ def side_by_side(tell: Tell, *, text: str, path: str) -> list[dict[str, Any]]:
         tell("step", name)
         try:
             made = sosmith.design(spec, realization=name)
-        except sosmith.ShortfallError as error:
+        except (sosmith.ShortfallError, sosmith.SpecificationError) as error:  # look-ahead chooses for itself
             row: dict[str, Any] = {"realization": name, "refused": str(error)}
         else:
             row = {
                 "realization": name,
                 "architecture": made.architecture,
                 "bound": float(made.bound),
-                "cycles": made.cycles_per_sample,
+                "cycles": made.core.architecture.clocks_per_sample,
                 "latency": made.latency_cycles,
                 "cost": _cost(made),
             }
@@ -139,8 +139,10 @@ def trace(tell: Tell, *, text: str, path: str, source: str, seconds: float | Non
     tell("step", "exact result")
     exact = made.run_exact(**inputs.inputs)
     error = hardware - exact
+    decimator = made.core.datapath.decimator
+    every = 1 if decimator is None else decimator.factor  # what is told of a sample is told of those with a result
     edges = np.unique(np.linspace(0, len(error), min(POINTS, len(error)) + 1).astype(int))
-    truth = [None] * error[0].size if inputs.truth is None else _columns(inputs.truth)
+    truth = [None] * error[0].size if inputs.truth is None else _columns(inputs.truth[::every])
     return {
         "name": inputs.name,
         "samples": len(error),
@@ -148,7 +150,7 @@ def trace(tell: Tell, *, text: str, path: str, source: str, seconds: float | Non
         "bound": float(made.bound),
         "max_error": float(abs(error).max()),
         "rms_error": float(np.sqrt(np.mean(error**2))),
-        "t": _numbers(inputs.time[edges[:-1]]),
+        "t": _numbers(inputs.time[::every][edges[:-1]]),
         "channels": [
             {
                 "low": _buckets(np.minimum, output, edges),

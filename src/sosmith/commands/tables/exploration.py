@@ -5,7 +5,7 @@ from __future__ import annotations
 from rich.markup import escape
 
 from sosmith.commands.tables.console import TableConsole, new_table
-from sosmith.gen.quantity import quantity
+from sosmith.gen.quantity import number, quantity
 from sosmith.interface.exploration import Exploration
 
 
@@ -34,7 +34,7 @@ def print_exploration(found: Exploration) -> None:
                     *(escape(_plain(point["changes"][key])) for key in keys),
                     quantity(error["bound"], error["unit"]),
                     f"{point['cost']['value']:,.0f}",
-                    f"{point['cycles_per_sample']:,}",
+                    number(point["cycles_per_sample"]),
                 )
         console.print(table)
     designs = [point for point in found.points if point["refused"] is None]
