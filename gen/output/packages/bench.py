@@ -28,8 +28,9 @@ def bench_files(design: CoreDesign, facts: PackageFacts) -> dict[str, str]:
     hex_in, hex_out = hex_words(stimuli.vectors, interface)
     into, out, lanes = interface.inputs, interface.outputs, interface.inputs.lanes
     sent, results = hex_in.count("\n"), hex_out.count("\n")
-    # The samples of a result, one at least at two clocks.
-    gathered = 2 * interface.samples_per_result if facts.core.decimation is not None else 0
+    # The samples of a result, each with a pause of the source.
+    each = max(2, facts.core.cycles_per_sample)
+    gathered = each * interface.samples_per_result if facts.core.decimation is not None else 0
     values = {
         "name": facts.name,
         "parts": stimuli.parts,

@@ -34,7 +34,15 @@ HELD: dict[str, Any] = {
     "filter": {**SPARSE["filter"], "hold": True},
     "hardware": {**SPARSE["hardware"], "architecture": "parallel"},
 }
-SPECIFICATIONS = {spec["name"]: spec for spec in (FILTER, INSTRUMENT, RELOADABLE, WIDE, SPARSE, HELD)}
+SLOW_INSTRUMENT: dict[str, Any] = {
+    **INSTRUMENT,
+    "name": "slow_gauge",
+    "channels": 1,
+    "filter": {**INSTRUMENT["filter"], "cutoff": INSTRUMENT["sample_rate"] / 400, "decimate": 16},
+    "hardware": {"architecture": "folded", "clock": 12e6},
+}
+"""A calibration of many clocks before a decimator: results are far apart."""
+SPECIFICATIONS = {spec["name"]: spec for spec in (FILTER, INSTRUMENT, RELOADABLE, WIDE, SPARSE, HELD, SLOW_INSTRUMENT)}
 
 
 @cache

@@ -46,6 +46,8 @@ def test_the_core_is_the_one_that_generate_writes(name: str) -> None:
 def test_the_readme_names_every_folder_and_only_files_that_exist(name: str) -> None:
     texts = package_of(name)
     readme = texts["README.md"]
+    assert readme.splitlines()[2].casefold().startswith(design_of(name).core.core)
+    assert f"{design_of(name).core.spec.output.unit}. Made by sosmith " in readme
     named = set(re.findall(r"[`(]([\w/]+/[\w.]*|[\w]+\.core)[`)]", readme))
     assert {path.split("/")[0] for path in texts} - {"README.md"} == {path.split("/")[0] for path in named}
     present = {*texts, *(f"{path.rpartition('/')[0]}/" for path in texts)}
@@ -84,6 +86,7 @@ TIMES = {
     "tunable": SINGLE,
     "wide": ("their samples, a beat of 8", ["samples 0 to 7", "samples 8 to 15", "results 0 to 7", "results 8 to 15"]),
     "sparse": ("its sample, which is one of 4", ["sample 0", "sample 4", "result 0", "result 1"]),
+    "slow_gauge": ("its sample, which is one of 16", ["sample 0", "sample 16", "result 0", "result 1"]),
     "held": ("its sample, which is one of 4; each", ["sample 0", "sample 4", "result 0, 4 times", "result 1, 4 times"]),
 }
 
