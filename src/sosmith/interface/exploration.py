@@ -38,8 +38,8 @@ class Exploration:
         """Every combination in the order of the grid or the search: `changes`, and `refused` or the design's figures.
 
         The figures are `error` (`bound` is proven, `max_abs` and `rms` are measured on the bit-true model), `sqnr_db`,
-        `cost` (`value` and `unit`, and what it is made of), `cycles_per_sample`, `latency_cycles`, `realization`,
-        `architecture`, `passed` and `shortfalls`.
+        `cost` (`value` and `unit`, and what it is made of), `cycles_per_sample` (0.25 with four samples a
+        clock), `samples_per_clock`, `latency_cycles`, `realization`, `architecture`, `passed` and `shortfalls`.
         """
         return list(self.outcome.points)
 
@@ -47,7 +47,8 @@ class Exploration:
     def front(self) -> list[dict[str, Any]]:
         """Points that pass and that no other one beats in both error bound and cost, by rising cost.
 
-        Costs before synthesis are compared within one architecture only.
+        Costs are compared among designs with as many samples a clock, and before synthesis within one architecture
+        only.
         """
         return self.outcome.front
 
