@@ -58,7 +58,7 @@ class Evidence:
     low, high : float
         Range of the output.
     bound : float
-        Limit of ``|hardware - golden|`` over all inputs in range, positive.
+        Limit of ``|hardware - golden|`` over all inputs in range; 0 for hardware that rounds nothing.
     bound_parts : Mapping
         Contributions to `bound` by name; their sum need not equal it.
     proven : bool
@@ -182,10 +182,12 @@ class Evidence:
     zero: float | None = None
 
     def __post_init__(self) -> None:
-        for name in ("lsb", "bound", "max_error"):
+        for name in ("lsb", "max_error"):
             value = getattr(self, name)
             if not 0 < value < math.inf:
                 raise ValueError(f"{name} must be positive and finite, not {value!r}")
+        if not 0 <= self.bound < math.inf:
+            raise ValueError(f"bound must be at least 0 and finite, not {self.bound!r}")
         if self.samples < 1:
             raise ValueError(f"samples must be at least 1, not {self.samples!r}")
         shape = np.shape(self.hardware)

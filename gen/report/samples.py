@@ -48,7 +48,7 @@ def viewer_data(evidence: Evidence, transient: int) -> dict[str, Any]:
         "truth": None if evidence.truth is None else packed(evidence.truth[index]),
         "unfiltered": None if evidence.unfiltered is None else packed(evidence.unfiltered[index]),
         "value": _shown(evidence.hardware, evidence.unit),
-        "fine": list(scale(evidence.bound, evidence.unit)),
+        "fine": list(scale(evidence.bound or evidence.lsb, evidence.unit)),
         "true_error": None if apart is None else _shown(apart, evidence.unit),
         "limits": [[limit.value, limit.role] for limit in inside],
         "focus": [near.start, near.stop - 1],

@@ -43,7 +43,7 @@ def lsb(steps: float) -> str:
 
 @dataclass(frozen=True)
 class ErrorUnit:
-    """The one unit of all errors of the arithmetic in a report, in which its limit reads well."""
+    """The one unit of all errors of the arithmetic in a report, in which its limit, or else an LSB, reads well."""
 
     factor: float
     symbol: str
@@ -51,7 +51,7 @@ class ErrorUnit:
     @classmethod
     def of(cls, evidence: Evidence) -> ErrorUnit:
         """Choose it for a run."""
-        return cls(*scale(evidence.bound, evidence.unit))
+        return cls(*scale(evidence.bound or evidence.lsb, evidence.unit))
 
     def number(self, value: float) -> str:
         """Return a value in this unit, without it."""
@@ -128,8 +128,10 @@ def _settling(found: Behaviour) -> Tile | None:
 
 def _arithmetic(evidence: Evidence, summary: Summary) -> list[Tile]:
     error, unit = summary["error"], ErrorUnit.of(evidence)
-    share = error["max_abs"] / evidence.bound
-    limit = f"{100 * share:.0f} % of the {'proven' if evidence.proven else 'estimated'} limit"
+    share = error["max_abs"] / evidence.bound if evidence.bound else None
+    limit = f"{'proven' if evidence.proven else 'estimated'} limit"
+    if share is not None:
+        limit = f"{100 * share:.0f} % of the {limit}"
     compared = "bit for bit" if summary["bit_exact"] else f"of {count(evidence.samples, 'sample')}"
     if evidence.channels > 1:
         compared += f", {count(evidence.channels, 'channel')}"

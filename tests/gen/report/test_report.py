@@ -788,6 +788,24 @@ def test_a_page_that_fails_leaves_the_old_report(tmp_path: Path, monkeypatch: py
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
 
 
+@pytest.mark.parametrize("off", [0, 1])
+def test_a_bound_of_zero_is_told(off: int) -> None:
+    """A pure delay: nothing is rounded, and one wrong code is over the limit."""
+    exact = LSB * np.arange(3000.0)
+    hardware = exact + LSB * off * (np.arange(3000) == 7)
+    run = evidence(bound=0.0, golden=exact, hardware=hardware, proven=True)
+    summary = summarise(run)
+    assert summary["error"]["bound"] == 0
+    assert summary["passed"] is not bool(off)
+    page = render_page(run, summary)
+    assert f"{off} LSB · proven limit 0\u00a0nm" in page.replace(".00 LSB", " LSB")
+    if off:
+        assert summary["shortfalls"][0] == "The largest error is 244 nm, over the limit of 0 mm."
+    else:
+        assert "stays within 0\u00a0nm of the exact calculation; the proven limit is 0\u00a0nm." in page
+        assert "no error at all" in page
+
+
 # refusals
 
 
@@ -795,7 +813,8 @@ def test_a_page_that_fails_leaves_the_old_report(tmp_path: Path, monkeypatch: py
     ("changes", "message"),
     [
         ({"lsb": 0.0}, "lsb must be positive and finite, not 0.0"),
-        ({"bound": math.nan}, "bound must be positive and finite, not nan"),
+        ({"bound": math.nan}, "bound must be at least 0 and finite, not nan"),
+        ({"bound": -1.0}, "bound must be at least 0 and finite, not -1.0"),
         ({"max_error": math.inf}, "max_error must be positive and finite, not inf"),
         ({"samples": 0}, "samples must be at least 1, not 0"),
         (

@@ -10,8 +10,9 @@ import pytest
 from tests.gen.designs import EXAMPLES
 
 from sosmith.gen.core import CoreDesign, design_core
+from sosmith.gen.report.page import render_page
 from sosmith.gen.report.report import summarise
-from sosmith.gen.specification.specification import load
+from sosmith.gen.specification.specification import from_text, load
 from sosmith.gen.stimuli import traces_for
 from sosmith.model.text_files import to_json
 from sosmith.sim import simulation
@@ -75,3 +76,33 @@ def test_reports_are_equal(report_of: Report) -> None:
 @pytest.mark.parametrize("architecture", ["parallel", "folded", "serial"])
 def test_reports_of_every_bench_are_equal(architecture: str, channels: int, report_of: Report) -> None:
     check_all(report_of, made_in(architecture, channels), 300, {*BENCHES})
+
+
+PURE_DELAY = """
+name = "pure_delay"
+sample_rate = 1000.0
+[input.x]
+bits = 8
+range = [0.0, 10.0]
+[filter]
+sos = [[0, 1, 0, 1, 0, 0]]
+[output]
+bits = 8
+range = [0.0, 10.0]
+unit = "V"
+max_error = "faithful"
+[hardware]
+architecture = "parallel"
+realization = "df1"
+"""
+
+
+def test_hardware_that_rounds_nothing(tmp_path: Path) -> None:
+    """A report of a bound of 0 is written like any other."""
+    made = design_core(from_text(PURE_DELAY, tmp_path / "pure_delay.toml"))
+    traces = [replace(trace, codes=trace.codes[:100]) for trace in traces_for(made, "noise", seed=8)]
+    traces = [replace(trace, truth=None, reading=None) for trace in traces]
+    evidence = simulate(made, traces, tmp_path)
+    found = summarise(evidence)
+    assert (found["error"]["max_abs"], found["error"]["bound"], found["passed"]) == (0, 0, True)
+    assert "the proven limit is 0" in render_page(evidence, found)
