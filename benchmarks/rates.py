@@ -57,7 +57,9 @@ def factor_table() -> str:
         "registers of the decimator, bits",
         "error bound",
         "delay",
-        "aliasing",
+        "into the pass band",
+        "anything that folds",
+        "without a decimator",
         "gain",
     )
     rows = [head, tuple("---" for _ in head)]
@@ -66,9 +68,11 @@ def factor_table() -> str:
         made = locomotive(factor)
         costs, found = rate_costs(made), decimation_facts(made)
         longer = 100 * (costs.delay / direct.delay - 1)
-        aliasing, gain = "-", "-"
+        folds, gain = ("-", "-", "-"), "-"
         if found is not None:
-            aliasing = f"{max(band.gain_db for band in found.aliasing):.0f} dB, {found.stages} stages"
+            most = max(band.gain_db for band in found.aliasing)
+            levels = (found.largest_db, found.direct_largest_db)
+            folds = (f"{most:.0f} dB, {found.stages} stages", *(f"{level:.0f} dB" for level in levels))
             gain = f"within {found.deviation_db:.2g} dB"
         chosen = f'"auto", {"none" if found is None else found.factor}' if factor == "auto" else str(factor or "-")
         rows.append(
@@ -79,7 +83,7 @@ def factor_table() -> str:
                 f"{costs.decimator_bits:,}",
                 quantity(costs.bound, made.datapath.output.unit),
                 f"{quantity(costs.delay, 's')}, {longer:+.1f} %",
-                aliasing,
+                *folds,
                 gain,
             )
         )
@@ -120,11 +124,16 @@ def instrument_table() -> str:
 
 
 def band_table() -> str:
-    """Return what folds into the pass band from each band, with the factor of "auto"."""
+    """Return what folds from each band, into the pass band and anywhere, with the factor of "auto"."""
     found = decimation_facts(locomotive("auto"))
     assert found is not None
-    rows = ["| from | gain at most |\n", "| --- | --- |\n"]
-    rows += [f"| {band.low:.6g} to {band.high:.6g} Hz | {band.gain_db:.2f} dB |\n" for band in found.aliasing]
+    rows = ["| from | gain at most | at the output | into the pass band from | gain of the decimator at most |\n"]
+    rows.append("| --- | --- | --- | --- | --- |\n")
+    rows += [
+        f"| {band.whole_low:.6g} to {band.whole_high:.6g} Hz | {band.largest_db:.2f} dB | {band.largest_at:.3g} Hz "
+        f"| {band.low:.6g} to {band.high:.6g} Hz | {band.gain_db:.2f} dB |\n"
+        for band in found.aliasing
+    ]
     return "".join(rows)
 
 

@@ -12,7 +12,7 @@ room for its zero; a filter without one gets a section of its own.
 **Aliasing.** What lies within the cutoff F of a multiple k of the lower rate folds into the pass band. There the gain
 of the CIC filter is largest at ``k fs / R - F``: with ``d = F R / fs`` below 1/2, no numerator ``sin(pi t)`` for t in
 [-d, d] exceeds ``sin(pi d)``, and no denominator ``R sin(pi (k + t) / R)`` up to half the sample rate is smaller than
-that at ``t = -d``.
+that at ``t = -d``. What folds elsewhere, the filter is there to stop: see `sosmith.gen.filter.largest_gain`.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ import numpy as np
 from flint import arb, fmpq
 
 from sosmith.gen.filter.design import Array, Filter, design
+from sosmith.gen.filter.largest_gain import Peak, band_gains
 from sosmith.gen.filter.response import Complex, complex_response
 from sosmith.gen.filter.sections import Exact, Row
 from sosmith.gen.specification.choices import AUTO, MAX_DECIMATION, MAX_RATIO
@@ -106,6 +107,14 @@ class Decimation:
     def worst_aliasing(self) -> Fraction:
         """Largest gain of anything that folds into the pass band."""
         return max(self.aliasing)
+
+    def bands(self, filter_: Filter) -> tuple[Peak, ...]:
+        """Largest gains to the output of a corrected filter, one for the band around each multiple of the lower rate.
+
+        Together the bands reach from half the lower rate to half the sample rate. In each, `Peak.at` is in units of the
+        lower rate; what comes out there came from so much below the multiple.
+        """
+        return band_gains(filter_.exact, self.factor, self.stages)
 
     def corrected(self, ideal: Filter) -> Filter:
         """Return a filter designed at the lower rate with the correction of the droop in it."""

@@ -27,6 +27,7 @@ from sosmith.gen.proof.response import IMPULSE, Response
 from sosmith.gen.verifier.certificate_file import (
     FORMAT,
     AboutEntry,
+    BandEntry,
     CalibrationEntry,
     Certificate,
     ClaimsEntry,
@@ -111,8 +112,8 @@ def certificate(
 
 
 def _decimation(quantized: Quantized) -> DecimationEntry | None:
-    decimator, found = quantized.datapath.decimator, quantized.decimation
-    if decimator is None or found is None:
+    decimator, found, filter_ = quantized.datapath.decimator, quantized.decimation, quantized.filter
+    if decimator is None or found is None or filter_ is None:
         return None
     return DecimationEntry(
         factor=decimator.factor,
@@ -122,6 +123,7 @@ def _decimation(quantized: Quantized) -> DecimationEntry | None:
         correction=found.correction,
         edge=found.edge / found.sample_rate,
         aliasing=tuple(map(on_grid, found.aliasing)),
+        bands=tuple(BandEntry(gain=on_grid(peak.gain), at=peak.at) for peak in found.bands(filter_)),
         calibration=None if quantized.ahead is None else _calibration(quantized.ahead),
     )
 

@@ -3,30 +3,44 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, replace
+from fractions import Fraction
 from typing import Any
 
 from sosmith.gen.architecture import Architecture
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.filter.decimation import group_delay, nearest_db
 from sosmith.gen.filter.design import design
+from sosmith.gen.filter.largest_gain import LargestGain
 from sosmith.gen.fpga.boards import find_board
+
+_HALF = Fraction(1, 2)
 
 
 @dataclass(frozen=True, kw_only=True)
 class AliasingFacts:
-    """What folds into the pass band from around one multiple of the lower rate, both sides of it.
+    """What folds from around one multiple of the lower rate, both sides of it.
 
     Attributes
     ----------
     low, high : float
-        Ends of the band in Hz.
+        Ends of the band that folds into the pass band, in Hz.
     gain_db : float
-        Bound on the gain in the band, proven.
+        Bound on the gain of the decimator in it, proven.
+    whole_low, whole_high : float
+        Ends of the whole band, half the lower rate to both sides of the multiple, in Hz.
+    largest_db : float
+        Bound on the gain of decimator and filter in the whole band, proven.
+    largest_at : float
+        Where at the output that gain is reached but for a thousandth, in Hz.
     """
 
     low: float
     high: float
     gain_db: float
+    whole_low: float
+    whole_high: float
+    largest_db: float
+    largest_at: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,6 +101,11 @@ class DecimationFacts:
     worst_aliasing : float
         Largest amplitude at the output of a sine in any of these bands that fills the range of the input, in the
         output's unit.
+    largest_db, largest : float
+        The same of a sine at any frequency from half the lower rate on, wherever it folds: the gain, and the amplitude
+        in the output's unit, both proven.
+    direct_largest_db : float
+        Largest gain of the filter without a decimator at these frequencies.
     calibration : AheadFacts or None
         What stands before it; None if it takes the input itself.
     """
@@ -103,6 +122,9 @@ class DecimationFacts:
     delay: float
     aliasing: tuple[AliasingFacts, ...]
     worst_aliasing: float
+    largest_db: float
+    largest: float
+    direct_largest_db: float
     calibration: AheadFacts | None = None
 
     @property
@@ -119,8 +141,11 @@ def decimation_facts(made: CoreDesign) -> DecimationFacts | None:
     found, decimator, filter_ = made.quantized.decimation, made.datapath.decimator, made.quantized.filter
     if found is None or decimator is None or filter_ is None:
         return None
-    gains = found.aliasing
-    x, (low, high) = decimator.input, made.datapath.decimated_range
+    direct = design(made.spec.filter, made.spec.sample_rate)
+    gains, peaks, rate = found.aliasing, found.bands(filter_), found.rate
+    largest = max(peak.gain for peak in peaks)
+    low, high = made.datapath.decimated_range
+    amplitude = decimator.input.lsb * (high - low) / 2
     return DecimationFacts(
         factor=decimator.factor,
         stages=decimator.stages,
@@ -130,17 +155,24 @@ def decimation_facts(made: CoreDesign) -> DecimationFacts | None:
         correction=float(found.correction),
         held=made.architecture.hold,
         cycles_per_result=made.architecture.cycles_per_result,
-        deviation_db=found.deviation(filter_, design(made.spec.filter, made.spec.sample_rate)),
+        deviation_db=found.deviation(filter_, direct),
         delay=float(found.delay(filter_)),
         aliasing=tuple(
             AliasingFacts(
-                low=float(band * found.rate - found.edge),
-                high=float(min(band * found.rate + found.edge, found.sample_rate / 2)),
+                low=float(band * rate - found.edge),
+                high=float(min(band * rate + found.edge, found.sample_rate / 2)),
                 gain_db=nearest_db(gain),
+                whole_low=float((band - _HALF) * rate),
+                whole_high=float(min((band + _HALF) * rate, found.sample_rate / 2)),
+                largest_db=nearest_db(peak.gain),
+                largest_at=float(peak.at * rate),
             )
-            for band, gain in enumerate(gains, start=1)
+            for band, (gain, peak) in enumerate(zip(gains, peaks, strict=True), start=1)
         ),
-        worst_aliasing=float(max(gains) * x.lsb * (high - low) / 2),
+        worst_aliasing=float(max(gains) * amplitude),
+        largest_db=nearest_db(largest),
+        largest=float(largest * amplitude),
+        direct_largest_db=nearest_db(LargestGain(direct.exact).from_frequency(_HALF / found.factor).gain),
         calibration=_ahead(made),
     )
 

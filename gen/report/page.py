@@ -277,13 +277,24 @@ _BANDS = 8
 
 
 def _decimation_table(found: DecimationFacts) -> Table:
-    """Tell what folds into the pass band from each band around a multiple of the lower rate."""
+    """Tell what folds from each band around a multiple of the lower rate, into the pass band and anywhere."""
     shown, others = found.aliasing[:_BANDS], found.aliasing[_BANDS:]
-    rows = [(f"{_hertz((band.low,))} to {_hertz((band.high,))}", decibels(band.gain_db)) for band in shown]
+    rows = [
+        (
+            f"{_hertz((band.whole_low,))} to {_hertz((band.whole_high,))}",
+            decibels(band.largest_db),
+            amount(band.largest_at, "Hz"),
+            f"{_hertz((band.low,))} to {_hertz((band.high,))}",
+            decibels(band.gain_db),
+        )
+        for band in shown
+    ]
     if others:
-        most = max(band.gain_db for band in others)
-        rows.append((f"{len(others)} more, up to {_hertz((others[-1].high,))}", decibels(most)))
-    return Table(head=("from", "gain at most"), rows=rows, numbers=(1,))
+        whole, part = (max(levels) for levels in zip(*((b.largest_db, b.gain_db) for b in others), strict=True))
+        end = _hertz((others[-1].high,))
+        rows.append((f"{len(others)} more, up to {end}", decibels(whole), "", f"up to {end}", decibels(part)))
+    head = ("from", "gain at most", "comes out at", "into the pass band from", "gain of the decimator at most")
+    return Table(head=head, rows=rows, numbers=(1, 2, 4))
 
 
 def _decimation_caption(found: DecimationFacts, unit: str) -> str:
@@ -295,9 +306,12 @@ def _decimation_caption(found: DecimationFacts, unit: str) -> str:
     return (
         f"{calibrated}{found.factor} samples make one result{held}, by {count(found.stages, 'stage')} of integrators "
         f"and combs of {found.width} bits, and the filter works at {rate}. A sine over the whole range of {what} in "
-        f"one of these bands comes out in the pass band with an amplitude of at most {worst}. In the pass band the "
-        f"gain is within {plain_number(found.deviation_db)} dB of that without a decimator, and decimator and filter "
-        f"together delay by {amount(found.delay, 's')}."
+        f"one of the bands on the right comes out in the pass band with an amplitude of at most {worst}; one at any "
+        f"frequency from half that rate on, wherever it comes out, with at most {amount(found.largest, unit)} "
+        f"({decibels(found.largest_db)}), where a filter without a decimator has "
+        f"{decibels(found.direct_largest_db)}. In the pass band the gain is "
+        f"within {plain_number(found.deviation_db)} dB of that without a decimator, and decimator and filter together "
+        f"delay by {amount(found.delay, 's')}."
     )
 
 

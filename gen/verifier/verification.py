@@ -14,8 +14,9 @@
 6. Where a filter starts from zero, samples may be flagged until it has settled: the counter is run, and what any other
    past could change is followed until it has faded (`sosmith.gen.verifier.settling`).
 
-6. A decimator before the stages is exact but for one rounding (`sosmith.gen.verifier.decimation`). All else is proven
-   of what is behind it, and, with a calibration before it, of that.
+7. A decimator before the stages is exact but for one rounding (`sosmith.gen.verifier.decimation`), and what comes
+   through it from above half the lower rate is bounded (`sosmith.gen.verifier.largest_gain`). All else is proven of
+   what is behind it, and, with a calibration before it, of that.
 
 The ranges hold by induction. Unbounded integers obey the linear model exactly, with the quantizers' errors as further
 inputs. The limits from the linear model therefore hold at every sample, and signals with these ranges never overflow.
@@ -36,6 +37,7 @@ from sosmith.gen.verifier.certificate_file import Certificate, Operation, StageE
 from sosmith.gen.verifier.decimation import at_lower_rate, calibration_alone, rounding
 from sosmith.gen.verifier.graph import RejectedError, Transfer, check_graph, inputs_of, label, require
 from sosmith.gen.verifier.l1_response import BITS, Inverse, UndecidedError, fraction, inverse, is_stable, response
+from sosmith.gen.verifier.largest_gain import check_bands
 from sosmith.gen.verifier.online import check_online
 from sosmith.gen.verifier.piecewise import Pieces
 from sosmith.gen.verifier.polynomial import output_error, polynomial_error
@@ -110,7 +112,7 @@ def _verified(certificate: Certificate, progress: Progress) -> Verdict:
     budget, nodes = _before_decimator(certificate, progress)
     progress("graphs", 0, 0)
     rounded = rounding(certificate)
-    certificate = at_lower_rate(certificate)
+    decimation, certificate = certificate.decimation, at_lower_rate(certificate)
     stages = certificate.stages
     for stage in stages:
         check_graph(stage)
@@ -148,6 +150,9 @@ def _verified(certificate: Certificate, progress: Progress) -> Verdict:
             require(start is None, "settling must not be claimed of a filter that starts from its first sample")
             progress("settling", 0, 0)
             check_fading(sections, settling)
+        if decimation is not None:
+            progress("aliasing", 0, 0)
+            check_bands(decimation, certificate.ideal.sections)
         if start is not None:
             error = abs(added - cascade.gain_at_zero) * start.size
             budget["start"] = on_grid(error)

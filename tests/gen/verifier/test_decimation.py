@@ -99,6 +99,12 @@ WRONG: list[tuple[str, Callable[[Any], None], str]] = [
         "aliasing must be given of 8 bands, not 7",
     ),
     (
+        "a larger gain in a whole band",
+        lambda tree: tree["decimation"]["bands"][3].update(gain="1/1000000"),
+        "the largest gain from band 4 must be that at 173/4096 of the lower rate, 1.28263e-08, or little more, "
+        "not 1e-06",
+    ),
+    (
         "another correction",
         lambda tree: tree["decimation"].update(correction="135/512"),
         "the correction of the droop must be the multiple of 1/1024 next to the best one, not 135/512",
@@ -179,6 +185,12 @@ def test_a_filter_without_the_correction_is_not_the_stated_one() -> None:
     tree["ideal"]["sections"].pop()
     with pytest.raises(RejectedError, match=r"^the filter must be the specified one within a peak gain of "):
         check_specification(read(tree), locomotive_text(), Fraction(1, 2**60))
+
+
+def test_a_certificate_from_before_whole_bands() -> None:
+    tree = copy.deepcopy(TREE)
+    del tree["decimation"]["bands"]
+    verify(read(tree))
 
 
 def test_gains_are_rounded_up_to_the_grid() -> None:

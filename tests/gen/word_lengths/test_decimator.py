@@ -1,5 +1,6 @@
 """A decimated filter from specification to proof: what it costs beside the direct one, and where it is refused."""
 
+import math
 import re
 from dataclasses import replace
 from fractions import Fraction
@@ -63,6 +64,17 @@ def test_facts_for_programs() -> None:
     assert found["aliasing"][-1]["high"] == 50
     assert max(band["gain_db"] for band in found["aliasing"]) == pytest.approx(-109.06, abs=0.01)
     assert found["worst_aliasing"] <= float(made.spec.max_error)
+    assert [(band["whole_low"], band["whole_high"]) for band in found["aliasing"]] == [
+        (6.25 * k - 3.125, min(6.25 * k + 3.125, 50)) for k in range(1, 9)
+    ]
+    assert max(band["largest_db"] for band in found["aliasing"]) == found["largest_db"]
+    assert found["largest_db"] == pytest.approx(-111.9, abs=0.01)
+    assert found["aliasing"][0]["largest_at"] == pytest.approx(0.2655, abs=1e-3)
+    # The amplitude of a sine over all codes of the input, 16 mm from end to end.
+    assert found["largest"] == pytest.approx(8 * (1 - 2**-16) * 10 ** (found["largest_db"] / 20), rel=1e-9)
+    assert found["direct_largest_db"] == pytest.approx(
+        -20 * 7 * math.log10(math.tan(math.pi / 32) / math.tan(math.pi * 0.002587802)), abs=0.01
+    )
     assert made.reasons["architecture"] == (
         f"folded: the smallest that keeps up; takes {clocks} of 1,920,000 clocks for 16 samples"
     )

@@ -55,7 +55,8 @@ def test_hardware_equals_the_integer_model(architecture: str, simulator: str, tm
     assert summary["decimation"]["factor"] == 16
     assert summary["delay"]["seconds"] == pytest.approx(3.006, abs=0.001)
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert "What folds into the pass band" in page
+    assert "What folds, anywhere and into the pass band" in page
+    assert "46.875 Hz to 50 Hz" in page
     assert "49.74122 Hz to 50 Hz" in page
 
 

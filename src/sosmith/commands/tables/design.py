@@ -97,6 +97,11 @@ def _add_decimation(overview: Table, design: Design) -> None:
         f"at most {most:.1f} dB, {quantity(found.worst_aliasing, unit)} of a sine over the whole range of "
         f"{'the input' if before is None else 'that result'}",
     )
+    overview.add_row(
+        f"anything from {found.sample_rate / 2:,.6g} Hz on",
+        f"at most {found.largest_db:.1f} dB, {quantity(found.largest, unit)}, wherever it folds; "
+        f"{found.direct_largest_db:.1f} dB without a decimator",
+    )
     overview.add_row("gain in the pass band", f"within {found.deviation_db:.2g} dB of that without a decimator")
 
 

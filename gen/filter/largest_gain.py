@@ -1,0 +1,176 @@
+"""Largest gain of a filter at any frequency, of what a decimator before it lets through, by branch and bound in balls.
+
+Of a sine at the frequency ``k - p`` or ``k + p``, in units of the rate at which the filter works, the samples that a
+decimator hands on are those of a sine at p, from 0 to 1/2, and its gain is that of the CIC filter times that of the
+filter at p. From below the multiple k more comes through than from above: the numerators ``sin(pi p)`` of the CIC
+filter are the same, and up to half the rate of its input the denominator ``R sin(pi (k - p) / R)`` is the smaller one.
+So one variable is left, p.
+
+On a short interval of it, the gain is at most that in the middle times ``exp(s d / 2)``, with the length d and a bound
+s on the logarithmic derivative, which is all but 0 where the gain is largest. Where a pole or zero is so close that
+there is no such bound, balls around all frequencies of the interval enclose the gain. The interval with the largest
+bound is halved again and again, until no bound exceeds the largest gain found by more than `TOLERANCE`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import lru_cache
+from heapq import heappop, heappush
+
+from flint import acb, arb, ctx
+
+from sosmith.gen.filter.sections import Exact
+from sosmith.model.arithmetic.correct_rounding import ball, evaluate, nearest_multiple
+
+TOLERANCE = Fraction(1, 1 << 10)
+"""Share by which a bound exceeds a gain that is reached."""
+
+_PRECISION = 192
+"""Bits of the balls."""
+
+_GAIN_BITS = 192
+"""Fraction bits of bounds."""
+
+_HALF = Fraction(1, 2)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Peak:
+    """A largest gain.
+
+    Attributes
+    ----------
+    at : Fraction
+        Where a gain is reached that is less than `gain` by the share `TOLERANCE` at most: the frequency at the output,
+        in units of the rate there.
+    gain : Fraction
+        No frequency has more.
+    """
+
+    at: Fraction
+    gain: Fraction
+
+
+@dataclass(frozen=True)
+class _Factor:
+    """Of a factor of the gain on an interval: itself in the middle and everywhere, and its logarithmic derivative."""
+
+    middle: arb
+    everywhere: arb
+    slope: arb
+
+    def times(self, other: _Factor) -> _Factor:
+        return _Factor(self.middle * other.middle, self.everywhere * other.everywhere, self.slope + other.slope)
+
+
+class LargestGain:
+    """Largest gains of one filter; what is known of it on an interval serves all bands.
+
+    Parameters
+    ----------
+    sections : sequence of Exact
+        Numerators and denominators of the filter in ``1/z``; no pole on the unit circle.
+    factor, stages : int
+        R and N of the decimator before it; 1 and 0 without one.
+    """
+
+    def __init__(self, sections: Sequence[Exact], factor: int = 1, stages: int = 0) -> None:
+        self._sections = sections
+        self._factor = factor
+        self._stages = stages
+        self._known: dict[tuple[Fraction, Fraction], _Factor] = {}
+
+    def of_band(self, band: int) -> Peak:
+        """Bound the gain from the multiple `band` of the filter's rate, half the rate to both sides of it.
+
+        The multiple is at least 1, and at most half of R, where the band ends.
+        """
+        return self._largest(Fraction(0), band)
+
+    def from_frequency(self, low: Fraction) -> Peak:
+        """Bound the gain of the filter alone from a frequency in units of its rate on."""
+        return self._largest(low, None)
+
+    def on_interval(self, low: Fraction, high: Fraction, band: int | None) -> tuple[arb, arb]:
+        """Enclose the gain in the middle of an interval of output frequencies, and bound it on all of it.
+
+        At the present precision of FLINT, from a band or of the filter alone.
+        """
+        found = self._on(low, high, band)
+        return found.middle, _bound(found, high - low)
+
+    def _largest(self, low: Fraction, band: int | None) -> Peak:
+        with ctx.workprec(_PRECISION):
+            at, best = low, arb(0)
+            open_: list[tuple[float, Fraction, Fraction, arb]] = [(-math.inf, low, _HALF, arb("inf"))]
+            while True:
+                _, start, end, most = heappop(open_)
+                if most <= best * ball(1 + TOLERANCE):
+                    break
+                middle = (start + end) / 2
+                for one, other in ((start, middle), (middle, end)):
+                    reached, bound = self.on_interval(one, other, band)
+                    if reached.lower() > best:
+                        at, best = (one + other) / 2, reached.lower()
+                    heappush(open_, (-float(bound), one, other, bound))
+
+        def gain() -> Fraction:
+            return nearest_multiple(self._on(at, at, band).middle * ball(1 + TOLERANCE), _GAIN_BITS)
+
+        return Peak(at=at, gain=evaluate(gain) + Fraction(1, 1 << _GAIN_BITS))
+
+    def _on(self, low: Fraction, high: Fraction, band: int | None) -> _Factor:
+        filter_ = self._known.get((low, high)) if low < high else None
+        if filter_ is None:
+            filter_ = self._known[low, high] = _filter(self._sections, low, high)
+        return filter_ if band is None else _cic(self._factor, self._stages, band, low, high).times(filter_)
+
+
+@lru_cache(maxsize=16)
+def band_gains(sections: tuple[Exact, ...], factor: int, stages: int) -> tuple[Peak, ...]:
+    """Return the largest gain from the band around each multiple of the lower rate, the lowest first."""
+    gains = LargestGain(sections, factor, stages)
+    return tuple(gains.of_band(band) for band in range(1, factor // 2 + 1))
+
+
+def _bound(found: _Factor, length: Fraction) -> arb:
+    """Bound a gain on an interval from above; infinite where nothing is known of it."""
+    steep = found.middle * (abs(found.slope) * ball(length / 2)).exp()
+    bounds = [bound.upper() for bound in (found.everywhere, steep) if bound.is_finite()]
+    return min(bounds, default=arb("inf"))
+
+
+def _between(low: Fraction, high: Fraction) -> arb:
+    return ball(low).union(ball(high))
+
+
+def _cic(factor: int, stages: int, band: int, low: Fraction, high: Fraction) -> _Factor:
+    """Gain of the CIC filter at `band` less a frequency in an interval."""
+    middle, p = ball((low + high) / 2), _between(low, high)
+    slope = stages * arb.pi() * (p.cot_pi() + ((band - p) / factor).cot_pi() / factor)
+    gains = [(q.sin_pi() / (factor * ((band - q) / factor).sin_pi())) ** stages for q in (middle, p)]
+    return _Factor(gains[0], gains[1], slope)
+
+
+def _filter(sections: Sequence[Exact], low: Fraction, high: Fraction) -> _Factor:
+    """Gain of sections on an interval of frequencies, of which ``d ln |B| / dp = 2 pi Im(u B'(u) / B(u))``."""
+    u, everywhere = (acb(-2 * q).exp_pi_i() for q in (ball((low + high) / 2), _between(low, high)))
+    made = _Factor(arb(1), arb(1), arb(0))
+    for numerator, denominator in sections:
+        for taps, power in ((numerator, 1), (denominator, -1)):
+            b = [ball(tap) for tap in taps]
+            value = _horner(b, everywhere)
+            slope = 2 * arb.pi() * (everywhere * _horner([k * c for k, c in enumerate(b)][1:], everywhere) / value).imag
+            made = made.times(_Factor(abs(_horner(b, u)) ** power, abs(value) ** power, power * slope))
+    return made
+
+
+def _horner(taps: Sequence[arb], u: acb) -> acb:
+    total = acb(0)
+    for tap in reversed(taps):
+        total = total * u + tap
+    return total
