@@ -16,7 +16,7 @@ samples there are, and where, is then what the pictures of the components say, f
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence, Set
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
 from itertools import pairwise, product
 from typing import TypeVar
@@ -44,13 +44,18 @@ class UndecidedError(Exception):
         self.name = name
 
 
-def cases(fixed: Case, evaluate: Callable[[Case], _Result]) -> Iterator[tuple[Case, _Result]]:
-    """Yield what is found in each case that the fixed control signals leave, as far as they count."""
+def cases(
+    fixed: Case, evaluate: Callable[[Case], _Result], values: Callable[[str], Iterable[int]] = lambda name: (0, 1)
+) -> Iterator[tuple[Case, _Result]]:
+    """Yield what is found in each case that the fixed control signals leave, as far as they count.
+
+    `values` are those that a signal can have.
+    """
     try:
         found = evaluate(fixed)
     except UndecidedError as undecided:
-        for value in (0, 1):
-            yield from cases({**fixed, undecided.name: value}, evaluate)
+        for value in values(undecided.name):
+            yield from cases({**fixed, undecided.name: value}, evaluate, values)
     else:
         yield fixed, found
 

@@ -67,6 +67,7 @@ def verify(certificate: Path, spec: Path | None, files: Path | None, rebuild: bo
                 "program_instructions": None if proof.program is None else proof.program.instructions,
                 **({} if proof.calibration is None else {"calibration_instructions": proof.calibration.instructions}),
                 "hardware_registers": None if proof.hardware is None else proof.hardware.registers,
+                "decimator_registers": None if proof.decimator is None else proof.decimator.registers,
                 "files_rebuilt": proof.rebuilt,
             }
         )

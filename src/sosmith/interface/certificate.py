@@ -10,6 +10,7 @@ from pathlib import Path
 from sosmith.gen.specification.specification import from_text, load
 from sosmith.gen.verifier.certificate_file import Certificate as Entries
 from sosmith.gen.verifier.certificate_file import certificate_text, read_certificate
+from sosmith.gen.verifier.cic_hardware import DecimatorVerdict, check_decimator
 from sosmith.gen.verifier.decimation import at_lower_rate, behind_decimator, calibration_alone, module_in
 from sosmith.gen.verifier.generated_files import (
     about_of,
@@ -63,6 +64,8 @@ class Proof:
     """What the same check of a calibration before a decimator found; None without one, and if it was not checked."""
     hardware: HardwareVerdict | None = None
     """What the check of a parallel core's SystemVerilog found; None if it was not checked."""
+    decimator: DecimatorVerdict | None = None
+    """What the check of a decimator's SystemVerilog found; None without one, or if it was not checked."""
     rebuilt: int = 0
     """Number of files that were generated again."""
 
@@ -132,7 +135,8 @@ class Certificate:
             certificate's own file may have been changed. From the SystemVerilog, the program of a folded or serial
             core, and all hardware of a parallel one, is proven to compute the certificate's graph for all inputs and
             states; online cores are not, nor cores with loadable constants, protection, look-ahead or several samples a
-            clock, nor a decimator, or a parallel core beside one.
+            clock, nor a parallel core beside a decimator. A decimator without a calibration before it, and what holds
+            the results behind it, is proven to be one, register by register.
         rebuild : bool
             Whether to generate all files again, from `spec` or the specification's text in the certificate, and compare
             them byte for byte.
@@ -145,7 +149,7 @@ class Certificate:
             If a file cannot be read, or the specification is invalid.
         """
         verdict = verify(self.entries, progress)
-        agreement, program, before, hardware, compared, again = None, None, None, None, 0, 0
+        agreement, program, before, hardware, decimator, compared, again = None, None, None, None, None, 0, 0
         checked = None if spec is None else load(Path(fspath(spec)))
         if checked is not None:
             progress("specification", 0, 0)
@@ -162,6 +166,9 @@ class Certificate:
             compared = check_files(check_seal(self.entries, content), folder)
             architecture, channels = fixed_architecture(folder / f"{self.name}.json")
             text = (folder / f"{self.name}.sv").read_text(encoding="utf-8")
+            if self.entries.decimation is not None and self.entries.decimation.calibration is None:
+                progress("decimator", 0, 0)
+                decimator = check_decimator(text, self.entries)
             if architecture in {"folded", "serial"}:
                 progress("program", 0, 0)
                 program = check_program(behind_decimator(text, self.entries), at_lower_rate(self.entries))
@@ -192,6 +199,7 @@ class Certificate:
             program=program,
             calibration=before,
             hardware=hardware,
+            decimator=decimator,
             rebuilt=again,
         )
 

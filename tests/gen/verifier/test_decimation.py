@@ -49,6 +49,8 @@ def test_the_program_is_proven_from_the_text(architecture: str, tmp_path: Path) 
     assert made.architecture.program is not None
     assert proof.program is not None
     assert proof.program.instructions == len(made.architecture.program.instructions)
+    assert proof.decimator is not None
+    assert proof.decimator.registers == 8 + 8 * 4
     assert proof.files == proof.rebuilt == 5
     sentence = "the core must have one module flange_wear_locomotive_behind, not 0"
     with rejected(sentence):

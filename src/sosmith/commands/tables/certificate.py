@@ -39,6 +39,14 @@ def print_proof(certificate: Certificate, proof: Proof) -> None:
             f"later, in {found.registers} registers, {found.states} of them states: for all inputs, stalls and resets, "
             "but for the flags outside_calibration, wear_warning and wear_critical"
         )
+    if proof.decimator is not None and certificate.decimation is not None:
+        entry, around = certificate.decimation, proof.decimator
+        held = f"; each result leaves {around.copies} times" if around.copies > 1 else ""
+        console.print(
+            f"[bold green]decimator[/]: {around.registers} registers around the core are {entry.stages} integrators, "
+            f"{entry.stages} combs and what moves one sample of {entry.factor} on, for all inputs, stalls and resets"
+            f"{held}"
+        )
     online = certificate.claims.online
     if online is not None:
         console.print(

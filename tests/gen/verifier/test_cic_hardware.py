@@ -1,0 +1,219 @@
+"""The hardware around a core at a lower rate: proven register by register, and rejected when anything is wrong."""
+
+import re
+from collections.abc import Iterator
+from functools import cache
+from typing import NamedTuple
+
+import pytest
+from tests.formal.prover import broken
+from tests.gen.verifier.parallel.cores import specified
+from tests.gen.word_lengths.decimated import read, tree_of
+
+from sosmith.gen.core import CoreDesign, design_core
+from sosmith.gen.output.verilog import to_rtlil, to_verilog
+from sosmith.gen.verifier.certificate_file import Certificate
+from sosmith.gen.verifier.cic_hardware import check_decimator
+from sosmith.gen.verifier.graph import RejectedError
+from sosmith.hdl import decimator as hardware
+
+
+class Case(NamedTuple):
+    """What a core is made of."""
+
+    bits: int = 8
+    signed: bool = True
+    factor: int = 4
+    cutoff: float = 10
+    error: float = 0.01
+    hold: bool = True
+    architecture: str = "parallel"
+
+    @property
+    def text(self) -> str:
+        signed, low = str(self.signed).lower(), -1 if self.signed else 0
+        return f"""
+name = "plain"
+sample_rate = 1000.0
+input.x = {{ bits = {self.bits}, signed = {signed}, range = [{low}.0, 1.0] }}
+[filter]
+family = "butterworth"
+kind = "lowpass"
+order = 1
+cutoff = {self.cutoff}
+decimate = {self.factor}
+hold = {str(self.hold).lower()}
+[output]
+bits = 8
+signed = {signed}
+range = [{low}.0, 1.0]
+unit = ""
+max_error = {self.error}
+[hardware]
+architecture = "{self.architecture}"
+realization = "df1"
+"""
+
+
+CASES = [
+    (Case(), 2),
+    (Case(hold=False, architecture="folded"), 2),
+    (Case(bits=12, signed=False, factor=2, cutoff=20, error=0.02), 2),
+    (Case(bits=9, factor=16, architecture="serial"), 3),
+    (Case(signed=False, factor=8, cutoff=2, error=0.5, hold=False), 1),
+    (Case(bits=6, factor=2, cutoff=1, error=0.5), 1),
+    (Case(bits=2, factor=4, error=0.02), 2),
+]
+
+
+@cache
+def designed(case: Case) -> tuple[CoreDesign, Certificate]:
+    made = design_core(specified(case.text))
+    return made, read(tree_of(made))
+
+
+@cache
+def written(case: Case) -> str:
+    made, _ = designed(case)
+    return to_verilog(to_rtlil(made.architecture.component(), made.datapath.name))
+
+
+@pytest.mark.parametrize(("case", "stages"), CASES)
+def test_a_decimator_is_proven(case: Case, stages: int) -> None:
+    _, certificate = designed(case)
+    assert certificate.decimation is not None
+    assert certificate.decimation.stages == stages
+    verdict = check_decimator(written(case), certificate)
+    assert verdict.copies == (case.factor if case.hold else 1)
+    assert verdict.registers == 8 + 8 * stages + 3 * case.hold
+
+
+EDITS = [
+    (r"(?<= )& (?=\w)", "| "),
+    (r"(?<= )\| (?=\w)", "& "),
+    (r"(?<=\w )& ", "| "),
+    (r"(?<=\w )\| ", "& "),
+    (r"(?<=\w )\+ ", "- "),
+    (r"(?<=\w )- ", "+ "),
+    (r"~ ", ""),
+    (r"! ", "| "),
+    (r"'h0\b", "'h1"),
+    (r"'h1\b", "'h0"),
+    (r" == ", " != "),
+    (r" != ", " == "),
+    (r"\? (\S+) : (\S+);", r"? \2 : \1;"),
+    (r"(?<!else )if \((?!front_rst)(\w+)\)", r"if (~ \1)"),
+    (r"else if \((\w+)\)", r"else if (~ \1)"),
+    (r"\bsum1\b(?! \+|;)", "sum2"),
+    (r"\bdifference1\b(?! -|;)", "difference2"),
+    (r"control0\b(?= <=|;$)", "control1"),
+    (r"(?<=[=(&|] )\bo_ready\b", "o_valid"),
+    (r"\bwaiting\b(?= [&|])", "filling"),
+    (r"\[(\d+):2\];", r"[\1:1];"),
+]
+"""Patterns and what takes their place, one at a time, in every statement outside the core."""
+
+SAME = re.compile(
+    "|".join(
+        (
+            r"reg \w+_control[12] .*|reg o_rail .*|reg (\S+ )?left .*",  # nothing counts before it is loaded
+            r"assign \w+ = difference\d - \d+'h0;",  # a rounding that rounds nothing
+            r"assign \w+ = (phase|left|filled) [-+] 1'h1;",
+            r"if \(front_rst\) (o_rail|o_data) <= .*",
+        )
+    )
+)
+"""What may be otherwise; of the third line, in a counter of one bit."""
+
+
+def edited(text: str) -> Iterator[tuple[str, str]]:
+    """Yield each edited line, and the whole text with it."""
+    for module in re.finditer(r"^module plain(_decimator|_holder|)\(.*?^endmodule$", text, re.MULTILINE | re.DOTALL):
+        for line in re.finditer(r"^  .*$", module[0], re.MULTILINE):
+            if re.match(r"  (wire|input|output) ", line[0]):
+                continue
+            for pattern, instead in EDITS:
+                changed = re.sub(pattern, instead, line[0], count=1)
+                if changed != line[0]:
+                    start, end = module.start() + line.start(), module.start() + line.end()
+                    yield changed.strip(), text[:start] + changed + text[end:]
+
+
+def accepted(case: Case) -> set[str]:
+    """Return the edits of a core's text that are not rejected, but for those that change nothing."""
+    _, certificate = designed(case)
+    found, tried = set(), 0
+    for line, text in edited(written(case)):
+        tried += 1
+        try:
+            check_decimator(text, certificate)
+        except RejectedError:
+            continue
+        found.add(line)
+    assert tried > 80
+    return {line for line in found if not SAME.fullmatch(line)}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", [CASES[0][0], CASES[1][0], CASES[2][0]])
+def test_every_edit_is_rejected(case: Case) -> None:
+    assert accepted(case) == set()
+
+
+BROKEN = [
+    ("a comb of another delay", "difference.eq(value - before), before.eq(value)", "difference.eq(value - before)"),
+    ("a rounding down", "(value + (1 << made.dropped >> 1)) >>", "value >>"),
+    ("a first sample that counts once", "filled == made.stages - 1", "filled == 0"),
+    ("a result that is not waited for", "~(waiting & completes)", "~(waiting & completes & 0)"),
+    ("a sum that takes what is not there", "with m.If(valid):", "with m.If(1):"),
+    ("a flag of one sample", "(rail | found) & ~completes", "found & ~completes"),
+    ("one copy less", "left.eq(self.copies - 1)", "left.eq(self.copies - 2)"),
+    ("a word that is not held", "self.i_ready.eq(~self.o_valid | (self.o_ready & (left == 0)))", "self.i_ready.eq(1)"),
+    ("a reset that is not passed on", "core.aresetn.eq(self.aresetn)", "core.aresetn.eq(1)"),
+    ("a reset the wrong way round", 'ResetSignal("front").eq(~self.aresetn)', 'ResetSignal("front").eq(self.aresetn)'),
+    ("a flag that gets lost", "core.s_axis_tuser.eq(decimator.o_rail)", "core.s_axis_tuser.eq(0)"),
+    ("a sink that is not asked", "core.m_axis_tready.eq(ready)", "core.m_axis_tready.eq(1)"),
+    ("results the wrong way round", "self.m_axis_tdata.eq(result[:data])", "self.m_axis_tdata.eq(result[:data][::-1])"),
+]
+
+
+def test_sentences() -> None:
+    """The first register or port that is wrong is named."""
+    text, (_, certificate) = written(CASES[0][0]), designed(CASES[0][0])
+
+    def rejected(right: str, wrong: str, sentence: str) -> None:
+        assert text.count(right) == 1
+        with pytest.raises(RejectedError, match=f"^{re.escape(sentence)}$"):
+            check_decimator(text.replace(right, wrong), certificate)
+
+    rejected(
+        "sum2 <= n38[11:0];",
+        "sum2 <= sum1;",
+        "decimator.sum2 must be what a decimator has there after a clock with decimator.integrator1_control0 = 1, "
+        "aresetn = 1, not another value",
+    )
+    rejected("reg waiting = 1'h0;", "reg waiting = 1'h1;", "decimator.waiting must be 0 before the first clock, not 1")
+    rejected(
+        "assign i_ready = n2 & n4;",
+        "assign i_ready = n2;",
+        "s_axis_tready must be what a decimator has there with decimator.filling = 0, decimator.phase = 0, "
+        "decimator.waiting = 1, not another value",
+    )
+    rejected(
+        ".o_ready(o_ready),\n    .o_valid(o_valid)\n  );",
+        ".o_ready(s_axis_tvalid),\n    .o_valid(o_valid)\n  );",
+        "decimator.o_ready must be an output of the core",
+    )
+    other = designed(CASES[0][0]._replace(hold=False))[1]
+    with pytest.raises(RejectedError, match=r"^results must not be held, as specified$"):
+        check_decimator(text, other)
+
+
+@pytest.mark.parametrize(("right", "wrong"), [pytest.param(*case, id=subject) for subject, *case in BROKEN])
+def test_hardware_that_is_wrong_is_rejected(right: str, wrong: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    made, certificate = designed(CASES[2][0])
+    monkeypatch.setattr(hardware, "DecimatedCore", broken(hardware, right, wrong).DecimatedCore)
+    text = to_verilog(to_rtlil(made.architecture.component(), made.datapath.name))
+    assert text != written(CASES[2][0])
+    with pytest.raises(RejectedError):
+        check_decimator(text, certificate)
