@@ -238,7 +238,9 @@ class Architecture:
         if self._is_block:
             lanes = self.samples_per_clock
             return parallel_clocks.block_latency_cycles(self.datapath, lanes, look_ahead=self.look_ahead)
-        before = 0 if self.decimator is None else decimator_clocks.latency_cycles(self.decimator) + self.hold
+        before = (
+            0 if self.decimator is None else decimator_clocks.latency_cycles(self.decimator, self.channels) + self.hold
+        )
         before += 0 if self.ahead is None else self.ahead.latency_cycles
         if self.program is None:
             return before + parallel_clocks.latency_cycles(self.built, self.channels, protect=self.protect)
@@ -255,7 +257,9 @@ class Architecture:
         """Clocks after a reset until the first sample is accepted, while memories are cleared or a decimator fills."""
         if self.decimator is None:
             return self._cleared_cycles
-        filled = decimator_clocks.reset_cycles(self.decimator)
+        filled = decimator_clocks.reset_cycles(self.decimator, self.channels)
+        if self.ahead is not None and self.channels > 1:
+            return max(self._cleared_cycles, filled, self.ahead.reset_cycles)
         if self.ahead is not None:  # which gives the first sample that the decimator fills with
             filled += self.ahead.reset_cycles + self.ahead.latency_cycles + decimator_clocks.FIRST_SAMPLE
         return max(self._cleared_cycles, filled)
@@ -291,6 +295,8 @@ class Architecture:
         if self.decimator is None:
             return behind
         each = 1 if self.ahead is None else self.ahead.cycles_per_result
+        if self.channels > 1:
+            return max(decimator_clocks.cycles_per_result_of_many(self.decimator, each=each), behind)
         if program is None:
             return decimator_clocks.cycles_per_result(self.decimator, each=each)
         overlaps = folded_clocks.overlaps(program, serial=self.name == "serial")

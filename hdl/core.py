@@ -241,10 +241,18 @@ class Core(wiring.Component):
 
     def _status(self, data: Value) -> Value:
         """Return the flags that are known with a sample as it comes in."""
+        given = self._given
+        if given and self.channels > 1:
+            given = [data[len(self.s_axis_tdata) :]]  # has been in the buffer with it
         if self.flags_given == OF_INPUT:
-            return self.s_axis_tuser
-        rail = self.s_axis_tuser if self.flags_given else at_rail(self.datapath.inputs, data)
+            return given[0]
+        rail = given[0] if given else at_rail(self.datapath.inputs, data)
         return Cat(rail, outside_calibration(self.datapath, data))
+
+    @property
+    def _given(self) -> list[Value]:
+        """Flags that come with a sample, if there are any."""
+        return [self.s_axis_tuser] if self.flags_given else []
 
     @property
     def _restarts(self) -> bool:
@@ -414,7 +422,7 @@ class Core(wiring.Component):
                 m.d.comb += swap.may.eq(empty)
             return _Place(self.s_axis_tvalid & open_, Const(0, 0), bank), self.s_axis_tdata
         bits = channel_bits(self.channels)
-        buffer = m.submodules.input_buffer = StreamBuffer(len(self.s_axis_tdata) + bits + 1)
+        buffer = m.submodules.input_buffer = StreamBuffer(len(self.s_axis_tdata) + self.flags_given + bits + 1)
         clearing = Signal(init=1)
         cleared = Signal(bits)
         exists = self.s_axis_tdest < self.channels
@@ -447,7 +455,7 @@ class Core(wiring.Component):
         m.d.comb += [
             self.s_axis_tready.eq(buffer.advance & ~shut),
             buffer.i_valid.eq(self.s_axis_tvalid & exists & ~shut),
-            buffer.i_data.eq(Cat(self.s_axis_tdest[:bits], bank, self.s_axis_tdata)),
+            buffer.i_data.eq(Cat(self.s_axis_tdest[:bits], bank, self.s_axis_tdata, *self._given)),
             waiting.eq(banks_in_use([buffer.o_valid, ~buffer.advance], [buffer.o_data[bits], buffer.o_next[bits]])),
             valid.eq(buffer.o_valid & moves),
             buffer.o_ready.eq(advance & moves),

@@ -39,6 +39,7 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from sosmith.hdl.axi_stream import core_members, extended
+from sosmith.hdl.channel_decimator import ChannelDecimator
 from sosmith.hdl.core import Core
 from sosmith.hdl.folded import FoldedCore
 from sosmith.hdl.plan.streams import fields, width
@@ -257,7 +258,8 @@ class DecimatedCore(wiring.Component):
         self.ahead = ahead
         self.hold = hold
         self.core = core
-        super().__init__(core_members(datapath.inputs, datapath.output))
+        self.channels = core.channels
+        super().__init__(core_members(datapath.inputs, datapath.output, self.channels))
 
     def elaborate(self, platform: object) -> Module:
         """Connect decimator and core."""
@@ -266,7 +268,8 @@ class DecimatedCore(wiring.Component):
         m.domains.front = ClockDomain(local=True)  # the core has its own domain `sync`
         m.d.comb += [ClockSignal("front").eq(self.aclk), ResetSignal("front").eq(~self.aresetn)]
         flags = 0 if self.ahead is None else OF_INPUT
-        decimator, core = CicDecimator(self.datapath.decimator, flags), self.core
+        several, core, made = self.channels > 1, self.core, self.datapath.decimator
+        decimator = ChannelDecimator(made, self.channels, flags) if several else CicDecimator(made, flags)
         if self.ahead is not None:
             m.submodules.ahead = self.ahead
         m.submodules.decimator = DomainRenamer("front")(decimator)
@@ -279,46 +282,64 @@ class DecimatedCore(wiring.Component):
             ]
         else:
             self._connect_ahead(m, self.ahead, decimator)
+        if isinstance(decimator, ChannelDecimator):
+            source = self.s_axis_tdest if self.ahead is None else self.ahead.m_axis_tdest
+            m.d.comb += [decimator.i_dest.eq(source), core.s_axis_tdest.eq(decimator.o_dest)]
         m.d.comb += [
             core.aclk.eq(self.aclk),
             core.aresetn.eq(self.aresetn),
             core.s_axis_tdata.eq(decimator.o_data),
-            core.s_axis_tuser.eq(decimator.o_flags if flags else decimator.o_rail),
+            core.s_axis_tuser.eq(decimator.o_flags if flags or several else decimator.o_rail),
             core.s_axis_tvalid.eq(decimator.o_valid),
             decimator.o_ready.eq(core.s_axis_tready),
         ]
-        result: Value = Cat(core.m_axis_tdata, core.m_axis_tuser)
+        result: Value = Cat(core.m_axis_tdata, core.m_axis_tuser, *([core.m_axis_tdest] if several else []))
         valid, ready = core.m_axis_tvalid, self.m_axis_tready
         if self.hold:
             holder = Holder(len(result), self.datapath.decimator.factor)
             m.submodules.holder = DomainRenamer("front")(holder)
             m.d.comb += [holder.i_data.eq(result), holder.i_valid.eq(valid), holder.o_ready.eq(ready)]
             result, valid, ready = holder.o_data, holder.o_valid, holder.i_ready
-        data = len(self.m_axis_tdata)
+        data, user = len(self.m_axis_tdata), len(self.m_axis_tdata) + len(core.m_axis_tuser)
+        if several:
+            m.d.comb += self.m_axis_tdest.eq(result[user:])
         m.d.comb += [
             self.m_axis_tdata.eq(result[:data]),
-            self.m_axis_tuser.eq(result[data:]),
+            self.m_axis_tuser.eq(result[data:user] if several else result[data:]),
             self.m_axis_tvalid.eq(valid),
             core.m_axis_tready.eq(ready),
         ]
         return m
 
-    def _connect_ahead(self, m: Module, ahead: Core | FoldedCore, decimator: CicDecimator) -> None:
-        """Let samples go through the calibration to the decimator, the first one before it is accepted."""
+    def _connect_ahead(self, m: Module, ahead: Core | FoldedCore, decimator: CicDecimator | ChannelDecimator) -> None:
+        """Let samples go through the calibration to the decimator."""
+        m.d.comb += [
+            ahead.aclk.eq(self.aclk),
+            ahead.aresetn.eq(self.aresetn),
+            ahead.s_axis_tdata.eq(self.s_axis_tdata),
+            decimator.i_data.eq(ahead.m_axis_tdata),
+            decimator.i_flags.eq(ahead.m_axis_tuser),
+            decimator.i_valid.eq(ahead.m_axis_tvalid),
+            ahead.m_axis_tready.eq(decimator.i_ready),
+        ]
+        if isinstance(decimator, CicDecimator):
+            self._fill(m, ahead, decimator)
+        else:
+            m.d.comb += [
+                ahead.s_axis_tdest.eq(self.s_axis_tdest),
+                ahead.s_axis_tvalid.eq(self.s_axis_tvalid),
+                self.s_axis_tready.eq(ahead.s_axis_tready),
+            ]
+
+    def _fill(self, m: Module, ahead: Core | FoldedCore, decimator: CicDecimator) -> None:
+        """Let the first sample go through the calibration, and fill the decimator, before it is accepted."""
         first = Signal(init=1)
         fills = Signal()
         filled = Signal()
         flows = ~first & ~fills & ~filled
         m.d.comb += [
-            ahead.aclk.eq(self.aclk),
-            ahead.aresetn.eq(self.aresetn),
-            ahead.s_axis_tdata.eq(self.s_axis_tdata),
             ahead.s_axis_tvalid.eq(self.s_axis_tvalid & (first | flows)),
             self.s_axis_tready.eq(filled | (flows & ahead.s_axis_tready)),
-            decimator.i_data.eq(ahead.m_axis_tdata),
-            decimator.i_flags.eq(ahead.m_axis_tuser),
-            decimator.i_valid.eq(ahead.m_axis_tvalid),
-            ahead.m_axis_tready.eq(decimator.i_ready),
         ]
         m.d.front += filled.eq(0)
         with m.If(first & self.s_axis_tvalid & ahead.s_axis_tready):

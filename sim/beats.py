@@ -35,6 +35,11 @@ class Beats:
         """Count the transfers."""
         return len(self.tdata)
 
+    def results(self, samples: int, copies: int) -> int:
+        """Count what comes out: of each channel, for its first transfer and each group of `samples`, its copies."""
+        counts = np.bincount(self.tdest) if len(self) else np.zeros(0, dtype=np.int64)
+        return int((-(-counts // samples)).sum()) * copies
+
     def first(self, count: int) -> Beats:
         """Return a view of the first `count` transfers, or of all if there are fewer."""
         return Beats(self.tdest[:count], self.tdata[:count], self.tuser[:count])

@@ -13,7 +13,7 @@ from sosmith.gen.output.core_facts import InterfaceFacts
 from sosmith.model.arrays import Codes
 from sosmith.model.errors import ShortfallError
 from sosmith.sim.bench import Bench, Progress
-from sosmith.sim.stream_packing import each_once, pack, random_order, unpack
+from sosmith.sim.stream_packing import completing, each_once, pack, random_order, unpack
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,7 +102,7 @@ def cosimulate(
     order = random_order(samples, channels, seed)
     run = bench.run(pack(codes, order, interface.inputs), progress)
     if interface.samples_per_result > 1:
-        order = random_order(-(-samples // interface.samples_per_result), channels, seed)
+        order = completing(order, interface.samples_per_result)
     result, status = unpack(each_once(run.received, interface.copies_per_result), order, interface.outputs)
     return CosimulationResult(
         codes=result,

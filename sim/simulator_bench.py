@@ -92,7 +92,7 @@ class SimulatorBench:
             _run(
                 plain,
                 tool,
-                -(-len(sent) // self.interface.samples_per_result) * self.interface.copies_per_result,
+                sent.results(self.interface.samples_per_result, self.interface.copies_per_result),
                 progress,
             )
         outcome = json.loads((folder / "result.json").read_text(encoding="utf-8"))

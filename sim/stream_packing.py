@@ -28,6 +28,12 @@ def random_order(samples: int, channels: int, seed: int) -> Order:
     return np.concatenate(blocks)
 
 
+def completing(order: Order, samples: int) -> Order:
+    """Return the channels of the results, of which a channel's first sample brings one, and each further group."""
+    found: Order = order[_turns(order) % samples == 0]
+    return found
+
+
 def pack(codes: Codes, order: Order, stream: StreamFacts) -> Beats:
     """Pack codes into beats: each field is sign-extended to whole bytes.
 

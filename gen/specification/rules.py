@@ -372,7 +372,6 @@ def _check_decimation(document: Document) -> None:
             where=where,
         )
     beside: tuple[tuple[str, object, object], ...] = (
-        ("channels", document.channels, 1),
         ("hardware.reload", hardware.reload, False),
         ("hardware.protect", hardware.protect, "none"),
         ("hardware.start", hardware.start, "steady"),

@@ -30,7 +30,7 @@ def c_header(datapath: Datapath) -> str:
         name=datapath.name,
         ports=[_told(port) for port in (*datapath.inputs, datapath.output)],
         ahead_ports=[] if whole.ahead is None else list(map(_told, whole.ahead.inputs)),
-        taken=_parameters_of(whole),
+        taken=_parameters(whole),
         flags=[(f"{1 << flag:#04x}", flag.meaning) for flag in Flag],
         state_type=_type_of_states(datapath),
         states=max(state_count(datapath), 1),
@@ -85,9 +85,10 @@ def c_source(datapath: Datapath) -> str:
         wear_flags=" | ".join(f"(code >= limit[{k}]) << {flag.value}" for k, flag in judged),
         decimator=whole.decimator,
         rail=f"{1 << Flag.INPUT_AT_RAIL:#04x}",
+        channel="channel, " if _takes_channel(datapath) else "",
         of_input=f"{1 << Flag.INPUT_AT_RAIL | 1 << Flag.OUTSIDE_CALIBRATION:#04x}",
         ahead=None if whole.ahead is None else _ahead(whole.ahead),
-        taken=_parameters_of(whole),
+        taken=_parameters(whole),
     )
 
 

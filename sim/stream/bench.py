@@ -36,7 +36,7 @@ class StreamBench:
         self.count = 0
         self.patience = self.config["latency_cycles"] + self.config["reset_cycles"]
         bits = self.config["tdata_bits"], self.config["tuser_bits"]
-        self._received = Beats.zeros(self.results(len(self.words)), *bits)
+        self._received = Beats.zeros(self.results(self.words), *bits)
         self._outputs = [(name, f"m_axis_{name}") for name in ("tdest", "tdata", "tuser") if self.has(name)]
         self._expected = 0
         self._shown = 0
@@ -46,9 +46,9 @@ class StreamBench:
         """What has come out since the counting began."""
         return self._received.first(self.count)
 
-    def results(self, samples: int) -> int:
-        """Count what comes out for so many samples: a result for the first and each further group, and its copies."""
-        return -(-samples // int(self.config["samples_per_result"])) * int(self.config["copies_per_result"])
+    def results(self, beats: Beats) -> int:
+        """Count what comes out: of each channel a result for the first sample and each group behind it, with copies."""
+        return beats.results(int(self.config["samples_per_result"]), int(self.config["copies_per_result"]))
 
     def has(self, name: str) -> bool:
         """Whether the streams have the optional signal `name`."""
@@ -129,7 +129,7 @@ class StreamBench:
     async def stream(self, beats: Beats, *, probe: bool) -> None:
         """Send `beats` at a random pace and receive all their results, checking every clock."""
         pins, words = self.pins, _words(beats)
-        self._expected = self.results(len(words))
+        self._expected = self.results(beats)
         source = random.Random(self.config["seed"])
         idle, stall = Pace(source, self.config["idle"]), Pace(source, self.config["stall"])
         sent, offered, silence = 0, False, 0

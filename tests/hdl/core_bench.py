@@ -58,7 +58,13 @@ def simulate(dut: Any, testbench: Callable[[Any], Awaitable[None]]) -> None:
     simulator.run()
 
 
-def run_core(architecture: Architecture, samples: Sequence[tuple[int, Sequence[int]]], pace: Pace) -> list[Result]:
+def run_core(
+    architecture: Architecture,
+    samples: Sequence[tuple[int, Sequence[int]]],
+    pace: Pace,
+    *,
+    results: int | None = None,
+) -> list[Result]:
     """Feed a core; return its output beats in their order.
 
     Parameters
@@ -69,20 +75,23 @@ def run_core(architecture: Architecture, samples: Sequence[tuple[int, Sequence[i
         Channel and input codes of each sample, in the order in which they are offered; whole beats.
     pace : Pace
         Of the handshakes.
+    results : int or None
+        Number of output beats; None for as many as there are samples.
     """
+    wanted = len(samples) if results is None else results
     dut: Any = architecture.component()
     ports, output = fields(architecture.datapath.inputs), architecture.datapath.output
     lanes, size = architecture.samples_per_clock, width(architecture.datapath.inputs)
     beats = [(samples[k][0], samples[k : k + lanes]) for k in range(0, len(samples), lanes)]
     chance = random.Random(1)
-    results: list[Result] = []
+    found: list[Result] = []
 
     async def bench(ctx: Any) -> None:
         ctx.set(dut.aresetn, 0)
         await ctx.tick("bench").repeat(2)
         ctx.set(dut.aresetn, 1)
         taken, waited, offers = 0, 0, False
-        while len(results) < len(samples):
+        while len(found) < wanted or taken < len(beats):
             offers = taken < len(beats) and chance.random() >= (pace.withdraw if offers else pace.idle)
             channel, beat = beats[taken] if offers else (chance.getrandbits(1), [(0, [0] * len(ports))])
             word = sum(
@@ -104,11 +113,11 @@ def run_core(architecture: Architecture, samples: Sequence[tuple[int, Sequence[i
                     code = ctx.get(dut.m_axis_tdata) >> 8 * output.bytes * lane & ((1 << output.bits) - 1)
                     code -= (output.signed and code >> (output.bits - 1)) << output.bits
                     status = ctx.get(dut.m_axis_tuser) >> STATUS_BITS * lane & ((1 << STATUS_BITS) - 1)
-                    results.append(Result(channel, code, status))
+                    found.append(Result(channel, code, status))
                 moved = True
             waited = 0 if moved else waited + 1
-            assert waited < _PATIENCE, f"the core hangs after {len(results)} results"
+            assert waited < _PATIENCE, f"the core hangs after {len(found)} results"
             await ctx.tick("bench")
 
     simulate(dut, bench)
-    return results
+    return found

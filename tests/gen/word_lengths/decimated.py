@@ -46,9 +46,9 @@ output = {{ bits = 10, range = [0.0, 16.0], unit = "mm", max_error = "faithful" 
 
 
 @cache
-def small(extra: str = "") -> CoreDesign:
-    """Design a small instrument with a decimator; `extra` are lines of its specification."""
-    return design_core(from_text(INSTRUMENT.format(extra=extra), Path("slight.toml")))
+def small(extra: str = "", core: str = "instrument") -> CoreDesign:
+    """Design a small instrument with a decimator, or its filter alone; `extra` are lines of its specification."""
+    return design_core(from_text(INSTRUMENT.format(extra=extra), Path("slight.toml")), core=core)
 
 
 def tree_of(made: CoreDesign) -> Any:

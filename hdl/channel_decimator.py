@@ -1,0 +1,208 @@
+"""A CIC filter for many channels: one adder, which takes a clock for each integrator and comb, and states in memories.
+
+::
+
+    i_data, i_dest --> [sample] --> - --> + --> [acc] --> - --> [acc] --> + --> round --> [o_data]
+                                    |     |  N times      |  N times     |
+                                  first   states: sum k   states: comb k |
+                                    |     of the channel, read and written at the same clock
+                                    |                                first << growth
+                    control: started, phase, flags, first sample of the channel
+
+    clock of the edge     0        1          2       ..    N + 1       N + 2     ..    2N + 1      2N + 2
+    what is kept       sample    control     sum 1    ..    sum N       comb 1    ..    comb N      o_data, o_valid
+
+The first sample of a channel is as if it had been there for ever: it is taken off all samples, so that the sums begin
+with 0, and added to each result, times ``R**N``. Of a channel that has not started, states count as 0; so only the
+control is cleared, a channel a clock after a reset. All sums are modulo ``2**width``, see
+`sosmith.model.dataflow.decimator`.
+
+A sample without a result takes N + 2 clocks, one with a result 2N + 3. A sample of a channel that does not exist is
+accepted and dropped. `i_ready` comes from registers only.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value
+from amaranth.lib import wiring
+from amaranth.lib.memory import Memory
+from amaranth.lib.wiring import In, Out
+
+from sosmith.hdl.axi_stream import extended
+from sosmith.hdl.plan.streams import channel_bits, dest_width, fields, width
+from sosmith.hdl.status import RAIL_ALONE, at_rail
+from sosmith.model.dataflow.decimator import Decimator
+
+
+class ChannelDecimator(wiring.Component):
+    """A CIC filter between two streams, for several channels.
+
+    Latency and throughput: those of `sosmith.hdl.plan.decimator_clocks` for several channels.
+
+    Parameters
+    ----------
+    decimator : Decimator
+        What it computes for each channel.
+    channels : int
+        Number of channels, at least 2.
+    flags : int
+        How many flags come with a sample; 0 to find out whether it is at the end of its range.
+
+    Members
+    -------
+    i_data, i_dest, i_valid, i_ready
+        Samples at the higher rate and their channels, by the rules of AXI4-Stream; `i_data` is as wide as on a core's
+        stream, or, with flags, as the code.
+    i_flags
+        Flags of a sample; only if there are any.
+    o_data, o_flags, o_dest, o_valid, o_ready
+        Results: the code of `decimator.output`, the flags of any sample of the channel since its result before, and the
+        channel.
+    """
+
+    def __init__(self, decimator: Decimator, channels: int, flags: int = 0) -> None:
+        self.decimator = decimator
+        self.channels = channels
+        self.flags = flags
+        super().__init__(
+            {
+                "i_data": In(decimator.input.bits if flags else width([decimator.input])),
+                **({"i_flags": In(flags)} if flags else {}),
+                "i_dest": In(dest_width(channels)),
+                "i_valid": In(1),
+                "i_ready": Out(1),
+                "o_data": Out(decimator.output.bits),
+                "o_flags": Out(flags or RAIL_ALONE),
+                "o_dest": Out(dest_width(channels)),
+                "o_valid": Out(1),
+                "o_ready": In(1),
+            }
+        )
+
+    def elaborate(self, platform: object) -> Module:
+        """Build the sequence, the two memories and the adder."""
+        m = Module()
+        made, bits = self.decimator, channel_bits(self.channels)
+        channel = Signal(bits)
+        sample = Signal(made.input.bits, reset_less=True)
+        gathered = Signal(len(self.o_flags), reset_less=True)
+        acc = Signal(made.width, reset_less=True)
+        step = Signal(range(2 * made.stages))
+        (field,) = fields([made.input])
+        kept = self._control(m, channel, sample, gathered)
+        adds = Signal()
+        total = self._states(m, channel, (step, adds), kept.started, acc)
+        rounded = acc + (extended(self._code(kept.first), made.width) << made.growth)[: made.width]
+        with m.If(self.o_ready):
+            m.d.sync += self.o_valid.eq(0)
+        with m.FSM():
+            with m.State("CLEAR"):
+                m.d.comb += kept.clears.eq(1)
+                m.d.sync += channel.eq(channel + 1)
+                with m.If(channel == self.channels - 1):
+                    m.next = "IDLE"
+            with m.State("IDLE"):
+                m.d.comb += [self.i_ready.eq(1), kept.reads.eq(1)]
+                m.d.sync += [
+                    channel.eq(self.i_dest[:bits]),
+                    sample.eq(self.i_data[field.offset : field.offset + made.input.bits]),
+                    gathered.eq(self.i_flags if self.flags else at_rail([made.input], self.i_data)),
+                ]
+                with m.If(self.i_valid & (self.i_dest < self.channels)):
+                    m.next = "TAKE"
+            with m.State("TAKE"):
+                m.d.sync += [acc.eq(self._code(sample) - self._code(kept.first)), step.eq(0)]
+                m.next = "ADD"
+            with m.State("ADD"):
+                m.d.comb += adds.eq(1)
+                m.d.sync += [acc.eq(total), step.eq(step + 1)]
+                with m.If((step == made.stages - 1) & ~kept.completes):
+                    m.d.comb += kept.writes.eq(1)
+                    m.next = "IDLE"
+                with m.If(step == 2 * made.stages - 1):
+                    m.next = "GIVE"
+            with m.State("GIVE"), m.If(~self.o_valid | self.o_ready):
+                m.d.comb += kept.writes.eq(1)
+                m.d.sync += [
+                    self.o_data.eq((rounded[: made.width] + (1 << made.dropped >> 1)) >> made.dropped),
+                    self.o_flags.eq(kept.flags | gathered),
+                    self.o_dest.eq(channel),
+                    self.o_valid.eq(1),
+                ]
+                m.next = "IDLE"
+        return m
+
+    def _code(self, bits: Value) -> Value:
+        """Return a code of the input as a number."""
+        return bits.as_signed() if self.decimator.input.signed else bits
+
+    def _control(self, m: Module, channel: Signal, sample: Signal, gathered: Signal) -> _Kept:
+        """Keep of each channel whether it has started, the phase, the flags, and the first sample."""
+        made, count = self.decimator, len(self.o_flags)
+        phases = made.factor.bit_length() - 1
+        m.submodules.control = memory = Memory(shape=1 + phases + count + len(sample), depth=self.channels, init=[])
+        read, write = memory.read_port(), memory.write_port()
+        kept = _Kept(
+            started=Signal(name="started"),
+            first=Signal(len(sample), name="first"),
+            flags=Signal(count, name="flags"),
+            completes=Signal(name="completes"),
+            clears=Signal(name="clears"),
+            reads=Signal(name="reads"),
+            writes=Signal(name="writes"),
+        )
+        phase = Signal(phases)
+        m.d.comb += kept.first.eq(sample)
+        with m.If(read.data[0]):
+            m.d.comb += Cat(kept.started, phase, kept.flags, kept.first).eq(read.data)
+        told = Mux(kept.completes, 0, kept.flags | gathered)
+        m.d.comb += [
+            kept.completes.eq(phase == 0),
+            read.en.eq(kept.reads),
+            read.addr.eq(self.i_dest),
+            write.en.eq(kept.clears | kept.writes),
+            write.addr.eq(channel),
+        ]
+        with m.If(kept.writes):
+            m.d.comb += write.data.eq(Cat(Const(1, 1), (phase + 1)[:phases], told[:count], kept.first))
+        return kept
+
+    def _states(
+        self, m: Module, channel: Signal, control: tuple[Signal, Signal], started: Signal, acc: Signal
+    ) -> Value:
+        """Keep of each channel its sums and combs; return what a step makes of the accumulator."""
+        made, (step, adds) = self.decimator, control
+        steps = len(step)
+        m.submodules.states = memory = Memory(shape=made.width, depth=self.channels << steps, init=[])
+        read, write = memory.read_port(), memory.write_port()
+        combing = Signal()
+        state = Signal(made.width)
+        total = Signal(made.width)
+        m.d.comb += [
+            combing.eq(step >= made.stages),
+            read.addr.eq(Cat(Mux(adds, step + 1, 0)[:steps], channel)),
+            read.en.eq(1),
+            state.eq(Mux(started, read.data, 0)),
+            total.eq(acc + Mux(combing, ~state, state) + combing),
+            write.addr.eq(Cat(step, channel)),
+            write.data.eq(Mux(combing, acc, total)),
+            write.en.eq(adds),
+        ]
+        return total
+
+
+class _Kept(NamedTuple):
+    """What is kept of a channel: of one that has not started nothing, but its first sample is the one that is there.
+
+    The last three are driven from outside: whether it is cleared, read, and written.
+    """
+
+    started: Signal
+    first: Signal
+    flags: Signal
+    completes: Signal
+    clears: Signal
+    reads: Signal
+    writes: Signal
