@@ -97,41 +97,40 @@ class ChannelDecimator(wiring.Component):
         rounded = acc + (extended(self._code(kept.first), made.width) << made.growth)[: made.width]
         with m.If(self.o_ready):
             m.d.sync += self.o_valid.eq(0)
-        with m.FSM():
-            with m.State("CLEAR"):
-                m.d.comb += kept.clears.eq(1)
-                m.d.sync += channel.eq(channel + 1)
-                with m.If(channel == self.channels - 1):
-                    m.next = "IDLE"
-            with m.State("IDLE"):
-                m.d.comb += [self.i_ready.eq(1), kept.reads.eq(1)]
-                m.d.sync += [
-                    channel.eq(self.i_dest[:bits]),
-                    sample.eq(self.i_data[field.offset : field.offset + made.input.bits]),
-                    gathered.eq(self.i_flags if self.flags else at_rail([made.input], self.i_data)),
-                ]
-                with m.If(self.i_valid & (self.i_dest < self.channels)):
-                    m.next = "TAKE"
-            with m.State("TAKE"):
-                m.d.sync += [acc.eq(self._code(sample) - self._code(kept.first)), step.eq(0)]
-                m.next = "ADD"
-            with m.State("ADD"):
-                m.d.comb += adds.eq(1)
-                m.d.sync += [acc.eq(total), step.eq(step + 1)]
-                with m.If((step == made.stages - 1) & ~kept.completes):
-                    m.d.comb += kept.writes.eq(1)
-                    m.next = "IDLE"
-                with m.If(step == 2 * made.stages - 1):
-                    m.next = "GIVE"
-            with m.State("GIVE"), m.If(~self.o_valid | self.o_ready):
+        # One of these is 1 at each clock.
+        clearing, idle, takes, gives = Signal(init=1), Signal(), Signal(), Signal()
+        m.d.comb += [self.i_ready.eq(idle), kept.clears.eq(clearing), kept.reads.eq(idle)]
+        with m.If(clearing):
+            m.d.sync += channel.eq(channel + 1)
+            with m.If(channel == self.channels - 1):
+                m.d.sync += [clearing.eq(0), idle.eq(1)]
+        with m.If(idle):
+            m.d.sync += [
+                channel.eq(self.i_dest[:bits]),
+                sample.eq(self.i_data[field.offset : field.offset + made.input.bits]),
+                gathered.eq(self.i_flags if self.flags else at_rail([made.input], self.i_data)),
+            ]
+            with m.If(self.i_valid & (self.i_dest < self.channels)):
+                m.d.sync += [idle.eq(0), takes.eq(1)]
+        with m.If(takes):
+            m.d.sync += [acc.eq(self._code(sample) - self._code(kept.first)), step.eq(0), takes.eq(0), adds.eq(1)]
+        with m.If(adds):
+            m.d.sync += [acc.eq(total), step.eq(step + 1)]
+            with m.If((step == made.stages - 1) & ~kept.completes):
                 m.d.comb += kept.writes.eq(1)
-                m.d.sync += [
-                    self.o_data.eq((rounded[: made.width] + (1 << made.dropped >> 1)) >> made.dropped),
-                    self.o_flags.eq(kept.flags | gathered),
-                    self.o_dest.eq(channel),
-                    self.o_valid.eq(1),
-                ]
-                m.next = "IDLE"
+                m.d.sync += [adds.eq(0), idle.eq(1)]
+            with m.If(step == 2 * made.stages - 1):
+                m.d.sync += [adds.eq(0), gives.eq(1)]
+        with m.If(gives & (~self.o_valid | self.o_ready)):
+            m.d.comb += kept.writes.eq(1)
+            m.d.sync += [
+                self.o_data.eq((rounded[: made.width] + (1 << made.dropped >> 1)) >> made.dropped),
+                self.o_flags.eq(kept.flags | gathered),
+                self.o_dest.eq(channel),
+                self.o_valid.eq(1),
+                gives.eq(0),
+                idle.eq(1),
+            ]
         return m
 
     def _code(self, bits: Value) -> Value:
@@ -159,7 +158,7 @@ class ChannelDecimator(wiring.Component):
             m.d.comb += Cat(kept.started, phase, kept.flags, kept.first).eq(read.data)
         told = Mux(kept.completes, 0, kept.flags | gathered)
         m.d.comb += [
-            kept.completes.eq(phase == 0),
+            kept.completes.eq(~phase.any()),
             read.en.eq(kept.reads),
             read.addr.eq(self.i_dest),
             write.en.eq(kept.clears | kept.writes),

@@ -12,6 +12,7 @@ from sosmith.gen.filter.decimation import group_delay, nearest_db
 from sosmith.gen.filter.design import design
 from sosmith.gen.filter.largest_gain import LargestGain
 from sosmith.gen.fpga.boards import find_board
+from sosmith.model.dataflow.decimator import Decimator
 
 _HALF = Fraction(1, 2)
 
@@ -206,9 +207,9 @@ class RateCosts:
         Clocks that each sample of the input takes, on average, at the highest rate. A calibration before a decimator
         works while the filter does: the slower of them counts.
     memory_bits : int or None
-        Bits of memory, with those of a calibration before a decimator; None in the parallel architecture.
+        Bits of memory for a channel, with those of a calibration before a decimator; None in the parallel architecture.
     decimator_bits : int
-        Bits of the decimator's registers, without its control.
+        Bits of the decimator's registers, without its control; with several channels, of its memories for each of them.
     bound : float
         Proven bound on the error, in the output's unit.
     delay : float
@@ -237,11 +238,15 @@ def rate_costs(made: CoreDesign) -> RateCosts:
     return RateCosts(
         clocks_per_sample=architecture.cycles_per_result / factor,
         memory_bits=architecture.memory_bits,
-        decimator_bits=0 if decimator is None else decimator.register_bits,
+        decimator_bits=0 if decimator is None else _kept_bits(decimator, made.spec.channels),
         bound=float(quantized.bound * made.datapath.output.lsb),
         delay=float(delay),
         architecture=_named(architecture),
     )
+
+
+def _kept_bits(decimator: Decimator, channels: int) -> int:
+    return decimator.register_bits if channels == 1 else decimator.bits_of_channel
 
 
 def _named(architecture: Architecture) -> str:

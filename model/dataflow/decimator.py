@@ -92,6 +92,11 @@ class Decimator:
         return 2 * self.stages * self.width + (self.width if self.dropped else 0)
 
     @property
+    def bits_of_channel(self) -> int:
+        """Bits that hardware for several channels keeps of each in memories: all sums, first sample, and phase."""
+        return 2 * self.stages * self.width + self.input.bits + self.factor.bit_length()
+
+    @property
     def lsb(self) -> Fraction:
         """Physical value of one LSB of the output."""
         return self.input.lsb * Fraction(2) ** (self.dropped - self.growth)

@@ -564,12 +564,6 @@ BAD = [
         "not yet available: filter.decimate must be left out unless the filter is given by order and cutoff, not 2",
     ),
     (
-        "decimation of several channels",
-        f"{RATE}\n",
-        f"{RATE}\nchannels = 3\n{DECIMATED}",
-        "not yet available: channels must be 1 with filter.decimate, not 3",
-    ),
-    (
         "decimation with constants to be loaded",
         CLOCK,
         f"{CLOCK}\nreload = true\n{DECIMATED}",

@@ -164,7 +164,7 @@ BROKEN = [
     ("no first sample", "(extended(self._code(kept.first), made.width) << made.growth)[: made.width]", "0"),
     ("flags that stay", "Mux(kept.completes, 0, kept.flags | gathered)", "kept.flags | gathered"),
     ("a comb of another delay", "Mux(combing, acc, total)", "total"),
-    ("a result overwritten", "with m.If(~self.o_valid | self.o_ready):", "with m.If(1):"),
+    ("a result overwritten", "with m.If(gives & (~self.o_valid | self.o_ready)):", "with m.If(gives):"),
     ("one state for all", "write.addr.eq(Cat(step, channel))", "write.addr.eq(step)"),
     ("a channel more", "(self.i_dest < self.channels)", "1"),
 ]

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.gen.word_lengths.decimated import locomotive, locomotive_text, read, tree_of
+from tests.gen.word_lengths.decimated import locomotive, locomotive_text, read, small, tree_of
 from tests.gen.word_lengths.multirate import worst_error
 from tests.sim.lint import icarus_check, lint
 
@@ -32,13 +32,20 @@ from sosmith.sim.simulation import simulate
 WEAR = "\n[wear]\ninitial = 4.0\nwarning = 1.4\nlimit = 1.8\n"
 
 
+CHANNELS = """
+channels = 5
+hardware.architecture = "{}"
+wear = {{ initial = [3.0, 3.5, 4.0, 4.5, 5.0], warning = 1.4, limit = 3.8 }}
+"""
+
+
 def whole(architecture: str) -> CoreDesign:
     return locomotive(architecture=architecture, core="instrument")
 
 
 def samples_of(made: CoreDesign, count: int) -> Trace:
     """Return random codes, the ends of both ranges, and a constant, which the filter settles on."""
-    (trace,) = traces_for(made, "worst_case", seed=3)
+    trace, *_ = traces_for(made, "worst_case", seed=3)
     codes = np.random.default_rng(count).integers(
         [port.lowest for port in made.datapath.inputs], [port.highest + 1 for port in made.datapath.inputs], (count, 2)
     )
@@ -89,6 +96,26 @@ def test_wear_held_and_judged(tmp_path: Path) -> None:
     assert (evidence.mismatches, evidence.samples) == (0, 132)
     assert {status >> 3 & 3 for status in made.datapath.compute_status(codes).tolist()} == {0, 1, 3}
     assert json.loads((tmp_path / f"{made.spec.name}.json").read_text(encoding="utf-8"))["decimation"]["held"]
+
+
+@pytest.mark.parametrize(
+    ("architecture", "core", "simulator"),
+    [("folded", "instrument", "icarus"), ("parallel", "instrument", "verilator"), ("folded", "filter", "verilator")],
+)
+def test_channels_in_any_order(architecture: str, core: str, simulator: str, tmp_path: Path) -> None:
+    """Each has its own limits of wear, and its samples come at random among those of the others."""
+    made = small(CHANNELS.format(architecture), core)
+    trace, *_ = traces_for(made, "worst_case", seed=1)
+    rng = np.random.default_rng(1)
+    codes = [np.repeat(rng.integers(0, 1024, (12, trace.codes.shape[1])), 20, axis=0) for _ in range(5)]
+    traces = [replace(trace, codes=each, truth=None, reading=None) for each in codes]
+    evidence = simulate(made, traces, tmp_path, seed=5, simulator=simulator)
+    assert (evidence.mismatches, evidence.samples) == (0, 5 * 60)
+    assert write_report(evidence, tmp_path)["passed"]
+    text = tmp_path / f"{made.spec.name}.sv"
+    assert lint(text, made.spec.name, tmp_path / "lint") == []
+    status = made.datapath.compute_status(np.stack(codes, axis=1))
+    assert {flags >> 3 & 3 for flags in status.ravel().tolist()} == {0, 1, 3}
 
 
 @pytest.mark.slow
@@ -165,6 +192,7 @@ def random_tree(number: int) -> dict[str, Any]:
     return {
         "name": f"instrument{number}",
         "sample_rate": 1000,
+        "channels": 3 if number % 6 == 5 else 1,
         "input": inputs,
         "calibration": {"coefficients": rows},
         "filter": table,
@@ -215,6 +243,7 @@ def test_random_designs(number: int, tmp_path: Path) -> None:
     assert verdict.bound * datapath.output.lsb <= spec.max_error
     check_specification(certificate, spec.text, verdict.margin)
     count = 60 * datapath.decimator.factor + number % 7
-    evidence = simulate(made, [samples_of(made, count)], tmp_path, seed=number)
+    trace = samples_of(made, count)
+    evidence = simulate(made, [trace.delayed(k) for k in range(spec.channels)], tmp_path, seed=number)
     assert evidence.mismatches == 0
-    assert evidence.samples == datapath.results(count)
+    assert evidence.samples == datapath.results(count) * spec.channels

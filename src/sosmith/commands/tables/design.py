@@ -55,7 +55,7 @@ def print_design(design: Design, *, details: bool = False) -> None:
     console.print(overview)
     print_budget(console, design.budget, datapath.output.lsb, design.specification.max_error)
     if design.facts.decimation is not None:
-        _print_rates(console, design.rate_costs, datapath.output.unit)
+        _print_rates(console, design.rate_costs, datapath.output.unit, made.spec.channels)
     if not details:
         return
     if design.uncertainty is not None:
@@ -105,13 +105,14 @@ def _add_decimation(overview: Table, design: Design) -> None:
     overview.add_row("gain in the pass band", f"within {found.deviation_db:.2g} dB of that without a decimator")
 
 
-def _print_rates(console: Console, costs: Mapping[str, RateCosts], unit: str) -> None:
+def _print_rates(console: Console, costs: Mapping[str, RateCosts], unit: str, channels: int) -> None:
     table = new_table("The same filter without a decimator", ["", *costs])
     table.add_row("architecture", *(each.architecture for each in costs.values()))
     table.add_row("clocks a sample", *(f"{each.clocks_per_sample:,.4g}" for each in costs.values()))
     memories = ("none" if each.memory_bits is None else f"{each.memory_bits:,} bits" for each in costs.values())
     table.add_row("memory", *memories)
-    table.add_row("registers of the decimator", *(f"{each.decimator_bits:,} bits" for each in costs.values()))
+    where = "registers" if channels == 1 else "memory"
+    table.add_row(f"{where} of the decimator", *(f"{each.decimator_bits:,} bits" for each in costs.values()))
     table.add_row("error bound", *(escape(quantity(each.bound, unit)) for each in costs.values()))
     table.add_row("delay", *(quantity(each.delay, "s") for each in costs.values()))
     console.print(table)
