@@ -325,7 +325,7 @@ class Architecture:
         from sosmith.hdl.decimator import DecimatedCore
 
         ahead = None if self.ahead is None else self.ahead._core(before=True)
-        return DecimatedCore(self.datapath, made, ahead, hold=self.hold)
+        return DecimatedCore(self.datapath, made, ahead, hold=self.hold, opens=self._cleared_cycles)
 
     def _core(self, *, before: bool = False) -> BlockCore | Core | FoldedCore:
         """Make what works on the datapath's own stages, `before` a decimator or behind it."""

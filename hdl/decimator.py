@@ -239,6 +239,8 @@ class DecimatedCore(wiring.Component):
         The core for `datapath.ahead`, whose results go to the decimator; None without one.
     hold : bool
         Whether each result is handed out once for each of its samples.
+    opens : int
+        Clocks after a reset before a sample is let in, with several channels: while the core clears its memories.
 
     Members
     -------
@@ -253,9 +255,11 @@ class DecimatedCore(wiring.Component):
         ahead: Core | FoldedCore | None = None,
         *,
         hold: bool = False,
+        opens: int = 0,
     ) -> None:
         self.datapath = datapath
         self.ahead = ahead
+        self.opens = opens
         self.hold = hold
         self.core = core
         self.channels = core.channels
@@ -274,14 +278,14 @@ class DecimatedCore(wiring.Component):
             m.submodules.ahead = self.ahead
         m.submodules.decimator = DomainRenamer("front")(decimator)
         m.submodules.behind = core
-        if self.ahead is None:
-            m.d.comb += [
-                decimator.i_data.eq(self.s_axis_tdata),
-                decimator.i_valid.eq(self.s_axis_tvalid),
-                self.s_axis_tready.eq(decimator.i_ready),
-            ]
-        else:
+        if self.ahead is not None:
             self._connect_ahead(m, self.ahead, decimator)
+        else:
+            m.d.comb += decimator.i_data.eq(self.s_axis_tdata)
+            if several:
+                self._open(m, decimator.i_valid, decimator.i_ready)
+            else:
+                m.d.comb += [decimator.i_valid.eq(self.s_axis_tvalid), self.s_axis_tready.eq(decimator.i_ready)]
         if isinstance(decimator, ChannelDecimator):
             source = self.s_axis_tdest if self.ahead is None else self.ahead.m_axis_tdest
             m.d.comb += [decimator.i_dest.eq(source), core.s_axis_tdest.eq(decimator.o_dest)]
@@ -325,11 +329,17 @@ class DecimatedCore(wiring.Component):
         if isinstance(decimator, CicDecimator):
             self._fill(m, ahead, decimator)
         else:
-            m.d.comb += [
-                ahead.s_axis_tdest.eq(self.s_axis_tdest),
-                ahead.s_axis_tvalid.eq(self.s_axis_tvalid),
-                self.s_axis_tready.eq(ahead.s_axis_tready),
-            ]
+            m.d.comb += ahead.s_axis_tdest.eq(self.s_axis_tdest)
+            self._open(m, ahead.s_axis_tvalid, ahead.s_axis_tready)
+
+    def _open(self, m: Module, valid: Value, ready: Value) -> None:
+        """Let samples in to what takes them, but not before all memories behind it are cleared."""
+        closed = Signal(range(self.opens + 1), init=self.opens)
+        m.d.front += closed.eq(closed - closed.any())
+        m.d.comb += [
+            valid.eq(self.s_axis_tvalid & ~closed.any()),
+            self.s_axis_tready.eq(ready & ~closed.any()),
+        ]
 
     def _fill(self, m: Module, ahead: Core | FoldedCore, decimator: CicDecimator) -> None:
         """Let the first sample go through the calibration, and fill the decimator, before it is accepted."""

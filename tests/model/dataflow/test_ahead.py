@@ -82,29 +82,52 @@ def test_a_result_tells_of_the_flags_of_all_its_samples() -> None:
     assert (instrument().compute_status(both) & 3).T.tolist() == [expected, [0] * 9]
 
 
-def test_the_c_model_takes_every_sample(tmp_path: Path) -> None:
-    datapath = instrument()
+def compiled(datapath: Datapath, folder: Path) -> Any:
+    """Compile the C model, and return its function that takes samples at the higher rate."""
     compiler = shutil.which("cc") or shutil.which("gcc")
     assert compiler is not None
-    (tmp_path / "lowpass.h").write_text(c_header(datapath), encoding="utf-8")
-    (tmp_path / "lowpass.c").write_text(c_source(datapath), encoding="utf-8")
+    (folder / "lowpass.h").write_text(c_header(datapath), encoding="utf-8")
+    (folder / "lowpass.c").write_text(c_source(datapath), encoding="utf-8")
     flags = ["-std=gnu99", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC"]
-    subprocess.run([compiler, *flags, "-o", "lowpass.so", "lowpass.c"], cwd=tmp_path, check=True)
-    push = ctypes.CDLL(str(tmp_path / "lowpass.so")).lowpass_push
-    push.argtypes = [ctypes.c_void_p, ctypes.c_int64, ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p]
-    codes = np.concatenate([flagged()[0], codes_for(500)])
+    subprocess.run([compiler, *flags, "-o", "lowpass.so", "lowpass.c"], cwd=folder, check=True)
+    return ctypes.CDLL(str(folder / "lowpass.so")).lowpass_push
+
+
+def pushed(push: Any, codes: np.ndarray, *channel: int) -> list[tuple[int, int]]:
+    """Return results and status that the C model gives for the samples of a channel."""
+    push.argtypes = [ctypes.c_void_p, *([ctypes.c_size_t] * len(channel)), *([ctypes.c_int64] * 2)]
+    push.argtypes += [ctypes.c_void_p] * 2
     state = ctypes.create_string_buffer(4096)
     result, status = ctypes.c_int64(), ctypes.c_uint8()
-    found = [
+    return [
         (result.value, status.value)
         for v, t in codes.tolist()
-        if push(state, v, t, ctypes.byref(result), ctypes.byref(status))
+        if push(state, *channel, v, t, ctypes.byref(result), ctypes.byref(status))
     ]
+
+
+def test_the_c_model_takes_every_sample(tmp_path: Path) -> None:
+    datapath = instrument()
+    codes = np.concatenate([flagged()[0], codes_for(500)])
+    found = pushed(compiled(datapath, tmp_path), codes)
     assert [code for code, _ in found] == datapath.compute(codes).tolist()
     assert [flags for _, flags in found] == datapath.compute_status(codes).tolist()
     header = c_header(datapath)
     assert "voltage_code: 0 .. 255" in header
     assert "calibration\n * and the decimator" in header
+
+
+def test_the_c_model_judges_the_wear_of_each_channel(tmp_path: Path) -> None:
+    limits = ((2000, 9000), (-20_000, 20_000), (-9000, 2000))
+    datapath = instrument(wear=limits)
+    push = compiled(datapath, tmp_path)
+    codes = np.stack([codes_for(400), codes_for(400)[::-1], codes_for(401)[1:]], axis=1)
+    status = datapath.compute_status(codes)
+    assert {flags >> 3 & 3 for flags in status.ravel().tolist()} == {0, 1, 3}
+    for channel in range(3):
+        found = pushed(push, codes[:, channel], channel)
+        assert [code for code, _ in found] == datapath.compute(codes)[:, channel].tolist()
+        assert [flags for _, flags in found] == status[:, channel].tolist()
 
 
 @pytest.mark.parametrize(
