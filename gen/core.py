@@ -380,6 +380,21 @@ def _left(blocks: Blocks, ahead: Architecture) -> Blocks:
     return blocks._replace(available=max(0, blocks.available - ahead.multiplier_blocks))
 
 
+def refuse_decimated_channels(design: CoreDesign, where: str) -> None:
+    """Refuse a core that decimates several channels `where` only others can be.
+
+    Raises
+    ------
+    SpecificationError
+        If it does.
+    """
+    channels = design.spec.channels
+    if design.datapath.decimator is not None and channels > 1:
+        raise SpecificationError(
+            f"{design.spec.path}: not yet available: channels must be 1 with filter.decimate {where}, not {channels}"
+        )
+
+
 def _known(wanted: str) -> str:
     if wanted not in {AUTO, *REALIZATIONS}:
         known = (AUTO, *REALIZATIONS)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from typing import Literal
 
-from sosmith.gen.core import CoreDesign
+from sosmith.gen.core import CoreDesign, refuse_decimated_channels
 from sosmith.gen.output.core_facts import interface_facts
 from sosmith.gen.reload.register_writes import bank_size
 from sosmith.gen.version import __version__
@@ -64,6 +64,7 @@ def identity(
 
 def _check(design: CoreDesign) -> None:
     """Check that a core takes one sample at a time, and has a result for each."""
+    refuse_decimated_channels(design, "on a board")
     lanes, decimator = design.architecture.samples_per_clock, design.datapath.decimator
     if lanes > 1:
         raise SpecificationError(

@@ -50,11 +50,7 @@ def bench_files(design: CoreDesign, facts: PackageFacts) -> dict[str, str]:
         "data_user": out.width + out.user_width,
         "response": out.dest_width + out.user_width + out.width,
         "registers": [pin for pin in facts.pins if pin.bus == "s_axil"],
-        "patience": interface.reset_cycles
-        + interface.latency_cycles
-        + facts.core.cycles_per_sample
-        + gathered
-        + _SPARE,
+        "patience": interface.reset_cycles + interface.latency_cycles + each + gathered + _SPARE,
         "channels": facts.core.channels,
         "takes_channel": len(datapath.wear) > 1,
         "inputs": into.fields,

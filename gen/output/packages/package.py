@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from sosmith.gen.core import CoreDesign
+from sosmith.gen.core import CoreDesign, refuse_decimated_channels
 from sosmith.gen.output.generate import generated
 from sosmith.gen.output.packages.bench import bench_files
 from sosmith.gen.output.packages.driver import driver_files
@@ -61,6 +61,7 @@ def packed(
     design: CoreDesign, progress: Callable[[str], None] = lambda step: None, *, vlnv: Vlnv | None = None
 ) -> dict[str, str]:
     """Return the texts that `package` writes, by their paths in the package; parameters and errors as there."""
+    refuse_decimated_channels(design, "in a package")
     facts = package_facts(design, vlnv)
     core = generated(design, progress, facts=facts.core)
     progress("bench")
