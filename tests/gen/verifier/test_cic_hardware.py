@@ -168,10 +168,10 @@ BROKEN = [
     ("a sum that takes what is not there", "with m.If(valid):", "with m.If(1):"),
     ("a flag of one sample", "(rail | found) & ~completes", "found & ~completes"),
     ("one copy less", "left.eq(self.copies - 1)", "left.eq(self.copies - 2)"),
-    ("a word that is not held", "self.i_ready.eq(~self.o_valid | (self.o_ready & (left == 0)))", "self.i_ready.eq(1)"),
+    ("a word that is not held", "self.i_ready.eq(~self.o_valid | (self.o_ready & ~left.any()))", "self.i_ready.eq(1)"),
     ("a reset that is not passed on", "core.aresetn.eq(self.aresetn)", "core.aresetn.eq(1)"),
     ("a reset the wrong way round", 'ResetSignal("front").eq(~self.aresetn)', 'ResetSignal("front").eq(self.aresetn)'),
-    ("a flag that gets lost", "core.s_axis_tuser.eq(decimator.o_rail)", "core.s_axis_tuser.eq(0)"),
+    ("a flag that gets lost", "if flags else decimator.o_rail)", "if flags else 0)"),
     ("a sink that is not asked", "core.m_axis_tready.eq(ready)", "core.m_axis_tready.eq(1)"),
     ("results the wrong way round", "self.m_axis_tdata.eq(result[:data])", "self.m_axis_tdata.eq(result[:data][::-1])"),
 ]
