@@ -107,7 +107,12 @@ def flattened(modules: Mapping[str, Module], clock: str) -> Netlist:
     """
     top = next(iter(modules.values()))
     netlist = Netlist(dict(top.ports))
-    _Flattening(modules, netlist, clock).add(top, "", {clock: clock})
+    flattening = _Flattening(modules, netlist, clock)
+    flattening.add(top, "", {clock: clock})
+    for register in netlist.registers.values():
+        flattening.check_statements(register.statements)
+    for memory in netlist.memories.values():
+        flattening.check_statements(memory.statements)
     for name, drivers in netlist.drivers.items():
         drivers.sort(key=lambda driver: driver.low)
         ends = [0, *(driver.low + driver.width for driver in drivers)]
@@ -188,6 +193,16 @@ class _Flattening:
                 self._drive(own, value)
             else:
                 self._drive(value, own)
+
+    def check_statements(self, statements: Sequence[Statement]) -> None:
+        """Check that all names in statements are declared, with the bits that are used."""
+        for statement in statements:
+            if isinstance(statement, Load):
+                self._check_names(statement.target)
+                self._check_names(statement.value)
+            else:
+                self._check_names(statement.condition)
+                self.check_statements((*statement.yes, *statement.no))
 
     def _drive(self, target: Expression, value: Expression) -> None:
         """Let `value` drive the bits of `target`: it is cut, or extended, to their number."""

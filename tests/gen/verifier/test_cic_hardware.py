@@ -204,6 +204,7 @@ def test_sentences() -> None:
         ".o_ready(s_axis_tvalid),\n    .o_valid(o_valid)\n  );",
         "decimator.o_ready must be an output of the core",
     )
+    rejected("sum2 <= n38[11:0];", "sum2 <= sum3;", "decimator.sum3 must be declared to be used")
     other = designed(CASES[0][0]._replace(hold=False))[1]
     with pytest.raises(RejectedError, match=r"^results must not be held, as specified$"):
         check_decimator(text, other)
