@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterator
 from functools import cache
+from pathlib import Path
 from typing import NamedTuple
 
 import pytest
@@ -11,11 +12,14 @@ from tests.gen.verifier.parallel.cores import specified
 from tests.gen.word_lengths.decimated import read, tree_of
 
 from sosmith.gen.core import CoreDesign, design_core
+from sosmith.gen.output.generate import generate
 from sosmith.gen.output.verilog import to_rtlil, to_verilog
+from sosmith.gen.specification.specification import from_text
 from sosmith.gen.verifier.certificate_file import Certificate
 from sosmith.gen.verifier.cic_hardware import check_decimator
 from sosmith.gen.verifier.graph import RejectedError
 from sosmith.hdl import decimator as hardware
+from sosmith.interface.certificate import Certificate as Saved
 
 
 class Case(NamedTuple):
@@ -86,6 +90,14 @@ def test_a_decimator_is_proven(case: Case, stages: int) -> None:
     verdict = check_decimator(written(case), certificate)
     assert verdict.copies == (case.factor if case.hold else 1)
     assert verdict.registers == 8 + 8 * stages + 3 * case.hold
+
+
+def test_the_decimator_of_several_channels_is_not_read(tmp_path: Path) -> None:
+    text = CASES[1][0].text.replace("sample_rate = 1000.0", "sample_rate = 1000.0\nchannels = 2")
+    generate(design_core(from_text(text, tmp_path / "plain.toml")), tmp_path)
+    proof = Saved.load(tmp_path / "plain.certificate.json").verify(files=tmp_path)
+    assert proof.program is not None
+    assert proof.decimator is None
 
 
 EDITS = [
@@ -171,7 +183,7 @@ BROKEN = [
     ("a word that is not held", "self.i_ready.eq(~self.o_valid | (self.o_ready & ~left.any()))", "self.i_ready.eq(1)"),
     ("a reset that is not passed on", "core.aresetn.eq(self.aresetn)", "core.aresetn.eq(1)"),
     ("a reset the wrong way round", 'ResetSignal("front").eq(~self.aresetn)', 'ResetSignal("front").eq(self.aresetn)'),
-    ("a flag that gets lost", "if flags else decimator.o_rail)", "if flags else 0)"),
+    ("a flag that gets lost", "or several else decimator.o_rail)", "or several else 0)"),
     ("a sink that is not asked", "core.m_axis_tready.eq(ready)", "core.m_axis_tready.eq(1)"),
     ("results the wrong way round", "self.m_axis_tdata.eq(result[:data])", "self.m_axis_tdata.eq(result[:data][::-1])"),
 ]
