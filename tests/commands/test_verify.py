@@ -129,6 +129,15 @@ def test_a_certificate_without_a_subject_cannot_be_held_against_one(folder: Path
         )
 
 
+@pytest.mark.parametrize("core", ["filter", "instrument"])
+def test_the_decimator_of_several_channels_is_not_read(core: str, tmp_path: Path) -> None:
+    generate(small("channels = 3\n", core), tmp_path)
+    found = json.loads(
+        command.good(str(tmp_path / "slight.certificate.json"), "--json", "--files", str(tmp_path)).stdout
+    )
+    assert found["program_instructions"] > 10
+
+
 def test_a_decimated_instrument_has_two_programs(tmp_path: Path) -> None:
     generate(small(), tmp_path)
     path = str(tmp_path / "slight.certificate.json")
