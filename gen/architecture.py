@@ -322,7 +322,7 @@ class Architecture:
         made = self._core()
         if self.decimator is None:
             return made
-        from sosmith.hdl.decimator import DecimatedCore
+        from sosmith.hdl.decimation.decimator import DecimatedCore
 
         ahead = None if self.ahead is None else self.ahead._core(before=True)
         return DecimatedCore(self.datapath, made, ahead, hold=self.hold, opens=self._cleared_cycles)

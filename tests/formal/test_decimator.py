@@ -8,7 +8,7 @@ import pytest
 from amaranth.hdl import Assert, Assume, Cat, Module, Signal, Value, signed
 from tests.formal.prover import Proof, broken, combinational_outputs, prove
 
-from sosmith.hdl import decimator as hardware
+from sosmith.hdl.decimation import decimator as hardware
 from sosmith.hdl.plan.decimator_clocks import latency_cycles
 from sosmith.model.dataflow.decimator import Decimator
 from sosmith.model.port import Port

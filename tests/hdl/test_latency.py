@@ -5,7 +5,7 @@ from collections.abc import Callable
 import pytest
 from tests.formal.small import limiter, resonator
 from tests.gen.designs import example_design
-from tests.hdl.stream_bench import run
+from tests.hdl.streams.stream_bench import run
 from tests.hdl.test_status import A, B, adder
 
 from sosmith.hdl.core import Core

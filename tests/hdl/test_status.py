@@ -6,7 +6,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from tests.hdl.stream_bench import run
+from tests.hdl.streams.stream_bench import run
 
 from sosmith.hdl.core import Core
 from sosmith.hdl.folded import FoldedCore

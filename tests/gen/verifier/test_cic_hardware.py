@@ -18,7 +18,7 @@ from sosmith.gen.specification.specification import from_text
 from sosmith.gen.verifier.certificate_file import Certificate
 from sosmith.gen.verifier.cic_hardware import check_decimator
 from sosmith.gen.verifier.graph import RejectedError
-from sosmith.hdl import decimator as hardware
+from sosmith.hdl.decimation import decimator as hardware
 from sosmith.interface.certificate import Certificate as Saved
 
 
@@ -225,8 +225,9 @@ def test_sentences() -> None:
 @pytest.mark.parametrize(("right", "wrong"), [pytest.param(*case, id=subject) for subject, *case in BROKEN])
 def test_hardware_that_is_wrong_is_rejected(right: str, wrong: str, monkeypatch: pytest.MonkeyPatch) -> None:
     made, certificate = designed(CASES[2][0])
+    whole = written(CASES[2][0])
     monkeypatch.setattr(hardware, "DecimatedCore", broken(hardware, right, wrong).DecimatedCore)
     text = to_verilog(to_rtlil(made.architecture.component(), made.datapath.name))
-    assert text != written(CASES[2][0])
+    assert text != whole
     with pytest.raises(RejectedError):
         check_decimator(text, certificate)

@@ -10,10 +10,10 @@ from tests.formal.prover import broken
 from tests.gen.word_lengths.decimated import small
 from tests.hdl import core_bench
 from tests.hdl.core_bench import Pace, run_core
-from tests.hdl.test_ahead import LIMITS, run
+from tests.hdl.decimation.test_calibration_ahead import LIMITS, run
 
 from sosmith.gen.architecture import Architecture
-from sosmith.hdl import decimator as hardware
+from sosmith.hdl.decimation import decimator as hardware
 from sosmith.hdl.plan import folded_clocks
 
 CHANNELS = 3

@@ -39,8 +39,8 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from sosmith.hdl.axi_stream import core_members, extended
-from sosmith.hdl.channel_decimator import ChannelDecimator
 from sosmith.hdl.core import Core
+from sosmith.hdl.decimation.channel_decimator import ChannelDecimator
 from sosmith.hdl.folded import FoldedCore
 from sosmith.hdl.plan.streams import fields, width
 from sosmith.hdl.status import OF_INPUT, at_rail

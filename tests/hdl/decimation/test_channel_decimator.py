@@ -11,9 +11,9 @@ import pytest
 from amaranth.hdl import ResetInserter, Signal
 from amaranth.sim import Simulator
 from tests.formal.prover import broken
-from tests.hdl.streams.test_decimator import decimator
+from tests.hdl.decimation.test_decimator import decimator
 
-from sosmith.hdl import channel_decimator as hardware
+from sosmith.hdl.decimation import channel_decimator as hardware
 from sosmith.hdl.plan.decimator_clocks import cycles_per_result_of_many, latency_cycles, reset_cycles
 from sosmith.model.dataflow.decimator import Decimator
 

@@ -11,7 +11,7 @@ import pytest
 from amaranth.hdl import ResetInserter, Signal
 from amaranth.sim import Simulator
 
-from sosmith.hdl.decimator import CicDecimator
+from sosmith.hdl.decimation.decimator import CicDecimator
 from sosmith.hdl.plan.decimator_clocks import cycles_per_result, latency_cycles, reset_cycles
 from sosmith.model.dataflow.decimator import Decimator
 from sosmith.model.port import Port

@@ -1,0 +1,1 @@
+"""Decimators before a core: of one channel, or of many that share one."""
