@@ -6,6 +6,7 @@ import hashlib
 import json
 from collections.abc import Mapping
 from pathlib import Path
+from typing import NamedTuple
 
 from sosmith.gen.verifier.certificate_file import AboutEntry, Certificate, certificate_text, sealed
 from sosmith.gen.verifier.graph import RejectedError, require
@@ -100,11 +101,19 @@ def check_measurements(about: AboutEntry, path: Path) -> None:
     _compare(str(path), about.measurements.sha256, _content(path))
 
 
-def fixed_architecture(path: Path) -> tuple[str | None, int]:
-    """Return architecture and number of channels from the manifest at `path`, which is known to be unchanged.
+class FixedArchitecture(NamedTuple):
+    """Architecture of a core that can be read, None for others; its number of channels, and samples of a beat."""
 
-    The architecture is None for a core whose constants can be loaded, whose memories and states are protected, whose
-    beats hold several samples, or whose sections look ahead.
+    name: str | None
+    channels: int
+    lanes: int
+
+
+def fixed_architecture(path: Path) -> FixedArchitecture:
+    """Return what hardware there is from the manifest at `path`, which is known to be unchanged.
+
+    The architecture is None for a core whose constants can be loaded, whose memories and states are protected, or whose
+    sections look ahead.
 
     Raises
     ------
@@ -114,8 +123,8 @@ def fixed_architecture(path: Path) -> tuple[str | None, int]:
     try:
         manifest = json.loads(_content(path))
         plain = manifest["reload"] is None and manifest["protect"] == "none"
-        plain = plain and "pipeline" not in manifest and "samples" not in manifest["streams"]["m_axis"]
-        return str(manifest["architecture"]) if plain else None, int(manifest["channels"])
+        name = str(manifest["architecture"]) if plain and "pipeline" not in manifest else None
+        return FixedArchitecture(name, int(manifest["channels"]), int(manifest["streams"]["m_axis"].get("samples", 1)))
     except (ValueError, KeyError, TypeError, AttributeError):
         raise RejectedError(f"{path} must be the manifest of a core, not another file") from None
 

@@ -24,6 +24,9 @@ by the name of its DELAY node. Under a wrong name a proof is not found.
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 from sosmith.gen.verifier.certificate_file import Certificate, Operation
@@ -33,8 +36,8 @@ from sosmith.gen.verifier.parallel.control import find_control
 from sosmith.gen.verifier.parallel.evaluation import Evaluation
 from sosmith.gen.verifier.parallel.fault import fault
 from sosmith.gen.verifier.parallel.forms import Forms
-from sosmith.gen.verifier.parallel.graph_codes import GraphCodes
-from sosmith.gen.verifier.parallel.netlist import flattened
+from sosmith.gen.verifier.parallel.graph_codes import GraphCodes, LanePorts
+from sosmith.gen.verifier.parallel.netlist import Netlist, flattened
 from sosmith.gen.verifier.parallel.pipeline import DATA, Pipeline
 from sosmith.gen.verifier.parallel.text import read_modules
 from sosmith.gen.verifier.program.normal_form import Form, constant, plus
@@ -45,7 +48,11 @@ _PORTS = frozenset(
     {CLOCK, "aresetn", DATA, "s_axis_tvalid", "s_axis_tready", OUTPUT, FLAGS, "m_axis_tvalid", "m_axis_tready"}
 )
 _AT_RAIL, _SATURATED, _SETTLING = 0, 2, 5
-"""Bits of the flags."""
+"""Bits of the flags of a sample."""
+_FLAG_BITS = 8
+
+_DEEPEST = 20_000
+"""Most calls inside each other: 16 lanes of a section take a few thousand."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +72,7 @@ class HardwareVerdict:
     latency: int
 
 
-def check_hardware(text: str, certificate: Certificate, channels: int = 1) -> HardwareVerdict:
+def check_hardware(text: str, certificate: Certificate, channels: int = 1, lanes: int = 1) -> HardwareVerdict:
     """Prove that the hardware in a core's SystemVerilog computes the graph of a certificate.
 
     Parameters
@@ -76,6 +83,8 @@ def check_hardware(text: str, certificate: Certificate, channels: int = 1) -> Ha
         Its certificate, which `verify` has accepted.
     channels : int
         Number of channels, each of which has states of its own.
+    lanes : int
+        Samples of a beat; with several of them, there is one channel.
 
     Returns
     -------
@@ -90,17 +99,33 @@ def check_hardware(text: str, certificate: Certificate, channels: int = 1) -> Ha
     """
     require("s_axil_" not in text, "the constants must be fixed to be checked, not loadable at run time")
     modules = read_modules(text)
+    require(channels == 1 or lanes == 1, f"several samples a clock must be those of one channel, not of {channels}")
     ports = set(next(iter(modules.values())).ports)
     wanted = _PORTS if channels == 1 else _PORTS | {DEST, OUTPUT_DEST}
     require(ports == wanted, f"the ports must be {', '.join(sorted(wanted))}, not {', '.join(sorted(ports))}")
-    netlist = flattened(modules, CLOCK)
+    with _deep_recursion():
+        return _checked(flattened(modules, CLOCK), certificate, channels, lanes)
+
+
+@contextmanager
+def _deep_recursion() -> Iterator[None]:
+    """Let nets be followed back through as many lanes as there are, one after the other."""
+    before = sys.getrecursionlimit()
+    sys.setrecursionlimit(max(before, _DEEPEST))
+    try:
+        yield
+    finally:
+        sys.setrecursionlimit(before)
+
+
+def _checked(netlist: Netlist, certificate: Certificate, channels: int, lanes: int) -> HardwareVerdict:
     control = find_control(netlist) if channels == 1 else find_channels(netlist, channels)
     forms = Forms()
-    graph = GraphCodes(certificate, forms)
+    graph = GraphCodes(certificate, forms, lanes)
     pipeline = Pipeline(netlist, control, graph, forms, certificate)
     try:
         pipeline.check_states()
-        _check_output(pipeline.buffered(), pipeline, graph, forms, certificate)
+        _check_output(pipeline.buffered(), netlist, pipeline, graph, certificate)
         if channels > 1:
             dest = pipeline.buffered().net(OUTPUT_DEST)
             right = pipeline.same(dest, pipeline.channel, netlist.widths[OUTPUT_DEST])
@@ -111,28 +136,34 @@ def check_hardware(text: str, certificate: Certificate, channels: int = 1) -> Ha
 
 
 def _check_output(
-    logic: Evaluation, pipeline: Pipeline, graph: GraphCodes, forms: Forms, certificate: Certificate
+    logic: Evaluation, netlist: Netlist, pipeline: Pipeline, graph: GraphCodes, certificate: Certificate
 ) -> None:
     """Check what leaves the core while `m_axis_tvalid` is 1."""
-    label = graph.nodes[graph.output].label
     width = -(-certificate.output.bits // 8) * 8
-    data = logic.net(OUTPUT, 0, width)
-    require(pipeline.same(data, graph.codes[graph.output], width), f"{OUTPUT} must be {label}, not another value")
-    for bit, flag, wanted in (
-        (_AT_RAIL, "input_at_rail", _at_rail(graph, forms, certificate)),
-        (_SATURATED, "output_saturated", _saturated(graph, forms)),
-        (_SETTLING, "settling", {} if graph.settling is None else forms.negative(graph.codes[graph.settling])),
-    ):
-        require(
-            pipeline.same(logic.net(FLAGS, bit, 1), wanted, 1),
-            f"bit {bit} of {FLAGS} must be {flag}, as the ports and {label} say, not another value",
-        )
+    for name, each in ((OUTPUT, width), (FLAGS, _FLAG_BITS)):
+        wanted = each * len(graph.lanes)
+        require(netlist.widths[name] == wanted, f"the port {name} must have {wanted} bits, not {netlist.widths[name]}")
+    for number, lane in enumerate(graph.lanes):
+        label = graph.nodes[lane.output].label
+        data = logic.net(OUTPUT, width * number, width)
+        what = OUTPUT if len(graph.lanes) == 1 else f"sample {number} of {OUTPUT}"
+        require(pipeline.same(data, graph.codes[lane.output], width), f"{what} must be {label}, not another value")
+        for place, flag, value in (
+            (_AT_RAIL, "input_at_rail", _at_rail(graph, lane, certificate)),
+            (_SATURATED, "output_saturated", _saturated(graph, lane)),
+            (_SETTLING, "settling", {} if lane.settling is None else graph.forms.negative(graph.codes[lane.settling])),
+        ):
+            bit = _FLAG_BITS * number + place
+            require(
+                pipeline.same(logic.net(FLAGS, bit, 1), value, 1),
+                f"bit {bit} of {FLAGS} must be {flag}, as the ports and {label} say, not another value",
+            )
 
 
-def _at_rail(graph: GraphCodes, forms: Forms, certificate: Certificate) -> Form:
+def _at_rail(graph: GraphCodes, lane: LanePorts, certificate: Certificate) -> Form:
     """Whether an input has its lowest or its highest code."""
-    inside = constant(1)
-    for node, port in zip(graph.inputs, certificate.inputs, strict=True):
+    forms, inside = graph.forms, constant(1)
+    for node, port in zip(lane.inputs, certificate.inputs, strict=True):
         code = graph.codes[node]
         above = forms.negative(plus(constant(port.lowest), code, -1))
         below = forms.negative(plus(code, constant(port.highest), -1))
@@ -140,12 +171,12 @@ def _at_rail(graph: GraphCodes, forms: Forms, certificate: Certificate) -> Form:
     return plus(constant(1), inside, -1)
 
 
-def _saturated(graph: GraphCodes, forms: Forms) -> Form:
+def _saturated(graph: GraphCodes, lane: LanePorts) -> Form:
     """Whether the output was limited to its range."""
-    node = graph.nodes[graph.output]
+    node = graph.nodes[lane.output]
     if node.entry.op is not Operation.CLAMP:
         return {}
     of = graph.codes[node.operands[0]]
-    below = forms.negative(plus(of, constant(node.entry.low), -1))
-    above = forms.negative(plus(constant(node.entry.high), of, -1))
+    below = graph.forms.negative(plus(of, constant(node.entry.low), -1))
+    above = graph.forms.negative(plus(constant(node.entry.high), of, -1))
     return plus(below, above)

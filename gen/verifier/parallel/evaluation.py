@@ -46,11 +46,15 @@ class Evaluation:
     content : callable
         What a register or an input holds.
     shortened : callable
-        Gives what enters an instance a shorter form, if it has one.
+        Gives a word a shorter form, if it has one, by its width and whether it enters an instance.
     word : callable or None
         What a memory, by its name, has at an address.
     cuts : set of str
         Nets whose value is asked for like that of a register.
+    part : callable or None
+        Gives an unsigned word that is joined with others a shorter form.
+    fields : callable
+        Gives bits of an input from one on, so many, where that is simpler than to cut them out; otherwise None.
     """
 
     def __init__(
@@ -58,13 +62,15 @@ class Evaluation:
         netlist: Netlist,
         forms: Forms,
         content: Content,
-        shortened: Callable[[Form], Form] = lambda form: form,
+        shortened: Callable[[Form, int, bool], Form] = lambda word, width, at_inlet: word,
         *,
         word: Callable[[str, Form], Form] | None = None,
         cuts: Set[str] = frozenset(),
+        part: Callable[[Form], Form] | None = None,
+        fields: Callable[[str, int, int], Form | None] = lambda name, low, width: None,
     ) -> None:
         self._netlist, self._forms, self._content, self._shortened = netlist, forms, content, shortened
-        self._word, self._cuts = word, cuts
+        self._word, self._cuts, self._part, self._fields = word, cuts, part, fields
         self._known: dict[tuple[str, int, int], Form] = {}
         self._open: set[tuple[str, int, int]] = set()
 
@@ -86,7 +92,7 @@ class Evaluation:
             require(key not in self._open, f"{name} must not depend on itself within a clock")
             self._open.add(key)
             found = self._net(*key)
-            self._known[key] = self._shortened(found) if name in self._netlist.inlets else found
+            self._known[key] = self._shortened(found, count, name in self._netlist.inlets)
             self._open.discard(key)
         return self._known[key]
 
@@ -126,7 +132,8 @@ class Evaluation:
                 name in self._cuts or name in self._netlist.registers or self._netlist.ports.get(name) == "input",
                 f"{name} must be driven to be used",
             )
-            return self._cut(self._content(name), low)
+            part = self._fields(name, low, width)
+            return self._cut(self._content(name), low) if part is None else part
         total: Form = {}
         done = low
         for driver in drivers:
@@ -134,15 +141,21 @@ class Evaluation:
             if first >= last:
                 continue
             require(first == done, f"bit {done} of {name} must be driven to be used")
-            needed = driver.start + last - driver.low
-            value = self._extended(driver.value, max(needed, self._netlist.width(driver.value)))
-            part = self._cut(value, driver.start + first - driver.low)
+            part = self._driven(driver.value, driver.start + first - driver.low, last - first)
             if last < low + width:
                 part = self._forms.unsigned(part, last - first)
             total = plus(total, part, 1 << (first - low))
             done = last
         require(done == low + width, f"bit {done} of {name} must be driven to be used")
         return total
+
+    def _driven(self, value: Expression, low: int, width: int) -> Form:
+        """Return bits of what drives a net as a word."""
+        own = self._netlist.width(value)
+        if isinstance(value, Bits) and low + width <= own:
+            return self.net(value.name, value.low + low, width)
+        word = self._extended(value, max(low + width, own))
+        return self._cut(self._shortened(word, max(low + width, own), False), low)
 
     def _cut(self, word: Form, low: int) -> Form:
         return self._forms.floor(shifted(word, -low)) if low else word
@@ -212,8 +225,12 @@ class Evaluation:
         if isinstance(value, Joined):
             total: Form = {}
             at = 0
+            flags = all(self._netlist.width(part) == 1 for part in value.parts)
             for k, part in enumerate(reversed(value.parts)):
-                word = self.word(part) if k == len(value.parts) - 1 else self._exact(part, signed=False)
+                last = k == len(value.parts) - 1 and self._part is None and not flags
+                word = self.word(part) if last else self._exact(part, signed=False)
+                word = self._forms.bit(word) if flags else word
+                word = word if self._part is None else self._part(word)
                 if k > 1 and k == len(value.parts) - 1 and self._forms.limits(total)[1] >= 1 << at:
                     self._forms.know(total, 0, (1 << at) - 1)  # of unsigned words side by side
                 total = plus(total, word, 1 << at)

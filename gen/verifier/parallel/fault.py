@@ -17,6 +17,8 @@ from sosmith.gen.verifier.parallel.pipeline import Pipeline
 def fault(netlist: Netlist, pipeline: Pipeline, graph: GraphCodes) -> RejectedError | None:
     """Return the rejection for the first net that does not hold the code of the node it is named after, if any."""
     for index, node in enumerate(graph.nodes):
+        if not node.entry.name and len(graph.lanes) > 1:
+            continue  # named by a number, which is that of another node in the hardware
         own = re.compile(rf"{re.escape(f'{node.stage}.{node.name}')}(_passed\d+|_register)?")
         for name in sorted(filter(own.fullmatch, netlist.widths), key=lambda name: (len(name), name)):
             try:

@@ -108,6 +108,12 @@ class Forms:
         """Return the integer variable `key`, which lies in low..high."""
         return self._settled(self._atom(key, low, high, None))
 
+    def is_variable(self, form: Form) -> bool:
+        """Whether a form is a variable by itself."""
+        return list(form.values()) == [1] and all(
+            len(monomial) == 1 and self._atoms[monomial[0]].inside is None for monomial in form
+        )
+
     def know(self, form: Form, low: int | Fraction, high: int | Fraction) -> None:
         """Take it for known that `form` lies in low..high; of a floor, its argument is known too."""
         found = _primitive(form)

@@ -5,19 +5,21 @@ that `node`, which is not a DELAY, had k samples ago. So a delay of a delay is t
 
     v1 = delay of v, v2 = delay of v1        v1 at the sample before = v2 = (v, 2)
 
-What one stage hands to the next is a variable too, ``(node, 0)``, so that forms stay short. The ranges that the
-certificate states are known of all of them.
+With several samples a clock, a beat takes the place of a sample, and a node is in one of its lanes
+(`sosmith.gen.verifier.parallel.lanes`). What a stage hands to the next, or a lane to the next, is a variable too,
+``(node, 0)``, so that forms stay short. The ranges that the certificate states are known of all of them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
 from sosmith.gen.verifier.certificate_file import Certificate, NodeEntry, Operation, StageEntry
-from sosmith.gen.verifier.graph import label, require
+from sosmith.gen.verifier.graph import require
 from sosmith.gen.verifier.parallel.forms import Forms, shifted
+from sosmith.gen.verifier.parallel.lanes import LaneNode, in_lanes
 from sosmith.gen.verifier.program.normal_form import Form, Monomial, constant, plus
 
 Origin = tuple[int, int]
@@ -47,6 +49,25 @@ class CodeNode:
     label: str
 
 
+@dataclass(frozen=True)
+class LanePorts:
+    """What enters and leaves a core in one lane, by the indices of nodes.
+
+    Attributes
+    ----------
+    inputs : tuple of int
+        The inputs, in the order of the ports.
+    output : int
+        The output.
+    settling : int or None
+        What is negative for the samples that are flagged as settling; None without the flag.
+    """
+
+    inputs: tuple[int, ...]
+    output: int
+    settling: int | None
+
+
 class GraphCodes:
     """All stages of a certificate that `verify` has accepted, joined.
 
@@ -56,32 +77,34 @@ class GraphCodes:
         The certificate.
     forms : Forms
         The atoms; the ranges become known to them.
+    lanes : int
+        Samples of a beat.
 
     Attributes
     ----------
     nodes : list of CodeNode
         The nodes, without the inputs of stages that others feed.
-    inputs : list of int
-        The inputs, in the order of the ports.
-    output : int
-        The output.
-    settling : int or None
-        What is negative for the samples that are flagged as settling; None without the flag.
+    forms : Forms
+    lanes : list of LanePorts
+        What enters and leaves in each lane.
     codes : list of Form
         Code of each node.
     """
 
-    def __init__(self, certificate: Certificate, forms: Forms) -> None:
-        self._forms = forms
+    def __init__(self, certificate: Certificate, forms: Forms, lanes: int = 1) -> None:
+        self.forms = forms
         self.nodes: list[CodeNode] = []
-        self.inputs: list[int] = []
+        self._remembered: set[int] = set()
         passed: list[int] = []
         between: set[int] = set()
         for number, stage in enumerate(certificate.stages):
             between.update(passed)
-            passed = self._join(stage, passed if number else None)
-        self.output, *flags = passed
-        self.settling = flags[0] if flags else None
+            passed = self._join(stage, lanes, passed if number else None)
+        inputs = [index for index, node in enumerate(self.nodes) if node.entry.op is Operation.INPUT]
+        self.lanes = [
+            LanePorts(tuple(entering), output, flags[0] if flags else None)
+            for entering, (output, *flags) in zip(_split(inputs, lanes), _split(passed, lanes), strict=True)
+        ]
         self._ranges: dict[Origin, tuple[int, int]] = {}
         for index in self.delays:
             entry, origin = self.nodes[index].entry, self.origin(index)
@@ -90,15 +113,23 @@ class GraphCodes:
         self.codes: list[Form] = []
         self._seams: dict[frozenset[tuple[Monomial, int | Fraction]], Form] = {}
         self._definitions: dict[Hashable, Form] = {}
+        self._words: dict[Hashable, Form] = {}
+        self._kept: dict[frozenset[tuple[Monomial, int | Fraction]], Form] = {}
+        self._kept_of: dict[int, dict[frozenset[tuple[Monomial, int | Fraction]], Form]] = {}
         self._handed_on: dict[int, Form] = {}
         for index, node in enumerate(self.nodes):
             code = self._code(index, node)
             forms.know(code, node.entry.low, node.entry.high)
-            if index in between and (len(code) > 1 or forms.keys(code) != {(index, 0)}):
+            self.codes.append(code)
+            if forms.is_variable(code) and (lanes > 1 or forms.keys(code) == {(index, 0)}):
+                continue
+            if index in between or index in self._remembered:
                 self._definitions[index, 0] = code
                 short = forms.variable((index, 0), node.entry.low, node.entry.high)
+            if index in between:
                 self._handed_on[index] = self._seams.setdefault(frozenset(code.items()), short)
-            self.codes.append(code)
+            if index in self._remembered and len(code) > 1:
+                self._kept.setdefault(frozenset(code.items()), short)
 
     @property
     def delays(self) -> list[int]:
@@ -120,69 +151,107 @@ class GraphCodes:
         if ago < 0:
             return None
         if ago == 0:
-            return self.codes[node]
+            return self.seen(node, self.nodes[node].stage)
         low, high = self._ranges.get(origin) or self._widest(node)
-        return self._forms.variable(origin, low, high)
+        return self.forms.variable(origin, low, high)
 
-    def shortened(self, code: Form) -> Form:
-        """Return the variable of a stage's output whose code this is; any other code as it is."""
-        return self._seams.get(frozenset(code.items()), code)
+    def shortened(self, word: Form, width: int, at_inlet: bool = False) -> Form:
+        """Return the variable whose code a word of `width` bits is; any other word as it is.
+
+        Those are what the next lane takes over, and, where a word enters an instance, what stages hand on.
+        """
+        key = frozenset(word.items())
+        if at_inlet and key in self._seams:
+            return self._seams[key]
+        if not self._kept or len(word) < 2:
+            return word
+        if key in self._kept:
+            return self._kept[key]
+        if width not in self._kept_of:
+            self._kept_of[width] = {_rest(code, width): short for code, short in self._kept.items()}
+        return self._kept_of[width].get(_rest(word.items(), width), word)
+
+    def seen(self, index: int, stage: str) -> Form:
+        """Return the code of a node as its own stage sees it, or as another one or another lane does."""
+        code = self.codes[index]
+        if self.nodes[index].stage != stage:
+            return self._handed_on.get(index, code)
+        return self._kept.get(frozenset(code.items()), code)
+
+    def named(self, word: Form) -> Form:
+        """Return a variable for an unsigned word that is joined with others, so that each is found again in the whole.
+
+        A word of several bits whose range follows from its terms, each by itself, stays as it is. Flags may have terms
+        in common, which would be added up.
+        """
+        low, high = self.forms.limits(word)
+        if low == high or self.forms.is_variable(word):
+            return word
+        ends = [self.forms.limits({monomial: value}) for monomial, value in word.items()]
+        if high > 1 and sum(end[0] for end in ends) >= low and sum(end[1] for end in ends) <= high:
+            return word
+        key = "word", frozenset(word.items())
+        self._words[key] = word
+        return self.forms.variable(key, low.__floor__(), high.__ceil__())
+
+    def unnamed(self, word: Form, width: int) -> Form:
+        """Return a word of `width` bits without the variables of words."""
+        if not self.forms.keys(word) & self._words.keys():
+            return word
+        counted = {monomial: value for monomial, value in word.items() if value % (1 << width)}
+        return self.forms.settled(counted, self._words)
 
     def opened(self, code: Form) -> Form:
         """Return a code without the variables of stages' outputs."""
-        return self._forms.settled(code, self._definitions)
+        return self.forms.settled(code, self._definitions)
 
     def _widest(self, node: int) -> tuple[int, int]:
         entry = self.nodes[node].entry
         return min(entry.low, 0), max(entry.high, 0)
 
-    def _join(self, stage: StageEntry, fed: Sequence[int] | None) -> list[int]:
+    def _join(self, stage: StageEntry, lanes: int, fed: Sequence[int] | None) -> list[int]:
         """Add the nodes of a stage, whose inputs are the nodes `fed`; return its outputs."""
-        names = _unique_names(stage)
+        nodes, outputs = in_lanes(stage, lanes)
+        names = _unique_names(nodes)
         supply = iter(fed or ())
         at: list[int] = []
         count = len(self.nodes)
-        for node in stage.nodes:
-            if node.op is Operation.INPUT and fed is not None:
+        for node in nodes:
+            if node.entry.op is Operation.INPUT and fed is not None:
                 at.append(next(supply))
             else:
                 at.append(count)
                 count += 1
-        for index, node in enumerate(stage.nodes):
+        here = len(self.nodes)
+        self._remembered |= {k for k, node in zip(at, nodes, strict=True) if node.remembered and k >= here}
+        for index, node in enumerate(nodes):
             if at[index] == len(self.nodes):
                 operands = tuple(at[k] for k in node.operands)
-                self.nodes.append(CodeNode(node, operands, stage.name, names[index], label(stage, index)))
-        if fed is None:
-            self.inputs = [at[k] for k, node in enumerate(stage.nodes) if node.op is Operation.INPUT]
-        return [at[k] for k in stage.outputs]
-
-    def _seen(self, index: int, stage: str) -> Form:
-        """Code of a node as its own stage sees it, or as another one does."""
-        own = self.nodes[index].stage == stage
-        return self.codes[index] if own else self._handed_on.get(index, self.codes[index])
+                self.nodes.append(CodeNode(node.entry, operands, stage.name, names[index], node.label))
+        return [at[k] for k in outputs]
 
     def _code(self, index: int, node: CodeNode) -> Form:
         entry = node.entry
         if entry.op is Operation.INPUT:
-            return self._forms.variable((index, 0), entry.low, entry.high)
+            return self.forms.variable((index, 0), entry.low, entry.high)
         if entry.op is Operation.DELAY:
             found = self.past(self.origin(index))
             assert found is not None
             return found
         if entry.op is Operation.CONSTANT:
             return constant(entry.parameter)
-        operands = [self._seen(k, node.stage) for k in node.operands]
+        operands = [self.seen(k, node.stage) for k in node.operands]
         fracs = [self.nodes[k].entry.frac for k in node.operands]
         if entry.op in {Operation.ADD, Operation.SUBTRACT}:
             a, b = (shifted(code, entry.frac - frac) for code, frac in zip(operands, fracs, strict=True))
             return plus(a, b, 1 if entry.op is Operation.ADD else -1)
         if entry.op is Operation.MULTIPLY:
-            return self._forms.times(*operands)
+            return self.forms.times(*operands)
         return self._of_one(entry, operands[0], fracs[0])
 
     def _of_one(self, entry: NodeEntry, of: Form, frac: int) -> Form:
         """Code of an operation with one operand."""
-        forms = self._forms
+        forms = self.forms
         if entry.op is Operation.SCALE:
             return forms.times(of, constant(entry.parameter))
         if entry.op is Operation.FLOOR:
@@ -202,12 +271,24 @@ class GraphCodes:
         return of  # SHIFT, BOUND
 
 
-def _unique_names(stage: StageEntry) -> list[str]:
+def _rest(word: Iterable[tuple[Monomial, int | Fraction]], width: int) -> frozenset[tuple[Monomial, int | Fraction]]:
+    """Return the coefficients of a word of `width` bits, each as the least that means the same."""
+    rests = ((monomial, coefficient % (1 << width)) for monomial, coefficient in word)
+    return frozenset((monomial, coefficient) for monomial, coefficient in rests if coefficient)
+
+
+def _split(indices: Sequence[int], parts: int) -> list[Sequence[int]]:
+    """Split a list into so many parts of the same length."""
+    each = len(indices) // parts
+    return [indices[each * k : each * (k + 1)] for k in range(parts)]
+
+
+def _unique_names(nodes: Sequence[LaneNode]) -> list[str]:
     """Return a name for each node of a stage: its own, or with its index where that is missing or taken."""
     seen: set[str] = set()
     names = []
-    for index, node in enumerate(stage.nodes):
-        name = node.name if node.name and node.name not in seen else f"{node.name or node.op.value}_{index}"
+    for index, node in enumerate(nodes):
+        name = node.name if node.name and node.name not in seen else f"{node.name or node.entry.op.value}_{index}"
         seen.add(name)
         names.append(name)
     return names

@@ -23,6 +23,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from typing import NamedTuple
 
 from sosmith.gen.verifier.certificate_file import Certificate
 from sosmith.gen.verifier.graph import RejectedError, require
@@ -30,7 +31,7 @@ from sosmith.gen.verifier.parallel.channels import DEST
 from sosmith.gen.verifier.parallel.control import RESET, Buffer, Case, Control, UndecidedError, about, cases
 from sosmith.gen.verifier.parallel.equality import same_word
 from sosmith.gen.verifier.parallel.evaluation import Evaluation
-from sosmith.gen.verifier.parallel.forms import Forms
+from sosmith.gen.verifier.parallel.forms import Forms, shifted
 from sosmith.gen.verifier.parallel.graph_codes import GraphCodes
 from sosmith.gen.verifier.parallel.netlist import Netlist
 from sosmith.gen.verifier.parallel.state_memories import State, StateMemories
@@ -38,6 +39,37 @@ from sosmith.gen.verifier.parallel.text import Bits, Choice, Expression, Joined,
 from sosmith.gen.verifier.program.normal_form import Form, constant, plus
 
 DATA = "s_axis_tdata"
+
+
+class _Field(NamedTuple):
+    """Bits of the input: their place, and what they hold as an unsigned word."""
+
+    offset: int
+    width: int
+    word: Form
+
+
+def _fields(graph: GraphCodes, certificate: Certificate, width: int) -> list[_Field]:
+    """Return the fields of the input and what is beside them; each begins a byte.
+
+    Raises
+    ------
+    RejectedError
+        If they do not fill the input, which has `width` bits.
+    """
+    found: list[_Field] = []
+    offset = 0
+    for lane in graph.lanes:
+        for node, port in zip(lane.inputs, certificate.inputs, strict=True):
+            found.append(_Field(offset, port.bits, graph.forms.unsigned(graph.codes[node], port.bits)))
+            offset += port.bits
+            beside = -offset % 8
+            if beside:
+                padding = graph.forms.variable(("padding", node), 0, (1 << beside) - 1)
+                found.append(_Field(offset, beside, padding))
+            offset += beside
+    require(width == offset, f"the port {DATA} must have {offset} bits, not {width}")
+    return found
 
 
 class Pipeline:
@@ -60,7 +92,7 @@ class Pipeline:
         self, netlist: Netlist, control: Control, graph: GraphCodes, forms: Forms, certificate: Certificate
     ) -> None:
         self._netlist, self._control, self._graph, self._forms = netlist, control, graph, forms
-        self._ports = certificate.inputs
+        self._fields = _fields(graph, certificate, netlist.widths[DATA])
         self._numbers = itertools.count()
         self._behind: dict[str, int | None] = {}
         self._found: dict[str, Form] = {}
@@ -119,7 +151,11 @@ class Pipeline:
             found = None if self.memories is None else self.memories.word(name, address, position)
             return self._unknown(name, frame) if found is None else found
 
-        return self.logic(content, word)
+        def fields(name: str, low: int, width: int) -> Form | None:
+            return self._field(low, width) if name == DATA and position == self._source else None
+
+        part = self._graph.named if position == self.last else None
+        return self.logic(content, word, part=part, fields=fields)
 
     def in_front(self, known: Mapping[str, Form], opened: str) -> Evaluation:
         """Return the logic as it is while the input buffer holds a sample, where some registers hold what is `known`.
@@ -137,11 +173,19 @@ class Pipeline:
         return self.logic(content, opened=opened)
 
     def logic(
-        self, content: Callable[[str], Form], word: Callable[[str, Form], Form] | None = None, *, opened: str = ""
+        self,
+        content: Callable[[str], Form],
+        word: Callable[[str, Form], Form] | None = None,
+        *,
+        opened: str = "",
+        part: Callable[[Form], Form] | None = None,
+        fields: Callable[[str, int, int], Form | None] = lambda name, low, width: None,
     ) -> Evaluation:
         """Return the logic where registers and inputs hold what `content` says, and memories what `word` does."""
         cuts = self._control.cuts - {opened}
-        return Evaluation(self._netlist, self._forms, content, self._graph.shortened, word=word, cuts=cuts)
+        return Evaluation(
+            self._netlist, self._forms, content, self._graph.shortened, word=word, cuts=cuts, part=part, fields=fields
+        )
 
     def held(self, name: str) -> Form:
         """Return what a register holds while there is a sample at its position.
@@ -167,6 +211,10 @@ class Pipeline:
 
     def same(self, a: Form, b: Form, width: int) -> bool:
         """Whether two words are proven to be the same, if need be by opening what stages hand on."""
+        a, b = (self._graph.shortened(word, width) for word in (a, b))
+        if same_word(self._forms, a, b, width):
+            return True
+        a, b = self._graph.unnamed(a, width), self._graph.unnamed(b, width)
         return same_word(self._forms, a, b, width) or same_word(
             self._forms, self._graph.opened(a), self._graph.opened(b), width
         )
@@ -304,7 +352,7 @@ class Pipeline:
         require(
             self.same(
                 self._one_of(name, state.behind, {RESET: 1, full: 0, valid: 1}),
-                self._graph.codes[source],
+                self._graph.seen(source, node.stage),
                 register.width,
             ),
             f"{what} and take over {self._graph.nodes[source].label}, not another value",
@@ -381,17 +429,16 @@ class Pipeline:
 
     def _samples(self) -> Form:
         total: Form = {}
-        offset = 0
-        for node, port in zip(self._graph.inputs, self._ports, strict=True):
-            padded = -(-port.bits // 8) * 8
-            total = plus(total, self._forms.unsigned(self._graph.codes[node], port.bits), 1 << offset)
-            if padded > port.bits:
-                padding = self._forms.variable(("padding", node), 0, (1 << (padded - port.bits)) - 1)
-                total = plus(total, padding, 1 << (offset + port.bits))
-            offset += padded
-        width = self._netlist.widths[DATA]
-        require(width == offset, f"the port {DATA} must have {offset} bits, not {width}")
+        for field in self._fields:
+            total = plus(total, field.word, 1 << field.offset)
         return total
+
+    def _field(self, low: int, width: int) -> Form | None:
+        """Return bits of the input that lie within one field."""
+        for field in self._fields:
+            if field.offset <= low and low + width <= field.offset + field.width:
+                return self._forms.floor(shifted(field.word, field.offset - low))
+        return None
 
     def _state(self, state: State, position: int, case: Case) -> Form | None:
         """Return what a state holds, as the sample at a position sees it; None if that is not known."""

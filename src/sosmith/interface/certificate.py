@@ -134,9 +134,9 @@ class Certificate:
             Folder with the generated files: their SHA-256 must be those in the certificate, and no byte of the
             certificate's own file may have been changed. From the SystemVerilog, the program of a folded or serial
             core, and all hardware of a parallel one, is proven to compute the certificate's graph for all inputs and
-            states; online cores are not, nor cores with loadable constants, protection, look-ahead or several samples a
-            clock, nor a parallel core beside a decimator. The decimator of one channel, without a calibration
-            before it, and what holds the results behind it, is proven to be one, register by register.
+            states; online cores are not, nor cores with loadable constants, protection or look-ahead, nor a parallel
+            core beside a decimator. The decimator of one channel, without a calibration before it, and what holds the
+            results behind it, is proven to be one, register by register.
         rebuild : bool
             Whether to generate all files again, from `spec` or the specification's text in the certificate, and compare
             them byte for byte.
@@ -164,7 +164,7 @@ class Certificate:
             content = self.text().encode() if self.path is None else self.path.read_bytes()
             folder = Path(fspath(files))
             compared = check_files(check_seal(self.entries, content), folder)
-            architecture, channels = fixed_architecture(folder / f"{self.name}.json")
+            architecture, channels, lanes = fixed_architecture(folder / f"{self.name}.json")
             text = (folder / f"{self.name}.sv").read_text(encoding="utf-8")
             found = self.entries.decimation
             if found is not None and found.calibration is None and channels == 1:
@@ -177,7 +177,7 @@ class Certificate:
                 raise RejectedError("the certificate of an online core must claim the residuals of its units")
             elif architecture == "parallel" and self.entries.decimation is None:
                 progress("hardware", 0, 0)
-                hardware = check_hardware(text, self.entries, channels)
+                hardware = check_hardware(text, self.entries, channels, lanes)
             ahead = calibration_alone(self.entries)
             if ahead is not None and architecture_ahead(folder / f"{self.name}.json") in {"folded", "serial"}:
                 progress("program of the calibration", 0, 0)

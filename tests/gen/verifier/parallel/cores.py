@@ -29,20 +29,23 @@ class Made(NamedTuple):
     text: str
     certificate: Certificate
     channels: int
+    lanes: int
 
     def check(self, text: str | None = None) -> HardwareVerdict:
-        return check_hardware(text or self.text, self.certificate, self.channels)
+        return check_hardware(text or self.text, self.certificate, self.channels, self.lanes)
 
 
 def specified(text: str) -> Specification:
     return from_tree(tomllib.loads(text, parse_float=Decimal), Path("small.toml"))
 
 
-def made(design: CoreDesign, channels: int = 1, *, reload: bool = False, blocks: Blocks = NO_LIMIT) -> Made:
-    core = Architecture("parallel", design.datapath, channels, reload=reload, blocks=blocks)
+def made(
+    design: CoreDesign, channels: int = 1, lanes: int = 1, *, reload: bool = False, blocks: Blocks = NO_LIMIT
+) -> Made:
+    core = Architecture("parallel", design.datapath, channels, reload=reload, blocks=blocks, samples_per_clock=lanes)
     text = to_verilog(to_rtlil(core.component(), design.datapath.name))
     read = json.loads(certificate_text(certificate(design.quantized, design.spec.max_error)))
-    return Made(design, text, Certificate.model_validate(read), channels)
+    return Made(design, text, Certificate.model_validate(read), channels, lanes)
 
 
 @cache
@@ -51,5 +54,5 @@ def small_design(spec: str, realization: str) -> CoreDesign:
 
 
 @cache
-def small(spec: str = PLAIN, realization: str = "df1_ef1", channels: int = 1) -> Made:
-    return made(small_design(spec, realization), channels)
+def small(spec: str = PLAIN, realization: str = "df1_ef1", channels: int = 1, lanes: int = 1) -> Made:
+    return made(small_design(spec, realization), channels, lanes)
