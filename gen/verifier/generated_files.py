@@ -101,6 +101,10 @@ def check_measurements(about: AboutEntry, path: Path) -> None:
     _compare(str(path), about.measurements.sha256, _content(path))
 
 
+MAX_LANES = 8
+"""Most samples of a beat whose hardware is read: with 16, what a lane computes is too long an expression."""
+
+
 class FixedArchitecture(NamedTuple):
     """Architecture of a core that can be read, None for others; its number of channels, and samples of a beat."""
 
@@ -112,8 +116,8 @@ class FixedArchitecture(NamedTuple):
 def fixed_architecture(path: Path) -> FixedArchitecture:
     """Return what hardware there is from the manifest at `path`, which is known to be unchanged.
 
-    The architecture is None for a core whose constants can be loaded, whose memories and states are protected, or whose
-    sections look ahead.
+    The architecture is None for a core whose constants can be loaded, whose memories and states are protected, whose
+    sections look ahead, or whose beats hold more than `MAX_LANES` samples.
 
     Raises
     ------
@@ -123,8 +127,9 @@ def fixed_architecture(path: Path) -> FixedArchitecture:
     try:
         manifest = json.loads(_content(path))
         plain = manifest["reload"] is None and manifest["protect"] == "none"
-        name = str(manifest["architecture"]) if plain and "pipeline" not in manifest else None
-        return FixedArchitecture(name, int(manifest["channels"]), int(manifest["streams"]["m_axis"].get("samples", 1)))
+        lanes = int(manifest["streams"]["m_axis"].get("samples", 1))
+        plain = plain and "pipeline" not in manifest and lanes <= MAX_LANES
+        return FixedArchitecture(str(manifest["architecture"]) if plain else None, int(manifest["channels"]), lanes)
     except (ValueError, KeyError, TypeError, AttributeError):
         raise RejectedError(f"{path} must be the manifest of a core, not another file") from None
 
