@@ -20,6 +20,9 @@ before the first clock leave no sample and no result. That this is a CIC filter 
   taken. So each result finds `o_data` free, and stays until it is taken.
 - The holder takes a word when it is empty or hands out the last of its copies, and hands out R of each.
 
+Above the bits of a result there are zeros, or its sign again, and flags: the core behind makes signs and flags, and
+here they are passed on.
+
 An undefined value, ``1'hx``, may be either: what is said holds for both.
 """
 
@@ -88,7 +91,9 @@ def check_decimator(text: str, certificate: Certificate) -> DecimatorVerdict:
         stated = tomllib.loads(certificate.about.specification).get("filter", {}).get("hold", False)
         require(held == stated, f"results must {'' if stated else 'not '}be held, as specified")
     seams = seams_of(netlist, held=held)
-    leaving = _Holder(seams, entry.factor) if held else _Passing(seams)
+    output = certificate.output
+    word = _held_word(netlist) if held else ""
+    leaving = _Holder(seams, output, word, entry.factor) if held else _Passing(seams, output)
     parts: list[_Part] = [_Cic(entry, port, seams), leaving]
     first = {name: value for part in parts for name, value in part.first.items()}
     require(
@@ -103,10 +108,18 @@ def check_decimator(text: str, certificate: Certificate) -> DecimatorVerdict:
     for part in parts:
         for name in (*part.nets, *part.first):
             _check(netlist, ranges, part, name)
-    for name in passed_on(netlist, Bits("m_axis_tuser")):
-        own = name == HOLDER + "o_data" if held else name.startswith(BEHIND)
-        require(own, f"m_axis_tuser must have bits of what leaves the core, not of {name}")
+    for stream in ("m_axis_tdata", "m_axis_tuser"):
+        for name in passed_on(netlist, Bits(stream)):
+            own = name == word if held else name.startswith(BEHIND)
+            require(own, f"{stream} must have bits of what leaves the core, not of {name}")
     return DecimatorVerdict(len(first), entry.factor if held else 1)
+
+
+def _held_word(netlist: Netlist) -> str:
+    """Return the register that holds a result: ``o_data``, or what is left of it without bits that are always 0."""
+    names = {name for name in passed_on(netlist, Bits("m_axis_tdata")) if name in netlist.registers}
+    require(len(names) == 1, f"m_axis_tdata must have bits of one register, not of {len(names)}")
+    return names.pop()
 
 
 def _check(netlist: Netlist, ranges: Mapping[str, _Ranges], part: _Part, name: str) -> None:
@@ -193,20 +206,21 @@ class _Logic:
         require(name in self._netlist.widths, f"there must be a {name}")
         return self._nets.net(name)
 
-    def result(self, word: Form) -> Form:
-        """Return the result, low in a word: that of the core as it leaves it, low among the bits of one output.
+    def result(self, word: Form, bits: int) -> Form:
+        """Return a word whose low bits are the result: that of the core as it leaves it, low among those of one output.
+
+        What is above them, repeated signs and flags, is left as it is.
 
         Raises
         ------
         RejectedError
             If there is more than one such output in it.
         """
-        width = self._netlist.widths["m_axis_tdata"]
-        names = self.forms.keys(self.forms.unsigned(word, width))
+        names = self.forms.keys(self.forms.unsigned(word, bits))
         name = next(iter(names), None)
         if len(names) != 1 or not isinstance(name, str) or not name.startswith(BEHIND):
             raise RejectedError("the result must be one output of the core")
-        return self.forms.unsigned(self.word(name), width)
+        return plus(self.forms.unsigned(self.word(name), bits), self.forms.floor(shifted(word, -bits)), 1 << bits)
 
     def after(self, name: str) -> Form:
         """Return what a register holds after the clock."""
@@ -392,6 +406,7 @@ class _Passing:
     """What leaves the core leaves at once."""
 
     seams: Seams
+    port: PortEntry
 
     @property
     def nets(self) -> Sequence[str]:
@@ -411,15 +426,18 @@ class _Passing:
     def wanted(self, now: _Logic, name: str) -> Form:
         """Return what is on the other side."""
         if name == "m_axis_tdata":
-            return now.result(now.net(name))
+            found = now.result(now.net(name), self.port.bits)
+            return found if self.port.signed else now.forms.unsigned(found, self.port.bits)
         return now.word(SINK if name == self.seams.ready else self.seams.valid)
 
 
 @dataclass(frozen=True)
 class _Holder:
-    """What hands out each result `copies` times."""
+    """What hands out each result, held in the register `word`, `copies` times."""
 
     seams: Seams
+    port: PortEntry
+    word: str
     copies: int
 
     @property
@@ -430,7 +448,7 @@ class _Holder:
     @property
     def first(self) -> Mapping[str, int | None]:
         """A word with its valid bit, and a counter."""
-        return {HOLDER + "o_valid": 0, HOLDER + "left": None, HOLDER + "o_data": None}
+        return {HOLDER + "o_valid": 0, HOLDER + "left": None, self.word: None}
 
     @property
     def ranges(self) -> Mapping[str, _Ranges]:
@@ -439,18 +457,17 @@ class _Holder:
 
     def wanted(self, now: _Logic, name: str) -> Form:
         """Return a new word where one can be taken, else one copy less where one leaves."""
-        valid, left, word = (HOLDER + part for part in ("o_valid", "left", "o_data"))
-        data = now.width("m_axis_tdata")
+        valid, left = HOLDER + "o_valid", HOLDER + "left"
         if name == "m_axis_tvalid":
             return now.word(valid)
         if name == "m_axis_tdata":
-            return now.forms.unsigned(now.word(word), data)
+            bits = now.width(name) if self.port.signed else self.port.bits
+            return now.forms.unsigned(now.word(self.word), bits)
         takes = not now.bit(valid) or (now.bit(SINK) and now.limits(left) == (0, 0))
         if name in self.nets:
             return constant(int(takes))
         if not takes:
             return plus(now.word(left), constant(-1)) if name == left and now.bit(SINK) else now.word(name)
-        if name == word:  # with the flags above
-            coming = now.after(word)
-            return plus(now.result(coming), now.forms.floor(shifted(coming, -data)), 1 << data)
+        if name == self.word:  # with the flags above
+            return now.result(now.after(name), self.port.bits)
         return constant(self.copies - 1) if name == left else now.word(self.seams.valid)

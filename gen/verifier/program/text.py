@@ -258,7 +258,7 @@ def _digits(text: str, registers: Mapping[str, int], word_bits: int, shift: int)
     slices = [int(low) for low in re.findall(r"^ *words(\d+)\[.*?\] <= ", text, re.MULTILINE)]
     require(len(set(slices)) == len(slices), "the words must have one write port")
     writes = [_written(text, rf"words{low}\[.*?\]") for low in sorted(slices)]
-    moved = _written(text, "moved") if "moved" in registers else None
+    moved = _moved(text, word_bits) if "moved" in registers else []
 
     def stored(number: int) -> list[Bit]:
         code = OPCODES.index("take") | number << shift
@@ -273,7 +273,7 @@ def _digits(text: str, registers: Mapping[str, int], word_bits: int, shift: int)
         }
         bits = [bit for write in writes for bit in write.bits(logic, bound)]
         through = bits == [("moved", i) for i in range(word_bits)]
-        return moved.bits(logic, bound) if moved and through else bits
+        return [bit for write in moved for bit in write.bits(logic, bound)] if moved and through else bits
 
     last = stored((1 << NUMBER_BITS) - 1)
     return (*takewhile(lambda digit: digit != last, map(stored, range(1 << NUMBER_BITS))), last)
@@ -290,6 +290,18 @@ class _Write(NamedTuple):
         """Return the bits of it, with the given bits for some of the signals."""
         is_other = self.otherwise and logic.value(self.condition, bound) == [0]
         return logic.value(self.otherwise if is_other else self.value, bound)
+
+
+def _moved(text: str, word_bits: int) -> list[_Write]:
+    """Return what is written to `moved`, the lowest bits first: at once, or in slices where some may be cleared."""
+    slices = re.findall(r"^ *(?:if \(.*\) )?moved\[(\d+)(?::(\d+))?\] <= ", text, re.MULTILINE)
+    if not slices:
+        return [_written(text, "moved")]
+    ends = sorted((int(low or high), int(high)) for high, low in slices)
+    starts = [0, *(high + 1 for _, high in ends)]
+    whole = starts == [*(low for low, _ in ends), word_bits]
+    require(whole, f"each of the {word_bits} bits of moved must be written at one place")
+    return [_written(text, rf"moved\[{high}(?::{low})?\]") for low, high in ends]
 
 
 def _written(text: str, register: str) -> _Write:

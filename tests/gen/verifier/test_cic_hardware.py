@@ -32,6 +32,7 @@ class Case(NamedTuple):
     error: float = 0.01
     hold: bool = True
     architecture: str = "parallel"
+    output_bits: int = 8
 
     @property
     def text(self) -> str:
@@ -48,7 +49,7 @@ cutoff = {self.cutoff}
 decimate = {self.factor}
 hold = {str(self.hold).lower()}
 [output]
-bits = 8
+bits = {self.output_bits}
 signed = {signed}
 range = [{low}.0, 1.0]
 unit = ""
@@ -67,6 +68,9 @@ CASES = [
     (Case(signed=False, factor=8, cutoff=2, error=0.5, hold=False), 1),
     (Case(bits=6, factor=2, cutoff=1, error=0.5), 1),
     (Case(bits=2, factor=4, error=0.02), 2),
+    (Case(output_bits=11), 2),  # with signs above it, each a port of the core
+    (Case(output_bits=12, hold=False, architecture="folded"), 2),
+    (Case(signed=False, output_bits=9, cutoff=20, error=0.02, architecture="folded"), 2),  # with zeros
 ]
 
 
