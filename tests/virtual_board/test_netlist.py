@@ -15,7 +15,7 @@ import pytest
 from tests.gen.designs import EXAMPLES
 from tests.gen.output.packages.made import HELD
 from tests.host.lines import ScriptedLine
-from tests.interface.small import filter_design, instrument_design
+from tests.interface.small import FILTER, filter_design, instrument_design
 
 import sosmith
 from sosmith.gen.core import CoreDesign, design_core
@@ -117,6 +117,17 @@ def test_another_core_is_recognized(place: Path) -> None:
         about = board.identity
     with pytest.raises(sosmith.ShortfallError, match=expected):
         check_files(about, place / "gauge")
+
+
+def test_another_core_of_the_same_name_is_built_in_the_folder_of_one_that_runs(place: Path) -> None:
+    first = filter_design()
+    second = sosmith.design({**FILTER, "filter": {**FILTER["filter"], "cutoff": 30.0}})
+    codes, folder = codes_for(first.core, 200), place / "shared"
+    rate, baud = Fraction(4_000_000), 1_000_000
+    with running(build(first.core, folder, clock=rate, baud=baud)) as port, Board(port) as board:
+        with running(build(second.core, folder, clock=rate, baud=baud)) as other, Board(other) as beside:
+            assert np.array_equal(beside.run_codes(codes).codes, second.core.datapath.compute(codes))
+        assert np.array_equal(board.run_codes(codes).codes, first.core.datapath.compute(codes))
 
 
 def test_the_line_is_busy_for_four_fifths_of_the_time(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
