@@ -426,8 +426,7 @@ class _Passing:
     def wanted(self, now: _Logic, name: str) -> Form:
         """Return what is on the other side."""
         if name == "m_axis_tdata":
-            found = now.result(now.net(name), self.port.bits)
-            return found if self.port.signed else now.forms.unsigned(found, self.port.bits)
+            return now.result(now.net(name), self.port.bits)
         return now.word(SINK if name == self.seams.ready else self.seams.valid)
 
 
@@ -461,7 +460,7 @@ class _Holder:
         if name == "m_axis_tvalid":
             return now.word(valid)
         if name == "m_axis_tdata":
-            bits = now.width(name) if self.port.signed else self.port.bits
+            bits = now.width(name) if self.word == HOLDER + "o_data" else self.port.bits  # else zeros are left out
             return now.forms.unsigned(now.word(self.word), bits)
         takes = not now.bit(valid) or (now.bit(SINK) and now.limits(left) == (0, 0))
         if name in self.nets:

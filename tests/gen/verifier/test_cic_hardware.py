@@ -71,6 +71,8 @@ CASES = [
     (Case(output_bits=11), 2),  # with signs above it, each a port of the core
     (Case(output_bits=12, hold=False, architecture="folded"), 2),
     (Case(signed=False, output_bits=9, cutoff=20, error=0.02, architecture="folded"), 2),  # with zeros
+    (Case(signed=False, output_bits=9, cutoff=20, error=0.02), 2),  # with zeros that a port of the core has
+    (Case(signed=False, output_bits=9, cutoff=20, error=0.02, hold=False), 2),
 ]
 
 
