@@ -89,8 +89,8 @@ def test_what_is_not_read_is_said(architecture: str, key: dict[str, Any], tmp_pa
     generate(design_core(replace(spec, hardware=hardware)), tmp_path)
     table = command.good(str(tmp_path / "plain.certificate.json"), "--files", str(tmp_path)).stdout
     assert table.endswith(
-        "not read: the SystemVerilog, as that of a core with loadable constants, protection, look-ahead or 16 samples "
-        "a clock\n"
+        "not read: the SystemVerilog, as that of a core with loadable constants, protection, look-ahead, 16 samples "
+        "a clock or several of no whole bytes\n"
     )
 
 

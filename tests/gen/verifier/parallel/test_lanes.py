@@ -92,10 +92,12 @@ def test_the_number_of_lanes_is_held_against_the_ports() -> None:
     assert rejection(two._replace(lanes=1), two.text) == "the port s_axis_tdata must have 8 bits, not 16"
 
 
-@pytest.mark.parametrize(("samples", "name"), [(8, "parallel"), (16, None)])
-def test_up_to_eight_lanes_are_read(samples: int, name: str | None, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("samples", "width", "name"), [(8, 16, "parallel"), (1, 12, "parallel"), (16, 16, None), (2, 12, None)]
+)
+def test_up_to_eight_lanes_of_whole_bytes_are_read(samples: int, width: int, name: str | None, tmp_path: Path) -> None:
     path = tmp_path / "core.json"
-    streams = {"m_axis": {"samples": samples}}
+    streams = {"m_axis": {"samples": samples, "fields": [{"width": width}]}}
     manifest = {"reload": None, "protect": "none", "architecture": "parallel", "channels": 1, "streams": streams}
     path.write_text(json.dumps(manifest), encoding="utf-8")
     assert fixed_architecture(path) == (name, 1, samples)
