@@ -292,7 +292,9 @@ class _Cic:
             return constant(self._ready(now))
         if name in self.seams.entering:
             return now.word(self.seams.entering[name])
-        kind, k, what = _NAME.fullmatch(name.removeprefix(CIC)).groups()  # type: ignore[union-attr]
+        parts = _NAME.fullmatch(name.removeprefix(CIC))
+        assert parts is not None  # as it is for all names in `first`
+        kind, k, what = parts.groups()
         stage = int(k or 0)
         if what is not None:
             holds = self._summed if kind == "integrator" else self._combed

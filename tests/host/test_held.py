@@ -14,6 +14,7 @@ from sosmith.gen.stimuli import traces_for
 from sosmith.host.board import Board
 from sosmith.host.model_line import ModelLine, model_of
 from sosmith.host.port_run import run_on
+from sosmith.model.arrays import Codes
 from sosmith.model.errors import ShortfallError
 from sosmith.model.traces.trace_file import write_traces
 from sosmith.sim.cosimulate import CosimulationResult, first_copies
@@ -23,15 +24,14 @@ STREAM, MONITOR = Invocation("stream"), Invocation("monitor")
 FACTOR = 4
 
 
-def held(codes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:  # type: ignore[type-arg]
+def held(codes: Codes) -> tuple[Codes, Codes]:
     """Return code and status of the result that belongs to each sample."""
     datapath = design_of("held").core.datapath
-    return tuple(  # type: ignore[return-value]
-        np.repeat(found, FACTOR)[: len(codes)] for found in (datapath.compute(codes), datapath.compute_status(codes))
-    )
+    results, status = datapath.compute(codes), datapath.compute_status(codes)
+    return np.repeat(results, FACTOR)[: len(codes)], np.repeat(status, FACTOR)[: len(codes)]
 
 
-def samples(count: int) -> np.ndarray:  # type: ignore[type-arg]
+def samples(count: int) -> Codes:
     return np.random.default_rng(2).integers(-512, 512, (count, 1))
 
 

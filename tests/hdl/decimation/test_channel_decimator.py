@@ -8,9 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from amaranth.hdl import ResetInserter, Signal
-from amaranth.sim import Simulator
 from tests.formal.prover import broken
+from tests.hdl.decimation.restarted import simulate
 from tests.hdl.decimation.test_decimator import decimator
 
 from sosmith.hdl.decimation import channel_decimator as hardware
@@ -70,7 +69,6 @@ def run(
 ) -> Seen:
     """Send samples at a pace, after a reset in which the first `restart` of them have gone in."""
     dut: Any = module.ChannelDecimator(made, channels, 2 * flags)
-    reset = Signal()
     chance = random.Random(f"{pace}")
     seen = Seen()
     valid, ready = pace
@@ -104,25 +102,12 @@ def run(
             clock += 1
             assert clock < 20_000
 
-    async def bench(ctx: Any) -> None:
-        if restart:
-            await send(ctx, samples[:restart], 0)
-            ctx.set(reset, 1)
-            await ctx.tick()
-            ctx.set(reset, 0)
-            for kept in (seen.results, seen.accepted, seen.left):
-                kept.clear()
-        await send(ctx, samples, wanted)
-        ctx.set(dut.i_valid, 0)
-        ctx.set(dut.o_ready, 1)
-        for _ in range(20):
-            await ctx.tick()
-            assert not ctx.get(dut.o_valid)
+    async def before(ctx: Any) -> None:
+        await send(ctx, samples[:restart], 0)
+        for kept in (seen.results, seen.accepted, seen.left):
+            kept.clear()
 
-    simulator = Simulator(ResetInserter(reset)(dut))
-    simulator.add_clock(1e-6)
-    simulator.add_testbench(bench)
-    simulator.run()
+    simulate(dut, lambda ctx: send(ctx, samples, wanted), before=before if restart else None, idle=20)
     return seen
 
 

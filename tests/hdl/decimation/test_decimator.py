@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from amaranth.hdl import ResetInserter, Signal
-from amaranth.sim import Simulator
+from tests.hdl.decimation.restarted import simulate
 
 from sosmith.hdl.decimation.decimator import CicDecimator
 from sosmith.hdl.plan.decimator_clocks import cycles_per_result, latency_cycles, reset_cycles
@@ -36,7 +35,6 @@ Run = tuple[list[tuple[int, int]], list[int], list[int]]
 def run(made: Decimator, codes: list[int], *, valid: float = 1.0, ready: float = 1.0, restart: int = 0) -> Run:
     """Send `codes`, after a reset in which the first `restart` of them have gone in."""
     dut: Any = CicDecimator(made)
-    reset = Signal()
     pace = random.Random(f"{valid} {ready}")
     found: list[tuple[int, int]] = []
     accepted: list[int] = []
@@ -67,25 +65,12 @@ def run(made: Decimator, codes: list[int], *, valid: float = 1.0, ready: float =
             clock += 1
             assert clock < 20_000
 
-    async def bench(ctx: Any) -> None:
-        if restart:
-            await send(ctx, codes[:restart])
-            ctx.set(reset, 1)
-            await ctx.tick()
-            ctx.set(reset, 0)
-            for kept in (found, accepted, left):
-                kept.clear()
-        await send(ctx, codes)
-        ctx.set(dut.i_valid, 0)
-        ctx.set(dut.o_ready, 1)
-        for _ in range(50):
-            await ctx.tick()
-            assert not ctx.get(dut.o_valid)
+    async def before(ctx: Any) -> None:
+        await send(ctx, codes[:restart])
+        for kept in (found, accepted, left):
+            kept.clear()
 
-    simulator = Simulator(ResetInserter(reset)(dut))
-    simulator.add_clock(1e-6)
-    simulator.add_testbench(bench)
-    simulator.run()
+    simulate(dut, lambda ctx: send(ctx, codes), before=before if restart else None, idle=50)
     return found, accepted, left
 
 

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from tests.gen.word_lengths.decimated import locomotive, locomotive_text, read, tree_of
 from tests.sim.lint import icarus_check, lint
+from tests.sim.stream.random_lowpass import lowpass
 
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.output.generate import generate
@@ -115,32 +116,19 @@ def test_results_come_at_the_rate_that_is_stated(tmp_path: Path) -> None:
     assert evidence.cycles == decimator.warm_up + 1 + stated.cycles_per_result * 50 + stated.latency_cycles
 
 
-FAMILIES = ("butterworth", "chebyshev1", "chebyshev2", "elliptic", "bessel")
 DESIGNS = 40
 
 
 def random_tree(number: int) -> dict[str, Any]:
     """Draw a specification: family, order, cutoff, factor, formats and architecture."""
     draw = random.Random(f"decimated {number}")
-    family = FAMILIES[number % len(FAMILIES)]
     factor = 2 ** draw.randint(1, 6)
     # The cutoff lies from a fortieth to a tenth of the lower rate.
     cutoff = 1000 / factor / 40 * 4 ** draw.random()
     bits, out = draw.randint(8, 18), draw.randint(8, 18)
     span = draw.choice([1.0, 1.0, 10.0, 3.3])
     signed = draw.random() < 0.5
-    table: dict[str, Any] = {
-        "family": family,
-        "kind": "lowpass",
-        "order": draw.randint(1, 7),
-        "cutoff": float(f"{cutoff:.4g}"),
-        "decimate": "auto" if number % 5 == 4 else factor,
-    }
-    losses = {"chebyshev1": ("passband_loss",), "chebyshev2": ("stopband_loss",)}
-    for key in losses.get(family, ("passband_loss", "stopband_loss") if family == "elliptic" else ()):
-        table[key] = 0.5 if key == "passband_loss" else 50
-    if family in {"chebyshev2", "elliptic"}:
-        table["order"] = max(2, table["order"])
+    table = lowpass(draw, number, cutoff, factor)
     ends = [-span, span] if signed else [0.0, span]
     return {
         "name": f"decimated{number}",

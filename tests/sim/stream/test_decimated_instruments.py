@@ -16,6 +16,7 @@ import pytest
 from tests.gen.word_lengths.decimated import locomotive, locomotive_text, read, small, tree_of
 from tests.gen.word_lengths.multirate import worst_error
 from tests.sim.lint import icarus_check, lint
+from tests.sim.stream.random_lowpass import lowpass
 
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.output.generate import generate
@@ -152,29 +153,16 @@ def test_tools_read_the_text_without_a_warning(architecture: str, tmp_path: Path
     assert {f"{made.spec.name}{part}" for part in ("", "_ahead", "_decimator", "_behind")} <= set(modules)
 
 
-FAMILIES = ("butterworth", "chebyshev1", "chebyshev2", "elliptic", "bessel")
 DESIGNS = 40
 
 
 def random_tree(number: int) -> dict[str, Any]:
     """Draw a specification: polynomial, family, order, cutoff, factor, formats and architecture."""
     draw = random.Random(f"decimated instrument {number}")
-    family = FAMILIES[number % len(FAMILIES)]
     factor = 2 ** draw.randint(1, 6)
     # The cutoff lies from a fortieth to a tenth of the lower rate; "auto" finds a factor where it is low.
     cutoff = 1000 / (64 if number % 5 == 4 else factor) / 40 * 4 ** draw.random()
-    table: dict[str, Any] = {
-        "family": family,
-        "kind": "lowpass",
-        "order": draw.randint(1, 7),
-        "cutoff": float(f"{cutoff:.4g}"),
-        "decimate": "auto" if number % 5 == 4 else factor,
-    }
-    losses = {"chebyshev1": ("passband_loss",), "chebyshev2": ("stopband_loss",)}
-    for key in losses.get(family, ("passband_loss", "stopband_loss") if family == "elliptic" else ()):
-        table[key] = 0.5 if key == "passband_loss" else 50
-    if family in {"chebyshev2", "elliptic"}:
-        table["order"] = max(2, table["order"])
+    table = lowpass(draw, number, cutoff, factor)
     signed = draw.random() < 0.3
     inputs = {
         "voltage": {"bits": draw.randint(8, 16), "range": [0.0, draw.choice([5.0, 10.0])]},
