@@ -74,6 +74,18 @@ def number(value: float) -> str:
     return f"{int(value):,}" if value == int(value) else f"{value:,.4g}"
 
 
+def frequency(*values: float) -> str:
+    """Frequency in Hz, or several with "to" between, with up to six significant digits; from 1 MHz on in MHz.
+
+    Examples
+    --------
+    >>> frequency(48000), frequency(3000, 6000.5), frequency(2.5e6, 10e6)
+    ('48000 Hz', '3000 to 6000.5 Hz', '2.5 to 10 MHz')
+    """
+    divisor, unit = (1e6, "MHz") if max(values) >= 1e6 else (1.0, "Hz")
+    return f"{' to '.join(f'{value / divisor:.6g}' for value in values)} {unit}"
+
+
 def scale(peak: float, unit: str, digits: int = 3) -> tuple[float, str]:
     """Choose the factor and the unit in which values up to `peak` read well.
 

@@ -32,6 +32,7 @@ from sosmith.gen.filter.sections import (
     sections,
 )
 from sosmith.gen.filter.transformations import bilinear, unwarped, warped
+from sosmith.gen.quantity import frequency
 from sosmith.gen.specification.specification import FilterSpec
 from sosmith.model.arithmetic.correct_rounding import evaluate, nearest_double, sign
 from sosmith.model.arithmetic.recursive_filters import sosfilt
@@ -126,12 +127,11 @@ class Filter:
     def describe(self) -> str:
         """One-line description: family, kind, order, cutoff, sample rate, and what else is not the default."""
         if self.cutoff is None:
-            return f"{len(self.rows)} given section{'s' * (len(self.rows) > 1)} at {self.sample_rate:g} Hz"
-        edges = " to ".join(f"{edge:.6g}" for edge in self.cutoff)
+            return f"{len(self.rows)} given section{'s' * (len(self.rows) > 1)} at {frequency(self.sample_rate)}"
         method = "" if self.aliasing is None else ", impulse-invariant"
         filter_ = f"{self.family.capitalize()} {self.kind}, order {self.order}"
         decimated = f", decimated by {self.decimated}" if self.decimated > 1 else ""
-        return f"{filter_}, {edges} Hz at {self.sample_rate:g} Hz{method}{decimated}"
+        return f"{filter_}, {frequency(*self.cutoff)} at {frequency(self.sample_rate)}{method}{decimated}"
 
 
 def impulse_response(sos: Array) -> Array:

@@ -21,6 +21,7 @@ from textwrap import wrap
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.output.core_facts import CoreFacts, SectionFacts
 from sosmith.gen.output.pins import pins
+from sosmith.gen.quantity import frequency
 from sosmith.gen.version import __version__
 from sosmith.model.templates import render
 
@@ -62,7 +63,7 @@ def _title(design: CoreDesign, facts: CoreFacts) -> str:
     (output,) = facts.interface.outputs.fields
     made = " ".join(filter(None, (facts.architecture, facts.realization)))
     channels = "1 channel" if facts.channels == 1 else f"{facts.channels} channels"
-    rate = f"{float(design.spec.sample_rate):g} Hz"
+    rate = frequency(float(design.spec.sample_rate))
     if facts.decimation is not None:
         rate += f", decimated by {facts.decimation.factor}"
     return f"{inputs} to {output.port.name}, {channels} at {rate}, {made}"
