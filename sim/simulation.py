@@ -223,7 +223,7 @@ def _evidence(
         cycles_per_second=result.cycles_per_second,
         realization=facts.realization or "none",
         architecture=facts.architecture,
-        why=" ".join(f"{reason}." for reason in facts.reasons.values()),
+        why=" ".join(f"{chosen[0].upper()}{chosen[1:]} {reason}." for chosen, reason in facts.reasons.items()),
         formats=facts.formats,
         sections=facts.sections,
         recursions=tuple(recursion_of(section.name, section.graph) for section in quantized.sections),

@@ -64,6 +64,8 @@ def test_hardware_equals_the_integer_model(architecture: str, simulator: str, tm
     evidence = simulate(made, [samples_of(made, 600)], tmp_path, seed=5, simulator=simulator)
     assert evidence.mismatches == 0
     assert evidence.samples == len(evidence.time) == 38
+    chosen = ("Decimation by ", " Realization ", " Architecture ", " Calibration before the decimator ")
+    assert all(evidence.why.count(words) == 1 for words in chosen)
     summary = write_report(evidence, tmp_path)
     assert summary["passed"]
     assert summary["error"]["max_abs"] <= summary["error"]["bound"] <= 0.00025
