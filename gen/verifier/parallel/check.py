@@ -52,7 +52,7 @@ _AT_RAIL, _SATURATED, _SETTLING = 0, 2, 5
 _FLAG_BITS = 8
 
 _DEEPEST = 20_000
-"""Most calls inside each other: 16 lanes of a section take a few thousand."""
+"""Most calls inside each other: the lanes of a section are followed back one through the other."""
 
 
 @dataclass(frozen=True)
