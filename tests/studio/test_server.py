@@ -10,8 +10,10 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
+from threading import Event
 from typing import Any
 from urllib.error import HTTPError
 from urllib.request import Request, urlopen
@@ -116,6 +118,26 @@ def test_every_page_is_told_of_a_change(studio: tuple[Session, Studio]) -> None:
             while known.get("preview", {}).get("filter", {}).get("cutoff") != [77.0]:
                 known |= json.loads(page.recv(PATIENCE))
             assert known["preview"]["client"] in ids
+
+
+def test_every_page_is_told_of_the_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with session_in(tmp_path) as session:
+        wait = session.wait
+
+        def late(seen: int, left: Event) -> tuple[int, dict[str, Any], bool]:
+            """Wait as before, but tell of the end only when the server has long begun to close, as on a busy machine."""
+            version, news, ended = wait(seen, left)
+            time.sleep(0.3 if ended else 0.0)
+            return version, news, ended
+
+        monkeypatch.setattr(session, "wait", late)
+        studio = Studio(session)
+        with live(studio) as first, live(studio) as second:
+            for page in (first, second):
+                assert set(json.loads(page.recv(PATIENCE))) == {"you"}
+            studio.close()
+            for page in (first, second):
+                assert [json.loads(text) for text in page][-1].get("ended")
 
 
 def test_a_port_that_is_taken_is_refused(studio: tuple[Session, Studio]) -> None:

@@ -7,6 +7,7 @@ import logging
 import os
 import secrets
 import threading
+import time
 from contextlib import suppress
 from types import TracebackType
 from typing import TYPE_CHECKING
@@ -21,6 +22,9 @@ if TYPE_CHECKING:
 
 POLICY_VIOLATION = 1008
 """Code with which a websocket is closed that says what no page of ours says."""
+
+FAREWELL = 2.0
+"""Seconds that pages have at most, all together, to hear that it is the end."""
 
 
 class Studio:
@@ -81,12 +85,18 @@ class Studio:
         taken = self._server.socket.getsockname()[1]
         self._hosts = {f"127.0.0.1:{taken}", f"localhost:{taken}"}
         self.address = f"http://127.0.0.1:{taken}/{self._token}/"
+        self._tellers: set[threading.Thread] = set()
         self._thread = threading.Thread(target=self._server.serve_forever, daemon=True)
         self._thread.start()
 
     def close(self) -> None:
         """End the session and the server."""
         self._session.close()
+        # Pages are told that it is the end, which they cannot be once the server has closed their connections. A page
+        # that does not listen is not waited for.
+        end = time.monotonic() + FAREWELL
+        for teller in self._tellers.copy():
+            teller.join(max(0.0, end - time.monotonic()))
         self._server.shutdown()
         self._thread.join()
 
@@ -139,7 +149,9 @@ class Studio:
         client, left = secrets.token_hex(8), threading.Event()
         with suppress(ConnectionClosed):
             connection.send(json.dumps({"you": client}))
-            threading.Thread(target=self._tell, args=(connection, left), daemon=True).start()
+            teller = threading.Thread(target=self._tell, args=(connection, left), daemon=True)
+            teller.start()
+            self._tellers.add(teller)
             for text in connection:
                 try:
                     self._session.handle(json.loads(text), client)
@@ -160,3 +172,4 @@ class Studio:
                     json.dumps(news | ({"ended": True} if ended else {}), allow_nan=False, separators=(",", ":"))
                 )
             connection.close()
+        self._tellers.discard(threading.current_thread())
