@@ -125,7 +125,7 @@ def test_every_page_is_told_of_the_end(tmp_path: Path, monkeypatch: pytest.Monke
         wait = session.wait
 
         def late(seen: int, left: Event) -> tuple[int, dict[str, Any], bool]:
-            """Wait as before, but tell of the end only when the server has long begun to close, as on a busy machine."""
+            """Wait as before, but tell of the end only when the server has begun to close, as on a busy machine."""
             version, news, ended = wait(seen, left)
             time.sleep(0.3 if ended else 0.0)
             return version, news, ended
