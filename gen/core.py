@@ -328,19 +328,23 @@ def front_in(spec: Specification, core: str, polynomial: Polynomial | None) -> t
     Raises
     ------
     ShortfallError
-        If the factor that is asked for lets too much fold into the pass band, or takes too many bits.
+        If the factor that is asked for lets too much fold into the pass band, or takes too many bits; with the name of
+        the specification's file.
     """
     if spec.filter.decimate is None or core == "calibration":
         return None, {}
-    front, reason = front_of(
-        spec.filter,
-        spec.sample_rate,
-        _inputs(spec, core),
-        spec.output,
-        spec.max_error,
-        polynomial,
-        f"{spec.name}_ahead",
-    )
+    try:
+        front, reason = front_of(
+            spec.filter,
+            spec.sample_rate,
+            _inputs(spec, core),
+            spec.output,
+            spec.max_error,
+            polynomial,
+            f"{spec.name}_ahead",
+        )
+    except ShortfallError as error:
+        raise ShortfallError(f"{spec.path}: {error}") from None
     return front, {"decimation": reason}
 
 

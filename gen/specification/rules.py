@@ -69,10 +69,12 @@ def _check_online(document: Document) -> None:
     """Check that nothing is asked of the online architecture that it does not have."""
     if document.hardware.architecture != "online":
         return
+    blocks = document.hardware.multipliers
     asked = {
         "channels": (document.channels, 1),
         "hardware.reload": (document.hardware.reload, False),
         "hardware.protect": (document.hardware.protect, "none"),
+        "hardware.multipliers": (AUTO if blocks is None else blocks, AUTO),
     }
     for where, (found, only) in asked.items():
         if found != only:

@@ -955,6 +955,12 @@ BAD = [
         "hardware.protect must be 'none' with hardware.architecture = \"online\", not 'detect'",
     ),
     (
+        "online within a number of multipliers",
+        CLOCK,
+        CLOCK + '\narchitecture = "online"\nmultipliers = 0',
+        "hardware.multipliers must be 'auto' with hardware.architecture = \"online\", not 0",
+    ),
+    (
         "reload is a text",
         CLOCK,
         CLOCK + '\nreload = "yes"',

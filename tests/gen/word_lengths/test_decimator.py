@@ -8,12 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.gen.word_lengths.decimated import locomotive, locomotive_spec
+from tests.gen.word_lengths.decimated import locomotive, locomotive_spec, locomotive_text
 
 from sosmith.gen.core import design_core
 from sosmith.gen.output.core_facts import core_facts
 from sosmith.gen.output.decimation_facts import direct_design, rate_costs
 from sosmith.gen.output.manifest import manifest
+from sosmith.gen.specification.specification import from_text
 from sosmith.gen.stimuli import traces_for
 from sosmith.gen.word_lengths.decimator import front_of
 from sosmith.gen.word_lengths.quantized import DECIMATION
@@ -162,6 +163,17 @@ def test_an_input_as_wide_as_can_be() -> None:
     )
     with refused(sentence, ShortfallError):
         front_of(spec.filter, spec.sample_rate, (x,), sharp, Fraction(16, 2**32))
+
+
+def test_a_factor_that_lets_too_much_fold_is_refused_with_the_name_of_the_file() -> None:
+    text = locomotive_text("64").replace("max_error = 0.00025", "max_error = 1e-6")
+    text = text.replace("[output]\nbits = 16", "[output]\nbits = 30")
+    sentence = (
+        "locomotive.toml: filter.decimate must be so small that a full-scale sine which folds into the pass band is at "
+        "most output.max_error with 8 stages of at most 63 bits, not 64"
+    )
+    with refused(sentence, ShortfallError):
+        design_core(from_text(text, Path("locomotive.toml")), core="filter")
 
 
 def test_a_clock_that_is_too_slow() -> None:

@@ -13,8 +13,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.gen.word_lengths.decimated import locomotive, locomotive_text, read, tree_of
+from tests.gen.word_lengths.decimated import locomotive, locomotive_text
 from tests.sim.lint import icarus_check, lint
+from tests.sim.stream.proof_and_hardware import check_proof_and_hardware
 from tests.sim.stream.random_lowpass import lowpass
 
 from sosmith.gen.core import CoreDesign, design_core
@@ -22,8 +23,6 @@ from sosmith.gen.output.generate import generate
 from sosmith.gen.report.report import write_report
 from sosmith.gen.specification.specification import from_text
 from sosmith.gen.stimuli import bench_of, traces_for
-from sosmith.gen.verifier.specified.stated_specification import check_specification
-from sosmith.gen.verifier.verification import verify
 from sosmith.interface.specification import Specification
 from sosmith.model.reference.golden import entering_filter, filtered
 from sosmith.model.scenarios.worst_case_inputs import sign_matched
@@ -154,10 +153,8 @@ def worst_cases(made: CoreDesign) -> Iterator[np.ndarray]:
 @pytest.mark.parametrize("number", range(DESIGNS))
 def test_random_designs(number: int, tmp_path: Path) -> None:
     """No input exceeds the bound, no result differs, and the other method proves the same."""
-    spec = Specification.load(random_tree(number)).checked
-    made = design_core(spec)
+    made = design_core(Specification.load(random_tree(number)).checked)
     quantized, datapath = made.quantized, made.datapath
-    assert datapath.decimator is not None
     assert quantized.filter is not None
     bound = float(quantized.bound)
     for codes in worst_cases(made):
@@ -166,14 +163,7 @@ def test_random_designs(number: int, tmp_path: Path) -> None:
         exact = filtered(entering, quantized.filter.sos, datapath.output, steady=quantized.steady)
         error = np.abs(datapath.output.decode(datapath.compute(column)) - exact).max() / float(datapath.output.lsb)
         assert error <= bound + 1e-6
-    certificate = read(tree_of(made))
-    verdict = verify(certificate)
-    assert verdict.bound * datapath.output.lsb <= spec.max_error
-    check_specification(certificate, spec.text, verdict.margin)
-    count = 60 * datapath.decimator.factor + number % 7
-    evidence = simulate(made, [samples_of(made, count)], tmp_path, seed=number)
-    assert evidence.mismatches == 0
-    assert evidence.samples == datapath.results(count)
+    check_proof_and_hardware(made, samples_of, number, tmp_path)
 
 
 @pytest.mark.parametrize("architecture", ["folded", "parallel"])

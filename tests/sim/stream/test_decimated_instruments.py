@@ -13,9 +13,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.gen.word_lengths.decimated import locomotive, locomotive_text, read, small, tree_of
+from tests.gen.word_lengths.decimated import locomotive, locomotive_text, small
 from tests.gen.word_lengths.multirate import worst_error
 from tests.sim.lint import icarus_check, lint
+from tests.sim.stream.proof_and_hardware import check_proof_and_hardware
 from tests.sim.stream.random_lowpass import lowpass
 
 from sosmith.gen.core import CoreDesign, design_core
@@ -23,8 +24,6 @@ from sosmith.gen.output.generate import generate
 from sosmith.gen.report.report import write_report
 from sosmith.gen.specification.specification import from_text
 from sosmith.gen.stimuli import bench_of, traces_for
-from sosmith.gen.verifier.specified.stated_specification import check_specification
-from sosmith.gen.verifier.verification import verify
 from sosmith.interface.specification import Specification
 from sosmith.model.scenarios.worst_case_inputs import sign_matched
 from sosmith.model.traces.trace import Trace
@@ -220,20 +219,9 @@ def worst_cases(made: CoreDesign) -> Iterator[np.ndarray]:
 @pytest.mark.parametrize("number", range(DESIGNS))
 def test_random_designs(number: int, tmp_path: Path) -> None:
     """No input exceeds the bound, no result differs, and the other method proves the same."""
-    spec = Specification.load(random_tree(number)).checked
-    made = design_core(spec)
-    quantized, datapath = made.quantized, made.datapath
-    assert datapath.ahead is not None
-    assert datapath.decimator is not None
-    bound = float(quantized.bound)
+    made = design_core(Specification.load(random_tree(number)).checked)
+    assert made.datapath.ahead is not None
+    bound = float(made.quantized.bound)
     for codes in worst_cases(made):
         assert worst_error(made, codes) <= bound
-    certificate = read(tree_of(made))
-    verdict = verify(certificate)
-    assert verdict.bound * datapath.output.lsb <= spec.max_error
-    check_specification(certificate, spec.text, verdict.margin)
-    count = 60 * datapath.decimator.factor + number % 7
-    trace = samples_of(made, count)
-    evidence = simulate(made, [trace.delayed(k) for k in range(spec.channels)], tmp_path, seed=number)
-    assert evidence.mismatches == 0
-    assert evidence.samples == datapath.results(count) * spec.channels
+    check_proof_and_hardware(made, samples_of, number, tmp_path)
