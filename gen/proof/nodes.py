@@ -29,7 +29,7 @@ import numpy.typing as npt
 from flint import arb, arb_mat, ctx, fmpq_poly
 
 from sosmith.gen.proof.decimation import decimated
-from sosmith.gen.proof.poles import Coefficients, pole_radii
+from sosmith.gen.proof.poles import Coefficients, pole_radii, power_of
 from sosmith.model.errors import ShortfallError
 
 Integers = npt.NDArray[np.object_]
@@ -101,6 +101,8 @@ class Nodes:
         self._denominator = fmpq_poly([1])
         for denominator in denominators:
             self._denominator *= polynomial(denominator)
+        self._turns = math.gcd(*(power_of(denominator) for denominator in denominators if len(denominator) > 1))
+        """M of a denominator in powers of ``w**M``."""
         self.degree = len(radii)
         self.bits = bits
         self._decay = accuracy + _DECAY_BITS
@@ -114,7 +116,7 @@ class Nodes:
         self.residue = Fraction(0)
         self.fine = bits + self.gain.bit_length() + self.spread.bit_length() + _GUARD_BITS
         """Fraction bits of `impulse` and `around`."""
-        self._wider = 1
+        self._wider, self._neighbours = 1, _NEIGHBOURS
         while True:
             try:
                 self._enclose()
@@ -177,7 +179,7 @@ class Nodes:
     def _reach(self, window: int) -> dict[int, list[int]]:
         """Find the d samples up to each place far from the beginning, the last one first, within two units."""
         doublings = max(window // _GROUPS, 1).bit_length() - 1
-        count, width = (window - 1 >> doublings) + 1, self.degree + _NEIGHBOURS - 1
+        count, width = (window - 1 >> doublings) + 1, self.degree + self._neighbours - 1
         more = (self.degree + 2) * (doublings + 4) + _GUARD_BITS
         while True:
             with ctx.workprec(self.fine + more):
@@ -190,7 +192,7 @@ class Nodes:
         return {
             (k << doublings) - back: made[k, back : back + self.degree].tolist()
             for k in range(count)
-            for back in range(_NEIGHBOURS)
+            for back in range(self._neighbours)
             if (k << doublings) - back >= _FIRST
         }
 
@@ -211,6 +213,10 @@ class Nodes:
         rows = {at: beginning[at + d : at : -1] for at in range(min(window, _FIRST))} | self._distant
         candidates = sorted(rows)
         picked, least = _pivots(np.array([rows[at] for at in candidates], dtype=object), self.fine)
+        if not least and self._neighbours < self._turns:
+            # M responses take turns: neighbours that miss too many of these are too few at any precision.
+            self._neighbours = self._turns
+            raise _CoarseError(0)
         short = self.bits + self.spread.bit_length() + _SLACK_BITS - least.bit_length()
         if short > 0:
             raise _CoarseError(short)

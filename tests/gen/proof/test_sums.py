@@ -76,6 +76,22 @@ def test_there_are_no_more_blocks_than_needed(name: str) -> None:
     assert after < target < before
 
 
+def test_responses_that_take_turns_each_have_nodes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of eight, neighbours of four places far from the beginning would miss half, however precise they are."""
+    monkeypatch.setattr(nodes, "_MOST_BITS", 2000)
+    pairs = [(1.5 - k / 16, -0.625 + k / 32) for k in range(6)]
+    denominators = [dyadic(1, *[0] * 7, -a, *[0] * 7, -b) for a, b in pairs]
+    made = Nodes(denominators, ACCURACY, 100)
+    assert {place % 8: sum(at % 8 == place % 8 for at in made.places) for place in made.places} == dict.fromkeys(
+        range(8), 12
+    )
+    samples = exact(dyadic(1), tuple(denominators), max(made.places) + made.block + 1)
+    held = [samples[at] for at in made.places]
+    for at in range(made.block):
+        found = sum(w * v for w, v in zip(made.weights[at], held, strict=True)) / 2**100
+        assert abs(found - samples[at]) < 2 * sum(map(abs, held)) / 2**100
+
+
 def test_a_precision_that_never_suffices_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
     """With all pivots said to be 0, the precision rises by what is missing and half the guard bits, up to 65,536."""
     tried: list[int] = []
