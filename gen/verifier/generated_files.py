@@ -116,8 +116,8 @@ class FixedArchitecture(NamedTuple):
 def fixed_architecture(path: Path) -> FixedArchitecture:
     """Return what hardware there is from the manifest at `path`, which is known to be unchanged.
 
-    The architecture is None for a core whose constants can be loaded, whose memories and states are protected, whose
-    sections look ahead, or whose beats hold more than `MAX_LANES` samples, or several that are no whole bytes: between
+    The architecture is None for a core whose constants can be loaded, whose memories and states are protected, or whose
+    beats hold more than `MAX_LANES` samples, or several that are no whole bytes: between
     their lanes signs are repeated, and no proof of the flags above them is found.
 
     Raises
@@ -131,7 +131,7 @@ def fixed_architecture(path: Path) -> FixedArchitecture:
         stream = manifest["streams"]["m_axis"]
         lanes = int(stream.get("samples", 1))
         whole = lanes == 1 or all(field["width"] % 8 == 0 for field in stream["fields"])
-        plain = plain and "pipeline" not in manifest and whole and lanes <= MAX_LANES
+        plain = plain and whole and lanes <= MAX_LANES
         return FixedArchitecture(str(manifest["architecture"]) if plain else None, int(manifest["channels"]), lanes)
     except (ValueError, KeyError, TypeError, AttributeError):
         raise RejectedError(f"{path} must be the manifest of a core, not another file") from None

@@ -125,7 +125,7 @@ class LookAheadStage(wiring.Component):
     def _connect_memories(self, m: Module, logic: PipelinedLogic, valid: list[Value]) -> None:
         """Give each state of a loop a memory with one word for each turn."""
         plan, graph = self.plan, self.plan.graph
-        turn, warm = Signal(range(plan.turns)), Signal()
+        turn, warm = Signal(range(plan.turns), name="turn"), Signal(name="warm")
         with m.If(self.advance & self.i_valid):
             m.d.sync += turn.eq(turn + 1)
             with m.If(turn == plan.turns - 1):

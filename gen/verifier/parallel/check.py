@@ -121,7 +121,8 @@ def _deep_recursion() -> Iterator[None]:
 def _checked(netlist: Netlist, certificate: Certificate, channels: int, lanes: int) -> HardwareVerdict:
     control = find_control(netlist) if channels == 1 else find_channels(netlist, channels)
     forms = Forms()
-    graph = GraphCodes(certificate, forms, lanes)
+    memories = {name: len(memory.first) for name, memory in netlist.memories.items()} if channels == 1 else {}
+    graph = GraphCodes(certificate, forms, lanes, memories)
     pipeline = Pipeline(netlist, control, graph, forms, certificate)
     try:
         pipeline.check_states()

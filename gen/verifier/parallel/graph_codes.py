@@ -6,15 +6,18 @@ that `node`, which is not a DELAY, had k samples ago. So a delay of a delay is t
     v1 = delay of v, v2 = delay of v1        v1 at the sample before = v2 = (v, 2)
 
 With several samples a clock, a beat takes the place of a sample, and a node is in one of its lanes
-(`sosmith.gen.verifier.parallel.lanes`). What a stage hands to the next, or a lane to the next, is a variable too,
-``(node, 0)``, so that forms stay short. The ranges that the certificate states are known of all of them.
+(`sosmith.gen.verifier.parallel.lanes`). With look-ahead, what a loop remembers of T samples ago or more is ``warm``
+times the variable, 0 for the first T samples (`sosmith.gen.verifier.parallel.turn_memories`). What a stage hands to the
+next, or a lane to the next, is a variable too, ``(node, 0)``, so that forms stay short. The ranges that the certificate
+states are known of all of them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from types import MappingProxyType
 
 from sosmith.gen.verifier.certificate_file import Certificate, NodeEntry, Operation, StageEntry
 from sosmith.gen.verifier.graph import require
@@ -79,9 +82,13 @@ class GraphCodes:
         The atoms; the ranges become known to them.
     lanes : int
         Samples of a beat.
+    memories : mapping of str to int
+        Number of words of each memory of a core with look-ahead, by its name.
 
     Attributes
     ----------
+    turned : dict of Origin to int
+        The origins of DELAY nodes in `memories`, and how many samples take turns there.
     nodes : list of CodeNode
         The nodes, without the inputs of stages that others feed.
     forms : Forms
@@ -91,7 +98,13 @@ class GraphCodes:
         Code of each node.
     """
 
-    def __init__(self, certificate: Certificate, forms: Forms, lanes: int = 1) -> None:
+    def __init__(
+        self,
+        certificate: Certificate,
+        forms: Forms,
+        lanes: int = 1,
+        memories: Mapping[str, int] = MappingProxyType({}),
+    ) -> None:
         self.forms = forms
         self.nodes: list[CodeNode] = []
         self._remembered: set[int] = set()
@@ -105,6 +118,11 @@ class GraphCodes:
             LanePorts(tuple(entering), output, flags[0] if flags else None)
             for entering, (output, *flags) in zip(_split(inputs, lanes), _split(passed, lanes), strict=True)
         ]
+        self.turned = {
+            self.origin(index): memories[self.memory_name(index)]
+            for index in self.delays
+            if self.memory_name(index) in memories
+        }
         self._ranges: dict[Origin, tuple[int, int]] = {}
         for index in self.delays:
             entry, origin = self.nodes[index].entry, self.origin(index)
@@ -136,6 +154,18 @@ class GraphCodes:
         """The DELAY nodes."""
         return [index for index, node in enumerate(self.nodes) if node.entry.op is Operation.DELAY]
 
+    def memory_name(self, index: int) -> str:
+        """Return the name of the memory that holds a DELAY node."""
+        return f"{self.nodes[index].stage}.{self.nodes[index].name}_memory"
+
+    def turn(self, turns: int) -> Form:
+        """Return the number of the sample modulo `turns`."""
+        return self.forms.variable(("turn", turns), 0, turns - 1)
+
+    def warm(self, turns: int) -> Form:
+        """Return whether there are as many samples before."""
+        return self.forms.variable(("warm", turns), 0, 1)
+
     def origin(self, index: int) -> Origin:
         """Return what a node repeats, and how many samples ago that was."""
         ago = 0
@@ -153,7 +183,8 @@ class GraphCodes:
         if ago == 0:
             return self.seen(node, self.nodes[node].stage)
         low, high = self._ranges.get(origin) or self._widest(node)
-        return self.forms.variable(origin, low, high)
+        code = self.forms.variable(origin, low, high)
+        return self.forms.times(self.warm(self.turned[origin]), code) if origin in self.turned else code
 
     def shortened(self, word: Form, width: int, at_inlet: bool = False) -> Form:
         """Return the variable whose code a word of `width` bits is; any other word as it is.

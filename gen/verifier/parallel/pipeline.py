@@ -27,15 +27,18 @@ from typing import NamedTuple
 
 from sosmith.gen.verifier.certificate_file import Certificate
 from sosmith.gen.verifier.graph import RejectedError, require
+from sosmith.gen.verifier.parallel.channel_memories import ChannelMemories
 from sosmith.gen.verifier.parallel.channels import DEST
 from sosmith.gen.verifier.parallel.control import RESET, Buffer, Case, Control, UndecidedError, about, cases
+from sosmith.gen.verifier.parallel.dependence import Dependence
 from sosmith.gen.verifier.parallel.equality import same_word
 from sosmith.gen.verifier.parallel.evaluation import Evaluation
 from sosmith.gen.verifier.parallel.forms import Forms, shifted
 from sosmith.gen.verifier.parallel.graph_codes import GraphCodes
 from sosmith.gen.verifier.parallel.netlist import Netlist
 from sosmith.gen.verifier.parallel.state_memories import State, StateMemories
-from sosmith.gen.verifier.parallel.text import Bits, Choice, Expression, Joined, Load, Operator, Statement, Word
+from sosmith.gen.verifier.parallel.text import Statement
+from sosmith.gen.verifier.parallel.turn_memories import Counter, TurnMemories
 from sosmith.gen.verifier.program.normal_form import Form, constant, plus
 
 DATA = "s_axis_tdata"
@@ -93,31 +96,35 @@ class Pipeline:
     ) -> None:
         self._netlist, self._control, self._graph, self._forms = netlist, control, graph, forms
         self._fields = _fields(graph, certificate, netlist.widths[DATA])
+        self._dependence = Dependence(netlist, control.cuts)
         self._numbers = itertools.count()
         self._behind: dict[str, int | None] = {}
         self._found: dict[str, Form] = {}
         self._second: dict[str, Form] = {}
         self._open: list[str] = []
-        self._reached: dict[str, frozenset[str]] = {}
         self.states: dict[str, State] = {}
         self.memories: StateMemories | None = None
+        self._counters: dict[str, Counter] = {}
         entrance = control.entrance
         self._source, self._apart, channels = 0, set[str](), 1
         if entrance is not None:
             self._source, self._apart, channels = -1, {entrance.word, *entrance.near}, entrance.channels
         self.channel = forms.variable("channel", 0, channels - 1)
         if entrance is not None:
-            self.memories = StateMemories(self, netlist, control, entrance, graph)
+            self.memories = ChannelMemories(self, netlist, control, graph, entrance)
             return
         for node in graph.delays:
             name = f"{graph.nodes[node].stage}.{graph.nodes[node].name}"
             if name in netlist.registers:
                 self.states[name] = State(node, self.position_by_control(name, netlist.registers[name].statements))
+        if graph.turned:
+            turns = TurnMemories(self, netlist, control, graph, self._dependence)
+            self.memories, self._counters = turns, turns.counters
 
     @property
     def registers(self) -> int:
         """Number of registers whose content is known."""
-        return len(self._found) + len(self._second) + len(self.states)
+        return len(self._found) + len(self._second) + len(self.states) + len(self._counters)
 
     @property
     def state_count(self) -> int:
@@ -144,12 +151,16 @@ class Pipeline:
             if name in self.states:
                 found = self._state(self.states[name], position, case)
                 return self._unknown(name, frame) if found is None else found
+            if name in self._counters:
+                counted = self._counters[name]
+                return counted.value if counted.behind == position else self._unknown(name, frame)
             known = position >= self._source and name not in self._apart and self.behind(name) == position - 1
             return self.held(name) if known else self._unknown(name, frame)
 
         def word(name: str, address: Form) -> Form:
-            found = None if self.memories is None else self.memories.word(name, address, position)
-            return self._unknown(name, frame) if found is None else found
+            unknown = self._unknown(name, frame)
+            found = None if self.memories is None else self.memories.word(name, address, position, unknown)
+            return unknown if found is None else found
 
         def fields(name: str, low: int, width: int) -> Form | None:
             return self._field(low, width) if name == DATA and position == self._source else None
@@ -260,7 +271,7 @@ class Pipeline:
             def content(name: str) -> Form:
                 if name in self._control.names:
                     return self._control_bit(name, case)
-                if name not in self._netlist.registers or name in self.states:
+                if name not in self._netlist.registers or name in self.states or name in self._counters:
                     return self._unknown(name, frame)
                 if name not in self._second:
                     stays = {RESET: 1, buffer.held: 1, buffer.ready: 0}
@@ -315,11 +326,11 @@ class Pipeline:
 
     def computed(self, name: str) -> Form | None:
         """Return what a net is for the sample whose words it is made of; None if it is made of states alone."""
-        if name in self.states:
+        if name in self.states or name in self._counters:
             return None
         if name in self._netlist.registers:
             return self.held(name)
-        sources = self._positions_of(self._leaves_of(name))
+        sources = self._positions_of(self._dependence.of_net(name))
         if len(sources) != 1:
             return None
         (position,) = sources
@@ -370,21 +381,23 @@ class Pipeline:
 
     def _position(self, name: str) -> int | None:
         """Return the position that a register is loaded behind: by the valid bit that loads it, or by its sources."""
-        conditions = self._leaves(_conditions(self._netlist.registers[name].statements))
+        conditions = self._dependence.of_conditions(self._netlist.registers[name].statements)
         if conditions & set(self._control.valid):
             return self.position_by_control(name, self._netlist.registers[name].statements)
-        leaves = self._leaves(_values(self._netlist.registers[name].statements)) - self._control.names
+        leaves = self._dependence.of_loads(self._netlist.registers[name].statements) - self._control.names
         if self._source < 0 and leaves & {DATA, DEST}:
             return self._source
         if not leaves:
             return None
-        sources = self._positions_of(leaves) or {self.states[leaf].behind for leaf in leaves & self.states.keys()}
+        sources = self._positions_of(leaves) or {
+            held[leaf].behind for held in (self.states, self._counters) for leaf in leaves & held.keys()
+        }
         require(len(sources) == 1, f"{name} must take over a word of one sample, not of {len(sources)}")
         return sources.pop()
 
     def _positions_of(self, leaves: frozenset[str]) -> set[int]:
         """Return the positions whose samples registers and inputs hold, without states."""
-        passed = leaves - self._control.names - self.states.keys()
+        passed = leaves - self._control.names - self.states.keys() - self._counters.keys()
         found = {self._source if leaf in {DATA, DEST} else self._position_of(leaf) for leaf in passed}
         return {position for position in found if position is not None}
 
@@ -395,26 +408,9 @@ class Pipeline:
 
     def position_by_control(self, name: str, statements: Sequence[Statement]) -> int:
         """Return the position behind which statements load something: there is one valid bit among their conditions."""
-        bits = sorted(self._leaves(_conditions(statements)) & set(self._control.valid))
+        bits = sorted(self._dependence.of_conditions(statements) & set(self._control.valid))
         require(len(bits) == 1, f"{name} must be loaded by one valid bit, not by {', '.join(bits) or 'none'}")
         return self._control.valid.index(bits[0])
-
-    def _leaves(self, values: Iterable[Expression]) -> frozenset[str]:
-        """Return the registers and inputs that expressions depend on."""
-        found: set[str] = set()
-        for value in values:
-            for name in _nets(value):
-                found |= self._leaves_of(name)
-        return frozenset(found)
-
-    def _leaves_of(self, name: str) -> frozenset[str]:
-        if name not in self._reached:
-            drivers = None if name in self._control.cuts else self._netlist.drivers.get(name)
-            self._reached[name] = frozenset()  # within a loop, which `Evaluation` refuses
-            self._reached[name] = (
-                frozenset({name}) if drivers is None else self._leaves(driver.value for driver in drivers)
-            )
-        return self._reached[name]
 
     # What is read.
 
@@ -463,7 +459,9 @@ class Pipeline:
         return count
 
     def _unknown(self, name: str, frame: int) -> Form:
-        return self._forms.variable(("unknown", name, frame), 0, (1 << self._netlist.widths[name]) - 1)
+        memory = self._netlist.memories.get(name)
+        width = self._netlist.widths[name] if memory is None else memory.width
+        return self._forms.variable(("unknown", name, frame), 0, (1 << width) - 1)
 
     @contextmanager
     def _once(self, name: str) -> Iterator[None]:
@@ -475,33 +473,3 @@ class Pipeline:
             yield
         finally:
             self._open.remove(name)
-
-
-def _conditions(statements: Sequence[Statement]) -> list[Expression]:
-    found: list[Expression] = []
-    for statement in statements:
-        if isinstance(statement, Choice):
-            found += [statement.condition, *_conditions(statement.yes), *_conditions(statement.no)]
-    return found
-
-
-def _values(statements: Sequence[Statement]) -> list[Expression]:
-    found: list[Expression] = []
-    for statement in statements:
-        if isinstance(statement, Load):
-            found.append(statement.value)
-        else:
-            found += [statement.condition, *_values(statement.yes), *_values(statement.no)]
-    return found
-
-
-def _nets(value: Expression) -> list[str]:
-    if isinstance(value, Bits):
-        return [value.name]
-    if isinstance(value, Word):
-        return _nets(value.address)
-    if isinstance(value, Joined):
-        return [name for part in value.parts for name in _nets(part)]
-    if isinstance(value, Operator):
-        return [name for operand in value.operands for name in _nets(operand)]
-    return []

@@ -1,33 +1,36 @@
-"""The states of a core with several channels: memories with a word for the DELAY node of each channel.
+"""The states of a core that lie in memories, with a word for each sample that may be on its way.
 
-A word is read for a sample at one position, and written when that sample leaves another, further on. In between, it may
-not be read for another sample of the channel::
+Those are the samples of different channels (`sosmith.gen.verifier.parallel.channel_memories`), or of different turns
+of a loop that goes back several samples (`sosmith.gen.verifier.parallel.turn_memories`): each has its address. A word
+is read for a sample at one position, and written when that sample leaves another, further on. In between, it may not be
+read for another sample with the same address::
 
-    position        r     r+1    ..    w                    distance: the least number of positions from a sample of a
-    read here ------+                  +------ written      channel to its next one, which the entrance keeps apart
+    position        r     r+1    ..    w                    distance: the least number of positions from a sample to
+    read here ------+                  +------ written      the next one with the same address
                     <------ w - r ----->
 
-    the sample before, of the same channel, is at r + distance or further: past w, if w - r + 1 <= distance
+    the sample before, with the same address, is at r + distance or further: past w, if w - r + 1 <= distance
 
-So a word that is read for a sample holds the code of the DELAY node for it, by induction over the samples of a channel:
-it is 0 once the states are cleared, and takes over the code of the node's operand when a sample leaves w.
+So a word that is read for a sample holds the code of the DELAY node for it, by induction over the samples with its
+address: it takes over what the node will be for the next one when a sample leaves w.
 """
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 from sosmith.gen.verifier.graph import RejectedError, require
-from sosmith.gen.verifier.parallel.control import Case, Control, Entrance, UndecidedError, cases
+from sosmith.gen.verifier.parallel.control import Case, Control, UndecidedError, cases
 from sosmith.gen.verifier.parallel.evaluation import Evaluation
 from sosmith.gen.verifier.parallel.graph_codes import GraphCodes
 from sosmith.gen.verifier.parallel.netlist import Memory, Netlist
 from sosmith.gen.verifier.parallel.text import Choice, Expression, Load, Statement, Word
-from sosmith.gen.verifier.program.normal_form import Form, constant
+from sosmith.gen.verifier.program.normal_form import Form
 
-_NOWHERE = -2
+NOWHERE = -2
 """A position before all samples."""
 
 
@@ -60,8 +63,8 @@ class Registers(Protocol):
     def position_by_control(self, name: str, statements: Sequence[Statement]) -> int: ...
 
 
-class StateMemories:
-    """The memories of a core with several channels that have the names of DELAY nodes.
+class StateMemories(ABC):
+    """The memories of a core that have the names of DELAY nodes.
 
     Parameters
     ----------
@@ -69,57 +72,72 @@ class StateMemories:
         What the registers hold.
     netlist : Netlist
     control : Control
-    entrance : Entrance
-        That of `control`.
     graph : GraphCodes
+    whose : str
+        What an address is: "channel" or "turn".
     """
 
-    def __init__(
-        self, registers: Registers, netlist: Netlist, control: Control, entrance: Entrance, graph: GraphCodes
-    ) -> None:
+    def __init__(self, registers: Registers, netlist: Netlist, control: Control, graph: GraphCodes, whose: str) -> None:
         self._registers, self._netlist, self._graph = registers, netlist, graph
-        self._control, self._entrance = control, entrance
+        self._control, self._whose = control, whose
         self.states: dict[str, State] = {}
         for node in graph.delays:
-            name = f"{graph.nodes[node].stage}.{graph.nodes[node].name}_memory"
+            name = graph.memory_name(node)
             if name in netlist.memories:
                 behind = registers.position_by_control(name, netlist.memories[name].statements)
                 self.states[name] = State(node, behind)
-        self._apart: int | None = None
+
+    @abstractmethod
+    def words(self, name: str) -> int:
+        """Return the number of words that a memory must have."""
+
+    @abstractmethod
+    def distance(self, name: str) -> int:
+        """Return the least number of positions from a sample to the next one with the same address in a memory."""
+
+    @abstractmethod
+    def address(self, name: str) -> Form:
+        """Return the address of a sample in a memory."""
+
+    @abstractmethod
+    def read(self, name: str, state: State, unknown: Form) -> Form:
+        """Return the word at the address of a sample; what is not known of it is `unknown`."""
+
+    @abstractmethod
+    def written(self, name: str, state: State) -> tuple[Form, str]:
+        """Return what is written for a sample, and its name: what the DELAY node is for the next with its address."""
 
     @property
-    def distance(self) -> int:
-        """Least number of positions from a sample of a channel to its next one."""
-        if self._apart is None:
-            self._apart = 1 + self._positions_without_the_channel()
-        return self._apart
+    @abstractmethod
+    def moving(self) -> Case:
+        """The control signals that say that samples may move, but for `Control.full`."""
 
-    def word(self, name: str, address: Form, position: int) -> Form | None:
+    @abstractmethod
+    def check_beginning(self, name: str, what: str) -> None:
+        """Check what a memory holds before the first sample; `what` begins the sentence of a rejection."""
+
+    def word(self, name: str, address: Form, position: int, unknown: Form) -> Form | None:
         """Return what is read from a memory for the sample at a position; None if it holds no state.
 
         Raises
         ------
         RejectedError
-            If it is not the word of the sample's channel, or may not have been written by then.
+            If it is not the word of the sample, or may not have been written by then.
         """
         if name not in self.states:
             return None
         state = self.states[name]
-        node = self._graph.nodes[state.node]
+        what = f"{name} must hold {self._graph.nodes[state.node].label} and be read"
         require(
-            self._registers.same(address, self._registers.channel, 64),
-            f"{name} must hold {node.label} and be read for the channel of the sample, not for another one",
+            self._registers.same(address, self.address(name), 64),
+            f"{what} for the {self._whose} of the sample, not for another one",
         )
-        ahead = state.behind - position
-        require(
-            0 <= ahead < self.distance,
-            f"{name} must hold {node.label} and be read at most {self.distance - 1} positions before it is written, "
-            f"not {ahead}",
-        )
-        return self._graph.codes[state.node]
+        ahead, most = state.behind - position, self.distance(name) - 1
+        require(0 <= ahead <= most, f"{what} at most {most} positions before it is written, not {ahead}")
+        return self.read(name, state, unknown)
 
     def check(self) -> None:
-        """Prove by induction that each word holds the code of the DELAY node for its channel.
+        """Prove by induction that each word holds the code of the DELAY node for the samples with its address.
 
         Raises
         ------
@@ -127,48 +145,35 @@ class StateMemories:
             If one does not.
         """
         for name, state in self.states.items():
-            memory, channels = self._netlist.memories[name], self._entrance.channels
+            held, words = len(self._netlist.memories[name].first), self.words(name)
             what = f"{name} must hold {self._graph.nodes[state.node].label}"
-            require(len(memory.first) == channels, f"{what} of {channels} channels, not of {len(memory.first)}")
+            require(held == words, f"{what} of {words} {self._whose}s, not of {held}")
             try:
-                self._check_cleared(memory, what)
-                self._check_taken(memory, state, what)
+                self.check_beginning(name, what)
+                self._check_taken(name, state, what)
             except UndecidedError as undecided:
                 raise RejectedError(f"{what}, and {undecided} must not count for what is written") from None
 
-    def _check_cleared(self, memory: Memory, what: str) -> None:
-        """Check that the word of one channel becomes 0 at each clock while states are cleared."""
-        address = _address(memory)
-        for logic, loaded in self._written(memory, _NOWHERE, {self._entrance.clearing: 1}):
-            require(
-                loaded is not None and self._registers.same(loaded, {}, memory.width), f"{what} and be cleared to 0"
-            )
-            require(
-                self._registers.same(logic.word(address), logic.net(self._entrance.word), self._netlist.width(address)),
-                f"{what} and be cleared for one channel after the other",
-            )
-
-    def _check_taken(self, memory: Memory, state: State, what: str) -> None:
+    def _check_taken(self, name: str, state: State, what: str) -> None:
         """Check what is written when a sample leaves, and that nothing is otherwise."""
-        address, clearing, full = _address(memory), self._entrance.clearing, self._control.full
+        memory = self._netlist.memories[name]
+        address, full = address_of(memory), self._control.full
         valid = self._control.valid[state.behind]
-        (source,) = self._graph.nodes[state.node].operands
-        for logic, loaded in self._written(memory, state.behind, {clearing: 0, full: 0, valid: 1}):
+        wanted, label = self.written(name, state)
+        for logic, loaded in self.each_written(memory, state.behind, {**self.moving, full: 0, valid: 1}):
             if loaded is None:
                 raise RejectedError(f"{what}, which is written when a sample leaves position {state.behind}")
             require(
-                self._registers.same(logic.word(address), self._registers.channel, self._netlist.width(address)),
-                f"{what} and be written for the channel of the sample",
+                self._registers.same(logic.word(address), self.address(name), self._netlist.width(address)),
+                f"{what} and be written for the {self._whose} of the sample",
             )
-            require(
-                self._registers.same(loaded, self._graph.codes[source], memory.width),
-                f"{what} and take over {self._graph.nodes[source].label}, not another value",
-            )
-        for case in ({clearing: 0, full: 1}, {clearing: 0, full: 0, valid: 0}):
-            for _, loaded in self._written(memory, _NOWHERE, case):
+            right = self._registers.same(loaded, wanted, memory.width)
+            require(right, f"{what} and take over {label}, not another value")
+        for case in ({**self.moving, full: 1}, {**self.moving, full: 0, valid: 0}):
+            for _, loaded in self.each_written(memory, NOWHERE, case):
                 require(loaded is None, f"{what}, which stays while no sample leaves position {state.behind}")
 
-    def _written(self, memory: Memory, position: int, fixed: Case) -> list[tuple[Evaluation, Form | None]]:
+    def each_written(self, memory: Memory, position: int, fixed: Case) -> list[tuple[Evaluation, Form | None]]:
         """Return the logic and what is written, in each case that is left; None where nothing is."""
 
         def evaluate(case: Case) -> tuple[Evaluation, Form | None]:
@@ -178,27 +183,8 @@ class StateMemories:
 
         return [found for _, found in cases(fixed, evaluate)]
 
-    def _positions_without_the_channel(self) -> int:
-        """Return how many first positions hold no sample of the channel of one that enters."""
-        enters, channel = self._control.valid[0], self._registers.channel
-        for count, near in enumerate(self._entrance.near):
-            repeated = f"near_channel{count}"
-            require(repeated in self._netlist.registers, f"{near} must come with a register {repeated}")
-            width = self._netlist.widths[repeated]
-            here = self._registers.behind(repeated) == count
-            require(
-                here and self._registers.same(self._registers.held(repeated), channel, width),
-                f"{repeated} must hold the channel of the sample at position {count + 1}",
-            )
-            met: Mapping[str, Form] = {
-                self._entrance.buffer.held: constant(1), near: constant(1), repeated: channel
-            }  # fmt: skip
-            if self._registers.in_front(met, enters).net(enters):
-                return count
-        return len(self._entrance.near)
 
-
-def _address(memory: Memory) -> Expression:
+def address_of(memory: Memory) -> Expression:
     """Return the address that a memory is written at: there is one place where it is."""
     (first, *rest) = memory.statements or (None,)
     if isinstance(first, Choice) and not (rest or first.no) and len(first.yes) == 1:

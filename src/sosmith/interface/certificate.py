@@ -134,8 +134,8 @@ class Certificate:
             Folder with the generated files: their SHA-256 must be those in the certificate, and no byte of the
             certificate's own file may have been changed. From the SystemVerilog, the program of a folded or serial
             core, and all hardware of a parallel one, is proven to compute the certificate's graph for all inputs and
-            states; online cores are not, nor cores with loadable constants, protection, look-ahead or 16 samples a
-            clock, nor a parallel core beside a decimator. The decimator of one channel, without a calibration before
+            states; online cores are not, nor cores with loadable constants, protection or 16 samples a clock, nor a
+            parallel core beside a decimator. The decimator of one channel, without a calibration before
             it, and what holds the results behind it, is proven to be one, register by register.
         rebuild : bool
             Whether to generate all files again, from `spec` or the specification's text in the certificate, and compare

@@ -40,9 +40,23 @@ def specified(text: str) -> Specification:
 
 
 def made(
-    design: CoreDesign, channels: int = 1, lanes: int = 1, *, reload: bool = False, blocks: Blocks = NO_LIMIT
+    design: CoreDesign,
+    channels: int = 1,
+    lanes: int = 1,
+    *,
+    reload: bool = False,
+    blocks: Blocks = NO_LIMIT,
+    look_ahead: bool = False,
 ) -> Made:
-    core = Architecture("parallel", design.datapath, channels, reload=reload, blocks=blocks, samples_per_clock=lanes)
+    core = Architecture(
+        "parallel",
+        design.datapath,
+        channels,
+        reload=reload,
+        blocks=blocks,
+        samples_per_clock=lanes,
+        look_ahead=look_ahead,
+    )
     text = to_verilog(to_rtlil(core.component(), design.datapath.name))
     read = json.loads(certificate_text(certificate(design.quantized, design.spec.max_error)))
     return Made(design, text, Certificate.model_validate(read), channels, lanes)
@@ -56,3 +70,15 @@ def small_design(spec: str, realization: str) -> CoreDesign:
 @cache
 def small(spec: str = PLAIN, realization: str = "df1_ef1", channels: int = 1, lanes: int = 1) -> Made:
     return made(small_design(spec, realization), channels, lanes)
+
+
+@cache
+def looking_ahead(spec: str = PLAIN, lanes: int = 1) -> Made:
+    """Return a core with look-ahead for 100 MHz."""
+    hardware = f"""
+hardware.architecture = "parallel"
+hardware.clock = 100.0e6
+hardware.pipeline = "look-ahead"
+hardware.samples_per_clock = {lanes}
+"""
+    return made(design_core(specified(spec + hardware)), lanes=lanes, look_ahead=True)
