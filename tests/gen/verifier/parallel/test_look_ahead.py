@@ -19,12 +19,15 @@ def accept(core: Made) -> None:
     assert found.states > len(re.findall(r"^  reg .*_memory \[", core.text, re.MULTILINE)) > 0
 
 
-@pytest.mark.parametrize("lanes", [1, 2, 4])
+@pytest.mark.parametrize("lanes", [1, pytest.param(2, marks=pytest.mark.slow), 4])
 def test_an_example(lanes: int) -> None:
     accept(made(designed(lanes), lanes=lanes, look_ahead=True))
 
 
-@pytest.mark.parametrize(("spec", "lanes"), [(PLAIN, 1), (STEADY, 2), (STEADY_INSTRUMENT, 1), (INSTRUMENT, 4)])
+@pytest.mark.parametrize(
+    ("spec", "lanes"),
+    [(PLAIN, 1), (STEADY, 2), (STEADY_INSTRUMENT, 1), pytest.param(INSTRUMENT, 4, marks=pytest.mark.slow)],
+)
 def test_starts_and_a_calibration(spec: str, lanes: int) -> None:
     accept(looking_ahead(spec, lanes))
 
