@@ -18,9 +18,9 @@ from sosmith.gen.verifier.parallel.text import Bits, Expression, Joined, Module,
 BEHIND, CIC, HOLDER = "behind.", "decimator.", "holder."
 """Prefixes of nets of the core's ports, of the decimator, and of what holds results."""
 
-_CLOCK = "aclk"
+CLOCK = "aclk"
 _UNDEFINED = re.compile(r"\b(\d+)'hx+")
-_PORT = re.compile(r"^  (input|output) (?:\[(\d+):0\] )?(\\\S+ |\w+);$", re.MULTILINE)
+_MODULE = re.compile(r"^module .*?^endmodule$", re.MULTILINE | re.DOTALL)
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ def seams_of(netlist: Netlist, *, held: bool) -> Seams:
         If the core has others, or not all of them.
     """
     sources = {name: _source(netlist, name) for name in sorted(netlist.inlets) if name.startswith(BEHIND)}
-    wanted = (_CLOCK, RESET, *(CIC + name for name in ("o_data", "o_rail", "o_valid")))
+    wanted = (CLOCK, RESET, *(CIC + name for name in ("o_data", "o_rail", "o_valid")))
     for source in wanted:
         count = list(sources.values()).count(source)
         require(count == 1, f"one port of the core must be {source}, not {count}")
@@ -76,25 +76,26 @@ def _source(netlist: Netlist, name: str) -> str:
     return names.pop() if len(names) == 1 else ""
 
 
-def read_around(text: str, name: str) -> tuple[Netlist, bool]:
+def read_core(text: str, name: str) -> dict[str, Module]:
+    """Read all modules of a core, the top first.
+
+    Raises
+    ------
+    RejectedError
+        If the first one has another name, or the text has anything that cannot be read.
+    """
+    modules = read_modules(_MODULE.sub(lambda found: _with_unknowns(found[0]), text))
+    first = next(iter(modules))
+    require(first == name, f"the first module must be {name}, not {first}")
+    return modules
+
+
+def read_around(modules: Mapping[str, Module], name: str) -> tuple[Netlist, bool]:
     """Put together everything but the core itself, and say whether results are held."""
-    modules: dict[str, Module] = {}
-    held = re.search(rf"^module {re.escape(name)}_holder\(", text, re.MULTILINE) is not None
-    for part in ("", "_decimator", "_holder")[: 2 + held]:
-        modules |= read_modules(_with_unknowns(_written(text, name + part)))
-    behind = _written(text, f"{name}_behind")
-    stub = Module()
-    for direction, top, port in _PORT.findall(behind):
-        key = port.strip().removeprefix("\\")
-        stub.ports[key], stub.widths[key] = direction, int(top or 0) + 1
-    modules[f"{name}_behind"] = stub
-    return flattened(modules, _CLOCK), held
-
-
-def _written(text: str, name: str) -> str:
-    found = re.findall(rf"^module {re.escape(name)}\(.*?^endmodule$", text, re.MULTILINE | re.DOTALL)
-    require(len(found) == 1, f"the core must have one module {name}, not {len(found)}")
-    return str(found[0])
+    behind, held = f"{name}_behind", f"{name}_holder" in modules
+    require(behind in modules, f"the core must have a module {behind}")
+    box = Module(ports=modules[behind].ports, widths=modules[behind].widths)
+    return flattened({**modules, behind: box}, CLOCK), held
 
 
 def _with_unknowns(module: str) -> str:

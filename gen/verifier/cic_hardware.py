@@ -20,8 +20,8 @@ before the first clock leave no sample and no result. That this is a CIC filter 
   taken. So each result finds `o_data` free, and stays until it is taken.
 - The holder takes a word when it is empty or hands out the last of its copies, and hands out R of each.
 
-Above the bits of a result there are zeros, or its sign again, and flags: the core behind makes signs and flags, and
-here they are passed on.
+Above the bits of a result there are zeros, or its sign again (`sosmith.gen.verifier.repeated_sign`), and flags, which
+the core behind makes: here they are passed on.
 
 An undefined value, ``1'hx``, may be either: what is said holds for both.
 """
@@ -35,7 +35,17 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Protocol
 
-from sosmith.gen.verifier.around_core import BEHIND, CIC, HOLDER, Seams, passed_on, read_around, seams_of
+from sosmith.gen.verifier.around_core import (
+    BEHIND,
+    CIC,
+    CLOCK,
+    HOLDER,
+    Seams,
+    passed_on,
+    read_around,
+    read_core,
+    seams_of,
+)
 from sosmith.gen.verifier.certificate_file import Certificate, DecimationEntry, PortEntry
 from sosmith.gen.verifier.graph import RejectedError, require
 from sosmith.gen.verifier.parallel.control import RESET, SINK, SOURCE, Case, UndecidedError, about, cases
@@ -45,6 +55,7 @@ from sosmith.gen.verifier.parallel.forms import Forms, shifted
 from sosmith.gen.verifier.parallel.netlist import Netlist
 from sosmith.gen.verifier.parallel.text import Bits
 from sosmith.gen.verifier.program.normal_form import Form, constant, plus
+from sosmith.gen.verifier.repeated_sign import check_signs
 
 _DATA = "s_axis_tdata"
 _DATA_REGISTERS = frozenset({"sum", "comb", "difference", "o_data"})
@@ -86,7 +97,8 @@ def check_decimator(text: str, certificate: Certificate) -> DecimatorVerdict:
     """
     entry, (port,) = certificate.decimation, certificate.inputs
     assert entry is not None
-    netlist, held = read_around(text, certificate.name)
+    modules = read_core(text, certificate.name)
+    netlist, held = read_around(modules, certificate.name)
     if certificate.about is not None:
         stated = tomllib.loads(certificate.about.specification).get("filter", {}).get("hold", False)
         require(held == stated, f"results must {'' if stated else 'not '}be held, as specified")
@@ -112,6 +124,7 @@ def check_decimator(text: str, certificate: Certificate) -> DecimatorVerdict:
         for name in passed_on(netlist, Bits(stream)):
             own = name == word if held else name.startswith(BEHIND)
             require(own, f"{stream} must have bits of what leaves the core, not of {name}")
+    check_signs(modules, output, CLOCK)
     return DecimatorVerdict(len(first), entry.factor if held else 1)
 
 
@@ -209,7 +222,7 @@ class _Logic:
     def result(self, word: Form, bits: int) -> Form:
         """Return a word whose low bits are the result: that of the core as it leaves it, low among those of one output.
 
-        What is above them, repeated signs and flags, is left as it is.
+        What is above them, signs and flags, is left as it is.
 
         Raises
         ------

@@ -34,6 +34,7 @@ from sosmith.gen.verifier.certificate_file import (
 )
 from sosmith.gen.verifier.graph import require
 from sosmith.gen.verifier.l1_response import UndecidedError
+from sosmith.gen.verifier.program.text import without_comments
 
 _PRECISION = 256
 """Bits to which gains are computed."""
@@ -124,8 +125,9 @@ def module_in(text: str, name: str) -> str:
     Raises
     ------
     RejectedError
-        If the text has no such module.
+        If the text has no such module, or anything that could hide another one.
     """
+    text = without_comments(text)
     found = re.findall(rf"^module {re.escape(name)}\(.*?^endmodule$", text, re.MULTILINE | re.DOTALL)
     require(len(found) == 1, f"the core must have one module {name}, not {len(found)}")
     return str(found[0])

@@ -155,11 +155,7 @@ def read_program(text: str) -> ProgramText:
     RejectedError
         If the text has no program, one that can be loaded at run time, or one that cannot be decoded.
     """
-    text = _COMMENT.sub("", text)
-    require(
-        _HIDING.search(text) is None,
-        "the text must have no comments over lines and no directives, which can hide words",
-    )
+    text = without_comments(text)
     require("s_axil_" not in text, "the program must be fixed to be checked, not loadable at run time")
     memories = _memories(text)
     require("instructions" in memories, "the core must be folded or serial to have a program, not parallel")
@@ -194,6 +190,22 @@ def read_program(text: str) -> ProgramText:
         results=tuple(widths[name] for name in sorted(widths, key=_number_of) if re.fullmatch(r"given\d+", name)),
         digits=_digits(text, widths, word_bits, _OPCODE_BITS + 2 * address_bits),
     )
+
+
+def without_comments(text: str) -> str:
+    """Return a text without its comments.
+
+    Raises
+    ------
+    RejectedError
+        If anything else in it could hide words.
+    """
+    text = _COMMENT.sub("", text)
+    require(
+        _HIDING.search(text) is None,
+        "the text must have no comments over lines and no directives, which can hide words",
+    )
+    return text
 
 
 _COMMENT = re.compile(r"^ *(?://.*|/\*(?:(?!\*/).)*\*/)$", re.MULTILINE)  # that ends on its line

@@ -1,64 +1,20 @@
 """The hardware around a core at a lower rate: proven register by register, and rejected when anything is wrong."""
 
 import re
-from collections.abc import Iterator
-from functools import cache
 from pathlib import Path
-from typing import NamedTuple
 
 import pytest
 from tests.formal.prover import broken
-from tests.gen.verifier.parallel.cores import specified
-from tests.gen.word_lengths.decimated import read, tree_of
+from tests.gen.verifier.decimators import Case, accepted, designed, written
 
-from sosmith.gen.core import CoreDesign, design_core
+from sosmith.gen.core import design_core
 from sosmith.gen.output.generate import generate
 from sosmith.gen.output.verilog import to_rtlil, to_verilog
 from sosmith.gen.specification.specification import from_text
-from sosmith.gen.verifier.certificate_file import Certificate
 from sosmith.gen.verifier.cic_hardware import check_decimator
 from sosmith.gen.verifier.graph import RejectedError
 from sosmith.hdl.decimation import decimator as hardware
 from sosmith.interface.certificate import Certificate as Saved
-
-
-class Case(NamedTuple):
-    """What a core is made of."""
-
-    bits: int = 8
-    signed: bool = True
-    factor: int = 4
-    cutoff: float = 10
-    error: float = 0.01
-    hold: bool = True
-    architecture: str = "parallel"
-    output_bits: int = 8
-
-    @property
-    def text(self) -> str:
-        signed, low = str(self.signed).lower(), -1 if self.signed else 0
-        return f"""
-name = "plain"
-sample_rate = 1000.0
-input.x = {{ bits = {self.bits}, signed = {signed}, range = [{low}.0, 1.0] }}
-[filter]
-family = "butterworth"
-kind = "lowpass"
-order = 1
-cutoff = {self.cutoff}
-decimate = {self.factor}
-hold = {str(self.hold).lower()}
-[output]
-bits = {self.output_bits}
-signed = {signed}
-range = [{low}.0, 1.0]
-unit = ""
-max_error = {self.error}
-[hardware]
-architecture = "{self.architecture}"
-realization = "df1"
-"""
-
 
 CASES = [
     (Case(), 2),
@@ -74,18 +30,6 @@ CASES = [
     (Case(signed=False, output_bits=9, cutoff=20, error=0.02), 2),  # with zeros that a port of the core has
     (Case(signed=False, output_bits=9, cutoff=20, error=0.02, hold=False), 2),
 ]
-
-
-@cache
-def designed(case: Case) -> tuple[CoreDesign, Certificate]:
-    made = design_core(specified(case.text))
-    return made, read(tree_of(made))
-
-
-@cache
-def written(case: Case) -> str:
-    made, _ = designed(case)
-    return to_verilog(to_rtlil(made.architecture.component(), made.datapath.name))
 
 
 @pytest.mark.parametrize(("case", "stages"), CASES)
@@ -104,72 +48,6 @@ def test_the_decimator_of_several_channels_is_not_read(tmp_path: Path) -> None:
     proof = Saved.load(tmp_path / "plain.certificate.json").verify(files=tmp_path)
     assert proof.program is not None
     assert proof.decimator is None
-
-
-EDITS = [
-    (r"(?<= )& (?=\w)", "| "),
-    (r"(?<= )\| (?=\w)", "& "),
-    (r"(?<=\w )& ", "| "),
-    (r"(?<=\w )\| ", "& "),
-    (r"(?<=\w )\+ ", "- "),
-    (r"(?<=\w )- ", "+ "),
-    (r"~ ", ""),
-    (r"! ", "| "),
-    (r"'h0\b", "'h1"),
-    (r"'h1\b", "'h0"),
-    (r" == ", " != "),
-    (r" != ", " == "),
-    (r"\? (\S+) : (\S+);", r"? \2 : \1;"),
-    (r"(?<!else )if \((?!front_rst)(\w+)\)", r"if (~ \1)"),
-    (r"else if \((\w+)\)", r"else if (~ \1)"),
-    (r"\bsum1\b(?! \+|;)", "sum2"),
-    (r"\bdifference1\b(?! -|;)", "difference2"),
-    (r"control0\b(?= <=|;$)", "control1"),
-    (r"(?<=[=(&|] )\bo_ready\b", "o_valid"),
-    (r"\bwaiting\b(?= [&|])", "filling"),
-    (r"\[(\d+):2\];", r"[\1:1];"),
-]
-"""Patterns and what takes their place, one at a time, in every statement outside the core."""
-
-SAME = re.compile(
-    "|".join(
-        (
-            r"reg \w+_control[12] .*|reg o_rail .*|reg (\S+ )?left .*",  # nothing counts before it is loaded
-            r"assign \w+ = difference\d - \d+'h0;",  # a rounding that rounds nothing
-            r"assign \w+ = (phase|left|filled) [-+] 1'h1;",
-            r"if \(front_rst\) (o_rail|o_data) <= .*",
-        )
-    )
-)
-"""What may be otherwise; of the third line, in a counter of one bit."""
-
-
-def edited(text: str) -> Iterator[tuple[str, str]]:
-    """Yield each edited line, and the whole text with it."""
-    for module in re.finditer(r"^module plain(_decimator|_holder|)\(.*?^endmodule$", text, re.MULTILINE | re.DOTALL):
-        for line in re.finditer(r"^  .*$", module[0], re.MULTILINE):
-            if re.match(r"  (wire|input|output) ", line[0]):
-                continue
-            for pattern, instead in EDITS:
-                changed = re.sub(pattern, instead, line[0], count=1)
-                if changed != line[0]:
-                    start, end = module.start() + line.start(), module.start() + line.end()
-                    yield changed.strip(), text[:start] + changed + text[end:]
-
-
-def accepted(case: Case) -> set[str]:
-    """Return the edits of a core's text that are not rejected, but for those that change nothing."""
-    _, certificate = designed(case)
-    found, tried = set(), 0
-    for line, text in edited(written(case)):
-        tried += 1
-        try:
-            check_decimator(text, certificate)
-        except RejectedError:
-            continue
-        found.add(line)
-    assert tried > 80
-    return {line for line in found if not SAME.fullmatch(line)}
 
 
 @pytest.mark.slow
