@@ -1,13 +1,13 @@
 """Reads what stands around a core that filters at a lower rate: its decimator, what holds its results, and the wires.
 
-The core itself, the module with the suffix ``_behind``, is a box with ports here. Which port is which is found from
-what it is connected to.
+The core itself, the module with the suffix ``_behind``, is a box with ports here, and so is a calibration, ``_ahead``.
+Which port is which is found from what it is connected to, but of the handshake from its name.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from sosmith.gen.verifier.graph import RejectedError, require
@@ -15,22 +15,25 @@ from sosmith.gen.verifier.parallel.control import RESET
 from sosmith.gen.verifier.parallel.netlist import Netlist, flattened
 from sosmith.gen.verifier.parallel.text import Bits, Expression, Joined, Module, Number, read_modules
 
-BEHIND, CIC, HOLDER = "behind.", "decimator.", "holder."
-"""Prefixes of nets of the core's ports, of the decimator, and of what holds results."""
+AHEAD, BEHIND, CIC, HOLDER = "ahead.", "behind.", "decimator.", "holder."
+"""Prefixes of ports of the calibration and of the core, and of nets of the decimator and of what holds results."""
 
-CLOCK = "aclk"
+OF_INPUT = 2
+"""Flags that are told of inputs: input_at_rail and outside_calibration."""
+
+CLOCK, DATA = "aclk", "s_axis_tdata"
 _UNDEFINED = re.compile(r"\b(\d+)'hx+")
 _MODULE = re.compile(r"^module .*?^endmodule$", re.MULTILINE | re.DOTALL)
 
 
 @dataclass(frozen=True)
 class Seams:
-    """Ports of the core behind, by what they are connected to.
+    """Ports of the core behind.
 
     Attributes
     ----------
     entering : dict of str to str
-        Inputs, and what each must have: the reset, the result of the decimator, its flag, and whether there is one.
+        Inputs, and what each must have: the reset, the result of the decimator, its flags, and whether there is one.
     taken : str
         Output: whether a result of the decimator is taken.
     ready, valid : str
@@ -43,28 +46,100 @@ class Seams:
     valid: str
 
 
-def seams_of(netlist: Netlist, *, held: bool) -> Seams:
-    """Find the ports.
+@dataclass(frozen=True)
+class AheadSeams:
+    """Ports of the calibration before the decimator.
+
+    Attributes
+    ----------
+    entering : dict of str to str
+        Inputs, and what each must have: the reset and the samples.
+    offered, taken : str
+        Input and output: whether there is a sample, and whether it is taken.
+    ready, valid : str
+        Input and output: whether a result is taken, and whether there is one.
+    code : str
+        Output: the code of a result, and above it its flags if there are no ports for these.
+    flags : tuple of str
+        Outputs with the flags, the lowest first.
+    """
+
+    entering: Mapping[str, str]
+    offered: str
+    taken: str
+    ready: str
+    valid: str
+    code: str
+    flags: tuple[str, ...]
+
+
+_OFFERED, _TAKEN = ("s_axis_tvalid", "i_valid"), ("s_axis_tready", "advance")
+_READY, _VALID = ("m_axis_tready", "o_ready"), ("m_axis_tvalid",)
+
+
+def seams_of(netlist: Netlist, told: str, *, held: bool) -> Seams:
+    """Find the ports of the core behind; `told` is the net with the flags of a result of the decimator.
 
     Raises
     ------
     RejectedError
         If the core has others, or not all of them.
     """
-    sources = {name: _source(netlist, name) for name in sorted(netlist.inlets) if name.startswith(BEHIND)}
-    wanted = (CLOCK, RESET, *(CIC + name for name in ("o_data", "o_rail", "o_valid")))
-    for source in wanted:
-        count = list(sources.values()).count(source)
-        require(count == 1, f"one port of the core must be {source}, not {count}")
-    others = [name for name, source in sources.items() if source not in wanted]
+    results = (CIC + "o_data", CIC + told, CIC + "o_valid")
+    entering, others = _entering(netlist, BEHIND, (RESET, *results))
     require(len(others) == 1, f"the core must have one other input, which takes its results, not {len(others)}")
-    entering = {name: source for name, source in sources.items() if source in wanted[1:]}
-    taken, valid = _source(netlist, CIC + "o_ready"), _source(netlist, "m_axis_tvalid")
-    if held:
-        valid = _source(netlist, HOLDER + "i_valid")
-    for name, found in ((CIC + "o_ready", taken), ("a valid result", valid)):
+    ready = _one_of(netlist, BEHIND, _READY)
+    require(others[0] == ready, f"{ready} must be an input of the core")
+    taken, valid = _source(netlist, CIC + "o_ready"), _source(netlist, HOLDER + "i_valid" if held else "m_axis_tvalid")
+    for name, found, wanted in ((CIC + "o_ready", taken, _TAKEN), ("a valid result", valid, _VALID)):
         require(found.startswith(BEHIND), f"{name} must be an output of the core")
-    return Seams(entering, taken, others[0], valid)
+        own = _one_of(netlist, BEHIND, wanted)
+        require(found == own, f"{name} must be {own}, not {found}")
+    return Seams(entering, taken, ready, valid)
+
+
+def ahead_of(netlist: Netlist, bits: int) -> AheadSeams:
+    """Find the ports of the calibration, whose results have so many bits.
+
+    Raises
+    ------
+    RejectedError
+        If it has others, or not all of them.
+    """
+    entering, others = _entering(netlist, AHEAD, (RESET, DATA))
+    offered, taken, ready, valid = (_one_of(netlist, AHEAD, names) for names in (_OFFERED, _TAKEN, _READY, _VALID))
+    require(
+        sorted(others) == sorted((offered, ready)), f"the other inputs of the calibration must be {offered}, {ready}"
+    )
+    outlets = {name for name in netlist.widths if name.startswith(AHEAD)} - netlist.inlets
+    outlets -= {taken, valid}
+    flags = tuple(AHEAD + name for name in ("m_axis_tuser", "rail", "outside") if AHEAD + name in outlets)
+    outlets -= {*flags}
+    require(len(outlets) == 1, f"the calibration must have one output for its results, not {len(outlets)}")
+    (code,) = outlets
+    count = netlist.widths[code] - bits + sum(netlist.widths[name] for name in flags)
+    apart = netlist.widths[code] == bits if flags else True
+    require(apart and count == OF_INPUT, f"{code} must have {bits} bits, and {OF_INPUT} flags beside it")
+    return AheadSeams(entering, offered, taken, ready, valid, code, flags)
+
+
+def _entering(netlist: Netlist, prefix: str, wanted: Sequence[str]) -> tuple[dict[str, str], list[str]]:
+    """Return the inputs of a core that have the clock, or one of some nets, in all their bits; and its others."""
+    sources = {name: _source(netlist, name) for name in sorted(netlist.inlets) if name.startswith(prefix)}
+    for source in (CLOCK, *wanted):
+        names = [name for name, found in sources.items() if found == source]
+        require(len(names) == 1, f"one port of the core must be {source}, not {len(names)}")
+        own, other = netlist.widths[names[0]], netlist.widths[source]
+        require(own == other, f"{names[0]} must have {other} bits, as {source} has, not {own}")
+    entering = {name: source for name, source in sources.items() if source in wanted}
+    return entering, [name for name, source in sources.items() if source not in {CLOCK, *wanted}]
+
+
+def _one_of(netlist: Netlist, prefix: str, names: Sequence[str]) -> str:
+    """Return the one port of a core that has one of these names."""
+    found = [prefix + name for name in names if prefix + name in netlist.widths]
+    require(len(found) == 1, f"one port of the core must be {' or '.join(names)}, not {len(found)}")
+    return found[0]
 
 
 def _source(netlist: Netlist, name: str) -> str:
@@ -90,12 +165,15 @@ def read_core(text: str, name: str) -> dict[str, Module]:
     return modules
 
 
-def read_around(modules: Mapping[str, Module], name: str) -> tuple[Netlist, bool]:
-    """Put together everything but the core itself, and say whether results are held."""
-    behind, held = f"{name}_behind", f"{name}_holder" in modules
-    require(behind in modules, f"the core must have a module {behind}")
-    box = Module(ports=modules[behind].ports, widths=modules[behind].widths)
-    return flattened({**modules, behind: box}, CLOCK), held
+def read_around(modules: Mapping[str, Module], name: str) -> Netlist:
+    """Put together everything but the core itself, and the calibration before the decimator."""
+    boxes = {}
+    for inside in (f"{name}_behind", f"{name}_ahead"):
+        if inside in modules:
+            ports = modules[inside].ports
+            boxes[inside] = Module(ports=ports, widths={port: modules[inside].widths[port] for port in ports})
+    require(f"{name}_behind" in boxes, f"the core must have a module {name}_behind")
+    return flattened({**modules, **boxes}, CLOCK)
 
 
 def _with_unknowns(module: str) -> str:

@@ -20,44 +20,43 @@ before the first clock leave no sample and no result. That this is a CIC filter 
   taken. So each result finds `o_data` free, and stays until it is taken.
 - The holder takes a word when it is empty or hands out the last of its copies, and hands out R of each.
 
-Above the bits of a result there are zeros, or its sign again (`sosmith.gen.verifier.repeated_sign`), and flags, which
-the core behind makes: here they are passed on.
-
-An undefined value, ``1'hx``, may be either: what is said holds for both.
+Above the bits of a result there are zeros, or its sign again (`sosmith.gen.verifier.repeated_sign`). Flags are made by
+the core behind: here they are passed on (`sosmith.gen.verifier.passed_flags`).
 """
 
 from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Protocol
+from typing import NamedTuple
 
 from sosmith.gen.verifier.around_core import (
-    BEHIND,
     CIC,
     CLOCK,
+    DATA,
     HOLDER,
     Seams,
+    ahead_of,
     passed_on,
     read_around,
     read_core,
     seams_of,
 )
+from sosmith.gen.verifier.around_logic import BIT, Field, Held, Logic, Part, Ranges, check_parts
+from sosmith.gen.verifier.calibration_hardware import FLAGS, Ahead, layout_of
 from sosmith.gen.verifier.certificate_file import Certificate, DecimationEntry, PortEntry
-from sosmith.gen.verifier.graph import RejectedError, require
-from sosmith.gen.verifier.parallel.control import RESET, SINK, SOURCE, Case, UndecidedError, about, cases
-from sosmith.gen.verifier.parallel.equality import same_word
-from sosmith.gen.verifier.parallel.evaluation import Evaluation
-from sosmith.gen.verifier.parallel.forms import Forms, shifted
+from sosmith.gen.verifier.graph import require
+from sosmith.gen.verifier.parallel.control import SINK, SOURCE
+from sosmith.gen.verifier.parallel.forms import shifted
 from sosmith.gen.verifier.parallel.netlist import Netlist
 from sosmith.gen.verifier.parallel.text import Bits
+from sosmith.gen.verifier.passed_flags import check_passed
 from sosmith.gen.verifier.program.normal_form import Form, constant, plus
 from sosmith.gen.verifier.repeated_sign import check_signs
 
-_DATA = "s_axis_tdata"
 _DATA_REGISTERS = frozenset({"sum", "comb", "difference", "o_data"})
 _NAME = re.compile(r"(\w*?)(\d*)(?:_control(\d))?")
 
@@ -95,37 +94,32 @@ def check_decimator(text: str, certificate: Certificate) -> DecimatorVerdict:
         If a register is loaded with anything else, a port is connected otherwise, or the text has anything that cannot
         be read; the sentence names the first register or port that is wrong.
     """
-    entry, (port,) = certificate.decimation, certificate.inputs
+    entry = certificate.decimation
     assert entry is not None
     modules = read_core(text, certificate.name)
-    netlist, held = read_around(modules, certificate.name)
+    netlist, held = read_around(modules, certificate.name), f"{certificate.name}_holder" in modules
     if certificate.about is not None:
         stated = tomllib.loads(certificate.about.specification).get("filter", {}).get("hold", False)
         require(held == stated, f"results must {'' if stated else 'not '}be held, as specified")
-    seams = seams_of(netlist, held=held)
+    seams = seams_of(netlist, "o_rail" if entry.calibration is None else "o_flags", held=held)
     output = certificate.output
     word = _held_word(netlist) if held else ""
-    leaving = _Holder(seams, output, word, entry.factor) if held else _Passing(seams, output)
-    parts: list[_Part] = [_Cic(entry, port, seams), leaving]
-    first = {name: value for part in parts for name, value in part.first.items()}
-    require(
-        netlist.registers.keys() == first.keys() and not netlist.memories,
-        f"the registers around the core must be {', '.join(sorted(first))}, not "
-        f"{', '.join(sorted({*netlist.registers, *netlist.memories}))}",
-    )
-    ranges = {name: found for part in parts for name, found in part.ranges.items()}
-    for name, value in first.items():
-        found = netlist.registers[name].first
-        require(value in {None, found}, f"{name} must be {value} before the first clock, not {found}")
-    for part in parts:
-        for name in (*part.nets, *part.first):
-            _check(netlist, ranges, part, name)
-    for stream in ("m_axis_tdata", "m_axis_tuser"):
-        for name in passed_on(netlist, Bits(stream)):
-            own = name == word if held else name.startswith(BEHIND)
-            require(own, f"{stream} must have bits of what leaves the core, not of {name}")
+    parts: list[Part] = [_Holder(seams, output, word, entry.factor) if held else _Passing(seams, output)]
+    if entry.calibration is None:
+        (port,) = certificate.inputs
+        source = _Source(SOURCE, DATA, ())
+        layout = {DATA: [Field(DATA, port.bits)]}
+        parts.append(_Cic(entry, port, seams, source, {"s_axis_tready": 1}))
+    else:
+        port = entry.calibration.output
+        ahead = ahead_of(netlist, port.bits)
+        source, layout = _Source(ahead.valid, ahead.code, FLAGS), layout_of(netlist, ahead, port)
+        cic = _Cic(entry, port, seams, source, {})
+        parts += [cic, Ahead(ahead, cic.ready, netlist.widths[DATA])]
+    registers = check_parts(netlist, parts, layout)
+    check_passed(netlist, seams, word)
     check_signs(modules, output, CLOCK)
-    return DecimatorVerdict(len(first), entry.factor if held else 1)
+    return DecimatorVerdict(registers, entry.factor if held else 1)
 
 
 def _held_word(netlist: Netlist) -> str:
@@ -135,174 +129,69 @@ def _held_word(netlist: Netlist) -> str:
     return names.pop()
 
 
-def _check(netlist: Netlist, ranges: Mapping[str, _Ranges], part: _Part, name: str) -> None:
-    """Check a register after a clock, or a net within one, in all cases."""
+class _Source(NamedTuple):
+    """Signals that enter the decimator: whether there is a sample, its code, and its flags, if there are any."""
 
-    def right(case: Case) -> bool:
-        now = _Logic(netlist, case, ranges)
-        register = name in netlist.registers
-        found = now.after(name) if register else now.net(name)
-        if register and not now.bit(RESET):
-            first = part.first[name]
-            return first is None or same_word(now.forms, found, constant(first), netlist.widths[name])
-        return same_word(now.forms, found, part.wanted(now, name), netlist.widths[name])
-
-    def values(signal: str) -> range:
-        return range(len(ranges.get(signal, _BIT)))
-
-    for case, same in cases({}, right, values):
-        if not same:
-            stated = ", ".join(f"{signal} = {_told(ranges.get(signal, _BIT)[k])}" for signal, k in case.items())
-            after = "after a clock with" if name in netlist.registers else "with"
-            raise RejectedError(f"{name} must be what a decimator has there {after} {stated}, not another value")
-
-
-def _told(limits: tuple[int, int]) -> str:
-    low, high = limits
-    return f"{low}" if low == high else f"{low}..{high}"
-
-
-_Ranges = Sequence[tuple[int, int]]
-"""Ranges that make up all values of a signal, told apart by the cases."""
-
-_BIT: _Ranges = ((0, 0), (1, 1))
-
-
-class _Logic:
-    """All nets of the core but for what is behind, in one case: each control signal lies in one of its ranges."""
-
-    def __init__(self, netlist: Netlist, case: Case, ranges: Mapping[str, _Ranges]) -> None:
-        self.forms = Forms()
-        self._netlist, self._case, self._ranges = netlist, case, ranges
-        undriven = {name for name in netlist.widths if name not in netlist.drivers and name not in netlist.registers}
-        self._nets = Evaluation(netlist, self.forms, self.word, cuts=undriven)
-
-    def limits(self, name: str) -> tuple[int, int]:
-        """Return the limits of a register, an input, or what leaves the core behind, in this case.
-
-        Raises
-        ------
-        UndecidedError
-            If the case says nothing of this signal, and it is one that must be told apart.
-        """
-        width = self._netlist.widths.get(name)
-        if width is None:
-            raise RejectedError(f"there must be a {name}")
-        if name not in self._ranges and width > 1:
-            return 0, (1 << width) - 1
-        if name not in self._case:
-            raise UndecidedError(name)
-        return self._ranges.get(name, _BIT)[self._case[name]]
-
-    def width(self, name: str) -> int:
-        """Return the width of a net."""
-        return self._netlist.widths[name]
-
-    def word(self, name: str) -> Form:
-        """Return what it holds."""
-        low, high = self.limits(name)
-        form = self.forms.variable(name, low, high)
-        if name != _DATA:
-            return form
-        _, most = self._ranges[name][-1]  # above the code there are bits that do not count
-        rest = self.forms.variable("padding", 0, (1 << self._netlist.widths[name]) // (most + 1) - 1)
-        return plus(form, rest, most + 1)
-
-    def bit(self, name: str) -> int:
-        """Return a signal of one bit."""
-        low, high = self.limits(name)
-        require(low == high, f"{name} must have one bit")
-        return low
-
-    def net(self, name: str) -> Form:
-        """Return what a net has within the clock."""
-        require(name in self._netlist.widths, f"there must be a {name}")
-        return self._nets.net(name)
-
-    def result(self, word: Form, bits: int) -> Form:
-        """Return a word whose low bits are the result: that of the core as it leaves it, low among those of one output.
-
-        What is above them, signs and flags, is left as it is.
-
-        Raises
-        ------
-        RejectedError
-            If there is more than one such output in it.
-        """
-        names = self.forms.keys(self.forms.unsigned(word, bits))
-        name = next(iter(names), None)
-        if len(names) != 1 or not isinstance(name, str) or not name.startswith(BEHIND):
-            raise RejectedError("the result must be one output of the core")
-        return plus(self.forms.unsigned(self.word(name), bits), self.forms.floor(shifted(word, -bits)), 1 << bits)
-
-    def after(self, name: str) -> Form:
-        """Return what a register holds after the clock."""
-        require(name in self._netlist.registers, f"there must be a register {name}")
-        try:
-            loaded = self._nets.loaded(self._netlist.registers[name].statements)
-        except RejectedError as error:
-            raise about(name, error) from None
-        return self.word(name) if loaded is None else loaded[1]
-
-
-class _Part(Protocol):
-    """What is checked of a part of the hardware."""
-
-    @property
-    def first(self) -> Mapping[str, int | None]:
-        """Its registers, and what they hold before the first clock and after a reset; None where it does not count."""
-
-    @property
-    def nets(self) -> Sequence[str]:
-        """Its nets that are checked."""
-
-    @property
-    def ranges(self) -> Mapping[str, _Ranges]:
-        """Signals of several bits whose values are told apart."""
-
-    def wanted(self, now: _Logic, name: str) -> Form:
-        """Return what a register must hold after the clock if there is no reset, or a net within the clock."""
+    valid: str
+    code: str
+    flags: tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class _Cic:
-    """The decimator, up to what enters the core."""
+    """The decimator, up to what enters the core; `accepting` are nets that say whether it takes a sample."""
 
     entry: DecimationEntry
     port: PortEntry
     seams: Seams
+    source: _Source
+    accepting: Mapping[str, int]
 
     @property
-    def nets(self) -> Sequence[str]:
+    def nets(self) -> Mapping[str, int]:
         """Whether a sample is taken, and what enters the core."""
-        return ("s_axis_tready", *self.seams.entering)
+        code = self.entry.width - self.entry.dropped
+        widths = {CIC + "o_data": code, CIC + "o_flags": len(self.source.flags)}
+        return {**self.accepting, **{name: widths.get(found, 1) for name, found in self.seams.entering.items()}}
 
     @property
-    def first(self) -> Mapping[str, int | None]:
+    def registers(self) -> Mapping[str, Held]:
         """Control, N sums, N combs and differences, and the output."""
-        found: dict[str, int | None] = {"phase": 0, "filled": 0, "filling": 1, "waiting": 0, "rail": 0}
+        bits, flags, width = self.entry.factor.bit_length() - 1, len(self.source.flags), self.entry.width
+        found = {"phase": Held(bits, 0), "filled": Held(self.entry.stages.bit_length(), 0)}
+        found |= {"filling": Held(1, 1), "waiting": Held(1, 0)}
         for k in range(1, self.entry.stages + 1):
-            found |= {f"integrator{k}_control0": 0, f"comb{k}_control0": 0}
-            found |= dict.fromkeys((f"integrator{k}_control1", f"integrator{k}_control2", f"comb{k}_control1"))
-            found |= dict.fromkeys((f"sum{k}", f"comb{k}", f"difference{k}"))
-        found |= {"o_valid": 0, "o_data": None, "o_rail": None}
-        return {CIC + name: value for name, value in found.items()}
+            found |= dict.fromkeys((f"integrator{k}_control0", f"comb{k}_control0"), Held(1, 0))
+            found |= dict.fromkeys(
+                (f"integrator{k}_control1", f"integrator{k}_control2", f"comb{k}_control1"), Held(1, None)
+            )
+            found |= dict.fromkeys((f"sum{k}", f"comb{k}", f"difference{k}"), Held(width, None))
+        found |= {"o_valid": Held(1, 0), "o_data": Held(width - self.entry.dropped, None)}
+        told = {"found": Held(flags, 0), "o_flags": Held(flags, None)}
+        found |= told if flags else {"rail": Held(1, 0), "o_rail": Held(1, None)}
+        return {CIC + name: held for name, held in found.items()}
 
     @property
-    def ranges(self) -> Mapping[str, _Ranges]:
+    def ranges(self) -> Mapping[str, Ranges]:
         """The phase and the pattern of the code by their ends, the count of results while filling by each value."""
         half = 1 << self.port.bits - 1
-        ends = (half - 1, half) if self.port.signed else (0, 2 * half - 1)
-        starts = sorted({0, half, 2 * half, *ends, *(end + 1 for end in ends)})
-        code = tuple((start, after - 1) for start, after in pairwise(starts))
+        ends = {half - 1, half} if self.port.signed else {0, 2 * half - 1}
+        starts = {0, 2 * half} | ({half} if self.port.signed else set())
+        if not self.source.flags:  # else the code is not asked for its rails
+            starts |= {0, half, *ends, *(end + 1 for end in ends)}
+        code = tuple((start, after - 1) for start, after in pairwise(sorted(starts)))
         last, count = self.entry.factor - 1, 1 << self.entry.stages.bit_length()
-        phase = ((0, 0), (1, last - 1), (last, last)) if last > 1 else _BIT
-        return {CIC + "phase": phase, CIC + "filled": tuple((k, k) for k in range(count)), _DATA: code}
+        phase = ((0, 0), (1, last - 1), (last, last)) if last > 1 else BIT
+        found: dict[str, Ranges] = {CIC + "phase": phase, CIC + "filled": tuple((k, k) for k in range(count))}
+        if self.source.flags:
+            found[CIC + "found"] = tuple((k, k) for k in range(1 << len(self.source.flags)))
+            found |= dict.fromkeys(self.source.flags, BIT)
+        return {**found, self.source.code: code}
 
-    def wanted(self, now: _Logic, name: str) -> Form:
+    def wanted(self, now: Logic, name: str) -> Form:
         """Return what the text at the top of this file says."""
-        if name == "s_axis_tready":
-            return constant(self._ready(now))
+        if name in self.accepting:
+            return constant(self.ready(now))
         if name in self.seams.entering:
             return now.word(self.seams.entering[name])
         parts = _NAME.fullmatch(name.removeprefix(CIC))
@@ -315,9 +204,8 @@ class _Cic:
         loaded = self._data(now, kind, stage) if kind in _DATA_REGISTERS else self._control(now, kind)
         return now.word(name) if loaded is None else loaded
 
-    def _control(self, now: _Logic, kind: str) -> Form | None:
+    def _control(self, now: Logic, kind: str) -> Form | None:
         """Return what a register of the control takes over, if it does."""
-        rail = self._bit(now, "rail") if kind in {"rail", "o_rail"} else 0
         match kind:
             case "phase" if self._enters(now):
                 return plus(now.word(CIC + kind), constant(1))
@@ -329,17 +217,17 @@ class _Cic:
                 return constant(1)
             case "waiting" if self._bit(now, "o_valid") and now.bit(self.seams.taken):
                 return constant(0)
-            case "rail" if self._accepted(now):
-                return constant(0 if self._completes(now) else rail | self._at_rail(now))
-            case "o_rail" if self._accepted(now) and self._completes(now):
-                return constant(rail | self._at_rail(now))
+            case "rail" | "found" if self._accepted(now):
+                return constant(0 if self._completes(now) else self._gathered(now))
+            case "o_rail" | "o_flags" if self._accepted(now) and self._completes(now):
+                return constant(self._gathered(now))
             case "o_valid" if self._leaves(now):
                 return constant(1)
             case "o_valid" if now.bit(self.seams.taken):
                 return constant(0)
         return None
 
-    def _data(self, now: _Logic, kind: str, k: int) -> Form | None:
+    def _data(self, now: Logic, kind: str, k: int) -> Form | None:
         """Return what a register of the filter takes over, if it does."""
         match kind:
             case "sum" if self._summed(now, k - 1, 0):
@@ -354,49 +242,53 @@ class _Cic:
                 return now.forms.floor(shifted(plus(last, half), -self.entry.dropped))
         return None
 
-    def _before(self, now: _Logic, kind: str, k: int) -> Form:
+    def _before(self, now: Logic, kind: str, k: int) -> Form:
         """Return what stands before a sum or a difference: the one before it, the last sum, or the code."""
         if k > 1:
             return now.word(f"{CIC}{kind}{k - 1}")
         if kind == "difference":
             return now.word(f"{CIC}sum{self.entry.stages}")
-        low, high = now.limits(_DATA)
+        low, _ = now.limits(self.source.code)
         negative = self.port.signed and low > self.port.highest
-        return plus(now.forms.variable(_DATA, low, high), constant(-(1 << self.port.bits) if negative else 0))
+        return plus(now.signal(self.source.code), constant(-(1 << self.port.bits) if negative else 0))
 
-    def _bit(self, now: _Logic, name: str) -> int:
+    def _bit(self, now: Logic, name: str) -> int:
         return now.bit(CIC + name)
 
-    def _ready(self, now: _Logic) -> int:
+    def ready(self, now: Logic) -> int:
         """Whether a sample would be accepted."""
         return int(not self._bit(now, "filling") and not (self._completes(now) and self._bit(now, "waiting")))
 
-    def _enters(self, now: _Logic) -> int:
+    def _enters(self, now: Logic) -> int:
         """Whether a sample goes in."""
-        return int(now.bit(SOURCE) and (self._bit(now, "filling") or self._ready(now)))
+        return int(now.bit(self.source.valid) and (self._bit(now, "filling") or self.ready(now)))
 
-    def _accepted(self, now: _Logic) -> int:
+    def _accepted(self, now: Logic) -> int:
         """Whether it is accepted as well."""
         return int(self._enters(now) and not self._bit(now, "filling"))
 
-    def _completes(self, now: _Logic) -> int:
+    def _completes(self, now: Logic) -> int:
         """Whether it would complete a result."""
         return int(now.limits(CIC + "phase") == (0, 0))
 
-    def _ends(self, now: _Logic) -> int:
+    def _ends(self, now: Logic) -> int:
         """Whether the sample after it would."""
         return int(now.limits(CIC + "phase") == (self.entry.factor - 1,) * 2)
 
-    def _filled(self, now: _Logic) -> int:
+    def _filled(self, now: Logic) -> int:
         """Whether R samples less than N R have gone in since the reset."""
         return int(now.limits(CIC + "filled") == (self.entry.stages - 1,) * 2)
 
-    def _at_rail(self, now: _Logic) -> int:
-        """Whether the code is at an end of its range."""
-        low, high = now.limits(_DATA)
-        return int(low == high and low in {self.port.lowest % (1 << self.port.bits), self.port.highest})
+    def _gathered(self, now: Logic) -> int:
+        """Return the flags of the samples since the last result, with those of the one that goes in."""
+        if self.source.flags:
+            (before, _), flags = now.limits(CIC + "found"), (now.bit(flag) for flag in self.source.flags)
+            return before | sum(flag << place for place, flag in enumerate(flags))
+        low, high = now.limits(self.source.code)
+        at_rail = low == high and low in {self.port.lowest % (1 << self.port.bits), self.port.highest}
+        return self._bit(now, "rail") | at_rail
 
-    def _summed(self, now: _Logic, stage: int, what: int) -> int:
+    def _summed(self, now: Logic, stage: int, what: int) -> int:
         """Of the sample behind a sum: whether there is one, whether it completes a result, and whether that counts."""
         if stage:
             return self._bit(now, f"integrator{stage}_control{what}")
@@ -404,16 +296,20 @@ class _Cic:
             return 1 - self._bit(now, "filling")
         return self._completes(now) if what else self._enters(now)
 
-    def _combed(self, now: _Logic, stage: int, what: int) -> int:
+    def _combed(self, now: Logic, stage: int, what: int) -> int:
         """Of the sample behind a comb: whether there is one, and whether the result counts."""
         if stage:
             return self._bit(now, f"comb{stage}_control{what}")
         last = self.entry.stages
         return self._summed(now, last, 2) if what else self._summed(now, last, 0) and self._summed(now, last, 1)
 
-    def _leaves(self, now: _Logic) -> int:
+    def _leaves(self, now: Logic) -> int:
         """Whether a result that counts comes to the output."""
         return self._combed(now, self.entry.stages, 0) and self._combed(now, self.entry.stages, 1)
+
+
+def _leaving(seams: Seams, port: PortEntry) -> Mapping[str, int]:
+    return {seams.ready: 1, "m_axis_tvalid": 1, "m_axis_tdata": -(-port.bits // 8) * 8}
 
 
 @dataclass(frozen=True)
@@ -424,21 +320,21 @@ class _Passing:
     port: PortEntry
 
     @property
-    def nets(self) -> Sequence[str]:
+    def nets(self) -> Mapping[str, int]:
         """Whether a result is taken, whether there is one, and the result."""
-        return (self.seams.ready, "m_axis_tvalid", "m_axis_tdata")
+        return _leaving(self.seams, self.port)
 
     @property
-    def first(self) -> Mapping[str, int | None]:
+    def registers(self) -> Mapping[str, Held]:
         """There is no register."""
         return {}
 
     @property
-    def ranges(self) -> Mapping[str, _Ranges]:
+    def ranges(self) -> Mapping[str, Ranges]:
         """Nor anything to tell apart."""
         return {}
 
-    def wanted(self, now: _Logic, name: str) -> Form:
+    def wanted(self, now: Logic, name: str) -> Form:
         """Return what is on the other side."""
         if name == "m_axis_tdata":
             return now.result(now.net(name), self.port.bits)
@@ -455,21 +351,22 @@ class _Holder:
     copies: int
 
     @property
-    def nets(self) -> Sequence[str]:
+    def nets(self) -> Mapping[str, int]:
         """Whether a result is taken, whether there is one, and the result."""
-        return (self.seams.ready, "m_axis_tvalid", "m_axis_tdata")
+        return _leaving(self.seams, self.port)
 
     @property
-    def first(self) -> Mapping[str, int | None]:
+    def registers(self) -> Mapping[str, Held]:
         """A word with its valid bit, and a counter."""
-        return {HOLDER + "o_valid": 0, HOLDER + "left": None, self.word: None}
+        count = self.copies.bit_length() - 1
+        return {HOLDER + "o_valid": Held(1, 0), HOLDER + "left": Held(count, None), self.word: Held(None, None)}
 
     @property
-    def ranges(self) -> Mapping[str, _Ranges]:
+    def ranges(self) -> Mapping[str, Ranges]:
         """The counter by whether it is 0."""
         return {HOLDER + "left": ((0, 0), (1, self.copies - 1))}
 
-    def wanted(self, now: _Logic, name: str) -> Form:
+    def wanted(self, now: Logic, name: str) -> Form:
         """Return a new word where one can be taken, else one copy less where one leaves."""
         valid, left = HOLDER + "o_valid", HOLDER + "left"
         if name == "m_axis_tvalid":

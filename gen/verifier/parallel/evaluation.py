@@ -249,21 +249,23 @@ class Evaluation:
         return self._compared(value)
 
     def _bitwise(self, value: Operator) -> Form:
+        """Join two words of equal width, bit by bit."""
         first, second = value.operands
-        require(
-            self._netlist.width(first) == self._netlist.width(second) == 1,
-            f"{value.symbol} must join single bits, not words",
-        )
+        width = self._netlist.width(first)
+        require(width == self._netlist.width(second), f"{value.symbol} must join words of one width, not of two")
         a = self._exact(first, signed=False)
         if value.symbol == "&" and not a:
             return a
-        if value.symbol == "|" and a == constant(1):
+        if value.symbol == "|" and a == constant((1 << width) - 1):
             return a
         b = self._exact(second, signed=False)
-        both = self._forms.times(a, b)
-        if value.symbol == "&":
-            return self._forms.bit(both)
-        return self._forms.bit(plus(plus(a, b), both, -1 if value.symbol == "|" else -2))
+        total: Form = {}
+        for place in range(width):
+            x, y = (self._forms.unsigned(self._cut(word, place), 1) for word in (a, b)) if width > 1 else (a, b)
+            both = self._forms.times(x, y)
+            one = both if value.symbol == "&" else plus(plus(x, y), both, -1 if value.symbol == "|" else -2)
+            total = plus(total, self._forms.bit(one), 1 << place)
+        return total
 
     def _any(self, value: Expression) -> Form:
         """Whether a bit is set."""

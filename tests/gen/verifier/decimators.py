@@ -26,6 +26,7 @@ class Case(NamedTuple):
     hold: bool = True
     architecture: str = "parallel"
     output_bits: int = 8
+    core: str = "filter"
 
     @property
     def text(self) -> str:
@@ -53,14 +54,49 @@ realization = "df1"
 """
 
 
+class Instrument(NamedTuple):
+    """What an instrument is made of."""
+
+    architecture: str = "folded"
+    signed: bool = False
+    factor: int = 4
+    hold: bool = False
+    core: str = "instrument"
+
+    @property
+    def text(self) -> str:
+        sign, low = ("-", -16) if self.signed else ("", 0)
+        return f"""
+name = "plain"
+sample_rate = 100.0
+input.voltage = {{ bits = 10, range = [0.0, 10.0] }}
+input.temperature = {{ bits = 10, range = [0.0, 128.0] }}
+calibration.coefficients = [[1.16, -0.0036], [0.3672, 0.0006618], [{sign}0.05812]]
+[filter]
+family = "butterworth"
+kind = "lowpass"
+order = 2
+cutoff = 1.0
+decimate = {self.factor}
+hold = {str(self.hold).lower()}
+[output]
+bits = 10
+range = [{low}.0, 16.0]
+unit = "mm"
+max_error = "faithful"
+[hardware]
+architecture = "{self.architecture}"
+"""
+
+
 @cache
-def designed(case: Case) -> tuple[CoreDesign, Certificate]:
-    made = design_core(specified(case.text))
+def designed(case: Case | Instrument) -> tuple[CoreDesign, Certificate]:
+    made = design_core(specified(case.text), core=case.core)
     return made, read(tree_of(made))
 
 
 @cache
-def written(case: Case) -> str:
+def written(case: Case | Instrument) -> str:
     made, _ = designed(case)
     return to_verilog(to_rtlil(made.architecture.component(), made.datapath.name))
 
@@ -87,16 +123,25 @@ EDITS = [
     (r"(?<=[=(&|] )\bo_ready\b", "o_valid"),
     (r"\bwaiting\b(?= [&|])", "filling"),
     (r"\[(\d+):2\];", r"[\1:1];"),
+    (r"\bfirst\b(?= [&|])", "fills"),
+    (r"\bfills\b(?= &)", "first"),
+    (r"\bfound\b(?= \|)", "o_flags"),
+    (r"\bi_flags\b(?=[,; ])", "found"),
+    (r"\(i_ready\)", "(i_valid)"),
+    (r"\(i_valid\)", "(s_axis_tvalid)"),
+    (r"\(aresetn\)", "(first)"),
+    (r"i_flags\[0\]", "i_flags[1]"),
+    (r"\{ i_flags, (\w+) \}", r"{ i_flags[0], i_flags[1], \1 }"),
 ]
 """Patterns and what takes their place, one at a time, in every statement outside the core."""
 
 SAME = re.compile(
     "|".join(
         (
-            r"reg \w+_control[12] .*|reg o_rail .*|reg (\S+ )?left .*",  # nothing counts before it is loaded
+            r"reg \w+_control[12] .*|reg (\S+ )?(o_rail|o_flags) .*|reg (\S+ )?left .*",  # not before it is loaded
             r"assign \w+ = difference\d - \d+'h0;",  # a rounding that rounds nothing
             r"assign \w+ = (phase|left|filled) [-+] 1'h1;",
-            r"if \(front_rst\) (o_rail|o_data) <= .*",
+            r"if \(front_rst\) (o_rail|o_flags|o_data) <= .*",
         )
     )
 )
@@ -116,7 +161,7 @@ def edited(text: str) -> Iterator[tuple[str, str]]:
                     yield changed.strip(), text[:start] + changed + text[end:]
 
 
-def accepted(case: Case) -> set[str]:
+def accepted(case: Case | Instrument) -> set[str]:
     """Return the edits of a core's text that are not rejected, but for those that change nothing."""
     _, certificate = designed(case)
     found, tried = set(), 0

@@ -63,6 +63,7 @@ def test_both_programs_are_proven_from_the_text(tmp_path: Path) -> None:
     assert proof.calibration is not None
     assert proof.program.instructions == len(behind.instructions)
     assert proof.calibration.instructions == len(ahead.program.instructions)
+    assert proof.decimator is not None
     assert proof.calibration.judged == ((0, 65535), (0, 65535))
     assert proof.files == proof.rebuilt == 5
 

@@ -100,6 +100,12 @@ def test_sentences() -> None:
         ".o_ready(s_axis_tvalid),\n    .o_valid(o_valid)\n  );",
         "decimator.o_ready must be an output of the core",
     )
+    narrow = text.replace("reg [11:0] sum1 = 12'h000;", "reg [10:0] sum1 = 11'h000;")
+    with pytest.raises(RejectedError, match=r"^decimator\.sum1 must have 12 bits, not 11$"):
+        check_decimator(re.sub(r"sum1 <= (n\d+)\[11:0\]", r"sum1 <= \1[10:0]", narrow), certificate)
+    wide = text.replace("reg [1:0] phase = 2'h0;", "reg [2:0] phase = 3'h0;").replace("= & phase;", "= & phase[1:0];")
+    with pytest.raises(RejectedError, match=r"^decimator\.phase must have 2 bits, not 3$"):
+        check_decimator(re.sub(r"phase <= (n\d+)\[1:0\]", r"phase <= \1[2:0]", wide), certificate)
     rejected("sum2 <= n38[11:0];", "sum2 <= sum3;", "decimator.sum3 must be declared to be used")
     other = designed(CASES[0][0]._replace(hold=False))[1]
     with pytest.raises(RejectedError, match=r"^results must not be held, as specified$"):

@@ -42,10 +42,11 @@ def print_proof(certificate: Certificate, proof: Proof) -> None:
     if proof.decimator is not None and certificate.decimation is not None:
         entry, around = certificate.decimation, proof.decimator
         held = f"; each result leaves {around.copies} times" if around.copies > 1 else ""
+        before = "" if entry.calibration is None else "; the first sample goes through the calibration once"
         console.print(
             f"[bold green]decimator[/]: {around.registers} registers around the core are {entry.stages} integrators, "
             f"{entry.stages} combs and what moves one sample of {entry.factor} on, for all inputs, stalls and resets"
-            f"{held}"
+            f"{before}{held}"
         )
     online = certificate.claims.online
     if online is not None:
@@ -58,8 +59,14 @@ def print_proof(certificate: Certificate, proof: Proof) -> None:
         what = plain if online is None else "an online core"
         other = ", or in parallel beside a decimator" if certificate.decimation is not None else ""
         console.print(f"not read: the SystemVerilog, as that of {what}{other}")
+    elif proof.files and proof.calibration is None and _has_calibration_ahead(certificate):
+        console.print("not read: the calibration before the decimator, which is parallel")
     if proof.rebuilt:
         console.print(f"[bold green]rebuilt[/]: {proof.rebuilt} files, the same byte for byte")
+
+
+def _has_calibration_ahead(certificate: Certificate) -> bool:
+    return certificate.decimation is not None and certificate.decimation.calibration is not None
 
 
 def _agreement(agreement: Agreement) -> str:

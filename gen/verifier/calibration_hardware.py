@@ -1,0 +1,93 @@
+r"""How a calibration is wired before a decimator: its first sample fills the decimator before it is accepted.
+
+::
+
+    s_axis_tvalid  _/~~~~~~~~~~~~~~~~~~~~~~~~~~~~~~~\_
+    first          ~~~~\______________________________   the sample goes into the calibration
+    fills          ____/~~~~~~~~~~~~~~~~~~~~~~~~~~\____   its result is offered to the decimator
+    filled         ______________________________/~\__   and has been accepted there: so is the sample
+
+A source holds a sample until it is accepted. So the first one goes into the calibration once, and its result stays
+there while the decimator fills, which takes it at each clock and accepts it at the end. From then on, each sample that
+is accepted goes into the calibration, and each of its results into the decimator.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from sosmith.gen.verifier.around_core import DATA, OF_INPUT, AheadSeams
+from sosmith.gen.verifier.around_logic import Field, Held, Logic, Ranges
+from sosmith.gen.verifier.certificate_file import PortEntry
+from sosmith.gen.verifier.parallel.control import SOURCE
+from sosmith.gen.verifier.parallel.netlist import Netlist
+from sosmith.gen.verifier.program.normal_form import Form, constant
+
+FLAGS = tuple(f"flag {place} of the calibration" for place in range(OF_INPUT))
+"""Signals: the flags of a result, the lowest first."""
+
+
+def layout_of(netlist: Netlist, seams: AheadSeams, port: PortEntry) -> dict[str, list[Field]]:
+    """Return what the outputs of a calibration with results and flags are made of."""
+    left = [Field(flag, 1) for flag in FLAGS]
+    layout = {seams.code: [Field(seams.code, port.bits)]}
+    for name in seams.flags or (seams.code,):
+        count = netlist.widths[name] if seams.flags else OF_INPUT
+        layout[name] = [*layout.get(name, []), *left[:count]]
+        left = left[count:]
+    return layout
+
+
+@dataclass(frozen=True)
+class Ahead:
+    """The ports of the calibration, and what lets samples in.
+
+    Attributes
+    ----------
+    seams : AheadSeams
+    ready : callable
+        Whether the decimator takes a result.
+    width : int
+        Bits of `s_axis_tdata`.
+    """
+
+    seams: AheadSeams
+    ready: Callable[[Logic], int]
+    width: int
+
+    @property
+    def nets(self) -> Mapping[str, int]:
+        """Whether a sample is accepted, and what enters the calibration."""
+        entering = {name: self.width if found == DATA else 1 for name, found in self.seams.entering.items()}
+        return {"s_axis_tready": 1, self.seams.offered: 1, self.seams.ready: 1, **entering}
+
+    @property
+    def registers(self) -> Mapping[str, Held]:
+        """What is done with the first sample."""
+        return {"first": Held(1, 1), "fills": Held(1, 0), "filled": Held(1, 0)}
+
+    @property
+    def ranges(self) -> Mapping[str, Ranges]:
+        """There are bits only."""
+        return {}
+
+    def wanted(self, now: Logic, name: str) -> Form:
+        """Return what the text at the top of this file says."""
+        if name in self.seams.entering:
+            return now.word(self.seams.entering[name])
+        if name == self.seams.ready:
+            return constant(self.ready(now))
+        first, fills, filled = (now.bit(register) for register in ("first", "fills", "filled"))
+        flows = not (first or fills or filled)
+        if name == self.seams.offered:
+            return constant(int((first or flows) and now.bit(SOURCE)))
+        if name == "s_axis_tready":
+            return constant(int(filled or (flows and now.bit(self.seams.taken))))
+        ends = fills and now.bit(self.seams.valid) and self.ready(now)
+        begins = first and now.bit(SOURCE) and now.bit(self.seams.taken)
+        if name == "filled":
+            return constant(int(ends))
+        if name == "first":
+            return constant(int(first and not begins))
+        return constant(int(not ends and (fills or begins)))

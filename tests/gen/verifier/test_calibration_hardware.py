@@ -1,0 +1,105 @@
+"""The decimator of an instrument and its wires to the calibration: proven, and rejected when anything is wrong."""
+
+import re
+
+import pytest
+from tests.formal.prover import broken
+from tests.gen.verifier.decimators import Instrument, accepted, designed, written
+
+from sosmith.gen.output.verilog import to_rtlil, to_verilog
+from sosmith.gen.verifier.cic_hardware import check_decimator
+from sosmith.gen.verifier.graph import RejectedError
+from sosmith.hdl.decimation import decimator as hardware
+
+CASES = [
+    Instrument(),
+    Instrument("serial", signed=True),
+    Instrument("parallel", signed=True, factor=2, hold=True),
+]
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_a_decimator_behind_a_calibration_is_proven(case: Instrument) -> None:
+    _, certificate = designed(case)
+    assert certificate.decimation is not None
+    verdict = check_decimator(written(case), certificate)
+    assert verdict.copies == (case.factor if case.hold else 1)
+    assert verdict.registers == 8 + 8 * certificate.decimation.stages + 3 + 3 * case.hold
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", CASES)
+def test_every_edit_is_rejected(case: Instrument) -> None:
+    assert accepted(case) == set()
+
+
+def test_sentences() -> None:
+    """The first register or port that is wrong is named."""
+    text, (_, certificate) = written(CASES[0]), designed(CASES[0])
+
+    def rejected(right: str, wrong: str, sentence: str) -> None:
+        assert text.count(right) == 1
+        with pytest.raises(RejectedError, match=f"^{re.escape(sentence)}$"):
+            check_decimator(text.replace(right, wrong), certificate)
+
+    rejected(
+        "else if (n14) first <= 1'h0;",
+        "else if (n13) first <= 1'h0;",
+        "first must be what a decimator has there after a clock with aresetn = 1, first = 1, s_axis_tvalid = 1, "
+        "fills = 0, filled = 0, ahead.s_axis_tready = 0, not another value",
+    )
+    rejected("reg first = 1'h1;", "reg first = 1'h0;", "first must be 1 before the first clock, not 0")
+    rejected(
+        "    .m_axis_tuser(i_flags),\n    .m_axis_tvalid(i_valid)",
+        "    .m_axis_tuser({ i_flags[0], i_flags[1] }),\n    .m_axis_tvalid(i_valid)",
+        "decimator.found must be what a decimator has there after a clock with aresetn = 1, ahead.m_axis_tvalid = 1, "
+        "decimator.filling = 0, decimator.waiting = 0, decimator.phase = 1..2, decimator.found = 0, "
+        "flag 0 of the calibration = 0, flag 1 of the calibration = 1, not another value",
+    )
+    rejected(
+        ".s_axis_tdata(s_axis_tdata),\n",
+        ".s_axis_tdata(s_axis_tdata[30:0]),\n",
+        "ahead.s_axis_tdata must be what a decimator has there, not another value",
+    )
+    rejected(
+        ".m_axis_tready(i_ready),",
+        ".m_axis_tready(1'h1),",
+        "ahead.m_axis_tready must be what a decimator has there with decimator.filling = 0, decimator.phase = 0, "
+        "decimator.waiting = 1, not another value",
+    )
+    rejected(
+        ".judged(m_axis_tuser[1:0])",
+        ".judged({ m_axis_tuser[0], m_axis_tuser[1] })",
+        "bit 0 of m_axis_tuser must be its flag as the core gives it, not another value",
+    )
+    rejected(
+        "m_axis_tuser[7:3] = 5'h00",
+        "m_axis_tuser[7:3] = { 4'h0, aresetn }",
+        "bit 3 of m_axis_tuser must be its flag as the core gives it, not another value",
+    )
+
+
+BROKEN = [
+    ("a first sample twice", "(first | flows))", "(first | flows | filled))"),
+    ("a first sample that is not accepted", "self.s_axis_tready.eq(filled |", "self.s_axis_tready.eq("),
+    ("a calibration that is not asked", "(flows & ahead.s_axis_tready)", "flows"),
+    ("filled before it is", "fills & ahead.m_axis_tvalid & decimator.i_ready", "fills & ahead.m_axis_tvalid"),
+    ("a result that gets lost", "ahead.m_axis_tready.eq(decimator.i_ready)", "ahead.m_axis_tready.eq(1)"),
+    ("flags of one sample", "found.eq(found | self.i_flags)", "found.eq(self.i_flags)"),
+    ("flags of the last sample", "self.o_flags.eq(found | self.i_flags), found.eq(0)", "self.o_flags.eq(found)"),
+    ("flags the wrong way round", "i_flags.eq(ahead.m_axis_tuser)", "i_flags.eq(ahead.m_axis_tuser[::-1])"),
+    ("a reset that is not passed on", "ahead.aresetn.eq(self.aresetn)", "ahead.aresetn.eq(1)"),
+    ("samples that are late", "ahead.s_axis_tdata.eq(self.s_axis_tdata)", "ahead.s_axis_tdata.eq(0)"),
+]
+
+
+@pytest.mark.parametrize(("right", "wrong"), [pytest.param(*case, id=subject) for subject, *case in BROKEN])
+def test_hardware_that_is_wrong_is_rejected(right: str, wrong: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    case = CASES[0]
+    made, certificate = designed(case)
+    whole = written(case)
+    monkeypatch.setattr(hardware, "DecimatedCore", broken(hardware, right, wrong).DecimatedCore)
+    text = to_verilog(to_rtlil(made.architecture.component(), made.datapath.name))
+    assert text != whole
+    with pytest.raises(RejectedError):
+        check_decimator(text, certificate)
