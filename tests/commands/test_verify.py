@@ -72,8 +72,12 @@ def test_a_parallel_core(channels: int, key: dict[str, Any], tmp_path: Path) -> 
     generate(design_core(replace(spec, hardware=hardware)), tmp_path)
     path = str(tmp_path / "plain.certificate.json")
     table = command.good(path, "--files", str(tmp_path)).stdout
+    memories = r" and \d+ memories" if channels > 1 or "pipeline" in key else ""
     assert re.search(
-        r"hardware: the SystemVerilog computes these graphs, each sample \d+ clocks later, in \d+ regis", table
+        r"hardware: the SystemVerilog computes these graphs, each sample \d+ clocks later, in \d+ registers"
+        + memories
+        + r", \d+ of them states",
+        table,
     )
     found = json.loads(command.good(path, "--json", "--files", str(tmp_path)).stdout)
     assert found["hardware_registers"] > 10

@@ -61,13 +61,14 @@ class HardwareVerdict:
 
     Attributes
     ----------
-    registers, states : int
-        Number of registers whose content was found, and of those that hold a DELAY node.
+    registers, memories, states : int
+        Number of registers whose content was found, of memories, and of those of both that hold a DELAY node.
     latency : int
         Clocks from the edge that accepts a sample to the edge that can hand its result on, without a stall.
     """
 
     registers: int
+    memories: int
     states: int
     latency: int
 
@@ -121,8 +122,8 @@ def _deep_recursion() -> Iterator[None]:
 def _checked(netlist: Netlist, certificate: Certificate, channels: int, lanes: int) -> HardwareVerdict:
     control = find_control(netlist) if channels == 1 else find_channels(netlist, channels)
     forms = Forms()
-    memories = {name: len(memory.first) for name, memory in netlist.memories.items()} if channels == 1 else {}
-    graph = GraphCodes(certificate, forms, lanes, memories)
+    words = {name: len(memory.first) for name, memory in netlist.memories.items()} if channels == 1 else {}
+    graph = GraphCodes(certificate, forms, lanes, words)
     pipeline = Pipeline(netlist, control, graph, forms, certificate)
     try:
         pipeline.check_states()
@@ -133,7 +134,9 @@ def _checked(netlist: Netlist, certificate: Certificate, channels: int, lanes: i
             require(right, f"{OUTPUT_DEST} must be the channel of the sample, not another value")
     except RejectedError as error:
         raise fault(netlist, pipeline, graph) or error from None
-    return HardwareVerdict(pipeline.registers, pipeline.state_count, len(control.valid) + (channels > 1))
+    memories = 0 if pipeline.memories is None else len(pipeline.memories.states)
+    latency = len(control.valid) + (channels > 1)
+    return HardwareVerdict(pipeline.registers, memories, len(pipeline.states) + memories, latency)
 
 
 def _check_output(

@@ -127,11 +127,6 @@ class Pipeline:
         return len(self._found) + len(self._second) + len(self.states) + len(self._counters)
 
     @property
-    def state_count(self) -> int:
-        """Number of registers and memories that hold DELAY nodes."""
-        return len(self.states) + (0 if self.memories is None else len(self.memories.states))
-
-    @property
     def last(self) -> int:
         """The position before the output buffer."""
         return len(self._control.valid) - 1

@@ -34,10 +34,11 @@ def print_proof(certificate: Certificate, proof: Proof) -> None:
         )
     if proof.hardware is not None:
         found = proof.hardware
+        memories = f" and {found.memories} memories" if found.memories else ""
         console.print(
             f"[bold green]hardware[/]: the SystemVerilog computes these graphs, each sample {found.latency} clocks "
-            f"later, in {found.registers} registers, {found.states} of them states: for all inputs, stalls and resets, "
-            "but for the flags outside_calibration, wear_warning and wear_critical"
+            f"later, in {found.registers} registers{memories}, {found.states} of them states: for all inputs, stalls "
+            "and resets, but for the flags outside_calibration, wear_warning and wear_critical"
         )
     if proof.decimator is not None and certificate.decimation is not None:
         entry, around = certificate.decimation, proof.decimator

@@ -16,7 +16,7 @@ FIRST_ORDER = PLAIN.replace("order = 2", "order = 1")
 def accept(core: Made) -> None:
     found = core.check()
     assert found.latency == block_latency_cycles(core.design.datapath, core.lanes, look_ahead=True)
-    assert found.states > len(re.findall(r"^  reg .*_memory \[", core.text, re.MULTILINE)) > 0
+    assert found.states > found.memories == len(re.findall(r"^  reg .*_memory \[", core.text, re.MULTILINE)) > 0
 
 
 @pytest.mark.parametrize("lanes", [1, pytest.param(2, marks=pytest.mark.slow), 4])
