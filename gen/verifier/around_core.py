@@ -21,7 +21,7 @@ AHEAD, BEHIND, CIC, HOLDER = "ahead.", "behind.", "decimator.", "holder."
 OF_INPUT = 2
 """Flags that are told of inputs: input_at_rail and outside_calibration."""
 
-CLOCK, DATA = "aclk", "s_axis_tdata"
+CLOCK, DATA, DEST = "aclk", "s_axis_tdata", "s_axis_tdest"
 _UNDEFINED = re.compile(r"\b(\d+)'hx+")
 _MODULE = re.compile(r"^module .*?^endmodule$", re.MULTILINE | re.DOTALL)
 
@@ -59,9 +59,11 @@ class AheadSeams:
     ready, valid : str
         Input and output: whether a result is taken, and whether there is one.
     code : str
-        Output: the code of a result, and above it its flags if there are no ports for these.
+        Output: the code of a result, and above it its flags and its channel if there are no ports for these.
     flags : tuple of str
         Outputs with the flags, the lowest first.
+    dest : str
+        Output: the channel of a result; "" without one.
     """
 
     entering: Mapping[str, str]
@@ -71,14 +73,17 @@ class AheadSeams:
     valid: str
     code: str
     flags: tuple[str, ...]
+    dest: str
 
 
 _OFFERED, _TAKEN = ("s_axis_tvalid", "i_valid"), ("s_axis_tready", "advance")
 _READY, _VALID = ("m_axis_tready", "o_ready"), ("m_axis_tvalid",)
 
 
-def seams_of(netlist: Netlist, told: str, *, held: bool) -> Seams:
-    """Find the ports of the core behind; `told` is the net with the flags of a result of the decimator.
+def seams_of(netlist: Netlist, told: str, *, held: bool, dest: str | None = None) -> Seams:
+    """Find the ports of the core behind.
+
+    A result of the decimator has its flags in the net `told`, and its channel in the register `dest`, if there are any.
 
     Raises
     ------
@@ -86,7 +91,7 @@ def seams_of(netlist: Netlist, told: str, *, held: bool) -> Seams:
         If the core has others, or not all of them.
     """
     results = (CIC + "o_data", CIC + told, CIC + "o_valid")
-    entering, others = _entering(netlist, BEHIND, (RESET, *results))
+    entering, others = _entering(netlist, BEHIND, (RESET, *results), () if dest is None else (dest,))
     require(len(others) == 1, f"the core must have one other input, which takes its results, not {len(others)}")
     ready = _one_of(netlist, BEHIND, _READY)
     require(others[0] == ready, f"{ready} must be an input of the core")
@@ -98,15 +103,15 @@ def seams_of(netlist: Netlist, told: str, *, held: bool) -> Seams:
     return Seams(entering, taken, ready, valid)
 
 
-def ahead_of(netlist: Netlist, bits: int) -> AheadSeams:
-    """Find the ports of the calibration, whose results have so many bits.
+def ahead_of(netlist: Netlist, bits: int, channel_bits: int = 0) -> AheadSeams:
+    """Find the ports of the calibration, whose results and their channels have so many bits.
 
     Raises
     ------
     RejectedError
         If it has others, or not all of them.
     """
-    entering, others = _entering(netlist, AHEAD, (RESET, DATA))
+    entering, others = _entering(netlist, AHEAD, (RESET, DATA, *([DEST] if channel_bits else [])))
     offered, taken, ready, valid = (_one_of(netlist, AHEAD, names) for names in (_OFFERED, _TAKEN, _READY, _VALID))
     require(
         sorted(others) == sorted((offered, ready)), f"the other inputs of the calibration must be {offered}, {ready}"
@@ -114,30 +119,35 @@ def ahead_of(netlist: Netlist, bits: int) -> AheadSeams:
     outlets = {name for name in netlist.widths if name.startswith(AHEAD)} - netlist.inlets
     outlets -= {taken, valid}
     flags = tuple(AHEAD + name for name in ("m_axis_tuser", "rail", "outside") if AHEAD + name in outlets)
-    outlets -= {*flags}
+    dest = AHEAD + "channel" if AHEAD + "channel" in outlets else ""
+    outlets -= {*flags, dest}
     require(len(outlets) == 1, f"the calibration must have one output for its results, not {len(outlets)}")
     (code,) = outlets
-    count = netlist.widths[code] - bits + sum(netlist.widths[name] for name in flags)
-    apart = netlist.widths[code] == bits if flags else True
-    require(apart and count == OF_INPUT, f"{code} must have {bits} bits, and {OF_INPUT} flags beside it")
-    return AheadSeams(entering, offered, taken, ready, valid, code, flags)
+    beside = netlist.widths[code], sum(netlist.widths[name] for name in flags), netlist.widths.get(dest, 0)
+    whole = (bits + OF_INPUT + channel_bits, 0, 0), (bits, OF_INPUT, channel_bits)
+    require(beside in whole, f"{code} must have {bits} bits, and {OF_INPUT} flags beside it")
+    return AheadSeams(entering, offered, taken, ready, valid, code, flags, dest)
 
 
-def _entering(netlist: Netlist, prefix: str, wanted: Sequence[str]) -> tuple[dict[str, str], list[str]]:
-    """Return the inputs of a core that have the clock, or one of some nets, in all their bits; and its others."""
+def _entering(
+    netlist: Netlist, prefix: str, whole: Sequence[str], extended: Sequence[str] = ()
+) -> tuple[dict[str, str], list[str]]:
+    """Return the inputs of a core that have one of some nets, in all their bits or extended; and those without."""
+    wanted = (*whole, *extended)
     sources = {name: _source(netlist, name) for name in sorted(netlist.inlets) if name.startswith(prefix)}
     for source in (CLOCK, *wanted):
         names = [name for name, found in sources.items() if found == source]
         require(len(names) == 1, f"one port of the core must be {source}, not {len(names)}")
         own, other = netlist.widths[names[0]], netlist.widths[source]
-        require(own == other, f"{names[0]} must have {other} bits, as {source} has, not {own}")
+        require(own == other or source in extended, f"{names[0]} must have {other} bits, as {source} has, not {own}")
     entering = {name: source for name, source in sources.items() if source in wanted}
     return entering, [name for name, source in sources.items() if source not in {CLOCK, *wanted}]
 
 
 def _one_of(netlist: Netlist, prefix: str, names: Sequence[str]) -> str:
     """Return the one port of a core that has one of these names."""
-    found = [prefix + name for name in names if prefix + name in netlist.widths]
+    ports = sorted(name for name in netlist.widths if name.startswith(prefix))
+    found = [name for name in ports if re.sub(r"_\d+$", "", name.removeprefix(prefix)) in names]
     require(len(found) == 1, f"one port of the core must be {' or '.join(names)}, not {len(found)}")
     return found[0]
 

@@ -22,21 +22,89 @@ from sosmith.gen.verifier.around_logic import Field, Held, Logic, Ranges
 from sosmith.gen.verifier.certificate_file import PortEntry
 from sosmith.gen.verifier.parallel.control import SOURCE
 from sosmith.gen.verifier.parallel.netlist import Netlist
-from sosmith.gen.verifier.program.normal_form import Form, constant
+from sosmith.gen.verifier.program.normal_form import Form, constant, plus
 
 FLAGS = tuple(f"flag {place} of the calibration" for place in range(OF_INPUT))
 """Signals: the flags of a result, the lowest first."""
 
+CHANNEL = "channel of the calibration"
+"""Signal: the channel of a result."""
 
-def layout_of(netlist: Netlist, seams: AheadSeams, port: PortEntry) -> dict[str, list[Field]]:
-    """Return what the outputs of a calibration with results and flags are made of."""
+
+def layout_of(netlist: Netlist, seams: AheadSeams, port: PortEntry, channel_bits: int = 0) -> dict[str, list[Field]]:
+    """Return what the outputs of a calibration with results, flags and channels are made of."""
     left = [Field(flag, 1) for flag in FLAGS]
     layout = {seams.code: [Field(seams.code, port.bits)]}
     for name in seams.flags or (seams.code,):
         count = netlist.widths[name] if seams.flags else OF_INPUT
         layout[name] = [*layout.get(name, []), *left[:count]]
         left = left[count:]
+    if channel_bits:
+        dest = seams.dest or seams.code
+        layout[dest] = [*layout.get(dest, []), Field(CHANNEL, channel_bits)]
     return layout
+
+
+@dataclass(frozen=True)
+class Gate:
+    """What lets samples of several channels in once some clocks have passed since the reset, and has them go on.
+
+    Attributes
+    ----------
+    clocks : int
+        Number of these clocks, which `closed` counts down.
+    width : int
+        Bits of `closed`.
+    ready : callable
+        Whether the decimator takes what comes.
+    seams : AheadSeams or None
+        Ports of the calibration before it.
+    widths : dict of str to int
+        Widths of ports of the core.
+    """
+
+    clocks: int | None
+    width: int
+    ready: Callable[[Logic], int]
+    seams: AheadSeams | None
+    widths: Mapping[str, int]
+
+    @property
+    def nets(self) -> Mapping[str, int]:
+        """Whether a sample is accepted, and what enters the calibration."""
+        if self.seams is None:
+            return {"s_axis_tready": 1}
+        entering = {name: self.widths[found] for name, found in self.seams.entering.items()}
+        return {"s_axis_tready": 1, self.seams.offered: 1, self.seams.ready: 1, **entering}
+
+    @property
+    def registers(self) -> Mapping[str, Held]:
+        """The counter."""
+        return {"closed": Held(self.width, self.clocks)}
+
+    @property
+    def ranges(self) -> Mapping[str, Ranges]:
+        """The counter by whether it is 0."""
+        return {"closed": ((0, 0), (1, (1 << self.width) - 1))}
+
+    def offered(self, now: Logic) -> int:
+        """Whether a sample is let in."""
+        return int(self._is_open(now) and now.bit(SOURCE))
+
+    def wanted(self, now: Logic, name: str) -> Form:
+        """Return what a register or a net must be."""
+        if name == "closed":
+            return plus(now.word(name), constant(0 if self._is_open(now) else -1))
+        if self.seams is None:
+            return constant(int(self._is_open(now) and self.ready(now)))
+        if name == "s_axis_tready":
+            return constant(int(self._is_open(now) and now.bit(self.seams.taken)))
+        if name == self.seams.offered:
+            return constant(self.offered(now))
+        return constant(self.ready(now)) if name == self.seams.ready else now.word(self.seams.entering[name])
+
+    def _is_open(self, now: Logic) -> bool:
+        return now.limits("closed") == (0, 0)
 
 
 @dataclass(frozen=True)

@@ -45,9 +45,10 @@ from sosmith.gen.verifier.around_core import (
     read_core,
     seams_of,
 )
-from sosmith.gen.verifier.around_logic import BIT, Field, Held, Logic, Part, Ranges, check_parts
+from sosmith.gen.verifier.around_logic import BIT, Field, Held, Logic, Part, Ranges, Signals, check_parts
 from sosmith.gen.verifier.calibration_hardware import FLAGS, Ahead, layout_of
 from sosmith.gen.verifier.certificate_file import Certificate, DecimationEntry, PortEntry
+from sosmith.gen.verifier.channel_cic_hardware import check_channels, names_of
 from sosmith.gen.verifier.graph import require
 from sosmith.gen.verifier.parallel.control import SINK, SOURCE
 from sosmith.gen.verifier.parallel.forms import shifted
@@ -71,13 +72,16 @@ class DecimatorVerdict:
         Number of registers that were proven to be loaded as they must.
     copies : int
         How often each result is handed out.
+    channels : int
+        Number of channels.
     """
 
     registers: int
     copies: int
+    channels: int = 1
 
 
-def check_decimator(text: str, certificate: Certificate) -> DecimatorVerdict:
+def check_decimator(text: str, certificate: Certificate, channels: int = 1) -> DecimatorVerdict:
     """Prove the hardware before and behind a core that filters at a lower rate.
 
     Parameters
@@ -87,6 +91,8 @@ def check_decimator(text: str, certificate: Certificate) -> DecimatorVerdict:
     certificate : Certificate
         Its certificate, with a decimator, which `verify` has accepted. If it has the specification, that says whether
         results are held.
+    channels : int
+        Number of channels.
 
     Raises
     ------
@@ -101,25 +107,35 @@ def check_decimator(text: str, certificate: Certificate) -> DecimatorVerdict:
     if certificate.about is not None:
         stated = tomllib.loads(certificate.about.specification).get("filter", {}).get("hold", False)
         require(held == stated, f"results must {'' if stated else 'not '}be held, as specified")
-    seams = seams_of(netlist, "o_rail" if entry.calibration is None else "o_flags", held=held)
+    several = channels > 1
+    names = names_of(netlist) if several else None
+    told = "o_rail" if entry.calibration is None and names is None else "o_flags"
+    seams = seams_of(netlist, told, held=held, dest=None if names is None else names.dest)
     output = certificate.output
     word = _held_word(netlist) if held else ""
-    parts: list[Part] = [_Holder(seams, output, word, entry.factor) if held else _Passing(seams, output)]
+    leaving = _Holder(seams, output, word, entry.factor) if held else _Passing(seams, output)
+    if names is None:
+        registers = _check_one(netlist, certificate, seams, leaving)
+    else:
+        registers = check_channels(netlist, certificate, channels, seams, names, leaving)
+    check_passed(netlist, seams, word, (channels - 1).bit_length())
+    check_signs(modules, output, CLOCK)
+    return DecimatorVerdict(registers, entry.factor if held else 1, channels)
+
+
+def _check_one(netlist: Netlist, certificate: Certificate, seams: Seams, leaving: Part) -> int:
+    """Check the decimator of one channel, and what is before it."""
+    entry = certificate.decimation
+    assert entry is not None
     if entry.calibration is None:
         (port,) = certificate.inputs
-        source = _Source(SOURCE, DATA, ())
-        layout = {DATA: [Field(DATA, port.bits)]}
-        parts.append(_Cic(entry, port, seams, source, {"s_axis_tready": 1}))
-    else:
-        port = entry.calibration.output
-        ahead = ahead_of(netlist, port.bits)
-        source, layout = _Source(ahead.valid, ahead.code, FLAGS), layout_of(netlist, ahead, port)
-        cic = _Cic(entry, port, seams, source, {})
-        parts += [cic, Ahead(ahead, cic.ready, netlist.widths[DATA])]
-    registers = check_parts(netlist, parts, layout)
-    check_passed(netlist, seams, word)
-    check_signs(modules, output, CLOCK)
-    return DecimatorVerdict(registers, entry.factor if held else 1)
+        cic = _Cic(entry, port, seams, _Source(SOURCE, DATA, ()), {"s_axis_tready": 1})
+        return check_parts(netlist, [leaving, cic], Signals({DATA: [Field(DATA, port.bits)]}))
+    port = entry.calibration.output
+    ahead = ahead_of(netlist, port.bits)
+    cic = _Cic(entry, port, seams, _Source(ahead.valid, ahead.code, FLAGS), {})
+    parts = [leaving, cic, Ahead(ahead, cic.ready, netlist.widths[DATA])]
+    return check_parts(netlist, parts, Signals(layout_of(netlist, ahead, port)))
 
 
 def _held_word(netlist: Netlist) -> str:
@@ -372,8 +388,8 @@ class _Holder:
         if name == "m_axis_tvalid":
             return now.word(valid)
         if name == "m_axis_tdata":
-            bits = now.width(name) if self.word == HOLDER + "o_data" else self.port.bits  # else zeros are left out
-            return now.forms.unsigned(now.word(self.word), bits)
+            above = now.forms.floor(shifted(now.net(name), -self.port.bits))
+            return plus(now.forms.unsigned(now.word(self.word), self.port.bits), above, 1 << self.port.bits)
         takes = not now.bit(valid) or (now.bit(SINK) and now.limits(left) == (0, 0))
         if name in self.nets:
             return constant(int(takes))

@@ -14,12 +14,12 @@ from sosmith.gen.verifier.bit_logic import Bit, BitLogic
 from sosmith.gen.verifier.graph import require
 from sosmith.gen.verifier.parallel.netlist import Netlist
 
-_LEAVING = _, _FLAGS, _ = "m_axis_tdata", "m_axis_tuser", "m_axis_tdest"
+_LEAVING = _, _FLAGS, _DEST = "m_axis_tdata", "m_axis_tuser", "m_axis_tdest"
 _LEAST, _MOST = 3, 8
 _PLACES = {"rail": 0, "outside": 1, "judged": 0, "m_axis_tuser": 0}
 
 
-def check_passed(netlist: Netlist, seams: Seams, word: str) -> None:
+def check_passed(netlist: Netlist, seams: Seams, word: str, channel_bits: int = 0) -> None:
     """Check what leaves, at once or through the register that holds results.
 
     Parameters
@@ -30,6 +30,8 @@ def check_passed(netlist: Netlist, seams: Seams, word: str) -> None:
         Its ports.
     word : str
         The register; "" if results leave at once.
+    channel_bits : int
+        Bits of a channel, above which there are zeros; 0 without one.
 
     Raises
     ------
@@ -51,9 +53,17 @@ def check_passed(netlist: Netlist, seams: Seams, word: str) -> None:
         first = _PLACES.get(name.removeprefix(BEHIND))
         right = own and (first is None or place == first + logic.made[bit].place)
         require(right, f"bit {place} of {_FLAGS} must be its flag as the core gives it, not another value")
-    for bit, above in pairwise(flags[:count]):
+    dest = left.get(_DEST, [])
+    channel = dest[:channel_bits]
+    require(not any(dest[channel_bits:]), f"{_DEST} must be the channel, and zeros above")
+    for bit, above in pairwise(flags[:count] + channel):
         one, other = logic.made[bit], logic.made[above]
         require(one.kind != other.kind or one.place + 1 == other.place, f"{_FLAGS} must have the flags in their order")
+    if channel:
+        names = {logic.made[bit].kind for bit in channel}
+        apart = logic.made[flags[0]].kind not in names
+        own = names == {BEHIND + "channel"} and logic.made[channel[0]].place == 0 if apart else len(names) == 1
+        require(own, f"{_DEST} must be the channel as the core gives it, not another value")
     others = {bit for name, bits in left.items() if name != _FLAGS for bit in bits}
     require(others.isdisjoint(flags[:count]), f"{_FLAGS} must have no bit that leaves elsewhere")
     passed = others | {*flags}

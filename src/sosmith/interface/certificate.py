@@ -135,8 +135,8 @@ class Certificate:
             certificate's own file may have been changed. From the SystemVerilog, the program of a folded or serial
             core, and all hardware of a parallel one, is proven to compute the certificate's graph for all inputs and
             states; online cores are not, nor cores with loadable constants, protection or 16 samples a clock, nor a
-            parallel core beside a decimator. The decimator of one channel, how it is wired to a calibration before it,
-            and what holds the results behind it, is proven register by register.
+            parallel core beside a decimator. A decimator, how it is wired to a calibration before it, and what holds
+            results behind it, is proven register by register.
         rebuild : bool
             Whether to generate all files again, from `spec` or the specification's text in the certificate, and compare
             them byte for byte.
@@ -167,9 +167,9 @@ class Certificate:
             architecture, channels, lanes = fixed_architecture(folder / f"{self.name}.json")
             text = (folder / f"{self.name}.sv").read_text(encoding="utf-8")
             found = self.entries.decimation
-            if found is not None and channels == 1:
+            if found is not None:
                 progress("decimator", 0, 0)
-                decimator = check_decimator(text, self.entries)
+                decimator = check_decimator(text, self.entries, channels)
             if architecture in {"folded", "serial"}:
                 progress("program", 0, 0)
                 program = check_program(behind_decimator(text, self.entries), at_lower_rate(self.entries))

@@ -1,20 +1,15 @@
 """The hardware around a core at a lower rate: proven register by register, and rejected when anything is wrong."""
 
 import re
-from pathlib import Path
 
 import pytest
 from tests.formal.prover import broken
 from tests.gen.verifier.decimators import Case, accepted, designed, written
 
-from sosmith.gen.core import design_core
-from sosmith.gen.output.generate import generate
 from sosmith.gen.output.verilog import to_rtlil, to_verilog
-from sosmith.gen.specification.specification import from_text
 from sosmith.gen.verifier.cic_hardware import check_decimator
 from sosmith.gen.verifier.graph import RejectedError
 from sosmith.hdl.decimation import decimator as hardware
-from sosmith.interface.certificate import Certificate as Saved
 
 CASES = [
     (Case(), 2),
@@ -40,14 +35,6 @@ def test_a_decimator_is_proven(case: Case, stages: int) -> None:
     verdict = check_decimator(written(case), certificate)
     assert verdict.copies == (case.factor if case.hold else 1)
     assert verdict.registers == 8 + 8 * stages + 3 * case.hold
-
-
-def test_the_decimator_of_several_channels_is_not_read(tmp_path: Path) -> None:
-    text = CASES[1][0].text.replace("sample_rate = 1000.0", "sample_rate = 1000.0\nchannels = 2")
-    generate(design_core(from_text(text, tmp_path / "plain.toml")), tmp_path)
-    proof = Saved.load(tmp_path / "plain.certificate.json").verify(files=tmp_path)
-    assert proof.program is not None
-    assert proof.decimator is None
 
 
 @pytest.mark.slow

@@ -43,11 +43,15 @@ def print_proof(certificate: Certificate, proof: Proof) -> None:
     if proof.decimator is not None and certificate.decimation is not None:
         entry, around = certificate.decimation, proof.decimator
         held = f"; each result leaves {around.copies} times" if around.copies > 1 else ""
-        before = "" if entry.calibration is None else "; the first sample goes through the calibration once"
+        parts = f"{entry.stages} integrators, {entry.stages} combs and"
+        if around.channels > 1:
+            parts = f"an adder for {entry.stages} sums and differences of each of {around.channels} channels and"
+        before = ""
+        if entry.calibration is not None and around.channels == 1:
+            before = "; the first sample goes through the calibration once"
         console.print(
-            f"[bold green]decimator[/]: {around.registers} registers around the core are {entry.stages} integrators, "
-            f"{entry.stages} combs and what moves one sample of {entry.factor} on, for all inputs, stalls and resets"
-            f"{before}{held}"
+            f"[bold green]decimator[/]: {around.registers} registers around the core are {parts} what moves "
+            f"one sample of {entry.factor} on, for all inputs, stalls and resets{before}{held}"
         )
     online = certificate.claims.online
     if online is not None:
