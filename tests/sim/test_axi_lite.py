@@ -10,6 +10,7 @@ from tests.sim.lint import icarus_check, lint
 
 from sosmith.gen.output.verilog import to_rtlil, to_verilog
 from sosmith.hdl.reload import ReloadPort
+from sosmith.sim.simulators import PLAIN_ASSERTIONS
 
 ROOT = Path(__file__).parents[2]
 
@@ -36,6 +37,7 @@ def results(tmp_path: Path, verilog: str) -> tuple[int, int]:
             results_xml=str(found),
             seed=1,
             timescale=("1ns", "1ps"),
+            extra_env=PLAIN_ASSERTIONS,
         )
     return get_results(found)
 

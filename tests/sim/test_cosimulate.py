@@ -81,6 +81,17 @@ def test_the_same_seed_gives_the_same_run(tmp_path: Path) -> None:
     assert cycles[0] == cycles[1] != cycles[2]
 
 
+@pytest.mark.parametrize("simulator", SIMULATORS)
+def test_a_users_settings_do_not_count_and_nothing_is_compiled_anew(
+    simulator: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COCOTB_RANDOM_SEED", "7")
+    monkeypatch.setenv("COCOTB_REWRITE_ASSERTION_FILES", "*.py")
+    environment = find_simulator(simulator, tmp_path).environment
+    owned = {key: value for key, value in environment.items() if key.startswith("COCOTB_")}
+    assert owned == {"COCOTB_REWRITE_ASSERTION_FILES": ""}
+
+
 def test_an_unchanged_core_is_not_built_again(tmp_path: Path) -> None:
     source = write(tmp_path)
     for _ in range(2):

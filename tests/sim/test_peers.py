@@ -22,6 +22,7 @@ from sosmith.gen.specification.specification import load
 from sosmith.hdl.check_bits import CheckBits
 from sosmith.hdl.folded import FoldedCore
 from sosmith.hdl.plan.streams import fields
+from sosmith.sim.simulators import PLAIN_ASSERTIONS
 
 UNFOLDABLE = {"normal", "lattice_wdf"}
 SAMPLES = {"parallel": 120, "folded": 24, "serial": 8}
@@ -67,7 +68,7 @@ def run(folder: Path, source: str, name: str, job: dict[str, Any]) -> list[list[
             hdl_toplevel=name,
             build_dir=folder / "build",
             test_dir=folder,
-            extra_env={"PEERS_BENCH": str(folder), "COCOTB_LOG_LEVEL": "WARNING"},
+            extra_env={"PEERS_BENCH": str(folder), "COCOTB_LOG_LEVEL": "WARNING", **PLAIN_ASSERTIONS},
             timescale=("1ns", "1ps"),
         )
     received: list[list[int]] = json.loads((folder / "received.json").read_text())

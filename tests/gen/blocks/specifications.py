@@ -19,5 +19,6 @@ def text(lanes: int = 1, *, pipeline: str = "look-ahead", clock: str = "48.0e6",
 
 
 @cache
-def designed(lanes: int = 1, *, pipeline: str = "look-ahead", clock: str = "48.0e6") -> CoreDesign:
-    return design_core(from_text(text(lanes, pipeline=pipeline, clock=clock), Path("audio.toml")))
+def designed(lanes: int = 1, *, pipeline: str = "look-ahead", clock: str = "48.0e6", order: int = 5) -> CoreDesign:
+    asked = text(lanes, pipeline=pipeline, clock=clock).replace("order = 5\n", f"order = {order}\n")
+    return design_core(from_text(asked, Path("audio.toml")))

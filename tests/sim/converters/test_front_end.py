@@ -24,6 +24,7 @@ from sosmith.model.sensors.spi_converter import CONVERTERS, ReadingFault
 from sosmith.model.sensors.spi_reading import Reading
 from sosmith.model.sensors.spi_schedule import Schedule
 from sosmith.sim.converters.cocotb_bus import thermocouple_frame
+from sosmith.sim.simulators import PLAIN_ASSERTIONS
 
 VOLTAGE = Port.from_range("voltage", 16, Fraction(0), Fraction(10), unit="V")
 SIGNED = Port.from_range("x", 12, Fraction(-1), Fraction(1), signed=True)
@@ -128,7 +129,7 @@ def run(folder: Path, job: Case, given: list[list[list[int]]]) -> dict[str, Any]
             test_dir=folder,
             results_xml=str(folder / "results.xml"),
             timescale=("1ns", "1ps"),
-            extra_env={"CONVERTERS_BENCH": str(folder)},
+            extra_env={"CONVERTERS_BENCH": str(folder), **PLAIN_ASSERTIONS},
             log_file=folder / "run.log",
         )
     if not (folder / "found.json").exists():

@@ -14,7 +14,7 @@ from tests.sim.stream.both_loops import run_cases
 
 from sosmith.sim.beats import Beats
 from sosmith.sim.cxxrtl_model import build_cxxrtl
-from sosmith.sim.simulators import find_simulator
+from sosmith.sim.simulators import PLAIN_ASSERTIONS, find_simulator
 from sosmith.sim.stream.bursts import Pace, below
 from sosmith.sim.stream.cxxrtl_pins import CxxrtlPins, finished
 from sosmith.sim.verilated_model import Builder, Model
@@ -107,7 +107,7 @@ def outcomes(tmp_path_factory: pytest.TempPathFactory) -> list[list[Any]]:
             test_dir=folder,
             results_xml=str(folder / "results.xml"),
             timescale=("1ns", "1ps"),
-            extra_env={"BOTH_LOOPS": str(folder), "COCOTB_LOG_LEVEL": "WARNING"},
+            extra_env={"BOTH_LOOPS": str(folder), "COCOTB_LOG_LEVEL": "WARNING", **PLAIN_ASSERTIONS},
         )
     return found_in(folder)
 
