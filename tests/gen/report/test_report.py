@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from scipy import signal
+from tests.gen.report.pictures import without_pictures
 
 from sosmith.gen import quantity
 from sosmith.gen.filter import response, step_response
@@ -227,6 +228,7 @@ def test_summary_has_the_keys_of_the_contract(built: tuple[str, Path, dict[str, 
     assert report["accuracy_percent"].keys() == {"unfiltered", "golden", "hardware"}
 
 
+@without_pictures
 def test_gates_are_told_with_what_does_not_fit(tmp_path: Path) -> None:
     cells = {"SB_LUT4": 952, "SB_MAC16": 13}
     run = evidence(gates=Netlist(find_board("icebreaker"), tmp_path / "netlist.v", cells, "0.70"))
@@ -304,6 +306,7 @@ def test_accuracy_is_null_where_it_has_no_meaning(changes: dict[str, Any]) -> No
     assert measured == {"unfiltered": None, "golden": None, "hardware": None}
 
 
+@without_pictures
 def test_json_has_no_infinities(tmp_path: Path) -> None:
     """Hardware equal to golden has no finite ratio of signal to error."""
     run = evidence(cycles_per_second=math.inf)
@@ -641,6 +644,7 @@ def test_page_says_the_verdict_first(built: tuple[str, Path, dict[str, Any]]) ->
     assert f'<div class="verdict {kind}">' in start
 
 
+@without_pictures
 def test_page_shows_numbers_with_units() -> None:
     content = " ".join(Page(page_of(evidence())).words)
     for words in ("122\u00a0nm", "0.500 LSB", "200\u00a0nm", "−66,026,473", "Q7.14", "5.048", "3.01 dB"):
@@ -652,6 +656,7 @@ def page_of(run: Evidence) -> str:
     return render_page(run, summarise(run))
 
 
+@without_pictures
 def test_parts_of_the_limit_that_count_for_nothing_are_left_out() -> None:
     """A part may be the width of a ball, with dozens of zeros behind the point."""
     rows = page_of(evidence(bound_parts={"output": LSB / 2, "start": 2.6e-76 * LSB, "coefficients": LSB / 10_000}))
@@ -660,6 +665,7 @@ def test_parts_of_the_limit_that_count_for_nothing_are_left_out() -> None:
     assert [word for word in Page(rows).words if "0.0000" in word] == []
 
 
+@without_pictures
 def test_texts_are_escaped_once(tmp_path: Path) -> None:
     """The name of a board stands in the verdict and in the facts about the run."""
     board = replace(find_board("icebreaker"), title="<Ice> & 'Breaker'")
@@ -701,6 +707,7 @@ def test_a_dollar_sign_in_a_figure_is_no_formula() -> None:
     assert "output in $x^2$" in Page(page_of(evidence(unit="$x^2$"))).words
 
 
+@without_pictures
 def test_page_shows_what_rounding_keeps_up() -> None:
     words = " ".join(Page(page_of(evidence())).words).replace("\u00a0", " ")
     start = words.index("What rounding can keep up by itself")
@@ -724,6 +731,7 @@ def test_this_design_is_not_its_own_alternative() -> None:
     assert page_of(evidence(alternatives=(*known, itself))) == page_of(evidence())
 
 
+@without_pictures
 @pytest.mark.parametrize(("length", "unfolded"), [(24, True), (25, False)])
 def test_many_formats_are_folded_up(length: int, unfolded: bool) -> None:
     formats = [NodeFormat(stage="stage", node=f"n{i}", format="Q1.15", low=-1.0, high=1.0) for i in range(length)]
@@ -739,6 +747,7 @@ def test_a_handful_of_samples_makes_a_page(length: int) -> None:
     assert Page(page_of(run)).open == []
 
 
+@without_pictures
 def test_a_limit_far_outside_is_named_instead_of_drawn() -> None:
     run = evidence(bound=0.5, max_error=1.0)
     assert plots.error_limits(run)[0] == []
@@ -774,6 +783,7 @@ def test_close_up_holds_the_largest_error() -> None:
 # files
 
 
+@without_pictures
 def test_a_page_that_fails_leaves_the_old_report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Neither file is written before both are made."""
     write_report(evidence(), tmp_path)
@@ -788,6 +798,7 @@ def test_a_page_that_fails_leaves_the_old_report(tmp_path: Path, monkeypatch: py
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
 
 
+@without_pictures
 @pytest.mark.parametrize("off", [0, 1])
 def test_a_bound_of_zero_is_told(off: int) -> None:
     """A pure delay: nothing is rounded, and one wrong code is over the limit."""
@@ -896,6 +907,7 @@ def test_the_worst_channel_has_the_largest_error_of_either_sign() -> None:
     assert several.of_channel(1).worst_channel == 0
 
 
+@without_pictures
 def test_several_channels_are_measured_together_and_the_worst_is_shown() -> None:
     one = evidence()
     arrays = {

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.gen.report.pictures import without_pictures
 from tests.gen.word_lengths.decimated import locomotive, locomotive_text
 from tests.sim.lint import icarus_check, lint
 from tests.sim.stream.proof_and_hardware import check_proof_and_hardware
@@ -41,6 +42,7 @@ def samples_of(made: CoreDesign, count: int) -> Trace:
     return replace(trace, codes=codes, truth=None, reading=None)
 
 
+@without_pictures
 @pytest.mark.parametrize(
     ("architecture", "simulator"), [("folded", "icarus"), ("parallel", "verilator"), ("serial", "cxxrtl")]
 )

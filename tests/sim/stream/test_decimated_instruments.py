@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.gen.report.pictures import without_pictures
 from tests.gen.word_lengths.decimated import locomotive, locomotive_text, small
 from tests.gen.word_lengths.multirate import worst_error
 from tests.sim.lint import icarus_check, lint
@@ -55,6 +56,7 @@ def samples_of(made: CoreDesign, count: int) -> Trace:
     return replace(trace, codes=codes, truth=None, reading=None)
 
 
+@without_pictures
 @pytest.mark.parametrize(
     ("architecture", "simulator"), [("folded", "icarus"), ("parallel", "verilator"), ("serial", "cxxrtl")]
 )
