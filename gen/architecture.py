@@ -392,6 +392,8 @@ class Budget:
         Samples in a beat of the streams.
     hold : bool
         Whether each result behind a decimator is handed out once for each of its samples.
+    folds : bool
+        Whether a shared multiplier is allowed, whatever it is made of.
     """
 
     clock: Fraction
@@ -403,6 +405,7 @@ class Budget:
     decimate: int = 1
     samples_per_clock: int = 1
     hold: bool = False
+    folds: bool = True
 
     @property
     def adders(self) -> bool:
@@ -458,13 +461,16 @@ def blocks_for(wanted: int | None, board: Board | None) -> Blocks:
     return Blocks(device.multipliers if wanted is None else wanted, device.factor_bits or MULTIPLIER_BITS)
 
 
-def candidates(wanted: str, blocks: Blocks) -> tuple[str, ...]:
+def candidates(wanted: str, blocks: Blocks, *, folds: bool = True) -> tuple[str, ...]:
     """Architectures to try for the one that the specification asks for, the smallest first.
 
-    Without multiplier blocks, shifts and additions are smaller than a multiplier made of LUT4.
+    Without multiplier blocks, shifts and additions are smaller than a multiplier made of LUT4; `folds` says whether
+    such a multiplier is allowed.
     """
     if wanted != "auto":
         return (wanted,)
+    if not folds:
+        return ("serial", "parallel")
     return ("serial", "folded", "parallel") if blocks.available == 0 else ("folded", "parallel")
 
 

@@ -168,7 +168,7 @@ def design_core(
 
     hardware = spec.hardware
     looks_ahead = hardware.pipeline == "look-ahead"
-    _check_realization(spec, wanted, widths_of)
+    _check_realization(spec, wanted, widths_of, front)
 
     def in_hardware(name: str, datapath: Datapath, *, look_ahead: bool = looks_ahead) -> Architecture:
         """Architecture with what costs a program instructions: the calibrated range, limits of wear, and settling."""
@@ -191,6 +191,7 @@ def design_core(
         decimate=1 if front is None else front.decimator.factor,
         samples_per_clock=hardware.samples_per_clock,
         hold=front is not None and spec.filter.hold,
+        folds=hardware.multipliers != 0,
     )
     before = None if front is None else front.ahead(codes)
     ahead, budget, calibrates = _ahead(before, hardware.architecture, budget, board)
@@ -206,7 +207,7 @@ def design_core(
         return plain if asked or name != "parallel" else _faster(plain, plan_of, with_look_ahead, budget)
 
     several = looks_ahead or hardware.samples_per_clock > 1
-    names = ("parallel",) if several else candidates(hardware.architecture, budget.blocks)
+    names = ("parallel",) if several else candidates(hardware.architecture, budget.blocks, folds=budget.folds)
     (quantized, reason, architecture), refused = _first_that_keeps_up(names, made_in)
     asked_for = len(names) == 1 and hardware.architecture != AUTO
     why = reason_for(architecture, budget, asked=asked_for, board=board, refused=refused)
@@ -225,8 +226,13 @@ _Made = tuple[Quantized, str, Architecture]
 """A proven design, the reason for its realization, and its architecture."""
 
 
-def _check_realization(spec: Specification, wanted: str, widths_of: str | None) -> None:
-    """Check that no realization is asked for beside look-ahead, which has its own."""
+def _check_realization(spec: Specification, wanted: str, widths_of: str | None, front: Front | None) -> None:
+    """Check that no realization is asked for beside look-ahead, which has its own, or that no decimated filter has."""
+    if front is not None and "lattice_wdf" in {wanted, widths_of}:
+        raise SpecificationError(
+            f"{spec.path}: the realization must be another one with filter.decimate = {front.decimator.factor}, not "
+            "lattice_wdf: with its droop corrected, the filter is no sum of two allpass filters"
+        )
     if spec.hardware.pipeline == "look-ahead" and (wanted != AUTO or widths_of is not None):
         raise SpecificationError(
             f'the realization must be auto with hardware.pipeline = "look-ahead", not {widths_of or wanted}'
@@ -363,7 +369,7 @@ def _ahead(
     if datapath is None:
         return None, budget, {}
     each = replace(budget, decimate=1, hold=False)
-    names = candidates(wanted, budget.blocks)
+    names = candidates(wanted, budget.blocks, folds=budget.folds)
     refused = ""
     for name in names:
         try:

@@ -57,6 +57,9 @@ def check(document: Document) -> None:
         )
     _check_online(document)
     _check_block(document)
+    if document.hardware.architecture == "folded" and document.hardware.multipliers == 0:
+        expected = '"auto" or at least 1 with hardware.architecture = "folded", which has one'
+        raise UnfitError(expected, "0", where="hardware.multipliers")
     if document.hardware.reload and document.hardware.multipliers is not None:
         raise UnfitError(
             '"auto" with hardware.reload = true: adders multiply by constants that are fixed',

@@ -961,6 +961,12 @@ BAD = [
         "hardware.multipliers must be 'auto' with hardware.architecture = \"online\", not 0",
     ),
     (
+        "folded without a multiplier",
+        CLOCK,
+        CLOCK + '\narchitecture = "folded"\nmultipliers = 0',
+        'hardware.multipliers must be "auto" or at least 1 with hardware.architecture = "folded", which has one, not 0',
+    ),
+    (
         "reload is a text",
         CLOCK,
         CLOCK + '\nreload = "yes"',

@@ -176,6 +176,16 @@ def test_a_factor_that_lets_too_much_fold_is_refused_with_the_name_of_the_file()
         design_core(from_text(text, Path("locomotive.toml")), core="filter")
 
 
+def test_no_lattice_behind_a_decimator() -> None:
+    spec = locomotive_spec("16")
+    sentence = (
+        "locomotive.toml: the realization must be another one with filter.decimate = 16, not lattice_wdf: with its "
+        "droop corrected, the filter is no sum of two allpass filters"
+    )
+    with refused(sentence):
+        design_core(spec, core="filter", realization="lattice_wdf")
+
+
 def test_a_clock_that_is_too_slow() -> None:
     spec = locomotive_spec("16", "folded")
     slow = replace(spec, hardware=replace(spec.hardware, clock=Fraction(500), realization="df2t"))

@@ -7,6 +7,7 @@ from tests.gen.verifier.parallel.cores import specified
 from tests.gen.verifier.small_specifications import PLAIN
 
 from sosmith.gen.architecture import Blocks, Budget, blocks_for, candidates, objective_of
+from sosmith.gen.core import design_core
 from sosmith.gen.fpga.boards import find_board
 from sosmith.gen.word_lengths.cost import area_by_digits, cost_of_graphs, products_from_adders, scalings
 from sosmith.gen.word_lengths.objective import FEW_ADDERS, SMALL_AREA
@@ -59,6 +60,16 @@ def test_neighbours_with_fewer_digits(exact: float) -> None:
     assert min(found) < exact < max(found)
 
 
+@pytest.mark.parametrize(("multipliers", "chosen"), [(None, "folded"), (1, "folded"), (0, "parallel")])
+def test_without_multipliers_nothing_is_folded(multipliers: int | None, chosen: str) -> None:
+    """Within 100 clocks a sample, folded is the smallest that keeps up; serial does not."""
+    spec = specified(PLAIN)
+    hardware = replace(spec.hardware, clock=100 * spec.sample_rate, architecture="auto", multipliers=multipliers)
+    made = design_core(replace(spec, hardware=hardware))
+    assert made.architecture.name == chosen
+    assert bool(made.architecture.multiplier_blocks) == (chosen == "folded")
+
+
 def test_the_board_and_the_specification_say_how_many_blocks_there_are() -> None:
     hx8k, up5k = find_board("ice40_hx8k_b_evn"), find_board("icebreaker")
     assert blocks_for(None, None) == Blocks(None)
@@ -67,6 +78,7 @@ def test_the_board_and_the_specification_say_how_many_blocks_there_are() -> None
     assert blocks_for(3, up5k) == Blocks(3, 16)
     assert candidates("auto", Blocks(0)) == ("serial", "folded", "parallel")
     assert candidates("auto", Blocks(8)) == ("folded", "parallel")
+    assert candidates("auto", Blocks(0), folds=False) == ("serial", "parallel")
     assert objective_of("parallel", hx8k, adders=True) == FEW_ADDERS
     assert objective_of("parallel", up5k) == SMALL_AREA
     budget = Budget(clock=specified(PLAIN).hardware.clock, sample_rate=specified(PLAIN).sample_rate, blocks=Blocks(0))

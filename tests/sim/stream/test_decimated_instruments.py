@@ -102,6 +102,7 @@ def test_wear_held_and_judged(tmp_path: Path) -> None:
     assert json.loads((tmp_path / f"{made.spec.name}.json").read_text(encoding="utf-8"))["decimation"]["held"]
 
 
+@without_pictures
 @pytest.mark.parametrize(
     ("architecture", "core", "simulator"),
     [("folded", "instrument", "icarus"), ("parallel", "instrument", "verilator"), ("folded", "filter", "verilator")],
