@@ -39,6 +39,7 @@ from sosmith.gen.verifier.parallel.forms import Forms
 from sosmith.gen.verifier.parallel.graph_codes import GraphCodes, LanePorts
 from sosmith.gen.verifier.parallel.netlist import Netlist, flattened
 from sosmith.gen.verifier.parallel.pipeline import DATA, Pipeline
+from sosmith.gen.verifier.parallel.split import split
 from sosmith.gen.verifier.parallel.text import read_modules
 from sosmith.gen.verifier.program.normal_form import Form, constant, plus
 
@@ -120,10 +121,11 @@ def _deep_recursion() -> Iterator[None]:
 
 
 def _checked(netlist: Netlist, certificate: Certificate, channels: int, lanes: int) -> HardwareVerdict:
-    control = find_control(netlist) if channels == 1 else find_channels(netlist, channels)
     forms = Forms()
     words = {name: len(memory.first) for name, memory in netlist.memories.items()} if channels == 1 else {}
     graph = GraphCodes(certificate, forms, lanes, words)
+    netlist = split(netlist, {f"{graph.nodes[node].stage}.{graph.nodes[node].name}" for node in graph.delays})
+    control = find_control(netlist) if channels == 1 else find_channels(netlist, channels)
     pipeline = Pipeline(netlist, control, graph, forms, certificate)
     try:
         pipeline.check_states()
@@ -152,6 +154,8 @@ def _check_output(
         data = logic.net(OUTPUT, width * number, width)
         what = OUTPUT if len(graph.lanes) == 1 else f"sample {number} of {OUTPUT}"
         require(pipeline.same(data, graph.codes[lane.output], width), f"{what} must be {label}, not another value")
+        for bit in range(_FLAG_BITS * number, _FLAG_BITS * (number + 1)):
+            logic.net(FLAGS, bit, 1)  # of the sample whose beat it leaves with, also where nothing is said of its value
         for place, flag, value in (
             (_AT_RAIL, "input_at_rail", _at_rail(graph, lane, certificate)),
             (_SATURATED, "output_saturated", _saturated(graph, lane)),
@@ -180,7 +184,7 @@ def _saturated(graph: GraphCodes, lane: LanePorts) -> Form:
     node = graph.nodes[lane.output]
     if node.entry.op is not Operation.CLAMP:
         return {}
-    of = graph.codes[node.operands[0]]
+    of = graph.seen(node.operands[0], node.stage)
     below = graph.forms.negative(plus(of, constant(node.entry.low), -1))
     above = graph.forms.negative(plus(constant(node.entry.high), of, -1))
     return plus(below, above)

@@ -14,6 +14,7 @@ from collections.abc import Callable, Sequence, Set
 from sosmith.gen.verifier.graph import RejectedError, require
 from sosmith.gen.verifier.parallel.forms import Forms, shifted
 from sosmith.gen.verifier.parallel.netlist import Netlist
+from sosmith.gen.verifier.parallel.split import sliced
 from sosmith.gen.verifier.parallel.text import (
     Bits,
     Choice,
@@ -51,8 +52,6 @@ class Evaluation:
         What a memory, by its name, has at an address.
     cuts : set of str
         Nets whose value is asked for like that of a register.
-    part : callable or None
-        Gives an unsigned word that is joined with others a shorter form.
     fields : callable
         Gives bits of an input from one on, so many, where that is simpler than to cut them out; otherwise None.
     """
@@ -66,11 +65,10 @@ class Evaluation:
         *,
         word: Callable[[str, Form], Form] | None = None,
         cuts: Set[str] = frozenset(),
-        part: Callable[[Form], Form] | None = None,
         fields: Callable[[str, int, int], Form | None] = lambda name, low, width: None,
     ) -> None:
         self._netlist, self._forms, self._content, self._shortened = netlist, forms, content, shortened
-        self._word, self._cuts, self._part, self._fields = word, cuts, part, fields
+        self._word, self._cuts, self._fields = word, cuts, fields
         self._known: dict[tuple[str, int, int], Form] = {}
         self._open: set[tuple[str, int, int]] = set()
 
@@ -126,6 +124,10 @@ class Evaluation:
         return yes[0], self._chosen(select, yes[1], no[1])
 
     def _net(self, name: str, low: int, width: int) -> Form:
+        if name in self._netlist.inlets and width < self._netlist.widths[name]:
+            whole = self.net(name)
+            if self._forms.is_variable(whole):
+                return self._cut(whole, low)  # what stages hand on is a variable, and so are its bits made of it
         drivers = self._netlist.drivers.get(name)
         if drivers is None or name in self._cuts:
             require(
@@ -154,6 +156,10 @@ class Evaluation:
         own = self._netlist.width(value)
         if isinstance(value, Bits) and low + width <= own:
             return self.net(value.name, value.low + low, width)
+        if isinstance(value, Joined) and low + width <= own:
+            bits = sliced(self._netlist, value, low, width, followed=0)
+            if bits is not None and bits != value:
+                return self._extended(bits, width)
         word = self._extended(value, max(low + width, own))
         return self._cut(self._shortened(word, max(low + width, own), False), low)
 
@@ -227,10 +233,9 @@ class Evaluation:
             at = 0
             flags = all(self._netlist.width(part) == 1 for part in value.parts)
             for k, part in enumerate(reversed(value.parts)):
-                last = k == len(value.parts) - 1 and self._part is None and not flags
+                last = k == len(value.parts) - 1 and not flags
                 word = self.word(part) if last else self._exact(part, signed=False)
                 word = self._forms.bit(word) if flags else word
-                word = word if self._part is None else self._part(word)
                 if k > 1 and k == len(value.parts) - 1 and self._forms.limits(total)[1] >= 1 << at:
                     self._forms.know(total, 0, (1 << at) - 1)  # of unsigned words side by side
                 total = plus(total, word, 1 << at)

@@ -131,7 +131,6 @@ class GraphCodes:
         self.codes: list[Form] = []
         self._seams: dict[frozenset[tuple[Monomial, int | Fraction]], Form] = {}
         self._definitions: dict[Hashable, Form] = {}
-        self._words: dict[Hashable, Form] = {}
         self._kept: dict[frozenset[tuple[Monomial, int | Fraction]], Form] = {}
         self._kept_of: dict[int, dict[frozenset[tuple[Monomial, int | Fraction]], Form]] = {}
         self._handed_on: dict[int, Form] = {}
@@ -208,29 +207,6 @@ class GraphCodes:
         if self.nodes[index].stage != stage:
             return self._handed_on.get(index, code)
         return self._kept.get(frozenset(code.items()), code)
-
-    def named(self, word: Form) -> Form:
-        """Return a variable for an unsigned word that is joined with others, so that each is found again in the whole.
-
-        A word of several bits whose range follows from its terms, each by itself, stays as it is. Flags may have terms
-        in common, which would be added up.
-        """
-        low, high = self.forms.limits(word)
-        if low == high or self.forms.is_variable(word):
-            return word
-        ends = [self.forms.limits({monomial: value}) for monomial, value in word.items()]
-        if high > 1 and sum(end[0] for end in ends) >= low and sum(end[1] for end in ends) <= high:
-            return word
-        key = "word", frozenset(word.items())
-        self._words[key] = word
-        return self.forms.variable(key, low.__floor__(), high.__ceil__())
-
-    def unnamed(self, word: Form, width: int) -> Form:
-        """Return a word of `width` bits without the variables of words."""
-        if not self.forms.keys(word) & self._words.keys():
-            return word
-        counted = {monomial: value for monomial, value in word.items() if value % (1 << width)}
-        return self.forms.settled(counted, self._words)
 
     def opened(self, code: Form) -> Form:
         """Return a code without the variables of stages' outputs."""

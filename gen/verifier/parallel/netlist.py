@@ -69,6 +69,8 @@ class Netlist:
     memories : dict of str to Memory
     inlets : set of str
         Nets that are input ports of instances.
+    fields : dict of str to str
+        Of a register that holds some bits of one in the text (`sosmith.gen.verifier.parallel.split`), the name of that.
     """
 
     ports: dict[str, str]
@@ -77,6 +79,7 @@ class Netlist:
     registers: dict[str, Register] = field(default_factory=dict)
     memories: dict[str, Memory] = field(default_factory=dict)
     inlets: set[str] = field(default_factory=set)
+    fields: dict[str, str] = field(default_factory=dict)
 
     def width(self, value: Expression) -> int:
         """Return the width that an expression has by itself, in bits."""

@@ -124,7 +124,8 @@ class Pipeline:
     @property
     def registers(self) -> int:
         """Number of registers whose content is known."""
-        return len(self._found) + len(self._second) + len(self.states) + len(self._counters)
+        found = {*self._found, *self._second, *self.states, *self._counters}
+        return len({self._netlist.fields.get(name, name) for name in found})
 
     @property
     def last(self) -> int:
@@ -160,8 +161,7 @@ class Pipeline:
         def fields(name: str, low: int, width: int) -> Form | None:
             return self._field(low, width) if name == DATA and position == self._source else None
 
-        part = self._graph.named if position == self.last else None
-        return self.logic(content, word, part=part, fields=fields)
+        return self.logic(content, word, fields=fields)
 
     def in_front(self, known: Mapping[str, Form], opened: str) -> Evaluation:
         """Return the logic as it is while the input buffer holds a sample, where some registers hold what is `known`.
@@ -184,13 +184,12 @@ class Pipeline:
         word: Callable[[str, Form], Form] | None = None,
         *,
         opened: str = "",
-        part: Callable[[Form], Form] | None = None,
         fields: Callable[[str, int, int], Form | None] = lambda name, low, width: None,
     ) -> Evaluation:
         """Return the logic where registers and inputs hold what `content` says, and memories what `word` does."""
         cuts = self._control.cuts - {opened}
         return Evaluation(
-            self._netlist, self._forms, content, self._graph.shortened, word=word, cuts=cuts, part=part, fields=fields
+            self._netlist, self._forms, content, self._graph.shortened, word=word, cuts=cuts, fields=fields
         )
 
     def held(self, name: str) -> Form:
@@ -220,10 +219,7 @@ class Pipeline:
         a, b = (self._graph.shortened(word, width) for word in (a, b))
         if same_word(self._forms, a, b, width):
             return True
-        a, b = self._graph.unnamed(a, width), self._graph.unnamed(b, width)
-        return same_word(self._forms, a, b, width) or same_word(
-            self._forms, self._graph.opened(a), self._graph.opened(b), width
-        )
+        return same_word(self._forms, self._graph.opened(a), self._graph.opened(b), width)
 
     # The output buffer.
 
