@@ -153,7 +153,7 @@ def _check_output(
         label = graph.nodes[lane.output].label
         data = logic.net(OUTPUT, width * number, width)
         what = OUTPUT if len(graph.lanes) == 1 else f"sample {number} of {OUTPUT}"
-        require(pipeline.same(data, graph.codes[lane.output], width), f"{what} must be {label}, not another value")
+        require(pipeline.same(data, graph.seen(lane.output, ""), width), f"{what} must be {label}, not another value")
         for bit in range(_FLAG_BITS * number, _FLAG_BITS * (number + 1)):
             logic.net(FLAGS, bit, 1)  # of the sample whose beat it leaves with, also where nothing is said of its value
         for place, flag, value in (

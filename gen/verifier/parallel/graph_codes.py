@@ -208,9 +208,18 @@ class GraphCodes:
             return self._handed_on.get(index, code)
         return self._kept.get(frozenset(code.items()), code)
 
-    def opened(self, code: Form) -> Form:
-        """Return a code without the variables of stages' outputs."""
-        return self.forms.settled(code, self._definitions)
+    def opened(self, a: Form, b: Form) -> tuple[Form, Form] | None:
+        """Return two codes without one of the variables of what is handed on; None if there is none left in them.
+
+        It is the last in the order of the graph, of those that only one of them has, if there are such.
+        """
+        first, second = (self.forms.keys(code) & self._definitions.keys() for code in (a, b))
+        found = first ^ second or first
+        if not found:
+            return None
+        key = next(key for key in reversed(self._definitions) if key in found)
+        meant = {key: self._definitions[key]}
+        return self.forms.settled(a, meant), self.forms.settled(b, meant)
 
     def _widest(self, node: int) -> tuple[int, int]:
         entry = self.nodes[node].entry

@@ -43,6 +43,9 @@ from sosmith.gen.verifier.program.normal_form import Form, constant, plus
 
 DATA = "s_axis_tdata"
 
+_MOST_OPENED = 12
+"""Most variables that are replaced by what they stand for, one after the other, for one comparison."""
+
 
 class _Field(NamedTuple):
     """Bits of the input: their place, and what they hold as an unsigned word."""
@@ -216,10 +219,14 @@ class Pipeline:
 
     def same(self, a: Form, b: Form, width: int) -> bool:
         """Whether two words are proven to be the same, if need be by opening what stages hand on."""
-        a, b = (self._graph.shortened(word, width) for word in (a, b))
-        if same_word(self._forms, a, b, width):
-            return True
-        return same_word(self._forms, self._graph.opened(a), self._graph.opened(b), width)
+        found: tuple[Form, Form] | None = self._graph.shortened(a, width), self._graph.shortened(b, width)
+        for _ in range(_MOST_OPENED):
+            if found is None or same_word(self._forms, *found, width):
+                break
+            found = self._graph.opened(*found)
+        else:
+            return False
+        return found is not None
 
     # The output buffer.
 
