@@ -124,7 +124,7 @@ def _checked(netlist: Netlist, certificate: Certificate, channels: int, lanes: i
     forms = Forms()
     words = {name: len(memory.first) for name, memory in netlist.memories.items()} if channels == 1 else {}
     graph = GraphCodes(certificate, forms, lanes, words)
-    netlist = split(netlist, {f"{graph.nodes[node].stage}.{graph.nodes[node].name}" for node in graph.delays})
+    netlist = split(netlist, {netlist.holder(graph.state_name(node)) or "" for node in graph.delays})
     control = find_control(netlist) if channels == 1 else find_channels(netlist, channels)
     pipeline = Pipeline(netlist, control, graph, forms, certificate)
     try:

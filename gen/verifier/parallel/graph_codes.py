@@ -153,9 +153,13 @@ class GraphCodes:
         """The DELAY nodes."""
         return [index for index, node in enumerate(self.nodes) if node.entry.op is Operation.DELAY]
 
+    def state_name(self, index: int) -> str:
+        """Return the name of the register that holds a DELAY node."""
+        return f"{self.nodes[index].stage}.{self.nodes[index].name}"
+
     def memory_name(self, index: int) -> str:
         """Return the name of the memory that holds a DELAY node."""
-        return f"{self.nodes[index].stage}.{self.nodes[index].name}_memory"
+        return f"{self.state_name(index)}_memory"
 
     def turn(self, turns: int) -> Form:
         """Return the number of the sample modulo `turns`."""

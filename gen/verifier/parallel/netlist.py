@@ -70,7 +70,8 @@ class Netlist:
     inlets : set of str
         Nets that are input ports of instances.
     fields : dict of str to str
-        Of a register that holds some bits of one in the text (`sosmith.gen.verifier.parallel.split`), the name of that.
+        Of a register that holds some bits of one in the text, which is loaded in parts or taken apart in
+        `sosmith.gen.verifier.parallel.split`, the name of that.
     """
 
     ports: dict[str, str]
@@ -80,6 +81,24 @@ class Netlist:
     memories: dict[str, Memory] = field(default_factory=dict)
     inlets: set[str] = field(default_factory=set)
     fields: dict[str, str] = field(default_factory=dict)
+
+    def add_field(self, name: str, field: Register, low: int) -> None:
+        """Add the register that holds the bits of the net `name` from `low` on."""
+        self.registers[field.name] = field
+        self.widths[field.name] = field.width
+        self.fields[field.name] = self.fields.get(name, name)
+        self.drivers.setdefault(name, []).append(Driver(low, field.width, Bits(field.name), 0))
+
+    def holder(self, name: str) -> str | None:
+        """Return the register that a net is, or whose bits it has below constant ones; None for others."""
+        if name in self.registers:
+            return name
+        found = [driver for driver in self.drivers.get(name, ()) if not isinstance(driver.value, Number)]
+        if len(found) == 1 and found[0].low == 0:
+            value = found[0].value
+            if isinstance(value, Bits) and value == Bits(value.name) and found[0].width == self.widths[value.name]:
+                return value.name if value.name in self.registers else None
+        return None
 
     def width(self, value: Expression) -> int:
         """Return the width that an expression has by itself, in bits."""
@@ -136,18 +155,23 @@ class _Flattening:
         require(depth < 10, "modules must not be nested deeper than ten")
         netlist = self._netlist
         statements: dict[str, tuple[Statement, ...]] = {}
+        fields: dict[str, list[Bits]] = {}
         for clock, executed in module.clocked:
             require(clock in clocks, f"registers must be clocked by {self._clock}, not {prefix}{clock}")
-            targets = set(_targets(executed))
+            targets = {_shown(target): target for target in _targets(executed)}
             require(len(targets) == 1, f"a process must load one register, not {', '.join(sorted(targets))}")
-            (name,) = targets
+            ((name, loaded),) = targets.items()
             require(name not in statements, f"{prefix}{name} must be loaded in one process, not several")
             statements[name] = executed
+            if isinstance(loaded, Bits) and loaded.width is not None:
+                fields.setdefault(loaded.name, []).append(loaded)
         for name, width in module.widths.items():
             if name in module.depths:
                 continue
             netlist.widths[prefix + name] = width
-            if name in module.registers:
+            if name in fields:
+                self._add_fields(module, name, prefix, fields[name], statements)
+            elif name in module.registers:
                 require(name in statements, f"the register {prefix}{name} must be loaded somewhere")
                 netlist.registers[prefix + name] = Register(
                     prefix + name, width, module.registers[name], _prefixed_all(statements.pop(name), prefix)
@@ -166,6 +190,26 @@ class _Flattening:
             self._drive(_prefixed(target, prefix), _prefixed(value, prefix))
         for kind, name, ports in module.instances:
             self._instance(kind, f"{prefix}{name}.", prefix, ports, clocks, depth)
+
+    def _add_fields(
+        self,
+        module: Module,
+        name: str,
+        prefix: str,
+        fields: Sequence[Bits],
+        statements: dict[str, tuple[Statement, ...]],
+    ) -> None:
+        """Add the registers that one is made of, which is loaded in parts."""
+        require(name in module.registers, f"what is loaded must be a register, not {prefix}{name}")
+        netlist, first, end = self._netlist, module.registers[name], 0
+        for field_ in sorted(fields, key=lambda field_: field_.low):
+            width, own = field_.width or 1, prefix + _shown(field_)
+            require(field_.low == end, f"every bit of {prefix}{name} must be loaded in one process")
+            end += width
+            value = None if first is None else first >> field_.low & ((1 << width) - 1)
+            executed = retargeted(_prefixed_all(statements.pop(_shown(field_)), prefix), own)
+            netlist.add_field(prefix + name, Register(own, width, value, executed), field_.low)
+        require(end == module.widths[name], f"every bit of {prefix}{name} must be loaded in one process")
 
     def _instance(
         self,
@@ -237,16 +281,36 @@ class _Flattening:
                 self._check_names(operand)
 
 
-def _targets(statements: Sequence[Statement]) -> list[str]:
-    found = []
+def _targets(statements: Sequence[Statement]) -> list[Bits | Word]:
+    found: list[Bits | Word] = []
     for statement in statements:
         if isinstance(statement, Load):
-            whole = isinstance(statement.target, Word) or statement.target.width is None
-            require(whole, f"the register {statement.target.name} must be loaded as a whole, not in parts")
-            found.append(statement.target.name)
+            found.append(statement.target)
         else:
             found += [*_targets(statement.yes), *_targets(statement.no)]
     return found
+
+
+def _shown(target: Bits | Word) -> str:
+    """Return the name of what is loaded; of a memory, without the address."""
+    if isinstance(target, Word) or target.width is None:
+        return target.name
+    return bits_name(target.name, target.low, target.width)
+
+
+def bits_name(name: str, low: int, width: int) -> str:
+    """Return the name of a register for bits of another one."""
+    return f"{name}[{low + width - 1}:{low}]"
+
+
+def retargeted(statements: Sequence[Statement], name: str) -> tuple[Statement, ...]:
+    """Return statements that load the register `name` with what they load now."""
+    return tuple(
+        Load(Bits(name), statement.value)
+        if isinstance(statement, Load)
+        else Choice(statement.condition, retargeted(statement.yes, name), retargeted(statement.no, name))
+        for statement in statements
+    )
 
 
 def _prefixed(value: Expression, prefix: str) -> Expression:

@@ -117,8 +117,8 @@ class Pipeline:
             self.memories = ChannelMemories(self, netlist, control, graph, entrance)
             return
         for node in graph.delays:
-            name = f"{graph.nodes[node].stage}.{graph.nodes[node].name}"
-            if name in netlist.registers:
+            name = netlist.holder(graph.state_name(node))
+            if name is not None:
                 self.states[name] = State(node, self.position_by_control(name, netlist.registers[name].statements))
         if graph.turned:
             turns = TurnMemories(self, netlist, control, graph, self._dependence)

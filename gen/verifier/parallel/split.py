@@ -19,8 +19,8 @@ from dataclasses import replace
 from itertools import pairwise
 from typing import TypeGuard
 
-from sosmith.gen.verifier.parallel.netlist import Driver, Netlist, Register
-from sosmith.gen.verifier.parallel.text import Bits, Choice, Expression, Joined, Load, Number, Operator, Statement
+from sosmith.gen.verifier.parallel.netlist import Netlist, Register, bits_name, retargeted
+from sosmith.gen.verifier.parallel.text import Bits, Expression, Joined, Load, Number, Operator, Statement
 
 _FOLLOWED = 4
 """Most nets that are followed one after the other: from the output buffer there is one."""
@@ -50,14 +50,12 @@ def split(netlist: Netlist, kept: Set[str]) -> Netlist:
     )
     for name, cuts in edges.items():
         register = made.registers.pop(name)
-        made.drivers[name] = []
         for low, high in pairwise((0, *sorted(cuts), register.width)):
-            field, width = f"{name}[{high - 1}:{low}]", high - low
+            width = high - low
             first = None if register.first is None else register.first >> low & ((1 << width) - 1)
-            statements = _sliced_all(netlist, register.statements, field, low, width)
-            made.registers[field] = Register(field, width, first, statements)
-            made.widths[field], made.fields[field] = width, name
-            made.drivers[name].append(Driver(low, width, Bits(field), 0))
+            statements = _sliced_all(netlist, register.statements, low, width)
+            own = bits_name(name, low, width)
+            made.add_field(name, Register(own, width, first, retargeted(statements, own)), low)
     return made
 
 
@@ -126,18 +124,16 @@ def _whole(netlist: Netlist, value: Bits) -> Expression | None:
     return drivers[0].value if netlist.width(drivers[0].value) == width else None
 
 
-def _sliced_all(
-    netlist: Netlist, statements: Sequence[Statement], field: str, low: int, width: int
-) -> tuple[Statement, ...]:
+def _sliced_all(netlist: Netlist, statements: Sequence[Statement], low: int, width: int) -> tuple[Statement, ...]:
     made: list[Statement] = []
     for statement in statements:
         if isinstance(statement, Load):
             value = sliced(netlist, statement.value, low, width)
             assert value is not None  # `_Edges` has asked
-            made.append(Load(Bits(field), value))
+            made.append(replace(statement, value=value))
         else:
-            yes, no = (_sliced_all(netlist, side, field, low, width) for side in (statement.yes, statement.no))
-            made.append(Choice(statement.condition, yes, no))
+            yes, no = (_sliced_all(netlist, side, low, width) for side in (statement.yes, statement.no))
+            made.append(replace(statement, yes=yes, no=no))
     return tuple(made)
 
 
