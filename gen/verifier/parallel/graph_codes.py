@@ -126,7 +126,7 @@ class GraphCodes:
         self._ranges: dict[Origin, tuple[int, int]] = {}
         for index in self.delays:
             entry, origin = self.nodes[index].entry, self.origin(index)
-            low, high = self._ranges.get(origin, (entry.low, entry.high))
+            low, high = self._ranges.get(origin) or self._widest(origin[0])  # it is 0 at first, or what it repeats
             self._ranges[origin] = max(low, entry.low), min(high, entry.high)
         self.codes: list[Form] = []
         self._seams: dict[frozenset[tuple[Monomial, int | Fraction]], Form] = {}
