@@ -101,10 +101,6 @@ def check_measurements(about: AboutEntry, path: Path) -> None:
     _compare(str(path), about.measurements.sha256, _content(path))
 
 
-MAX_LANES = 8
-"""Most samples of a beat whose hardware is read: with 16, what a lane computes is too long an expression."""
-
-
 class FixedArchitecture(NamedTuple):
     """Architecture of a core that can be read, None for others; its number of channels, and samples of a beat."""
 
@@ -116,9 +112,7 @@ class FixedArchitecture(NamedTuple):
 def fixed_architecture(path: Path) -> FixedArchitecture:
     """Return what hardware there is from the manifest at `path`, which is known to be unchanged.
 
-    The architecture is None for a core whose constants can be loaded, whose memories and states are protected, or whose
-    beats hold more than `MAX_LANES` samples, or several that are no whole bytes: between
-    their lanes signs are repeated, and no proof of the flags above them is found.
+    The architecture is None for a core whose constants can be loaded, or whose memories and states are protected.
 
     Raises
     ------
@@ -128,10 +122,7 @@ def fixed_architecture(path: Path) -> FixedArchitecture:
     try:
         manifest = json.loads(_content(path))
         plain = manifest["reload"] is None and manifest["protect"] == "none"
-        stream = manifest["streams"]["m_axis"]
-        lanes = int(stream.get("samples", 1))
-        whole = lanes == 1 or all(field["width"] % 8 == 0 for field in stream["fields"])
-        plain = plain and whole and lanes <= MAX_LANES
+        lanes = int(manifest["streams"]["m_axis"].get("samples", 1))
         return FixedArchitecture(str(manifest["architecture"]) if plain else None, int(manifest["channels"]), lanes)
     except (ValueError, KeyError, TypeError, AttributeError):
         raise RejectedError(f"{path} must be the manifest of a core, not another file") from None

@@ -231,14 +231,9 @@ class Evaluation:
         if isinstance(value, Joined):
             total: Form = {}
             at = 0
-            flags = all(self._netlist.width(part) == 1 for part in value.parts)
             for k, part in enumerate(reversed(value.parts)):
-                last = k == len(value.parts) - 1 and not flags
-                word = self.word(part) if last else self._exact(part, signed=False)
-                word = self._forms.bit(word) if flags else word
-                if k > 1 and k == len(value.parts) - 1 and self._forms.limits(total)[1] >= 1 << at:
-                    self._forms.know(total, 0, (1 << at) - 1)  # of unsigned words side by side
-                total = plus(total, word, 1 << at)
+                last = k == len(value.parts) - 1
+                total = plus(total, self.word(part) if last else self._exact(part, signed=False), 1 << at)
                 at += self._netlist.width(part)
             return total
         if value.symbol == "signed":

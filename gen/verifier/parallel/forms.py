@@ -224,31 +224,35 @@ class Forms:
 
         Variables whose keys are in `meant` are replaced by these forms, in which the same is done.
         """
-        total: Form = {}
-        for monomial, coefficient in form.items():
-            product: Form = constant(coefficient)
-            for atom in monomial:
-                product = self.times(product, self._settled_atom(atom, meant))
-            total = plus(total, product)
-        return total
+        return self._settled_form(form, meant, {})
 
     def floors(self, form: Form) -> Iterator[Form]:
-        """Yield the floors in a form that are not constant, those inside others first."""
-        for monomial in form:
-            for atom in monomial:
-                inside = self._atoms[atom].inside
-                if inside is not None:
-                    yield from self.floors(inside)
-                    yield {(atom,): 1}
+        """Yield the floors in a form that are not constant, each once, those inside others first."""
+        yield from self._floors(form, set())
 
     def keys(self, form: Form) -> set[Hashable]:
         """Return the keys of all variables in a form."""
         found: set[Hashable] = set()
+        seen: set[int] = set()
+        left = [form]
+        while left:
+            for atom in {atom for monomial in left.pop() for atom in monomial} - seen:
+                seen.add(atom)
+                inside = self._atoms[atom].inside
+                if inside is None:
+                    found.add(self._atoms[atom].key)
+                else:
+                    left.append(inside)
+        return found
+
+    def _floors(self, form: Form, seen: set[int]) -> Iterator[Form]:
         for monomial in form:
             for atom in monomial:
                 inside = self._atoms[atom].inside
-                found |= {self._atoms[atom].key} if inside is None else self.keys(inside)
-        return found
+                if inside is not None and atom not in seen:
+                    seen.add(atom)
+                    yield from self._floors(inside, seen)
+                    yield {(atom,): 1}
 
     def _remainder(self, form: Form, width: int, offset: int) -> Form:
         size = 1 << width
@@ -291,12 +295,24 @@ class Forms:
             self._atoms.append(_Atom(low, high, inside, key))
         return self._numbers[key]
 
-    def _settled_atom(self, atom: int, meant: Mapping[Hashable, Form]) -> Form:
+    def _settled_form(self, form: Form, meant: Mapping[Hashable, Form], done: dict[int, Form]) -> Form:
+        """Return a form again; `done` has the atoms whose turn has come, many of which are in several others."""
+        total: Form = {}
+        for monomial, coefficient in form.items():
+            product: Form = constant(coefficient)
+            for atom in monomial:
+                if atom not in done:
+                    done[atom] = self._settled_atom(atom, meant, done)
+                product = self.times(product, done[atom])
+            total = plus(total, product)
+        return total
+
+    def _settled_atom(self, atom: int, meant: Mapping[Hashable, Form], done: dict[int, Form]) -> Form:
         inside, key = self._atoms[atom].inside, self._atoms[atom].key
         if inside is not None:
-            own = self.settled(inside, meant)
+            own = self._settled_form(inside, meant, done)
             return self.floor(own) if self._is_floor(atom) else self.bit(own)
-        return self.settled(meant[key], meant) if key in meant else self._settled(atom)
+        return self._settled_form(meant[key], meant, done) if key in meant else self._settled(atom)
 
     def _settled(self, atom: int) -> Form:
         low, high = self._limits_of(atom)

@@ -300,7 +300,7 @@ def _shown(target: Bits | Word) -> str:
 
 def bits_name(name: str, low: int, width: int) -> str:
     """Return the name of a register for bits of another one."""
-    return f"{name}[{low + width - 1}:{low}]"
+    return f"{name}[{low + width - 1}:{low}]" if width > 1 else f"{name}[{low}]"
 
 
 def retargeted(statements: Sequence[Statement], name: str) -> tuple[Statement, ...]:

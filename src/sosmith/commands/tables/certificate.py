@@ -60,7 +60,7 @@ def print_proof(certificate: Certificate, proof: Proof) -> None:
             f"{online.interval} clocks; no residual leaves its range, whatever the digits are"
         )
     if proof.files and proof.program is None and proof.hardware is None:
-        plain = "a core with loadable constants, protection, 16 samples a clock or several of no whole bytes"
+        plain = "a core with loadable constants or protection"
         what = plain if online is None else "an online core"
         other = ", or in parallel beside a decimator" if certificate.decimation is not None else ""
         console.print(f"not read: the SystemVerilog, as that of {what}{other}")

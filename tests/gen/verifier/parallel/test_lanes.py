@@ -15,6 +15,11 @@ from sosmith.gen.verifier.generated_files import fixed_architecture
 from sosmith.hdl.plan.parallel_clocks import block_latency_cycles
 
 
+def with_output(bits: int) -> str:
+    before, after = PLAIN.split("output = { bits = 8")
+    return f"{before}output = {{ bits = {bits}{after}"
+
+
 def accept(core: Made) -> None:
     found = core.check()
     assert found.latency == block_latency_cycles(core.design.datapath, core.lanes, look_ahead=False)
@@ -31,15 +36,31 @@ def test_starts_and_a_calibration(spec: str) -> None:
     accept(small(spec, lanes=4))
 
 
-@pytest.mark.parametrize("lanes", [2, 4])
+@pytest.mark.parametrize("lanes", [2, 4, 16])
 def test_an_example(lanes: int) -> None:
     accept(made(designed(lanes, pipeline="plain"), lanes=lanes))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("realization", REALIZATIONS)
-def test_many_lanes(realization: str) -> None:
-    accept(small(ODD if realization == "lattice_wdf" else PLAIN, realization, lanes=8))
+@pytest.mark.parametrize("lanes", [8, 16])
+def test_many_lanes(realization: str, lanes: int) -> None:
+    accept(small(ODD if realization == "lattice_wdf" else PLAIN, realization, lanes=lanes))
+
+
+@pytest.mark.parametrize(
+    ("bits", "realization", "lanes"), [(12, "df1_ef1", 2), (10, "state_space", 4), (13, "df2t", 16), (7, "normal", 2)]
+)
+def test_outputs_of_no_whole_bytes(bits: int, realization: str, lanes: int) -> None:
+    """Between the lanes signs are repeated, in the words of the output buffer too."""
+    accept(small(with_output(bits), realization, lanes=lanes))
+
+
+def test_a_port_narrower_than_a_limited_sum() -> None:
+    """Each word of the buffer is loaded for itself, and one of them with zeros only."""
+    core = small(STEADY_INSTRUMENT, lanes=2)
+    assert len(re.findall(r"reg \[\d+:0\] slice\d+", core.text)) > 1
+    accept(core)
 
 
 BREAKS = {
@@ -92,21 +113,74 @@ def test_the_number_of_lanes_is_held_against_the_ports() -> None:
     assert rejection(two._replace(lanes=1), two.text) == "the port s_axis_tdata must have 8 bits, not 16"
 
 
-@pytest.mark.parametrize(
-    ("samples", "width", "name"), [(8, 16, "parallel"), (1, 12, "parallel"), (16, 16, None), (2, 12, None)]
-)
-def test_up_to_eight_lanes_of_whole_bytes_are_read(samples: int, width: int, name: str | None, tmp_path: Path) -> None:
+WIDE_BREAKS = {
+    "a sign of another bit": (
+        r"(o_next <= .*)port_(\d+)_0\[11\], port_\2_0\[11\], port_\2_0 ",
+        r"\1port_\2_0[11], port_\2_0[10], port_\2_0 ",
+        rf"(sample \d of m_axis_tdata must be {NODE}output_stage in lane \d, not another value"
+        r"|\S*o_data\S* must take over the same from the pipeline and from the second place)",
+    ),
+    "a sign of another lane": (
+        r"(m_axis_tdata = )o_data\[31:0\]",
+        r"\1{ o_data[15], o_data[30:0] }",
+        rf"sample 1 of m_axis_tdata must be {NODE}output_stage in lane 1, not another value",
+    ),
+    "a flag of lane 1 from lane 0": (
+        r"(m_axis_tuser = \{ .*)o_data\[35\]",
+        r"\1o_data[32]",
+        rf"bit 8 of m_axis_tuser must be input_at_rail, as the ports and {NODE}output_stage in lane 1 say, not another "
+        "value",
+    ),
+    "a flag that comes a beat late": (
+        r"status(\d+) <= status(\d+);",
+        r"status\1 <= { status\2[1], status\1[0] };",
+        r"status\d+\[0\] must .*",
+    ),
+    "a stale beat in one lane": (
+        r"if \(n2\) o_data <= choice(\d+);",
+        r"if (n2) o_data <= { choice\1[37:16], o_data[15:0] };",
+        r"output_buffer\.o_data\S* must .*",
+    ),
+    "lanes swapped in the second place": (
+        r"(o_next <= \{.*), (port_\d+_0\[11\].*), (port_\d+_0\[11\].*) \};",
+        r"\1, \3, \2 };",
+        r"output_buffer\.o_data\S* must take over the same from the pipeline and from the second place",
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", WIDE_BREAKS)
+def test_each_kind_of_break_between_bytes_is_named(kind: str) -> None:
+    core = small(with_output(12), lanes=2)
+    old, new, sentence = WIDE_BREAKS[kind]
+    text, count = re.subn(old, new, core.text, count=1)
+    assert count == 1
+    assert re.fullmatch(sentence, rejection(core, text)), rejection(core, text)
+
+
+@pytest.mark.parametrize("samples", [1, 2, 16])
+def test_the_number_of_lanes_is_in_the_manifest(samples: int, tmp_path: Path) -> None:
     path = tmp_path / "core.json"
-    streams = {"m_axis": {"samples": samples, "fields": [{"width": width}]}}
+    streams = {"m_axis": {} if samples == 1 else {"samples": samples}}
     manifest = {"reload": None, "protect": "none", "architecture": "parallel", "channels": 1, "streams": streams}
     path.write_text(json.dumps(manifest), encoding="utf-8")
-    assert fixed_architecture(path) == (name, 1, samples)
+    assert fixed_architecture(path) == ("parallel", 1, samples)
 
 
-def test_forty_edits() -> None:
-    found = sweep(small(lanes=2), 40, seed=4, clocks=150)
-    assert found["accepted"] + found["rejected"] == 40
-    assert found["rejected"] > 20
+@pytest.mark.parametrize(("bits", "lanes", "count"), [(8, 2, 40), (12, 2, 20), (10, 2, 20), (12, 16, 2)], ids=str)
+def test_edits(bits: int, lanes: int, count: int) -> None:
+    found = sweep(small(with_output(bits), lanes=lanes), count, seed=4, clocks=150)
+    assert found["accepted"] + found["rejected"] == count
+    assert found["rejected"] >= count // 2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("bits", "realization", "lanes"), [(12, "df1_ef1", 2), (10, "df2t", 4), (12, "normal", 16)])
+def test_hundreds_of_edits_between_bytes(bits: int, realization: str, lanes: int) -> None:
+    count = 200 if lanes < 16 else 40
+    found = sweep(small(with_output(bits), realization, lanes=lanes), count, seed=6, clocks=300)
+    assert found["accepted"] + found["rejected"] == count
+    assert found["rejected"] > count // 2
 
 
 @pytest.mark.slow
