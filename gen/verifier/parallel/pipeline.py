@@ -255,10 +255,11 @@ class Pipeline:
         for full in (0, 1):
             self._require_kept(name, position, {RESET: 1, buffer.held: 1, buffer.ready: 0, buffer.full: full})
         case = {RESET: 1, buffer.full: 1, buffer.held: 1, buffer.ready: 1}
-        moved = self._loaded(name, self._seconds(buffer, position), case)
-        if moved is None:
-            raise RejectedError(f"{name} must take over the second sample when the first leaves")
-        self._require_same(name, loaded[0], moved, "from the pipeline and from the second place")
+        seconds = self._seconds(buffer, position)
+        for _, moved in cases(case, lambda each: self._loaded(name, seconds, each)):
+            if moved is None:
+                raise RejectedError(f"{name} must take over the second sample when the first leaves")
+            self._require_same(name, loaded[0], moved, "from the pipeline and from the second place")
         return loaded[0]
 
     def _seconds(self, buffer: Buffer, position: int) -> Callable[[Case], Evaluation]:

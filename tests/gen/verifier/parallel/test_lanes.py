@@ -158,6 +158,15 @@ def test_each_kind_of_break_between_bytes_is_named(kind: str) -> None:
     assert re.fullmatch(sentence, rejection(core, text)), rejection(core, text)
 
 
+def test_a_second_sample_moves_whether_another_one_comes_or_not() -> None:
+    core = small(with_output(12), lanes=2)
+    same = re.sub(r"if \(n2\) (o_data <= choice\d+;)", r"if (n2) if (i_valid) \1 else \1", core.text)
+    assert rejection(core, same) == ""
+    waits = re.sub(r"if \(n2\) (o_data <= choice\d+;)", r"if (n2) if (i_valid) \1", core.text)
+    sentence = r"output_buffer\.o_data\S* must take over the second sample when the first leaves"
+    assert re.fullmatch(sentence, rejection(core, waits)), rejection(core, waits)
+
+
 @pytest.mark.parametrize("samples", [1, 2, 16])
 def test_the_number_of_lanes_is_in_the_manifest(samples: int, tmp_path: Path) -> None:
     path = tmp_path / "core.json"
