@@ -43,7 +43,7 @@ from sosmith.gen.verifier.program.normal_form import Form, constant, plus
 
 DATA = "s_axis_tdata"
 
-_MOST_OPENED = 12
+_MOST_OPENED = 4
 """Most variables that are replaced by what they stand for, one after the other, for one comparison."""
 
 

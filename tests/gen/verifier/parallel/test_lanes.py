@@ -186,7 +186,7 @@ def test_edits(bits: int, lanes: int, count: int) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(("bits", "realization", "lanes"), [(12, "df1_ef1", 2), (10, "df2t", 4), (12, "normal", 16)])
 def test_hundreds_of_edits_between_bytes(bits: int, realization: str, lanes: int) -> None:
-    count = 200 if lanes < 16 else 40
+    count = 200 if lanes < 16 else 15
     found = sweep(small(with_output(bits), realization, lanes=lanes), count, seed=6, clocks=300)
     assert found["accepted"] + found["rejected"] == count
     assert found["rejected"] > count // 2
