@@ -156,14 +156,16 @@ EDITS = [
 SAME = re.compile(
     "|".join(
         (
-            r"reg \w+_control[12] .*|reg (\S+ )?(o_rail|o_flags) .*|reg (\S+ )?left .*",  # not before it is loaded
+            r"reg \w+_control[12] .*",  # nothing counts before it is loaded
+            r"reg (\S+ )?(o_rail|o_flags|left|gathered|step|slice\d+) .*",
+            r"if \(front_rst\) (o_rail|o_flags|o_data|step|slice\d+) <= .*",
             r"assign \w+ = difference\d - \d+'h0;",  # a rounding that rounds nothing
-            r"assign \w+ = (phase|left|filled) [-+] 1'h1;",
-            r"if \(front_rst\) (o_rail|o_flags|o_data) <= .*",
+            r"assign \w+ = (phase|left|filled|channel) [-+] 1'h1;",  # in a counter of one bit
+            r"assign signature__addr20\[(\d:)?2\] = step;",  # bits that are not used
         )
     )
 )
-"""What may be otherwise; of the third line, in a counter of one bit."""
+"""What may be otherwise."""
 
 
 def edited(text: str) -> Iterator[tuple[str, str]]:
