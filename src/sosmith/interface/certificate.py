@@ -8,9 +8,9 @@ from os import PathLike, fspath
 from pathlib import Path
 
 from sosmith.gen.specification.specification import from_text, load
+from sosmith.gen.verifier.around.cic import DecimatorVerdict, check_decimator
 from sosmith.gen.verifier.certificate_file import Certificate as Entries
 from sosmith.gen.verifier.certificate_file import certificate_text, read_certificate
-from sosmith.gen.verifier.cic_hardware import DecimatorVerdict, check_decimator
 from sosmith.gen.verifier.decimation import at_lower_rate, behind_decimator, calibration_alone, module_in
 from sosmith.gen.verifier.generated_files import (
     about_of,

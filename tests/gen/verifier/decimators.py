@@ -10,8 +10,8 @@ from tests.gen.word_lengths.decimated import read, tree_of
 
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.output.verilog import to_rtlil, to_verilog
+from sosmith.gen.verifier.around.cic import check_decimator
 from sosmith.gen.verifier.certificate_file import Certificate
-from sosmith.gen.verifier.cic_hardware import check_decimator
 from sosmith.gen.verifier.graph import RejectedError
 
 

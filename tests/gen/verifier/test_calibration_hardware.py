@@ -7,7 +7,7 @@ from tests.formal.prover import broken
 from tests.gen.verifier.decimators import Instrument, accepted, designed, written
 
 from sosmith.gen.output.verilog import to_rtlil, to_verilog
-from sosmith.gen.verifier.cic_hardware import check_decimator
+from sosmith.gen.verifier.around.cic import check_decimator
 from sosmith.gen.verifier.graph import RejectedError
 from sosmith.hdl.decimation import decimator as hardware
 

@@ -11,8 +11,8 @@ from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.output.generate import generate
 from sosmith.gen.output.verilog import to_rtlil, to_verilog
 from sosmith.gen.specification.specification import from_text
+from sosmith.gen.verifier.around.cic import check_decimator
 from sosmith.gen.verifier.certificate_file import Certificate
-from sosmith.gen.verifier.cic_hardware import check_decimator
 from sosmith.gen.verifier.graph import RejectedError
 from sosmith.hdl.decimation import channel_decimator as hardware
 from sosmith.hdl.decimation import decimator as around

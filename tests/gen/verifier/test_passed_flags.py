@@ -5,7 +5,7 @@ import re
 import pytest
 from tests.gen.verifier.decimators import Case, designed, written
 
-from sosmith.gen.verifier.cic_hardware import check_decimator
+from sosmith.gen.verifier.around.cic import check_decimator
 from sosmith.gen.verifier.graph import RejectedError
 
 WORD = "o_data_30"

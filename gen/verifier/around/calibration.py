@@ -17,8 +17,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from sosmith.gen.verifier.around_core import DATA, OF_INPUT, AheadSeams
-from sosmith.gen.verifier.around_logic import Field, Held, Logic, Ranges
+from sosmith.gen.verifier.around.logic import Field, Held, Logic, Ranges
+from sosmith.gen.verifier.around.seams import DATA, OF_INPUT, AheadSeams
 from sosmith.gen.verifier.certificate_file import PortEntry
 from sosmith.gen.verifier.parallel.control import SOURCE
 from sosmith.gen.verifier.parallel.netlist import Netlist

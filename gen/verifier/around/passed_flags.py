@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from itertools import pairwise
 
-from sosmith.gen.verifier.around_core import BEHIND, Seams
-from sosmith.gen.verifier.bit_logic import Bit, BitLogic
+from sosmith.gen.verifier.around.bit_logic import Bit, BitLogic
+from sosmith.gen.verifier.around.seams import BEHIND, Seams
 from sosmith.gen.verifier.graph import require
 from sosmith.gen.verifier.parallel.netlist import Netlist
 

@@ -20,8 +20,8 @@ before the first clock leave no sample and no result. That this is a CIC filter 
   taken. So each result finds `o_data` free, and stays until it is taken.
 - The holder takes a word when it is empty or hands out the last of its copies, and hands out R of each.
 
-Above the bits of a result there are zeros, or its sign again (`sosmith.gen.verifier.repeated_sign`). Flags are made by
-the core behind: here they are passed on (`sosmith.gen.verifier.passed_flags`).
+Above the bits of a result there are zeros, or its sign again (`sosmith.gen.verifier.around.repeated_sign`). Flags are
+made by the core behind: here they are passed on (`sosmith.gen.verifier.around.passed_flags`).
 """
 
 from __future__ import annotations
@@ -33,7 +33,12 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
 
-from sosmith.gen.verifier.around_core import (
+from sosmith.gen.verifier.around.calibration import FLAGS, Ahead, layout_of
+from sosmith.gen.verifier.around.channel_cic import check_channels, names_of
+from sosmith.gen.verifier.around.logic import BIT, Field, Held, Logic, Part, Ranges, Signals, check_parts
+from sosmith.gen.verifier.around.passed_flags import check_passed
+from sosmith.gen.verifier.around.repeated_sign import check_signs
+from sosmith.gen.verifier.around.seams import (
     CIC,
     CLOCK,
     DATA,
@@ -45,18 +50,13 @@ from sosmith.gen.verifier.around_core import (
     read_core,
     seams_of,
 )
-from sosmith.gen.verifier.around_logic import BIT, Field, Held, Logic, Part, Ranges, Signals, check_parts
-from sosmith.gen.verifier.calibration_hardware import FLAGS, Ahead, layout_of
 from sosmith.gen.verifier.certificate_file import Certificate, DecimationEntry, PortEntry
-from sosmith.gen.verifier.channel_cic_hardware import check_channels, names_of
 from sosmith.gen.verifier.graph import require
 from sosmith.gen.verifier.parallel.control import SINK, SOURCE
 from sosmith.gen.verifier.parallel.forms import shifted
 from sosmith.gen.verifier.parallel.netlist import Netlist
 from sosmith.gen.verifier.parallel.text import Bits
-from sosmith.gen.verifier.passed_flags import check_passed
 from sosmith.gen.verifier.program.normal_form import Form, constant, plus
-from sosmith.gen.verifier.repeated_sign import check_signs
 
 _DATA_REGISTERS = frozenset({"sum", "comb", "difference", "o_data"})
 _NAME = re.compile(r"(\w*?)(\d*)(?:_control(\d))?")

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import NamedTuple, Protocol
 
-from sosmith.gen.verifier.around_core import BEHIND
+from sosmith.gen.verifier.around.seams import BEHIND
 from sosmith.gen.verifier.graph import RejectedError, require
 from sosmith.gen.verifier.parallel.control import RESET, Case, UndecidedError, about, cases
 from sosmith.gen.verifier.parallel.equality import same_word

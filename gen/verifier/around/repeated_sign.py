@@ -17,7 +17,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from sosmith.gen.verifier.bit_logic import Bit, BitLogic
+from sosmith.gen.verifier.around.bit_logic import Bit, BitLogic
 from sosmith.gen.verifier.certificate_file import PortEntry
 from sosmith.gen.verifier.graph import require
 from sosmith.gen.verifier.parallel.netlist import flattened

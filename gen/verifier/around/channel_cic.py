@@ -31,8 +31,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
 
-from sosmith.gen.verifier.around_core import CIC, DATA, DEST, Seams, ahead_of, passed_on
-from sosmith.gen.verifier.around_logic import (
+from sosmith.gen.verifier.around.bit_logic import BitLogic
+from sosmith.gen.verifier.around.calibration import CHANNEL, FLAGS, Gate, layout_of
+from sosmith.gen.verifier.around.logic import (
     BIT,
     Field,
     Held,
@@ -44,8 +45,7 @@ from sosmith.gen.verifier.around_logic import (
     Written,
     check_parts,
 )
-from sosmith.gen.verifier.bit_logic import BitLogic
-from sosmith.gen.verifier.calibration_hardware import CHANNEL, FLAGS, Gate, layout_of
+from sosmith.gen.verifier.around.seams import CIC, DATA, DEST, Seams, ahead_of, passed_on
 from sosmith.gen.verifier.certificate_file import Certificate, DecimationEntry, PortEntry
 from sosmith.gen.verifier.graph import RejectedError, require
 from sosmith.gen.verifier.parallel.forms import shifted
