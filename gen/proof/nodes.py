@@ -46,9 +46,12 @@ _FIRST = 64  # places among which the nodes are chosen, and
 _GROUPS, _NEIGHBOURS = 32, 4  # groups of neighbours at even distances, at least; fewer than twice as many
 _SLACK_BITS = 16
 _LARGEST_GROWTH = 1 << 32  # of an error from block to block; more distant nodes make it smaller
+_MOST_GROWTH = 1 << 512  # of an error; beyond, sums are not in the range of doubles, and worth nothing
 _DIGITS = 3  # binary digits of the number of blocks
 _GUARD_BITS = 64  # of the first precision that is tried
 _MOST_BITS = 1 << 16  # of a precision
+
+_TOO_CLOSE = "the poles must not lie so close to each other that a response cannot be enclosed"
 
 
 class _CoarseError(ArithmeticError):
@@ -89,7 +92,8 @@ class Nodes:
     Raises
     ------
     ShortfallError
-        If a pole does not lie inside the unit circle, or a response lasts longer than `LONGEST` samples.
+        If a pole does not lie inside the unit circle, a response lasts longer than `LONGEST` samples, or poles lie too
+        close to each other.
     """
 
     def __init__(
@@ -123,9 +127,7 @@ class Nodes:
                 break
             except _CoarseError as error:
                 if self.fine > _MOST_BITS:
-                    raise ShortfallError(
-                        "the poles must not lie so close to each other that a response cannot be enclosed"
-                    ) from None
+                    raise ShortfallError(_TOO_CLOSE) from None
                 if error.bits:
                     self.fine += error.bits + _GUARD_BITS // 2
 
@@ -236,9 +238,12 @@ class Nodes:
             found = (balls(wanted) * inverse).entries()
             self.weights = _rounded(found[: size * d], self.bits).reshape(size, d)
             self._multiply(arb_mat(d, d, found[size * d :]))
-        if self._wider < _WINDOWS and math.prod(max(norm, Fraction(1)) for norm in self.norms) > _LARGEST_GROWTH:
+        growth = math.prod(max(norm, Fraction(1)) for norm in self.norms)
+        if self._wider < _WINDOWS and growth > _LARGEST_GROWTH:
             self._wider *= 2
             raise _CoarseError(0)
+        if growth > _MOST_GROWTH:
+            raise ShortfallError(_TOO_CLOSE)
 
     def _multiply(self, step: arb_mat) -> None:
         """Find the number of blocks and the powers of K up to there."""

@@ -19,6 +19,7 @@ from sosmith.gen.output.core_facts import core_facts
 from sosmith.gen.output.identity import identity
 from sosmith.gen.output.manifest import manifest
 from sosmith.gen.output.pins import pins
+from sosmith.gen.output.verilog import to_rtlil, to_verilog
 from sosmith.gen.realizations import look_ahead as realization
 from sosmith.gen.realizations.registry import LOOK_AHEAD, realization_of
 from sosmith.gen.realizations.section_format import SectionFormat
@@ -27,6 +28,7 @@ from sosmith.gen.specification.specification import from_text
 from sosmith.gen.stimuli import traces_for
 from sosmith.gen.verifier import verification
 from sosmith.gen.verifier.certificate_file import Certificate, certificate_text
+from sosmith.gen.verifier.parallel.check import check_hardware
 from sosmith.gen.verifier.verification import verify
 from sosmith.gen.word_lengths import quantize
 from sosmith.model.errors import ShortfallError, SpecificationError
@@ -302,6 +304,8 @@ def test_a_random_design_is_proven_and_equal_to_the_model(pipeline: str, number:
     core, quantized, output = made.architecture, made.quantized, made.datapath.output
     assert (core.samples_per_clock, core.look_ahead) == (lanes, pipeline == "look-ahead")
     verify(proven(made))
+    written = to_verilog(to_rtlil(core.component(), made.datapath.name))
+    assert check_hardware(written, proven(made), lanes=lanes).latency == core.latency_cycles
     (trace,) = traces_for(made, "worst_case_errors", seed=number)
     codes = trace.codes[-len(trace.codes[: 20 * 16]) // lanes * lanes :]
     wanted = made.datapath.compute_exact(codes)

@@ -108,6 +108,14 @@ def test_a_precision_that_never_suffices_is_given_up(monkeypatch: pytest.MonkeyP
     assert tried[-2] <= 1 << 16 < tried[-1]
 
 
+def test_errors_that_grow_without_end_are_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With nodes in the worst places, however far apart: sums would leave the range of doubles."""
+    monkeypatch.setattr(nodes, "_MOST_GROWTH", 1)
+    Nodes((dyadic(1, -0.5),), ACCURACY, 100)
+    with pytest.raises(ShortfallError, match=f"^{nodes._TOO_CLOSE}$"):
+        Nodes((SLOW, SLOW, SLOW), ACCURACY, 100)
+
+
 def test_a_response_may_last_longer_for_sums_of_more_bits() -> None:
     """As long as it decays to the accuracy of the word-length search in time; blocks do not grow without end."""
     slow = (dyadic(1, -(1 - 2.0**-15)),)
