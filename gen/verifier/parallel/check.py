@@ -14,7 +14,7 @@ The core is read from its SystemVerilog, which is what tools synthesize, and not
 2. What a register holds is a form of its own sample, and it is loaded exactly when a sample moves there; a register of
    a recursion holds the code of a DELAY node, by induction over the clocks (`sosmith.gen.verifier.parallel.pipeline`).
 3. What leaves is the output of the graph, extended to whole bytes, with the flags input_at_rail, output_saturated and
-   settling.
+   settling, and 0 for flags that the core does not have.
 
 Sums and products are those of the hardware, modulo the width of each net; extensions by a sign or by zeros, and bits
 that are left out, change a value unless its range says otherwise. The only ranges are those of the certificate, which
@@ -25,6 +25,7 @@ by the name of its DELAY node. Under a wrong name a proof is not found.
 from __future__ import annotations
 
 import sys
+import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -48,8 +49,8 @@ OUTPUT, FLAGS, OUTPUT_DEST = "m_axis_tdata", "m_axis_tuser", "m_axis_tdest"
 _PORTS = frozenset(
     {CLOCK, "aresetn", DATA, "s_axis_tvalid", "s_axis_tready", OUTPUT, FLAGS, "m_axis_tvalid", "m_axis_tready"}
 )
-_AT_RAIL, _SATURATED, _SETTLING = 0, 2, 5
-"""Bits of the flags of a sample."""
+_AT_RAIL, _OUTSIDE, _SATURATED, _WEAR, _SETTLING, _NONE = 0, 1, 2, (3, 4), 5, (6, 7)
+"""Bits of the flags of a sample; those of `_NONE` are 0 without protection."""
 _FLAG_BITS = 8
 
 _DEEPEST = 20_000
@@ -149,6 +150,7 @@ def _check_output(
     for name, each in ((OUTPUT, width), (FLAGS, _FLAG_BITS)):
         wanted = each * len(graph.lanes)
         require(netlist.widths[name] == wanted, f"the port {name} must have {wanted} bits, not {netlist.widths[name]}")
+    unused = _unused(certificate)
     for number, lane in enumerate(graph.lanes):
         label = graph.nodes[lane.output].label
         data = logic.net(OUTPUT, width * number, width)
@@ -166,6 +168,20 @@ def _check_output(
                 pipeline.same(logic.net(FLAGS, bit, 1), value, 1),
                 f"bit {bit} of {FLAGS} must be {flag}, as the ports and {label} say, not another value",
             )
+        for place in unused:
+            bit = _FLAG_BITS * number + place
+            none = pipeline.same(logic.net(FLAGS, bit, 1), {}, 1)
+            require(none, f"bit {bit} of {FLAGS} must be 0, as there is no such flag, not another value")
+
+
+def _unused(certificate: Certificate) -> list[int]:
+    """Return the bits of flags that a core does not have; if the specification is not there, it may have wear."""
+    found = [*_NONE]
+    if certificate.ideal.polynomial is None:
+        found.append(_OUTSIDE)
+    if certificate.about is not None and "wear" not in tomllib.loads(certificate.about.specification):
+        found += _WEAR
+    return sorted(found)
 
 
 def _at_rail(graph: GraphCodes, lane: LanePorts, certificate: Certificate) -> Form:

@@ -100,11 +100,14 @@ class Evaluation:
         Raises
         ------
         RejectedError
-            If it depends on data whether anything is loaded.
+            If it depends on data whether anything is loaded, or words at two places are.
         """
         found: tuple[Expression, Form] | None = None
         for statement in statements:
-            found = self._executed(statement) or found
+            loaded = self._executed(statement)
+            if found is not None and loaded is not None and found[0] != loaded[0]:
+                raise RejectedError("it must not be loaded at two places at a clock")
+            found = loaded or found
         return found
 
     def bit(self, value: Expression) -> Form:

@@ -165,7 +165,11 @@ class _Flattening:
             statements[name] = executed
             if isinstance(loaded, Bits) and loaded.width is not None:
                 fields.setdefault(loaded.name, []).append(loaded)
+        for name in module.held:
+            require(name in module.depths, f"{prefix}{name} must be a memory to be given words")
         for name, width in module.widths.items():
+            known = prefix + name in netlist.widths or prefix + name in netlist.memories
+            require(not known, f"{prefix}{name} must be the name of one net, not of two")
             if name in module.depths:
                 continue
             netlist.widths[prefix + name] = width

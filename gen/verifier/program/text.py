@@ -187,9 +187,15 @@ def read_program(text: str) -> ProgramText:
         words=words,
         channels=depth // words,
         accumulator_bits=sum(accumulator),
-        results=tuple(widths[name] for name in sorted(widths, key=_number_of) if re.fullmatch(r"given\d+", name)),
+        results=_results(widths),
         digits=_digits(text, widths, word_bits, _OPCODE_BITS + 2 * address_bits),
     )
+
+
+def _results(widths: Mapping[str, int]) -> tuple[int, ...]:
+    """Return the widths of the registers that hold a result: one that leaves as it is has the name of its port."""
+    found = tuple(widths[name] for name in sorted(widths, key=_number_of) if re.fullmatch(r"given\d+", name))
+    return found or tuple(width for name, width in widths.items() if name == _OUTPUT)
 
 
 def without_comments(text: str) -> str:
@@ -217,6 +223,7 @@ _REGISTER = re.compile(r"^ *(?:output )?reg (?:\[(\d+):0\] )?(\S+) *(?:=.*)?;$",
 
 
 _MAX_WORDS = 1 << 24
+_OUTPUT = "m_axis_tdata"
 
 
 def _words(text: str) -> Iterator[tuple[int, int, str, int]]:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.gen.verifier.decimators import Instrument, designed, written
 from tests.gen.word_lengths.decimated import INSTRUMENT, locomotive, locomotive_text, read, small, tree_of
 
 from sosmith.gen.core import design_core
@@ -47,6 +48,18 @@ def test_the_locomotive_is_proven_again() -> None:
     assert (agreement.core, agreement.fitted) == ("instrument", False)
     assert agreement.distance is not None
     assert agreement.distance < 2**-100
+
+
+def test_a_result_that_leaves_as_it_is_given_is_found() -> None:
+    case = Instrument(signed=True)
+    alone = calibration_alone(designed(case)[1])
+    assert alone is not None
+    text = module_in(written(case), alone.name)
+    assert "reg [12:0] m_axis_tdata" in text
+    assert check_program(text, alone).instructions == 24
+    narrow = text.replace("reg [12:0] m_axis_tdata", "reg [11:0] m_axis_tdata")
+    with pytest.raises(RejectedError, match=r"^the result must have room for .*, not 12 bits$"):
+        check_program(narrow, alone)
 
 
 def test_both_programs_are_proven_from_the_text(tmp_path: Path) -> None:

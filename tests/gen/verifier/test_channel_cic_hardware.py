@@ -48,6 +48,17 @@ def test_it_is_proven_with_its_files(tmp_path: Path) -> None:
     assert proof.decimator.channels == 2
 
 
+@pytest.mark.parametrize("memory", ["control", "states"])
+def test_a_word_that_is_written_beside_another_one_is_found(memory: str) -> None:
+    old = rf"if \((\w+)\)\n *({memory}\[.*\]) <= (.*);"
+    new = rf"if (\1) begin {memory}[1'h0] <= 1'h0; \2 <= \3; end"
+    text, count = re.subn(old, new, written(SMALL))
+    assert count == 1
+    sentence = rf"^decimator\.{memory} must not be loaded at two places at a clock$"
+    with pytest.raises(RejectedError, match=sentence):
+        check_decimator(text, designed(SMALL)[1], SMALL.channels)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("case", [CASES[0], CASES[2], CASES[4]])
 def test_every_edit_is_rejected(case: Case | Instrument) -> None:

@@ -11,6 +11,7 @@ from tests.gen.verifier.parallel.simulated import outputs
 from tests.gen.verifier.small_specifications import INSTRUMENT, PLAIN
 
 from sosmith.gen.realizations.registry import REALIZATIONS
+from sosmith.gen.verifier.certificate_file import AboutEntry
 from sosmith.gen.verifier.graph import RejectedError
 from sosmith.gen.verifier.parallel.check import check_hardware
 from sosmith.hdl.plan.parallel_clocks import latency_cycles
@@ -245,6 +246,43 @@ def test_each_kind_of_break_is_named(kind: str) -> None:
     text, count = re.subn(old, new, core.text, count=1)
     assert count == 1
     assert re.fullmatch(sentence, rejection(core, text)), rejection(core, text)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        (r"= \{ 2'h0, ", "= { 2'h1, ", "bit 6 of m_axis_tuser must be 0, as there is no such flag, not another value"),
+        (r"= \{ 2'h0, ", "= { 2'h2, ", "bit 7 of m_axis_tuser must be 0, as there is no such flag, not another value"),
+        (
+            r"o_data\[13:8\] \};",
+            "o_data[13:10], o_data[8], o_data[8] };",
+            "bit 1 of m_axis_tuser must be 0, as there is no such flag, not another value",
+        ),
+        ("  wire rst;", r"  wire rst;\n  wire \\section0.rst ;", "section0.rst must be the name of one net, not of two"),
+        (
+            r"(\n  reg full = 1'h0;)",
+            r"\1\n  initial begin\n    full[0] = 1'h1;\n  end",
+            "output_buffer.full must be a memory to be given words",
+        ),
+    ],
+)
+def test_what_no_node_says_is_checked(old: str, new: str, sentence: str) -> None:
+    core = small()
+    text, count = re.subn(old, new, core.text, count=1)
+    assert count == 1
+    assert rejection(core, text) == sentence
+
+
+def test_without_wear_its_flags_are_0() -> None:
+    core = small()
+    text = core.text.replace("o_data[13:8] };", "o_data[13:12], 1'h1, o_data[10:8] };")
+    assert text != core.text
+    assert rejection(core, text) == ""  # the specification is not there, which would say whether there is wear
+    for specification, place in ((PLAIN, 3), (PLAIN + "[wear]", None)):
+        about = AboutEntry(specification=specification, sha256="0" * 64, options={}, files=(), versions={}, certificate="0" * 64)
+        stated = core._replace(certificate=core.certificate.model_copy(update={"about": about}))
+        none = "must be 0, as there is no such flag, not another value"
+        assert rejection(stated, text) == (f"bit {place} of m_axis_tuser {none}" if place else "")
 
 
 def test_bits_beside_a_field_may_be_anything() -> None:
