@@ -230,6 +230,12 @@ class Forms:
         """Yield the floors in a form that are not constant, each once, those inside others first."""
         yield from self._floors(form, set())
 
+    def grain(self, floor: Form) -> int:
+        """Return the number of steps in 1 of what a floor is taken of."""
+        ((monomial, _),) = floor.items()
+        inside = self._atoms[monomial[0]].inside
+        return 1 if inside is None else lcm(*(value.denominator for value in inside.values()))
+
     def keys(self, form: Form) -> set[Hashable]:
         """Return the keys of all variables in a form."""
         found: set[Hashable] = set()

@@ -8,7 +8,7 @@ from tests.gen.designs import ALL, parallel_design
 from tests.gen.verifier.parallel.cores import ODD, Made, made, small
 from tests.gen.verifier.parallel.edits import random_edits
 from tests.gen.verifier.parallel.simulated import outputs
-from tests.gen.verifier.small_specifications import INSTRUMENT, PLAIN
+from tests.gen.verifier.small_specifications import INSTRUMENT, PLAIN, UNSIGNED
 
 from sosmith.gen.realizations.registry import REALIZATIONS
 from sosmith.gen.verifier.certificate_file import AboutEntry
@@ -38,6 +38,10 @@ def test_every_realization_behind_a_calibration(realization: str) -> None:
 @pytest.mark.parametrize(("realization", "channels"), [("df1_ef1", 2), ("df1_ef1", 17), ("lattice_wdf", 5)])
 def test_several_channels(realization: str, channels: int) -> None:
     accept(small(ODD if realization == "lattice_wdf" else PLAIN, realization, channels))
+
+
+def test_an_output_that_saturates_far_from_its_ends() -> None:
+    accept(small(UNSIGNED, "df1_ef1", 5))
 
 
 @pytest.mark.slow
@@ -258,7 +262,11 @@ def test_each_kind_of_break_is_named(kind: str) -> None:
             "o_data[13:10], o_data[8], o_data[8] };",
             "bit 1 of m_axis_tuser must be 0, as there is no such flag, not another value",
         ),
-        ("  wire rst;", r"  wire rst;\n  wire \\section0.rst ;", "section0.rst must be the name of one net, not of two"),
+        (
+            "  wire rst;",
+            r"  wire rst;\n  wire \\section0.rst ;",
+            "section0.rst must be the name of one net, not of two",
+        ),
         (
             r"(\n  reg full = 1'h0;)",
             r"\1\n  initial begin\n    full[0] = 1'h1;\n  end",
@@ -273,13 +281,32 @@ def test_what_no_node_says_is_checked(old: str, new: str, sentence: str) -> None
     assert rejection(core, text) == sentence
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        (
+            "~ aresetn;",
+            f"{'{ ' * 30_000}aresetn;",
+            "expressions and statements of plain must not be nested as deep as that",
+        ),
+        ("full = 1'h0;", "full = 99999999999999'h1;", "output_buffer.full must be 0 before the first clock, not 1"),
+        ("  reg full ", "  reg [2:0] words [999999999:0];\n  reg full ", "all 1000000000 words of .* must be given"),
+    ],
+)
+def test_a_text_that_asks_for_much_is_refused(old: str, new: str, sentence: str) -> None:
+    core = small()
+    assert re.fullmatch(sentence, rejection(core, core.text.replace(old, new, 1)))
+
+
 def test_without_wear_its_flags_are_0() -> None:
     core = small()
     text = core.text.replace("o_data[13:8] };", "o_data[13:12], 1'h1, o_data[10:8] };")
     assert text != core.text
     assert rejection(core, text) == ""  # the specification is not there, which would say whether there is wear
     for specification, place in ((PLAIN, 3), (PLAIN + "[wear]", None)):
-        about = AboutEntry(specification=specification, sha256="0" * 64, options={}, files=(), versions={}, certificate="0" * 64)
+        about = AboutEntry(
+            specification=specification, sha256="0" * 64, options={}, files=(), versions={}, certificate="0" * 64
+        )
         stated = core._replace(certificate=core.certificate.model_copy(update={"about": about}))
         none = "must be 0, as there is no such flag, not another value"
         assert rejection(stated, text) == (f"bit {place} of m_axis_tuser {none}" if place else "")

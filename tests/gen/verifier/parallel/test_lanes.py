@@ -8,7 +8,7 @@ import pytest
 from tests.gen.blocks.specifications import designed
 from tests.gen.verifier.parallel.cores import ODD, Made, made, small
 from tests.gen.verifier.parallel.test_check import NODE, rejection, sweep
-from tests.gen.verifier.small_specifications import INSTRUMENT, PLAIN, STEADY, STEADY_INSTRUMENT
+from tests.gen.verifier.small_specifications import INSTRUMENT, PLAIN, STEADY, STEADY_INSTRUMENT, WIDE
 
 from sosmith.gen.realizations.registry import REALIZATIONS
 from sosmith.gen.verifier.generated_files import fixed_architecture
@@ -34,6 +34,10 @@ def test_every_realization(realization: str) -> None:
 @pytest.mark.parametrize("spec", [STEADY, STEADY_INSTRUMENT, INSTRUMENT])
 def test_starts_and_a_calibration(spec: str) -> None:
     accept(small(spec, lanes=4))
+
+
+def test_an_output_with_more_bits_than_the_input() -> None:
+    accept(small(WIDE, "df1", lanes=2))
 
 
 @pytest.mark.parametrize("lanes", [2, 4, 16])

@@ -6,7 +6,7 @@ import pytest
 from tests.gen.blocks.specifications import designed
 from tests.gen.verifier.parallel.cores import Made, looking_ahead, made
 from tests.gen.verifier.parallel.test_check import NODE, rejection, sweep
-from tests.gen.verifier.small_specifications import INSTRUMENT, PLAIN, STEADY, STEADY_INSTRUMENT
+from tests.gen.verifier.small_specifications import INSTRUMENT, NARROW, PLAIN, STEADY, STEADY_INSTRUMENT
 
 from sosmith.hdl.plan.parallel_clocks import block_latency_cycles
 
@@ -26,7 +26,7 @@ def test_an_example(lanes: int) -> None:
 
 @pytest.mark.parametrize(
     ("spec", "lanes"),
-    [(PLAIN, 1), (STEADY, 2), (STEADY_INSTRUMENT, 1), pytest.param(INSTRUMENT, 4, marks=pytest.mark.slow)],
+    [(PLAIN, 1), (NARROW, 1), (STEADY, 2), (STEADY_INSTRUMENT, 1), pytest.param(INSTRUMENT, 4, marks=pytest.mark.slow)],
 )
 def test_starts_and_a_calibration(spec: str, lanes: int) -> None:
     accept(looking_ahead(spec, lanes))
