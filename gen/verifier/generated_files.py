@@ -101,6 +101,10 @@ def check_measurements(about: AboutEntry, path: Path) -> None:
     _compare(str(path), about.measurements.sha256, _content(path))
 
 
+_NO_MANIFEST = (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError)
+"""What is raised where a manifest has anything else."""
+
+
 class FixedArchitecture(NamedTuple):
     """Architecture of a core that can be read, None for others; its number of channels, and samples of a beat."""
 
@@ -122,10 +126,26 @@ def fixed_architecture(path: Path) -> FixedArchitecture:
     try:
         manifest = json.loads(_content(path))
         plain = manifest["reload"] is None and manifest["protect"] == "none"
-        lanes = int(manifest["streams"]["m_axis"].get("samples", 1))
-        return FixedArchitecture(str(manifest["architecture"]) if plain else None, int(manifest["channels"]), lanes)
-    except (ValueError, KeyError, TypeError, AttributeError):
+        channels, lanes = int(manifest["channels"]), int(manifest["streams"]["m_axis"].get("samples", 1))
+        if min(channels, lanes) < 1:
+            raise ValueError
+        return FixedArchitecture(str(manifest["architecture"]) if plain else None, channels, lanes)
+    except _NO_MANIFEST:
         raise RejectedError(f"{path} must be the manifest of a core, not another file") from None
+
+
+def core_text(path: Path) -> str:
+    """Return the SystemVerilog of a core.
+
+    Raises
+    ------
+    RejectedError
+        If there is none.
+    """
+    try:
+        return _content(path).decode("ascii")
+    except UnicodeDecodeError:
+        raise RejectedError(f"{path} must be ASCII") from None
 
 
 def architecture_ahead(path: Path) -> str | None:
@@ -139,7 +159,7 @@ def architecture_ahead(path: Path) -> str | None:
     try:
         found = (json.loads(_content(path))["decimation"] or {}).get("calibration")
         return None if found is None else str(found["architecture"])
-    except (ValueError, KeyError, TypeError, AttributeError):
+    except _NO_MANIFEST:
         raise RejectedError(f"{path} must be the manifest of a core, not another file") from None
 
 

@@ -182,7 +182,8 @@ class _Flattening:
                 )
         for name, depth_ in module.depths.items():
             held = module.held.get(name, {})
-            require(sorted(held) == list(range(depth_)), f"all {depth_} words of {prefix}{name} must be given")
+            given = len(held) == depth_ and sorted(held) == list(range(depth_))
+            require(given, f"all {depth_} words of {prefix}{name} must be given")
             netlist.memories[prefix + name] = Memory(
                 prefix + name,
                 module.widths[name],

@@ -139,7 +139,10 @@ def read_modules(text: str) -> dict[str, Module]:
         tokens.expect("module")
         name = tokens.name()
         require(name not in modules, f"module {name} must be written once, not twice")
-        modules[name] = _Reader(tokens).module()
+        try:
+            modules[name] = _Reader(tokens).module()
+        except RecursionError:
+            raise RejectedError(f"expressions and statements of {name} must not be nested as deep as that") from None
     require(bool(modules), "the text must have a module")
     return modules
 
@@ -416,5 +419,5 @@ class _Reader:
             raise self._tokens.refused("a number with its width", token)
         digits, base = next((found[k], base) for k, base in ((2, 16), (3, 10), (4, 2)) if found[k])
         number = Number(int(digits, base), int(found[1]))
-        require(number.value < 1 << number.width, f"the number {token} must fit {number.width} bits")
+        require(number.value.bit_length() <= number.width, f"the number {token} must fit {number.width} bits")
         return number

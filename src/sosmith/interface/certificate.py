@@ -20,6 +20,7 @@ from sosmith.gen.verifier.generated_files import (
     check_seal,
     check_text,
     check_texts,
+    core_text,
     fixed_architecture,
 )
 from sosmith.gen.verifier.graph import RejectedError
@@ -165,7 +166,7 @@ class Certificate:
             folder = Path(fspath(files))
             compared = check_files(check_seal(self.entries, content), folder)
             architecture, channels, lanes = fixed_architecture(folder / f"{self.name}.json")
-            text = (folder / f"{self.name}.sv").read_text(encoding="utf-8")
+            text = core_text(folder / f"{self.name}.sv")
             found = self.entries.decimation
             if found is not None:
                 progress("decimator", 0, 0)

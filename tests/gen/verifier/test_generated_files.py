@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shutil
 from collections.abc import Callable
@@ -14,7 +15,7 @@ from sosmith.gen.output.generate import generate
 from sosmith.gen.output.rebuild import rebuilt
 from sosmith.gen.specification.specification import load
 from sosmith.gen.verifier.certificate_file import AboutEntry, read_certificate
-from sosmith.gen.verifier.generated_files import check_files, check_seal, check_texts
+from sosmith.gen.verifier.generated_files import check_files, check_seal, check_texts, core_text, fixed_architecture
 from sosmith.gen.verifier.verification import RejectedError
 from sosmith.model.errors import SpecificationError
 
@@ -88,6 +89,32 @@ def test_sentences(folder: Path) -> None:
         RejectedError, match=r"^the certificate must have the layout in which it was written, not another one$"
     ):
         checked(folder)
+
+
+@pytest.mark.parametrize(("key", "value"), [("channels", 0), ("channels", 1e400), ("samples", 0), ("samples", [])])
+def test_a_manifest_with_other_numbers_is_none(folder: Path, key: str, value: object) -> None:
+    path = folder / f"{NAME}.json"
+    assert fixed_architecture(path).channels > 0
+    manifest = json.loads(path.read_text(encoding="utf-8"))
+    (manifest if key == "channels" else manifest["streams"]["m_axis"])[key] = value
+    path.write_text(json.dumps(manifest), encoding="utf-8")
+    with pytest.raises(RejectedError, match=r"\.json must be the manifest of a core, not another file$"):
+        fixed_architecture(path)
+
+
+def test_a_manifest_nested_too_deep_is_none(folder: Path) -> None:
+    path = folder / f"{NAME}.json"
+    path.write_text("[" * 100_000, encoding="utf-8")
+    with pytest.raises(RejectedError, match=r"\.json must be the manifest of a core, not another file$"):
+        fixed_architecture(path)
+
+
+def test_what_is_no_text_is_not_read(folder: Path) -> None:
+    path = folder / f"{NAME}.sv"
+    assert core_text(path) == path.read_text(encoding="ascii")
+    path.write_bytes(b"// \xe4")
+    with pytest.raises(RejectedError, match=r"\.sv must be ASCII$"):
+        core_text(path)
 
 
 def test_files_generated_again_are_the_same(folder: Path) -> None:
