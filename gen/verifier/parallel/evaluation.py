@@ -89,8 +89,7 @@ class Evaluation:
         if key not in self._known:
             require(key not in self._open, f"{name} must not depend on itself within a clock")
             self._open.add(key)
-            found = self._of_whole(*key)
-            found = self._net(*key) if found is None else found
+            found = self._net(*key)
             self._known[key] = self._shortened(found, count, name in self._netlist.inlets)
             self._open.discard(key)
         return self._known[key]
@@ -126,13 +125,6 @@ class Evaluation:
         if yes is None or no is None or yes[0] != no[0]:
             raise RejectedError("it must not depend on data whether something is loaded")
         return yes[0], self._chosen(select, yes[1], no[1])
-
-    def _of_whole(self, name: str, low: int, width: int) -> Form | None:
-        """Return bits of what enters an instance, if all of it has a variable of its own; so bits have it, too."""
-        if name not in self._netlist.inlets or width == self._netlist.widths[name]:
-            return None
-        whole = self.net(name)
-        return self._cut(whole, low) if self._forms.is_variable(whole) else None
 
     def _net(self, name: str, low: int, width: int) -> Form:
         if name in self._netlist.inlets and width < self._netlist.widths[name]:

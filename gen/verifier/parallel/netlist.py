@@ -84,6 +84,7 @@ class Netlist:
 
     def add_field(self, name: str, field: Register, low: int) -> None:
         """Add the register that holds the bits of the net `name` from `low` on."""
+        require(field.name not in self.widths, f"{field.name} must be the name of one net, not of two")
         self.registers[field.name] = field
         self.widths[field.name] = field.width
         self.fields[field.name] = self.fields.get(name, name)

@@ -268,6 +268,11 @@ def test_each_kind_of_break_is_named(kind: str) -> None:
             "section0.rst must be the name of one net, not of two",
         ),
         (
+            r"(\n  reg \[11:0\] (slice\d+) = .*;)",
+            r"\1\n  wire \\\2[10] ;",
+            r"output_buffer\.slice\d+\[10\] must be the name of one net, not of two",
+        ),
+        (
             r"(\n  reg full = 1'h0;)",
             r"\1\n  initial begin\n    full[0] = 1'h1;\n  end",
             "output_buffer.full must be a memory to be given words",
@@ -278,7 +283,7 @@ def test_what_no_node_says_is_checked(old: str, new: str, sentence: str) -> None
     core = small()
     text, count = re.subn(old, new, core.text, count=1)
     assert count == 1
-    assert rejection(core, text) == sentence
+    assert re.fullmatch(sentence, rejection(core, text))
 
 
 @pytest.mark.parametrize(
