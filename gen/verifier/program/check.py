@@ -402,12 +402,13 @@ class _Run:
     def _node(self, total: Form, top: int) -> tuple[int, int] | None:
         """Find a node that is `total` modulo ``2**(top + 1)`` as a signed number, with some number of fraction bits.
 
-        Of several with the same value, take the one with the narrowest range: it holds for all of them.
+        Of several with the same value, take the one with the narrowest range: it holds for all of them. A total of 0 is
+        any node that is 0.
         """
         modulus = 2 << top
         rest = {monomial: c for monomial, c in total.items() if c % modulus}
         if not rest:
-            return None
+            return next(((node, 0) for node, value in enumerate(self._of) if not value), None)
         least = min(map(valuation, rest.values()))
         best: tuple[Fraction, int, int] | None = None
         for node, value in enumerate(self._of):

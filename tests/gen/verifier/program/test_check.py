@@ -92,6 +92,18 @@ def test_channels_have_one_program(architecture: str) -> None:
     )
 
 
+@pytest.mark.parametrize("start", ["zero", "steady"])
+@pytest.mark.parametrize("realization", ["delta", "df2t"])
+def test_a_state_that_is_always_zero(realization: str, start: str) -> None:
+    """As that of a section whose rounded poles cancel its zeros: what it takes over is like no node but a zero."""
+    filters = "filter = { sos = [[0.25, 0.25, 0.0, 1.0, -0.5, 0.0], [1.0, 1e-9, 0.0, 1.0, 0.0, 0.0]] }"
+    spec = re.sub(r"filter = .*", filters, PLAIN).replace('"faithful"', "0.5").replace('"zero"', f'"{start}"')
+    core = small(spec, realization=realization)
+    never = {node.name for stage in core.certificate.stages for node in stage.nodes if node.low == node.high == 0}
+    assert never == {"s1", "t1"}
+    assert core.check().instructions == len(core.program.instructions)
+
+
 def test_the_calibration_alone() -> None:
     design = design_core(specified(INSTRUMENT), core="calibration")
     assert made(design, "folded").check().states == 0
