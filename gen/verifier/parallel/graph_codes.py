@@ -25,6 +25,7 @@ from sosmith.gen.verifier.parallel.forms import Forms, shifted
 from sosmith.gen.verifier.parallel.lanes import LaneNode, in_lanes
 from sosmith.gen.verifier.program.normal_form import Form, Monomial, constant, plus
 
+_Key = frozenset[tuple[Monomial, int | Fraction]]
 Origin = tuple[int, int]
 """A node that is not a DELAY, and how many samples ago."""
 
@@ -129,10 +130,11 @@ class GraphCodes:
             low, high = self._ranges.get(origin) or self._widest(origin[0])  # it is 0 at first, or what it repeats
             self._ranges[origin] = max(low, entry.low), min(high, entry.high)
         self.codes: list[Form] = []
-        self._seams: dict[frozenset[tuple[Monomial, int | Fraction]], Form] = {}
+        self._seams: dict[_Key, Form] = {}
         self._definitions: dict[Hashable, Form] = {}
-        self._kept: dict[frozenset[tuple[Monomial, int | Fraction]], Form] = {}
-        self._kept_of: dict[int, dict[frozenset[tuple[Monomial, int | Fraction]], Form]] = {}
+        self._kept: dict[_Key, Form] = {}
+        self._kept_of: dict[int, dict[_Key, Form]] = {}
+        self._seams_of: dict[int, dict[_Key, Form]] = {}
         self._handed_on: dict[int, Form] = {}
         for index, node in enumerate(self.nodes):
             code = self._code(index, node)
@@ -194,16 +196,17 @@ class GraphCodes:
 
         Those are what the next lane takes over, and, where a word enters an instance, what stages hand on.
         """
-        key = frozenset(word.items())
-        if at_inlet and key in self._seams:
-            return self._seams[key]
-        if not self._kept or len(word) < 2:
-            return word
-        if key in self._kept:
-            return self._kept[key]
-        if width not in self._kept_of:
-            self._kept_of[width] = {_rest(code, width): short for code, short in self._kept.items()}
-        return self._kept_of[width].get(_rest(word.items(), width), word)
+        for codes, by_width in ((self._seams, self._seams_of), (self._kept, self._kept_of)):
+            if not codes or (len(word) < 2 if codes is self._kept else not at_inlet):
+                continue
+            found = codes.get(frozenset(word.items()))
+            if found is None:
+                if width not in by_width:
+                    by_width[width] = {_rest(code, width): short for code, short in codes.items()}
+                found = by_width[width].get(_rest(word.items(), width))
+            if found is not None:
+                return found
+        return word
 
     def seen(self, index: int, stage: str) -> Form:
         """Return the code of a node as its own stage sees it, or as another one or another lane does."""
@@ -291,7 +294,7 @@ class GraphCodes:
         return of  # SHIFT, BOUND
 
 
-def _rest(word: Iterable[tuple[Monomial, int | Fraction]], width: int) -> frozenset[tuple[Monomial, int | Fraction]]:
+def _rest(word: Iterable[tuple[Monomial, int | Fraction]], width: int) -> _Key:
     """Return the coefficients of a word of `width` bits, each as the least that means the same."""
     rests = ((monomial, coefficient % (1 << width)) for monomial, coefficient in word)
     return frozenset((monomial, coefficient) for monomial, coefficient in rests if coefficient)

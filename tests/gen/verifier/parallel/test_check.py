@@ -8,7 +8,7 @@ from tests.gen.designs import ALL, parallel_design
 from tests.gen.verifier.parallel.cores import ODD, Made, made, small
 from tests.gen.verifier.parallel.edits import random_edits
 from tests.gen.verifier.parallel.simulated import outputs
-from tests.gen.verifier.small_specifications import INSTRUMENT, PLAIN, UNSIGNED
+from tests.gen.verifier.small_specifications import INSTRUMENT, PLAIN, STEADY_INSTRUMENT, UNSIGNED
 
 from sosmith.gen.realizations.registry import REALIZATIONS
 from sosmith.gen.verifier.certificate_file import AboutEntry
@@ -55,6 +55,12 @@ def test_every_realization_for_several_channels(realization: str, channels: int)
 @pytest.mark.parametrize("name", ALL)
 def test_examples_for_several_channels(name: str) -> None:
     accept(made(parallel_design(name, realization="df1_ef2"), 12))
+
+
+def test_a_word_of_the_calibration_that_is_negative() -> None:
+    """Its signs are extended differently in the hardware, where the next stage takes it over."""
+    negative = STEADY_INSTRUMENT.replace("bits = 12, range = [0.0, 10.0]", "bits = 24, range = [0.0, 10.0]")
+    accept(small(negative.replace("[0.05812]", "[-0.05812]")))
 
 
 def accept(core: Made) -> None:
