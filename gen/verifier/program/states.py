@@ -19,7 +19,9 @@ from sosmith.gen.verifier.program.graph_forms import Graph
 from sosmith.gen.verifier.program.run import Machine, samples
 from sosmith.gen.verifier.program.text import ProgramText
 
-_SAMPLES = 32
+_SAMPLES, _MOST_SAMPLES = 32, 4096
+"""Samples of a run, and how many where a state is 0 until then: those of a slow filter take long to be told apart."""
+
 _MOST_DIGITS = 8
 _NEARBY = Fraction(1, 16)
 """Share of a state's largest value in the samples that a match may be away from it."""
@@ -57,7 +59,9 @@ def find_states(program: ProgramText, graph: Graph, certificate: Certificate) ->
     states = dict.fromkeys(graph.delays, 0)
     series: dict[int, list[int]] = {node: [] for node in graph.delays}
     machine = Machine(program, certificate)
-    for codes in samples(certificate, _SAMPLES):
+    for number, codes in enumerate(samples(certificate, _MOST_SAMPLES)):
+        if number >= _SAMPLES and all(map(any, series.values())):
+            break
         words.append(machine.words[:, 0].tolist())
         for node, past in series.items():
             past.append(states[node])
