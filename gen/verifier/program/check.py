@@ -295,14 +295,11 @@ class _Run:
             self._group.instructions.append(number)
 
     def _take(self, number: int, address: int, value: int) -> None:
-        form = self._taken(number, self.program.digits[value % (1 << NUMBER_BITS)])
-        low, high = self._forms.extent(form)
-        base = 1 << self._bits
-        self._store(number, address, _Word(form, max(int(low), -base), min(int(high), base - 1)))
+        self._store(number, address, self._taken(number, self.program.digits[value % (1 << NUMBER_BITS)]))
         self._acc = _Accumulator()
 
-    def _taken(self, number: int, bits: Sequence[Bit]) -> Form:
-        """Return a digit of an input as a form: zeros, then bits of its code in order, then zeros or its sign."""
+    def _taken(self, number: int, bits: Sequence[Bit]) -> _Word:
+        """Return a digit of an input: zeros, then bits of its code in order, then zeros or its sign."""
         offset = 0
         zeros = next((k for k, bit in enumerate(bits) if bit != 0), len(bits))
         for port, node in zip(self._certificate.inputs, self.graph.inputs, strict=True):
@@ -318,18 +315,16 @@ class _Run:
             )
             rest, ends_in_sign = bits[zeros + count :], port.signed and first + count == port.bits
             if ends_in_sign and all(bit == own[-1] for bit in rest):
-                return scaled(self._forms.floor(scaled(code, -first)), zeros)
+                form = scaled(self._forms.floor(scaled(code, -first)), zeros)
+                low, high = self._forms.extent(form)
+                base = 1 << self._bits
+                return _Word(form, max(int(low), -base), min(int(high), base - 1))
             if not any(rest) and count < len(bits) - zeros:
-                return scaled(
-                    plus(
-                        self._forms.floor(scaled(code, -first)),
-                        self._forms.floor(scaled(code, -first - count)),
-                        -(1 << count),
-                    ),
-                    zeros,
-                )
+                above, below = (self._forms.floor(scaled(code, -first - k)) for k in (count, 0))
+                form = scaled(plus(below, above, -(1 << count)), zeros)
+                return _Word(form, 0, ((1 << count) - 1) << zeros)
         require(zeros == len(bits), f"{self.program.named(number)} must take a digit of an input, not bits of several")
-        return {}
+        return _Word({}, 0, 0)
 
     def _store(self, number: int, address: int, word: _Word) -> None:
         self._words[address] = word

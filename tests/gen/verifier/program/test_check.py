@@ -111,6 +111,14 @@ def test_a_slow_filter(realization: str) -> None:
     assert core.check().instructions == len(core.program.instructions)
 
 
+def test_the_lower_digits_of_an_input_are_not_negative() -> None:
+    """So says the width of the accumulator, which a digit with a sign would exceed."""
+    filters = 'filter = { family = "elliptic", kind = "bandstop", order = 1, cutoff = [10.0, 26.0]'
+    spec = re.sub(r"filter = .*", filters + ", passband_loss = 1.0, stopband_loss = 40.0 }", PLAIN)
+    core = small(spec.replace("bits = 8", "bits = 24"), realization="df2t")
+    assert core.check().instructions == len(core.program.instructions)
+
+
 def test_the_calibration_alone() -> None:
     design = design_core(specified(INSTRUMENT), core="calibration")
     assert made(design, "folded").check().states == 0
