@@ -79,7 +79,7 @@ def test_a_broken_core_is_found_out(right: str, wrong: str, tmp_path: Path) -> N
             "with m.If(self.advance):\n            m.d.sync += turn.eq",
         ),
         ("Mux(warms[own], read.data, 0)", "read.data"),  # what was before a reset comes back
-        ("warm = Signal(range(plan.turns)), Signal()", "warm = Signal(range(plan.turns)), Signal(init=1)"),
+        ('Signal(name="warm")', 'Signal(name="warm", init=1)'),
         ("write.addr.eq(turns[written])", "write.addr.eq(turns[own])"),
         ("self.advance & valid[written]),\n            ]", "self.advance),\n            ]"),
         ("with m.If(self.advance & valid[stage]):", "with m.If(self.advance):"),  # a delay moves without a sample
