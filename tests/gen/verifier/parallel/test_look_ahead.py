@@ -19,7 +19,7 @@ def accept(core: Made) -> None:
     assert found.states > found.memories == len(re.findall(r"^  reg .*_memory \[", core.text, re.MULTILINE)) > 0
 
 
-@pytest.mark.parametrize("lanes", [1, pytest.param(2, marks=pytest.mark.slow), 4])
+@pytest.mark.parametrize("lanes", [1, *(pytest.param(lanes, marks=pytest.mark.slow) for lanes in (2, 4))])
 def test_an_example(lanes: int) -> None:
     accept(made(designed(lanes), lanes=lanes, look_ahead=True))
 
