@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 import click
 
 if TYPE_CHECKING:
+    from rich.live import Live
     from rich.progress import Progress, TaskID
 
 _quiet = False
@@ -39,6 +43,45 @@ def reader_may_leave() -> Iterator[None]:
 def silence_stdout() -> None:
     """Discard the output that is still buffered: flushing it at exit would fail again."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+@contextmanager
+def undisturbed() -> Iterator[None]:
+    """Let signals wait until the context ends: what is written to a terminal is not cut in two, or written twice.
+
+    Python runs handlers between any two of its instructions, also between what was written and the note that it was.
+    """
+    if threading.current_thread() is not threading.main_thread():  # handlers run in the main thread only
+        yield
+        return
+    came: list[int] = []
+
+    def remember(number: int, frame: FrameType | None) -> None:
+        came.append(number)
+
+    before = {number: signal.getsignal(number) for number in (signal.SIGHUP, signal.SIGTERM, signal.SIGINT)}
+    held = {number: handler for number, handler in before.items() if callable(handler)}
+    try:
+        for number in held:
+            signal.signal(number, remember)
+        yield
+    finally:
+        for number, handler in held.items():
+            signal.signal(number, handler)
+        for stopped in came:
+            signal.raise_signal(stopped)
+
+
+@contextmanager
+def live(display: Progress | Live) -> Iterator[None]:
+    """Show a display of rich inside the context, and leave the terminal whole whatever ends it."""
+    try:
+        with undisturbed():
+            display.start()
+        yield
+    finally:
+        with undisturbed():
+            display.stop()
 
 
 class Step:
@@ -71,12 +114,13 @@ class _BarStep(Step):
         self._name = ""
 
     def __call__(self, name: str, done: int = 0, total: int = 0) -> None:
-        if name != self._name:
-            self.finish()
-            self._name = name
-            self._task = self._progress.add_task(name, total=None)
-        if total and self._task is not None:
-            self._progress.update(self._task, completed=done, total=total)
+        with undisturbed():
+            if name != self._name:
+                self.finish()
+                self._name = name
+                self._task = self._progress.add_task(name, total=None)
+            if total and self._task is not None:
+                self._progress.update(self._task, completed=done, total=total)
 
     def finish(self) -> None:
         """Mark the current step as done."""
@@ -127,14 +171,17 @@ def show_progress(*, remaining: bool = False) -> Iterator[Step]:
         *([TimeRemainingColumn(), TextColumn("left")] if remaining else []),
         TimeElapsedColumn(),
     ]
-    with Progress(*columns, console=Console(stderr=True)) as progress:
+    progress = Progress(*columns, console=Console(stderr=True))
+    with live(progress):
         step = _BarStep(progress)
         try:
             yield step
         except BaseException:
-            step.drop()
+            with undisturbed():
+                step.drop()
             raise
-        step.finish()
+        with undisturbed():
+            step.finish()
 
 
 def _shown(text: str) -> str:
@@ -144,7 +191,8 @@ def _shown(text: str) -> str:
 
 def note(text: str) -> None:
     """Print a message on stderr."""
-    click.echo(f"sosmith: {_shown(text)}", err=True)
+    with undisturbed():
+        click.echo(f"sosmith: {_shown(text)}", err=True)
 
 
 def print_json(tree: Any) -> None:

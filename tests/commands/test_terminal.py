@@ -1,12 +1,14 @@
 """What only a process or a terminal shows: progress, signals, the other end of a pipe."""
 
 import contextlib
+import io
 import json
 import os
 import re
 import signal
 import subprocess
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -24,6 +26,7 @@ from tests.commands.command_line import (
 
 from sosmith.sim import simulators
 from sosmith.sim.build_cache import LIMIT, BuildCache
+from sosmith.terminal import be_quiet, show_progress
 
 
 def test_progress_is_one_line_a_step_in_a_log(sosmith: Command) -> None:
@@ -121,6 +124,69 @@ def test_a_terminal_is_left_whole(command: str, on_terminal: OnTerminal, tmp_pat
     assert terminal.is_left_whole()
     wait_for(lambda: not processes_with("SOSMITH_TEST", tmp_path), 5)
     assert not list(tmp_path.rglob(".sosmith-*"))
+
+
+class InterruptedTerminal(io.TextIOBase):
+    """A terminal whose user presses Ctrl-C at the n-th write of the main thread, before or after it is shown."""
+
+    def __init__(self, at: int, *, before: bool) -> None:
+        self._at = at
+        self._before = before
+        self._screen = pyte.Screen(columns=120, lines=20)
+        self._stream = pyte.Stream(self._screen)
+        self.writes = 0
+
+    def isatty(self) -> bool:
+        return True
+
+    def write(self, text: str) -> int:
+        now = threading.current_thread() is threading.main_thread()
+        self.writes += now
+        if now and self.writes == self._at and self._before:
+            signal.raise_signal(signal.SIGINT)
+        self._stream.feed(text.replace("\n", "\r\n"))
+        if now and self.writes == self._at and not self._before:
+            signal.raise_signal(signal.SIGINT)
+        return len(text)
+
+    @property
+    def lines(self) -> list[str]:
+        """Every line with something on it, up to the time it took."""
+        return [line.partition("%")[0].rstrip() for line in self._screen.display if line.strip()]
+
+    @property
+    def hides_the_cursor(self) -> bool:
+        return bool(self._screen.cursor.hidden)
+
+
+def steps_on(terminal: InterruptedTerminal, monkeypatch: pytest.MonkeyPatch) -> bool:
+    """Show two steps on a terminal; return whether they came to their end."""
+    be_quiet(False)
+    monkeypatch.setattr(sys, "stderr", terminal)
+    monkeypatch.setenv("TERM", "xterm")
+    try:
+        with show_progress() as step:
+            for name in ("first", "second"):
+                step(name)
+                step(name, 1, 2)
+    except KeyboardInterrupt:
+        return False
+    return True
+
+
+@pytest.mark.parametrize("before", [True, False])
+def test_a_terminal_is_left_whole_wherever_ctrl_c_comes(before: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    terminal = InterruptedTerminal(0, before=before)
+    assert steps_on(terminal, monkeypatch)
+    ended = [f"✓ {name:<6} {'━' * 30} 100" for name in ("first", "second")]
+    assert terminal.lines == ended
+    writes = terminal.writes
+    assert writes > 4
+    for at in range(1, writes + 1):
+        terminal = InterruptedTerminal(at, before=before)
+        assert not steps_on(terminal, monkeypatch)
+        assert terminal.lines in ([], [ended[0].replace("first ", "first")], ended)
+        assert not terminal.hides_the_cursor
 
 
 def test_an_interrupted_exploration_says_where_it_goes_on(on_terminal: OnTerminal, tmp_path: Path) -> None:

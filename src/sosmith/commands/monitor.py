@@ -15,7 +15,7 @@ import click
 
 from sosmith.commands.options import BAUD, default_folder
 from sosmith.model.errors import SpecificationError
-from sosmith.terminal import note, output_option
+from sosmith.terminal import live, note, output_option
 
 if TYPE_CHECKING:
     from sosmith.host.alarms import Alarm
@@ -245,8 +245,9 @@ class _Monitor:
         from sosmith.host.live_view import render
 
         console = Console(stderr=True)
-        live = self._stack.enter_context(Live(console=console, refresh_per_second=REFRESHES, transient=False))
-        return lambda: live.update(render(readings, console.width))
+        view = Live(console=console, refresh_per_second=REFRESHES, transient=False)
+        self._stack.enter_context(live(view))
+        return lambda: view.update(render(readings, console.width))
 
     def _received(self, event: Any) -> None:
         from sosmith.host.line_protocol import influx_lines
