@@ -27,6 +27,9 @@ from sosmith.gen.verifier.program.normal_form import Form, constant, plus
 FLAGS = tuple(f"flag {place} of the calibration" for place in range(OF_INPUT))
 """Signals: the flags of a result, the lowest first."""
 
+CODE = "result of the calibration"
+"""Signal: its code."""
+
 CHANNEL = "channel of the calibration"
 """Signal: the channel of a result."""
 
@@ -34,13 +37,17 @@ CHANNEL = "channel of the calibration"
 def layout_of(netlist: Netlist, seams: AheadSeams, port: PortEntry, channel_bits: int = 0) -> dict[str, list[Field]]:
     """Return what the outputs of a calibration with results, flags and channels are made of."""
     left = [Field(flag, 1) for flag in FLAGS]
-    layout = {seams.code: [Field(seams.code, port.bits)]}
-    for name in seams.flags or (seams.code,):
+    layout, low = dict[str, list[Field]](), 0
+    for name in seams.code:
+        count = min(netlist.widths[name], port.bits - low)
+        layout[name] = [Field(CODE, count, low)]
+        low += count
+    for name in seams.flags or seams.code:
         count = netlist.widths[name] if seams.flags else OF_INPUT
         layout[name] = [*layout.get(name, []), *left[:count]]
         left = left[count:]
     if channel_bits:
-        dest = seams.dest or seams.code
+        dest = seams.dest or seams.code[0]
         layout[dest] = [*layout.get(dest, []), Field(CHANNEL, channel_bits)]
     return layout
 

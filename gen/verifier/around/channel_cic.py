@@ -32,7 +32,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 from sosmith.gen.verifier.around.bit_logic import BitLogic
-from sosmith.gen.verifier.around.calibration import CHANNEL, FLAGS, Gate, layout_of
+from sosmith.gen.verifier.around.calibration import CHANNEL, CODE, FLAGS, Gate, layout_of
 from sosmith.gen.verifier.around.logic import (
     BIT,
     Field,
@@ -50,7 +50,7 @@ from sosmith.gen.verifier.certificate_file import Certificate, DecimationEntry, 
 from sosmith.gen.verifier.graph import RejectedError, require
 from sosmith.gen.verifier.parallel.forms import shifted
 from sosmith.gen.verifier.parallel.netlist import Netlist
-from sosmith.gen.verifier.parallel.text import Bits, Choice, Statement, Word
+from sosmith.gen.verifier.parallel.text import Bits, Choice, Module, Statement, Word
 from sosmith.gen.verifier.program.normal_form import Form, constant, plus
 
 STATE = "state of the decimator"
@@ -128,9 +128,15 @@ def _sets(netlist: Netlist, register: str, by: str) -> bool:
 
 
 def check_channels(
-    netlist: Netlist, certificate: Certificate, channels: int, seams: Seams, names: Names, leaving: Part
+    netlist: Netlist,
+    box: Module | None,
+    certificate: Certificate,
+    channels: int,
+    seams: Seams,
+    names: Names,
+    leaving: Part,
 ) -> int:
-    """Check the decimator of several channels, and what is before it; return the number of registers.
+    """Check the decimator of several channels, and what is before it, the module `box`; return its number of registers.
 
     Raises
     ------
@@ -153,9 +159,9 @@ def check_channels(
         enters = _Enters(DATA, DEST, netlist.widths[DEST], ())
     else:
         port = entry.calibration.output
-        ahead = ahead_of(netlist, port.bits, bits)
+        ahead = ahead_of(netlist, box, port.bits, bits)
         layout = layout_of(netlist, ahead, port, bits)
-        enters = _Enters(ahead.code, CHANNEL, bits, FLAGS)
+        enters = _Enters(CODE, CHANNEL, bits, FLAGS)
 
     def valid(now: Logic) -> int:
         return gate.offered(now) if ahead is None else now.bit(ahead.valid)

@@ -33,7 +33,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
 
-from sosmith.gen.verifier.around.calibration import FLAGS, Ahead, layout_of
+from sosmith.gen.verifier.around.calibration import CODE, FLAGS, Ahead, layout_of
 from sosmith.gen.verifier.around.channel_cic import check_channels, names_of
 from sosmith.gen.verifier.around.logic import BIT, Field, Held, Logic, Part, Ranges, Signals, check_parts
 from sosmith.gen.verifier.around.passed_flags import check_passed
@@ -55,7 +55,7 @@ from sosmith.gen.verifier.graph import require
 from sosmith.gen.verifier.parallel.control import SINK, SOURCE
 from sosmith.gen.verifier.parallel.forms import shifted
 from sosmith.gen.verifier.parallel.netlist import Netlist
-from sosmith.gen.verifier.parallel.text import Bits
+from sosmith.gen.verifier.parallel.text import Bits, Module
 from sosmith.gen.verifier.program.normal_form import Form, constant, plus
 
 _DATA_REGISTERS = frozenset({"sum", "comb", "difference", "o_data"})
@@ -110,20 +110,21 @@ def check_decimator(text: str, certificate: Certificate, channels: int = 1) -> D
     several = channels > 1
     names = names_of(netlist) if several else None
     told = "o_rail" if entry.calibration is None and names is None else "o_flags"
+    box = modules.get(f"{certificate.name}_ahead")
     seams = seams_of(netlist, told, held=held, dest=None if names is None else names.dest)
     output = certificate.output
     word = _held_word(netlist) if held else ""
     leaving = _Holder(seams, output, word, entry.factor) if held else _Passing(seams, output)
     if names is None:
-        registers = _check_one(netlist, certificate, seams, leaving)
+        registers = _check_one(netlist, box, certificate, seams, leaving)
     else:
-        registers = check_channels(netlist, certificate, channels, seams, names, leaving)
+        registers = check_channels(netlist, box, certificate, channels, seams, names, leaving)
     check_passed(netlist, seams, word, (channels - 1).bit_length())
     check_signs(modules, output, CLOCK)
     return DecimatorVerdict(registers, entry.factor if held else 1, channels)
 
 
-def _check_one(netlist: Netlist, certificate: Certificate, seams: Seams, leaving: Part) -> int:
+def _check_one(netlist: Netlist, box: Module | None, certificate: Certificate, seams: Seams, leaving: Part) -> int:
     """Check the decimator of one channel, and what is before it."""
     entry = certificate.decimation
     assert entry is not None
@@ -132,8 +133,8 @@ def _check_one(netlist: Netlist, certificate: Certificate, seams: Seams, leaving
         cic = _Cic(entry, port, seams, _Source(SOURCE, DATA, ()), {"s_axis_tready": 1})
         return check_parts(netlist, [leaving, cic], Signals({DATA: [Field(DATA, port.bits)]}))
     port = entry.calibration.output
-    ahead = ahead_of(netlist, port.bits)
-    cic = _Cic(entry, port, seams, _Source(ahead.valid, ahead.code, FLAGS), {})
+    ahead = ahead_of(netlist, box, port.bits)
+    cic = _Cic(entry, port, seams, _Source(ahead.valid, CODE, FLAGS), {})
     parts = [leaving, cic, Ahead(ahead, cic.ready, netlist.widths[DATA])]
     return check_parts(netlist, parts, Signals(layout_of(netlist, ahead, port)))
 

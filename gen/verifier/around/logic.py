@@ -29,10 +29,11 @@ BIT: Ranges = ((0, 0), (1, 1))
 
 
 class Field(NamedTuple):
-    """A part of a word: the signal that it is, and its width."""
+    """A part of a word: the signal whose bits it is, their number, and the lowest of them."""
 
     signal: str
     width: int
+    low: int = 0
 
 
 class Held(NamedTuple):
@@ -244,8 +245,9 @@ class Logic:
             return self.signal(name)
         total: Form = {}
         done, width = 0, self._netlist.widths[name]
-        for signal, bits in self._layout[name]:
-            total = plus(total, self.signal(signal), 1 << done)
+        for signal, bits, low in self._layout[name]:
+            part = self.forms.floor(shifted(self.signal(signal), -low))
+            total = plus(total, self.forms.unsigned(part, bits), 1 << done)
             done += bits
         require(done <= width, f"{name} must have {done} bits, not {width}")
         return plus(total, self.forms.variable("rest", 0, (1 << width - done) - 1), 1 << done)

@@ -58,8 +58,9 @@ class AheadSeams:
         Input and output: whether there is a sample, and whether it is taken.
     ready, valid : str
         Input and output: whether a result is taken, and whether there is one.
-    code : str
-        Output: the code of a result, and above it its flags and its channel if there are no ports for these.
+    code : tuple of str
+        Outputs: the code of a result, or its digits from the lowest on. Above a code that is in one piece there are its
+        flags and its channel if there are no ports for these.
     flags : tuple of str
         Outputs with the flags, the lowest first.
     dest : str
@@ -71,7 +72,7 @@ class AheadSeams:
     taken: str
     ready: str
     valid: str
-    code: str
+    code: tuple[str, ...]
     flags: tuple[str, ...]
     dest: str
 
@@ -103,14 +104,16 @@ def seams_of(netlist: Netlist, told: str, *, held: bool, dest: str | None = None
     return Seams(entering, taken, ready, valid)
 
 
-def ahead_of(netlist: Netlist, bits: int, channel_bits: int = 0) -> AheadSeams:
-    """Find the ports of the calibration, whose results and their channels have so many bits.
+def ahead_of(netlist: Netlist, box: Module | None, bits: int, channel_bits: int = 0) -> AheadSeams:
+    """Find the ports of the calibration, the module `box`, whose results and their channels have so many bits.
 
     Raises
     ------
     RejectedError
         If it has others, or not all of them.
     """
+    if box is None:
+        raise RejectedError("the core must have a module for the calibration before its decimator")
     entering, others = _entering(netlist, AHEAD, (RESET, DATA, *([DEST] if channel_bits else [])))
     offered, taken, ready, valid = (_one_of(netlist, AHEAD, names) for names in (_OFFERED, _TAKEN, _READY, _VALID))
     require(
@@ -121,12 +124,38 @@ def ahead_of(netlist: Netlist, bits: int, channel_bits: int = 0) -> AheadSeams:
     flags = tuple(AHEAD + name for name in ("m_axis_tuser", "rail", "outside") if AHEAD + name in outlets)
     dest = AHEAD + "channel" if AHEAD + "channel" in outlets else ""
     outlets -= {*flags, dest}
-    require(len(outlets) == 1, f"the calibration must have one output for its results, not {len(outlets)}")
-    (code,) = outlets
-    beside = netlist.widths[code], sum(netlist.widths[name] for name in flags), netlist.widths.get(dest, 0)
+    code = tuple(sorted(outlets)) if len(outlets) == 1 else _digits(box, sorted(outlets), bits)
+    count = sum(netlist.widths[name] for name in code)
+    beside = count, sum(netlist.widths[name] for name in flags), netlist.widths.get(dest, 0)
     whole = (bits + OF_INPUT + channel_bits, 0, 0), (bits, OF_INPUT, channel_bits)
-    require(beside in whole, f"{code} must have {bits} bits, and {OF_INPUT} flags beside it")
+    named = " and ".join(code)
+    require(beside in whole[len(code) > 1 :], f"{named} must have {bits} bits, and {OF_INPUT} flags beside it")
     return AheadSeams(entering, offered, taken, ready, valid, code, flags, dest)
+
+
+def _digits(box: Module, outlets: Sequence[str], bits: int) -> tuple[str, ...]:
+    """Return the outputs of a calibration in the order of the digits of its result, of which they have all bits.
+
+    A digit is what a register has that is called ``given`` with its number, from its lowest bit on.
+    """
+    found: dict[int, tuple[str, int]] = {}
+    for outlet in outlets:
+        name = outlet.removeprefix(AHEAD)
+        driven = [value for target, value in box.assigns if target == Bits(name)]
+        source = Bits(name) if name in box.registers and not driven else next(iter(driven), None)
+        digit = (
+            re.fullmatch(r"given(0|[1-9]\d*)", source.name) if isinstance(source, Bits) and len(driven) < 2 else None
+        )
+        right = digit is not None and isinstance(source, Bits) and source.low == 0 and source.name in box.registers
+        require(right, f"{outlet} must be a digit of the result, as there are {len(outlets)} outputs for it")
+        assert digit is not None
+        found[int(digit[1])] = outlet, box.widths[name]
+    places = range(len(outlets))
+    require(found.keys() == {*places}, f"the digits of the calibration must be 0..{len(outlets) - 1}, each once")
+    below = [box.widths[f"given{place}"] == found[place][1] for place in places[:-1]]
+    whole = all(below) and sum(width for _, width in found.values()) == bits
+    require(whole, f"the digits of the calibration must have {bits} bits in all, and all of each but for the last")
+    return tuple(found[place][0] for place in places)
 
 
 def _entering(

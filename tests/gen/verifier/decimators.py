@@ -65,6 +65,7 @@ class Instrument(NamedTuple):
     hold: bool = False
     channels: int = 1
     core: str = "instrument"
+    output_bits: int = 10
 
     @property
     def text(self) -> str:
@@ -84,10 +85,10 @@ cutoff = 1.0
 decimate = {self.factor}
 hold = {str(self.hold).lower()}
 [output]
-bits = 10
+bits = {self.output_bits}
 range = [{low}.0, 16.0]
 unit = "mm"
-max_error = "faithful"
+max_error = {'"faithful"' if self.output_bits == 10 else 0.01}
 [hardware]
 architecture = "{self.architecture}"
 """
@@ -148,6 +149,8 @@ EDITS = [
     (r"\bwrites\b", "adds"),
     (r"signature__data_\[0\]", "signature__data_[1]"),
     (r"i_dest\b", "s_axis_tdest"),
+    (r"\{ (port_\w+), (port_\w+) \}", r"{ \2, \1 }"),
+    (r"\(i_data\[14:0\]\)", "({ i_data[0], i_data[14:1] })"),
     (r" < ", " > "),
     (r" >= ", " < "),
 ]

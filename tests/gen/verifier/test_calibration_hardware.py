@@ -15,7 +15,14 @@ CASES = [
     Instrument(),
     Instrument("serial", signed=True),
     Instrument("parallel", signed=True, factor=2, hold=True),
+    Instrument(output_bits=24),  # with a result of two digits, each a port of the calibration
+    Instrument(signed=True, output_bits=24),
 ]
+
+ENTERS = (
+    "ahead.m_axis_tvalid = 1, decimator.filling = 0, decimator.waiting = 0, "
+    "result of the calibration = 0..16777215, aresetn = 1, decimator.phase = 0"
+)
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -77,6 +84,41 @@ def test_sentences() -> None:
         "m_axis_tuser[7:3] = { 4'h0, aresetn }",
         "bit 3 of m_axis_tuser must be its flag as the core gives it, not another value",
     )
+
+
+def test_digits_that_are_wrong_are_rejected() -> None:
+    """A result of two words leaves the calibration in two ports, the lower digit whole and below the other."""
+    text, (_, certificate) = written(CASES[3]), designed(CASES[3])
+    low, high = ".given0(i_data[14:0])", ".port_486_0(i_data[23:15])"
+    assert (text.count(low), text.count(high)) == (1, 2)  # the second one of the decimator
+    check_decimator(text, certificate)
+
+    def rejected(wrong: str, sentence: str) -> None:
+        assert wrong != text
+        with pytest.raises(RejectedError, match=f"^{re.escape(sentence)}$"):
+            check_decimator(wrong, certificate)
+
+    digits = "ahead.port_486_0 must be a digit of the result, as there are 2 outputs for it"
+    driven = "  assign port_486_0 = given1[8:0];\n"
+    other = "not another value"
+    rejected(
+        text.replace(low, ".given0(i_data[23:9])").replace(high, ".port_486_0(i_data[8:0])", 1),
+        f"decimator.sum1 must be what a decimator has there after a clock with {ENTERS}, {other}",
+    )
+    rejected(
+        text.replace("{ port_486_0, port_484_0 }", "{ port_484_0, port_486_0 }"),
+        f"decimator.sum1 must be what a decimator has there after a clock with {ENTERS}, {other}",
+    )
+    rejected(text.replace(driven, "  assign port_486_0 = given1[9:1];\n"), digits)
+    rejected(text.replace(driven, "  assign port_486_0 = added[8:0];\n"), digits)
+    rejected(text.replace(driven, "  assign port_486_0 = total_high[8:0];\n"), digits)
+    rejected(text.replace(driven, ""), digits)
+    rejected(
+        text.replace(driven, "  assign port_486_0 = given0[8:0];\n"),
+        "the digits of the calibration must be 0..1, each once",
+    )
+    narrow = "the digits of the calibration must have 24 bits in all, and all of each but for the last"
+    rejected(text.replace("given0", "given2").replace("given1", "given0").replace("given2", "given1"), narrow)
 
 
 BROKEN = [
