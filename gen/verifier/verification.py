@@ -511,7 +511,13 @@ def _extremes(over: _Denominator, driven: Sequence[_Driven], *, rough: bool = Fa
         # No sum of all turns up to some n is beyond the sum of their own limits, and of 0 for a turn still to come.
         limits = [_extremes(over.turn, turn, rough=True) for turn in _turns(driven, over.step)]
         none = Fraction(0)
-        return sum((min(none, low) for low, _ in limits), none), sum((max(none, high) for _, high in limits), none)
+        in_turns = [
+            sum((min(none, low) for low, _ in limits), none),
+            sum((max(none, high) for _, high in limits), none),
+        ]
+        # Nor is it beyond the limits of the whole sums by more than all that is still to come of the constants.
+        beyond = over.norm(_still_to_come(over, apart), rough=True)
+        return max(in_turns[0], centre - reach - beyond), min(in_turns[1], centre + reach + beyond)
     more = _overshoot(over, apart, summed)
     if more is None or (max(more) > reach * _NEGLIGIBLE and not rough):
         return _running_extremes(over, summed)
@@ -536,15 +542,25 @@ def _overshoot(
     """
     if over.pieces is None:
         return None
-    steady, others = fmpq_poly([0]), [one for one in driven if one[1] <= 0 <= one[2]]
+    others = [one for one in driven if one[1] <= 0 <= one[2]]
     for numerator, low, high in apart:
-        constant = low if low > 0 else high
-        steady += numerator * _rational(constant)
-        others.append((numerator, low - constant, high - constant))
-    whole = over.polynomial * (steady(1) / over.polynomial(1))
-    falling = (whole - steady) / fmpq_poly([1, -1])
+        others.append((numerator, low - _constant(low, high), high - _constant(low, high)))
     largest = max(others, key=lambda one: (one[2] - one[1]) * over.norm(one[0], rough=True))
-    return over.pieces.excess(falling, *largest)
+    return over.pieces.excess(_still_to_come(over, apart), *largest)
+
+
+def _constant(low: Fraction, high: Fraction) -> Fraction:
+    """Return the end of a range without zero that is next to it."""
+    return low if low > 0 else high
+
+
+def _still_to_come(over: _Denominator, apart: Sequence[_Driven]) -> fmpq_poly:
+    """Numerator of what is still to come, behind each sample, of the constants in ranges that do not contain zero."""
+    steady = fmpq_poly([0])
+    for numerator, low, high in apart:
+        steady += numerator * _rational(_constant(low, high))
+    whole = over.polynomial * (steady(1) / over.polynomial(1))
+    return (whole - steady) / fmpq_poly([1, -1])
 
 
 def _summed_up(driven: Sequence[_Driven]) -> list[_Driven]:

@@ -25,6 +25,7 @@ outside_calibration are not part of this proof.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from itertools import pairwise
@@ -96,11 +97,7 @@ def check_program(
     """
     program = read_program(text)
     graph = joined(certificate)
-    run = _Run(program, graph, certificate)
-    try:
-        run.all()
-    except RejectedError as error:
-        raise _located(run, certificate) or error from None
+    run = _proven(program, graph, certificate)
     ends = [(port.lowest, port.highest) for port in certificate.inputs]
     judged = tuple((max(low, a), min(high, b)) for (low, high), (a, b) in zip(ends, run.judged, strict=True))
     for index, (port, found, wanted) in enumerate(zip(certificate.inputs, judged, calibrated or judged, strict=True)):
@@ -111,6 +108,21 @@ def check_program(
             f"{who} must judge {port.name} by the codes {wanted[0]}..{wanted[1]}, not {found[0]}..{found[1]}",
         )
     return ProgramVerdict(len(program.instructions), run.values, len(run.states), judged)
+
+
+def _proven(program: ProgramText, graph: Graph, certificate: Certificate) -> _Run:
+    """Return a run that proves a program by either guess of its states, or say what is wrong by the first one."""
+    run = _Run(program, graph, certificate)
+    try:
+        run.all()
+    except RejectedError as error:
+        other = _Run(program, graph, certificate, own_words=True)
+        if other.states != run.states:
+            with suppress(RejectedError):
+                other.all()
+                return other
+        raise _located(run, certificate) or error from None
+    return run
 
 
 def _check_order(program: ProgramText) -> None:
@@ -198,11 +210,13 @@ class _Accumulator:
 class _Run:
     """One sample of a program, on forms."""
 
-    def __init__(self, program: ProgramText, graph: Graph, certificate: Certificate) -> None:
+    def __init__(
+        self, program: ProgramText, graph: Graph, certificate: Certificate, *, own_words: bool = False
+    ) -> None:
         self.program, self.graph, self._certificate = program, graph, certificate
         self._bits = program.digit_bits
         self._forms = Forms()
-        self.states, self._floors = find_states(program, graph, certificate)
+        self.states, self._floors = find_states(program, graph, certificate, own_words=own_words)
         self._of = graph.values(self._forms, self._floors)
         base = 1 << self._bits
         self._words = [

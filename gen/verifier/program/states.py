@@ -5,7 +5,10 @@ sample, the words hold the state times the same power of two. States come first 
 hold is the floor of another one: a program keeps y(n-1) of a section with all its fraction bits, and reads x(n-1) of
 the next section there.
 
-This is a guess, which the checker proves: see `sosmith.gen.verifier.program.check`.
+Behind a section that does nothing, other states are the same at every sample, but in words of their own. So there are
+two guesses: that any state may be kept as a floor, or only one that takes over a FLOOR of what the other takes over.
+
+These are guesses, which the checker proves: see `sosmith.gen.verifier.program.check`.
 """
 
 from __future__ import annotations
@@ -14,7 +17,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-from sosmith.gen.verifier.certificate_file import Certificate
+from sosmith.gen.verifier.certificate_file import Certificate, Operation
 from sosmith.gen.verifier.program.graph_forms import Graph
 from sosmith.gen.verifier.program.run import Machine, samples
 from sosmith.gen.verifier.program.text import ProgramText
@@ -47,8 +50,10 @@ class State:
     shift: int
 
 
-def find_states(program: ProgramText, graph: Graph, certificate: Certificate) -> tuple[list[State], dict[int, int]]:
-    """Guess where a program keeps the states of a graph.
+def find_states(
+    program: ProgramText, graph: Graph, certificate: Certificate, *, own_words: bool = False
+) -> tuple[list[State], dict[int, int]]:
+    """Guess where a program keeps the states of a graph; with `own_words`, as floors only what the graph says is one.
 
     Returns
     -------
@@ -72,7 +77,7 @@ def find_states(program: ProgramText, graph: Graph, certificate: Certificate) ->
     address = 0
     while True:
         held = {state.node for state in found}
-        floors = _floors(graph, series, held)
+        floors = _floors(graph, series, held, own_words=own_words)
         left = [node for node in series if node not in held and node not in floors]
         tried = (_matched(program, graph, words, address, node, series[node]) for node in left)
         state = next((state for state in tried if state is not None), None)
@@ -133,16 +138,25 @@ def _fits(program: ProgramText, graph: Graph, state: State) -> bool:
     return -limit <= entry.low << state.shift and entry.high << state.shift < limit
 
 
-def _floors(graph: Graph, series: Mapping[int, list[int]], held: set[int]) -> dict[int, int]:
+def _floors(graph: Graph, series: Mapping[int, list[int]], held: set[int], *, own_words: bool) -> dict[int, int]:
     """Find the states that are the floor of one of those in words, at every sample."""
     floors = {}
     for node in series.keys() - held:
         for other in sorted(held):
             shift = graph.nodes[other].entry.frac - graph.nodes[node].entry.frac
-            if shift >= 0 and all(b >> shift == a for a, b in zip(series[node], series[other], strict=True)):
+            same = shift >= 0 and all(b >> shift == a for a, b in zip(series[node], series[other], strict=True))
+            if same and (not own_words or _takes_floor(graph, node, other)):
                 floors[node] = other
                 break
     return floors
+
+
+def _takes_floor(graph: Graph, node: int, other: int) -> bool:
+    """Whether a state takes over a FLOOR of what another takes over, or both repeat such states."""
+    (source,), (larger,) = (graph.nodes[state].entry.operands for state in (node, other))
+    while graph.nodes[source].entry.op is graph.nodes[larger].entry.op is Operation.DELAY:
+        (source,), (larger,) = (graph.nodes[state].entry.operands for state in (source, larger))
+    return graph.nodes[source].entry.op is Operation.FLOOR and graph.nodes[source].entry.operands == (larger,)
 
 
 def _shift(past: Sequence[int], codes: Sequence[int]) -> int | None:

@@ -111,6 +111,22 @@ def test_a_slow_filter(realization: str) -> None:
     assert core.check().instructions == len(core.program.instructions)
 
 
+NOTHING = re.sub(
+    r"filter = .*",
+    "filter = { sos = [[0.25, 0.5, 0.25, 1.0, -0.5, 0.25], [1.0, 0.0, 0.0, 1.0, 0.0, 0.0]] }",
+    PLAIN,
+).replace('"faithful"', "0.5")
+
+
+@pytest.mark.parametrize("start", ["zero", "steady"])
+@pytest.mark.parametrize("realization", ["df1", "df1_ef1"])
+def test_a_section_that_does_nothing(realization: str, start: str) -> None:
+    """Its output is a floor like its input, but has a word of its own."""
+    core = small(NOTHING.replace('"zero"', f'"{start}"'), realization=realization)
+    assert core.check().states == 6 + (start == "steady")
+    assert core.check().instructions == len(core.program.instructions)
+
+
 def test_the_lower_digits_of_an_input_are_not_negative() -> None:
     """So says the width of the accumulator, which a digit with a sign would exceed."""
     filters = 'filter = { family = "elliptic", kind = "bandstop", order = 1, cutoff = [10.0, 26.0]'
@@ -341,6 +357,12 @@ def test_a_hundred_edits() -> None:
     assert found["rejected"] > 30
     assert found["rejected for another instruction"] == 0
     assert found["accepted: unused field"] > 5
+
+
+@pytest.mark.slow
+def test_edits_of_a_section_that_does_nothing() -> None:
+    found = sweep(small(NOTHING.replace('"zero"', '"steady"')), 100, seed=3)
+    assert found["rejected"] > 50
 
 
 @pytest.mark.slow
