@@ -516,7 +516,9 @@ def _extremes(over: _Denominator, driven: Sequence[_Driven], *, rough: bool = Fa
             sum((max(none, high) for _, high in limits), none),
         ]
         # Nor is it beyond the limits of the whole sums by more than all that is still to come of the constants.
-        beyond = over.norm(_still_to_come(over, apart), rough=True)
+        coming = _still_to_come(over, apart)
+        odd = int(coming.denom()) // (int(coming.denom()) & -int(coming.denom()))  # a norm is of binary fractions
+        beyond = over.norm(coming * odd, rough=True) / odd
         return max(in_turns[0], centre - reach - beyond), min(in_turns[1], centre + reach + beyond)
     more = _overshoot(over, apart, summed)
     if more is None or (max(more) > reach * _NEGLIGIBLE and not rough):
