@@ -132,14 +132,26 @@ def state_bytes(datapath: Datapath) -> int:
 
 
 def _type_of_states(datapath: Datapath) -> str:
-    widths = [stage.graph.nodes[i].width for stage in datapath.stages for i in stage.graph.delays]
-    return _type(max(widths, default=1))
+    return _type(*(stage.graph.nodes[i] for stage in datapath.stages for i in stage.graph.delays))
 
 
-def _type(width: int) -> str:
+def _type(*nodes: Node) -> str:
+    """Return the type that holds the values of all `nodes`; all types are signed, whatever the sign of the values."""
+    width = max((signed_width(each.low, each.high) for each in nodes), default=1)
     if width > _WIDEST:
         raise ValueError(f"values of the C model must be at most {_WIDEST} bits wide, not {width}")
     return "int64_t" if width <= _NARROW else "__int128"
+
+
+def signed_width(low: int, high: int) -> int:
+    """Count the bits of two's complement that hold `low` to `high`, also where neither is negative.
+
+    Examples
+    --------
+    >>> signed_width(0, 2**63 - 1), signed_width(0, 2**63), signed_width(-(2**63), 0)
+    (64, 65, 64)
+    """
+    return max((-low - 1).bit_length() if low < 0 else 0, max(high, 0).bit_length()) + 1
 
 
 def _wire(index: int, node: int) -> str:
@@ -164,7 +176,7 @@ def _wires(datapath: Datapath) -> list[tuple[str, str]]:
     """Type and name of each input and of what stages hand on."""
     wires = [("int64_t", f"{port.name}_code") for port in datapath.inputs]
     for index, stage in enumerate(datapath.stages):
-        wires += [(_type(stage.graph.nodes[i].width), _wire(index, i)) for i in _exported(datapath, index)]
+        wires += [(_type(stage.graph.nodes[i]), _wire(index, i)) for i in _exported(datapath, index)]
     return wires
 
 
@@ -202,7 +214,7 @@ def _statements(graph: Graph, index: int, wires: list[str], offset: int) -> list
         else:
             expression = _expression(graph, node, f"n{index}_")
         comment = f" /* {node.name}, {node.format} */" if node.name else ""
-        statements.append(f"const {_type(node.width)} {_wire(index, i)} = {expression};{comment}")
+        statements.append(f"const {_type(node)} {_wire(index, i)} = {expression};{comment}")
     statements += [
         f"state->s[{offset + k}] = {_wire(index, graph.nodes[i].operands[0])};" for k, i in enumerate(graph.delays)
     ]
@@ -241,7 +253,7 @@ def _status(datapath: Datapath) -> str:
 def _expression(graph: Graph, node: Node, prefix: str) -> str:
     operands = [graph.nodes[i] for i in node.operands]
     names = [f"{prefix}{i}" for i in node.operands]
-    kind = _type(max([node.width, *(operand.width for operand in operands)]))
+    kind = _type(node, *operands)
     if node.op is Op.CONSTANT:
         return _literal(node.parameter)
     if node.op in {Op.ADD, Op.SUBTRACT}:
@@ -253,7 +265,9 @@ def _expression(graph: Graph, node: Node, prefix: str) -> str:
     if node.op is Op.MULTIPLY:
         return f"({kind}){names[0]} * {names[1]}"
     if node.op is Op.FLOOR:
-        return f"{names[0]} >> {operands[0].frac - node.frac}"
+        # By one bit less than the word has at most, as C leaves more undefined; that is the sign already.
+        last = (_WIDEST if _type(*operands) == "__int128" else _NARROW) - 1
+        return f"{names[0]} >> {min(operands[0].frac - node.frac, last)}"
     if node.op is Op.TRUNCATE:  # as C99 divides
         return f"{names[0]} / {_power(operands[0].frac - node.frac)}"
     if node.op is Op.FRACTION:

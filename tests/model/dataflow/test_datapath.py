@@ -68,6 +68,36 @@ def test_values_wider_than_a_machine_word_stay_exact() -> None:
     assert datapath.compute(codes).tolist() == datapath.compute_exact(codes)
 
 
+def of_one_input(g: GraphBuilder, wire: int, bits: int) -> Datapath:
+    """Close a graph whose input x has so many bits without sign, and limit `wire` to an output of eight bits."""
+    stage = HornerStep("only", g.build([g.clamp(g.floor(wire, 0), -128, 127)]))
+    return Datapath(
+        name="edge",
+        inputs=(Port.from_range("x", bits, Fraction(0), Fraction(1)),),
+        output=Port.from_range("y", 8, Fraction(-1), Fraction(1), signed=True),
+        stages=(stage,),
+    )
+
+
+def test_values_without_sign_that_fill_a_machine_word_stay_exact() -> None:
+    """The types of C are signed: 64 bits without a sign take 65 there."""
+    g = GraphBuilder()
+    x = g.input("x", 0, 0, (1 << 30) - 1)
+    product = g.scale(x, (1 << 34) - 1, 0)
+    assert (g[product].signed, g[product].width) == (False, 64)
+    datapath = of_one_input(g, g.shift(product, -58), 30)
+    codes = np.array([[0], [1], [(1 << 29) - 1], [1 << 29], [(1 << 30) - 1]])
+    assert datapath.compute(codes).tolist() == datapath.compute_exact(codes) == [0, 0, 31, 31, 63]
+
+
+def test_shifts_by_a_whole_machine_word_leave_the_sign() -> None:
+    g = GraphBuilder()
+    tiny = g.shift(g.subtract(g.input("x", 0, 0, 255), g.constant(128, 0)), -70)
+    datapath = of_one_input(g, tiny, 8)
+    codes = np.array([[0], [127], [128], [255]])
+    assert datapath.compute(codes).tolist() == datapath.compute_exact(codes) == [-1, -1, 0, 0]
+
+
 def test_c_text_is_the_same_on_every_run() -> None:
     one, two = (cascade(butterworth(5, 0.02)) for _ in range(2))
     assert (c_source(one), c_header(one)) == (c_source(two), c_header(two))
