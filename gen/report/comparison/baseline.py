@@ -80,6 +80,8 @@ class Judged:
         "better", "equal", "within" the tolerance, "worse" or "not comparable".
     reason : str
         Why it is not comparable, else empty.
+    same_unit : bool
+        Whether both values have the same unit.
     """
 
     figure: str
@@ -89,6 +91,7 @@ class Judged:
     tolerance: Tolerance
     verdict: str
     reason: str = ""
+    same_unit: bool = True
 
     @property
     def passed(self) -> bool:
@@ -99,7 +102,7 @@ class Judged:
     def change(self) -> str:
         """Change from the baseline in per cent, empty where that has no meaning."""
         before, after = self.values
-        if before is None or after is None or before == 0:
+        if before is None or after is None or before == 0 or not self.same_unit:
             return ""
         return f"{100 * (after - before) / abs(before):+.2f} %".replace("-", "−")
 
@@ -223,6 +226,7 @@ def _judged(baseline: Report, candidate: Report, name: str, allowed: Tolerance) 
         tolerance=allowed,
         verdict=verdict,
         reason=reason,
+        same_unit=units[0] == units[1] or figure.kind not in {"accuracy", "bounds"},
     )
 
 

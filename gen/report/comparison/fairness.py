@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from sosmith.gen.report.comparison.report_file import Report, fact
+from sosmith.gen.specification.values import listed
 
 
 @dataclass(frozen=True)
@@ -47,8 +48,7 @@ def fairness(reports: Sequence[Report]) -> Fairness:
 
 def _reference(reports: Sequence[Report]) -> str:
     if _differ(reports, "error.unit"):
-        units = _listed(reports, "error.unit").replace(", ", " and ")
-        return f"Errors in {units} cannot be compared."
+        return f"Errors in {listed(_distinct(reports, 'error.unit'))} cannot be compared."
     if _unknown(reports, "provenance.reference_sha256"):
         return "A report of an earlier version does not tell which exact calculation the hardware was held against."
     if _differ(reports, "provenance.reference_sha256"):
@@ -88,6 +88,9 @@ def _unknown(reports: Sequence[Report], key: str) -> bool:
 
 
 def _listed(reports: Sequence[Report], key: str) -> str:
-    """Join the distinct values, in the order of the reports; without a unit, numbers are plain."""
-    found = dict.fromkeys(str(fact(report, key)) or "plain numbers" for report in reports)
-    return ", ".join(found)
+    return ", ".join(_distinct(reports, key))
+
+
+def _distinct(reports: Sequence[Report], key: str) -> list[str]:
+    """Return the distinct values, in the order of the reports; without a unit, numbers are plain."""
+    return list(dict.fromkeys(str(fact(report, key)) or "plain numbers" for report in reports))

@@ -348,6 +348,17 @@ def test_reasons_beside_the_baseline() -> None:
     ]
 
 
+def test_values_of_different_units_have_no_change_in_per_cent() -> None:
+    one = judged(report(**WORSE, **{"error.unit": "V"}), "error=5%,bound=0,latency=0")
+    assert [each.change for each in one.judged] == ["", "", judged(report(**WORSE), "latency=0").judged[0].change]
+    assert one.judged[2].change.endswith(" %")
+
+
+def test_several_units_are_listed() -> None:
+    found = fairness([report(**{"error.unit": unit}) for unit in ("kPa", "bar", "", "kPa")])
+    assert found.bounds == "Errors in kPa, bar and plain numbers cannot be compared."
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
