@@ -35,7 +35,7 @@ def test_the_locomotive_is_proven_again() -> None:
     agreement = check_specification(certificate, locomotive_text(), verdict.margin)
     assert agreement.distance is not None
     assert agreement.distance < 2**-100
-    held = locomotive_text().replace("[filter]", "[filter]\nhold = true")
+    held = locomotive_text(hold=True)
     assert check_specification(certificate, held, verdict.margin) == agreement
 
 

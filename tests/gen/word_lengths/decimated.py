@@ -15,22 +15,24 @@ from sosmith.gen.specification.specification import Specification, from_text
 from sosmith.gen.verifier.certificate_file import Certificate, certificate_text
 
 
-def locomotive_text(decimate: str = '"auto"', architecture: str = "auto") -> str:
+def locomotive_text(decimate: str = '"auto"', architecture: str = "auto", *, hold: bool = False) -> str:
     """Return the locomotive's specification with a decimator before its filter."""
     text = (EXAMPLES / "flange_wear_locomotive.toml").read_text(encoding="utf-8")
-    text = text.replace("order = 7\n", f"order = 7\ndecimate = {decimate}\n")
+    text = text.replace("order = 7\n", f"order = 7\ndecimate = {decimate}\nhold = {str(hold).lower()}\n")
     return text.replace('architecture = "auto"', f'architecture = "{architecture}"')
 
 
-def locomotive_spec(decimate: str = '"auto"', architecture: str = "auto") -> Specification:
+def locomotive_spec(decimate: str = '"auto"', architecture: str = "auto", *, hold: bool = False) -> Specification:
     """Return the same, read."""
-    return from_text(locomotive_text(decimate, architecture), Path("locomotive.toml"))
+    return from_text(locomotive_text(decimate, architecture, hold=hold), Path("locomotive.toml"))
 
 
 @cache
-def locomotive(decimate: str = '"auto"', architecture: str = "auto", core: str = "filter") -> CoreDesign:
+def locomotive(
+    decimate: str = '"auto"', architecture: str = "auto", core: str = "filter", *, hold: bool = False
+) -> CoreDesign:
     """Design its filter, or all of it."""
-    return design_core(locomotive_spec(decimate, architecture), core=core)
+    return design_core(locomotive_spec(decimate, architecture, hold=hold), core=core)
 
 
 INSTRUMENT = """

@@ -212,8 +212,8 @@ def test_registers_too_wide_for_the_models() -> None:
 
 @pytest.mark.parametrize("hold", [False, True])
 def test_wear_is_judged_behind_the_filter(hold: bool) -> None:
-    text = locomotive_text(architecture="folded") + "\n[wear]\ninitial = 4.0\nwarning = 1.4\nlimit = 1.8\n"
-    text = text.replace("order = 7\n", f"order = 7\nhold = {str(hold).lower()}\n")
+    wear = "\n[wear]\ninitial = 4.0\nwarning = 1.4\nlimit = 1.8\n"
+    text = locomotive_text(architecture="folded", hold=hold) + wear
     made = design_core(from_text(text, Path("locomotive.toml")))
     assert len(made.datapath.wear) == 1
     ahead, decimator = made.datapath.ahead, made.datapath.decimator

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.gen.report.pictures import without_pictures
-from tests.gen.word_lengths.decimated import locomotive, locomotive_text
+from tests.gen.word_lengths.decimated import locomotive
 from tests.sim.lint import icarus_check, lint
 from tests.sim.stream.proof_and_hardware import check_proof_and_hardware
 from tests.sim.stream.random_lowpass import lowpass
@@ -22,7 +22,6 @@ from tests.sim.stream.random_lowpass import lowpass
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.output.generate import generate
 from sosmith.gen.report.report import write_report
-from sosmith.gen.specification.specification import from_text
 from sosmith.gen.stimuli import bench_of, traces_for
 from sosmith.interface.specification import Specification
 from sosmith.model.reference.golden import entering_filter, filtered
@@ -62,10 +61,10 @@ def test_hardware_equals_the_integer_model(architecture: str, simulator: str, tm
     assert "49.74122 Hz to 50 Hz" in page
 
 
+@without_pictures
 @pytest.mark.parametrize(("architecture", "simulator"), [("folded", "verilator"), ("parallel", "icarus")])
 def test_held_results_come_as_often_as_samples(architecture: str, simulator: str, tmp_path: Path) -> None:
-    text = locomotive_text(architecture=architecture).replace("order = 7\n", "order = 7\nhold = true\n")
-    made = design_core(from_text(text, Path("locomotive.toml")), core="filter")
+    made = locomotive(architecture=architecture, hold=True)
     bare = locomotive(architecture=architecture).architecture
     assert (made.architecture.copies_per_result, bare.copies_per_result) == (16, 1)
     assert made.architecture.cycles_per_result == bare.cycles_per_result
@@ -80,8 +79,7 @@ def test_held_results_come_as_often_as_samples(architecture: str, simulator: str
 @pytest.mark.parametrize("hold", [False, True])
 def test_vectors_have_a_result_for_every_16th_sample(hold: bool, tmp_path: Path) -> None:
     """The last of three groups is not complete: its result is there, and as often as the others if it is held."""
-    text = locomotive_text(architecture="folded").replace("order = 7\n", f"order = 7\nhold = {str(hold).lower()}\n")
-    made = design_core(from_text(text, Path("locomotive.toml")), core="filter")
+    made = locomotive(architecture="folded", hold=hold)
     trace = samples_of(made, 40)
     expected = made.datapath.compute(trace.codes).tolist()
     assert len(expected) == 3
@@ -98,8 +96,7 @@ def test_vectors_have_a_result_for_every_16th_sample(hold: bool, tmp_path: Path)
 
 
 def test_held_results_take_no_longer(tmp_path: Path) -> None:
-    text = locomotive_text(architecture="folded").replace("order = 7\n", "order = 7\nhold = true\n")
-    made = design_core(from_text(text, Path("locomotive.toml")), core="filter")
+    made = locomotive(architecture="folded", hold=True)
     stated, decimator = made.architecture, made.datapath.decimator
     assert decimator is not None
     evidence = simulate(made, [samples_of(made, 801)], tmp_path, seed=1, idle=0.0, stall=0.0)

@@ -92,7 +92,7 @@ def test_the_locomotive_on_its_worst_case(simulator: str, tmp_path: Path) -> Non
 
 def test_wear_held_and_judged(tmp_path: Path) -> None:
     """The locomotive's readings rise over the limits of wear; each result leaves once for each of its samples."""
-    text = locomotive_text(architecture="folded").replace("order = 7\n", "order = 7\nhold = true\n") + WEAR
+    text = locomotive_text(architecture="folded", hold=True) + WEAR
     made = design_core(from_text(text, Path("locomotive.toml")))
     (trace,) = traces_for(made, "worst_case", seed=1)
     codes = np.repeat(np.array([[20000, 20000], [32000, 20000], [60000, 20000]]), 700, axis=0)
