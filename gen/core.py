@@ -235,7 +235,8 @@ def _check_realization(spec: Specification, wanted: str, widths_of: str | None, 
         )
     if spec.hardware.pipeline == "look-ahead" and (wanted != AUTO or widths_of is not None):
         raise SpecificationError(
-            f'the realization must be auto with hardware.pipeline = "look-ahead", not {widths_of or wanted}'
+            f'{spec.path}: the realization must be auto with hardware.pipeline = "look-ahead", not '
+            f"{widths_of or wanted}"
         )
 
 
@@ -334,23 +335,19 @@ def front_in(spec: Specification, core: str, polynomial: Polynomial | None) -> t
     Raises
     ------
     ShortfallError
-        If the factor that is asked for lets too much fold into the pass band, or takes too many bits; with the name of
-        the specification's file.
+        If the factor that is asked for lets too much fold into the pass band, or takes too many bits.
     """
     if spec.filter.decimate is None or core == "calibration":
         return None, {}
-    try:
-        front, reason = front_of(
-            spec.filter,
-            spec.sample_rate,
-            _inputs(spec, core),
-            spec.output,
-            spec.max_error,
-            polynomial,
-            f"{spec.name}_ahead",
-        )
-    except ShortfallError as error:
-        raise ShortfallError(f"{spec.path}: {error}") from None
+    front, reason = front_of(
+        spec.filter,
+        spec.sample_rate,
+        _inputs(spec, core),
+        spec.output,
+        spec.max_error,
+        polynomial,
+        f"{spec.name}_ahead",
+    )
     return front, {"decimation": reason}
 
 
@@ -443,5 +440,16 @@ def calibrated_codes(inputs: Sequence[Port], fitted: Fit) -> tuple[tuple[int, in
 
 
 def filter_of(spec: Specification) -> Filter:
-    """Design the filter of a specification."""
-    return design(spec.filter, spec.sample_rate)
+    """Design the filter of a specification.
+
+    Raises
+    ------
+    SpecificationError
+        If its edges and losses need an order that is too high.
+    ShortfallError
+        If a pole lies too close to the unit circle.
+    """
+    try:
+        return design(spec.filter, spec.sample_rate)
+    except SpecificationError as error:
+        raise SpecificationError(f"{spec.path}: {error}") from None

@@ -4,6 +4,12 @@ Every message is one sentence that the user can act on: it names the file, key o
 and what was found. Only the command line catches these errors.
 """
 
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
 
 class SosmithError(Exception):
     """An expected failure; `exit_status` is what the command line returns for it."""
@@ -15,6 +21,15 @@ class ShortfallError(SosmithError):
     """The result falls short: a mismatch, a bound exceeded, a specification that cannot be met."""
 
     exit_status = 1
+
+
+@contextmanager
+def falling_short(path: Path) -> Iterator[None]:
+    """Put the name of the file at `path` before what falls short of it as a whole, and so names no key."""
+    try:
+        yield
+    except ShortfallError as error:
+        raise ShortfallError(f"{path}: {error}") from None
 
 
 class SpecificationError(SosmithError):

@@ -130,7 +130,7 @@ def test_a_design_that_cannot_meet_its_specification_falls_short(sosmith: Comman
     assert (outcome.status, outcome.stdout) == (1, "")
     (message,) = outcome.messages
     assert re.fullmatch(
-        r"sosmith: error: none of the \d realizations meets the specification: (with df1_ef2, )?"
+        r"sosmith: error: plain\.toml: none of the \d realizations meets the specification: (with df1_ef2, )?"
         r"the filter's coefficients must keep their error below .*: "
         r"raise output\.max_error or raise output\.bits",
         message,
@@ -199,8 +199,8 @@ def test_reload_refuses_a_set_that_breaks_the_bound(sosmith: Command) -> None:
     assert (outcome.status, outcome.stdout) == (1, "")
     (message,) = outcome.messages
     assert re.fullmatch(
-        r"sosmith: error: the set must keep its error within 250 × 10⁻⁶, and is proven to [\d.]+ × 10⁻⁶ only: "
-        "nothing is to be loaded",
+        r"sosmith: error: next\.toml: the set must keep its error within 250 × 10⁻⁶, and is proven to [\d.]+ × 10⁻⁶ "
+        "only: nothing is to be loaded",
         message,
     )
     assert not Path("build").exists()

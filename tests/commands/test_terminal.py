@@ -99,7 +99,9 @@ def test_progress_on_a_terminal_ends_before_the_error(on_terminal: OnTerminal, t
     assert running.wait(HANGS) == 1
     assert terminal.is_left_whole()
     (error,) = [k for k, line in enumerate(terminal.lines) if line.startswith("sosmith: error: ")]
-    assert terminal.lines[error].startswith("sosmith: error: none of the 8 realizations meets the specification")
+    assert terminal.lines[error].startswith(
+        "sosmith: error: plain.toml: none of the 8 realizations meets the specification"
+    )
     assert error > 3
     assert all(line.startswith("✓") for line in terminal.lines[:error])
 

@@ -116,6 +116,25 @@ def test_codes_that_do_not_fit(codes: list[float], message: str) -> None:
         filter_design().run_codes(x=codes)
 
 
+def test_what_refuses_a_specification_as_a_whole_names_its_file() -> None:
+    bands = {"passband_edge": 100.0, "stopband_edge": 101.0, "passband_loss": 0.01, "stopband_loss": 90.0}
+    for changes, error, message in (
+        (
+            {"output": FILTER["output"] | {"max_error": 0.00097656250001}},
+            sosmith.ShortfallError,
+            "the filter's coefficients must ",
+        ),
+        ({"filter": {"family": "butterworth", "kind": "lowpass", **bands}}, SpecificationError, "filter's edges and "),
+        (
+            {"filter": FILTER["filter"] | {"order": 2}, "hardware": {"architecture": "serial", "clock": 1000}},
+            sosmith.ShortfallError,
+            "none of the 8 realizations meets the specification: with df1_ef2, the serial architecture takes ",
+        ),
+    ):
+        with pytest.raises(error, match=f"^specification: {message}"):
+            sosmith.design(FILTER | changes)  # type: ignore[arg-type]
+
+
 def test_names_that_do_not_exist_are_refused_before_the_design() -> None:
     for options, message in (
         ({"board": "icebraker"}, r"the board must be one of .*, not icebraker \(did you mean icebreaker\?\)"),

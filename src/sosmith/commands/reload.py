@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from sosmith.commands.options import BAUD, BOARD, CORE, PORT, REALIZATION, SPEC, WIDTHS_OF, default_folder
+from sosmith.model.errors import falling_short
 from sosmith.model.text_files import to_json, write_files
 from sosmith.terminal import JSON_OPTION, note, output_option, print_json, show_progress
 
@@ -86,8 +87,10 @@ def reload_command(
 
         made = design(asked, core=core, realization=realization, widths_of=widths_of, board=board, progress=step).core
         step("set")
-        new = set_for(made, wanted)
-        before = own_set(made) if running is None else set_for(made, running)
+        with falling_short(other):
+            new = set_for(made, wanted)
+        with falling_short(active or spec):
+            before = own_set(made) if running is None else set_for(made, running)
         step("swap")
         swap = check_swap(made, None if reset else before, new)
     tree = reload_json(made, swap, version)

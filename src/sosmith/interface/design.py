@@ -25,7 +25,7 @@ from sosmith.interface.notebook import table_html
 from sosmith.interface.quantity import Quantity
 from sosmith.interface.specification import Specification, specification_of
 from sosmith.interface.trace import Trace
-from sosmith.model.errors import SpecificationError
+from sosmith.model.errors import SpecificationError, falling_short
 from sosmith.model.reference.golden import entering_filter, filtered
 
 if TYPE_CHECKING:
@@ -740,12 +740,14 @@ def design(
     sosmith.model.errors.SpecificationError: the realization must be auto, df1, ..., not df3 (did you mean df1?)
     """
     target = None if board is None else find_board(board)
-    made = design_core(
-        specification_of(specification).checked,
-        core=core,
-        realization=realization,
-        widths_of=widths_of,
-        board=target,
-        progress=lambda step: progress(step, 0, 0),
-    )
+    spec = specification_of(specification).checked
+    with falling_short(spec.path):
+        made = design_core(
+            spec,
+            core=core,
+            realization=realization,
+            widths_of=widths_of,
+            board=target,
+            progress=lambda step: progress(step, 0, 0),
+        )
     return Design(made)

@@ -109,7 +109,7 @@ def side_by_side(tell: Tell, *, text: str, path: str) -> list[dict[str, Any]]:
         try:
             made = sosmith.design(spec, realization=name)
         except (sosmith.ShortfallError, sosmith.SpecificationError) as error:  # look-ahead chooses for itself
-            row: dict[str, Any] = {"realization": name, "refused": str(error)}
+            row: dict[str, Any] = {"realization": name, "refused": str(error).removeprefix(f"{path}: ")}
         else:
             row = {
                 "realization": name,

@@ -108,7 +108,7 @@ def test_auto_looks_ahead_where_clock_and_rate_ask_for_it(clock: str, rate: str,
 
 def test_a_realization_cannot_be_asked_for_with_look_ahead() -> None:
     spec = from_text(text(), Path("audio.toml"))
-    message = 'the realization must be auto with hardware.pipeline = "look-ahead", not df1'
+    message = 'audio.toml: the realization must be auto with hardware.pipeline = "look-ahead", not df1'
     with pytest.raises(SpecificationError, match=f"^{re.escape(message)}$"):
         design_core(spec, realization="df1")
     with pytest.raises(SpecificationError, match=f"^{re.escape(message)}$"):

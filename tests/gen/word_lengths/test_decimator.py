@@ -165,11 +165,11 @@ def test_an_input_as_wide_as_can_be() -> None:
         front_of(spec.filter, spec.sample_rate, (x,), sharp, Fraction(16, 2**32))
 
 
-def test_a_factor_that_lets_too_much_fold_is_refused_with_the_name_of_the_file() -> None:
+def test_a_factor_that_lets_too_much_fold_is_refused() -> None:
     text = locomotive_text("64").replace("max_error = 0.00025", "max_error = 1e-6")
     text = text.replace("[output]\nbits = 16", "[output]\nbits = 30")
     sentence = (
-        "locomotive.toml: filter.decimate must be so small that a full-scale sine which folds into the pass band is at "
+        "filter.decimate must be so small that a full-scale sine which folds into the pass band is at "
         "most output.max_error with 8 stages of at most 63 bits, not 64"
     )
     with refused(sentence, ShortfallError):
