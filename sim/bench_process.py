@@ -11,16 +11,23 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import signal
 import subprocess
 import sys
+import threading
+import time
 from pathlib import Path
 from typing import Any
 
 from sosmith.model.errors import ToolError
 
+_LOOK_SECONDS = 0.5
+"""How often it looks whether its parent is still there."""
+
 
 def main() -> None:
     """Build if anything changed since the last build, then run."""
+    threading.Thread(target=_end_with, args=(os.getppid(),), daemon=True).start()
     job = json.loads((Path(sys.argv[1]) / "job.json").read_text(encoding="utf-8"))
     try:
         _RUNS[job["simulator"]](job)
@@ -29,6 +36,13 @@ def main() -> None:
         sys.exit(1)
     except ToolError as error:
         sys.exit(str(error))
+
+
+def _end_with(parent: int) -> None:
+    """End this process, and all that it has started, once its parent is gone: killed, it could not do so itself."""
+    while os.getppid() == parent:
+        time.sleep(_LOOK_SECONDS)
+    os.killpg(0, signal.SIGKILL)  # the bench has a session of its own
 
 
 def _run_verilator(job: dict[str, Any]) -> None:

