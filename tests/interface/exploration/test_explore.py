@@ -9,6 +9,7 @@ import re
 import signal
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from collections.abc import Iterator
@@ -216,6 +217,24 @@ def started(*command: str, folder: Path) -> Iterator[subprocess.Popen[str]]:
         with suppress(ProcessLookupError):
             os.killpg(running.pid, signal.SIGKILL)
         running.communicate()
+
+
+def hangs_at_the_second(task: Any) -> Any:
+    """Stand for an evaluation: leaves a temporary folder, and never ends if the task is true."""
+    made = {"folder": tempfile.mkdtemp()}
+    if task:
+        time.sleep(600)
+    return made
+
+
+def test_what_processes_leave_that_are_ended_is_deleted(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(processes, "evaluate", hangs_at_the_second)
+    batches: Any = [[False, True]]
+    results = processes.in_processes(batches, 2)
+    folder = Path(next(results)["folder"])
+    assert folder.is_dir()
+    results.close()
+    assert not folder.exists()
 
 
 def command_line(folder: Path, *more: str) -> list[str]:
