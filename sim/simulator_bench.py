@@ -27,6 +27,7 @@ from sosmith.sim.verilated_model import LIBRARY_SECONDS, Builder
 
 _POLL_SECONDS = 0.05
 _LOG_TAIL = 12  # lines of the log shown in an error
+_ROOM = 1 << 16  # bytes; a disk with less is full
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -230,6 +231,8 @@ def _run(folder: Path, tool: Simulator, total: int, progress: Progress) -> None:
                 os.killpg(process.pid, signal.SIGKILL)
                 process.wait()
     if not (folder / "result.json").exists():
+        if shutil.disk_usage(folder).free < _ROOM:  # the log has not taken what the tools said of it
+            raise ToolError(f"{folder}: the disk must have room for the simulation, not be full")
         tail = "\n".join(log.read_text(encoding="utf-8", errors="replace").splitlines()[-_LOG_TAIL:])
         raise ToolError(f"{tool.name} {tool.version} failed; the end of {log}:\n{tail}")
     progress(total, total)

@@ -108,7 +108,8 @@ def read_csv_table(
                 _check_header(where, header, known, required)
                 continue
             if len(cells) != len(header):
-                raise SpecificationError(f"{where}: row must have {len(header)} cells, not {len(cells)}")
+                expected = "1 cell" if len(header) == 1 else f"{len(header)} cells"
+                raise SpecificationError(f"{where}: row must have {expected}, not {len(cells)}")
             rows.append([_number(where, name, cell, readers or {}) for name, cell in zip(header, cells, strict=True)])
             lines.append(reader.line_num)
     except csv.Error as error:

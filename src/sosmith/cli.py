@@ -217,13 +217,24 @@ def main() -> None:
         error.show()
         status = error.exit_code
     except (KeyboardInterrupt, click.Abort):
-        note("interrupted")
-        status = _INTERRUPTED
+        status = _interrupted()
+    except RuntimeError as error:
+        # As Python 3.11 wraps what a signal's handler raises while a library makes a class.
+        if isinstance(error.__cause__, SystemExit):
+            raise error.__cause__ from None
+        if not isinstance(error.__cause__, KeyboardInterrupt):
+            raise
+        status = _interrupted()
     except OSError as error:
         note(f"error: {error.filename or 'the output'} must be readable and writable, not: {error.strerror}")
         status = ToolError.exit_status
         silence_stdout()
     sys.exit(status)
+
+
+def _interrupted() -> int:
+    note("interrupted")
+    return _INTERRUPTED
 
 
 def _stop(number: int, frame: FrameType | None) -> None:

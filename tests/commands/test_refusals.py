@@ -169,7 +169,7 @@ BAD_TRACES: dict[str, tuple[str, str | bytes, str]] = {
         "trace.csv must hold rows of numbers below its header, not only the header",
     ),
     "ragged row": ("plain", "time_s,x_code\n0,1\n0.001\n", "trace.csv, line 3: row must have 2 cells, not 1"),
-    "long row": ("plain", "x_code\n1\n2,3\n", "trace.csv, line 3: row must have 1 cells, not 2"),
+    "long row": ("plain", "x_code\n1\n2,3\n", "trace.csv, line 3: row must have 1 cell, not 2"),
     "word": ("plain", "x_code\n1\nhigh\n", "trace.csv, line 3: x_code must be a finite number, not 'high'"),
     "empty cell": ("plain", "time_s,x_code\n0,\n", "trace.csv, line 2: x_code must be a finite number, not ''"),
     "NaN": ("plain", "x_code\n1\nnan\n", "trace.csv, line 3: x_code must be a finite number, not 'nan'"),

@@ -11,6 +11,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import pyte
 import pytest
@@ -24,6 +25,7 @@ from tests.commands.command_line import (
     wait_for,
 )
 
+from sosmith import cli
 from sosmith.sim import simulators
 from sosmith.sim.build_cache import LIMIT, BuildCache
 from sosmith.terminal import be_quiet, show_progress
@@ -257,6 +259,32 @@ def test_a_full_disk_is_one_sentence(process: Start, tmp_path: Path) -> None:
     assert running.returncode == 3
     message = "sosmith: error: the output must be readable and writable, not: No space left on device"
     assert [line for line in errors.splitlines() if not PROGRESS.search(line)] == [message]
+
+
+class Interrupting:
+    """What is interrupted as it becomes part of a class: up to Python 3.11, that is a RuntimeError."""
+
+    def __init__(self, interrupt: BaseException) -> None:
+        self._interrupt = interrupt
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        raise self._interrupt
+
+
+@pytest.mark.parametrize(("interrupt", "status"), [(KeyboardInterrupt(), 130), (SystemExit(143), 143)])
+def test_a_signal_while_a_library_makes_a_class(
+    interrupt: BaseException, status: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(cli, "cli", SimpleNamespace(main=lambda **_: type("Made", (), {"it": Interrupting(interrupt)})))
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGHUP)}
+    try:
+        with pytest.raises(SystemExit) as ended:
+            cli.main()
+    finally:
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+    assert ended.value.code == status
+    assert capsys.readouterr().err == ("sosmith: interrupted\n" if status == 130 else "")
 
 
 def test_tools_that_are_missing(sosmith: Command, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -21,14 +21,15 @@ def test_a_session_over_a_port(baud: int) -> None:
 
 
 def test_a_port_is_for_one_program() -> None:
-    expected = pytest.raises(sosmith.ToolError, match=r"^/dev/pts/\d+ must be a serial port that is free, not: ")
+    message = r"^/dev/pts/\d+ must be a serial port that is free, not: in use by another program$"
+    expected = pytest.raises(sosmith.ToolError, match=message)
     with plugged(plain_device()) as port, sosmith.Board(port), expected:
         sosmith.Board(port)
 
 
 def test_a_file_is_no_port(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
-    with pytest.raises(sosmith.ToolError, match=r"file must be a serial port that is free, not: "):
+    with pytest.raises(sosmith.ToolError, match=r"file must be a serial port that is free, not: no serial port$"):
         sosmith.Board(str(tmp_path / "file"))
 
 

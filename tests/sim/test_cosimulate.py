@@ -5,6 +5,7 @@ import re
 import shutil
 import threading
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -128,6 +129,13 @@ def test_two_runs_side_by_side(tmp_path: Path) -> None:
 
 def test_text_that_is_no_verilog_is_a_tool_failure_with_the_log(tmp_path: Path) -> None:
     with pytest.raises(ToolError, match=r"^icarus .* failed; the end of .*log\.txt:\n(.|\n)*syntax error"):
+        run(write(tmp_path, "module nonsense"), stimulus(9), build_dir=tmp_path, simulator="icarus")
+
+
+def test_a_failure_on_a_full_disk_is_that_of_the_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: SimpleNamespace(free=4096))
+    message = r"/icarus: the disk must have room for the simulation, not be full$"
+    with pytest.raises(ToolError, match=message):
         run(write(tmp_path, "module nonsense"), stimulus(9), build_dir=tmp_path, simulator="icarus")
 
 

@@ -110,7 +110,8 @@ def _table(path: Path, lines: Sequence[str]) -> Content:
             continue
         rows.append(_numbers(path, at, cells))
         if len(rows[-1]) != len(rows[0]):
-            raise _unfit(path, at, f"{len(rows[0])} numbers as in the first row", " ".join(cells))
+            numbers = "1 number" if len(rows[0]) == 1 else f"{len(rows[0])} numbers"
+            raise _unfit(path, at, f"{numbers} as in the first row", " ".join(cells))
     if not rows:
         raise SpecificationError(f"{path}: the filter must have numbers, not none")
     return of_rows(path, rows, kind="a table")

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import select
+import termios
 from typing import Protocol
 
 import serial
@@ -12,6 +14,9 @@ from sosmith.model.errors import LinkLostError, ToolError
 
 _ROOM = 1 << 16
 """Most bytes that one read takes."""
+
+_PLAIN = {errno.ENOTTY: "no serial port", errno.EWOULDBLOCK: "in use by another program"}
+"""What some errors of the system mean for a port."""
 
 
 class Line(Protocol):
@@ -80,6 +85,9 @@ class SerialLine:
 
 def _reason(error: Exception) -> str:
     """Return what the system says, without what pyserial puts around it."""
-    if isinstance(error, OSError) and error.errno is not None:
-        return os.strerror(error.errno)
-    return str(error)
+    number = error.errno if isinstance(error, OSError) else None
+    if isinstance(error.__context__, termios.error):
+        number = error.__context__.args[0]
+    if number is None:
+        return str(error)
+    return _PLAIN.get(number) or os.strerror(number)

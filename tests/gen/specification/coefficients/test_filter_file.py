@@ -224,6 +224,7 @@ def test_a_convention_that_is_asked_for_has_to_be_stable(tmp_path: Path) -> None
         ("f.csv", "", "the filter must have numbers, not none"),
         ("f.csv", "1;0,5;0;1;0;0\n", "line 1 must have numbers with a decimal point, not '0,5'"),
         ("f.csv", "1,0,0,1,nan,0\n", "line 1 must have finite numbers within reason, not 'nan'"),
+        ("f.csv", "x\n1\n2 3\n", "line 3 must have 1 number as in the first row, not '2 3'"),
         ("f.csv", "1,0,0,1,0,0\n1,0,0\n", "line 2 must have 6 numbers as in the first row, not '1 0 0'"),
         ("f.txt", "biquad1,\nb0=1,\nb1=0,\nb2=0,\na1=0\n", "biquad 1 must have a2, not leave it out"),
         ("f.txt", "biquad1,\nb0=1,\nb0=0,\n", "line 3 must not give b0 a second time"),
