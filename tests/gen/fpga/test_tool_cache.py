@@ -1,0 +1,44 @@
+"""The programs that compile themselves run where the user's cache folder cannot be written, too."""
+
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from sosmith.gen.fpga.tools import Tool
+from sosmith.gen.output.verilog import converted
+from sosmith.model.dataflow.tool_cache import tool_cache
+
+
+def test_the_users_cache_is_used_where_it_can_be_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    assert tool_cache() == {}
+    monkeypatch.setenv("XDG_CACHE_HOME", "relative")
+    monkeypatch.setenv("HOME", str(tmp_path))
+    assert tool_cache() == {}
+    assert (tmp_path / ".cache").is_dir()
+
+
+@pytest.mark.parametrize("name", ["XDG_CACHE_HOME", "HOME"])
+def test_else_a_folder_of_this_process(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "file").touch()
+    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+    monkeypatch.setenv(name, str(tmp_path / "file"))
+    made = Path(tool_cache()["XDG_CACHE_HOME"])
+    assert made.is_dir()
+    environments: list[dict[str, str]] = []
+
+    def runs(command: Any, **options: Any) -> SimpleNamespace:
+        environments.append(options["env"])
+        return SimpleNamespace(returncode=0, stdout="", stderr="")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(subprocess, "run", runs)
+        converted("")
+    assert environments[0]["XDG_CACHE_HOME"] == str(made)
+    log, show = tmp_path / "log.txt", "import os; print(os.environ['XDG_CACHE_HOME'])"
+    assert Tool("python", Path(sys.executable), "3").run(["-c", show], tmp_path, log) == 0
+    assert log.read_text(encoding="utf-8").splitlines()[-1] == str(made)
