@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -121,7 +121,7 @@ def fixed_architecture(path: Path) -> FixedArchitecture:
     Raises
     ------
     RejectedError
-        If it is no manifest.
+        If it is no manifest, or the architecture is none that there is.
     """
     try:
         manifest = json.loads(_content(path))
@@ -129,9 +129,21 @@ def fixed_architecture(path: Path) -> FixedArchitecture:
         channels, lanes = int(manifest["channels"]), int(manifest["streams"]["m_axis"].get("samples", 1))
         if min(channels, lanes) < 1:
             raise ValueError
-        return FixedArchitecture(str(manifest["architecture"]) if plain else None, channels, lanes)
+        architecture = str(manifest["architecture"])
     except _NO_MANIFEST:
         raise RejectedError(f"{path} must be the manifest of a core, not another file") from None
+    _check_known(architecture, (*_AHEAD, "online"), path)
+    return FixedArchitecture(architecture if plain else None, channels, lanes)
+
+
+_AHEAD = ("parallel", "folded", "serial")
+
+
+def _check_known(architecture: str, known: Sequence[str], path: Path) -> None:
+    named = ", ".join(known[:-1])
+    require(
+        architecture in known, f"the architecture in {path} must be {named} or {known[-1]}, not {architecture[:40]!r}"
+    )
 
 
 def core_text(path: Path) -> str:
@@ -154,13 +166,16 @@ def architecture_ahead(path: Path) -> str | None:
     Raises
     ------
     RejectedError
-        If it is no manifest.
+        If it is no manifest, or the architecture is none that there is.
     """
     try:
         found = (json.loads(_content(path))["decimation"] or {}).get("calibration")
-        return None if found is None else str(found["architecture"])
+        architecture = None if found is None else str(found["architecture"])
     except _NO_MANIFEST:
         raise RejectedError(f"{path} must be the manifest of a core, not another file") from None
+    if architecture is not None:
+        _check_known(architecture, _AHEAD, path)
+    return architecture
 
 
 def check_texts(about: AboutEntry, texts: Mapping[str, str]) -> int:

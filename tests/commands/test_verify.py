@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 from tests.commands.invocation import Invocation
 from tests.gen.designs import EXAMPLES, example_design
+from tests.gen.verifier.decimators import Instrument
 from tests.gen.verifier.parallel.cores import specified
 from tests.gen.verifier.small_specifications import PLAIN
 from tests.gen.word_lengths.decimated import small
@@ -141,6 +142,21 @@ def test_the_decimator_of_several_channels_is_not_read(core: str, tmp_path: Path
         command.good(str(tmp_path / "slight.certificate.json"), "--json", "--files", str(tmp_path)).stdout
     )
     assert found["program_instructions"] > 10
+
+
+@pytest.mark.parametrize("channels", [1, 3])
+def test_a_decimated_instrument_in_parallel_is_proven_whole(channels: int, tmp_path: Path) -> None:
+    case = Instrument("parallel", channels=channels)
+    generate(design_core(specified(case.text), core=case.core), tmp_path)
+    path = str(tmp_path / "plain.certificate.json")
+    found = json.loads(command.good(path, "--json", "--files", str(tmp_path)).stdout)
+    assert found["program_instructions"] is None
+    assert min(found[f"{part}_registers"] for part in ("calibration", "hardware", "decimator")) > 10
+    table = command.good(path, "--files", str(tmp_path)).stdout
+    for part in ("calibration", "hardware"):
+        sentence = rf"^{part}: the SystemVerilog computes these graphs, each sample \d+ clocks later, in \d+ registers"
+        assert re.search(sentence, table, re.MULTILINE)
+    assert "not read" not in table
 
 
 def test_a_decimated_instrument_has_two_programs(tmp_path: Path) -> None:

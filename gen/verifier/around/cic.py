@@ -34,7 +34,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 from sosmith.gen.verifier.around.calibration import CODE, FLAGS, Ahead, layout_of
-from sosmith.gen.verifier.around.channel_cic import check_channels, names_of
+from sosmith.gen.verifier.around.channel_cic import Names, check_channels, names_of
 from sosmith.gen.verifier.around.logic import BIT, Field, Held, Logic, Part, Ranges, Signals, check_parts
 from sosmith.gen.verifier.around.passed_flags import check_passed
 from sosmith.gen.verifier.around.repeated_sign import check_signs
@@ -100,6 +100,38 @@ def check_decimator(text: str, certificate: Certificate, channels: int = 1) -> D
         If a register is loaded with anything else, a port is connected otherwise, or the text has anything that cannot
         be read; the sentence names the first register or port that is wrong.
     """
+    found, output = around(text, certificate, channels), certificate.output
+    entry = certificate.decimation
+    assert entry is not None
+    netlist, seams, word = found.netlist, found.seams, found.word
+    leaving = _Holder(seams, output, word, entry.factor) if word else _Passing(seams, output)
+    box = found.modules.get(f"{certificate.name}_ahead")
+    if found.names is None:
+        registers = _check_one(netlist, box, certificate, seams, leaving)
+    else:
+        registers = check_channels(netlist, box, certificate, channels, seams, found.names, leaving)
+    check_passed(netlist, seams, word, (channels - 1).bit_length())
+    check_signs(found.modules, output, CLOCK)
+    return DecimatorVerdict(registers, entry.factor if word else 1, channels)
+
+
+class Around(NamedTuple):
+    """What is around a core: all modules, a netlist without the core, its seams, and what has no names of its own.
+
+    `told` is the net with the flags of a result of the decimator, and `word` the register that holds results, "" if
+    they leave at once.
+    """
+
+    modules: dict[str, Module]
+    netlist: Netlist
+    seams: Seams
+    names: Names | None
+    told: str
+    word: str
+
+
+def around(text: str, certificate: Certificate, channels: int) -> Around:
+    """Find what is around a core; the rest is as of `check_decimator`."""
     entry = certificate.decimation
     assert entry is not None
     modules = read_core(text, certificate.name)
@@ -107,21 +139,10 @@ def check_decimator(text: str, certificate: Certificate, channels: int = 1) -> D
     if certificate.about is not None:
         stated = tomllib.loads(certificate.about.specification).get("filter", {}).get("hold", False)
         require(held == stated, f"results must {'' if stated else 'not '}be held, as specified")
-    several = channels > 1
-    names = names_of(netlist) if several else None
+    names = names_of(netlist) if channels > 1 else None
     told = "o_rail" if entry.calibration is None and names is None else "o_flags"
-    box = modules.get(f"{certificate.name}_ahead")
     seams = seams_of(netlist, told, held=held, dest=None if names is None else names.dest)
-    output = certificate.output
-    word = _held_word(netlist) if held else ""
-    leaving = _Holder(seams, output, word, entry.factor) if held else _Passing(seams, output)
-    if names is None:
-        registers = _check_one(netlist, box, certificate, seams, leaving)
-    else:
-        registers = check_channels(netlist, box, certificate, channels, seams, names, leaving)
-    check_passed(netlist, seams, word, (channels - 1).bit_length())
-    check_signs(modules, output, CLOCK)
-    return DecimatorVerdict(registers, entry.factor if held else 1, channels)
+    return Around(modules, netlist, seams, names, CIC + told, _held_word(netlist) if held else "")
 
 
 def _check_one(netlist: Netlist, box: Module | None, certificate: Certificate, seams: Seams, leaving: Part) -> int:

@@ -38,8 +38,7 @@ def check_passed(netlist: Netlist, seams: Seams, word: str, channel_bits: int = 
     RejectedError
         If a bit of an output of the core is lost, or comes where a flag must not be.
     """
-    logic = BitLogic(netlist)
-    left = {name: [_origin(logic, bit, word) for bit in logic.net(name)] for name in _LEAVING if name in netlist.ports}
+    logic, left = origins(netlist, word)
     flags = left[_FLAGS]
     count = sum(1 for bit in flags if bit)
     require(len(flags) == _MOST, f"{_FLAGS} must have {_MOST} bits, not {len(flags)}")
@@ -71,6 +70,22 @@ def check_passed(netlist: Netlist, seams: Seams, word: str, channel_bits: int = 
         if name.startswith(BEHIND) and name not in netlist.inlets | {seams.taken, seams.valid}:
             lost = [place for place, bit in enumerate(logic.net(name)) if bit not in passed]
             require(not lost, f"bit {lost[0] if lost else 0} of {name} must leave the core")
+
+
+def origins(netlist: Netlist, word: str) -> tuple[BitLogic, dict[str, list[Bit]]]:
+    """Return where the bits of each port that leaves come from: what they are, or what the register `word` takes over.
+
+    Raises
+    ------
+    RejectedError
+        If the register does not take over all of them under the same condition.
+    """
+    logic = BitLogic(netlist)
+    left = {name: [_origin(logic, bit, word) for bit in logic.net(name)] for name in _LEAVING if name in netlist.ports}
+    if word:
+        taken = {logic.made[logic.after(bit)].operands[0] for name in left for bit in logic.net(name) if bit}
+        require(len(taken) == 1, f"{word} must take over all of a result at once")
+    return logic, left
 
 
 def _origin(logic: BitLogic, bit: Bit, word: str) -> Bit:

@@ -72,7 +72,7 @@ class ChannelMemories(StateMemories):
         """Return how many first positions hold no sample of the channel of one that enters."""
         enters, channel = self._control.valid[0], self._registers.channel
         for count, near in enumerate(self._entrance.near):
-            repeated = f"near_channel{count}"
+            repeated = near.replace("near", "near_channel")
             require(repeated in self._netlist.registers, f"{near} must come with a register {repeated}")
             width = self._netlist.widths[repeated]
             here = self._registers.behind(repeated) == count

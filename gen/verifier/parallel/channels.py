@@ -28,48 +28,53 @@ from sosmith.gen.verifier.parallel.text import Bits, Expression, Load, Statement
 from sosmith.gen.verifier.program.normal_form import constant, plus
 
 DEST = "s_axis_tdest"
-_BUFFER = Buffer("input_buffer.o_valid", "input_buffer.full", "input_buffer.i_valid", "input_buffer.o_ready")
+_BUFFER = ("o_valid", "full", "i_valid", "o_ready")
 
 
-def find_channels(netlist: Netlist, channels: int) -> Control:
-    """Find the control signals of a core with several channels, and check all that they do.
+def find_channels(netlist: Netlist, channels: int, prefix: str = "") -> Control:
+    """Find the control signals of a core with several channels, whose nets have a prefix, and check all that they do.
 
     Raises
     ------
     RejectedError
         If samples do not move as they must.
     """
-    for name in (_BUFFER.held, _BUFFER.full, _BUFFER.coming, _BUFFER.ready, "output_buffer.full"):
+    buffer, full = Buffer(*(f"{prefix}input_buffer.{name}" for name in _BUFFER)), f"{prefix}output_buffer.full"
+    for name in (buffer.held, buffer.full, buffer.coming, buffer.ready, full):
         require(name in netlist.widths, f"a core with several channels must have {name}")
-    search = Search(netlist, {_BUFFER.coming, _BUFFER.ready})
-    held, full = search.register(search.net("m_axis_tvalid", {}), "m_axis_tvalid"), "output_buffer.full"
+    search = Search(netlist, {buffer.coming, buffer.ready})
+    held = search.register(search.net("m_axis_tvalid", {}), "m_axis_tvalid")
     chain = search.chain(held, full)
+    if chain[0] == buffer.held and len(chain) > 1:  # without states, nothing holds a sample back
+        chain = chain[1:]
     enters = _source(netlist, chain[0])
-    search = Search(netlist, {_BUFFER.coming, _BUFFER.ready, enters})
-    ready = search.net("s_axis_tready", {_BUFFER.full: 0})
+    search = Search(netlist, {buffer.coming, buffer.ready, enters})
+    ready = search.net("s_axis_tready", {buffer.full: 0})
     clearing = search.register(search.inverted(ready), "what withholds s_axis_tready")
     word = _counter(netlist, search, clearing, channels)
-    near = tuple(f"near{k}" for k in range(len(chain)) if f"near{k}" in netlist.registers)
+    near = tuple(name for name in (f"{prefix}near{k}" for k in range(len(chain))) if name in netlist.registers)
     control = Control(
-        (enters, *chain), Buffer(held, full, chain[-1], SINK), Entrance(_BUFFER, clearing, word, channels, near)
+        (enters, *chain), Buffer(held, full, chain[-1], SINK), Entrance(buffer, clearing, word, channels, near)
     )
     search.check_chain(control.valid, full)
     search.check_chain((enters, *near), full)
     search.check_buffer(control.output)
-    search.check_buffer(_BUFFER)
-    _check_acceptance(netlist, clearing, channels)
-    _check_leaving(netlist, control)
+    search.check_buffer(buffer)
+    _check_acceptance(netlist, buffer, clearing, channels)
+    _check_leaving(netlist, buffer, control)
     return control
 
 
 def _source(netlist: Netlist, register: str) -> str:
-    """Return the net that a valid bit takes over, followed back through the ports of instances."""
+    """Return the net that a valid bit takes over, followed back through the ports of instances up to a register."""
     found = [value for value in _loaded(netlist.registers[register].statements) if isinstance(value, Bits)]
     require(len(found) == 1, f"{register} must take over one net, not {len(found)}")
     name = found[0].name
     while True:
         drivers = netlist.drivers.get(name, [])
         if len(drivers) != 1 or not isinstance(drivers[0].value, Bits) or drivers[0].value.width is not None:
+            return name
+        if drivers[0].value.name in netlist.registers:
             return name
         name = drivers[0].value.name
 
@@ -113,30 +118,30 @@ def _counts(search: Search, name: str, case: dict[str, int], channels: int) -> b
     return True
 
 
-def _check_acceptance(netlist: Netlist, clearing: str, channels: int) -> None:
+def _check_acceptance(netlist: Netlist, buffer: Buffer, clearing: str, channels: int) -> None:
     """Check that the input buffer is given what the stream hands over, if its channel exists."""
     search = Search(netlist)
     for full in (0, 1):
         for busy in (0, 1):
-            _, value = search.net("s_axis_tready", {_BUFFER.full: full, clearing: busy})
+            _, value = search.net("s_axis_tready", {buffer.full: full, clearing: busy})
             require(value == constant(int(not full and not busy)), "s_axis_tready must be 0 just while nothing fits")
-    _, value = search.net(_BUFFER.coming, {clearing: 1})
-    require(not value, f"{_BUFFER.coming} must be 0 while states are being cleared")
-    forms, value = search.net(_BUFFER.coming, {clearing: 0})
+    _, value = search.net(buffer.coming, {clearing: 1})
+    require(not value, f"{buffer.coming} must be 0 while states are being cleared")
+    forms, value = search.net(buffer.coming, {clearing: 0})
     dest = forms.variable(DEST, 0, (1 << netlist.widths[DEST]) - 1)
     exists = forms.negative(plus(dest, constant(channels), -1))
     require(
         same_word(forms, value, forms.times(forms.variable(SOURCE, 0, 1), exists), 1),
-        f"{_BUFFER.coming} must be {SOURCE} for the {channels} channels that exist, and 0 for others",
+        f"{buffer.coming} must be {SOURCE} for the {channels} channels that exist, and 0 for others",
     )
 
 
-def _check_leaving(netlist: Netlist, control: Control) -> None:
+def _check_leaving(netlist: Netlist, buffer: Buffer, control: Control) -> None:
     """Check that a sample leaves the input buffer just when it enters the pipeline."""
-    search, enters, ready = Search(netlist), control.valid[0], _BUFFER.ready
-    _, value = search.net(enters, {_BUFFER.held: 0})
+    search, enters, ready = Search(netlist), control.valid[0], buffer.ready
+    _, value = search.net(enters, {buffer.held: 0})
     require(not value, f"{enters} must be 0 while the input buffer is empty")
-    _, value = search.net(ready, {_BUFFER.held: 1, control.full: 1})
+    _, value = search.net(ready, {buffer.held: 1, control.full: 1})
     require(not value, f"{ready} must be 0 while the pipeline stands")
-    forms, logic = search.logic({_BUFFER.held: 1, control.full: 0})
+    forms, logic = search.logic({buffer.held: 1, control.full: 0})
     require(same_word(forms, logic.net(enters), logic.net(ready), 1), f"{ready} must be 1 just when {enters} is")

@@ -26,7 +26,7 @@ from __future__ import annotations
 
 import sys
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -41,7 +41,7 @@ from sosmith.gen.verifier.parallel.graph_codes import GraphCodes, LanePorts
 from sosmith.gen.verifier.parallel.netlist import Netlist, flattened
 from sosmith.gen.verifier.parallel.pipeline import DATA, Pipeline
 from sosmith.gen.verifier.parallel.split import split
-from sosmith.gen.verifier.parallel.text import read_modules
+from sosmith.gen.verifier.parallel.text import Module, read_modules
 from sosmith.gen.verifier.program.normal_form import Form, constant, plus
 
 CLOCK = "aclk"
@@ -103,11 +103,37 @@ def check_hardware(text: str, certificate: Certificate, channels: int = 1, lanes
     require("s_axil_" not in text, "the constants must be fixed to be checked, not loadable at run time")
     modules = read_modules(text)
     require(channels == 1 or lanes == 1, f"several samples a clock must be those of one channel, not of {channels}")
+    return check_modules(modules, certificate, channels, Inside(lanes=lanes))
+
+
+@dataclass(frozen=True)
+class Inside:
+    """What a core has inside.
+
+    Attributes
+    ----------
+    prefix : str
+        Prefix of its nets.
+    told : int
+        Number of flags of the inputs that come with a sample, above its fields, in place of what the ports say.
+    lanes : int
+        Samples of a beat.
+    """
+
+    prefix: str = ""
+    told: int = 0
+    lanes: int = 1
+
+
+def check_modules(
+    modules: Mapping[str, Module], certificate: Certificate, channels: int, inside: Inside
+) -> HardwareVerdict:
+    """Prove what modules compute, the top first; the rest is as of `check_hardware`."""
     ports = set(next(iter(modules.values())).ports)
     wanted = _PORTS if channels == 1 else _PORTS | {DEST, OUTPUT_DEST}
     require(ports == wanted, f"the ports must be {', '.join(sorted(wanted))}, not {', '.join(sorted(ports))}")
     with _deep_recursion():
-        return _checked(flattened(modules, CLOCK), certificate, channels, lanes)
+        return _checked(flattened(modules, CLOCK), certificate, channels, inside)
 
 
 @contextmanager
@@ -121,13 +147,14 @@ def _deep_recursion() -> Iterator[None]:
         sys.setrecursionlimit(before)
 
 
-def _checked(netlist: Netlist, certificate: Certificate, channels: int, lanes: int) -> HardwareVerdict:
+def _checked(netlist: Netlist, certificate: Certificate, channels: int, inside: Inside) -> HardwareVerdict:
     forms = Forms()
+    prefix = inside.prefix
     words = {name: len(memory.first) for name, memory in netlist.memories.items()} if channels == 1 else {}
-    graph = GraphCodes(certificate, forms, lanes, words)
+    graph = GraphCodes(certificate, forms, inside.lanes, words, prefix)
     netlist = split(netlist, {netlist.holder(graph.state_name(node)) or "" for node in graph.delays})
-    control = find_control(netlist) if channels == 1 else find_channels(netlist, channels)
-    pipeline = Pipeline(netlist, control, graph, forms, certificate)
+    control = find_control(netlist) if channels == 1 else find_channels(netlist, channels, prefix)
+    pipeline = Pipeline(netlist, control, graph, forms, certificate, inside.told)
     try:
         pipeline.check_states()
         _check_output(pipeline.buffered(), netlist, pipeline, graph, certificate)
@@ -150,7 +177,8 @@ def _check_output(
     for name, each in ((OUTPUT, width), (FLAGS, _FLAG_BITS)):
         wanted = each * len(graph.lanes)
         require(netlist.widths[name] == wanted, f"the port {name} must have {wanted} bits, not {netlist.widths[name]}")
-    unused = _unused(certificate)
+    told = pipeline.told
+    unused = [place for place in _unused(certificate) if place >= len(told)]
     for number, lane in enumerate(graph.lanes):
         label = graph.nodes[lane.output].label
         data = logic.net(OUTPUT, width * number, width)
@@ -159,7 +187,8 @@ def _check_output(
         for bit in range(_FLAG_BITS * number, _FLAG_BITS * (number + 1)):
             logic.net(FLAGS, bit, 1)  # of the sample whose beat it leaves with, also where nothing is said of its value
         for place, flag, value in (
-            (_AT_RAIL, "input_at_rail", _at_rail(graph, lane, certificate)),
+            (_AT_RAIL, "input_at_rail", told[0] if told else _at_rail(graph, lane, certificate)),
+            *([(_OUTSIDE, "outside_calibration", told[1])] if len(told) > 1 else []),
             (_SATURATED, "output_saturated", _saturated(graph, lane)),
             (_SETTLING, "settling", {} if lane.settling is None else graph.forms.negative(graph.codes[lane.settling])),
         ):

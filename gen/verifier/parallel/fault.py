@@ -19,7 +19,7 @@ def fault(netlist: Netlist, pipeline: Pipeline, graph: GraphCodes) -> RejectedEr
     for index, node in enumerate(graph.nodes):
         if not node.entry.name and len(graph.lanes) > 1:
             continue  # named by a number, which is that of another node in the hardware
-        own = re.compile(rf"{re.escape(f'{node.stage}.{node.name}')}(_passed\d+|_register)?")
+        own = re.compile(rf"{re.escape(graph.state_name(index))}(_passed\d+|_register)?")
         for name in sorted(filter(own.fullmatch, netlist.widths), key=lambda name: (len(name), name)):
             try:
                 found = pipeline.computed(name)

@@ -85,6 +85,8 @@ class GraphCodes:
         Samples of a beat.
     memories : mapping of str to int
         Number of words of each memory of a core with look-ahead, by its name.
+    prefix : str
+        Prefix of the core's nets.
 
     Attributes
     ----------
@@ -105,7 +107,9 @@ class GraphCodes:
         forms: Forms,
         lanes: int = 1,
         memories: Mapping[str, int] = MappingProxyType({}),
+        prefix: str = "",
     ) -> None:
+        self._prefix = prefix
         self.forms = forms
         self.nodes: list[CodeNode] = []
         self._remembered: set[int] = set()
@@ -156,8 +160,8 @@ class GraphCodes:
         return [index for index, node in enumerate(self.nodes) if node.entry.op is Operation.DELAY]
 
     def state_name(self, index: int) -> str:
-        """Return the name of the register that holds a DELAY node."""
-        return f"{self.nodes[index].stage}.{self.nodes[index].name}"
+        """Return the name of the register that holds a DELAY node, or of the net that has any other."""
+        return f"{self._prefix}{self.nodes[index].stage}.{self.nodes[index].name}"
 
     def memory_name(self, index: int) -> str:
         """Return the name of the memory that holds a DELAY node."""

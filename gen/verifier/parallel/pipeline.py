@@ -55,8 +55,8 @@ class _Field(NamedTuple):
     word: Form
 
 
-def _fields(graph: GraphCodes, certificate: Certificate, width: int) -> list[_Field]:
-    """Return the fields of the input and what is beside them; each begins a byte.
+def _fields(graph: GraphCodes, certificate: Certificate, width: int, told: Sequence[Form]) -> list[_Field]:
+    """Return the fields of the input and what is beside them; each begins a byte. Above them are flags that are told.
 
     Raises
     ------
@@ -74,6 +74,9 @@ def _fields(graph: GraphCodes, certificate: Certificate, width: int) -> list[_Fi
                 padding = graph.forms.variable(("padding", node), 0, (1 << beside) - 1)
                 found.append(_Field(offset, beside, padding))
             offset += beside
+    for flag in told:
+        found.append(_Field(offset, 1, flag))
+        offset += 1
     require(width == offset, f"the port {DATA} must have {offset} bits, not {width}")
     return found
 
@@ -92,13 +95,27 @@ class Pipeline:
         The atoms of `graph`.
     certificate : Certificate
         Where the fields of the input are read.
+    told : int
+        Number of flags that come with a sample above its fields.
+
+    Attributes
+    ----------
+    told : list of Form
+        These flags.
     """
 
     def __init__(
-        self, netlist: Netlist, control: Control, graph: GraphCodes, forms: Forms, certificate: Certificate
+        self,
+        netlist: Netlist,
+        control: Control,
+        graph: GraphCodes,
+        forms: Forms,
+        certificate: Certificate,
+        told: int = 0,
     ) -> None:
         self._netlist, self._control, self._graph, self._forms = netlist, control, graph, forms
-        self._fields = _fields(graph, certificate, netlist.widths[DATA])
+        self.told = [forms.variable(("told", place), 0, 1) for place in range(told)]
+        self._fields = _fields(graph, certificate, netlist.widths[DATA], self.told)
         self._dependence = Dependence(netlist, control.cuts)
         self._numbers = itertools.count()
         self._behind: dict[str, int | None] = {}

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from sosmith.terminal import JSON_OPTION, print_json, show_progress
+
+if TYPE_CHECKING:
+    from sosmith.interface.certificate import Proof
 
 
 @click.command()
@@ -65,7 +69,7 @@ def verify(certificate: Path, spec: Path | None, files: Path | None, rebuild: bo
                 },
                 "files_compared": proof.files,
                 "program_instructions": None if proof.program is None else proof.program.instructions,
-                **({} if proof.calibration is None else {"calibration_instructions": proof.calibration.instructions}),
+                **_calibration(proof),
                 "hardware_registers": None if proof.hardware is None else proof.hardware.registers,
                 "decimator_registers": None if proof.decimator is None else proof.decimator.registers,
                 "files_rebuilt": proof.rebuilt,
@@ -75,3 +79,15 @@ def verify(certificate: Path, spec: Path | None, files: Path | None, rebuild: bo
         from sosmith.commands.tables.certificate import print_proof
 
         print_proof(read.entries, proof)
+
+
+def _calibration(proof: Proof) -> dict[str, int]:
+    """Return what the proof of a calibration before a decimator is about."""
+    from sosmith.gen.verifier.program.check import ProgramVerdict
+
+    found = proof.calibration
+    if found is None:
+        return {}
+    if isinstance(found, ProgramVerdict):
+        return {"calibration_instructions": found.instructions}
+    return {"calibration_registers": found.registers}

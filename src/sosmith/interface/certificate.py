@@ -9,6 +9,7 @@ from pathlib import Path
 
 from sosmith.gen.specification.specification import from_text, load
 from sosmith.gen.verifier.around.cic import DecimatorVerdict, check_decimator
+from sosmith.gen.verifier.around.parallel_core import check_ahead, check_behind
 from sosmith.gen.verifier.certificate_file import Certificate as Entries
 from sosmith.gen.verifier.certificate_file import certificate_text, read_certificate
 from sosmith.gen.verifier.decimation import at_lower_rate, behind_decimator, calibration_alone, module_in
@@ -61,8 +62,9 @@ class Proof:
     """Number of files whose content was compared."""
     program: ProgramVerdict | None = None
     """What the check of the program in the SystemVerilog found; None if it was not checked."""
-    calibration: ProgramVerdict | None = None
-    """What the same check of a calibration before a decimator found; None without one, and if it was not checked."""
+    calibration: ProgramVerdict | HardwareVerdict | None = None
+    """What the check of a calibration before a decimator found, by its architecture; None without one, or if it was not
+    checked."""
     hardware: HardwareVerdict | None = None
     """What the check of a parallel core's SystemVerilog found; None if it was not checked."""
     decimator: DecimatorVerdict | None = None
@@ -135,9 +137,8 @@ class Certificate:
             Folder with the generated files: their SHA-256 must be those in the certificate, and no byte of the
             certificate's own file may have been changed. From the SystemVerilog, the program of a folded or serial
             core, and all hardware of a parallel one, is proven to compute the certificate's graph for all inputs and
-            states; online cores are not, nor cores with loadable constants or protection, nor a parallel core beside a
-            decimator. A decimator, how it is wired to a calibration before it, and what holds results behind it, is
-            proven register by register.
+            states; online cores are not, nor cores with loadable constants or protection. A decimator, how it is wired
+            to a calibration before it, and what holds results behind it, is proven register by register.
         rebuild : bool
             Whether to generate all files again, from `spec` or the specification's text in the certificate, and compare
             them byte for byte.
@@ -150,7 +151,8 @@ class Certificate:
             If a file cannot be read, or the specification is invalid.
         """
         verdict = verify(self.entries, progress)
-        agreement, program, before, hardware, decimator, compared, again = None, None, None, None, None, 0, 0
+        agreement, program, hardware, decimator, compared, again = None, None, None, None, 0, 0
+        before: ProgramVerdict | HardwareVerdict | None = None
         checked = None if spec is None else load(Path(fspath(spec)))
         if checked is not None:
             progress("specification", 0, 0)
@@ -176,13 +178,21 @@ class Certificate:
                 program = check_program(behind_decimator(text, self.entries), at_lower_rate(self.entries))
             elif architecture == "online" and self.entries.claims.online is None:
                 raise RejectedError("the certificate of an online core must claim the residuals of its units")
-            elif architecture == "parallel" and self.entries.decimation is None:
+            elif architecture == "parallel":
                 progress("hardware", 0, 0)
-                hardware = check_hardware(text, self.entries, channels, lanes)
+                hardware = (
+                    check_hardware(text, self.entries, channels, lanes)
+                    if found is None
+                    else check_behind(text, self.entries, channels)
+                )
             ahead = calibration_alone(self.entries)
-            if ahead is not None and architecture_ahead(folder / f"{self.name}.json") in {"folded", "serial"}:
-                progress("program of the calibration", 0, 0)
-                before = check_program(module_in(text, ahead.name), ahead)
+            if ahead is not None:
+                if architecture_ahead(folder / f"{self.name}.json") == "parallel":
+                    progress("hardware of the calibration", 0, 0)
+                    before = check_ahead(text, self.entries, channels)
+                else:
+                    progress("program of the calibration", 0, 0)
+                    before = check_program(module_in(text, ahead.name), ahead)
         if rebuild:
             from sosmith.gen.output.rebuild import rebuilt
 

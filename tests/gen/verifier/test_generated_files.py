@@ -15,7 +15,14 @@ from sosmith.gen.output.generate import generate
 from sosmith.gen.output.rebuild import rebuilt
 from sosmith.gen.specification.specification import load
 from sosmith.gen.verifier.certificate_file import AboutEntry, read_certificate
-from sosmith.gen.verifier.generated_files import check_files, check_seal, check_texts, core_text, fixed_architecture
+from sosmith.gen.verifier.generated_files import (
+    architecture_ahead,
+    check_files,
+    check_seal,
+    check_texts,
+    core_text,
+    fixed_architecture,
+)
 from sosmith.gen.verifier.verification import RejectedError
 from sosmith.model.errors import SpecificationError
 
@@ -100,6 +107,25 @@ def test_a_manifest_with_other_numbers_is_none(folder: Path, key: str, value: ob
     path.write_text(json.dumps(manifest), encoding="utf-8")
     with pytest.raises(RejectedError, match=r"\.json must be the manifest of a core, not another file$"):
         fixed_architecture(path)
+
+
+@pytest.mark.parametrize("architecture", ["systolic", "", None, ["parallel"]])
+def test_an_architecture_that_does_not_exist_is_refused(folder: Path, architecture: object) -> None:
+    path = folder / f"{NAME}.json"
+    manifest = json.loads(path.read_text(encoding="utf-8"))
+    path.write_text(json.dumps(manifest | {"architecture": architecture}), encoding="utf-8")
+    known, found = "parallel, folded, serial or online", re.escape(repr(str(architecture)))
+    with pytest.raises(
+        RejectedError, match=rf"^the architecture in {re.escape(str(path))} must be {known}, not {found}$"
+    ):
+        fixed_architecture(path)
+    ahead = {"calibration": {"architecture": architecture}}
+    path.write_text(json.dumps(manifest | {"decimation": ahead}), encoding="utf-8")
+    with pytest.raises(
+        RejectedError,
+        match=rf"^the architecture in {re.escape(str(path))} must be parallel, folded or serial, not {found}$",
+    ):
+        architecture_ahead(path)
 
 
 def test_a_manifest_nested_too_deep_is_none(folder: Path) -> None:

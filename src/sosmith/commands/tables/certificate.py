@@ -7,6 +7,8 @@ from rich.markup import escape
 from sosmith.commands.tables.console import TableConsole
 from sosmith.commands.tables.design import print_budget
 from sosmith.gen.verifier.certificate_file import Certificate
+from sosmith.gen.verifier.parallel.check import HardwareVerdict
+from sosmith.gen.verifier.program.check import ProgramVerdict
 from sosmith.gen.verifier.specified.stated_specification import Agreement
 from sosmith.interface.certificate import Proof
 from sosmith.interface.quantity import Quantity
@@ -24,7 +26,7 @@ def print_proof(certificate: Certificate, proof: Proof) -> None:
         console.print(f"[bold green]as specified[/]: {_agreement(proof.agreement)}")
     if proof.files:
         console.print(f"[bold green]unchanged[/]: {proof.files} files and the certificate itself, by their SHA-256")
-    programs = [found.instructions for found in (proof.calibration, proof.program) if found is not None]
+    programs = [found.instructions for found in (proof.calibration, proof.program) if isinstance(found, ProgramVerdict)]
     if programs:
         both = len(programs) > 1
         console.print(
@@ -32,14 +34,10 @@ def print_proof(certificate: Certificate, proof: Proof) -> None:
             f"compute these graphs, for all inputs and states; the unit{'s' * both} that run{'s' * (not both)} them "
             f"{'are' if both else 'is'} not part of it"
         )
+    if isinstance(proof.calibration, HardwareVerdict):
+        _print_hardware(console, "calibration", proof.calibration)
     if proof.hardware is not None:
-        found = proof.hardware
-        memories = f" and {found.memories} memories" if found.memories else ""
-        console.print(
-            f"[bold green]hardware[/]: the SystemVerilog computes these graphs, each sample {found.latency} clocks "
-            f"later, in {found.registers} registers{memories}, {found.states} of them states: for all inputs, stalls "
-            "and resets, but for the flags outside_calibration, wear_warning and wear_critical"
-        )
+        _print_hardware(console, "hardware", proof.hardware)
     if proof.decimator is not None and certificate.decimation is not None:
         entry, around = certificate.decimation, proof.decimator
         held = f"; each result leaves {around.copies} times" if around.copies > 1 else ""
@@ -62,16 +60,18 @@ def print_proof(certificate: Certificate, proof: Proof) -> None:
     if proof.files and proof.program is None and proof.hardware is None:
         plain = "a core with loadable constants or protection"
         what = plain if online is None else "an online core"
-        other = ", or in parallel beside a decimator" if certificate.decimation is not None else ""
-        console.print(f"not read: the SystemVerilog, as that of {what}{other}")
-    elif proof.files and proof.calibration is None and _has_calibration_ahead(certificate):
-        console.print("not read: the calibration before the decimator, which is parallel")
+        console.print(f"not read: the SystemVerilog, as that of {what}")
     if proof.rebuilt:
         console.print(f"[bold green]rebuilt[/]: {proof.rebuilt} files, the same byte for byte")
 
 
-def _has_calibration_ahead(certificate: Certificate) -> bool:
-    return certificate.decimation is not None and certificate.decimation.calibration is not None
+def _print_hardware(console: TableConsole, what: str, found: HardwareVerdict) -> None:
+    memories = f" and {found.memories} memories" if found.memories else ""
+    console.print(
+        f"[bold green]{what}[/]: the SystemVerilog computes these graphs, each sample {found.latency} clocks "
+        f"later, in {found.registers} registers{memories}, {found.states} of them states: for all inputs, stalls "
+        "and resets, but for the flags outside_calibration, wear_warning and wear_critical"
+    )
 
 
 def _agreement(agreement: Agreement) -> str:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import random
 import re
-from collections.abc import Callable, Iterator
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator
 
 Edit = tuple[str, str]
 """A line before and after."""
@@ -44,6 +45,29 @@ def random_edits(text: str, count: int, seed: int) -> Iterator[tuple[str, str, E
         kind = rng.choice(sorted(places))
         number, new = rng.choice(places[kind])
         yield kind, "\n".join([*lines[:number], new, *lines[number + 1 :]]) + "\n", (lines[number], new)
+
+
+def swept(
+    edited: Iterable[tuple[str, str, Edit]],
+    rejection: Callable[[str], str],
+    seen: Callable[[str], object],
+    text: str,
+    named: str = "$.",
+) -> Counter[str]:
+    """Check that each edit is rejected with a sentence, or changes nothing that is seen in simulation; count them."""
+    right = seen(text)
+    found: Counter[str] = Counter()
+    for kind, other, edit in edited:
+        sentence = rejection(other)
+        if sentence:
+            assert re.search(r"\bmust\b", sentence), (kind, edit, sentence)
+            found["rejected"] += 1
+            found["rejected, a node named"] += re.search(named, sentence) is not None
+        else:
+            assert seen(other) == right, (kind, edit)
+            found["accepted"] += 1
+        found[f"{'rejected' if sentence else 'accepted'}: {kind}"] += 1
+    return found
 
 
 def _right(line: str) -> tuple[str, str]:
