@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.gen.verifier.decimators import Instrument, designed, written
+from tests.gen.verifier.around.decimators import Instrument, designed, written
 from tests.gen.word_lengths.decimated import INSTRUMENT, locomotive, locomotive_text, read, small, tree_of
 
 from sosmith.gen.core import design_core

@@ -4,7 +4,7 @@ import re
 
 import pytest
 from tests.formal.prover import broken
-from tests.gen.verifier.decimators import Case, Instrument, designed, written
+from tests.gen.verifier.around.decimators import Case, Instrument, designed, written
 from tests.gen.verifier.parallel.edits import random_edits, swept
 from tests.gen.verifier.parallel.simulated import outputs
 

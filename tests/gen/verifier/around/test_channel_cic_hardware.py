@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from tests.formal.prover import broken
-from tests.gen.verifier.decimators import Case, Instrument, accepted, designed, written
+from tests.gen.verifier.around.decimators import Case, Instrument, accepted, designed, written
 
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.output.generate import generate

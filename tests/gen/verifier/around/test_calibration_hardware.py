@@ -4,7 +4,7 @@ import re
 
 import pytest
 from tests.formal.prover import broken
-from tests.gen.verifier.decimators import Instrument, accepted, designed, written
+from tests.gen.verifier.around.decimators import Instrument, accepted, designed, written
 
 from sosmith.gen.output.verilog import to_rtlil, to_verilog
 from sosmith.gen.verifier.around.cic import check_decimator

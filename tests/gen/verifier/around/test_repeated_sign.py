@@ -3,7 +3,7 @@
 import re
 
 import pytest
-from tests.gen.verifier.decimators import Case, designed, written
+from tests.gen.verifier.around.decimators import Case, designed, written
 
 from sosmith.gen.verifier.around.cic import check_decimator
 from sosmith.gen.verifier.decimation import module_in
