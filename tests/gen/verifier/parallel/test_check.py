@@ -5,11 +5,12 @@ from collections import Counter
 
 import pytest
 from tests.gen.designs import ALL, parallel_design
-from tests.gen.verifier.parallel.cores import ODD, Made, made, small
+from tests.gen.verifier.parallel.cores import ODD, Made, made, small, specified
 from tests.gen.verifier.parallel.edits import random_edits, swept
 from tests.gen.verifier.parallel.simulated import outputs
 from tests.gen.verifier.small_specifications import INSTRUMENT, PLAIN, STEADY_INSTRUMENT, UNSIGNED
 
+from sosmith.gen.core import design_core
 from sosmith.gen.realizations.registry import REALIZATIONS
 from sosmith.gen.verifier.certificate_file import AboutEntry
 from sosmith.gen.verifier.graph import RejectedError
@@ -360,6 +361,14 @@ def sweep(core: Made, count: int, seed: int, clocks: int) -> Counter[str]:
         return proven(outputs(text, clocks, seed, core.channels), core.lanes)
 
     return swept(random_edits(core.text, count, seed), lambda text: rejection(core, text), seen, core.text, NODE)
+
+
+def test_a_calibration_of_several_channels() -> None:
+    """Nothing holds its samples back, as it has no states."""
+    core = made(design_core(specified(INSTRUMENT), core="calibration"), 3)
+    found = core.check()
+    assert (found.states, found.latency) == (0, latency_cycles(core.design.datapath, 3))
+    assert sweep(core, 15, seed=8, clocks=200)["rejected"] > 7
 
 
 def test_sixty_edits() -> None:
