@@ -18,10 +18,11 @@ from sosmith.sim.build_cache import BuildCache, cache_folder, key_of
 USE = "simulation in CXXRTL"
 
 # Registers without a reset start at random, as they do in hardware. With the higher level, waveforms show all signals;
-# with the one below, the names of ports lead to their values.
+# with the one below, the names of ports lead to their values. A wire's attribute `init` only repeats what each `reg`
+# says, with x for bits that are wired to a constant: setundef would find two initial values of one constant.
 _SCRIPT = (
-    "read_verilog -sv core.sv; hierarchy -check -top {top}; rename -top core; proc; flatten; memory_collect; "
-    "setundef -undriven -init -random 1; write_cxxrtl -g{level} model.cc"
+    "read_verilog -sv core.sv; hierarchy -check -top {top}; rename -top core; setattr -unset init w:*; proc; flatten; "
+    "memory_collect; setundef -undriven -init -random 1; write_cxxrtl -g{level} model.cc"
 )
 _LEVELS = {False: 2, True: 4}
 _FLAGS = ("-O2", "-std=c++17", "-shared", "-fPIC", "-DCXXRTL_NDEBUG")
