@@ -438,7 +438,7 @@ class Budget:
         per = "a sample" if self._at_once == 1 else f"for {self._at_once} samples"
         raise ShortfallError(
             f"the {architecture.name} architecture takes {needed:,} clock{'s' * (needed > 1)} {per}: at a clock of "
-            f"{float(self.clock):,.0f} Hz{many} the sample rate must be at most {most} Hz, not {wanted} Hz"
+            f"{_in_full(self.clock, 12)} Hz{many} the sample rate must be at most {most} Hz, not {wanted} Hz"
         )
 
 
@@ -447,10 +447,15 @@ def _told_apart(most: Fraction, wanted: Fraction) -> tuple[str, str]:
     for digits in range(6, 17):
         context = decimal.Context(prec=digits, rounding=decimal.ROUND_FLOOR)
         floor = context.divide(decimal.Decimal(most.numerator), decimal.Decimal(most.denominator))
-        texts = f"{floor:,f}", f"{float(wanted):,.{digits}g}"
+        texts = f"{floor:,f}", _in_full(wanted, digits)
         if texts[0] != texts[1]:
             break
     return texts
+
+
+def _in_full(rate: Fraction, digits: int) -> str:
+    """Text of a rate with so many significant digits, and without an exponent."""
+    return f"{decimal.Decimal(f'{float(rate):.{digits}g}'):,f}"
 
 
 def blocks_for(wanted: int | None, board: Board | None) -> Blocks:

@@ -152,6 +152,7 @@ def test_an_architecture_that_cannot_keep_up_says_what_it_could_do(architecture:
         ("7", "10000", "0.583333", "10,000"),
         ("11", "10000", "0.916666", "10,000"),
         ("34156.9452", "2846.4123", "2,846.4121", "2,846.4123"),
+        ("3000000", "1000000", "250,000", "1,000,000"),
     ],
 )
 def test_the_rate_that_it_could_do_is_never_rounded_up(clock: str, rate: str, most: str, wanted: str) -> None:
@@ -193,3 +194,8 @@ def test_cores_in_the_field_keep_their_fingerprint(architecture: str, expected: 
 def test_digits_of_another_width_make_another_core() -> None:
     found = {Architecture("folded", limiter(), reload=True, digit_bits=bits).fingerprint for bits in (14, 15, 17)}
     assert len(found) == 3
+
+
+def test_slow_clocks_are_told_in_full() -> None:
+    with pytest.raises(ShortfallError, match=r": at a clock of 0\.4 Hz .* must be at most 0\.4 Hz, not 7\.3 Hz$"):
+        Budget(clock=Fraction("0.4"), sample_rate=Fraction("7.3"), channels=1).check(design_in("parallel").architecture)
