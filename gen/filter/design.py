@@ -33,6 +33,7 @@ from sosmith.gen.filter.sections import (
 )
 from sosmith.gen.filter.transformations import bilinear, unwarped, warped
 from sosmith.gen.quantity import frequency
+from sosmith.gen.specification.choices import MAX_DECIMATION
 from sosmith.gen.specification.specification import FilterSpec
 from sosmith.model.arithmetic.correct_rounding import evaluate, nearest_double, sign
 from sosmith.model.arithmetic.recursive_filters import sosfilt
@@ -117,11 +118,13 @@ class Filter:
     def decimation(self) -> int:
         """Largest power-of-two decimation that leaves the upper band edge below a twentieth of the sample rate.
 
-        1 if there is none, if the filter passes high frequencies, or if its cutoff is not known.
+        At most what `filter.decimate` takes; 1 if there is none, if the filter passes high frequencies, or if its
+        cutoff is not known.
         """
         if self.cutoff is None or self.kind not in {"lowpass", "bandpass"}:
             return 1
-        return 1 << max(0, math.floor(math.log2(self.sample_rate / (_COMFORTABLE * self.cutoff[-1]))))
+        factor = 1 << max(0, math.floor(math.log2(self.sample_rate / (_COMFORTABLE * self.cutoff[-1]))))
+        return min(factor, MAX_DECIMATION)
 
     @property
     def describe(self) -> str:

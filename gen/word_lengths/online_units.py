@@ -84,7 +84,7 @@ class OnlineUnits:
 def unsuitable_online(error: OnlineError) -> str:
     """Return the sentence for a datapath that has no on-line form."""
     return (
-        f"the realization must suit the online architecture, as df1, df1_ef1 and df1_ef2 do: {error}; "
+        f"the sections must suit the online architecture, as recursive ones in df1, df1_ef1 and df1_ef2 do: {error}; "
         "parallel takes every realization"
     )
 

@@ -87,7 +87,7 @@ def test_calibration() -> None:
 def test_a_cutoff_too_low_for_any_format(realization: str) -> None:
     refused(
         "the impulse response must end within 2097152 samples, not 34703473: a pole lies too close to the unit "
-        "circle, decimate by 32768 first",
+        "circle, decimate by 1024 first",
         beyond_half=Fraction(1, 2),
         ideal=butterworth(7, 0.000001),
         realization=realization,
