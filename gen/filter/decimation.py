@@ -160,6 +160,22 @@ class Decimation:
         return np.array(ratios).reshape(frequency.shape)
 
 
+def decimated_step(factor: int, stages: int) -> Array:
+    """Step response of a decimator at its results, of gain 1, until it has reached 1.
+
+    The step comes with a sample that brings a result, the first value.
+
+    Examples
+    --------
+    >>> decimated_step(2, 2).tolist()
+    [0.25, 1.0]
+    """
+    response = np.ones(1)
+    for _ in range(stages):
+        response = np.convolve(response, np.full(factor, 1 / factor))
+    return np.cumsum(np.append(response, np.zeros(-(len(response) - 1) % factor)))[::factor]
+
+
 def _fmpq(value: Fraction) -> fmpq:
     return fmpq(value.numerator, value.denominator)
 

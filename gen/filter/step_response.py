@@ -16,6 +16,9 @@ MAX_SAMPLES = 1 << 20
 SETTLED = 0.01
 """Tolerance of the settling time as engineers quote it, as a fraction of the step."""
 
+_STEP = np.ones(1)
+"""A step."""
+
 _PASSES = 0.1
 """Least share of the peak that the end of a response must be; below, a constant is in the stopband, not in the
 passband."""
@@ -71,7 +74,7 @@ class StepResponse:
         return int(outside[-1]) + 1 if len(outside) else 0
 
 
-def step_response(sos: Array, sample_rate: float, precision: float) -> StepResponse | None:
+def step_response(sos: Array, sample_rate: float, precision: float, entering: Array = _STEP) -> StepResponse | None:
     """Compute the step response of a filter until it is within a thousandth of `precision` of its end.
 
     Parameters
@@ -82,6 +85,8 @@ def step_response(sos: Array, sample_rate: float, precision: float) -> StepRespo
         Sampling frequency in Hz.
     precision : float
         Smallest tolerance that will be asked for, above 0.
+    entering : ndarray, shape (n,)
+        What enters the filter from the step on, and then 1: the step response of what is before it.
 
     Returns
     -------
@@ -93,9 +98,10 @@ def step_response(sos: Array, sample_rate: float, precision: float) -> StepRespo
         return None
     # a pole of multiplicity m decays later than a single one: n**(m-1) r**n, for which the factor makes room
     decay = 0.0 if radius == 0 else math.log(precision / 1000) / math.log(radius)
-    samples = 8 + 2 * len(sos) + math.ceil(1.5 * decay)
+    samples = 8 + 2 * len(sos) + math.ceil(1.5 * decay) + len(entering) - 1
     if samples > MAX_SAMPLES:
         return None
-    values = sosfilt(sos / sos[:, 3:4], np.ones(samples))
+    step = np.append(entering, np.ones(samples - len(entering)))
+    values = sosfilt(sos / sos[:, 3:4], step)
     final = float(np.prod(sos[:, :3].sum(axis=1) / sos[:, 3:].sum(axis=1)))
     return StepResponse(sample_rate=sample_rate, values=values, final=final)

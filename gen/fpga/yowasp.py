@@ -18,7 +18,7 @@ from pathlib import Path
 
 import platformdirs
 
-from sosmith.model.dataflow.tool_cache import tool_cache
+from sosmith.gen.fpga.tool_cache import tool_cache
 
 
 @contextmanager

@@ -129,6 +129,11 @@ class DecimationFacts:
     calibration: AheadFacts | None = None
 
     @property
+    def own_delay(self) -> float:
+        """Delay of the decimator alone, in s."""
+        return self.stages * (self.factor - 1) / 2 / (self.sample_rate * self.factor)
+
+    @property
     def entries(self) -> dict[str, Any]:
         """All of it as a tree; of a calibration nothing if there is none."""
         found = asdict(self)

@@ -12,9 +12,9 @@ from amaranth.back import rtlil
 from amaranth.lib.wiring import Component
 
 from sosmith.gen.core import CoreDesign
+from sosmith.gen.fpga.tool_cache import tool_cache
 from sosmith.gen.output.core_facts import core_facts
 from sosmith.gen.output.header import with_comments
-from sosmith.model.dataflow.tool_cache import tool_cache
 from sosmith.model.errors import ToolError
 
 # `proc` without `-nomux` leaves no combinational processes, which Icarus would not evaluate at time 0.

@@ -9,15 +9,17 @@ from typing import Any
 
 import numpy as np
 
+from sosmith.gen.filter.decimation import decimated_step
 from sosmith.gen.filter.response import FilterFacts, group_delay, passbands
 from sosmith.gen.filter.step_response import SETTLED, StepResponse, step_response
+from sosmith.gen.output.decimation_facts import DecimationFacts
 from sosmith.gen.report.evidence import Evidence, Mask
 from sosmith.model.reference.accuracy import ErrorStatistics, error_statistics
 
 
 @dataclass(frozen=True, kw_only=True)
 class Behaviour:
-    """Figures of the core and of its filter with integer coefficients.
+    """Figures of the core, and of its filter with integer coefficients and what decimates before it.
 
     Attributes
     ----------
@@ -52,7 +54,7 @@ def behaviour(evidence: Evidence) -> Behaviour:
     """Measure a run and its filter; of several channels, all count for the error against the true value."""
     error = true_error(evidence)
     facts, span = evidence.filter, evidence.high - evidence.low
-    step = None if facts is None else _step(facts, evidence.lsb, span)
+    step = None if facts is None else _step(facts, evidence.lsb, span, evidence.decimation)
     delay = None if facts is None else _delay(facts)
     if delay is not None and evidence.decimation is not None:
         delay = evidence.decimation.delay, delay[1]  # of decimator and filter, at zero frequency as the filter's own
@@ -113,13 +115,17 @@ def behaviour_entry(found: Behaviour) -> dict[str, Any]:
     }
 
 
-def _step(facts: FilterFacts, lsb: float, span: float) -> StepResponse | None:
-    return _cached_step(facts.quantized_sos.tobytes(), facts.sample_rate, lsb / 2 / span)
+def _step(facts: FilterFacts, lsb: float, span: float, before: DecimationFacts | None) -> StepResponse | None:
+    factor, stages = (1, 0) if before is None else (before.factor, before.stages)
+    return _cached_step(facts.quantized_sos.tobytes(), facts.sample_rate, lsb / 2 / span, factor, stages)
 
 
 @lru_cache(maxsize=8)
-def _cached_step(sections: bytes, sample_rate: float, precision: float) -> StepResponse | None:
-    return step_response(np.frombuffer(sections).reshape(-1, 6), sample_rate, precision)
+def _cached_step(
+    sections: bytes, sample_rate: float, precision: float, factor: int, stages: int
+) -> StepResponse | None:
+    sos = np.frombuffer(sections).reshape(-1, 6)
+    return step_response(sos, sample_rate, precision, decimated_step(factor, stages))
 
 
 def _delay(facts: FilterFacts) -> tuple[float, float] | None:

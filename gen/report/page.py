@@ -339,21 +339,23 @@ def _response_table(facts: FilterFacts, measures: Mapping[str, float | None]) ->
     return Table(head=("with the integer coefficients", ""), rows=rows, numbers=(1,))
 
 
-def _filter_figures(facts: FilterFacts) -> dict[str, Figure]:
+def _filter_figures(facts: FilterFacts, decimation: DecimationFacts | None) -> dict[str, Figure]:
     legend = [("golden", "broad", "ideal filter"), ("hardware", "dashed", "integer coefficients")]
     masked = (facts.passband_edge and facts.passband_loss) or (facts.stopband_edge and facts.stopband_loss)
     mask = [("limit", "area", "forbidden by the specification")] if masked else []
+    alone = "" if decimation is None else " Of the filter alone, behind the decimator."
+    later = "" if decimation is None else f" That adds {amount(decimation.own_delay, 's')}."
     return {
         "gain": Figure(
             title="Gain",
             drawing=plots.magnitude_figure(facts),
-            caption="Rounding the coefficients bends the ideal curve by the difference drawn below it.",
+            caption=f"Rounding the coefficients bends the ideal curve by the difference drawn below it.{alone}",
             legend=legend + mask,
         ),
         "delay": Figure(
             title="Group delay",
             drawing=plots.delay_figure(facts),
-            caption="How much later a slow change of each frequency appears at the output.",
+            caption=f"How much later a slow change of each frequency appears at the output.{alone}{later}",
             legend=legend,
         ),
         "plane": Figure(
@@ -489,7 +491,7 @@ def render_page(evidence: Evidence, summary: Summary) -> str:
         parts["alternatives"] = _alternatives_figure(shown)
         parts["alternatives_table"] = _alternatives_table(shown, summary)
     if shown.filter is not None:
-        parts |= _filter_figures(shown.filter)
+        parts |= _filter_figures(shown.filter, evidence.decimation)
         parts["step"] = None if found.step is None else _step_figure(found.step)
         parts["response"] = _response_table(shown.filter, summary["frequency_response"])
     if evidence.decimation is not None:

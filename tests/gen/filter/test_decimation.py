@@ -7,7 +7,14 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from sosmith.gen.filter.decimation import Decimation, choose, decimated, group_delay, stages_for
+from sosmith.gen.filter.decimation import (
+    Decimation,
+    choose,
+    decimated,
+    decimated_step,
+    group_delay,
+    stages_for,
+)
 from sosmith.gen.filter.design import design, impulse_response
 from sosmith.gen.specification.specification import FilterSpec
 from sosmith.model.dataflow.decimator import Decimator
@@ -44,6 +51,16 @@ def response_at(made: Decimation, frequency: np.ndarray) -> np.ndarray:
     taps = np.array(cic.impulse_response, dtype=np.float64) / made.factor**made.stages
     turns = np.exp(-2j * np.pi / float(made.sample_rate) * np.outer(frequency, np.arange(len(taps))))
     return turns @ taps
+
+
+@pytest.mark.parametrize(("factor", "stages"), [(2, 1), (2, 4), (8, 3), (16, 4), (64, 5)])
+def test_a_step_goes_through_as_in_integers(factor: int, stages: int) -> None:
+    port = Port(name="x", bits=8, signed=True, lsb=Fraction(1), zero=Fraction(0))
+    cic = Decimator(input=port, factor=factor, stages=stages, dropped=0)
+    step = decimated_step(factor, stages)
+    codes = np.repeat([0, 1], [factor, len(step) * factor])
+    assert (step * factor**stages).tolist() == cic.exact(codes)[1:].tolist()
+    assert step[-1] == 1 > step[-2]
 
 
 @pytest.mark.parametrize(("factor", "stages"), [(2, 1), (8, 3), (16, 4), (64, 8)])

@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 
+from sosmith.gen.fpga.tool_cache import tool_cache
 from sosmith.gen.fpga.tools import Tool
 from sosmith.gen.output.verilog import converted
-from sosmith.model.dataflow.tool_cache import tool_cache
 
 
 def test_the_users_cache_is_used_where_it_can_be_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

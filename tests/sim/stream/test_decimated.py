@@ -41,6 +41,18 @@ def samples_of(made: CoreDesign, count: int) -> Trace:
     return replace(trace, codes=codes, truth=None, reading=None)
 
 
+def settling_of(made: CoreDesign) -> float:
+    """Measure, with the integer model, the seconds from a step until results stay within 1 % of it."""
+    decimator = made.datapath.decimator
+    assert decimator is not None
+    ends = decimator.input.lowest // 2, decimator.input.highest // 2
+    codes = np.repeat(ends, [decimator.factor, 400 * decimator.factor])[:, np.newaxis]
+    before, *results = made.datapath.compute(codes).tolist()
+    left = np.abs(np.array(results) - results[-1])
+    outside = np.flatnonzero(left > 0.01 * abs(results[-1] - before))
+    return float((outside[-1] + 1) * decimator.factor / made.spec.sample_rate)
+
+
 @without_pictures
 @pytest.mark.parametrize(
     ("architecture", "simulator"), [("folded", "icarus"), ("parallel", "verilator"), ("serial", "cxxrtl")]
@@ -55,10 +67,13 @@ def test_hardware_equals_the_integer_model(architecture: str, simulator: str, tm
     assert summary["passed"]
     assert summary["decimation"]["factor"] == 16
     assert summary["delay"]["seconds"] == pytest.approx(3.006, abs=0.001)
+    assert summary["settling"]["seconds"] == settling_of(made)
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "What folds, anywhere and into the pass band" in page
     assert "46.875 Hz to 50 Hz" in page
     assert "49.74122 Hz to 50 Hz" in page
+    assert page.count("Of the filter alone, behind the decimator.") == 2
+    assert "That adds 300\xa0ms." in page
 
 
 @without_pictures
