@@ -335,9 +335,11 @@ def read_certificate(path: Path) -> Certificate:
         ) from None
     except json.JSONDecodeError as error:
         where = f"line {error.lineno}, column {error.colno}"
-        raise SpecificationError(f"{path}: the file must be a certificate in JSON, not: what is at {where}") from None
+        raise SpecificationError(
+            f"{path}: the file must be a certificate in JSON, not text that is no JSON from {where} on"
+        ) from None
     except RecursionError:
-        raise SpecificationError(f"{path}: the file must be a certificate in JSON, not: one nested so deep") from None
+        raise SpecificationError(f"{path}: the file must be a certificate in JSON, not one nested so deep") from None
     except ValueError as error:
         raise SpecificationError(f"{path}: the file must be a certificate in JSON, not: {error}") from None
 

@@ -616,8 +616,8 @@ def test_text_and_back(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "the file must be a certificate in JSON, not: what is at line 1, column 1"),
-        ("[" * 100000, "the file must be a certificate in JSON, not: one nested so deep"),
+        ("", "the file must be a certificate in JSON, not text that is no JSON from line 1, column 1 on"),
+        ("[" * 100000, "the file must be a certificate in JSON, not one nested so deep"),
         ("9" * 5000, "the file must be a certificate in JSON, not: an integer of 5000 digits"),
         ("1.5", "the file must be a certificate in JSON, not: 1.5, which is neither an integer nor a text"),
         ("NaN", "the file must be a certificate in JSON, not: NaN, which is neither an integer nor a text"),
