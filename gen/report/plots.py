@@ -78,6 +78,9 @@ STYLE: dict[Any, Any] = {
     "savefig.transparent": True,
 }
 
+_PASSES_DB = 60
+"""Attenuation, in dB, beyond which nothing is said to pass."""
+
 
 def draw(name: str, title: str, width: int, height: int, paint: Callable[[Figure], None]) -> str:
     """Paint a figure of `width` by `height` CSS pixels and return it as one ``<svg>`` element.
@@ -479,8 +482,8 @@ def delay_figure(facts: FilterFacts) -> str:
         ideal = group_delay(facts.ideal_sos, frequency, facts.sample_rate)
         quantized = group_delay(facts.quantized_sos, frequency, facts.sample_rate)
         # Zeros just off the unit circle, where nothing passes anyway, have delays beyond all bounds: not to be framed.
-        most = 2 * float(np.nanmax(np.abs(ideal)))
-        both = np.concatenate([ideal, np.clip(quantized, -most, most)])
+        level = magnitude_db(facts.quantized_sos, frequency, facts.sample_rate)
+        both = np.concatenate([ideal, quantized[level > np.nanmax(level) - _PASSES_DB]])
         factor, unit = scale(float(np.nanmax(np.abs(both))), "s")
         axes.plot(frequency, ideal * factor, color=COLOUR["golden"], **IDEAL_LINE)
         axes.plot(frequency, quantized * factor, color=COLOUR["hardware"], **REAL_LINE)

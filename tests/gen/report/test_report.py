@@ -723,6 +723,7 @@ def test_a_delay_beyond_all_bounds_is_not_framed() -> None:
     moved = ideal * [1, 1 + 1e-6, 1, 1, 1, 1]
     drawn = plots.delay_figure(facts(ideal_sos=ideal, quantized_sos=moved, sample_rate=48000.0, cutoff=(1000.0,)))
     assert "group delay in µs" in Page(drawn).words
+    assert [word for word in Page(drawn).words if word.startswith("\u2212")] == []  # no delay is below 0
 
 
 def test_this_design_is_not_its_own_alternative() -> None:
