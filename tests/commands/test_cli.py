@@ -232,7 +232,9 @@ PASSING = ("scenario", "wall_seconds", "cycles_per_second")
 """Keys of a report that differ between two runs on the same codes."""
 
 
-@pytest.mark.parametrize(("spec", "scenario"), [("demo", "wear_ramp"), ("plain", "noise")])
+@pytest.mark.parametrize(
+    ("spec", "scenario"), [("demo", "wear_ramp"), pytest.param("plain", "noise", marks=pytest.mark.slow)]
+)
 def test_a_scenario_by_way_of_a_file_gives_the_same_result(spec: str, scenario: str, sosmith: Command) -> None:
     options = ["--simulator", "icarus", "--seed", "0", "--json"]
     direct = sosmith("simulate", f"{spec}.toml", "--trace", scenario, "--seconds", "2", *options)

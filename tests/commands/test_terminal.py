@@ -339,7 +339,7 @@ def test_the_cache_can_be_emptied(sosmith: Command, tmp_path: Path, monkeypatch:
     [
         (signal.SIGINT, 130, ["sosmith: interrupted"]),
         (signal.SIGTERM, 143, []),
-        (signal.SIGHUP, 129, []),
+        pytest.param(signal.SIGHUP, 129, [], marks=pytest.mark.slow),
         (signal.SIGKILL, -9, []),
     ],
 )

@@ -79,7 +79,7 @@ def step_of(datapath: Datapath, folder: Path) -> Any:
         (1, 1, "zero", "none"),
         (3, 3, "zero", "none"),
         (1, 1, "zero", "correct"),
-        (3, 3, "zero", "correct"),
+        pytest.param(3, 3, "zero", "correct", marks=pytest.mark.slow),
     ],
 )
 def test_a_sample_has_the_same_flags_everywhere(

@@ -54,7 +54,9 @@ def test_the_fastest_cores_hold_their_bound(kind: str, lanes: int, clock: str, s
     worst(designed(lanes, clock=clock), kind, 1 << 20, tmp_path, simulator)
 
 
-@pytest.mark.parametrize(("lanes", "pipeline"), [(1, "look-ahead"), (2, "plain"), (2, "look-ahead")])
+@pytest.mark.parametrize(
+    ("lanes", "pipeline"), [(1, "look-ahead"), (2, "plain"), pytest.param(2, "look-ahead", marks=pytest.mark.slow)]
+)
 def test_tools_read_the_text_without_a_warning(lanes: int, pipeline: str, tmp_path: Path) -> None:
     made = designed(lanes, pipeline=pipeline)
     generate(made, tmp_path)

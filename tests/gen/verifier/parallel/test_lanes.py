@@ -40,7 +40,7 @@ def test_an_output_with_more_bits_than_the_input() -> None:
     accept(small(WIDE, "df1", lanes=2))
 
 
-@pytest.mark.parametrize("lanes", [2, 4, 16])
+@pytest.mark.parametrize("lanes", [2, 4, pytest.param(16, marks=pytest.mark.slow)])
 def test_an_example(lanes: int) -> None:
     accept(made(designed(lanes, pipeline="plain"), lanes=lanes))
 
