@@ -27,19 +27,17 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property
-from itertools import accumulate, zip_longest
-from math import gcd, lcm, prod
+from math import prod
 
-from flint import fmpq, fmpq_poly
+from flint import fmpq_poly
 
 from sosmith.gen.verifier.certificate_file import Certificate, Operation, StageEntry, on_grid
 from sosmith.gen.verifier.decimation import at_lower_rate, calibration_alone, rounding
+from sosmith.gen.verifier.driven_responses import Denominator, Driven, deviation, extremes, magnitude, rational
 from sosmith.gen.verifier.graph import RejectedError, Transfer, check_graph, inputs_of, label, require
-from sosmith.gen.verifier.l1_response import BITS, Inverse, UndecidedError, fraction, inverse, is_stable, response
+from sosmith.gen.verifier.l1_response import UndecidedError, fraction, is_stable
 from sosmith.gen.verifier.largest_gain import check_bands
 from sosmith.gen.verifier.online import check_online
-from sosmith.gen.verifier.piecewise import Pieces
 from sosmith.gen.verifier.polynomial import output_error, polynomial_error
 from sosmith.gen.verifier.settling import check_fading, without_counter
 from sosmith.gen.verifier.start import Start, check_start, section_alone
@@ -48,12 +46,6 @@ Progress = Callable[[str, int, int], None]
 """Callback for progress, called with the name of the step, the number of units done, and their total."""
 
 _ROLES = ("polynomial", "start", "section", "output")
-
-_SHORT = 1 << 10
-"""Samples of an inverse that is faster than pieces."""
-
-_NEGLIGIBLE = Fraction(1, 1 << 64)
-"""Share of a limit that may be added to it instead of summing up to every sample."""
 
 
 @dataclass(frozen=True)
@@ -272,10 +264,6 @@ class _Drive:
     high: Fraction
 
 
-_Driven = tuple[fmpq_poly, Fraction, Fraction]
-"""Numerator of a response, and the range of what drives it."""
-
-
 class _Cascade:
     """The proof of a cascade of sections; its attributes are the claimed figures, rounded up to the grid."""
 
@@ -283,7 +271,7 @@ class _Cascade:
         self, certificate: Certificate, sections: Sequence[StageEntry], start: Start | None, progress: Progress
     ) -> None:
         self._models = [Transfer(section) for section in sections]
-        self._over: dict[str, _Denominator] = {}
+        self._over: dict[str, Denominator] = {}
         shape = (len(inputs_of(sections[0])), len(sections[-1].outputs))
         require(shape == (1, 1), f"the sections must have one input and one output in all, not {shape}")
         for section, model in zip(sections, self._models, strict=True):
@@ -309,12 +297,12 @@ class _Cascade:
         last = len(self._models) - 1
         made, *errors = (self._driven(drive, last) for drive in drives)
         over = self._up_to(last)
-        self.rounding = on_grid(_magnitude(over, errors))
-        deviation = _deviation(over, made[0], ideal, exact[0], self._windows)
-        self.coefficients = on_grid(deviation)
+        self.rounding = on_grid(magnitude(over, errors))
+        exceeded = deviation(over, made[0], ideal, exact[0], self._windows)
+        self.coefficients = on_grid(exceeded)
         # Both figures are rounded up: what that adds is room for another ideal filter.
         largest = max(Fraction(1), *(abs(end) for window in self._windows for end in window))
-        self.margin = min(self.peak_gain - gain, (self.coefficients - deviation) / largest)
+        self.margin = min(self.peak_gain - gain, (self.coefficients - exceeded) / largest)
 
     def _compare_gains(self, certificate: Certificate) -> None:
         claims = certificate.claims.sections
@@ -338,17 +326,17 @@ class _Cascade:
         """Numerator and denominator of the ideal filter."""
         numerator = denominator = fmpq_poly([1])
         for index, section in enumerate(certificate.ideal.sections):
-            b, a = (fmpq_poly(list(map(_rational, p))) for p in (section.numerator, section.denominator))
+            b, a = (fmpq_poly(list(map(rational, p))) for p in (section.numerator, section.denominator))
             require(section.denominator[0] == 1, f"the denominator of ideal section {index} must begin with 1")
             require(is_stable(a), f"ideal section {index} must have its poles inside the unit circle")
             numerator, denominator = numerator * b, denominator * a
         return numerator, denominator
 
-    def _over_all(self, denominator: fmpq_poly, like: _Denominator | None = None) -> _Denominator:
+    def _over_all(self, denominator: fmpq_poly, like: Denominator | None = None) -> Denominator:
         """Return what is known over a denominator; the same for the same one."""
-        return self._over.setdefault(str(denominator.coeffs()), _Denominator(denominator, like))
+        return self._over.setdefault(str(denominator.coeffs()), Denominator(denominator, like))
 
-    def _up_to(self, last: int) -> _Denominator:
+    def _up_to(self, last: int) -> Denominator:
         """Return what is known over the denominators of all sections up to `last`."""
         under = prod((m.denominator for m in self._models[: last + 1]), start=fmpq_poly([1]))
         return self._over_all(under, self._ideal_over if last == len(self._models) - 1 else None)
@@ -366,7 +354,7 @@ class _Cascade:
             ),
         ]
 
-    def _driven(self, drive: _Drive, last: int) -> _Driven:
+    def _driven(self, drive: _Drive, last: int) -> Driven:
         """Response to a drive over the denominators of all sections up to `last`."""
         (numerator,) = drive.numerators
         before = prod((model.denominator for model in self._models[: drive.first]), start=fmpq_poly([1]))
@@ -380,7 +368,7 @@ class _Cascade:
         low = high = Fraction(0)
         for rough in (True, False):  # a rough range mostly fits
             found = [
-                _extremes(self._up_to(index), [(through, *window), *others], rough=rough) for window in self._windows
+                extremes(self._up_to(index), [(through, *window), *others], rough=rough) for window in self._windows
             ]
             low, high = min(low for low, _ in found) * 2**bound.frac, max(high for _, high in found) * 2**bound.frac
             if bound.low <= max(low, of.low) and min(high, of.high) <= bound.high:
@@ -395,209 +383,6 @@ def _combined(numerators: Sequence[fmpq_poly], way: Sequence[fmpq_poly]) -> fmpq
     for numerator, through in zip(numerators, way, strict=True):
         total += numerator * through
     return total
-
-
-class _Denominator:
-    """Sums over responses with one denominator, each computed when it is needed first, in pieces as another's.
-
-    A response over a polynomial in ``w**step`` is `step` responses that take turns, each over that polynomial in w: its
-    norm is the sum of theirs.
-    """
-
-    def __init__(self, polynomial: fmpq_poly, like: _Denominator | None = None) -> None:
-        self.polynomial = polynomial
-        self.step = gcd(*(k for k, value in enumerate(polynomial.coeffs()) if value)) or 1
-        self._like = like
-
-    @cached_property
-    def _short(self) -> Inverse | None:
-        """Approximate inverse, if it is short."""
-        try:
-            return inverse(self.polynomial, _SHORT)
-        except UndecidedError:
-            return None
-
-    @cached_property
-    def pieces(self) -> Pieces | None:
-        """Responses in pieces, if they are long."""
-        if self.step > 1 or self._short is not None:
-            return None
-        return Pieces(self.polynomial, None if self._like is None else self._like.pieces)
-
-    @cached_property
-    def inverse(self) -> Inverse:
-        """Approximate inverse, however long."""
-        return inverse(self.polynomial) if self._short is None else self._short
-
-    def norm(self, numerator: fmpq_poly, *, rough: bool = False) -> Fraction:
-        """Upper bound of the sum of magnitudes; if `rough`, it need not be close."""
-        if self.step > 1:
-            parts = (fmpq_poly(numerator.coeffs()[k :: self.step]) for k in range(self.step))
-            return sum((self.turn.norm(part, rough=rough) for part in parts if part), Fraction(0))
-        if self.pieces is None:
-            return response(numerator, self.inverse).gain
-        return self.pieces.norm(numerator, rough=rough)
-
-    @cached_property
-    def turn(self) -> _Denominator:
-        """The polynomial in w, if this is one in ``w**step``."""
-        return _Denominator(fmpq_poly(self.polynomial.coeffs()[:: self.step]))
-
-    def total(self, numerator: fmpq_poly) -> Fraction:
-        """Sum of all samples, exact."""
-        return fraction(numerator(1) / self.polynomial(1))
-
-
-def _rational(value: Fraction) -> fmpq:
-    return fmpq(value.numerator, value.denominator)
-
-
-def _magnitude(over: _Denominator, driven: Sequence[_Driven]) -> Fraction:
-    low, high = _extremes(over, driven)
-    return max(-low, high)
-
-
-def _deviation(
-    over: _Denominator,
-    made: fmpq_poly,
-    ideal: _Denominator,
-    exact: fmpq_poly,
-    windows: Sequence[tuple[Fraction, Fraction]],
-) -> Fraction:
-    """Largest magnitude of one response minus that of the ideal filter, both driven by the same, within any window."""
-    if over.step > 1:
-        # Over a denominator in the same power of w, the ideal filter's responses take turns as well.
-        factor, scattered = _scattered(ideal.polynomial, over.step)
-        ideal, exact = _Denominator(scattered), exact * factor
-    difference = made * ideal.polynomial - exact * over.polynomial
-    size = None
-    if difference and over.pieces is not None and ideal.pieces is not None:
-        size = over.pieces.distance(made, ideal.pieces, exact)
-    if size is None or any(low > 0 or high < 0 for low, high in windows):
-        both = _Denominator(over.polynomial * ideal.polynomial)
-        return max(_magnitude(both, [(difference, *window)]) for window in windows)
-    gain = abs(over.total(made) - ideal.total(exact))
-    return max(abs(low + high) / 2 * gain + (high - low) / 2 * size for low, high in windows)
-
-
-def _scattered(polynomial: fmpq_poly, step: int) -> tuple[fmpq_poly, fmpq_poly]:
-    """Return a factor with which a polynomial becomes one in ``w**step``, and that; `step` is a power of two."""
-    if step == 1:
-        return fmpq_poly([1]), polynomial
-    mirrored = polynomial(fmpq_poly([0, -1]))
-    even = fmpq_poly((polynomial * mirrored).coeffs()[::2])  # in w**2
-    factor, made = _scattered(even, step // 2)
-    square = fmpq_poly([0, 0, 1])
-    return mirrored * factor(square), made(square)
-
-
-def _extremes(over: _Denominator, driven: Sequence[_Driven], *, rough: bool = False) -> tuple[Fraction, Fraction]:
-    """Limits, over all times n, of the sum over all drives of ``sum over k <= n of h_k u(n - k)``.
-
-    If every range contains zero, each term with the worst u is on one side of it, and the limits are those of the whole
-    sums: with ``u = c + v`` and ``|v| <= r``, c times the sum of all samples, and r times the sum of magnitudes. If one
-    does not, sums up to some n may be beyond these, by what `_overshoot` bounds. If that is not next to nothing, they
-    are followed from sample to sample, unless limits may be `rough`.
-    """
-    summed = _summed_up(driven)
-    centre = reach = Fraction(0)
-    for numerator, low, high in summed:
-        centre += (low + high) / 2 * over.total(numerator)
-        reach += (high - low) / 2 * over.norm(numerator, rough=rough)
-    apart = [(numerator, low, high) for numerator, low, high in summed if low > 0 or high < 0]
-    if not apart:
-        return centre - reach, centre + reach
-    if rough and over.step > 1:
-        # No sum of all turns up to some n is beyond the sum of their own limits, and of 0 for a turn still to come.
-        limits = [_extremes(over.turn, turn, rough=True) for turn in _turns(driven, over.step)]
-        none = Fraction(0)
-        in_turns = [
-            sum((min(none, low) for low, _ in limits), none),
-            sum((max(none, high) for _, high in limits), none),
-        ]
-        # Nor is it beyond the limits of the whole sums by more than all that is still to come of the constants.
-        coming = _still_to_come(over, apart)
-        odd = int(coming.denom()) // (int(coming.denom()) & -int(coming.denom()))  # a norm is of binary fractions
-        beyond = over.norm(coming * odd, rough=True) / odd
-        return max(in_turns[0], centre - reach - beyond), min(in_turns[1], centre + reach + beyond)
-    more = _overshoot(over, apart, summed)
-    if more is None or (max(more) > reach * _NEGLIGIBLE and not rough):
-        return _running_extremes(over, summed)
-    above, below = more
-    return centre - reach - below, centre + reach + above
-
-
-def _turns(driven: Sequence[_Driven], step: int) -> list[list[_Driven]]:
-    """Numerators of the responses that take turns over a denominator in ``w**step``, with the same drives."""
-    return [[(fmpq_poly(over.coeffs()[k::step]), low, high) for over, low, high in driven] for k in range(step)]
-
-
-def _overshoot(
-    over: _Denominator, apart: Sequence[_Driven], driven: Sequence[_Driven]
-) -> tuple[Fraction, Fraction] | None:
-    """Bounds on how far sums up to some n leave the upper and lower limit of whole sums; None if responses are short.
-
-    Each of the drives `apart`, whose ranges do not contain zero, is a constant, its end next to zero, and a drive from
-    there on, whose range does. What is still to come after n, with the worst u, is negative at most by the magnitude of
-    what is to come of the constants. Of all the others no term is negative, and those of the largest one are taken as
-    they are.
-    """
-    if over.pieces is None:
-        return None
-    others = [one for one in driven if one[1] <= 0 <= one[2]]
-    for numerator, low, high in apart:
-        others.append((numerator, low - _constant(low, high), high - _constant(low, high)))
-    largest = max(others, key=lambda one: (one[2] - one[1]) * over.norm(one[0], rough=True))
-    return over.pieces.excess(_still_to_come(over, apart), *largest)
-
-
-def _constant(low: Fraction, high: Fraction) -> Fraction:
-    """Return the end of a range without zero that is next to it."""
-    return low if low > 0 else high
-
-
-def _still_to_come(over: _Denominator, apart: Sequence[_Driven]) -> fmpq_poly:
-    """Numerator of what is still to come, behind each sample, of the constants in ranges that do not contain zero."""
-    steady = fmpq_poly([0])
-    for numerator, low, high in apart:
-        steady += numerator * _rational(_constant(low, high))
-    whole = over.polynomial * (steady(1) / over.polynomial(1))
-    return (whole - steady) / fmpq_poly([1, -1])
-
-
-def _summed_up(driven: Sequence[_Driven]) -> list[_Driven]:
-    """Replace drives with equal numerators, but for a factor, by one with the sum of their ranges."""
-    ranges: dict[tuple[str, ...], _Driven] = {}
-    for numerator, *ends in driven:
-        if numerator and any(ends):
-            leading = numerator.leading_coefficient()
-            key = tuple(map(str, (numerator / leading).coeffs()))
-            first, *before = ranges.get(key, (numerator, Fraction(0), Fraction(0)))
-            low, high = sorted(fraction(leading / first.leading_coefficient()) * end for end in ends)
-            ranges[key] = first, before[0] + low, before[1] + high
-    return list(ranges.values())
-
-
-def _running_extremes(over: _Denominator, driven: Sequence[_Driven]) -> tuple[Fraction, Fraction]:
-    """Limits as above, from the sums up to every sample."""
-    scale = lcm(*(end.denominator for _, *ends in driven for end in ends))
-    tops: list[int] = []
-    bottoms: list[int] = []
-    slack = Fraction(0)
-    for numerator, *ends in driven:
-        low, high = (int(end * scale) for end in ends)
-        if low or high:
-            reached = response(numerator, over.inverse)
-            up, down = (low, high), (high, low)
-            tops = _added(tops, [value * up[value > 0] for value in reached.samples])
-            bottoms = _added(bottoms, [value * down[value > 0] for value in reached.samples])
-            slack += max(map(abs, ends)) * reached.error
-    unit = Fraction(1, scale << BITS)
-    return min(accumulate(bottoms), default=0) * unit - slack, max(accumulate(tops), default=0) * unit + slack
-
-
-def _added(a: list[int], b: list[int]) -> list[int]:
-    return [x + y for x, y in zip_longest(a, b, fillvalue=0)]
 
 
 __all__ = ["Progress", "RejectedError", "Verdict", "verify"]

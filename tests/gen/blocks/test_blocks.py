@@ -26,7 +26,7 @@ from sosmith.gen.realizations.section_format import SectionFormat
 from sosmith.gen.report.provenance import provenance_of
 from sosmith.gen.specification.specification import from_text
 from sosmith.gen.stimuli import traces_for
-from sosmith.gen.verifier import verification
+from sosmith.gen.verifier import driven_responses
 from sosmith.gen.verifier.certificate_file import Certificate, certificate_text
 from sosmith.gen.verifier.parallel.check import check_hardware
 from sosmith.gen.verifier.verification import verify
@@ -228,16 +228,16 @@ def test_the_verifier_proves_look_ahead_by_its_own_method() -> None:
 
 
 def test_responses_that_take_turns_have_the_norm_of_all_of_them() -> None:
-    poly = verification.fmpq_poly
-    scattered = poly([1, 0, 0, 0, verification.fmpq(1, 2)])
-    plain = poly([1, verification.fmpq(1, 2)])
+    poly = driven_responses.fmpq_poly
+    scattered = poly([1, 0, 0, 0, driven_responses.fmpq(1, 2)])
+    plain = poly([1, driven_responses.fmpq(1, 2)])
     numerator = poly([1, 2, 3, 0, 5])
-    turns = verification._Denominator(scattered).norm(numerator)
-    apart = sum(verification._Denominator(plain).norm(part) for part in (poly([1, 5]), poly([2]), poly([3])))
+    turns = driven_responses.Denominator(scattered).norm(numerator)
+    apart = sum(driven_responses.Denominator(plain).norm(part) for part in (poly([1, 5]), poly([2]), poly([3])))
     assert turns == apart
-    factor, made = verification._scattered(poly([1, -1, verification.fmpq(1, 4)]), 8)
+    factor, made = driven_responses._scattered(poly([1, -1, driven_responses.fmpq(1, 4)]), 8)
     assert {k for k, value in enumerate(made.coeffs()) if value} == {0, 8, 16}
-    assert made == factor * poly([1, -1, verification.fmpq(1, 4)])
+    assert made == factor * poly([1, -1, driven_responses.fmpq(1, 4)])
 
 
 @pytest.mark.parametrize(
@@ -245,14 +245,14 @@ def test_responses_that_take_turns_have_the_norm_of_all_of_them() -> None:
 )
 def test_rough_limits_by_turns_enclose_those_of_every_sample(numerators: tuple[list[int], list[int]]) -> None:
     """With drives that do not contain zero, sums up to some sample may be beyond whole ones."""
-    poly, quarter = verification.fmpq_poly, verification.fmpq(1, 4)
-    over = verification._Denominator(poly([1, 0, 0, 0, -4 * quarter, 0, 0, 0, quarter]))
+    poly, quarter = driven_responses.fmpq_poly, driven_responses.fmpq(1, 4)
+    over = driven_responses.Denominator(poly([1, 0, 0, 0, -4 * quarter, 0, 0, 0, quarter]))
     driven = [
         (poly(numerators[0]), Fraction(1), Fraction(2)),
         (poly(numerators[1]), Fraction(-3), Fraction(-1, 2)),
     ]
-    low, high = verification._running_extremes(over, driven)
-    below, above = verification._extremes(over, driven, rough=True)
+    low, high = driven_responses._running_extremes(over, driven)
+    below, above = driven_responses.extremes(over, driven, rough=True)
     slack = Fraction(1, 2**64)  # limits of every sample are rounded
     assert below - slack <= low < high <= above + slack
     assert above - below <= 2 * (high - low)

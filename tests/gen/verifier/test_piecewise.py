@@ -7,7 +7,7 @@ from math import prod
 import pytest
 from flint import fmpq, fmpq_poly
 
-from sosmith.gen.verifier import piecewise, summed_forms, verification
+from sosmith.gen.verifier import driven_responses, piecewise, summed_forms
 from sosmith.gen.verifier.l1_response import BITS, UndecidedError, inverse, response
 from sosmith.gen.verifier.piecewise import Pieces
 
@@ -186,16 +186,16 @@ def test_limits_with_a_constant_are_those_of_the_sums_up_to_every_sample(
     constant: fmpq, low: Fraction, summed_up: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A small one does not reach beyond what a large signal can still do; a large one overshoots."""
-    over, value = verification._Denominator(LONG), Fraction(int(constant.p), int(constant.q))
+    over, value = driven_responses.Denominator(LONG), Fraction(int(constant.p), int(constant.q))
     driven = [
         (fmpq_poly([0, 1, 1]), Fraction(low), Fraction(5)),
         (fmpq_poly([1, -2, 1]), Fraction(-1, 1 << 21), Fraction(0)),
         (fmpq_poly([1]), value, value),
     ]
-    exact = verification._running_extremes(over, driven)
+    exact = driven_responses._running_extremes(over, driven)
     calls = []
-    monkeypatch.setattr(verification, "_running_extremes", lambda *given: calls.append(given) or exact)
-    found = verification._extremes(over, driven)
+    monkeypatch.setattr(driven_responses, "_running_extremes", lambda *given: calls.append(given) or exact)
+    found = driven_responses.extremes(over, driven)
     assert bool(calls) == summed_up
     assert found[0] <= exact[0] + Fraction(1, 1 << 80)
     assert exact[1] - Fraction(1, 1 << 80) <= found[1]

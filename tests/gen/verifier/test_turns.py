@@ -10,8 +10,9 @@ from tests.gen.word_lengths.decimated import read, tree_of
 
 from sosmith.gen.core import design_core
 from sosmith.gen.verifier.certificate_file import Certificate, Operation
+from sosmith.gen.verifier.driven_responses import Denominator, extremes
 from sosmith.gen.verifier.graph import RejectedError
-from sosmith.gen.verifier.verification import _Denominator, _extremes, verify
+from sosmith.gen.verifier.verification import verify
 
 
 def _binary(rng: random.Random) -> fmpq:
@@ -23,13 +24,13 @@ def test_rough_limits_hold_for_every_sum() -> None:
     rng, hardly = random.Random(4), Fraction(1, 1 << 60)
     for _ in range(40):
         step = rng.choice([2, 4])
-        over = _Denominator(fmpq_poly([1, *[0] * (step - 1), _binary(rng) / 2]))
+        over = Denominator(fmpq_poly([1, *[0] * (step - 1), _binary(rng) / 2]))
         drives = [
             (fmpq_poly([_binary(rng) for _ in range(3)]), Fraction(low), Fraction(high))
             for low, high in ((-1, 2), (1, 1), (-3, -2), (0, 1))
         ]
-        low, high = _extremes(over, drives)
-        rough_low, rough_high = _extremes(over, drives, rough=True)
+        low, high = extremes(over, drives)
+        rough_low, rough_high = extremes(over, drives, rough=True)
         assert rough_low - hardly <= low < high <= rough_high + hardly
 
 
