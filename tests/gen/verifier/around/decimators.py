@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from functools import cache
 from typing import NamedTuple
 
+import pytest
 from tests.gen.verifier.parallel.cores import specified
 from tests.gen.word_lengths.decimated import read, tree_of
 
@@ -104,6 +105,20 @@ def designed(case: Case | Instrument) -> tuple[CoreDesign, Certificate]:
 def written(case: Case | Instrument) -> str:
     made, _ = designed(case)
     return to_verilog(to_rtlil(made.architecture.component(), made.datapath.name))
+
+
+def check_rejected(case: Case | Instrument, text: str, sentence: str | None = None) -> None:
+    """Check that the verifier rejects a text instead of that of a core, by that sentence if one is given."""
+    _, certificate = designed(case)
+    assert text != written(case)
+    with pytest.raises(RejectedError, match=None if sentence is None else f"^{re.escape(sentence)}$"):
+        check_decimator(text, certificate, case.channels)
+
+
+def check_rejected_as_made(case: Case | Instrument) -> None:
+    """Check that the verifier rejects what a core is written as now, with its hardware broken."""
+    made, _ = designed(case)
+    check_rejected(case, to_verilog(to_rtlil(made.architecture.component(), made.datapath.name)))
 
 
 EDITS = [
