@@ -21,6 +21,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from itertools import accumulate
 
 import numpy as np
 from flint import arb, fmpq
@@ -32,7 +33,7 @@ from sosmith.gen.filter.sections import Exact, Row
 from sosmith.gen.specification.choices import AUTO, MAX_DECIMATION, MAX_RATIO
 from sosmith.gen.specification.specification import FilterSpec
 from sosmith.model.arithmetic.correct_rounding import evaluate, nearest_double, nearest_multiple
-from sosmith.model.dataflow.decimator import MAX_WIDTH
+from sosmith.model.dataflow.decimator import MAX_WIDTH, impulse_response
 from sosmith.model.errors import ShortfallError
 
 MAX_STAGES = 8
@@ -129,7 +130,7 @@ class Decimation:
 
     def delay(self, filter_: Filter) -> Fraction:
         """Group delay at zero frequency of the decimator and a corrected filter, in s."""
-        return group_delay(filter_.exact) / self.rate + Fraction(self.stages * (self.factor - 1), 2) / self.sample_rate
+        return group_delay(filter_.exact) / self.rate + own_delay(self.factor, self.stages) / self.sample_rate
 
     def deviation(self, filter_: Filter, direct: Filter) -> float:
         """Largest deviation, in the pass band, of decimator and corrected filter from a `direct` filter, in dB."""
@@ -160,6 +161,11 @@ class Decimation:
         return np.array(ratios).reshape(frequency.shape)
 
 
+def own_delay(factor: int, stages: int) -> Fraction:
+    """Delay of a decimator alone, in samples at the higher rate: half the length of its symmetric response."""
+    return Fraction(stages * (factor - 1), 2)
+
+
 def decimated_step(factor: int, stages: int) -> Array:
     """Step response of a decimator at its results, of gain 1, until it has reached 1.
 
@@ -170,10 +176,9 @@ def decimated_step(factor: int, stages: int) -> Array:
     >>> decimated_step(2, 2).tolist()
     [0.25, 1.0]
     """
-    response = np.ones(1)
-    for _ in range(stages):
-        response = np.convolve(response, np.full(factor, 1 / factor))
-    return np.cumsum(np.append(response, np.zeros(-(len(response) - 1) % factor)))[::factor]
+    response = impulse_response(factor, stages)
+    reached = list(accumulate([*response, *[0] * (-(len(response) - 1) % factor)]))[::factor]
+    return np.array([value / factor**stages for value in reached])
 
 
 def _fmpq(value: Fraction) -> fmpq:

@@ -13,7 +13,8 @@ _PARTS = ("wasmtime", "YoWASP")
 def tool_cache() -> dict[str, str]:
     """Variables of the environment that these programs need beside this process's.
 
-    None if the user's cache folder can be written; else a folder of our own, which lasts as long as this process.
+    There are none if the user's cache folder can be written; else a folder of our own takes its place, which lasts as
+    long as this process.
     """
     named = os.environ.get("XDG_CACHE_HOME", "")
     try:

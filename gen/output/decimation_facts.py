@@ -8,7 +8,7 @@ from typing import Any
 
 from sosmith.gen.architecture import Architecture
 from sosmith.gen.core import CoreDesign, design_core
-from sosmith.gen.filter.decimation import group_delay, nearest_db
+from sosmith.gen.filter.decimation import group_delay, nearest_db, own_delay
 from sosmith.gen.filter.design import design
 from sosmith.gen.filter.largest_gain import LargestGain
 from sosmith.gen.fpga.boards import find_board
@@ -131,7 +131,7 @@ class DecimationFacts:
     @property
     def own_delay(self) -> float:
         """Delay of the decimator alone, in s."""
-        return self.stages * (self.factor - 1) / 2 / (self.sample_rate * self.factor)
+        return float(own_delay(self.factor, self.stages)) / (self.sample_rate * self.factor)
 
     @property
     def entries(self) -> dict[str, Any]:

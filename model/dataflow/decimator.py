@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import accumulate
 from typing import TypeVar
 
 import numpy as np
@@ -29,6 +30,15 @@ _Flags = TypeVar("_Flags", np.bool_, np.uint8)
 
 MAX_WIDTH = 63
 """Widest register of a decimator, in bits: the models in software have words of 64."""
+
+
+def impulse_response(factor: int, stages: int) -> tuple[int, ...]:
+    """Impulse response, at the higher rate, of a CIC filter; the sum of its samples is ``factor**stages``."""
+    response = [1]
+    for _ in range(stages):
+        sums = list(accumulate([*response, *[0] * (factor - 1)]))
+        response = [a - b for a, b in zip(sums, [*[0] * factor, *sums], strict=False)]
+    return tuple(response)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -121,12 +131,7 @@ class Decimator:
     @property
     def impulse_response(self) -> tuple[int, ...]:
         """Response at the higher rate; the sum of its samples is ``R**N``."""
-        response = [1]
-        for _ in range(self.stages):
-            response = [
-                sum(response[max(0, k - self.factor + 1) : k + 1]) for k in range(len(response) + self.factor - 1)
-            ]
-        return tuple(response)
+        return impulse_response(self.factor, self.stages)
 
     def before(self, response: Values) -> Values:
         """Return the response of decimator and filter, at the higher rate, from the filter's own.

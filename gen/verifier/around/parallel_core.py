@@ -59,15 +59,13 @@ def check_behind(text: str, certificate: Certificate, channels: int = 1) -> Hard
         found.told: Bits(DATA, whole, told),
         CIC + "o_valid": Bits(SOURCE),
     }
-    if found.names is not None:
-        supplied[found.names.dest] = Bits(DEST)
-    dest = [found.netlist.widths[name] for name, source in found.seams.entering.items() if source not in supplied]
-    assert not dest  # as these are all that enters
-    wires = {name: supplied[source] for name, source in found.seams.entering.items()}
-    wires |= {found.seams.ready: Bits(SINK), found.seams.taken: Bits(_READY), found.seams.valid: Bits(_VALID)}
     widths = {DATA: whole + told}
     if found.names is not None:
-        widths[DEST] = next(found.netlist.widths[name] for name, wire in wires.items() if wire == Bits(DEST))
+        supplied[found.names.dest] = Bits(DEST)
+        (taken,) = (name for name, source in found.seams.entering.items() if source == found.names.dest)
+        widths[DEST] = found.netlist.widths[taken]
+    wires = {name: supplied[source] for name, source in found.seams.entering.items()}
+    wires |= {found.seams.ready: Bits(SINK), found.seams.taken: Bits(_READY), found.seams.valid: Bits(_VALID)}
     top = _top(found, f"{certificate.name}_behind", BEHIND, wires, widths, _leaving(found))
     return check_modules({_TOP: top, **found.modules}, behind, channels, Inside(f"{_CORE}.", told))
 
