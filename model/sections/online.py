@@ -305,7 +305,7 @@ def _recurrence(graph: Graph) -> tuple[_Row, _Row, tuple[int, ...], _Rest]:
         raise OnlineError("its output must be the floor of a sum of taps, without a quantizer before")
     rows = {kind: _row(total, kind) for kind in "xye"}
     if not rows["y"]:
-        raise OnlineError("it must be recursive")
+        raise OnlineError("a section must be recursive")
     unit = Fraction(2) ** -y.frac
     centre = total.get(_ONE, Fraction(0)) / unit
     wanted = (1 - sum(rows["e"], Fraction(0))) / 2

@@ -9,6 +9,7 @@ from tests.gen.designs import ALL, example_design, parallel_design
 from sosmith.gen.architecture import objective_of
 from sosmith.gen.fpga.boards import find_board
 from sosmith.gen.word_lengths.objective import SMALL_AREA, Objective, ShortProgram
+from sosmith.gen.word_lengths.online_units import OnlineUnits
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.graph import GraphBuilder
 from sosmith.model.dataflow.program import serial_clocks
@@ -62,6 +63,17 @@ def test_what_cannot_be_folded() -> None:
     with pytest.raises(ShortfallError, match=f"^{re.escape(sentence)}$"):
         objective.least([graph])
     assert objective.of_datapath(parallel_design("audio_lowpass.toml", realization="lattice_wdf").datapath) == math.inf
+
+
+def test_what_cannot_be_on_line() -> None:
+    g = GraphBuilder()
+    x = g.input("x", frac=3, low=-8, high=7)
+    sentence = (
+        "the sections must suit the online architecture, as recursive ones in df1, df1_ef1 and df1_ef2 do: a section "
+        "must be recursive; parallel takes every realization"
+    )
+    with pytest.raises(ShortfallError, match=f"^{re.escape(sentence)}$"):
+        OnlineUnits().least([g.build([g.bound(g.previous(x, "x1"), -8, 7, "y")])])
 
 
 @pytest.mark.parametrize(

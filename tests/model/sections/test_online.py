@@ -218,7 +218,7 @@ def test_a_sum_without_a_recursion_is_refused() -> None:
     g = GraphBuilder()
     x = g.input("x", 0, -8, 7)
     graph = g.build([g.bound(g.add(x, g.previous(x, "x1")), -16, 14, "y")])
-    with pytest.raises(OnlineError, match=r"^it must be recursive$"):
+    with pytest.raises(OnlineError, match=r"^a section must be recursive$"):
         online_section("section0", graph)
 
 
