@@ -23,7 +23,7 @@ from typing import Any
 import sosmith
 from sosmith.gen.fpga.boards import BOARDS, BUILDABLE, PROJECTS, RATE
 from sosmith.hdl.bus.link import LEDS
-from sosmith.model.sensors.spi_converter import CONVERTERS, ReadingFault
+from sosmith.model.converters.spi_converter import CONVERTERS, ReadingFault
 
 ROOT = Path(__file__).resolve().parent.parent
 RECORD = ROOT / "benchmarks" / "boards.json"

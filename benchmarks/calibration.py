@@ -13,13 +13,13 @@ import time
 
 import numpy as np
 
-from sosmith.model.calibration.acceptance import DEFAULT_RANGES
-from sosmith.model.calibration.bayesian_fit import bayesian_fit
-from sosmith.model.calibration.fit import Measurements, fit
-from sosmith.model.calibration.fit_quality import assess_posterior
-from sosmith.model.calibration.polynomial import EQUATION_5A
-from sosmith.model.calibration.sensor_type import DEFAULT_TYPE, SENSOR_TYPES
+from sosmith.gen.calibration.fit import Measurements, fit
+from sosmith.instrument.calibration.acceptance import DEFAULT_RANGES
+from sosmith.instrument.calibration.bayesian_fit import bayesian_fit
+from sosmith.instrument.calibration.fit_quality import assess_posterior
+from sosmith.instrument.calibration.sensor_type import DEFAULT_TYPE, SENSOR_TYPES
 from sosmith.model.errors import SpecificationError
+from sosmith.model.polynomial import EQUATION_5A
 
 SCATTER = 0.3
 """Standard deviation of the measured clearance in mm: least squares reach an adjusted r of 0.99, but not of 0.9999."""

@@ -26,7 +26,7 @@ from benchmarks.speed_page import Benchmark
 from sosmith.gen.core import design_core
 from sosmith.gen.output.certificate import certificate
 from sosmith.gen.specification.specification import from_text
-from sosmith.gen.verifier.verification import verify
+from sosmith.verify.verification import verify
 
 ORDERS = (2, 4, 8, 12)
 CUTOFFS = ("0.0001", "0.001", "0.01", "0.1")

@@ -27,8 +27,8 @@ from sosmith.gen.realizations.registry import REALIZATIONS
 from sosmith.gen.realizations.section_format import SectionFormat
 from sosmith.gen.realizations.state_space import minimum_noise
 from sosmith.gen.specification.specification import Specification, load
-from sosmith.gen.stimuli import traces_for
 from sosmith.gen.word_lengths.cost import LUTS_OF_A_BLOCK
+from sosmith.instrument.scenarios.traces import traces_for
 from sosmith.model.arrays import Codes
 from sosmith.model.dataflow.graph import Op
 from sosmith.model.errors import ShortfallError

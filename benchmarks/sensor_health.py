@@ -19,11 +19,9 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
-from sosmith.gen.instrument.health_plot import health_plot
-from sosmith.model.arrays import Values
-from sosmith.model.calibration.acceptance import DEFAULT_RANGES
-from sosmith.model.calibration.fit import COLUMNS, Measurements
-from sosmith.model.calibration.health.charts import (
+from sosmith.gen.calibration.fit import COLUMNS, Measurements
+from sosmith.instrument.calibration.acceptance import DEFAULT_RANGES
+from sosmith.instrument.calibration.health.charts import (
     ALLOWANCE,
     CHARTS,
     DECISION,
@@ -31,14 +29,16 @@ from sosmith.model.calibration.health.charts import (
     STEP_LIMIT,
     charts_of,
 )
-from sosmith.model.calibration.health.explanation import FOLLOWING, explanation_of
-from sosmith.model.calibration.health.innovations import Course, course_of
-from sosmith.model.calibration.health.monitoring import health_of
-from sosmith.model.calibration.polynomial import EQUATION_5A
-from sosmith.model.calibration.sensor_type import DEFAULT_TYPE, SENSOR_TYPES
-from sosmith.model.scenarios.depot_measurements import measurements_of
-from sosmith.model.scenarios.file import ScenarioFile, load_scenario
-from sosmith.model.sensors.inductive_sensor import FORWARD_MODELS, InverseRegression
+from sosmith.instrument.calibration.health.explanation import FOLLOWING, explanation_of
+from sosmith.instrument.calibration.health.health_plot import health_plot
+from sosmith.instrument.calibration.health.innovations import Course, course_of
+from sosmith.instrument.calibration.health.monitoring import health_of
+from sosmith.instrument.calibration.sensor_type import DEFAULT_TYPE, SENSOR_TYPES
+from sosmith.instrument.scenarios.depot_measurements import measurements_of
+from sosmith.instrument.scenarios.file import ScenarioFile, load_scenario
+from sosmith.instrument.sensors.inductive_sensor import FORWARD_MODELS, InverseRegression
+from sosmith.model.arrays import Values
+from sosmith.model.polynomial import EQUATION_5A
 from sosmith.model.text_files import write_contents
 from sosmith.terminal import show_progress
 

@@ -17,23 +17,23 @@ import numpy as np
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
+from sosmith.gen.calibration.fit import Fit, Measurements, fit
 from sosmith.gen.core import CoreDesign, design_core
-from sosmith.gen.paper.figures import read_paper_figures
 from sosmith.gen.picture import settled
 from sosmith.gen.specification.specification import load
-from sosmith.gen.stimuli import bench_of
+from sosmith.gen.stimuli.core import bench_of
+from sosmith.instrument.paper.figures import read_paper_figures
+from sosmith.instrument.scenarios.depot_measurements import measurements_of
+from sosmith.instrument.scenarios.file import ScenarioFile, emulate_file, load_scenario
+from sosmith.instrument.scenarios.instrument_signals import TABLE_1_STEPS, TABLE_2_STEPS
+from sosmith.instrument.scenarios.schema import ScenarioDocument
+from sosmith.instrument.sensors.inductive_sensor import FORWARD_MODELS, SystematicError, sensor_voltage
+from sosmith.instrument.sensors.thermocouple import thermocouple_emf, thermocouple_temperature
 from sosmith.model.arithmetic.random_streams import streams
 from sosmith.model.arrays import Values
-from sosmith.model.calibration.fit import Fit, Measurements, fit
-from sosmith.model.calibration.polynomial import EQUATION_5A, Polynomial
+from sosmith.model.polynomial import EQUATION_5A, Polynomial
 from sosmith.model.reference.accuracy import accuracy_percent
 from sosmith.model.reference.golden import calibrated, filtered
-from sosmith.model.scenarios.depot_measurements import measurements_of
-from sosmith.model.scenarios.file import ScenarioFile, emulate_file, load_scenario
-from sosmith.model.scenarios.instrument_signals import TABLE_1_STEPS, TABLE_2_STEPS
-from sosmith.model.scenarios.schema import ScenarioDocument
-from sosmith.model.sensors.inductive_sensor import FORWARD_MODELS, SystematicError, sensor_voltage
-from sosmith.model.sensors.thermocouple import thermocouple_emf, thermocouple_temperature
 from sosmith.model.tables.toml_tables import Table, shown
 from sosmith.model.traces.trace import Trace
 

@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from rich.progress import Progress
+from sosmith.benchmarks.upset_simulation import Fate, Target
 
 from sosmith.gen.architecture import Architecture
 from sosmith.gen.core import design_core
@@ -27,7 +28,6 @@ from sosmith.gen.specification.specification import load
 from sosmith.hdl.plan.streams import dest_width, fields
 from sosmith.sim import upsets
 from sosmith.sim.stream_packing import pack, random_order
-from sosmith.sim.upsets import Fate, Target
 
 ROOT = Path(__file__).resolve().parent.parent
 RECORD = ROOT / "benchmarks" / "upsets.json"

@@ -16,6 +16,7 @@ from sosmith.gen.architecture import (
     objective_of,
     reason_for,
 )
+from sosmith.gen.calibration.fit import Fit, fit, read_measurements
 from sosmith.gen.filter.design import Filter, design
 from sosmith.gen.fpga.boards import Board
 from sosmith.gen.realizations.registry import LOOK_AHEAD, REALIZATIONS
@@ -28,10 +29,9 @@ from sosmith.gen.word_lengths.quantize import Plan, least_size, plan, prove
 from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.gen.word_lengths.selection import Selection
 from sosmith.gen.word_lengths.settling import samples_to_settle, with_settling
-from sosmith.model.calibration.fit import Fit, fit, read_measurements
-from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.errors import ShortfallError, SpecificationError
+from sosmith.model.polynomial import Polynomial
 from sosmith.model.port import Port
 from sosmith.model.suggestion import did_you_mean
 

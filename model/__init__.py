@@ -1,1 +1,1 @@
-"""Bit-true arithmetic, its double-precision reference, and the emulated instrument that feeds it."""
+"""Bit-true arithmetic: ports, dataflow graphs, sections, and the double-precision reference."""

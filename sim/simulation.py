@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -18,7 +18,6 @@ import numpy.typing as npt
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.fpga.boards import Board
 from sosmith.gen.fpga.synthesis import Netlist, synthesize
-from sosmith.gen.instrument.uncertainty_budget import budget_json, budget_of
 from sosmith.gen.output.core_facts import CoreFacts, InterfaceFacts, core_facts
 from sosmith.gen.output.generate import generate
 from sosmith.gen.output.vectors import Vectors, vector_files, whole_beats
@@ -63,6 +62,7 @@ def simulate(
     vectors: Path | None = None,
     hardware: Hardware | None = None,
     date: str | None = None,
+    uncertainty: dict[str, Any] | None = None,
     progress: Progress = lambda step, done, total: None,
 ) -> Evidence:
     """Generate the core into `directory`, run `traces` through it, and compare it with model and golden chain.
@@ -70,7 +70,8 @@ def simulate(
     There is one trace for each channel, all of the same length. With `gates`, the simulation runs the netlist
     synthesized for that board; with `hardware`, that runs the core, and nothing is simulated. With `vectors`, what went
     in and what came out is written to that file, in the format of its suffix
-    (`sosmith.gen.output.vectors.vector_files`).
+    (`sosmith.gen.output.vectors.vector_files`). `uncertainty` is the budget of the instrument, in the types of JSON,
+    for the report; None where there is none.
 
     Raises
     ------
@@ -133,6 +134,7 @@ def simulate(
         _evidence(design, facts, traces, result, netlist, seed=seed, wall_seconds=time.monotonic() - started),
         files={path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in made},
         date=date,
+        uncertainty=uncertainty,
     )
 
 
@@ -186,7 +188,7 @@ def _evidence(
     if datapath.decimator is not None:  # what is told of a sample is told of those that bring a result
         traces = [trace.every(datapath.decimator.factor) for trace in traces]
     unfiltered = np.stack([calibrated(t.codes, datapath.inputs, quantized.polynomial) for t in traces], axis=1)
-    trace, worth = traces[0], budget_of(design)
+    trace = traces[0]
     low, high = output.decode(np.array([output.lowest, output.highest]))
     evidence = Evidence(
         name=datapath.name,
@@ -230,7 +232,6 @@ def _evidence(
         limit_cycles=facts.limit_cycles,
         settling=facts.settling,
         unsettled=(status >> Flag.SETTLING & 1).astype(np.bool_) if datapath.settles else None,
-        uncertainty=None if worth is None else budget_json(worth),
         filter=filter_facts(quantized),
         decimation=facts.decimation,
         alternatives=_alternatives(quantized, codes, golden),

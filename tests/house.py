@@ -9,9 +9,9 @@ from graphlib import TopologicalSorter
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-ROOMS = ("model", "hdl", "gen", "sim")
+ROOMS = ("model", "verify", "hdl", "gen", "sim", "instrument")
 """The rooms below the command line, the lowest first."""
-WITH_SUB_ROOMS = ("model", "hdl", "gen", "sim")
+WITH_SUB_ROOMS = ("model", "verify", "hdl", "gen", "sim", "instrument")
 
 
 @cache

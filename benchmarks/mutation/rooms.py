@@ -52,9 +52,9 @@ class Room:
         return sorted({name.partition("::")[0] for name in self.entries(root)})
 
 
-_CERTIFICATE = "tests/gen/verifier/test_certificate.py::"
-_PROGRAM = "tests/gen/verifier/program/test_check.py::"
-_SPECIFIED = "tests/gen/verifier/specified/"
+_CERTIFICATE = "tests/verify/test_certificate.py::"
+_PROGRAM = "tests/verify/program/test_check.py::"
+_SPECIFIED = "tests/verify/specified/"
 _REPORT = "tests/gen/report/test_report.py::"
 _HDL = (
     "tests/hdl/test_stage.py::test_stages_equal_their_graphs[flange_wear_locomotive",
@@ -78,13 +78,13 @@ ROOMS = {
         ),
     ),
     "verifier": Room(
-        files=("gen/verifier/*.py", "gen/verifier/parallel/*.py", "gen/verifier/specified/*.py"),
+        files=("verify/*.py", "verify/parallel/*.py", "verify/specified/*.py"),
         tests=(
-            "tests/gen/verifier/parallel",
-            "tests/gen/verifier/specified",
-            "tests/gen/verifier/test_certificate.py",
-            "tests/gen/verifier/test_generated_files.py",
-            "tests/gen/verifier/test_piecewise.py",
+            "tests/verify/parallel",
+            "tests/verify/specified",
+            "tests/verify/test_certificate.py",
+            "tests/verify/test_generated_files.py",
+            "tests/verify/test_piecewise.py",
         ),
         without=(
             f"{_CERTIFICATE}test_examples_in_every_realization[audio",
@@ -97,15 +97,15 @@ ROOMS = {
         ),
     ),
     "program": Room(
-        files=("gen/verifier/program/*.py",),
-        tests=("tests/gen/verifier/program",),
+        files=("verify/program/*.py",),
+        tests=("tests/verify/program",),
         without=(
             f"{_PROGRAM}test_examples",
             f"{_PROGRAM}test_every_realization[instrument",
             f"{_PROGRAM}test_a_hundred_edits",
             f"{_PROGRAM}test_channels_have_one_program",
         ),
-        whole_messages=("gen/verifier/program/fault.py",),
+        whole_messages=("verify/program/fault.py",),
     ),
     "arithmetic": Room(
         files=("model/arithmetic/*.py",),

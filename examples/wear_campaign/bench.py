@@ -12,18 +12,18 @@ import numpy.typing as npt
 from examples.wear_campaign import depot, hardware
 
 from sosmith.gen.core import CoreDesign
-from sosmith.gen.spectrum.filter_table import filter_table
-from sosmith.gen.spectrum.proposal import Content, Proposal, propose
-from sosmith.gen.spectrum.settings import SpectrumSettings, Wish
-from sosmith.gen.spectrum.spectra import spectrum
-from sosmith.gen.stimuli import bench_of
-from sosmith.model.calibration.polynomial import EQUATION_5A, Polynomial
+from sosmith.gen.stimuli.core import bench_of
+from sosmith.instrument.scenarios.catalogue import Bench
+from sosmith.instrument.scenarios.depot_measurements import measurements_of
+from sosmith.instrument.scenarios.file import ScenarioFile, emulate_file
+from sosmith.instrument.sensors.inductive_sensor import SystematicError
+from sosmith.instrument.spectrum.filter_table import filter_table
+from sosmith.instrument.spectrum.proposal import Content, Proposal, propose
+from sosmith.instrument.spectrum.settings import SpectrumSettings, Wish
+from sosmith.instrument.spectrum.spectra import spectrum
+from sosmith.model.polynomial import EQUATION_5A, Polynomial
 from sosmith.model.reference.accuracy import accuracy_percent
 from sosmith.model.reference.golden import calibrated, filtered
-from sosmith.model.scenarios.catalogue import Bench
-from sosmith.model.scenarios.depot_measurements import measurements_of
-from sosmith.model.scenarios.file import ScenarioFile, emulate_file
-from sosmith.model.sensors.inductive_sensor import SystematicError
 from sosmith.model.traces.trace import Trace
 from sosmith.sim.simulation import Progress
 

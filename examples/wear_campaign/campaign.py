@@ -12,11 +12,11 @@ from examples.wear_campaign.spread import spread
 from examples.wear_campaign.wear_intervals import wear_covered
 
 from sosmith.gen.core import CoreDesign, design_core
-from sosmith.gen.instrument.calibration_report import specification_table
 from sosmith.gen.specification.specification import load
-from sosmith.gen.stimuli import bench_of
-from sosmith.model.calibration.polynomial import EQUATION_5A, Polynomial
-from sosmith.model.scenarios.file import ScenarioFile, emulate_file, load_scenario
+from sosmith.gen.stimuli.core import bench_of
+from sosmith.instrument.calibration.calibration_report import specification_table
+from sosmith.instrument.scenarios.file import ScenarioFile, emulate_file, load_scenario
+from sosmith.model.polynomial import EQUATION_5A, Polynomial
 from sosmith.sim.simulation import Progress
 
 HERE = Path(__file__).parent

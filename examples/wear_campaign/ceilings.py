@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from sosmith.gen.calibration.least_squares import Sums
+from sosmith.instrument.calibration.sensor_type import TERMS
+from sosmith.instrument.scenarios.file import ScenarioFile
+from sosmith.instrument.sensors.inductive_sensor import InductiveSensor, InductiveState
 from sosmith.model.arithmetic.random_streams import streams
 from sosmith.model.arrays import Values
-from sosmith.model.calibration.least_squares import Sums
-from sosmith.model.calibration.polynomial import Polynomial
-from sosmith.model.calibration.sensor_type import TERMS
-from sosmith.model.scenarios.file import ScenarioFile
-from sosmith.model.sensors.inductive_sensor import InductiveSensor, InductiveState
+from sosmith.model.polynomial import Polynomial
 from sosmith.model.traces.trace import Trace
 
 Curve = Callable[[Values, Values], Values]

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from sosmith.model.calibration.fit import COLUMNS, Fit, Measurements, fit
-from sosmith.model.calibration.measurement_store import open_store
-from sosmith.model.calibration.self_updating import Calibration, Method, add
-from sosmith.model.scenarios.depot_measurements import DepotMeasurement, measurements_csv, measurements_of
-from sosmith.model.scenarios.file import ScenarioFile
+from sosmith.gen.calibration.fit import COLUMNS, Fit, Measurements, fit
+from sosmith.instrument.calibration.measurement_store import open_store
+from sosmith.instrument.calibration.self_updating import Calibration, Method, add
+from sosmith.instrument.scenarios.depot_measurements import DepotMeasurement, measurements_csv, measurements_of
+from sosmith.instrument.scenarios.file import ScenarioFile
 from sosmith.model.text_files import write_files
 
 

@@ -10,7 +10,7 @@ from examples.wear_campaign.methods_document import SENSORS, section
 from examples.wear_campaign.pictures import stated
 from examples.wear_campaign.week import MAX_ERROR, SET_ERROR
 
-from sosmith.gen.paper.figures import read_paper_figures
+from sosmith.instrument.paper.figures import read_paper_figures
 
 WIDTH = 120
 """Line length in characters."""

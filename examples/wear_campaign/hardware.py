@@ -11,7 +11,7 @@ from typing import Any
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.report.report import write_report
 from sosmith.gen.specification.specification import load
-from sosmith.model.calibration.polynomial import Polynomial
+from sosmith.model.polynomial import Polynomial
 from sosmith.model.text_files import write_files
 from sosmith.model.traces.trace import Trace
 from sosmith.sim.simulation import Progress, simulate

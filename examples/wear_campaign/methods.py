@@ -15,23 +15,23 @@ from examples.wear_campaign.bench import PAPER_FILTER
 from examples.wear_campaign.ceilings import Curve, ceilings
 from examples.wear_campaign.spread import spread
 
+from sosmith.gen.calibration.fit import COLUMNS, Measurements, fit
+from sosmith.gen.calibration.least_squares import Sums
 from sosmith.gen.core import CoreDesign
-from sosmith.gen.instrument.uncertainty_budget import Instrument
-from sosmith.gen.stimuli import bench_of
-from sosmith.model.calibration.acceptance import DEFAULT_RANGES
-from sosmith.model.calibration.bayesian_fit import bayesian_fit
-from sosmith.model.calibration.coefficient_covariance import CoefficientUncertainty, of_bayes, of_least_squares
-from sosmith.model.calibration.fit import COLUMNS, Measurements, fit
-from sosmith.model.calibration.least_squares import Sums
-from sosmith.model.calibration.polynomial import EQUATION_5A, Polynomial
-from sosmith.model.calibration.sensor_type import SENSOR_TYPES, TERMS
-from sosmith.model.calibration.uncertainty import Interval, of_polynomial, of_posterior
+from sosmith.gen.stimuli.core import bench_of
+from sosmith.instrument.calibration.acceptance import DEFAULT_RANGES
+from sosmith.instrument.calibration.bayesian_fit import bayesian_fit
+from sosmith.instrument.calibration.coefficient_covariance import CoefficientUncertainty, of_bayes, of_least_squares
+from sosmith.instrument.calibration.sensor_type import SENSOR_TYPES, TERMS
+from sosmith.instrument.calibration.uncertainty import Interval, of_polynomial, of_posterior
+from sosmith.instrument.scenarios.depot_measurements import measurements_of
+from sosmith.instrument.scenarios.file import ScenarioFile, emulate_file
+from sosmith.instrument.sensors.inductive_sensor import FORWARD_MODELS
+from sosmith.instrument.uncertainty.instrument_budget import Instrument
 from sosmith.model.errors import SpecificationError
+from sosmith.model.polynomial import EQUATION_5A, Polynomial
 from sosmith.model.reference.accuracy import accuracy_percent
 from sosmith.model.reference.golden import filtered
-from sosmith.model.scenarios.depot_measurements import measurements_of
-from sosmith.model.scenarios.file import ScenarioFile, emulate_file
-from sosmith.model.sensors.inductive_sensor import FORWARD_MODELS
 from sosmith.model.traces.trace import Trace
 from sosmith.sim.simulation import Progress
 

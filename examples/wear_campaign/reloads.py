@@ -11,11 +11,11 @@ from examples.wear_campaign.week import MAX_ERROR, SET_ERROR
 
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.reload.reload import check_swap, other_set, own_set
-from sosmith.model.calibration.acceptance import DEFAULT_RANGES
-from sosmith.model.calibration.bayesian_fit import bayesian_fit
-from sosmith.model.calibration.polynomial import EQUATION_5A
+from sosmith.instrument.calibration.acceptance import DEFAULT_RANGES
+from sosmith.instrument.calibration.bayesian_fit import bayesian_fit
+from sosmith.instrument.scenarios.file import ScenarioFile
 from sosmith.model.errors import ShortfallError, SpecificationError
-from sosmith.model.scenarios.file import ScenarioFile
+from sosmith.model.polynomial import EQUATION_5A
 from sosmith.sim.simulation import Progress
 
 

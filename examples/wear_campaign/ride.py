@@ -15,22 +15,22 @@ from scipy import signal
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.filter.design import prewarp, unwarp
 from sosmith.gen.filter.response import group_delay, magnitude_db
-from sosmith.gen.spectrum.filter_table import filter_table
-from sosmith.gen.spectrum.proposal import Content, Proposal, propose
-from sosmith.gen.spectrum.settings import SpectrumSettings, Wish
-from sosmith.gen.spectrum.spectra import spectrum
-from sosmith.gen.stimuli import bench_of
-from sosmith.model.calibration.polynomial import EQUATION_5A
+from sosmith.gen.stimuli.core import bench_of
+from sosmith.instrument.scenarios.catalogue import Bench
+from sosmith.instrument.scenarios.file import ScenarioFile, emulate_file
+from sosmith.instrument.scenarios.vehicle_clearance import IRREGULARITY, SPEED, WHEELSET, vehicle_clearance
+from sosmith.instrument.spectrum.filter_table import filter_table
+from sosmith.instrument.spectrum.proposal import Content, Proposal, propose
+from sosmith.instrument.spectrum.settings import SpectrumSettings, Wish
+from sosmith.instrument.spectrum.spectra import spectrum
+from sosmith.instrument.vehicle.limits import limits
+from sosmith.instrument.vehicle.parameters import built_in
+from sosmith.instrument.vehicle.run import run
+from sosmith.instrument.vehicle.track import curved_track, tangent_track
+from sosmith.model.polynomial import EQUATION_5A
 from sosmith.model.reference.accuracy import accuracy_percent
 from sosmith.model.reference.golden import calibrated, filtered
-from sosmith.model.scenarios.catalogue import Bench
-from sosmith.model.scenarios.file import ScenarioFile, emulate_file
-from sosmith.model.scenarios.vehicle_clearance import IRREGULARITY, SPEED, WHEELSET, vehicle_clearance
 from sosmith.model.traces.trace import Trace
-from sosmith.model.vehicle.limits import limits
-from sosmith.model.vehicle.parameters import built_in
-from sosmith.model.vehicle.run import run
-from sosmith.model.vehicle.track import curved_track, tangent_track
 from sosmith.sim.simulation import Progress
 
 Values = npt.NDArray[np.float64]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sosmith.model.wear.assessment import ClearanceUncertainty, WearLimits, judge
+from sosmith.instrument.wear.assessment import ClearanceUncertainty, WearLimits, judge
 
 RUNS, DAYS, RATE = 400, 60, 0.05
 """Records of wear, their length, and the true rate in mm a day."""

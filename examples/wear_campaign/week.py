@@ -11,19 +11,19 @@ import numpy as np
 import numpy.typing as npt
 from examples.wear_campaign import depot, hardware
 
-from sosmith.gen.instrument.calibration_report import specification_table
 from sosmith.gen.reload.reload import check_swap, own_set, set_for
 from sosmith.gen.specification.specification import load
-from sosmith.gen.stimuli import bench_of
-from sosmith.model.calibration.polynomial import EQUATION_5A
-from sosmith.model.calibration.self_updating import Calibration
+from sosmith.gen.stimuli.core import bench_of
+from sosmith.instrument.calibration.calibration_report import specification_table
+from sosmith.instrument.calibration.self_updating import Calibration
+from sosmith.instrument.scenarios.file import ScenarioFile, emulate_file
+from sosmith.instrument.wear.assessment import WearLimits, WearReport, judge
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.status import Flag
 from sosmith.model.errors import ShortfallError
+from sosmith.model.polynomial import EQUATION_5A
 from sosmith.model.reference.accuracy import accuracy_percent
-from sosmith.model.scenarios.file import ScenarioFile, emulate_file
 from sosmith.model.traces.trace import Trace
-from sosmith.model.wear.assessment import WearLimits, WearReport, judge
 from sosmith.sim.simulation import Progress
 
 Values = npt.NDArray[np.float64]

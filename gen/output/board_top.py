@@ -12,8 +12,8 @@ from sosmith.gen.output.verilog import core_verilog, to_rtlil, to_verilog
 from sosmith.hdl.boards.board_top import BoardTop
 from sosmith.hdl.bus.command_engine import MAX_CHANNELS, MAX_READINGS, MAX_SAMPLE_BYTES
 from sosmith.hdl.bus.uart import MIN_CLOCKS
+from sosmith.model.converters.spi_schedule import Schedule
 from sosmith.model.errors import SpecificationError
-from sosmith.model.sensors.spi_schedule import Schedule
 
 
 def top_name(design: CoreDesign) -> str:

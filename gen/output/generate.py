@@ -13,9 +13,9 @@ from sosmith.gen.output.manifest import manifest
 from sosmith.gen.output.verilog import to_rtlil, to_verilog
 from sosmith.gen.reload.register_map import c_registers, systemrdl
 from sosmith.gen.reload.register_writes import bank_size
-from sosmith.gen.verifier.certificate_file import certificate_text
 from sosmith.model.dataflow.c_model import c_header, c_source
 from sosmith.model.text_files import to_json, write_files
+from sosmith.verify.certificate_file import certificate_text
 
 
 def generate(

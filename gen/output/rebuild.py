@@ -8,8 +8,8 @@ from sosmith.gen.core import design_core
 from sosmith.gen.fpga.boards import find_board
 from sosmith.gen.output.generate import generated
 from sosmith.gen.specification.specification import Specification
-from sosmith.gen.verifier.certificate_file import AboutEntry
 from sosmith.model.errors import SpecificationError
+from sosmith.verify.certificate_file import AboutEntry
 
 _OPTIONS = ("core", "realization", "widths_of", "board")
 

@@ -18,8 +18,8 @@ from sosmith.gen.word_lengths.input_stage import InputStage, horner_error, norma
 from sosmith.gen.word_lengths.quantize import gain_at_zero, gain_of
 from sosmith.gen.word_lengths.quantized import Quantized, assembled
 from sosmith.gen.word_lengths.settling import with_settling
-from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.errors import ShortfallError
+from sosmith.model.polynomial import Polynomial
 from sosmith.model.sections.horner import HornerPolynomial, HornerStep, Variable
 
 _DOUBLE = 53

@@ -8,9 +8,9 @@ from fractions import Fraction
 from typing import TYPE_CHECKING
 
 from sosmith.gen.specification.values import UnfitError
+from sosmith.model.converters.spi_converter import CONVERTERS, SUPPLY, Timing
+from sosmith.model.converters.spi_reading import Reading, UnfitReadingError
 from sosmith.model.port import Port
-from sosmith.model.sensors.spi_converter import CONVERTERS, SUPPLY, Timing
-from sosmith.model.sensors.spi_reading import Reading, UnfitReadingError
 
 if TYPE_CHECKING:
     from sosmith.gen.specification.schema import ConverterTable

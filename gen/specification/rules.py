@@ -13,7 +13,7 @@ from sosmith.gen.specification.choices import AUTO, CALIBRATION_INPUTS, FAMILIES
 from sosmith.gen.specification.schema import MAX_ORDER, Document, FilterTable, InputTable
 from sosmith.gen.specification.uncertainty import check_coefficients
 from sosmith.gen.specification.values import UnfitError, identifier, key_text, listed, literal, one_of
-from sosmith.model.sensors.spi_converter import CONVERTERS
+from sosmith.model.converters.spi_converter import CONVERTERS
 
 MARGIN = Fraction(1, 10**6)
 """Minimum distance of a band edge from 0 and from half the sample rate, as a fraction of the sample rate.

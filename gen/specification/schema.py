@@ -47,8 +47,8 @@ from sosmith.gen.specification.values import (
     text,
     whole,
 )
+from sosmith.model.converters.spi_converter import CONVERTERS, SUPPLIES
 from sosmith.model.dataflow.protection import PROTECTIONS
-from sosmith.model.sensors.spi_converter import CONVERTERS, SUPPLIES
 from sosmith.model.suggestion import did_you_mean
 
 MAX_ORDER = 20

@@ -14,8 +14,8 @@ from fractions import Fraction
 from sosmith.gen.realizations.registry import REALIZATIONS
 from sosmith.gen.word_lengths.quantize import plan, prove
 from sosmith.gen.word_lengths.quantized import Quantized
-from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.errors import ShortfallError
+from sosmith.model.polynomial import Polynomial
 from sosmith.model.port import Port
 
 _WIDEST = 32

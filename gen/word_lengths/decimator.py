@@ -12,10 +12,10 @@ from sosmith.gen.specification.specification import FilterSpec
 from sosmith.gen.word_lengths.ahead import calibration_ahead
 from sosmith.gen.word_lengths.quantize import gain_of
 from sosmith.gen.word_lengths.quantized import CALIBRATION, DECIMATION, Quantized
-from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.decimator import MAX_WIDTH, Decimator
 from sosmith.model.errors import ShortfallError
+from sosmith.model.polynomial import Polynomial
 from sosmith.model.port import Port
 
 _SHARE = Fraction(1, 32)

@@ -12,10 +12,10 @@ from fractions import Fraction
 
 from sosmith.gen.realizations.coefficients import lowest_terms
 from sosmith.gen.word_lengths.bit_limits import MAX_BITS
-from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.dataflow.datapath import Stage
 from sosmith.model.dataflow.graph import Range
 from sosmith.model.errors import ShortfallError
+from sosmith.model.polynomial import Polynomial
 from sosmith.model.port import Port
 from sosmith.model.sections.horner import HornerPolynomial, Variable
 from sosmith.model.sections.output import Held

@@ -28,8 +28,8 @@ from sosmith.gen.word_lengths.ordering import best_order
 from sosmith.gen.word_lengths.output_stage import output_stage
 from sosmith.gen.word_lengths.quantized import Quantized, assembled
 from sosmith.gen.word_lengths.search import Choice, Search
-from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.errors import ShortfallError
+from sosmith.model.polynomial import Polynomial
 from sosmith.model.port import Port
 
 _BITS_TO_ORDER = 24

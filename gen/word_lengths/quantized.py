@@ -19,8 +19,8 @@ from sosmith.gen.realizations.effective import effective_sections
 from sosmith.gen.realizations.registry import Section
 from sosmith.gen.word_lengths.input_stage import InputStage
 from sosmith.gen.word_lengths.output_stage import output_stage
-from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.dataflow.datapath import Datapath, Stage
+from sosmith.model.polynomial import Polynomial
 from sosmith.model.port import Port
 from sosmith.model.sections.horner import HornerStep
 from sosmith.model.sections.output import Held, OutputStage

@@ -37,7 +37,7 @@ from amaranth.lib.wiring import In, Out
 from sosmith.hdl.bus.command_engine import Face, core_side
 from sosmith.hdl.bus.link import LEDS, Link
 from sosmith.hdl.converters.front_end import FrontEnd
-from sosmith.model.sensors.spi_schedule import Schedule
+from sosmith.model.converters.spi_schedule import Schedule
 
 
 class BoardTop(wiring.Component):

@@ -35,6 +35,7 @@ from amaranth.lib.wiring import In, Out
 from sosmith.hdl.bus.axi_lite import slave_members
 from sosmith.hdl.bus.checked_bytes import CheckedBytes
 from sosmith.hdl.bus.frame_receiver import BLOCK_RAM, LENGTH_ADDRESS
+from sosmith.model.converters.spi_converter import ReadingFault
 from sosmith.model.dataflow.status import STATUS_BITS
 from sosmith.model.link.protocol import (
     BLOCK_BYTES,
@@ -50,7 +51,6 @@ from sosmith.model.link.protocol import (
     samples_per_message,
 )
 from sosmith.model.reload.registers import BITS
-from sosmith.model.sensors.spi_converter import ReadingFault
 
 WINDOW = 2
 """Requests that may be without a response: one for each buffer of the receiver and of the sender."""

@@ -17,7 +17,7 @@
 
 A code whose reading is bad is held: the last good one is fed again, and its result has the flag `fault`. A converter
 that takes its time is not asked before, and its last code is fed until then. Latency, from the tick to the last result:
-at most `sosmith.model.sensors.spi_schedule.Schedule.clocks`, and that of the core for each channel.
+at most `sosmith.model.converters.spi_schedule.Schedule.clocks`, and that of the core for each channel.
 """
 
 from __future__ import annotations
@@ -29,10 +29,10 @@ from amaranth.lib.wiring import In, Out
 
 from sosmith.hdl.converters.result_queue import ResultQueue
 from sosmith.hdl.converters.spi_reader import COMMAND_BITS, SpiReader
+from sosmith.model.converters.spi_converter import THERMOCOUPLE_FAULTS, ReadingFault
+from sosmith.model.converters.spi_reading import Reading
+from sosmith.model.converters.spi_schedule import Schedule
 from sosmith.model.dataflow.status import STATUS_BITS, Flag
-from sosmith.model.sensors.spi_converter import THERMOCOUPLE_FAULTS, ReadingFault
-from sosmith.model.sensors.spi_reading import Reading
-from sosmith.model.sensors.spi_schedule import Schedule
 
 _START = 15
 """Clocks of the core's reset after configuration."""
@@ -63,7 +63,7 @@ class FrontEnd(wiring.Component):
     i_index : In(8)
         Which reading's faults to tell: ``channel * inputs + input``.
     o_reading : Out(5)
-        The faults of that reading, one clock later: bits as `sosmith.model.sensors.spi_converter.ReadingFault`.
+        The faults of that reading, one clock later: bits as `sosmith.model.converters.spi_converter.ReadingFault`.
     o_new, o_status : Out(1), Out(8)
         High for one clock for each result; its status.
     """

@@ -9,8 +9,8 @@ import numpy as np
 
 from sosmith.model.arithmetic.recursive_filters import sosfilt
 from sosmith.model.arrays import Codes, Values
-from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.dataflow.datapath import Datapath
+from sosmith.model.polynomial import Polynomial
 from sosmith.model.port import Port
 
 

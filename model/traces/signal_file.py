@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from sosmith.model.arrays import Values
-from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.errors import SpecificationError
+from sosmith.model.polynomial import Polynomial
 from sosmith.model.tables.csv_table import CsvTable, check_rows, csv_header, read_csv_table
 from sosmith.model.traces.trace_file import CHANNEL, PHYSICAL_COLUMNS, TIME_TOLERANCE, rows_of_channel
 

@@ -5,7 +5,7 @@ r"""Models of converters on an SPI in a simulator under cocotb; they fail the te
     cs_n n, sck, mosi --> SpiBus: one model for each chip select --> miso
                             checks the times, tells the models       pulled up; wrong until the output is valid
 
-Figures of timing are those of `sosmith.model.sensors.spi_converter`, which names the data sheets. What the models say
+Figures of timing are those of `sosmith.model.converters.spi_converter`, which names the data sheets. What the models say
 in which clock is written here once more, from the data sheets, and shares nothing with the hardware.
 """
 
@@ -18,7 +18,7 @@ import cocotb
 from cocotb.triggers import First, Timer, ValueChange
 from cocotb.utils import get_sim_time
 
-from sosmith.model.sensors.spi_converter import Timing, ns
+from sosmith.model.converters.spi_converter import Timing, ns
 
 PULLED_UP = 1
 """Level of a line that nothing drives."""

@@ -6,18 +6,24 @@ import dataclasses
 import json
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
-from sosmith.gen.core import design_core
+from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.report.report import write_report
 from sosmith.sim.exploration.evaluation import traces_of
 from sosmith.sim.exploration.run import Outcome
 from sosmith.sim.simulation import simulate
 
 Progress = Callable[[str, int, int], None]
+Uncertainty = Callable[[CoreDesign], dict[str, Any] | None]
 
 
-def confirmed(outcome: Outcome, folder: Path, *, simulator: str = "verilator", progress: Progress) -> Outcome:
+def confirmed(
+    outcome: Outcome, folder: Path, *, uncertainty: Uncertainty, simulator: str = "verilator", progress: Progress
+) -> Outcome:
     """Co-simulate the front on the traces of the exploration; reports that are there already are kept.
+
+    `uncertainty` returns the budget of a core for its report, as `sosmith.sim.simulation.simulate` takes it.
 
     Returns
     -------
@@ -43,7 +49,8 @@ def confirmed(outcome: Outcome, folder: Path, *, simulator: str = "verilator", p
             continue
         task = tasks[point["key"]]
         design = design_core(task.specification(), core=task.core)
-        evidence = simulate(design, traces_of(design, task), place, simulator=simulator, seed=task.seed)
+        traces, budget = traces_of(design, task), uncertainty(design)
+        evidence = simulate(design, traces, place, simulator=simulator, seed=task.seed, uncertainty=budget)
         passed[point["key"]] = bool(write_report(evidence, place)["passed"])
     progress("co-simulating the front", len(front), len(front))
     points = tuple(

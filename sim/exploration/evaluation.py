@@ -15,7 +15,6 @@ from sosmith.gen.report.comparison.choice import cost_unit, hardware_cost
 from sosmith.gen.report.filter_facts import filter_facts
 from sosmith.gen.report.mask import mask_shortfalls
 from sosmith.gen.report.provenance import provenance_of
-from sosmith.gen.stimuli import default_scenario, traces_for
 from sosmith.model.errors import ShortfallError, SpecificationError
 from sosmith.model.reference.accuracy import error_statistics, sqnr_db
 from sosmith.model.reference.golden import entering_filter, filtered
@@ -57,7 +56,7 @@ def evaluate(task: Task) -> Point:
 def traces_of(design: CoreDesign, task: Task) -> tuple[Trace, ...]:
     """Make the traces that a design of `task` is run on."""
     seconds = task.samples / float(design.spec.sample_rate)
-    return traces_for(design, default_scenario(design), seed=task.seed, seconds=seconds)
+    return task.traces(design, task.seed, seconds)
 
 
 def _measured(design: CoreDesign, traces: tuple[Trace, ...], task: Task) -> Point:

@@ -5,18 +5,23 @@ from __future__ import annotations
 import hashlib
 import itertools
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any, cast
 
+from sosmith.gen.core import CoreDesign
 from sosmith.gen.specification.exact_values import exact
 from sosmith.gen.specification.specification import Specification, from_tree
 from sosmith.gen.version import __version__
 from sosmith.model.errors import SpecificationError
+from sosmith.model.traces.trace import Trace
 from sosmith.sim.exploration.parameters import Parameters, Span
+
+Traces = Callable[[CoreDesign, int, float], tuple[Trace, ...]]
+"""Makes a trace for each channel of a core, from a seed and a length in s; a function that can be pickled."""
 
 MAX_POINTS = 100_000
 """Combinations, at most."""
@@ -29,7 +34,7 @@ class Task:
     Attributes
     ----------
     key : str
-        Digest of all the others.
+        Digest of all the others but `traces`, which are those of the version.
     changes : dict
         Values of the swept keys, with dots, in the types of JSON.
     tree : dict
@@ -44,6 +49,8 @@ class Task:
         Seed of its noise.
     board : str or None
         Board to synthesize for; None for a cost without synthesis.
+    traces : callable
+        Makes the traces that designs are run on.
     """
 
     key: str
@@ -54,6 +61,7 @@ class Task:
     samples: int
     seed: int
     board: str | None
+    traces: Traces
 
     def specification(self) -> Specification:
         """Check the specification.
@@ -74,7 +82,7 @@ class Subject:
     ----------
     spec : Specification
         The specification that tasks change.
-    core, samples, seed, board
+    core, samples, seed, board, traces
         As in `Task`.
     """
 
@@ -83,6 +91,7 @@ class Subject:
     samples: int
     seed: int
     board: str | None
+    traces: Traces
 
     @cached_property
     def _measurements(self) -> str:
@@ -109,6 +118,7 @@ class Subject:
             samples=self.samples,
             seed=self.seed,
             board=self.board,
+            traces=self.traces,
         )
 
 

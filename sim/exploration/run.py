@@ -13,7 +13,7 @@ from typing import Any
 from sosmith.gen.specification.specification import Specification
 from sosmith.sim.exploration.evaluation import Point
 from sosmith.sim.exploration.front import pareto_front
-from sosmith.sim.exploration.grid import Subject, Task, tasks_of
+from sosmith.sim.exploration.grid import Subject, Task, Traces, tasks_of
 from sosmith.sim.exploration.parameters import Parameters, in_json
 from sosmith.sim.exploration.record import record_in
 from sosmith.sim.exploration.search import Search
@@ -119,6 +119,7 @@ def explore(
     folder: Path,
     runner: Runner,
     *,
+    traces: Traces,
     search: int | None = None,
     core: str | None = None,
     samples: int = 20_000,
@@ -140,7 +141,7 @@ def explore(
         Such as `sosmith.sim.exploration.processes.in_processes`.
     search : int or None
         Number of designs to search for, see `sosmith.sim.exploration.search.Search`; None for a grid.
-    core, samples, seed, board
+    core, samples, seed, board, traces
         As in `Task`.
     progress : callable
         Called with the name of the step, the amount done and the total.
@@ -153,7 +154,7 @@ def explore(
         As the runner and `Search`, or if the disk is full.
     """
     progress("checking combinations", 0, 0)
-    subject = Subject(spec=spec, core=core, samples=samples, seed=seed, board=board)
+    subject = Subject(spec=spec, core=core, samples=samples, seed=seed, board=board, traces=traces)
     tasks = tasks_of(subject, parameters) if search is None else []
     with record_in(folder) as record:
         searched = None if search is None else Search(subject, parameters, search, record.points)

@@ -25,9 +25,9 @@ from sosmith.gen.fpga.boards import Board
 from sosmith.gen.fpga.synthesis import synthesize
 from sosmith.gen.output.board_top import board_verilog, schedule_of, top_name
 from sosmith.model.arrays import Codes
+from sosmith.model.converters.spi_schedule import Schedule
 from sosmith.model.errors import SpecificationError, ToolError
 from sosmith.model.link.protocol import MAX_BODY, WINDOWS
-from sosmith.model.sensors.spi_schedule import Schedule
 from sosmith.model.text_files import write_files
 from sosmith.sim.converters import values
 from sosmith.sim.converters.values import MAX_SELECTS, values_text

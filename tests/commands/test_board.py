@@ -16,7 +16,7 @@ from tests.commands.invocation import Invocation
 
 import sosmith
 from sosmith.gen.output.board_top import schedule_of
-from sosmith.gen.stimuli import traces_for
+from sosmith.instrument.scenarios.traces import traces_for
 from sosmith.sim.converters.values import fed_codes
 
 BOARD = Invocation("board")

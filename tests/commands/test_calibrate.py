@@ -11,18 +11,18 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.commands.invocation import Invocation
-from tests.model.calibration.measuring import readings, write_csv
+from tests.instrument.calibration.measuring import readings, write_csv
 
 from sosmith.commands.instrument.calibrate import calibrate
+from sosmith.gen.calibration.fit import fit, read_measurements
 from sosmith.gen.core import design_core
-from sosmith.gen.instrument.uncertainty_budget import instrument_of
 from sosmith.gen.specification.specification import example, load
+from sosmith.instrument.calibration.measurement_store import open_store
+from sosmith.instrument.calibration.self_updating import Addition, add, refused_first_file
+from sosmith.instrument.uncertainty.instrument_budget import instrument_of
 from sosmith.interface.specification import Specification
-from sosmith.model.calibration.fit import fit, read_measurements
-from sosmith.model.calibration.measurement_store import open_store
-from sosmith.model.calibration.polynomial import EQUATION_5A
-from sosmith.model.calibration.self_updating import Addition, add, refused_first_file
 from sosmith.model.errors import ShortfallError, SpecificationError
+from sosmith.model.polynomial import EQUATION_5A
 
 INVOCATION = Invocation("calibrate", columns=100)
 run, good, refused = INVOCATION.run, INVOCATION.good, INVOCATION.refused
@@ -106,7 +106,7 @@ def test_a_store_that_another_process_makes_meanwhile_is_kept(monkeypatch: pytes
             add(opened, "sensor", Path("a.csv"), "2024-03-01")
         return refused_first_file(*arguments, **options)
 
-    monkeypatch.setattr("sosmith.model.calibration.self_updating.refused_first_file", meanwhile)
+    monkeypatch.setattr("sosmith.instrument.calibration.self_updating.refused_first_file", meanwhile)
     refused("a.csv must hold new measurements, not those already added as a.csv", "add", "a.csv")
     Path("calibration.db").unlink()
     good("add", "b.csv")

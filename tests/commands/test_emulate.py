@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 from tests.commands.command_line import FILTER, INSTRUMENT
-from tests.model.scenarios.scenario_texts import CALIBRATION, PLAIN
+from tests.instrument.scenarios.scenario_texts import CALIBRATION, PLAIN
 
 from sosmith.cli import cli
 from sosmith.gen.core import design_core
 from sosmith.gen.specification.specification import load
-from sosmith.gen.stimuli import traces_for
+from sosmith.instrument.scenarios.file import load_scenario, range_notes
+from sosmith.instrument.scenarios.traces import traces_for
+from sosmith.instrument.scenarios.vehicle_clearance import vehicle_clearance
 from sosmith.model.errors import SpecificationError
-from sosmith.model.scenarios.file import load_scenario, range_notes
-from sosmith.model.scenarios.vehicle_clearance import vehicle_clearance
 
 SHORT = PLAIN.replace("seconds = 60", "seconds = 20")
 

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from tests.commands.command_line import FILTER, reloadable
 from tests.gen.report.test_comparison import report
-from tests.model.calibration.measuring import readings, write_csv
+from tests.instrument.calibration.measuring import readings, write_csv
 
 from sosmith.cli import main
 from sosmith.model.text_files import to_json

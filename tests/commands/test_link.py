@@ -14,10 +14,10 @@ from tests.interface.small import filter_design, instrument_design
 
 import sosmith
 from sosmith.gen.output.generate import generated
-from sosmith.gen.stimuli import traces_for
 from sosmith.host.board import Board
 from sosmith.host.model_line import ModelLine, model_of
 from sosmith.host.port_run import run_on
+from sosmith.instrument.scenarios.traces import traces_for
 from sosmith.model.errors import ShortfallError, SpecificationError, ToolError
 from sosmith.model.link.device import Device
 from sosmith.model.traces.trace_file import write_traces

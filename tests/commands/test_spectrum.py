@@ -13,8 +13,8 @@ from tests.commands.invocation import Invocation
 
 from sosmith.gen.filter.design import design
 from sosmith.gen.specification.specification import example, load
+from sosmith.instrument.sensors.instrument import sensor_voltage
 from sosmith.model.errors import ShortfallError
-from sosmith.model.sensors.instrument import sensor_voltage
 
 INVOCATION = Invocation("spectrum", columns=120)
 run, good, refused = INVOCATION.run, INVOCATION.good, INVOCATION.refused

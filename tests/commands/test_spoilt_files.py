@@ -23,11 +23,11 @@ from tests.commands.command_line import FILTER, INSTRUMENT
 from tests.commands.spoilt_files import Spoil, spoilt, spoilt_store, spoilt_workbook
 from tests.gen.report.test_comparison import report
 from tests.house import ROOT
-from tests.model.scenarios.scenario_texts import CALIBRATION, FAULT, PLAIN
+from tests.instrument.scenarios.scenario_texts import CALIBRATION, FAULT, PLAIN
 
 from sosmith.cli import main
+from sosmith.instrument.vehicle.parameters import built_in_text
 from sosmith.model.errors import ShortfallError
-from sosmith.model.vehicle.parameters import built_in_text
 from sosmith.sim import simulation
 
 DEMO = f'{INSTRUMENT}realization = "df1"\n'

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from tests.commands.invocation import Invocation
 
-from sosmith.model.vehicle.parameters import built_in, built_in_text
+from sosmith.instrument.vehicle.parameters import built_in, built_in_text
 
 INVOCATION = Invocation("vehicle", columns=110)
 run, good, refused = INVOCATION.run, INVOCATION.good, INVOCATION.refused

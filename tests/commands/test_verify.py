@@ -12,10 +12,10 @@ from typing import Any
 import pytest
 from tests.commands.invocation import Invocation
 from tests.gen.designs import EXAMPLES, example_design
-from tests.gen.verifier.around.decimators import Instrument
-from tests.gen.verifier.parallel.cores import specified
-from tests.gen.verifier.small_specifications import PLAIN
 from tests.gen.word_lengths.decimated import small
+from tests.verify.around.decimators import Instrument
+from tests.verify.parallel.cores import specified
+from tests.verify.small_specifications import PLAIN
 
 from sosmith.gen.core import design_core
 from sosmith.gen.output.generate import generate

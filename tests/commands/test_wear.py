@@ -10,8 +10,8 @@ import pytest
 from tests.commands.invocation import Invocation
 
 from sosmith.gen.specification.specification import example
+from sosmith.instrument.wear.record_file import moment_text, parse_moment, read_wear_record
 from sosmith.model.errors import SpecificationError
-from sosmith.model.wear.record_file import moment_text, parse_moment, read_wear_record
 
 INVOCATION = Invocation("wear", columns=100)
 run, good, refused = INVOCATION.run, INVOCATION.good, INVOCATION.refused

@@ -6,12 +6,12 @@ import re
 from tests.interface.small import instrument_design
 
 from sosmith.gen.output.identity import identity
+from sosmith.model.converters.spi_converter import ReadingFault
 from sosmith.model.link.device import Device
 from sosmith.model.link.frames import Message
 from sosmith.model.link.identity import Identity
 from sosmith.model.link.integer_core import IntegerCore
 from sosmith.model.link.protocol import LAYOUTS, Counter, Status, Type, samples_per_message
-from sosmith.model.sensors.spi_converter import ReadingFault
 
 _PART = re.compile(r"<!-- (?P<what>[a-z]+) -->\n.*?<!-- end of (?P=what) -->", re.DOTALL)
 _BITS = 10

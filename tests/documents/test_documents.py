@@ -23,12 +23,12 @@ from tests.gen.designs import example_design
 from tests.house import ROOMS, WITH_SUB_ROOMS, file_table, picture
 
 from sosmith.cli import cli
-from sosmith.gen.instrument.vehicle_report import parameters_json
 from sosmith.gen.output.core_facts import core_facts
 from sosmith.gen.output.manifest import manifest
 from sosmith.gen.reload.register_map import markdown
-from sosmith.model.calibration.measurement_store import SCHEMA
-from sosmith.model.vehicle.parameters import built_in
+from sosmith.instrument.calibration.measurement_store import SCHEMA
+from sosmith.instrument.vehicle.parameters import built_in
+from sosmith.instrument.vehicle.vehicle_report import parameters_json
 
 ROOT = Path(__file__).parents[2]
 README = ROOT / "README.md"

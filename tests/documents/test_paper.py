@@ -9,9 +9,9 @@ import pytest
 from click.testing import CliRunner, Result
 
 from sosmith.cli import cli
-from sosmith.gen.paper.comparison import LABELS
-from sosmith.gen.paper.document import paper_files
-from sosmith.gen.paper.figures import read_paper_figures
+from sosmith.instrument.paper.comparison import LABELS
+from sosmith.instrument.paper.document import paper_files
+from sosmith.instrument.paper.figures import read_paper_figures
 
 DOCS = Path(__file__).parents[2] / "docs"
 

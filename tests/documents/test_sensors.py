@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from benchmarks import sensors
 
-from sosmith.model.scenarios.file import load_scenario
+from sosmith.instrument.scenarios.file import load_scenario
 
 ROOT = Path(sensors.__file__).parents[1]
 

@@ -19,9 +19,9 @@ from scipy import signal
 
 from sosmith.gen.reload.reload import check_swap
 from sosmith.gen.specification.specification import load
-from sosmith.gen.stimuli import bench_of
-from sosmith.model.calibration.polynomial import EQUATION_5A
-from sosmith.model.scenarios.file import emulate_file, load_scenario
+from sosmith.gen.stimuli.core import bench_of
+from sosmith.instrument.scenarios.file import emulate_file, load_scenario
+from sosmith.model.polynomial import EQUATION_5A
 
 ROOT = Path(__file__).parents[2]
 HERE = ROOT / "examples" / "wear_campaign"

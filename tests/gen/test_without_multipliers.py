@@ -12,12 +12,12 @@ from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.output.certificate import certificate
 from sosmith.gen.output.verilog import to_rtlil, to_verilog
 from sosmith.gen.specification.specification import from_text
-from sosmith.gen.stimuli import traces_for
-from sosmith.gen.verifier.certificate_file import Certificate, certificate_text
-from sosmith.gen.verifier.parallel.check import check_hardware
-from sosmith.gen.verifier.verification import verify
+from sosmith.instrument.scenarios.traces import traces_for
 from sosmith.model.errors import ShortfallError
 from sosmith.model.reference.golden import calibrated, filtered
+from sosmith.verify.certificate_file import Certificate, certificate_text
+from sosmith.verify.parallel.check import check_hardware
+from sosmith.verify.verification import verify
 
 DESIGNS = 40
 SAMPLES = 300

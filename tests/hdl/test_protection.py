@@ -9,21 +9,21 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from sosmith.benchmarks.upset_simulation import Fate, Hit, Target
 from tests.formal.small import leaky, resonator
 from tests.gen.test_architecture import design_in
 
 from sosmith.gen.architecture import Architecture
 from sosmith.gen.core import design_core
 from sosmith.gen.output.core_facts import StreamFacts
-from sosmith.gen.stimuli import traces_for
 from sosmith.hdl.plan.streams import dest_width, fields
+from sosmith.instrument.scenarios.traces import traces_for
 from sosmith.model.arrays import Codes
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.sim import upsets
 from sosmith.sim.beats import Beats
 from sosmith.sim.simulation import simulate
 from sosmith.sim.stream_packing import Order, pack, random_order, unpack
-from sosmith.sim.upsets import Fate, Hit, Target
 
 FAULT = 1 << 6
 

@@ -13,9 +13,9 @@ from typing import Any
 import pytest
 from amaranth.hdl import ClockDomain, ClockSignal, Module, ResetInserter, Signal
 from amaranth.sim import Simulator
-from tests.gen.verifier.parallel.cores import small_design
-from tests.gen.verifier.small_specifications import PLAIN
 from tests.hdl.axi_lite_bench import OKAY, SLVERR, Bus, run
+from tests.verify.parallel.cores import small_design
+from tests.verify.small_specifications import PLAIN
 
 from sosmith.hdl import core, reload
 from sosmith.hdl.constant_banks import ConstantBanks

@@ -10,10 +10,10 @@ from tests.gen.output.packages.made import design_of
 from tests.host.ports import plugged
 
 from sosmith.gen.output.generate import generated
-from sosmith.gen.stimuli import traces_for
 from sosmith.host.board import Board
 from sosmith.host.model_line import ModelLine, model_of
 from sosmith.host.port_run import run_on
+from sosmith.instrument.scenarios.traces import traces_for
 from sosmith.model.arrays import Codes
 from sosmith.model.errors import ShortfallError
 from sosmith.model.traces.trace_file import write_traces

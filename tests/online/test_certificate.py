@@ -10,8 +10,8 @@ import sosmith
 from sosmith.gen.core import design_core
 from sosmith.gen.output.generate import generate
 from sosmith.gen.specification.specification import load
-from sosmith.gen.verifier.certificate_file import certificate_text, read_certificate, sealed
-from sosmith.gen.verifier.graph import RejectedError
+from sosmith.verify.certificate_file import certificate_text, read_certificate, sealed
+from sosmith.verify.graph import RejectedError
 
 
 @pytest.fixture(scope="module")

@@ -17,12 +17,12 @@ from sosmith.gen.output.certificate import certificate
 from sosmith.gen.output.generate import generate
 from sosmith.gen.report.report import summarise
 from sosmith.gen.specification.specification import from_text, load
-from sosmith.gen.stimuli import traces_for
-from sosmith.gen.verifier.certificate_file import Certificate, certificate_text
-from sosmith.gen.verifier.verification import verify
+from sosmith.instrument.scenarios.traces import traces_for
 from sosmith.model.errors import ShortfallError
 from sosmith.model.reference.golden import calibrated, filtered
 from sosmith.sim.simulation import simulate
+from sosmith.verify.certificate_file import Certificate, certificate_text
+from sosmith.verify.verification import verify
 
 DESIGNS = 40
 SAMPLES = 200

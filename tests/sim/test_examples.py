@@ -20,9 +20,10 @@ from sosmith.gen.realizations.registry import REALIZATIONS
 from sosmith.gen.report.evidence import Evidence
 from sosmith.gen.report.report import summarise
 from sosmith.gen.specification.specification import load
-from sosmith.gen.stimuli import bench_of, traces_for
+from sosmith.gen.stimuli.core import bench_of
+from sosmith.instrument.scenarios.summaries import fitting
+from sosmith.instrument.scenarios.traces import traces_for
 from sosmith.model.errors import ShortfallError
-from sosmith.model.scenarios.summaries import fitting
 from sosmith.model.traces.trace import Trace
 from sosmith.sim import simulation
 from sosmith.sim.simulation import simulate

@@ -8,8 +8,8 @@ from tests.gen.test_architecture import design_in
 
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.fpga.boards import find_board
-from sosmith.gen.stimuli import traces_for
 from sosmith.hdl.plan.folded_clocks import reset_cycles
+from sosmith.instrument.scenarios.traces import traces_for
 from sosmith.sim.simulation import simulate
 
 FOLDABLE = ("df1", "df1_ef1", "df1_ef2", "df2t", "delta", "state_space")

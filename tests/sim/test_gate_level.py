@@ -16,7 +16,7 @@ from sosmith.gen.report.evidence import Evidence
 from sosmith.gen.report.page import render_page
 from sosmith.gen.report.report import summarise
 from sosmith.gen.specification.specification import load
-from sosmith.gen.stimuli import traces_for
+from sosmith.instrument.scenarios.traces import traces_for
 from sosmith.model.errors import ShortfallError, ToolError
 from sosmith.sim import simulation
 from sosmith.sim.gate_level import with_cell_models

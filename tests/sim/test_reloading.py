@@ -29,7 +29,7 @@ from sosmith.gen.specification.wear_limits import WearSpec
 from sosmith.hdl.folded import FoldedCore
 from sosmith.hdl.plan.streams import fields
 from sosmith.hdl.reload import ReloadPort
-from sosmith.model.calibration.polynomial import Polynomial
+from sosmith.model.polynomial import Polynomial
 from sosmith.sim.simulators import find_simulator
 
 RATIOS = ("0.8", "0.9", "1.1", "1.2")

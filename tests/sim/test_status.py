@@ -17,7 +17,7 @@ from sosmith.gen.output.generate import generate
 from sosmith.gen.output.manifest import manifest
 from sosmith.gen.specification.specification import load
 from sosmith.gen.specification.wear_limits import WearSpec
-from sosmith.gen.stimuli import traces_for
+from sosmith.instrument.scenarios.traces import traces_for
 from sosmith.model.dataflow.status import Flag
 from sosmith.model.errors import ShortfallError
 from sosmith.model.port import Port

@@ -14,10 +14,10 @@ from tests.virtual_board.test_netlist import SocketLine
 import sosmith
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.fpga.boards import find_board
-from sosmith.gen.stimuli import traces_for
 from sosmith.host.board import Board
 from sosmith.host.identity_check import check_files
 from sosmith.host.monitor import Changed, Connected, Received, watch
+from sosmith.instrument.scenarios.traces import traces_for
 from sosmith.model.arrays import Codes
 from sosmith.model.dataflow.status import Flag
 from sosmith.model.errors import SpecificationError

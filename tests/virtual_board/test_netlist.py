@@ -21,10 +21,10 @@ import sosmith
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.fpga.boards import find_board
 from sosmith.gen.specification.specification import load
-from sosmith.gen.stimuli import traces_for
 from sosmith.host import session
 from sosmith.host.board import Board
 from sosmith.host.identity_check import check_files
+from sosmith.instrument.scenarios.traces import traces_for
 from sosmith.model.link.protocol import Type
 from sosmith.sim.virtual_board.line_damage import LineDamage
 from sosmith.sim.virtual_board.netlist import Damage, Netlist, build, forward

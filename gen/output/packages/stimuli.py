@@ -10,10 +10,10 @@ import numpy as np
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.output.core_facts import InterfaceFacts
 from sosmith.gen.output.vectors import Vectors, whole_beats
-from sosmith.gen.stimuli import bench_of
+from sosmith.gen.stimuli.core import bench_of
+from sosmith.gen.stimuli.run import Bench, Run
+from sosmith.gen.stimuli.worst_case_inputs import all_responses, worst_cases
 from sosmith.model.arrays import Codes, Values
-from sosmith.model.scenarios.run import Bench, Run
-from sosmith.model.scenarios.worst_case_inputs import all_responses, worst_cases
 
 _MOST = 8192
 """Most transfers of a part of the stimuli: an event-driven simulator takes them in seconds."""

@@ -160,7 +160,7 @@ def _measured(design: CoreDesign, trace: str | None, seed: int) -> Codes:
     """Return what the converters measure, as codes of the inputs: shape (samples, channels, inputs)."""
     import numpy as np
 
-    from sosmith.gen.stimuli import default_scenario, traces_for
+    from sosmith.instrument.scenarios.traces import default_scenario, traces_for
 
     traces = traces_for(design, trace or default_scenario(design), seed=seed)
     return np.stack([each.codes for each in traces], axis=1)

@@ -108,7 +108,7 @@ def design_command(
     if plot is not None:
         note(f"wrote {plot}")
     if as_json:
-        from sosmith.gen.instrument.uncertainty_budget import budget_json
+        from sosmith.instrument.uncertainty.instrument_budget import budget_json
 
         worth = None if made.uncertainty is None else budget_json(made.uncertainty)
         beside = {name: asdict(costs) for name, costs in made.rate_costs.items()}

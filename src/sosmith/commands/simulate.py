@@ -24,8 +24,8 @@ from sosmith.commands.options import (
     default_folder,
 )
 from sosmith.gen.fpga.boards import MODELLED, find_board
+from sosmith.instrument.scenarios.summaries import SUMMARIES, check_scenario, fitting
 from sosmith.model.errors import SpecificationError
-from sosmith.model.scenarios.summaries import SUMMARIES, check_scenario, fitting
 from sosmith.model.suggestion import did_you_mean
 from sosmith.model.text_files import write_files
 from sosmith.terminal import JSON_OPTION, Step, note, output_option, print_json, reader_may_leave, show_progress
@@ -183,7 +183,7 @@ def simulate_command(
 
         check_format(vectors)
     if date is not None:
-        from sosmith.model.calibration.measurement_files import parse_date
+        from sosmith.instrument.calibration.measurement_files import parse_date
 
         parse_date(date)
     if port is not None and (gates is not None or waves):
@@ -277,7 +277,7 @@ def emulate_command(
             f"{scenario}{did_you_mean(scenario, known)}"
         )
     with show_progress() as step:
-        from sosmith.gen.stimuli import notes_on, traces_for
+        from sosmith.instrument.scenarios.traces import notes_on, traces_for
         from sosmith.interface.design import design
         from sosmith.model.traces.trace_file import traces_csv, write_traces
 
@@ -340,7 +340,7 @@ def _say_how_long() -> None:
 def _simulated(made: Design, step: Step, source: str | None, **options: Any) -> Report:
     report = made.simulate(source, progress=step, **options)
     if source is not None:
-        from sosmith.gen.stimuli import notes_on
+        from sosmith.instrument.scenarios.traces import notes_on
 
         for sentence in notes_on(made.core, source):
             note(f"note: {sentence}")
@@ -381,8 +381,8 @@ def _write_measurements(spec: Path, source: str | None, seed: int, output: Path 
     from sosmith.interface.specification import Specification
 
     Specification.load(spec)  # so that a mistake in it is found now
-    from sosmith.model.scenarios.depot_measurements import measurements_csv, measurements_of
-    from sosmith.model.scenarios.file import load_scenario
+    from sosmith.instrument.scenarios.depot_measurements import measurements_csv, measurements_of
+    from sosmith.instrument.scenarios.file import load_scenario
 
     rows = measurements_of(load_scenario(Path(source)), seed)
     text = measurements_csv(rows)

@@ -83,7 +83,7 @@ def verify(certificate: Path, spec: Path | None, files: Path | None, rebuild: bo
 
 def _calibration(proof: Proof) -> dict[str, int]:
     """Return what the proof of a calibration before a decimator is about."""
-    from sosmith.gen.verifier.program.check import ProgramVerdict
+    from sosmith.verify.program.check import ProgramVerdict
 
     found = proof.calibration
     if found is None:

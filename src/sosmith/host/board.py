@@ -13,11 +13,11 @@ import numpy.typing as npt
 
 from sosmith.host.line import Line, SerialLine
 from sosmith.host.session import Request, Session
+from sosmith.model.converters.spi_converter import ReadingFault
 from sosmith.model.errors import LinkError, SpecificationError
 from sosmith.model.link.identity import Identity
 from sosmith.model.link.packing import bytes_of, codes_of
 from sosmith.model.link.protocol import BLOCK_BYTES, MAX_IDENTITY, MAX_WORDS, WORD_BYTES, Counter, Type
-from sosmith.model.sensors.spi_converter import ReadingFault
 
 if TYPE_CHECKING:
     from sosmith.host.loading import Loaded
@@ -280,7 +280,7 @@ class Board:
     def readings(self) -> dict[tuple[int, str], tuple[str, ...]]:
         """Read what was wrong with the last reading of each converter: by channel and name of the input.
 
-        Names of faults are those of `sosmith.model.sensors.spi_converter.ReadingFault` in small letters; none for a
+        Names of faults are those of `sosmith.model.converters.spi_converter.ReadingFault` in small letters; none for a
         good reading.
         """
         body = self._session.request(Type.CONVERTERS)

@@ -8,9 +8,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from sosmith.gen.verifier.certificate_file import read_certificate
 from sosmith.model.errors import ShortfallError, SpecificationError
 from sosmith.model.link.identity import CONVERTER_FLAGS, Identity
+from sosmith.verify.certificate_file import read_certificate
 
 
 def check_design(identity: Identity, verilog: str) -> None:

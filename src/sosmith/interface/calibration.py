@@ -11,12 +11,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from sosmith.gen.calibration.fit import REQUIRED_R, Fit, Measurements, fit, read_measurements, residuals
 from sosmith.gen.specification.toml_text import toml_text
+from sosmith.instrument.calibration.uncertainty import Uncertainty, of_polynomial
 from sosmith.interface.notebook import table_html
 from sosmith.interface.quantity import Quantity
-from sosmith.model.calibration.acceptance import REQUIRED_R
-from sosmith.model.calibration.fit import Fit, Measurements, fit, read_measurements, residuals
-from sosmith.model.calibration.uncertainty import Uncertainty, of_polynomial
 from sosmith.model.errors import SpecificationError
 
 

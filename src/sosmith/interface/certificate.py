@@ -8,12 +8,14 @@ from os import PathLike, fspath
 from pathlib import Path
 
 from sosmith.gen.specification.specification import from_text, load
-from sosmith.gen.verifier.around.cic import DecimatorVerdict, check_decimator
-from sosmith.gen.verifier.around.parallel_core import check_ahead, check_behind
-from sosmith.gen.verifier.certificate_file import Certificate as Entries
-from sosmith.gen.verifier.certificate_file import certificate_text, read_certificate
-from sosmith.gen.verifier.decimation import at_lower_rate, behind_decimator, calibration_alone, module_in
-from sosmith.gen.verifier.generated_files import (
+from sosmith.interface.quantity import Quantity
+from sosmith.model.text_files import write_files
+from sosmith.verify.around.cic import DecimatorVerdict, check_decimator
+from sosmith.verify.around.parallel_core import check_ahead, check_behind
+from sosmith.verify.certificate_file import Certificate as Entries
+from sosmith.verify.certificate_file import certificate_text, read_certificate
+from sosmith.verify.decimation import at_lower_rate, behind_decimator, calibration_alone, module_in
+from sosmith.verify.generated_files import (
     about_of,
     architecture_ahead,
     check_files,
@@ -24,13 +26,11 @@ from sosmith.gen.verifier.generated_files import (
     core_text,
     fixed_architecture,
 )
-from sosmith.gen.verifier.graph import RejectedError
-from sosmith.gen.verifier.parallel.check import HardwareVerdict, check_hardware
-from sosmith.gen.verifier.program.check import ProgramVerdict, check_program
-from sosmith.gen.verifier.specified.stated_specification import Agreement, check_specification
-from sosmith.gen.verifier.verification import verify
-from sosmith.interface.quantity import Quantity
-from sosmith.model.text_files import write_files
+from sosmith.verify.graph import RejectedError
+from sosmith.verify.parallel.check import HardwareVerdict, check_hardware
+from sosmith.verify.program.check import ProgramVerdict, check_program
+from sosmith.verify.specified.stated_specification import Agreement, check_specification
+from sosmith.verify.verification import verify
 
 Progress = Callable[[str, int, int], None]
 """Called with the name of a step, the amount done and the total; both are 0 if they are not known."""

@@ -29,9 +29,9 @@ from sosmith.model.errors import SpecificationError, falling_short
 from sosmith.model.reference.golden import entering_filter, filtered
 
 if TYPE_CHECKING:
-    from sosmith.gen.instrument.uncertainty_budget import InstrumentBudget
     from sosmith.gen.output.decimation_facts import RateCosts
     from sosmith.host.board import Board
+    from sosmith.instrument.uncertainty.instrument_budget import InstrumentBudget
     from sosmith.interface.build import Build
     from sosmith.interface.certificate import Certificate, Progress, Proof
     from sosmith.interface.report import Report
@@ -150,7 +150,7 @@ class Design:
     @cached_property
     def uncertainty(self) -> InstrumentBudget | None:
         """The uncertainty budget of a reading in the terms of the GUM; None if the calibration's is not known."""
-        from sosmith.gen.instrument.uncertainty_budget import budget_of
+        from sosmith.instrument.uncertainty.instrument_budget import budget_of
 
         return budget_of(self.core)
 
@@ -315,7 +315,7 @@ class Design:
     @property
     def scenarios(self) -> dict[str, str]:
         """Descriptions of the built-in traces for this design, by their names; `trace` and `simulate` take them."""
-        from sosmith.model.scenarios.summaries import SUMMARIES, fitting
+        from sosmith.instrument.scenarios.summaries import SUMMARIES, fitting
 
         kind = "filter" if self.core.quantized.polynomial is None else "instrument"
         return {name: SUMMARIES[name].description for name in fitting(kind)}
@@ -619,8 +619,9 @@ class Design:
         """
         # The simulation modules are slow to import; a design that only computes does not need them.
         from sosmith.gen.output.vectors import check_format
+        from sosmith.instrument.calibration.measurement_files import parse_date
+        from sosmith.instrument.uncertainty.instrument_budget import budget_in_json
         from sosmith.interface.report import Report
-        from sosmith.model.calibration.measurement_files import parse_date
         from sosmith.sim.simulation import simulate
         from sosmith.sim.simulators import check_name
 
@@ -656,6 +657,7 @@ class Design:
                 hardware=hardware,
                 vectors=None if vectors is None else Path(fspath(vectors)),
                 date=date,
+                uncertainty=budget_in_json(self.core),
                 progress=progress,
             )
         progress("writing the report", 0, 0)

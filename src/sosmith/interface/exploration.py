@@ -175,6 +175,7 @@ def explore(
     >>> found
     <sosmith.Exploration sos_filter: 4 points, ... on the front>
     """
+    from sosmith.instrument.uncertainty.instrument_budget import budget_in_json
     from sosmith.sim.exploration.confirmation import confirmed
     from sosmith.sim.exploration.parameters import default_parameters
     from sosmith.sim.exploration.processes import in_processes, processors
@@ -199,6 +200,7 @@ def explore(
         swept,
         place,
         runner,
+        traces=default_traces,
         search=search,
         core=core,
         samples=samples,
@@ -207,7 +209,7 @@ def explore(
         progress=progress,
     )
     if simulate:
-        outcome = confirmed(outcome, place, simulator=simulator, progress=progress)
+        outcome = confirmed(outcome, place, uncertainty=budget_in_json, simulator=simulator, progress=progress)
     progress("writing the results", 0, 0)
     made = Exploration(outcome, place)
     files = {

@@ -63,10 +63,10 @@ def traces_of(
     Raises
     ------
     SpecificationError
-        As `encoded` and `sosmith.gen.stimuli.traces_for`.
+        As `encoded` and `sosmith.instrument.scenarios.traces.traces_for`.
     """
     if not isinstance(trace, Mapping):
-        from sosmith.gen.stimuli import default_scenario, traces_for  # and with it all scenarios
+        from sosmith.instrument.scenarios.traces import default_scenario, traces_for  # and with it all scenarios
 
         source = default_scenario(design) if trace is None else fspath(trace)
         return traces_for(design, source, seed=seed, seconds=seconds)

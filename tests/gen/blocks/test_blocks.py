@@ -25,14 +25,14 @@ from sosmith.gen.realizations.registry import LOOK_AHEAD, realization_of
 from sosmith.gen.realizations.section_format import SectionFormat
 from sosmith.gen.report.provenance import provenance_of
 from sosmith.gen.specification.specification import from_text
-from sosmith.gen.stimuli import traces_for
-from sosmith.gen.verifier import driven_responses
-from sosmith.gen.verifier.certificate_file import Certificate, certificate_text
-from sosmith.gen.verifier.parallel.check import check_hardware
-from sosmith.gen.verifier.verification import verify
 from sosmith.gen.word_lengths import quantize
+from sosmith.instrument.scenarios.traces import traces_for
 from sosmith.model.errors import ShortfallError, SpecificationError
 from sosmith.model.reference.golden import calibrated, filtered
+from sosmith.verify import driven_responses
+from sosmith.verify.certificate_file import Certificate, certificate_text
+from sosmith.verify.parallel.check import check_hardware
+from sosmith.verify.verification import verify
 
 DESIGNS = 40
 MOST_POLES = 10

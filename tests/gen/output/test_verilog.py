@@ -17,9 +17,9 @@ from tests.gen.output.test_converters import SPEC
 import sosmith
 from sosmith.gen.output.board_top import board_top
 from sosmith.gen.output.verilog import _MODULE, _with_plain_names, converted, to_rtlil, to_verilog
-from sosmith.gen.verifier.graph import RejectedError
-from sosmith.gen.verifier.parallel.text import read_modules
-from sosmith.gen.verifier.program.text import _memories
+from sosmith.verify.graph import RejectedError
+from sosmith.verify.parallel.text import read_modules
+from sosmith.verify.program.text import _memories
 
 WORDS = [3] * 2 + [7] * 20 + [1] + [0] * 30 + [2] * 7
 """Runs of every kind: short ones, long ones, a single word."""

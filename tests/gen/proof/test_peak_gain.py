@@ -16,8 +16,8 @@ from sosmith.gen.proof.nodes import LONGEST
 from sosmith.gen.proof.peak_gain import Drive, Extent, extent, peak_gain
 from sosmith.gen.proof.poles import Coefficients, pole_radii
 from sosmith.gen.proof.response import IMPULSE
-from sosmith.gen.verifier.l1_response import inverse, is_stable, response
 from sosmith.model.errors import ShortfallError
+from sosmith.verify.l1_response import inverse, is_stable, response
 
 Section = tuple[Coefficients, Coefficients]
 

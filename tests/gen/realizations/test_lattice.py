@@ -14,9 +14,9 @@ from scipy import signal
 from tests.gen.designs import EXAMPLES, with_rows
 from tests.gen.proof.cycle_search import search_cycles
 from tests.gen.proven_stages import run
-from tests.gen.verifier.test_certificate import all_edits, proven, wrongly_accepted
 from tests.gen.word_lengths.test_quantize import OUT, SIGNED, butterworth, errors, plain, stimulus
 from tests.gen.word_lengths.test_sweep import REFUSED
+from tests.verify.test_certificate import all_edits, proven, wrongly_accepted
 
 from sosmith.gen.core import design_core
 from sosmith.gen.filter.design import Filter
@@ -29,14 +29,14 @@ from sosmith.gen.realizations.lattice import LatticePair, LatticeSigns, Row, lat
 from sosmith.gen.realizations.registry import REALIZATIONS
 from sosmith.gen.realizations.section_format import SectionFormat
 from sosmith.gen.specification.specification import load
-from sosmith.gen.verifier.certificate_file import Certificate, certificate_text
-from sosmith.gen.verifier.verification import RejectedError, verify
 from sosmith.gen.word_lengths.error_paths import error_paths
 from sosmith.model.dataflow.datapath import Stage
 from sosmith.model.dataflow.graph import Graph, Op, Range
 from sosmith.model.errors import ShortfallError
 from sosmith.model.sections.lattice import Adaptor, Allpass, LatticeStage
 from sosmith.model.sections.state_space import Coefficient
+from sosmith.verify.certificate_file import Certificate, certificate_text
+from sosmith.verify.verification import RejectedError, verify
 
 KINDS = ("lowpass", "highpass", "bandpass", "bandstop")
 ODD = [(kind, order, cutoff) for kind in KINDS for order in (1, 3, 5) for cutoff in (0.002, 0.05, 0.25, 0.35)]

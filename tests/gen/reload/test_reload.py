@@ -24,9 +24,9 @@ from sosmith.gen.specification.specification import load
 from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.gen.word_lengths.settling import samples_to_settle
 from sosmith.hdl.plan.instructions import encoded
-from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.dataflow.program import Judged, Opcode, Program
 from sosmith.model.errors import ShortfallError, SpecificationError
+from sosmith.model.polynomial import Polynomial
 from sosmith.model.reload.constants import constants
 from sosmith.model.reload.registers import CRC, DATA, VERSION
 

@@ -24,10 +24,10 @@ from sosmith.gen.specification.wear_limits import WearSpec
 from sosmith.gen.word_lengths.input_stage import InputStage, Start, starting_like
 from sosmith.gen.word_lengths.quantize import gain_at_zero
 from sosmith.gen.word_lengths.quantized import START, Quantized
-from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.graph import Range
 from sosmith.model.errors import ShortfallError
+from sosmith.model.polynomial import Polynomial
 from sosmith.model.reload.constants import with_ranges
 from sosmith.model.sections.output import Held
 

@@ -19,7 +19,7 @@ from sosmith.gen.report.curves import STRETCHES, error_over_time, error_spectrum
 from sosmith.gen.report.provenance import Provenance, hardware_cost, provenance_of
 from sosmith.gen.report.report import summarise
 from sosmith.gen.specification.specification import from_text
-from sosmith.gen.stimuli import traces_for
+from sosmith.instrument.scenarios.traces import traces_for
 from sosmith.model.dataflow.program import Program
 
 DIGESTS = ("specification_sha256", "reference_sha256", "trace_sha256", "datapath_sha256")

@@ -12,7 +12,7 @@ from tests.gen.designs import EXAMPLES
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.output.certificate import about, certificate
 from sosmith.gen.specification.specification import Specification, from_text
-from sosmith.gen.verifier.certificate_file import Certificate, certificate_text
+from sosmith.verify.certificate_file import Certificate, certificate_text
 
 
 def locomotive_text(decimate: str = '"auto"', architecture: str = "auto", *, hold: bool = False) -> str:

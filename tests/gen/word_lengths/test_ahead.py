@@ -16,18 +16,18 @@ from tests.gen.word_lengths.multirate import exact_results, worst_error
 
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.filter.decimation import Decimation
-from sosmith.gen.instrument.uncertainty_budget import instrument_of
 from sosmith.gen.output.core_facts import core_facts
 from sosmith.gen.output.decimation_facts import direct_design, rate_costs
 from sosmith.gen.output.manifest import manifest
 from sosmith.gen.specification.specification import from_text, from_tree
-from sosmith.gen.stimuli import traces_for
 from sosmith.gen.word_lengths import decimator as decimator_module
 from sosmith.gen.word_lengths.ahead import calibration_ahead
 from sosmith.gen.word_lengths.quantized import CALIBRATION, DECIMATION
-from sosmith.model.calibration.polynomial import Polynomial
+from sosmith.instrument.scenarios.traces import traces_for
+from sosmith.instrument.uncertainty.instrument_budget import instrument_of
 from sosmith.model.dataflow.graph import Op
 from sosmith.model.errors import ShortfallError
+from sosmith.model.polynomial import Polynomial
 from sosmith.model.port import Port
 from sosmith.model.reference.golden import entering_filter, filtered
 

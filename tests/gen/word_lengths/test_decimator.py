@@ -15,9 +15,9 @@ from sosmith.gen.output.core_facts import core_facts
 from sosmith.gen.output.decimation_facts import direct_design, rate_costs
 from sosmith.gen.output.manifest import manifest
 from sosmith.gen.specification.specification import from_text
-from sosmith.gen.stimuli import traces_for
 from sosmith.gen.word_lengths.decimator import front_of
 from sosmith.gen.word_lengths.quantized import DECIMATION
+from sosmith.instrument.scenarios.traces import traces_for
 from sosmith.interface.design import Design
 from sosmith.model.errors import ShortfallError, SpecificationError
 from sosmith.model.port import Port

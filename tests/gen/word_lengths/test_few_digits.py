@@ -3,8 +3,8 @@
 from dataclasses import replace
 
 import pytest
-from tests.gen.verifier.parallel.cores import specified
-from tests.gen.verifier.small_specifications import PLAIN
+from tests.verify.parallel.cores import specified
+from tests.verify.small_specifications import PLAIN
 
 from sosmith.gen.architecture import Blocks, Budget, blocks_for, candidates, objective_of
 from sosmith.gen.core import design_core

@@ -17,7 +17,7 @@ from sosmith.gen.specification.specification import FilterSpec
 from sosmith.gen.word_lengths.other_realization import with_realization
 from sosmith.gen.word_lengths.quantize import quantize
 from sosmith.gen.word_lengths.quantized import Quantized
-from sosmith.model.calibration.polynomial import Polynomial
+from sosmith.model.polynomial import Polynomial
 from sosmith.model.port import Port
 from sosmith.model.reference.golden import calibrated, filtered
 

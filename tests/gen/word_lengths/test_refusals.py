@@ -12,8 +12,8 @@ from sosmith.gen.filter.design import Filter
 from sosmith.gen.realizations.registry import CASCADES, REALIZATIONS, Row
 from sosmith.gen.realizations.section_format import SectionFormat
 from sosmith.gen.word_lengths.quantize import quantize
-from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.errors import ShortfallError
+from sosmith.model.polynomial import Polynomial
 from sosmith.model.port import Port
 
 EIGHT_BITS = Port.from_range("y", 8, Fraction(-1), Fraction(1), signed=True)

@@ -16,13 +16,13 @@ import pytest
 from sosmith.gen.filter.design import decay_length, design, impulse_response
 from sosmith.gen.realizations.registry import CASCADES, REALIZATIONS
 from sosmith.gen.specification.specification import FilterSpec
+from sosmith.gen.stimuli.worst_case_inputs import sign_matched
 from sosmith.gen.word_lengths.error_paths import error_responses
 from sosmith.gen.word_lengths.quantize import quantize
 from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.model.errors import ShortfallError
 from sosmith.model.port import Port
 from sosmith.model.reference.golden import calibrated, filtered
-from sosmith.model.scenarios.worst_case_inputs import sign_matched
 
 RANDOM_SAMPLES = 1_000_000
 

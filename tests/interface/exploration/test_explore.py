@@ -25,7 +25,7 @@ from tests.interface.small import FILTER
 
 import sosmith
 from sosmith import SpecificationError, ToolError
-from sosmith.gen.stimuli import traces_for
+from sosmith.instrument.scenarios.traces import traces_for
 from sosmith.sim.exploration import processes
 from sosmith.sim.exploration.evaluation import evaluate
 

@@ -12,7 +12,7 @@ import sosmith
 from sosmith.gen.report.provenance import hardware_cost, provenance_of
 from sosmith.gen.report.report import summarise
 from sosmith.gen.specification.specification import from_text
-from sosmith.gen.stimuli import traces_for
+from sosmith.instrument.scenarios.traces import traces_for
 from sosmith.interface.specification import Specification
 from sosmith.sim.exploration.front import cost_kind, pareto_front
 from sosmith.sim.exploration.parameters import default_parameters

@@ -13,6 +13,7 @@ from tests.interface.small import FILTER
 
 import sosmith
 from sosmith import Specification, SpecificationError, ToolError
+from sosmith.instrument.scenarios.traces import default_traces
 from sosmith.sim.exploration.grid import Task
 from sosmith.sim.exploration.parameters import Parameters, Span
 from sosmith.sim.exploration.run import Outcome, explore
@@ -70,7 +71,9 @@ class Machine:
 def searched(
     folder: Path, count: int = COUNT, *, seed: int = 1, machine: Machine | None = None, **more: Any
 ) -> Outcome:
-    return explore(SPEC, SPACE | more, folder, machine or Machine(), search=count, samples=100, seed=seed)
+    return explore(
+        SPEC, SPACE | more, folder, machine or Machine(), traces=default_traces, search=count, samples=100, seed=seed
+    )
 
 
 @pytest.fixture(scope="module", name="found")
@@ -132,7 +135,7 @@ def test_architectures_whose_costs_count_different_things_are_searched_apart(tmp
 
 def test_a_space_that_is_small_enough_is_a_grid(tmp_path: Path) -> None:
     small = {"hardware.realization": ["df1", "df2t"], "output.bits": Span(12, 14), "output.max_error": [0.01]}
-    found = explore(SPEC, small, tmp_path, Machine(), search=6, samples=100)
+    found = explore(SPEC, small, tmp_path, Machine(), traces=default_traces, search=6, samples=100)
     assert [tuple(point["changes"].values())[:2] for point in found.points] == [
         (name, bits) for name in ("df1", "df2t") for bits in (12, 13, 14)
     ]
@@ -144,7 +147,7 @@ def test_a_space_that_is_used_up_ends_the_search(tmp_path: Path) -> None:
         "output.max_error": Span(0.01, 0.01001),
         "output.bits": [12],
     }
-    found = explore(SPEC, small, tmp_path, Machine(), search=100, samples=100)
+    found = explore(SPEC, small, tmp_path, Machine(), traces=default_traces, search=100, samples=100)
     assert 2 <= len(found.points) <= 4
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from sosmith.model.calibration.polynomial import Polynomial
+from sosmith.model.polynomial import Polynomial
 from sosmith.model.port import Port
 from sosmith.model.reference.golden import calibrated, filtered
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sosmith.model.scenarios.vehicle_clearance import IRREGULARITY, SPEED, WHEELSET, vehicle_clearance
-from sosmith.model.vehicle.choices import MODELS
-from sosmith.model.vehicle.parameters import built_in
-from sosmith.model.vehicle.run import run
-from sosmith.model.vehicle.track import curved_track, tangent_track
+from sosmith.instrument.scenarios.vehicle_clearance import IRREGULARITY, SPEED, WHEELSET, vehicle_clearance
+from sosmith.instrument.vehicle.choices import MODELS
+from sosmith.instrument.vehicle.parameters import built_in
+from sosmith.instrument.vehicle.run import run
+from sosmith.instrument.vehicle.track import curved_track, tangent_track
 
 
 @pytest.mark.parametrize(("name", "make"), [("paper", curved_track), ("tangent", tangent_track)])

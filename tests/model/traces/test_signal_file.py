@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sosmith.model.calibration.polynomial import EQUATION_5A
 from sosmith.model.errors import SpecificationError
+from sosmith.model.polynomial import EQUATION_5A
 from sosmith.model.traces.signal_file import CALIBRATED, SignalFile, read_signal_file
 
 

@@ -18,7 +18,7 @@ import cocotb
 from cocotb.clock import Clock
 from cocotb.triggers import ClockCycles, FallingEdge, RisingEdge
 
-from sosmith.model.sensors.spi_converter import CONVERTERS
+from sosmith.model.converters.spi_converter import CONVERTERS
 from sosmith.sim.converters.cocotb_bus import Adc, SpiBus, ThermocoupleConverter
 
 

@@ -18,11 +18,11 @@ from cocotb_tools.runner import Icarus
 
 from sosmith.gen.output.verilog import to_rtlil, to_verilog
 from sosmith.hdl.converters.front_end import FrontEnd, _Scan
+from sosmith.model.converters.spi_converter import CONVERTERS, ReadingFault
+from sosmith.model.converters.spi_reading import Reading
+from sosmith.model.converters.spi_schedule import Schedule
 from sosmith.model.dataflow.status import Flag
 from sosmith.model.port import Port
-from sosmith.model.sensors.spi_converter import CONVERTERS, ReadingFault
-from sosmith.model.sensors.spi_reading import Reading
-from sosmith.model.sensors.spi_schedule import Schedule
 from sosmith.sim.converters.cocotb_bus import thermocouple_frame
 from sosmith.sim.simulators import PLAIN_ASSERTIONS
 

@@ -6,10 +6,10 @@ from pathlib import Path
 from tests.gen.word_lengths.decimated import read, tree_of
 
 from sosmith.gen.core import CoreDesign
-from sosmith.gen.verifier.specified.stated_specification import check_specification
-from sosmith.gen.verifier.verification import verify
 from sosmith.model.traces.trace import Trace
 from sosmith.sim.simulation import simulate
+from sosmith.verify.specified.stated_specification import check_specification
+from sosmith.verify.verification import verify
 
 
 def check_proof_and_hardware(

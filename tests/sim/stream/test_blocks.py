@@ -13,7 +13,7 @@ from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.output.generate import generate
 from sosmith.gen.report.report import write_report
 from sosmith.gen.specification.specification import from_text
-from sosmith.gen.stimuli import traces_for
+from sosmith.instrument.scenarios.traces import traces_for
 from sosmith.sim.simulation import simulate
 
 SIMPLE = AUDIO.replace("order = 5", "order = 1")

@@ -22,10 +22,11 @@ from tests.sim.stream.random_lowpass import lowpass
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.output.generate import generate
 from sosmith.gen.report.report import write_report
-from sosmith.gen.stimuli import bench_of, traces_for
+from sosmith.gen.stimuli.core import bench_of
+from sosmith.gen.stimuli.worst_case_inputs import sign_matched
+from sosmith.instrument.scenarios.traces import traces_for
 from sosmith.interface.specification import Specification
 from sosmith.model.reference.golden import entering_filter, filtered
-from sosmith.model.scenarios.worst_case_inputs import sign_matched
 from sosmith.model.traces.trace import Trace
 from sosmith.sim.simulation import simulate
 

@@ -13,7 +13,7 @@ from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.report.page import render_page
 from sosmith.gen.report.report import summarise
 from sosmith.gen.specification.specification import from_text, load
-from sosmith.gen.stimuli import traces_for
+from sosmith.instrument.scenarios.traces import traces_for
 from sosmith.model.text_files import to_json
 from sosmith.sim import simulation
 from sosmith.sim.simulation import simulate

@@ -13,8 +13,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from tests.gen.designs import EXAMPLES
-from tests.gen.verifier.small_specifications import STEADY_INSTRUMENT
 from tests.sim.stream.restarts import Outcome, run
+from tests.verify.small_specifications import STEADY_INSTRUMENT
 
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.filter.design import design
@@ -23,10 +23,10 @@ from sosmith.gen.reload.reload import OtherSet, other_set
 from sosmith.gen.specification.specification import from_tree, load
 from sosmith.gen.specification.wear_limits import WearSpec
 from sosmith.model.arrays import Codes
-from sosmith.model.calibration.polynomial import Polynomial
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.status import Flag
 from sosmith.model.errors import ShortfallError
+from sosmith.model.polynomial import Polynomial
 from sosmith.model.reference.golden import calibrated
 
 LIMITS = 5.4, 5.8

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.gen.verifier.small_specifications import STEADY_INSTRUMENT
+from tests.verify.small_specifications import STEADY_INSTRUMENT
 
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.proof.settling import SETTLED

@@ -10,16 +10,17 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from sosmith.gen.calibration.fit import REQUIRED_R
 from sosmith.gen.picture import format_of
-from sosmith.model.calibration.acceptance import DEFAULT_RANGES, METHODS, REQUIRED_R, Method, Range
+from sosmith.instrument.calibration.acceptance import DEFAULT_RANGES, METHODS, Method, Range
 from sosmith.model.errors import ShortfallError, SpecificationError
 from sosmith.model.text_files import write_contents, write_files
 from sosmith.terminal import JSON_OPTION, note, output_option, print_json, show_progress
 
 if TYPE_CHECKING:
-    from sosmith.model.calibration.measurement_files import Refusal
-    from sosmith.model.calibration.self_updating import Calibration
-    from sosmith.model.calibration.sensor_type import SensorType
+    from sosmith.instrument.calibration.measurement_files import Refusal
+    from sosmith.instrument.calibration.self_updating import Calibration
+    from sosmith.instrument.calibration.sensor_type import SensorType
 
 _SHOWN = 20
 """Number of refused lines that are printed; JSON has all of them."""
@@ -49,7 +50,7 @@ def calibrate() -> None:
 def _day(ctx: click.Context, parameter: click.Parameter, text: str | None) -> str:
     if text is None:
         return datetime.date.today().isoformat()
-    from sosmith.model.calibration.measurement_files import parse_date
+    from sosmith.instrument.calibration.measurement_files import parse_date
 
     return parse_date(text)
 
@@ -102,7 +103,7 @@ def _length(name: str, text: str) -> float:
 def _sensor_type(ctx: click.Context, parameter: click.Parameter, given: str | None) -> SensorType | None:
     if given is None:
         return None
-    from sosmith.model.calibration.sensor_type_file import sensor_type_named
+    from sosmith.instrument.calibration.sensor_type_file import sensor_type_named
 
     return sensor_type_named(given)
 
@@ -198,9 +199,9 @@ def add_command(
         sosmith calibrate add bench.csv --sensor left
         sosmith calibrate add april.xlsx --sensor left --date 2026-04-20 --keep-good
     """
-    from sosmith.gen.instrument.calibration_report import addition_json
-    from sosmith.model.calibration.measurement_store import open_store
-    from sosmith.model.calibration.self_updating import add, refused_first_file
+    from sosmith.instrument.calibration.calibration_report import addition_json
+    from sosmith.instrument.calibration.measurement_store import open_store
+    from sosmith.instrument.calibration.self_updating import add, refused_first_file
 
     ranges = (clearance_range, voltage_range, temperature_range)
     chosen, needed_r = _method(method, required_r, robust)
@@ -276,9 +277,9 @@ def fit_command(
     """
     chosen, needed_r = _method(method, required_r, robust)
     from sosmith.commands.tables.calibration import print_calibration
-    from sosmith.gen.instrument.calibration_report import calibration_json
-    from sosmith.model.calibration.measurement_store import open_store
-    from sosmith.model.calibration.self_updating import refit
+    from sosmith.instrument.calibration.calibration_report import calibration_json
+    from sosmith.instrument.calibration.measurement_store import open_store
+    from sosmith.instrument.calibration.self_updating import refit
 
     with show_progress() as step, open_store(store) as opened:
         step(f"fitting {sensor}")
@@ -316,9 +317,9 @@ def history_command(store: Path, sensor: str, verify: bool, as_json: bool) -> No
         sosmith calibrate history --sensor left --verify
     """
     from sosmith.commands.tables.calibration import print_history
-    from sosmith.gen.instrument.calibration_report import version_json
-    from sosmith.model.calibration.measurement_store import open_store
-    from sosmith.model.calibration.self_updating import calibration_of, find_version
+    from sosmith.instrument.calibration.calibration_report import version_json
+    from sosmith.instrument.calibration.measurement_store import open_store
+    from sosmith.instrument.calibration.self_updating import calibration_of, find_version
 
     with show_progress() as step, open_store(store) as opened:
         newest = find_version(opened, sensor)
@@ -361,9 +362,9 @@ def export_command(store: Path, sensor: str, number: int | None, file_format: st
         sosmith calibrate export --sensor left -o left.toml
         sosmith calibrate export --sensor left --version 1 --format csv -o left.csv
     """
-    from sosmith.gen.instrument.calibration_report import measurements_csv, specification_table
-    from sosmith.model.calibration.measurement_store import open_store
-    from sosmith.model.calibration.self_updating import calibration_of, find_version
+    from sosmith.instrument.calibration.calibration_report import measurements_csv, specification_table
+    from sosmith.instrument.calibration.measurement_store import open_store
+    from sosmith.instrument.calibration.self_updating import calibration_of, find_version
 
     with show_progress() as step, open_store(store) as opened:
         version = find_version(opened, sensor, number)
@@ -397,9 +398,9 @@ def plot_command(store: Path, sensor: str, number: int | None, output: Path | No
     """
     path = output or Path("calibration.svg")
     file_format = format_of(path)
-    from sosmith.gen.instrument.calibration_plot import calibration_plot
-    from sosmith.model.calibration.measurement_store import open_store
-    from sosmith.model.calibration.self_updating import calibration_of
+    from sosmith.instrument.calibration.calibration_plot import calibration_plot
+    from sosmith.instrument.calibration.measurement_store import open_store
+    from sosmith.instrument.calibration.self_updating import calibration_of
 
     with show_progress() as step, open_store(store) as opened:
         step("fitting again")
@@ -446,9 +447,9 @@ def advise_command(
         sosmith calibrate advise 2mm 3mm 4mm --sensor left --within 0.2mm
     """
     from sosmith.commands.tables.calibration import print_advice
-    from sosmith.gen.instrument.calibration_report import advice_json
-    from sosmith.model.calibration.measurement_store import open_store
-    from sosmith.model.calibration.self_updating import advice_for
+    from sosmith.instrument.calibration.calibration_report import advice_json
+    from sosmith.instrument.calibration.measurement_store import open_store
+    from sosmith.instrument.calibration.self_updating import advice_for
 
     with show_progress() as step, open_store(store) as opened:
         step(f"fitting {sensor}")
@@ -488,15 +489,15 @@ def health_command(store: Path, sensor: str, since: str | None, plot: Path | Non
     """
     file_format = "" if plot is None else format_of(plot)
     from sosmith.commands.tables.calibration import print_health
-    from sosmith.gen.instrument.health_report import health_json
-    from sosmith.model.calibration.measurement_store import open_store
-    from sosmith.model.calibration.self_updating import health_for
+    from sosmith.instrument.calibration.health.health_report import health_json
+    from sosmith.instrument.calibration.measurement_store import open_store
+    from sosmith.instrument.calibration.self_updating import health_for
 
     with show_progress() as step, open_store(store) as opened:
         step(f"going through the days of {sensor}")
         found = health_for(opened, sensor, since)
         if plot is not None:
-            from sosmith.gen.instrument.health_plot import health_plot
+            from sosmith.instrument.calibration.health.health_plot import health_plot
 
             step("drawing")
             write_contents(plot.parent, {plot.name: health_plot(sensor, found, file_format)})

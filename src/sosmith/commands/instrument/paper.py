@@ -22,9 +22,9 @@ def paper(output: Path | None, as_json: bool) -> None:
     \b
         sosmith paper -o paper/paper.md
     """
-    from sosmith.gen.paper.comparison import LABELS
-    from sosmith.gen.paper.document import paper_files, paper_json, summary_rows
-    from sosmith.gen.paper.figures import read_paper_figures
+    from sosmith.instrument.paper.comparison import LABELS
+    from sosmith.instrument.paper.document import paper_files, paper_json, summary_rows
+    from sosmith.instrument.paper.figures import read_paper_figures
 
     with show_progress() as step:
         figures = read_paper_figures()

@@ -10,7 +10,7 @@ import click
 
 from sosmith.commands.options import OneOf
 from sosmith.gen.picture import format_of
-from sosmith.gen.spectrum.settings import (
+from sosmith.instrument.spectrum.settings import (
     COVERAGE,
     DETRENDS,
     PASSBAND_LOSS,
@@ -126,8 +126,8 @@ def spectrum_command(
     picture = plot if plot is not None or output is None else output.with_suffix(".svg")
     file_format = "" if picture is None else format_of(picture)
     with show_progress() as step:
-        from sosmith.gen.spectrum.report import proposal_json, signal_json
-        from sosmith.gen.spectrum.survey import survey
+        from sosmith.instrument.spectrum.report import proposal_json, signal_json
+        from sosmith.instrument.spectrum.survey import survey
 
         made = survey(
             traces,

@@ -10,12 +10,12 @@ import click
 
 from sosmith.commands.options import OneOf
 from sosmith.gen.picture import format_of
+from sosmith.instrument.vehicle.choices import LEVELS, MODELS, TRACK_NAMES
 from sosmith.model.text_files import write_contents, write_files
-from sosmith.model.vehicle.choices import LEVELS, MODELS, TRACK_NAMES
 from sosmith.terminal import JSON_OPTION, note, output_option, print_json, show_progress
 
 if TYPE_CHECKING:
-    from sosmith.gen.instrument.vehicle_report import VehicleRun
+    from sosmith.instrument.vehicle.vehicle_report import VehicleRun
 
 
 @click.command("vehicle")
@@ -82,16 +82,16 @@ def vehicle(
         sosmith vehicle my_vehicle.toml --track tangent --irregularities low -o motion.csv
     """
     file_format = "" if plot is None else format_of(plot)
-    from sosmith.model.vehicle.parameters import built_in, built_in_text, load
+    from sosmith.instrument.vehicle.parameters import built_in, built_in_text, load
 
     if write_parameters is not None:
         write_files(write_parameters.parent, {write_parameters.name: built_in_text()})
         note(f"wrote {write_parameters}")
         return
     given = built_in() if parameters is None else load(parameters)
-    from sosmith.gen.instrument.vehicle_report import parameters_json, vehicle_csv, vehicle_json, vehicle_run
-    from sosmith.gen.paper.figures import read_paper_figures
-    from sosmith.gen.paper.vehicle_comparison import comparison_json, run_comparison
+    from sosmith.instrument.paper.figures import read_paper_figures
+    from sosmith.instrument.paper.vehicle_comparison import comparison_json, run_comparison
+    from sosmith.instrument.vehicle.vehicle_report import parameters_json, vehicle_csv, vehicle_json, vehicle_run
 
     with show_progress() as step:
         step("running over the track")
@@ -110,7 +110,7 @@ def vehicle(
             step("writing the motion")
             write_files(output.parent, {output.name: vehicle_csv(made.motion)})
         if plot is not None:
-            from sosmith.gen.instrument.vehicle_plot import linear_beside, vehicle_plot
+            from sosmith.instrument.vehicle.vehicle_plot import linear_beside, vehicle_plot
 
             step("drawing")
             beside = linear_beside(made)

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from sosmith.gen.picture import format_of
+from sosmith.instrument.wear.record_columns import CLEARANCES, TIMES
 from sosmith.model.errors import SpecificationError
 from sosmith.model.text_files import write_contents
-from sosmith.model.wear.record_columns import CLEARANCES, TIMES
 from sosmith.terminal import JSON_OPTION, note, print_json, show_progress
 
 if TYPE_CHECKING:
-    from sosmith.model.wear.assessment import ClearanceUncertainty, WearLimits, WearReport
-    from sosmith.model.wear.record_file import WearRecord
+    from sosmith.instrument.wear.assessment import ClearanceUncertainty, WearLimits, WearReport
+    from sosmith.instrument.wear.record_file import WearRecord
 
 _HELP = f"""Estimate the wear, wear rate and remaining life of a wheel flange from TRACE.csv.
 
@@ -74,8 +74,8 @@ def wear_command(
 ) -> None:
     """Carry out `sosmith wear`."""
     file_format = "" if plot is None else format_of(plot)
-    from sosmith.model.wear.assessment import WearLimits, judge
-    from sosmith.model.wear.record_file import read_wear_record
+    from sosmith.instrument.wear.assessment import WearLimits, judge
+    from sosmith.instrument.wear.record_file import read_wear_record
 
     worth = None
     if spec is not None:
@@ -103,7 +103,7 @@ def wear_command(
         )
         drawn = None
         if plot is not None:
-            from sosmith.gen.instrument.wear_plot import wear_plot
+            from sosmith.instrument.wear.wear_plot import wear_plot
 
             step("drawing")
             drawn = wear_plot(record.time, record.clearance, report, file_format, dated=record.dated)
@@ -120,7 +120,7 @@ def wear_command(
 
 def _limits_of(path: Path, channel: int) -> WearLimits:
     from sosmith.gen.specification.specification import load
-    from sosmith.model.wear.assessment import WearLimits
+    from sosmith.instrument.wear.assessment import WearLimits
 
     spec = load(path)
     wear = spec.wear
@@ -140,8 +140,8 @@ def _limits_of(path: Path, channel: int) -> WearLimits:
 
 def _uncertainty_of(path: Path) -> Callable[[float, float], ClearanceUncertainty] | None:
     """Return what clearances are worth; None if the specification does not say what its calibration is worth."""
-    from sosmith.gen.instrument.uncertainty_budget import instrument_of
     from sosmith.gen.specification.specification import load
+    from sosmith.instrument.uncertainty.instrument_budget import instrument_of
 
     found = instrument_of(load(path))
     return None if found is None else found.of_wear

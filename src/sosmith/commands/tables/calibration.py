@@ -6,12 +6,12 @@ from rich.markup import escape
 from rich.table import Table
 
 from sosmith.commands.tables.console import TableConsole, new_table
-from sosmith.gen.instrument.calibration_report import CALLED_OUT, uncertainty_plane
-from sosmith.model.calibration.advice import Advice
-from sosmith.model.calibration.fit_quality import CELLS
-from sosmith.model.calibration.health.monitoring import Health, date_of
-from sosmith.model.calibration.measurement_store import Version
-from sosmith.model.calibration.self_updating import Calibration
+from sosmith.instrument.calibration.advice import Advice
+from sosmith.instrument.calibration.calibration_report import CALLED_OUT, uncertainty_plane
+from sosmith.instrument.calibration.fit_quality import CELLS
+from sosmith.instrument.calibration.health.monitoring import Health, date_of
+from sosmith.instrument.calibration.measurement_store import Version
+from sosmith.instrument.calibration.self_updating import Calibration
 
 
 def _mm(value: float | None) -> str:

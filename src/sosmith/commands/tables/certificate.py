@@ -6,12 +6,12 @@ from rich.markup import escape
 
 from sosmith.commands.tables.console import TableConsole
 from sosmith.commands.tables.design import print_budget
-from sosmith.gen.verifier.certificate_file import Certificate
-from sosmith.gen.verifier.parallel.check import HardwareVerdict
-from sosmith.gen.verifier.program.check import ProgramVerdict
-from sosmith.gen.verifier.specified.stated_specification import Agreement
 from sosmith.interface.certificate import Proof
 from sosmith.interface.quantity import Quantity
+from sosmith.verify.certificate_file import Certificate
+from sosmith.verify.parallel.check import HardwareVerdict
+from sosmith.verify.program.check import ProgramVerdict
+from sosmith.verify.specified.stated_specification import Agreement
 
 
 def print_proof(certificate: Certificate, proof: Proof) -> None:

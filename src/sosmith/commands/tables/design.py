@@ -12,19 +12,19 @@ from rich.table import Table
 
 from sosmith.commands.tables.console import TableConsole, new_table
 from sosmith.gen.architecture import Architecture
-from sosmith.gen.instrument.uncertainty_budget import InstrumentBudget
+from sosmith.gen.calibration.fit import Fit, read_measurements
 from sosmith.gen.output.core_facts import LimitCycleFacts
 from sosmith.gen.output.decimation_facts import RateCosts
 from sosmith.gen.quantity import LEAST_PART, quantity
 from sosmith.gen.specification.specification import Specification
 from sosmith.gen.specification.wear_limits import WearSpec
+from sosmith.instrument.calibration.uncertainty import of_polynomial
+from sosmith.instrument.uncertainty.budget import SHARE
+from sosmith.instrument.uncertainty.instrument_budget import InstrumentBudget
 from sosmith.interface.design import Design
 from sosmith.interface.quantity import Quantity
-from sosmith.model.calibration.fit import Fit, read_measurements
-from sosmith.model.calibration.uncertainty import of_polynomial
 from sosmith.model.dataflow.program import Program
 from sosmith.model.port import Port
-from sosmith.model.reference.uncertainty_budget import SHARE
 from sosmith.model.sections.start import StartStage
 
 

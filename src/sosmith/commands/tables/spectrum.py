@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from rich.markup import escape
 
 from sosmith.commands.tables.console import TableConsole, new_table
-from sosmith.gen.spectrum.proposal import Proposal
-from sosmith.gen.spectrum.report import peaks, ripple
-from sosmith.gen.spectrum.survey import SignalSpectra
-from sosmith.gen.spectrum.trial import Trial
+from sosmith.instrument.spectrum.proposal import Proposal
+from sosmith.instrument.spectrum.report import peaks, ripple
+from sosmith.instrument.spectrum.survey import SignalSpectra
+from sosmith.instrument.spectrum.trial import Trial
 
 _NOTHING = 1e-9
 """Figures below this, in any unit, are rounding errors of zero."""

@@ -8,9 +8,9 @@ import numpy as np
 from rich.table import Table
 
 from sosmith.commands.tables.console import TableConsole, new_table
-from sosmith.gen.instrument.vehicle_report import VehicleRun, acceleration, largest
-from sosmith.gen.paper.comparison import Comparison
-from sosmith.model.vehicle.linear_motion import Mode
+from sosmith.instrument.paper.comparison import Comparison
+from sosmith.instrument.vehicle.linear_motion import Mode
+from sosmith.instrument.vehicle.vehicle_report import VehicleRun, acceleration, largest
 
 SWINGING = 0.999
 """Damping ratio from which on a mode is not listed separately: it hardly oscillates."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from rich.markup import escape
 
 from sosmith.commands.tables.console import TableConsole, new_table
-from sosmith.model.wear.assessment import WearLimits, WearReport
-from sosmith.model.wear.record_file import WearRecord, moment_text
+from sosmith.instrument.wear.assessment import WearLimits, WearReport
+from sosmith.instrument.wear.record_file import WearRecord, moment_text
 
 
 def print_wear(record: WearRecord, report: WearReport, channel: int) -> None:

@@ -9,8 +9,8 @@ from tests.gen.output.packages.made import SPECIFICATIONS, called, design_of, sp
 
 from sosmith.gen.output.core_facts import InterfaceFacts
 from sosmith.gen.output.packages.stimuli import Stimuli, bench_stimuli
-from sosmith.gen.stimuli import bench_of
-from sosmith.model.scenarios.worst_case_inputs import sign_matched
+from sosmith.gen.stimuli.core import bench_of
+from sosmith.gen.stimuli.worst_case_inputs import sign_matched
 
 PASS = re.compile(r"^PASS: (\d+) (?:samples|beats|results), 0 mismatches$", re.MULTILINE)
 FAIL = re.compile(r"^FAIL: .*\b[1-9]\d* mismatches", re.MULTILINE)

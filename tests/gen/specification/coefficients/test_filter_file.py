@@ -18,9 +18,9 @@ from sosmith.gen.specification.coefficients.content import Content, StatedSectio
 from sosmith.gen.specification.coefficients.filter_file import read_filter_file
 from sosmith.gen.specification.coefficients.mat_file import matrices
 from sosmith.gen.specification.coefficients.signs import sentence, settled
-from sosmith.gen.verifier.graph import RejectedError
-from sosmith.gen.verifier.specified.sections_file import sections_in
 from sosmith.model.errors import SpecificationError
+from sosmith.verify.graph import RejectedError
+from sosmith.verify.specified.sections_file import sections_in
 
 SOS: npt.NDArray[np.float64] = scipy.signal.ellip(4, 0.5, 40, [0.1, 0.3], "bandpass", output="sos")
 """Complex zeros, complex poles, and both signs of a1."""

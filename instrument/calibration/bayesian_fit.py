@@ -1,0 +1,272 @@
+"""Calibration by the mixed-effects model: for one day, with what is known of the sensor's type.
+
+Unlike the paper's rule, it knows that a sensor is one of a type, that it drifts, that a day has an error of its own,
+and how large these are compared with the scatter of a measurement. It ends in a polynomial of the type curve's orders,
+like the paper's.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+
+from sosmith.gen.calibration.fit import (
+    MIN_SCATTER,
+    NORMAL_CONSISTENCY,
+    Fit,
+    Measurements,
+    Progress,
+    Trial,
+    check_variation,
+    residuals,
+    root_mean_square,
+    untold,
+)
+from sosmith.gen.calibration.least_squares import Sums
+from sosmith.instrument.calibration.acceptance import Range
+from sosmith.instrument.calibration.covered_region import CoveredRegion
+from sosmith.instrument.calibration.mixed_effects.model import (
+    NONE,
+    RATIOS,
+    SCATTERS,
+    Index,
+    Model,
+    Posterior,
+    Rows,
+    Scatters,
+    rows_of,
+)
+from sosmith.instrument.calibration.mixed_effects.systematic_error import SystematicCurves
+from sosmith.instrument.calibration.sensor_type import DEVIATIONS, SYSTEMATIC_FACTOR, TERMS, SensorType
+from sosmith.model.arrays import Values
+from sosmith.model.errors import SpecificationError
+from sosmith.model.polynomial import Polynomial
+
+ORDERS = (2, 1)
+"""Orders of the polynomial: those of the type curve."""
+
+REJECTED = 3.5
+"""Residual, in standard deviations estimated from the median magnitude, above which a measurement is left out."""
+
+MAX_ROUNDS = 10
+"""Limit on rounds of rejection. Two or three are usual."""
+
+PROJECTED = (33, 9)
+"""Voltages and temperatures at which the day's curve is fitted by a polynomial."""
+
+SMALLEST = 1.0
+"""Clearance in mm below which the projection weights errors equally; above it, relative to the clearance."""
+
+SURPRISING, SYSTEMATIC_SURPRISING = 4.0, 2.0
+"""Deviations beyond this many tolerances, and systematic errors beyond this many standard deviations, are told."""
+
+MOST_REJECTED = 0.25
+"""Share of outliers above which it is the sensor that is not of the type."""
+
+
+@dataclass(frozen=True, eq=False)
+class BayesianFit:
+    """A calibration for one day.
+
+    Attributes
+    ----------
+    fit : Fit
+        The polynomial, with weights of 0 for measurements left out as outliers.
+    posterior : Posterior
+        What the measurements say about the day's curve.
+    model : Model
+        The model and its sums, without the outliers.
+    plain : bool
+        Whether the day's own curve is left out of the polynomial: no measurement is of that day, or a polynomial with
+        it would leave the range of the clearance or not rise with the voltage.
+    order : ndarray, shape (n,)
+        The measurement of each row of the model.
+    at_rail : int
+        Measurements that were left out because the voltage was at an end of its range.
+    """
+
+    fit: Fit
+    posterior: Posterior
+    model: Model
+    plain: bool
+    order: Index
+    at_rail: int
+
+    @property
+    def surprise(self) -> str:
+        """A sentence if the measurements are far from what is known of the sensor's type, else empty."""
+        posterior = self.posterior
+        deviations = dict(zip(DEVIATIONS, posterior.deviations, strict=True))
+        name, most = max(deviations.items(), key=lambda one: abs(one[1]))
+        known = posterior.sensor_type
+        if abs(most) > SURPRISING:
+            return f"the sensor's {name} is {abs(most):.1f} tolerances off that of the type {known.name}"
+        if posterior.systematic > SYSTEMATIC_FACTOR**SYSTEMATIC_SURPRISING * known.systematic:
+            return (
+                f"the systematic error of a day is {posterior.systematic:.2g} mm rms, and {known.systematic:g} mm is "
+                f"that of the type {known.name}"
+            )
+        return ""
+
+    @property
+    def kept(self) -> Index:
+        """Rows of the model that are no outliers."""
+        return np.flatnonzero(np.array(self.fit.weights)[self.order])
+
+
+def bayesian_fit(
+    measurements: Measurements,
+    sensor_type: SensorType,
+    date: int,
+    ranges: tuple[Range, Range, Range],
+    progress: Progress = untold,
+) -> BayesianFit:
+    """Calibrate a sensor for the day of ordinal `date`.
+
+    1. Measurements with the voltage at an end of its range are left out: a sensor at its rail says only that the
+       clearance is there or beyond, and hides the day's systematic error.
+    2. Without systematic errors of the days, the model gives a curve, at which those errors are then taken.
+    3. Measurements whose residual from the curve of their day is more than `REJECTED` standard deviations are left
+       out, and the model is fitted again, until these are the same.
+    4. The posterior mean for `date` is the polynomial. If there are measurements of that very day, it is the polynomial
+       nearest to the day's own curve, with squared errors relative to the clearance, unless that polynomial leaves the
+       range of the clearance somewhere or falls with the voltage; for a later day the day's own curve is unknown.
+
+    Parameters
+    ----------
+    measurements : Measurements
+        With their `days`; without, all are taken to be of the day `date`.
+    sensor_type : SensorType
+        The prior.
+    date : int
+        Proleptic Gregorian ordinal; a day before the last measurement counts as that of the last.
+    ranges : tuple of Range
+        Lowest and highest clearance in mm, voltage in V, temperature in degC, of the sensor's ports.
+    progress : callable
+        Receives the number of steps done and expected.
+
+    Raises
+    ------
+    SpecificationError
+        If measurements are too few, or do not vary, as for `fit`; if all are at a rail; if more than `MOST_REJECTED` of
+        them are outliers; if the polynomial falls with the voltage somewhere in the region that the measurements cover.
+    """
+    check_variation(measurements)
+    rows, order = rows_of(measurements, sensor_type, date)
+    V, T, d = (values[order] for values in (measurements.voltage, measurements.temperature, measurements.clearance))
+    low, high = ranges[1]
+    free = np.where((low < V) & (high > V), 1.0, 0.0)
+    at_rail = int(np.count_nonzero(free == 0))
+    if at_rail == len(d):
+        raise SpecificationError(
+            f"{measurements.source}: some voltage_V must be inside the range {low:g} to {high:g} V, "
+            f"not all {len(d):,} at an end of it"
+        )
+    progress(0, 3)
+    model, at, weights = _rejecting(sensor_type, rows, free, free, NONE)
+    curve = sensor_type.polynomial(tuple(at.mean_of(model.course(at).mean[-1]).tolist()))
+    clearance = curve(V, T)
+    curves = SystematicCurves(float(clearance.min()), float(clearance.max()), sensor_type.correlation)
+    rows = Rows(rows.a, curves.columns(clearance), rows.r, rows.day, rows.days)
+    progress(1, 3)
+    model, _, weights = _rejecting(sensor_type, rows, weights, free, RATIOS)
+    progress(2, 3)
+    outliers = int(np.count_nonzero(weights == 0)) - at_rail
+    if outliers > MOST_REJECTED * len(d):
+        raise SpecificationError(
+            f"{measurements.source}: at most a quarter of the measurements must be outliers for a sensor of the type "
+            f"{sensor_type.name}, not {outliers:,} of {len(d):,}"
+        )
+    posterior = model.posterior(model.scatters(), curves, max(date, rows.days[-1]))
+    polynomial, plain = _polynomial(posterior, measurements, ranges)
+    given = np.empty(len(d))
+    given[order] = weights
+    return BayesianFit(_as_fit(measurements, polynomial, given), posterior, model, plain, order, at_rail)
+
+
+def _rejecting(
+    sensor_type: SensorType, rows: Rows, weights: Values, free: Values, ratios: Values
+) -> tuple[Model, Scatters, Values]:
+    """Fit on the coarse grid, leaving out outliers; return the model, its scatters and weights of 0 or 1.
+
+    `free` is 0 for what is left out in any case.
+    """
+    for _ in range(MAX_ROUNDS):
+        model = Model.of(sensor_type, rows, weights)
+        at = model.weighed(SCATTERS, ratios)
+        off = np.abs(model.residuals(at.likeliest))
+        allowed = REJECTED * max(NORMAL_CONSISTENCY * float(np.median(off[free > 0])), MIN_SCATTER)
+        kept = np.where(off > allowed, 0.0, free)
+        if np.array_equal(kept, weights):
+            return model, at, weights
+        weights = kept
+    model = Model.of(sensor_type, rows, weights)
+    return model, model.weighed(SCATTERS, ratios), weights
+
+
+def _polynomial(
+    posterior: Posterior, measurements: Measurements, ranges: tuple[Range, Range, Range]
+) -> tuple[Polynomial, bool]:
+    """Return the polynomial, and whether the day's own curve is left out of it."""
+    region = CoveredRegion.of(measurements.voltage, measurements.temperature)
+    if posterior.same_day:
+        own = _projected(posterior, measurements, ranges)
+        if stays_within(own, ranges) and lowest_slope(own, region) > 0:
+            return own, False
+    plain = posterior.sensor_type.polynomial(posterior.deviations)
+    slope = lowest_slope(plain, region)
+    if not slope > 0:
+        raise SpecificationError(
+            f"{measurements.source}: the clearance must rise with voltage_V over all measurements, "
+            f"not with a slope of {float(slope):.3g} mm/V somewhere"
+        )
+    return plain, True
+
+
+def _projected(posterior: Posterior, measurements: Measurements, ranges: tuple[Range, Range, Range]) -> Polynomial:
+    """Return the polynomial nearest to the day's curve over the voltages of the port and the measured temperatures."""
+    voltages, temperatures = (
+        np.linspace(low, high, count)
+        for (low, high), count in zip((ranges[1], measurements.covered[1]), PROJECTED, strict=True)
+    )
+    V, T = (grid.ravel() for grid in np.meshgrid(voltages, temperatures))
+    curve = posterior.curve(V, T)
+    weights = 1.0 / np.maximum(curve, SMALLEST) ** 2
+    solution = Sums(curve, V, T, weights).solve(TERMS)
+    assert solution is not None, "a grid determines the terms"
+    return solution.polynomial
+
+
+def stays_within(polynomial: Polynomial, ranges: tuple[Range, Range, Range]) -> bool:
+    """Whether a polynomial of `ORDERS` stays in the range of clearance at all voltages and temperatures; exact."""
+    clearance, (v_low, v_high), temperatures = ((Fraction(low), Fraction(high)) for low, high in ranges)
+    for T in temperatures:
+        c, b, a = (sum(value * T**j for j, value in enumerate(row)) for row in polynomial.coefficients)
+        turns = [-b / (2 * a)] if a else []
+        at = [v_low, v_high, *(v for v in turns if v_low < v < v_high)]
+        if not all(clearance[0] <= (a * v + b) * v + c <= clearance[1] for v in at):
+            return False
+    return True
+
+
+def lowest_slope(polynomial: Polynomial, region: CoveredRegion) -> Fraction:
+    """Return the lowest slope in mm/V of a polynomial of `ORDERS` over a region; exact.
+
+    The slope is linear in voltage and temperature, so that it is lowest at a corner.
+    """
+    _, (b, b_t), (a,) = polynomial.coefficients
+    return min(b + b_t * Fraction(T) + 2 * a * Fraction(v) for v, T in region.corners)
+
+
+def _as_fit(measurements: Measurements, polynomial: Polynomial, weights: Values) -> Fit:
+    residual = residuals(measurements, polynomial)
+    count, d = math.fsum(weights), measurements.clearance
+    off = d - math.fsum(weights * d) / count
+    unexplained = math.fsum(weights * residual**2) / max(count - len(TERMS), 1.0)
+    adjusted = 1.0 - unexplained / (math.fsum(weights * off**2) / (count - 1.0))
+    trial = Trial(ORDERS, len(TERMS), adjusted)
+    given = tuple(weights.tolist())
+    return Fit(polynomial, trial, root_mean_square(residual), (), measurements.covered, given)

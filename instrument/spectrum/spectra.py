@@ -1,0 +1,151 @@
+"""Windowed spectra by Welch's method: density, amplitude, and confidence interval."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy import signal, stats
+
+from sosmith.instrument.spectrum.settings import SpectrumSettings
+from sosmith.model.errors import SpecificationError
+
+Array = npt.NDArray[np.float64]
+
+SEGMENTS = 8
+"""Default number of segments, without overlap, that a signal is divided into: 15 averages at 50 % overlap."""
+
+MIN_SEGMENT = 16
+"""Smallest number of samples in a segment."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Spectrum:
+    """Spectrum of a signal in a unit U; all arrays have shape (n,).
+
+    Attributes
+    ----------
+    frequency : ndarray
+        Hz, even steps from 0 to half the sample rate.
+    density : ndarray
+        One-sided power spectral density, U**2/Hz; 0 at zero frequency if a mean or a line was subtracted. The sum
+        over a band times `step` is the mean square in the band.
+    sides : ndarray of int
+        2 where the density includes a negative frequency, 1 at zero and at half the sample rate.
+    amplitude : ndarray
+        Amplitude of a sine wave at that frequency, U; at half the sample rate, that of samples of alternating sign;
+        at zero frequency, the mean.
+    averages : int
+        Number of segments.
+    degrees_of_freedom : float
+        Degrees of freedom of the chi-square distribution of a noise density, 2 for each independent segment.
+    lower, upper : float
+        Confidence limits of a noise density, as multiples of the estimate, at the confidence of the settings.
+    """
+
+    frequency: Array
+    density: Array
+    sides: npt.NDArray[np.int64]
+    amplitude: Array
+    averages: int
+    degrees_of_freedom: float
+    lower: float
+    upper: float
+
+    @property
+    def step(self) -> float:
+        """Spacing of the frequencies, Hz: the inverse of a segment's length."""
+        return float(self.frequency[1])
+
+    @property
+    def rms(self) -> float:
+        """Root mean square over all frequencies except zero, U."""
+        return float(np.sqrt(np.sum(self.density[1:]) * self.step))
+
+
+def segment_length(count: int, sample_rate: float, settings: SpectrumSettings) -> int:
+    """Count the samples of a segment of a signal of `count` samples.
+
+    Raises
+    ------
+    SpecificationError
+        If there are too few, or more than in the signal.
+    """
+    if settings.segment is None:
+        return max(count // SEGMENTS, MIN_SEGMENT)
+    length = round(settings.segment * sample_rate)
+    if not MIN_SEGMENT <= length <= count:
+        raise SpecificationError(
+            f"segment must be {MIN_SEGMENT / sample_rate:.4g} to {count / sample_rate:.4g} s "
+            f"({MIN_SEGMENT} to {count} samples), not {settings.segment:g} s"
+        )
+    return length
+
+
+def spectrum(values: Array, sample_rate: float, settings: SpectrumSettings) -> Spectrum:
+    """Estimate the spectrum of `values`, shape (n,), sampled at `sample_rate` in Hz.
+
+    Welch's method (P. D. Welch, IEEE Trans. Audio Electroacoust. AU-15, 1967): the mean of the windowed periodograms
+    of overlapping segments.
+
+    Raises
+    ------
+    SpecificationError
+        If the segment does not fit the signal.
+    """
+    length = segment_length(len(values), sample_rate, settings)
+    overlap = min(int(settings.overlap * length), length - 1)
+    detrend = False if settings.detrend == "none" else settings.detrend
+    common = {"fs": sample_rate, "window": settings.window, "nperseg": length, "noverlap": overlap, "detrend": detrend}
+    frequency, density = signal.welch(values, scaling="density", **common)
+    _, power = signal.welch(values, scaling="spectrum", **common)
+    sides = np.full(len(frequency), 2)
+    sides[[0, -1] if length % 2 == 0 else [0]] = 1
+    averages = 1 + (len(values) - length) // (length - overlap)
+    window = signal.get_window(settings.window, length)
+    freedom = degrees_of_freedom(window, length - overlap, averages)
+    tail = (1 - settings.confidence) / 2
+    return Spectrum(
+        frequency=frequency,
+        density=density,
+        sides=sides,
+        amplitude=np.sqrt(sides * power),
+        averages=averages,
+        degrees_of_freedom=freedom,
+        lower=float(freedom / stats.chi2.ppf(1 - tail, freedom)),
+        upper=float(freedom / stats.chi2.ppf(tail, freedom)),
+    )
+
+
+def slow_rms(values: Array, length: int) -> float:
+    """Rms, about the total mean, of the lines fitted to segments of `length` samples of `values`, shape (n,).
+
+    This is the slow part of `values` that spectra of such segments cannot resolve and that detrending removes.
+    """
+    count = len(values) // length
+    cut = (values - np.mean(values))[: count * length].reshape(count, length)
+    return float(np.sqrt(np.mean((cut - signal.detrend(cut, axis=1)) ** 2)))
+
+
+def degrees_of_freedom(window: Array, step: int, averages: int) -> float:
+    """Equivalent degrees of freedom of a mean of `averages` periodograms, `step` samples apart.
+
+    ``2 K / (1 + 2 sum_m (1 - m / K) rho_m**2)`` with ``rho_m`` the correlation of the window with itself, shifted by m
+    steps (Welch 1967; D. B. Percival and A. T. Walden, Spectral Analysis for Physical Applications, 1993, eq. 292b).
+
+    Examples
+    --------
+    Segments that do not overlap are independent, with two degrees of freedom each.
+
+    >>> degrees_of_freedom(np.ones(8), 8, 5)
+    10.0
+    """
+    length, energy = len(window), float(np.sum(window**2))
+    variance = 1.0
+    for m in range(1, averages):
+        if m * step >= length:
+            break
+        rho = float(np.sum(window[m * step :] * window[: length - m * step])) / energy
+        variance += 2 * (1 - m / averages) * rho**2
+    return 2 * averages / variance

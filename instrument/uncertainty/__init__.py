@@ -1,0 +1,1 @@
+"""The uncertainty budget of an instrument, from the sensor to its output."""

@@ -1,0 +1,151 @@
+"""The Bayesian calibration: what it finds, what it leaves out, what it refuses."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from sosmith.gen.calibration.fit import Measurements
+from sosmith.instrument.calibration.bayesian_fit import BayesianFit, bayesian_fit, lowest_slope, stays_within
+from sosmith.instrument.calibration.covered_region import CoveredRegion
+from sosmith.instrument.calibration.sensor_type import SENSOR_TYPES
+from sosmith.model.errors import SpecificationError
+from sosmith.model.polynomial import EQUATION_5A, Polynomial
+
+TYPE = SENSOR_TYPES["equation_5a"]
+RANGES = ((0.0, 16.0), (0.0, 10.0), (0.0, 128.0))
+FIRST = 738000
+TRUE = TYPE.polynomial((0.6, -0.8, 0.4, 0.1, 0.5))
+
+
+def measured(
+    days: int, each: int, *, scatter: float = 0.3, systematic: float = 0.0, seed: int = 1, curve: Polynomial = TRUE
+) -> Measurements:
+    """Measurements of a sensor whose day has an error of one period of 8 mm, of random phase."""
+    generator = np.random.default_rng(seed)
+    day = np.repeat(np.arange(days), each)
+    V, T = generator.uniform(0.5, 9.5, days * each), generator.uniform(20.0, 98.0, days * each)
+    clearance = curve(V, T)
+    phase = generator.uniform(0, 2 * np.pi, days)[day]
+    error = np.sqrt(2) * systematic * np.sin(2 * np.pi * clearance / 8.0 + phase)
+    d = np.maximum(clearance + error + generator.normal(0, scatter, len(day)), 0)
+    return Measurements(d, V, T, "m.csv", tuple((FIRST + day).tolist()))
+
+
+def picked(measurements: Measurements, index: np.ndarray) -> Measurements:  # type: ignore[type-arg]
+    """Return some of the measurements, in the order of `index`."""
+    m = measurements
+    days = tuple(np.array(m.days)[index].tolist())
+    return Measurements(m.clearance[index], m.voltage[index], m.temperature[index], m.source, days)
+
+
+def fitted(measurements: Measurements, date: int | None = None) -> BayesianFit:
+    return bayesian_fit(measurements, TYPE, max(measurements.days) if date is None else date, RANGES)
+
+
+def test_many_measurements_give_the_sensor_and_its_scatters() -> None:
+    made = fitted(measured(25, 20, systematic=0.2), FIRST + 25)
+    assert made.plain
+    assert made.posterior.scatter == pytest.approx(0.3, rel=0.1)
+    assert made.posterior.systematic == pytest.approx(0.2, rel=0.3)
+    V, T = np.array([1.0, 5.0, 9.0]), np.array([30.0, 60.0, 90.0])
+    assert made.fit.polynomial(V, T) == pytest.approx(TRUE(V, T), abs=0.12)
+
+
+def test_without_a_systematic_error_none_is_found() -> None:
+    assert fitted(measured(15, 20)).posterior.systematic < 0.06
+
+
+def test_few_measurements_stay_near_the_type() -> None:
+    made = fitted(measured(1, 5))
+    V, T = np.array([1.0, 9.0]), np.array([30.0, 90.0])
+    assert made.fit.polynomial(V, T) == pytest.approx(TRUE(V, T), abs=1.0)
+
+
+def test_the_order_of_the_measurements_does_not_matter() -> None:
+    rows = measured(3, 12, systematic=0.2)
+    shuffled = np.random.default_rng(2).permutation(len(rows))
+    one, other = fitted(rows), fitted(picked(rows, shuffled))
+    assert one.fit.polynomial == other.fit.polynomial
+    assert [one.fit.weights[k] for k in shuffled] == list(other.fit.weights)
+
+
+def test_the_days_own_curve_is_used_on_that_day_only() -> None:
+    rows = measured(8, 60, scatter=0.05, systematic=0.2)
+    today, later = fitted(rows), fitted(rows, FIRST + 8)
+    assert not today.plain
+    assert later.plain
+    last = np.array(rows.days) == FIRST + 7
+    V, T, d = rows.voltage[last], rows.temperature[last], rows.clearance[last]
+    off = [float(np.std(d - made.fit.polynomial(V, T))) for made in (today, later)]
+    assert off[0] < 0.9 * off[1]
+    half = [float(made.posterior.half_width(V, T, made.fit.polynomial(V, T), 0.95).mean()) for made in (today, later)]
+    assert half[0] < half[1]
+
+
+def test_outliers_are_left_out() -> None:
+    rows = measured(4, 25)
+    off = np.arange(0, 100, 20)
+    clearance = rows.clearance.copy()
+    clearance[off] += 3.0
+    spoilt = Measurements(clearance, rows.voltage, rows.temperature, rows.source, rows.days)
+    made = fitted(spoilt, FIRST + 4)
+    assert set(np.flatnonzero(np.array(made.fit.weights) == 0)) >= set(off)
+    V, T = np.array([1.0, 5.0, 9.0]), np.array([30.0, 60.0, 90.0])
+    assert made.fit.polynomial(V, T) == pytest.approx(fitted(rows, FIRST + 4).fit.polynomial(V, T), abs=0.03)
+
+
+def test_a_curve_that_falls_is_refused() -> None:
+    rows = measured(2, 30, scatter=0.01, curve=TYPE.polynomial((3.0, -12.0, 0.0, 0.0, 7.0)))
+    text = r"must rise with voltage_V over all measurements, not with a slope of -0\.\d+ mm/V somewhere$"
+    with pytest.raises(SpecificationError, match=rf"^m\.csv: the clearance {text}"):
+        fitted(rows)
+
+
+def test_a_sensor_of_another_type_is_told_by_its_interval() -> None:
+    V, T = (grid.ravel() for grid in np.meshgrid(np.linspace(0, 9, 10), [20.0, 60.0, 98.0]))
+    clearance = 3.0 + 0.15 * (V - 4.0) ** 2 + 0.001 * T
+    made = fitted(Measurements(clearance, V, T, "m.csv", (FIRST,) * 30))
+    off = np.abs(made.fit.polynomial(V, T) - clearance)
+    assert off.max() > 1.0
+    assert made.posterior.half_width(V, T, made.fit.polynomial(V, T), 0.95).mean() > 1.0
+
+
+def test_too_many_outliers_are_refused() -> None:
+    rows = measured(2, 30, scatter=0.05)
+    clearance = rows.clearance + np.where(np.arange(60) % 10 < 3, 3.0, 0.0) * (-1) ** np.arange(60)
+    text = "at most a quarter of the measurements must be outliers for a sensor of the type equation_5a"
+    with pytest.raises(SpecificationError, match=rf"^m\.csv: {text}, not 18 of 60$"):
+        fitted(Measurements(clearance, rows.voltage, rows.temperature, "m.csv", rows.days))
+
+
+def test_a_days_curve_that_leaves_the_range_falls_back_to_the_posterior() -> None:
+    rows = measured(8, 60, scatter=0.05, systematic=0.2)
+    assert not fitted(rows).plain
+    narrow = ((0.0, 11.0), *RANGES[1:])
+    made = bayesian_fit(rows, TYPE, FIRST + 7, narrow)
+    assert made.plain
+    assert made.fit.polynomial == TYPE.polynomial(made.posterior.deviations)
+
+
+@pytest.mark.parametrize(
+    ("polynomial", "inside"),
+    [(EQUATION_5A, True), ([[15.0], [0.3], [-0.02]], False), ([[0.1], [-0.1], [0.02]], False), ([[5], [0], [0]], True)],
+)
+def test_the_range_is_exact_at_ends_and_turns(polynomial: Polynomial | list[list[float]], inside: bool) -> None:
+    made = polynomial if isinstance(polynomial, Polynomial) else Polynomial.from_numbers(polynomial)
+    assert stays_within(made, RANGES) == inside
+    V, T = np.meshgrid(np.linspace(0, 10, 201), [0.0, 128.0])
+    values = made(V, T)
+    assert bool(np.all((values >= 0) & (values <= 16))) == inside
+
+
+def test_the_lowest_slope_is_at_a_corner() -> None:
+    region = CoveredRegion(((0.0, 20.0), (8.0, 20.0), (8.0, 90.0), (0.0, 90.0)))
+    polynomial = Polynomial.from_numbers([["1", "0"], ["0.5", "-0.004"], ["0.03"]])
+    assert lowest_slope(polynomial, region) == Fraction("0.5") - 90 * Fraction("0.004")
+
+
+def test_days_must_be_as_many_as_measurements() -> None:
+    with pytest.raises(ValueError, match=r"^days must be of length 3, not 2$"):
+        Measurements(np.ones(3), np.ones(3), np.ones(3), "m.csv", (1, 2))

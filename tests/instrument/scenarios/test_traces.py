@@ -1,0 +1,10 @@
+"""Input signals of a core: made without any simulator."""
+
+import subprocess
+import sys
+
+
+def test_no_simulator_is_imported() -> None:
+    code = "import sys, sosmith.instrument.scenarios.traces; print([m for m in sys.modules if m.startswith(('sosmith.sim', 'cocotb'))])"
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout.strip() == "[]"

@@ -1,0 +1,142 @@
+"""The decimator of an instrument and its wires to the calibration: proven, and rejected when anything is wrong."""
+
+from functools import partial
+
+import pytest
+from tests.formal.prover import broken
+from tests.verify.around.decimators import (
+    Instrument,
+    accepted,
+    check_rejected,
+    check_rejected_as_made,
+    designed,
+    written,
+)
+
+from sosmith.hdl.decimation import decimator as hardware
+from sosmith.verify.around.cic import check_decimator
+
+CASES = [
+    Instrument(),
+    Instrument("serial", signed=True),
+    Instrument("parallel", signed=True, factor=2, hold=True),
+    Instrument(output_bits=24),  # with a result of two digits, each a port of the calibration
+    Instrument(signed=True, output_bits=24),
+]
+
+ENTERS = (
+    "ahead.m_axis_tvalid = 1, decimator.filling = 0, decimator.waiting = 0, "
+    "result of the calibration = 0..16777215, aresetn = 1, decimator.phase = 0"
+)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_a_decimator_behind_a_calibration_is_proven(case: Instrument) -> None:
+    _, certificate = designed(case)
+    assert certificate.decimation is not None
+    verdict = check_decimator(written(case), certificate)
+    assert verdict.copies == (case.factor if case.hold else 1)
+    assert verdict.registers == 8 + 8 * certificate.decimation.stages + 3 + 3 * case.hold
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", CASES)
+def test_every_edit_is_rejected(case: Instrument) -> None:
+    assert accepted(case) == set()
+
+
+def test_sentences() -> None:
+    """The first register or port that is wrong is named."""
+    text = written(CASES[0])
+
+    def rejected(right: str, wrong: str, sentence: str) -> None:
+        assert text.count(right) == 1
+        check_rejected(CASES[0], text.replace(right, wrong), sentence)
+
+    rejected(
+        "else if (n14) first <= 1'h0;",
+        "else if (n13) first <= 1'h0;",
+        "first must be what a decimator has there after a clock with aresetn = 1, first = 1, s_axis_tvalid = 1, "
+        "fills = 0, filled = 0, ahead.s_axis_tready = 0, not another value",
+    )
+    rejected("reg first = 1'h1;", "reg first = 1'h0;", "first must be 1 before the first clock, not 0")
+    rejected(
+        "    .m_axis_tuser(i_flags),\n    .m_axis_tvalid(i_valid)",
+        "    .m_axis_tuser({ i_flags[0], i_flags[1] }),\n    .m_axis_tvalid(i_valid)",
+        "decimator.found must be what a decimator has there after a clock with aresetn = 1, ahead.m_axis_tvalid = 1, "
+        "decimator.filling = 0, decimator.waiting = 0, decimator.phase = 1..2, decimator.found = 0, "
+        "flag 0 of the calibration = 0, flag 1 of the calibration = 1, not another value",
+    )
+    rejected(
+        ".s_axis_tdata(s_axis_tdata),\n",
+        ".s_axis_tdata(s_axis_tdata[30:0]),\n",
+        "ahead.s_axis_tdata must be what a decimator has there, not another value",
+    )
+    rejected(
+        ".m_axis_tready(i_ready),",
+        ".m_axis_tready(1'h1),",
+        "ahead.m_axis_tready must be what a decimator has there with decimator.filling = 0, decimator.phase = 0, "
+        "decimator.waiting = 1, not another value",
+    )
+    rejected(
+        ".judged(m_axis_tuser[1:0])",
+        ".judged({ m_axis_tuser[0], m_axis_tuser[1] })",
+        "bit 0 of m_axis_tuser must be its flag as the core gives it, not another value",
+    )
+    rejected(
+        "m_axis_tuser[7:3] = 5'h00",
+        "m_axis_tuser[7:3] = { 4'h0, aresetn }",
+        "bit 3 of m_axis_tuser must be its flag as the core gives it, not another value",
+    )
+
+
+def test_digits_that_are_wrong_are_rejected() -> None:
+    """A result of two words leaves the calibration in two ports, the lower digit whole and below the other."""
+    text, (_, certificate) = written(CASES[3]), designed(CASES[3])
+    low, high = ".given0(i_data[14:0])", ".port_486_0(i_data[23:15])"
+    assert (text.count(low), text.count(high)) == (1, 2)  # the second one of the decimator
+    check_decimator(text, certificate)
+
+    rejected = partial(check_rejected, CASES[3])
+    digits = "ahead.port_486_0 must be a digit of the result, as there are 2 outputs for it"
+    driven = "  assign port_486_0 = given1[8:0];\n"
+    other = "not another value"
+    rejected(
+        text.replace(low, ".given0(i_data[23:9])").replace(high, ".port_486_0(i_data[8:0])", 1),
+        f"decimator.sum1 must be what a decimator has there after a clock with {ENTERS}, {other}",
+    )
+    rejected(
+        text.replace("{ port_486_0, port_484_0 }", "{ port_484_0, port_486_0 }"),
+        f"decimator.sum1 must be what a decimator has there after a clock with {ENTERS}, {other}",
+    )
+    rejected(text.replace(driven, "  assign port_486_0 = given1[9:1];\n"), digits)
+    rejected(text.replace(driven, "  assign port_486_0 = added[8:0];\n"), digits)
+    rejected(text.replace(driven, "  assign port_486_0 = total_high[8:0];\n"), digits)
+    rejected(text.replace(driven, ""), digits)
+    rejected(
+        text.replace(driven, "  assign port_486_0 = given0[8:0];\n"),
+        "the digits of the calibration must be 0..1, each once",
+    )
+    narrow = "the digits of the calibration must have 24 bits in all, and all of each but for the last"
+    rejected(text.replace("given0", "given2").replace("given1", "given0").replace("given2", "given1"), narrow)
+
+
+BROKEN = [
+    ("a first sample twice", "(first | flows))", "(first | flows | filled))"),
+    ("a first sample that is not accepted", "self.s_axis_tready.eq(filled |", "self.s_axis_tready.eq("),
+    ("a calibration that is not asked", "(flows & ahead.s_axis_tready)", "flows"),
+    ("filled before it is", "fills & ahead.m_axis_tvalid & decimator.i_ready", "fills & ahead.m_axis_tvalid"),
+    ("a result that gets lost", "ahead.m_axis_tready.eq(decimator.i_ready)", "ahead.m_axis_tready.eq(1)"),
+    ("flags of one sample", "found.eq(found | self.i_flags)", "found.eq(self.i_flags)"),
+    ("flags of the last sample", "self.o_flags.eq(found | self.i_flags), found.eq(0)", "self.o_flags.eq(found)"),
+    ("flags the wrong way round", "i_flags.eq(ahead.m_axis_tuser)", "i_flags.eq(ahead.m_axis_tuser[::-1])"),
+    ("a reset that is not passed on", "ahead.aresetn.eq(self.aresetn)", "ahead.aresetn.eq(1)"),
+    ("samples that are late", "ahead.s_axis_tdata.eq(self.s_axis_tdata)", "ahead.s_axis_tdata.eq(0)"),
+]
+
+
+@pytest.mark.parametrize(("right", "wrong"), [pytest.param(*case, id=subject) for subject, *case in BROKEN])
+def test_hardware_that_is_wrong_is_rejected(right: str, wrong: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    written(CASES[0])  # what is right, before anything is broken
+    monkeypatch.setattr(hardware, "DecimatedCore", broken(hardware, right, wrong).DecimatedCore)
+    check_rejected_as_made(CASES[0])

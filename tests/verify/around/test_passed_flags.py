@@ -1,0 +1,52 @@
+"""What leaves a core behind a decimator: each output of the core once, and flags in their places."""
+
+import re
+
+import pytest
+from tests.verify.around.decimators import Case, designed, written
+
+from sosmith.verify.around.cic import check_decimator
+from sosmith.verify.graph import RejectedError
+
+WORD = "o_data_30"
+ENTERING = "i_data_24"
+ALL = f"{{ 5'h00, {WORD}[10:8] }}"
+
+
+@pytest.mark.parametrize(
+    ("wrong", "sentence"),
+    [
+        (f"{{ 5'h00, {ENTERING}[10:8] }}", "what leaves must be 0 or a bit of holder.o_data, not one of behind.o_data"),
+        (f"{{ 4'h0, aresetn, {WORD}[10:8] }}", "what leaves must be 0 or a bit of holder.o_data, not one of aresetn"),
+        (f"{{ 5'h01, {WORD}[10:8] }}", "what leaves must be 0 or a bit of holder.o_data, not one of 1"),
+        (f"{{ 5'h00, {WORD}[9:7] }}", "m_axis_tuser must have no bit that leaves elsewhere"),
+        (f"{{ 6'h00, {WORD}[9:8] }}", "m_axis_tuser must have 3 or more flags, each once, and zeros above"),
+        (f"{{ 4'h0, {WORD}[10:8], 1'h0 }}", "m_axis_tuser must have 3 or more flags, each once, and zeros above"),
+        (f"{{ 4'h0, {WORD}[8], {WORD}[10:8] }}", "m_axis_tuser must have 3 or more flags, each once, and zeros above"),
+        (f"{{ 5'h00, {WORD}[10], {WORD}[8], {WORD}[9] }}", "m_axis_tuser must have the flags in their order"),
+    ],
+)
+def test_flags_that_are_wrong_are_rejected(wrong: str, sentence: str) -> None:
+    text, (_, certificate) = written(Case()), designed(Case())
+    assert text.count(ALL) == 1
+    with pytest.raises(RejectedError, match=f"^{re.escape(sentence)}$"):
+        check_decimator(text.replace(ALL, wrong), certificate)
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "sentence"),
+    [
+        (r"\.judged\(m_axis_tuser\[1:0\]\)", ".judged({ m_axis_tuser[0], m_axis_tuser[1] })", "bit 0"),
+        (r"m_axis_tuser\[7:3\] = 5'h00", "m_axis_tuser[7:3] = { 4'h0, aresetn }", "bit 3"),
+        (r"user\[1:0\]\)(.*)\(m_axis_tuser\[2\]\)", r"user[2:1])\1(m_axis_tuser[0])", "bit 1"),
+    ],
+)
+def test_flags_have_their_places(right: str, wrong: str, sentence: str) -> None:
+    case = Case(hold=False, architecture="folded")
+    text, (_, certificate) = written(case), designed(case)
+    changed, count = re.subn(right, wrong, text, flags=re.DOTALL)
+    assert count == 1
+    with pytest.raises(
+        RejectedError, match=f"^{sentence} of m_axis_tuser must be its flag as the core gives it, not another value$"
+    ):
+        check_decimator(changed, certificate)

@@ -1,0 +1,394 @@
+"""The hardware of parallel cores: proven against the certificate's graph, rejected when it computes anything else."""
+
+import re
+from collections import Counter
+
+import pytest
+from tests.gen.designs import ALL, parallel_design
+from tests.verify.parallel.cores import ODD, Made, made, small, specified
+from tests.verify.parallel.edits import random_edits, swept
+from tests.verify.parallel.simulated import outputs
+from tests.verify.small_specifications import INSTRUMENT, PLAIN, STEADY_INSTRUMENT, UNSIGNED
+
+from sosmith.gen.core import design_core
+from sosmith.gen.realizations.registry import REALIZATIONS
+from sosmith.hdl.plan.parallel_clocks import latency_cycles
+from sosmith.verify.certificate_file import AboutEntry
+from sosmith.verify.graph import RejectedError
+from sosmith.verify.parallel.check import check_hardware
+
+# What the generator writes is accepted.
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_examples(name: str) -> None:
+    accept(made(parallel_design(name, realization="df1_ef2")))
+
+
+@pytest.mark.parametrize("realization", REALIZATIONS)
+def test_every_realization(realization: str) -> None:
+    accept(small(ODD if realization == "lattice_wdf" else PLAIN, realization))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("realization", REALIZATIONS)
+def test_every_realization_behind_a_calibration(realization: str) -> None:
+    accept(small(INSTRUMENT, realization))
+
+
+@pytest.mark.parametrize(("realization", "channels"), [("df1_ef1", 2), ("df1_ef1", 17), ("lattice_wdf", 5)])
+def test_several_channels(realization: str, channels: int) -> None:
+    accept(small(ODD if realization == "lattice_wdf" else PLAIN, realization, channels))
+
+
+def test_an_output_that_saturates_far_from_its_ends() -> None:
+    accept(small(UNSIGNED, "df1_ef1", 5))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("channels", [2, 3, 16, 17, 64])
+@pytest.mark.parametrize("realization", REALIZATIONS)
+def test_every_realization_for_several_channels(realization: str, channels: int) -> None:
+    accept(small(ODD if realization == "lattice_wdf" else PLAIN, realization, channels))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ALL)
+def test_examples_for_several_channels(name: str) -> None:
+    accept(made(parallel_design(name, realization="df1_ef2"), 12))
+
+
+def test_a_word_of_the_calibration_that_is_negative() -> None:
+    """Its signs are extended differently in the hardware, where the next stage takes it over."""
+    negative = STEADY_INSTRUMENT.replace("bits = 12, range = [0.0, 10.0]", "bits = 24, range = [0.0, 10.0]")
+    accept(small(negative.replace("[0.05812]", "[-0.05812]")))
+
+
+def accept(core: Made) -> None:
+    found = core.check()
+    assert found.latency == latency_cycles(core.design.datapath, core.channels)
+    assert found.states == sum(len(stage.graph.delays) for stage in core.design.datapath.stages) > 0
+
+
+def test_registers_are_counted_but_for_those_of_the_control() -> None:
+    core = small()
+    names = re.findall(r"^ *reg (?:\[\d+:0\] )?([^\s;]+)", core.text, re.MULTILINE)
+    control = [name for name in names if re.fullmatch(r"full|o_valid|valid\d|bank\d", name)]
+    assert core.check().registers == len(names) - len(control) > len(control) > 4
+
+
+# What is not the graph of the certificate is rejected.
+
+
+def test_another_certificate_is_rejected() -> None:
+    with pytest.raises(RejectedError, match=r"^section0\.\w+ must .*node \d+ \(.+\) of section0.*$"):
+        check_hardware(small().text, small(PLAIN, "df2t").certificate)
+
+
+def test_reloadable_cores_are_refused() -> None:
+    text = made(small().design, reload=True).text
+    with pytest.raises(RejectedError, match=r"^the constants must be fixed to be checked, not loadable at run time$"):
+        small().check(text)
+
+
+def rejection(core: Made, text: str) -> str:
+    """Return the sentence of a rejection; nothing if a text is accepted."""
+    try:
+        core.check(text)
+    except RejectedError as error:
+        return str(error)
+    return ""
+
+
+NODE = r"node \d+ \(.+\) of "
+BREAKS = {
+    "a coefficient": (
+        r"(product_A2 = .*\* \$signed\(\d+'h\w*)(\w)\)",
+        r"\g<1>0)",
+        rf"section\d\.product_A2 must be {NODE}.*",
+    ),
+    "no sign": (
+        r"(assign product_A2 = )\$signed\((.*)\) \* \$signed",
+        r"\1\2 * $signed",
+        rf"section\d\.product_A2 must be {NODE}.*",
+    ),
+    "a tap": (r"else if \(take2\) v2 <= v1;", "else if (take2) v2 <= v2;", rf"section\d\.v2 must hold {NODE}.*"),
+    "an enable": (
+        r"else if \(take2\) v1 <=",
+        "else if (advance) v1 <=",
+        r"section\d\.v1 must be loaded by one valid bit, not by none",
+    ),
+    "a stall": (
+        r"assign take1 = advance & valid1;",
+        "assign take1 = valid1;",
+        r"(section\d\.\w+ must be node .*, but )?section\d\.\w+ must keep what it holds while its sample stays",
+    ),
+    "a reset": (
+        r"if \(rst\) valid2 <= 1'h0;",
+        "if (rst) valid2 <= 1'h1;",
+        r"section\d\.valid2 must be 0 after a clock with aresetn = 0",
+    ),
+    "a first value": (
+        r"reg (\[\d+:0\]) v1 = (\d+)'h0+;",
+        r"reg \1 v1 = \2'h1;",
+        rf"section\d\.v1 must hold {NODE}section\d, which is 0 at first, not 1",
+    ),
+    "a limit": (
+        r"code_register <= 8'h80",
+        "code_register <= 8'h81",
+        rf"output_stage\.code_register must be {NODE}output_stage, not another value",
+    ),
+    "a queue": (
+        r"(choice\d+ +)= full \? 1'h1 : i_valid",
+        r"\1= full ? 1'h0 : i_valid",
+        r"output_buffer\.o_valid must be 1 after a clock with .*",
+    ),
+    "a second sample": (
+        r"= full \? \{ o_next.*? \} : (.*);",
+        r"= full ? \1 : \1;",
+        r"output_stage\.code_register must be loaded whenever a sample leaves position 4",
+    ),
+    "a field": (
+        r"\.i0\(s_axis_tdata\)",
+        ".i0({ s_axis_tdata[6:0], s_axis_tdata[7] })",
+        rf"section0\.\w+ must .*{NODE}section0.*",
+    ),
+    "an output": (
+        r"m_axis_tdata = o_data\[7:0\]",
+        "m_axis_tdata = o_data[8:1]",
+        rf"m_axis_tdata must be {NODE}output_stage, not another value",
+    ),
+    "a flag": (
+        r"m_axis_tuser = \{ 2'h0, o_data\[13:8\] \}",
+        "m_axis_tuser = { 2'h0, o_data[13:11], 1'h0, o_data[9:8] }",
+        rf"bit 2 of m_axis_tuser must be output_saturated, as the ports and {NODE}output_stage say, "
+        "not another value",
+    ),
+    "a clock": (
+        r"always_ff @\(posedge clk\)\n(    if \(take1\))",
+        r"always_ff @(posedge rst)\n\1",
+        r"registers must be clocked by aclk, not section\d\.rst",
+    ),
+    "a driver": (
+        r"assign take2 = advance & valid2;",
+        "assign take2 = advance & valid2;\n  assign take2 = advance;",
+        r"every bit of section\d\.take2 must be driven once, not twice",
+    ),
+    "a source": (
+        r"\.i_valid\(s_axis_tvalid\)",
+        ".i_valid(1'h1)",
+        r"what section0\.valid1 takes over must be one register, not logic of 0 signals",
+    ),
+    "a loop": (
+        r"assign take2 = advance & valid2;",
+        "assign take2 = take2 & valid2;",
+        r".*section\d\.take2 must not depend on itself within a clock",
+    ),
+}
+
+
+CHANNEL_BREAKS = {
+    "an address in time": (
+        r"(assign write__addr_\d+ +=.* : )channel3;",
+        r"\1clear_channel;",
+        rf"section0\.\w+_memory must hold {NODE}section0 and be written for the channel of the sample",
+    ),
+    "a ready of its own": (
+        r"(assign s_axis_tready = ).*& (.*);",
+        r"\1\2;",
+        "s_axis_tready must be 0 just while nothing fits",
+    ),
+    "an address for a reason of its own": (
+        r"(assign write__addr_\d+ +=) clear \?",
+        r"\1 valid1 ?",
+        rf"section0\.\w+_memory must hold {NODE}section0, and section0\.valid1 must not count for what is written",
+    ),
+    "an address": (
+        r"(_\d_ <= x1_memory\[port_\w+)\[1:0\]",
+        r"\1[2:1]",
+        rf"section0\.x1_memory must hold {NODE}section0 and be read for the channel of the sample, not for another one",
+    ),
+    "a word": (
+        r"(assign write__data_\d+ += clear \? \d+'h0+)0 :",
+        r"\g<1>1 :",
+        rf"section0\.\w+_memory must hold {NODE}section0 and be cleared to 0",
+    ),
+    "too few words": (
+        r"(clear_channel == 2'h)2;",
+        r"\g<1>1;",
+        "clear must be 1 after a clock with aresetn = 1, clear = 1, clear_channel = 1",
+    ),
+    "a channel": (
+        r"s_axis_tdest < 2'h3",
+        "s_axis_tdest < 2'h2",
+        r"input_buffer\.i_valid must be s_axis_tvalid for the 3 channels that exist, and 0 for others",
+    ),
+    "a distance": (
+        r"near0 & ",
+        "near1 & ",
+        rf"section0\.\w+_memory must hold {NODE}section0 and be read at most 0 positions before it is written, not \d",
+    ),
+    "a sample that stays": (
+        r"(assign o_ready = advance)( & .*);",
+        r"\1;",
+        r"input_buffer\.o_ready must be 1 just when i_valid\S+ is",
+    ),
+    "a label": (
+        r"(m_axis_tdest = .*)\[15:14\]",
+        r"\1[14:13]",
+        "m_axis_tdest must be the channel of the sample, not another value",
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", CHANNEL_BREAKS)
+def test_each_kind_of_break_of_several_channels_is_named(kind: str) -> None:
+    core = small(channels=3)
+    old, new, sentence = CHANNEL_BREAKS[kind]
+    text, count = re.subn(old, new, core.text)
+    assert count >= 1
+    assert re.fullmatch(sentence, rejection(core, text)), rejection(core, text)
+
+
+@pytest.mark.parametrize("kind", BREAKS)
+def test_each_kind_of_break_is_named(kind: str) -> None:
+    core = small()
+    old, new, sentence = BREAKS[kind]
+    text, count = re.subn(old, new, core.text, count=1)
+    assert count == 1
+    assert re.fullmatch(sentence, rejection(core, text)), rejection(core, text)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        (r"= \{ 2'h0, ", "= { 2'h1, ", "bit 6 of m_axis_tuser must be 0, as there is no such flag, not another value"),
+        (r"= \{ 2'h0, ", "= { 2'h2, ", "bit 7 of m_axis_tuser must be 0, as there is no such flag, not another value"),
+        (
+            r"o_data\[13:8\] \};",
+            "o_data[13:10], o_data[8], o_data[8] };",
+            "bit 1 of m_axis_tuser must be 0, as there is no such flag, not another value",
+        ),
+        (
+            "  wire rst;",
+            r"  wire rst;\n  wire \\section0.rst ;",
+            "section0.rst must be the name of one net, not of two",
+        ),
+        (
+            r"(\n  reg \[11:0\] (slice\d+) = .*;)",
+            r"\1\n  wire \\\2[10] ;",
+            r"output_buffer\.slice\d+\[10\] must be the name of one net, not of two",
+        ),
+        (
+            r"(\n  reg full = 1'h0;)",
+            r"\1\n  initial begin\n    full[0] = 1'h1;\n  end",
+            "output_buffer.full must be a memory to be given words",
+        ),
+    ],
+)
+def test_what_no_node_says_is_checked(old: str, new: str, sentence: str) -> None:
+    core = small()
+    text, count = re.subn(old, new, core.text, count=1)
+    assert count == 1
+    assert re.fullmatch(sentence, rejection(core, text))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        (
+            "~ aresetn;",
+            f"{'{ ' * 30_000}aresetn;",
+            "expressions and statements of plain must not be nested as deep as that",
+        ),
+        ("full = 1'h0;", "full = 99999999999999'h1;", "output_buffer.full must be 0 before the first clock, not 1"),
+        ("  reg full ", "  reg [2:0] words [999999999:0];\n  reg full ", "all 1000000000 words of .* must be given"),
+    ],
+)
+def test_a_text_that_asks_for_much_is_refused(old: str, new: str, sentence: str) -> None:
+    core = small()
+    assert re.fullmatch(sentence, rejection(core, core.text.replace(old, new, 1)))
+
+
+def test_without_wear_its_flags_are_0() -> None:
+    core = small()
+    text = core.text.replace("o_data[13:8] };", "o_data[13:12], 1'h1, o_data[10:8] };")
+    assert text != core.text
+    assert rejection(core, text) == ""  # the specification is not there, which would say whether there is wear
+    for specification, place in ((PLAIN, 3), (PLAIN + "[wear]", None)):
+        about = AboutEntry(
+            specification=specification, sha256="0" * 64, options={}, files=(), versions={}, certificate="0" * 64
+        )
+        stated = core._replace(certificate=core.certificate.model_copy(update={"about": about}))
+        none = "must be 0, as there is no such flag, not another value"
+        assert rejection(stated, text) == (f"bit {place} of m_axis_tuser {none}" if place else "")
+
+
+def test_bits_beside_a_field_may_be_anything() -> None:
+    """Even a single one: the eighth bit of seven counts as 0 nowhere."""
+    core = small(PLAIN.replace("bits = 8", "bits = 7", 1))
+    assert rejection(core, core.text) == ""
+    word = "wire [6:0] word;\n  assign word = s_axis_tdata[6:0] + s_axis_tdata[7];"
+    text = core.text.replace(".i0(s_axis_tdata[6:0])", ".i0(word)")
+    text = text.replace("wire [7:0] s_axis_tdata;", f"wire [7:0] s_axis_tdata;\n  {word}", 1)
+    assert re.fullmatch(rf"section0\.\w+ must be {NODE}section0, not another value", rejection(core, text))
+
+
+def test_names_of_registers_do_not_make_a_proof() -> None:
+    core = small()
+    swapped = re.sub(r"\bv([12])\b", lambda found: f"v{3 - int(found[1])}", core.text)
+    assert swapped != core.text
+    sentence = (
+        rf"section0\.y2_passed2 must be {NODE}section0, but section0\.y2_passed2 must take over the same whatever "
+        "other positions hold"
+    )
+    assert re.fullmatch(sentence, rejection(core, swapped))
+
+
+# Random edits.
+
+
+def proven(seen: list[dict[str, int]], lanes: int) -> list[dict[str, int]]:
+    """Return outputs without the flags that no certificate speaks of."""
+    flags = int.from_bytes([5] * lanes)
+    return [{name: value & flags if name == "m_axis_tuser" else value for name, value in row.items()} for row in seen]
+
+
+def sweep(core: Made, count: int, seed: int, clocks: int) -> Counter[str]:
+    """Edit at random; what is accepted must be the same in simulation, and what is rejected must have a sentence."""
+
+    def seen(text: str) -> object:
+        return proven(outputs(text, clocks, seed, core.channels), core.lanes)
+
+    return swept(random_edits(core.text, count, seed), lambda text: rejection(core, text), seen, core.text, NODE)
+
+
+def test_a_calibration_of_several_channels() -> None:
+    """Nothing holds its samples back, as it has no states."""
+    core = made(design_core(specified(INSTRUMENT), core="calibration"), 3)
+    found = core.check()
+    assert (found.states, found.latency) == (0, latency_cycles(core.design.datapath, 3))
+    assert sweep(core, 15, seed=8, clocks=200)["rejected"] > 7
+
+
+def test_sixty_edits() -> None:
+    found = sweep(small(), 60, seed=1, clocks=200)
+    assert found["accepted"] + found["rejected"] == 60
+    assert found["rejected"] > 40
+    assert found["rejected, a node named"] > 15
+
+
+@pytest.mark.slow
+def test_a_hundred_edits_of_several_channels() -> None:
+    found = sweep(small(channels=3), 100, seed=3, clocks=400)
+    assert found["accepted"] + found["rejected"] == 100
+    assert found["rejected"] > 50
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("realization", "channels"), [("df1_ef1", 1), ("df2t", 1), ("normal", 1), ("lattice_wdf", 3)])
+def test_a_thousand_edits(realization: str, channels: int) -> None:
+    found = sweep(small(INSTRUMENT, realization, channels), 250, seed=2, clocks=600)
+    assert found["accepted"] + found["rejected"] == 250
+    assert found["rejected"] > 150
+    assert found["rejected, a node named"] > 50

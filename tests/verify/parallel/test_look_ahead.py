@@ -1,0 +1,127 @@
+"""Loops that take turns: proven against the certificate's graph, and each wrong one is rejected."""
+
+import re
+
+import pytest
+from tests.gen.blocks.specifications import designed
+from tests.verify.parallel.cores import Made, looking_ahead, made
+from tests.verify.parallel.test_check import NODE, rejection, sweep
+from tests.verify.small_specifications import INSTRUMENT, NARROW, PLAIN, STEADY, STEADY_INSTRUMENT
+
+from sosmith.hdl.plan.parallel_clocks import block_latency_cycles
+
+FIRST_ORDER = PLAIN.replace("order = 2", "order = 1")
+
+
+def accept(core: Made) -> None:
+    found = core.check()
+    assert found.latency == block_latency_cycles(core.design.datapath, core.lanes, look_ahead=True)
+    assert found.states > found.memories == len(re.findall(r"^  reg .*_memory \[", core.text, re.MULTILINE)) > 0
+
+
+@pytest.mark.parametrize("lanes", [1, *(pytest.param(lanes, marks=pytest.mark.slow) for lanes in (2, 4))])
+def test_an_example(lanes: int) -> None:
+    accept(made(designed(lanes), lanes=lanes, look_ahead=True))
+
+
+@pytest.mark.parametrize(
+    ("spec", "lanes"),
+    [(PLAIN, 1), (NARROW, 1), (STEADY, 2), (STEADY_INSTRUMENT, 1), pytest.param(INSTRUMENT, 4, marks=pytest.mark.slow)],
+)
+def test_starts_and_a_calibration(spec: str, lanes: int) -> None:
+    accept(looking_ahead(spec, lanes))
+
+
+BREAKS = {
+    "a turn too long": (
+        r"(choice\d+ = n\d+ \? 2'h)0 :",
+        r"\g<1>1 :",
+        r"section0\.turn must be 0 after a clock with aresetn = 1, section0\.turn = 3, .*",
+    ),
+    "a turn too short": (
+        r"(assign n\d+ = turn == 2'h)3",
+        r"\g<1>2",
+        r"section0\.turn must be 3 after a clock with aresetn = 1, section0\.turn = 2, .*",
+    ),
+    "never warm": (
+        r"(else if \(enable\d+\) warm <= 1'h)1",
+        r"\g<1>0",
+        r"section0\.warm must be 1 after a clock with aresetn = 1, section0\.turn = 3, .*",
+    ),
+    "warm across a reset": (
+        r"if \(rst\) warm <= 1'h0;\n *else if",
+        "if",
+        r"section0\.warm must not depend on data whether something is loaded",
+    ),
+    "a turn across a reset": (
+        r"if \(rst\) turn <= 2'h0;\n *else if",
+        "if",
+        r"section0\.turn must not depend on data whether something is loaded",
+    ),
+    "a turn that counts clocks": (
+        r"else if \(n5\) turn",
+        "else if (advance) turn",
+        r"section0\.turn must be loaded by one valid bit, not by none",
+    ),
+    "a cold sample that finds a past": (
+        r"assign y_4 = warm6 \?",
+        "assign y_4 = 1'h1 ?",
+        rf"section0\.y_4 must be {NODE}section0, not another value",
+    ),
+    "warm of a sample behind": (
+        r"assign y_4 = warm6 \?",
+        "assign y_4 = warm5 ?",
+        rf"section0\.y_register must be {NODE}section0, but section0\.y_register must take over a word of one sample, "
+        "not of 2",
+    ),
+    "a word of another turn": (
+        r"(_0_ <= y_4_memory\[)signature__addr_\]",
+        r"\1turn4]",
+        rf"section0\.y_register must be {NODE}section0, but section0\.y_register must take over a word of one sample, "
+        "not of 2",
+    ),
+    "written a turn early": (
+        r"y_4_memory\[turn6\] <=",
+        "y_4_memory[signature__addr_] <=",
+        rf"section0\.y_4_memory must hold {NODE}section0 and be written for the turn of the sample",
+    ),
+    "another word written": (
+        r"(y_4_memory\[turn6\] <= subtract_\d+)\[23:11\]",
+        r"\1[22:10]",
+        rf"section0\.y_4_memory must hold {NODE}section0 and take over {NODE}section0 of 0 samples ago, not another "
+        "value",
+    ),
+    "written while the pipeline stands": (
+        r"assign write__en = advance & valid6",
+        "assign write__en = valid6",
+        rf"section0\.y_4_memory must hold {NODE}section0, which stays while no sample leaves position 6",
+    ),
+    "too few words": (
+        r"(reg \[12:0\] y_4_memory \[)3:0\];(.*?)    y_4_memory\[3\] = 13'h0000;\n",
+        r"\g<1>2:0];\2",
+        r"section0\.turn must be 0 after a clock with aresetn = 1, section0\.turn = 2, .*",
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", BREAKS)
+def test_each_kind_of_break_is_named(kind: str) -> None:
+    core = looking_ahead(FIRST_ORDER)
+    old, new, sentence = BREAKS[kind]
+    text, count = re.subn(old, new, core.text, flags=re.DOTALL)
+    assert count == 1
+    assert re.fullmatch(sentence, rejection(core, text)), rejection(core, text)
+
+
+def test_forty_edits() -> None:
+    found = sweep(looking_ahead(FIRST_ORDER), 40, seed=6, clocks=300)
+    assert found["accepted"] + found["rejected"] == 40
+    assert found["rejected"] > 20
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("spec", "lanes"), [(PLAIN, 1), (STEADY, 2), (STEADY_INSTRUMENT, 1)])
+def test_hundreds_of_edits(spec: str, lanes: int) -> None:
+    found = sweep(looking_ahead(spec, lanes), 200, seed=7, clocks=600)
+    assert found["accepted"] + found["rejected"] == 200
+    assert found["rejected"] > 100

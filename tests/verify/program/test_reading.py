@@ -1,0 +1,43 @@
+"""How the checker of programs reads SystemVerilog: numbers, write ports, and parts of what is assigned."""
+
+import re
+
+import pytest
+from tests.verify.program.test_check import changed, number_of, small
+from tests.verify.small_specifications import PLAIN
+
+from sosmith.hdl.plan.instructions import encoded
+from sosmith.model.dataflow.program import Opcode
+from sosmith.verify.graph import RejectedError
+from sosmith.verify.program.logic import Logic
+from sosmith.verify.program.text import _number, read_program
+
+
+@pytest.mark.parametrize(("token", "value"), [("4'b0110", 6), ("6'd10", 10), ("8'h1f", 31)])
+def test_numbers_in_every_base(token: str, value: int) -> None:
+    assert _number(token) == value
+
+
+def test_the_parts_of_a_sum_that_is_assigned_to_several_signals() -> None:
+    logic = Logic("  wire [2:0] high;\n  wire low;\n  assign { high, low } = 2'h3;\n")
+    assert logic.value("low", {}) == [1]
+    assert logic.value("high", {}) == [1, 0, 0]
+
+
+def test_a_second_write_port_is_rejected() -> None:
+    text = small(PLAIN).text
+    (write,) = re.findall(r"^ *words0\[.*?\] <= .*;\n", text, re.MULTILINE)
+    with pytest.raises(RejectedError, match=r"^the words must have one write port$"):
+        read_program(text.replace(write, 2 * write))
+
+
+def test_a_wrong_result_is_rejected() -> None:
+    core = small(PLAIN)
+    number = number_of(core, Opcode.GIVE)
+    give = core.program.instructions[number]
+    # Several bits, so that no other instruction is one bit away from this one.
+    text = changed(core, number, encoded(give._replace(constant=give.constant ^ 0b10101), core.program))
+    with pytest.raises(
+        RejectedError, match=rf"^instruction {number} \(give, .*\) must give part 0 of .*, not another value$"
+    ):
+        core.check(text)

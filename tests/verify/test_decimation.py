@@ -1,0 +1,201 @@
+"""Certificates of decimated filters: proven by the other method, and rejected when anything in them is not right."""
+
+import copy
+import re
+from collections.abc import Callable
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import pytest
+from tests.gen.word_lengths.decimated import locomotive, locomotive_text, read, tree_of
+
+from sosmith.gen.output.generate import generate
+from sosmith.interface.certificate import Certificate
+from sosmith.verify.certificate_file import on_grid
+from sosmith.verify.decimation import at_lower_rate, behind_decimator, folding_gain
+from sosmith.verify.graph import RejectedError
+from sosmith.verify.specified.stated_specification import check_specification
+from sosmith.verify.verification import verify
+
+TREE = tree_of(locomotive())
+
+
+def rejected(sentence: str) -> pytest.RaisesExc[RejectedError]:
+    return pytest.raises(RejectedError, match=f"^{re.escape(sentence)}$")
+
+
+def test_the_locomotive_is_proven_again() -> None:
+    made = locomotive()
+    certificate = read(TREE)
+    verdict = verify(certificate)
+    assert verdict.budget.keys() == made.quantized.budget.keys()
+    for part, value in made.quantized.budget.items():
+        assert -(2**-60) < value - verdict.budget[part] < 2**-16
+    agreement = check_specification(certificate, locomotive_text(), verdict.margin)
+    assert agreement.distance is not None
+    assert agreement.distance < 2**-100
+    held = locomotive_text(hold=True)
+    assert check_specification(certificate, held, verdict.margin) == agreement
+
+
+@pytest.mark.parametrize("architecture", ["folded", "serial"])
+def test_the_program_is_proven_from_the_text(architecture: str, tmp_path: Path) -> None:
+    made = locomotive(architecture=architecture)
+    generate(made, tmp_path)
+    (tmp_path / "spec.toml").write_text(made.spec.text, encoding="utf-8")
+    certificate = Certificate.load(tmp_path / f"{made.spec.name}.certificate.json")
+    proof = certificate.verify(spec=tmp_path / "spec.toml", files=tmp_path, rebuild=True)
+    assert made.architecture.program is not None
+    assert proof.program is not None
+    assert proof.program.instructions == len(made.architecture.program.instructions)
+    assert proof.decimator is not None
+    assert proof.decimator.registers == 8 + 8 * 4
+    assert proof.files == proof.rebuilt == 5
+    sentence = "the core must have one module flange_wear_locomotive_behind, not 0"
+    with rejected(sentence):
+        behind_decimator("module flange_wear_locomotive();\nendmodule\n", certificate.entries)
+
+
+def folded_wrongly(tree: Any, value: Fraction) -> None:
+    tree["decimation"]["aliasing"][2] = str(value)
+
+
+THIRD = Fraction(TREE["decimation"]["aliasing"][2])
+SECTION = TREE["ideal"]["sections"][-1]["numerator"]
+
+WRONG: list[tuple[str, Callable[[Any], None], str]] = [
+    (
+        "registers a bit short",
+        lambda tree: tree["decimation"].update(width=31),
+        "the registers of the decimator must hold 0..4294901760, which 31 bits do not",
+    ),
+    (
+        "a bit more dropped",
+        lambda tree: tree["decimation"].update(dropped=11),
+        "input x of start must take the range 0..2097151 and the format of what feeds it, not 0..4194303",
+    ),
+    (
+        "a factor that is no power of two",
+        lambda tree: tree["decimation"].update(factor=12),
+        "the factor of the decimator must be a power of two, not 12",
+    ),
+    (
+        "a stage less",
+        lambda tree: tree["decimation"].update(stages=3),
+        "aliasing from band 1 must be at most 8.13342e-05, not 3.52396e-06",
+    ),
+    (
+        "less folds than can",
+        lambda tree: folded_wrongly(tree, THIRD - Fraction(1, 2**64)),
+        f"aliasing from band 3 must be at most {float(THIRD):.6g}, not {float(THIRD):.6g}",
+    ),
+    (
+        "more folds than can",
+        lambda tree: folded_wrongly(tree, THIRD + Fraction(1, 2**64)),
+        f"aliasing from band 3 must be at most {float(THIRD):.6g}, not {float(THIRD):.6g}",
+    ),
+    (
+        "a band left out",
+        lambda tree: tree["decimation"]["aliasing"].pop(),
+        "aliasing must be given of 8 bands, not 7",
+    ),
+    (
+        "a larger gain in a whole band",
+        lambda tree: tree["decimation"]["bands"][3].update(gain="1/1000000"),
+        "the largest gain from band 4 must be that at 173/4096 of the lower rate, 1.28263e-08, or little more, "
+        "not 1e-06",
+    ),
+    (
+        "another correction",
+        lambda tree: tree["decimation"].update(correction="135/512"),
+        "the correction of the droop must be the multiple of 1/1024 next to the best one, not 135/512",
+    ),
+    (
+        "no correction in the filter",
+        lambda tree: tree["ideal"]["sections"][-1].update(numerator=["1"]),
+        f"the last ideal section must be {SECTION[0]} - {SECTION[1][1:]} / z, which corrects the droop",
+    ),
+    (
+        "a rounding that costs nothing",
+        lambda tree: tree["claims"]["budget"].pop("decimation"),
+        "the parts of the budget must be decimation, filter coefficients, filter rounding, start, output rounding, "
+        "not filter coefficients, filter rounding, start, output rounding",
+    ),
+    (
+        "a pass band that folds onto itself",
+        lambda tree: tree["decimation"].update(edge="1/32"),
+        "the pass band must end below half the rate behind the decimator",
+    ),
+    (
+        "no filter",
+        lambda tree: tree["ideal"].update(sections=[]),
+        "a decimator must have a filter behind it",
+    ),
+    (
+        "two inputs",
+        lambda tree: tree["inputs"].append(tree["inputs"][0]),
+        "a decimator must have one input, not 2",
+    ),
+    (
+        "too wide for a filter",
+        lambda tree: tree["decimation"].update(width=43),
+        "what leaves the decimator must have 2 to 32 bits, not 33",
+    ),
+]
+
+
+@pytest.mark.parametrize(("change", "sentence"), [pytest.param(*case, id=subject) for subject, *case in WRONG])
+def test_what_is_wrong_is_rejected(change: Callable[[Any], None], sentence: str) -> None:
+    tree = copy.deepcopy(TREE)
+    change(tree)
+    with rejected(sentence):
+        verify(read(tree))
+
+
+def test_a_smaller_part_of_the_budget_is_rejected() -> None:
+    tree = copy.deepcopy(TREE)
+    claimed = Fraction(tree["claims"]["budget"]["decimation"])
+    tree["claims"]["budget"]["decimation"] = str(claimed / 2)
+    with pytest.raises(RejectedError, match=r"^the part decimation of the budget must be "):
+        verify(read(tree))
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        (locomotive_text("8"), "the factor of the decimator must be 8 as specified, not 16"),
+        (
+            locomotive_text().replace('decimate = "auto"\n', ""),
+            "the factor of the decimator must be 1 as specified, not 16",
+        ),
+        (
+            locomotive_text().replace("0.2587802", "0.2587803"),
+            "the edge of the pass band must be 2587803/1000000000 as specified, not 1293901/500000000",
+        ),
+    ],
+)
+def test_another_specification_is_rejected(text: str, sentence: str) -> None:
+    certificate = read(TREE)
+    with rejected(sentence):
+        check_specification(certificate, text, verify(certificate).margin)
+
+
+def test_a_filter_without_the_correction_is_not_the_stated_one() -> None:
+    """Its factor is part of what the specification means at the lower rate."""
+    tree = copy.deepcopy(TREE)
+    tree["ideal"]["sections"].pop()
+    with pytest.raises(RejectedError, match=r"^the filter must be the specified one within a peak gain of "):
+        check_specification(read(tree), locomotive_text(), Fraction(1, 2**60))
+
+
+def test_a_certificate_from_before_whole_bands() -> None:
+    tree = copy.deepcopy(TREE)
+    del tree["decimation"]["bands"]
+    verify(read(tree))
+
+
+def test_gains_are_rounded_up_to_the_grid() -> None:
+    gain = folding_gain(2, 1, Fraction(1, 3))  # |cos(pi / 3)|
+    assert gain == on_grid(Fraction(1, 2))
+    assert at_lower_rate(read(TREE)).inputs[0].bits == 22

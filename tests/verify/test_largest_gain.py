@@ -1,0 +1,104 @@
+"""The verifier's own proof of the largest gain in each band: of the generator's claims, and against others."""
+
+import re
+from fractions import Fraction
+from types import ModuleType
+
+import pytest
+from tests.formal.prover import broken
+from tests.gen.filter.test_largest_gain import CASES, made
+
+from sosmith.gen.filter import largest_gain
+from sosmith.verify.certificate_file import BandEntry, DecimationEntry, SectionEntry, on_grid
+from sosmith.verify.graph import RejectedError
+from sosmith.verify.largest_gain import check_bands
+
+Case = tuple[str, int, int, int, str]
+
+
+def claimed(case: Case, module: ModuleType = largest_gain) -> tuple[DecimationEntry, list[SectionEntry]]:
+    """Return what a certificate says of a filter's bands."""
+    found, filter_ = made(*case)
+    peaks = module.band_gains(filter_.exact, found.factor, found.stages)
+    entry = DecimationEntry(
+        factor=found.factor,
+        stages=found.stages,
+        width=32,
+        dropped=0,
+        correction=found.correction,
+        edge=found.edge / found.sample_rate,
+        aliasing=(),
+        bands=tuple(BandEntry(gain=on_grid(peak.gain), at=peak.at) for peak in peaks),
+    )
+    return entry, [SectionEntry(numerator=b, denominator=a) for b, a in filter_.exact]
+
+
+def with_band(entry: DecimationEntry, band: int, **changes: Fraction) -> DecimationEntry:
+    bands = list(entry.bands)
+    bands[band - 1] = bands[band - 1].model_copy(update=changes)
+    return entry.model_copy(update={"bands": tuple(bands)})
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_claims_are_proven_and_others_rejected(case: Case) -> None:
+    """A claim is at most a thousandth too high; two thousandths off are too much, both ways."""
+    entry, sections = claimed(case)
+    check_bands(entry, sections)
+    for band in {1, entry.factor // 2}:
+        gain = entry.bands[band - 1].gain
+        less = with_band(entry, band, gain=gain * Fraction(998, 1000))
+        with pytest.raises(RejectedError, match=rf"^the largest gain from band {band} must be at least \d"):
+            check_bands(less, sections)
+        more = with_band(entry, band, gain=gain * Fraction(1002, 1000) + Fraction(1, 2**62))
+        with pytest.raises(RejectedError, match=rf"^the largest gain from band {band} must be that at \d"):
+            check_bands(more, sections)
+
+
+def test_sentences() -> None:
+    entry, sections = claimed(CASES[0])
+
+    def rejected(wrong: DecimationEntry, sentence: str) -> None:
+        with pytest.raises(RejectedError, match=f"^{re.escape(sentence)}$"):
+            check_bands(wrong, sections)
+
+    rejected(
+        with_band(entry, 1, gain=Fraction(1, 2**19)),
+        "the largest gain from band 1 must be at least 2.41949e-06, which is reached at 0.0398931 of the lower rate, "
+        "not 1.90735e-06",
+    )
+    rejected(
+        with_band(entry, 1, gain=Fraction(1, 2**18)),
+        "the largest gain from band 1 must be that at 87/2048 of the lower rate, 2.53968e-06, or little more, not "
+        "3.8147e-06",
+    )
+    rejected(
+        with_band(entry, 1, at=Fraction(1, 8)),
+        "the largest gain from band 1 must be that at 1/8 of the lower rate, 1.31187e-07, or little more, not "
+        "2.54216e-06",
+    )
+    rejected(
+        with_band(entry, 8, at=Fraction(5, 8)),
+        "band 8 must have its largest gain at 0 to 1/2 of the lower rate, not at 5/8",
+    )
+    rejected(entry.model_copy(update={"bands": entry.bands[:-1]}), "largest gains must be given of 8 bands, not 7")
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [("((band - q) / factor)", "((band + q) / factor)"), (" ** stages for q", " ** (stages + 1) for q")],
+)
+def test_a_generator_that_errs_is_found_out(right: str, wrong: str) -> None:
+    entry, sections = claimed(CASES[5], broken(largest_gain, right, wrong))
+    with pytest.raises(RejectedError, match=r"^the largest gain from band 1 must be at least "):
+        check_bands(entry, sections)
+
+
+def test_a_certificate_without_such_claims() -> None:
+    entry, sections = claimed(CASES[0])
+    check_bands(entry.model_copy(update={"bands": ()}), sections)
+
+
+def test_another_filter_has_other_gains() -> None:
+    entry, sections = claimed(CASES[2])
+    with pytest.raises(RejectedError, match=r"^the largest gain from band 1 must be "):
+        check_bands(entry, sections[:-1])

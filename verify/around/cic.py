@@ -1,0 +1,422 @@
+"""Proves from the SystemVerilog that the decimator of a core, and what hands out its results, do what they must.
+
+::
+
+    s_axis --> [decimator] --> [behind: the core] --> [holder, if results are held] --> m_axis
+
+The modules of decimator and holder, and the top that connects them, are read as they are written; of the core behind,
+only the ports. Every register has a name by which it is known here, and there is no other. For each of them it is
+proven, for all values of all registers and inputs, that a clock loads what is said below, and that resets and the time
+before the first clock leave no sample and no result. That this is a CIC filter follows from there:
+
+- A stage of the filter holds one sample, and moves on at each clock. Of N sums, ``sum(k)`` adds what ``sum(k-1)`` holds
+  of the same sample, and of N differences, ``difference(k)`` takes from every R-th the one before it, all modulo
+  ``2**width``: N combs behind N integrators are a moving sum, N times, once each comb holds a result. What the sums
+  held before does not count, as each comb takes away a power of the polynomial that comes of it.
+- While `filling` is 1, no sample is accepted, but the one that is offered goes in at each clock, N R times: N of them
+  move the combs, and no result counts. Then every sum that counts is of samples since the reset, the first of them
+  with those that it stands for.
+- A sample is accepted with the phase 0 only when no result is `waiting`, from the sample that completes it until it is
+  taken. So each result finds `o_data` free, and stays until it is taken.
+- The holder takes a word when it is empty or hands out the last of its copies, and hands out R of each.
+
+Above the bits of a result there are zeros, or its sign again (`sosmith.verify.around.repeated_sign`). Flags are
+made by the core behind: here they are passed on (`sosmith.verify.around.passed_flags`).
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import NamedTuple
+
+from sosmith.verify.around.calibration import CODE, FLAGS, Ahead, layout_of
+from sosmith.verify.around.channel_cic import Names, check_channels, names_of
+from sosmith.verify.around.logic import BIT, Field, Held, Logic, Part, Ranges, Signals, check_parts
+from sosmith.verify.around.passed_flags import check_passed
+from sosmith.verify.around.repeated_sign import check_signs
+from sosmith.verify.around.seams import (
+    CIC,
+    CLOCK,
+    DATA,
+    HOLDER,
+    Seams,
+    ahead_of,
+    passed_on,
+    read_around,
+    read_core,
+    seams_of,
+)
+from sosmith.verify.certificate_file import Certificate, DecimationEntry, PortEntry
+from sosmith.verify.graph import require
+from sosmith.verify.parallel.control import SINK, SOURCE
+from sosmith.verify.parallel.forms import shifted
+from sosmith.verify.parallel.netlist import Netlist
+from sosmith.verify.parallel.text import Bits, Module
+from sosmith.verify.program.normal_form import Form, constant, plus
+
+_DATA_REGISTERS = frozenset({"sum", "comb", "difference", "o_data"})
+_NAME = re.compile(r"(\w*?)(\d*)(?:_control(\d))?")
+
+
+@dataclass(frozen=True)
+class DecimatorVerdict:
+    """What the check of a decimator's hardware has found.
+
+    Attributes
+    ----------
+    registers : int
+        Number of registers that were proven to be loaded as they must.
+    copies : int
+        How often each result is handed out.
+    channels : int
+        Number of channels.
+    """
+
+    registers: int
+    copies: int
+    channels: int = 1
+
+
+def check_decimator(text: str, certificate: Certificate, channels: int = 1) -> DecimatorVerdict:
+    """Prove the hardware before and behind a core that filters at a lower rate.
+
+    Parameters
+    ----------
+    text : str
+        SystemVerilog of the core.
+    certificate : Certificate
+        Its certificate, with a decimator, which `verify` has accepted. If it has the specification, that says whether
+        results are held.
+    channels : int
+        Number of channels.
+
+    Raises
+    ------
+    RejectedError
+        If a register is loaded with anything else, a port is connected otherwise, or the text has anything that cannot
+        be read; the sentence names the first register or port that is wrong.
+    """
+    found, output = around(text, certificate, channels), certificate.output
+    entry = certificate.decimation
+    assert entry is not None
+    netlist, seams, word = found.netlist, found.seams, found.word
+    leaving = _Holder(seams, output, word, entry.factor) if word else _Passing(seams, output)
+    box = found.modules.get(f"{certificate.name}_ahead")
+    if found.names is None:
+        registers = _check_one(netlist, box, certificate, seams, leaving)
+    else:
+        registers = check_channels(netlist, box, certificate, channels, seams, found.names, leaving)
+    check_passed(netlist, seams, word, (channels - 1).bit_length())
+    check_signs(found.modules, output, CLOCK)
+    return DecimatorVerdict(registers, entry.factor if word else 1, channels)
+
+
+class Around(NamedTuple):
+    """What is around a core: all modules, a netlist without the core, its seams, and what has no names of its own.
+
+    `told` is the net with the flags of a result of the decimator, and `word` the register that holds results, "" if
+    they leave at once.
+    """
+
+    modules: dict[str, Module]
+    netlist: Netlist
+    seams: Seams
+    names: Names | None
+    told: str
+    word: str
+
+
+def around(text: str, certificate: Certificate, channels: int) -> Around:
+    """Find what is around a core; the rest is as of `check_decimator`."""
+    entry = certificate.decimation
+    assert entry is not None
+    modules = read_core(text, certificate.name)
+    netlist, held = read_around(modules, certificate.name), f"{certificate.name}_holder" in modules
+    if certificate.about is not None:
+        stated = tomllib.loads(certificate.about.specification).get("filter", {}).get("hold", False)
+        require(held == stated, f"results must {'' if stated else 'not '}be held, as specified")
+    names = names_of(netlist) if channels > 1 else None
+    told = "o_rail" if entry.calibration is None and names is None else "o_flags"
+    seams = seams_of(netlist, told, held=held, dest=None if names is None else names.dest)
+    return Around(modules, netlist, seams, names, CIC + told, _held_word(netlist) if held else "")
+
+
+def _check_one(netlist: Netlist, box: Module | None, certificate: Certificate, seams: Seams, leaving: Part) -> int:
+    """Check the decimator of one channel, and what is before it."""
+    entry = certificate.decimation
+    assert entry is not None
+    if entry.calibration is None:
+        (port,) = certificate.inputs
+        cic = _Cic(entry, port, seams, _Source(SOURCE, DATA, ()), {"s_axis_tready": 1})
+        return check_parts(netlist, [leaving, cic], Signals({DATA: [Field(DATA, port.bits)]}))
+    port = entry.calibration.output
+    ahead = ahead_of(netlist, box, port.bits)
+    cic = _Cic(entry, port, seams, _Source(ahead.valid, CODE, FLAGS), {})
+    parts = [leaving, cic, Ahead(ahead, cic.ready, netlist.widths[DATA])]
+    return check_parts(netlist, parts, Signals(layout_of(netlist, ahead, port)))
+
+
+def _held_word(netlist: Netlist) -> str:
+    """Return the register that holds a result: ``o_data``, or what is left of it without bits that are always 0."""
+    names = {name for name in passed_on(netlist, Bits("m_axis_tdata")) if name in netlist.registers}
+    require(len(names) == 1, f"m_axis_tdata must have bits of one register, not of {len(names)}")
+    return names.pop()
+
+
+class _Source(NamedTuple):
+    """Signals that enter the decimator: whether there is a sample, its code, and its flags, if there are any."""
+
+    valid: str
+    code: str
+    flags: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class _Cic:
+    """The decimator, up to what enters the core; `accepting` are nets that say whether it takes a sample."""
+
+    entry: DecimationEntry
+    port: PortEntry
+    seams: Seams
+    source: _Source
+    accepting: Mapping[str, int]
+
+    @property
+    def nets(self) -> Mapping[str, int]:
+        """Whether a sample is taken, and what enters the core."""
+        code = self.entry.width - self.entry.dropped
+        widths = {CIC + "o_data": code, CIC + "o_flags": len(self.source.flags)}
+        return {**self.accepting, **{name: widths.get(found, 1) for name, found in self.seams.entering.items()}}
+
+    @property
+    def registers(self) -> Mapping[str, Held]:
+        """Control, N sums, N combs and differences, and the output."""
+        bits, flags, width = self.entry.factor.bit_length() - 1, len(self.source.flags), self.entry.width
+        found = {"phase": Held(bits, 0), "filled": Held(self.entry.stages.bit_length(), 0)}
+        found |= {"filling": Held(1, 1), "waiting": Held(1, 0)}
+        for k in range(1, self.entry.stages + 1):
+            found |= dict.fromkeys((f"integrator{k}_control0", f"comb{k}_control0"), Held(1, 0))
+            found |= dict.fromkeys(
+                (f"integrator{k}_control1", f"integrator{k}_control2", f"comb{k}_control1"), Held(1, None)
+            )
+            found |= dict.fromkeys((f"sum{k}", f"comb{k}", f"difference{k}"), Held(width, None))
+        found |= {"o_valid": Held(1, 0), "o_data": Held(width - self.entry.dropped, None)}
+        told = {"found": Held(flags, 0), "o_flags": Held(flags, None)}
+        found |= told if flags else {"rail": Held(1, 0), "o_rail": Held(1, None)}
+        return {CIC + name: held for name, held in found.items()}
+
+    @property
+    def ranges(self) -> Mapping[str, Ranges]:
+        """The phase and the pattern of the code by their ends, the count of results while filling by each value."""
+        half = 1 << self.port.bits - 1
+        ends = {half - 1, half} if self.port.signed else {0, 2 * half - 1}
+        starts = {0, 2 * half} | ({half} if self.port.signed else set())
+        if not self.source.flags:  # else the code is not asked for its rails
+            starts |= {0, half, *ends, *(end + 1 for end in ends)}
+        code = tuple((start, after - 1) for start, after in pairwise(sorted(starts)))
+        last, count = self.entry.factor - 1, 1 << self.entry.stages.bit_length()
+        phase = ((0, 0), (1, last - 1), (last, last)) if last > 1 else BIT
+        found: dict[str, Ranges] = {CIC + "phase": phase, CIC + "filled": tuple((k, k) for k in range(count))}
+        if self.source.flags:
+            found[CIC + "found"] = tuple((k, k) for k in range(1 << len(self.source.flags)))
+            found |= dict.fromkeys(self.source.flags, BIT)
+        return {**found, self.source.code: code}
+
+    def wanted(self, now: Logic, name: str) -> Form:
+        """Return what the text at the top of this file says."""
+        if name in self.accepting:
+            return constant(self.ready(now))
+        if name in self.seams.entering:
+            return now.word(self.seams.entering[name])
+        parts = _NAME.fullmatch(name.removeprefix(CIC))
+        assert parts is not None  # as it is for all names in `first`
+        kind, k, what = parts.groups()
+        stage = int(k or 0)
+        if what is not None:
+            holds = self._summed if kind == "integrator" else self._combed
+            return constant(holds(now, stage - 1, int(what)))
+        loaded = self._data(now, kind, stage) if kind in _DATA_REGISTERS else self._control(now, kind)
+        return now.word(name) if loaded is None else loaded
+
+    def _control(self, now: Logic, kind: str) -> Form | None:
+        """Return what a register of the control takes over, if it does."""
+        match kind:
+            case "phase" if self._enters(now):
+                return plus(now.word(CIC + kind), constant(1))
+            case "filled" if self._enters(now) and self._ends(now):
+                return plus(now.word(CIC + kind), constant(1))
+            case "filling" if self._enters(now) and self._ends(now) and self._filled(now):
+                return constant(0)
+            case "waiting" if self._accepted(now) and self._completes(now):
+                return constant(1)
+            case "waiting" if self._bit(now, "o_valid") and now.bit(self.seams.taken):
+                return constant(0)
+            case "rail" | "found" if self._accepted(now):
+                return constant(0 if self._completes(now) else self._gathered(now))
+            case "o_rail" | "o_flags" if self._accepted(now) and self._completes(now):
+                return constant(self._gathered(now))
+            case "o_valid" if self._leaves(now):
+                return constant(1)
+            case "o_valid" if now.bit(self.seams.taken):
+                return constant(0)
+        return None
+
+    def _data(self, now: Logic, kind: str, k: int) -> Form | None:
+        """Return what a register of the filter takes over, if it does."""
+        match kind:
+            case "sum" if self._summed(now, k - 1, 0):
+                return plus(now.word(f"{CIC}sum{k}"), self._before(now, "sum", k))
+            case "comb" if self._combed(now, k - 1, 0):
+                return self._before(now, "difference", k)
+            case "difference" if self._combed(now, k - 1, 0):
+                return plus(self._before(now, "difference", k), now.word(f"{CIC}comb{k}"), -1)
+            case "o_data" if self._leaves(now):
+                half = constant(1 << self.entry.dropped >> 1)
+                last = now.word(f"{CIC}difference{self.entry.stages}")
+                return now.forms.floor(shifted(plus(last, half), -self.entry.dropped))
+        return None
+
+    def _before(self, now: Logic, kind: str, k: int) -> Form:
+        """Return what stands before a sum or a difference: the one before it, the last sum, or the code."""
+        if k > 1:
+            return now.word(f"{CIC}{kind}{k - 1}")
+        if kind == "difference":
+            return now.word(f"{CIC}sum{self.entry.stages}")
+        low, _ = now.limits(self.source.code)
+        negative = self.port.signed and low > self.port.highest
+        return plus(now.signal(self.source.code), constant(-(1 << self.port.bits) if negative else 0))
+
+    def _bit(self, now: Logic, name: str) -> int:
+        return now.bit(CIC + name)
+
+    def ready(self, now: Logic) -> int:
+        """Whether a sample would be accepted."""
+        return int(not self._bit(now, "filling") and not (self._completes(now) and self._bit(now, "waiting")))
+
+    def _enters(self, now: Logic) -> int:
+        """Whether a sample goes in."""
+        return int(now.bit(self.source.valid) and (self._bit(now, "filling") or self.ready(now)))
+
+    def _accepted(self, now: Logic) -> int:
+        """Whether it is accepted as well."""
+        return int(self._enters(now) and not self._bit(now, "filling"))
+
+    def _completes(self, now: Logic) -> int:
+        """Whether it would complete a result."""
+        return int(now.limits(CIC + "phase") == (0, 0))
+
+    def _ends(self, now: Logic) -> int:
+        """Whether the sample after it would."""
+        return int(now.limits(CIC + "phase") == (self.entry.factor - 1,) * 2)
+
+    def _filled(self, now: Logic) -> int:
+        """Whether R samples less than N R have gone in since the reset."""
+        return int(now.limits(CIC + "filled") == (self.entry.stages - 1,) * 2)
+
+    def _gathered(self, now: Logic) -> int:
+        """Return the flags of the samples since the last result, with those of the one that goes in."""
+        if self.source.flags:
+            (before, _), flags = now.limits(CIC + "found"), (now.bit(flag) for flag in self.source.flags)
+            return before | sum(flag << place for place, flag in enumerate(flags))
+        low, high = now.limits(self.source.code)
+        at_rail = low == high and low in {self.port.lowest % (1 << self.port.bits), self.port.highest}
+        return self._bit(now, "rail") | at_rail
+
+    def _summed(self, now: Logic, stage: int, what: int) -> int:
+        """Of the sample behind a sum: whether there is one, whether it completes a result, and whether that counts."""
+        if stage:
+            return self._bit(now, f"integrator{stage}_control{what}")
+        if what == 2:
+            return 1 - self._bit(now, "filling")
+        return self._completes(now) if what else self._enters(now)
+
+    def _combed(self, now: Logic, stage: int, what: int) -> int:
+        """Of the sample behind a comb: whether there is one, and whether the result counts."""
+        if stage:
+            return self._bit(now, f"comb{stage}_control{what}")
+        last = self.entry.stages
+        return self._summed(now, last, 2) if what else self._summed(now, last, 0) and self._summed(now, last, 1)
+
+    def _leaves(self, now: Logic) -> int:
+        """Whether a result that counts comes to the output."""
+        return self._combed(now, self.entry.stages, 0) and self._combed(now, self.entry.stages, 1)
+
+
+def _leaving(seams: Seams, port: PortEntry) -> Mapping[str, int]:
+    return {seams.ready: 1, "m_axis_tvalid": 1, "m_axis_tdata": -(-port.bits // 8) * 8}
+
+
+@dataclass(frozen=True)
+class _Passing:
+    """What leaves the core leaves at once."""
+
+    seams: Seams
+    port: PortEntry
+
+    @property
+    def nets(self) -> Mapping[str, int]:
+        """Whether a result is taken, whether there is one, and the result."""
+        return _leaving(self.seams, self.port)
+
+    @property
+    def registers(self) -> Mapping[str, Held]:
+        """There is no register."""
+        return {}
+
+    @property
+    def ranges(self) -> Mapping[str, Ranges]:
+        """Nor anything to tell apart."""
+        return {}
+
+    def wanted(self, now: Logic, name: str) -> Form:
+        """Return what is on the other side."""
+        if name == "m_axis_tdata":
+            return now.result(now.net(name), self.port.bits)
+        return now.word(SINK if name == self.seams.ready else self.seams.valid)
+
+
+@dataclass(frozen=True)
+class _Holder:
+    """What hands out each result, held in the register `word`, `copies` times."""
+
+    seams: Seams
+    port: PortEntry
+    word: str
+    copies: int
+
+    @property
+    def nets(self) -> Mapping[str, int]:
+        """Whether a result is taken, whether there is one, and the result."""
+        return _leaving(self.seams, self.port)
+
+    @property
+    def registers(self) -> Mapping[str, Held]:
+        """A word with its valid bit, and a counter."""
+        count = self.copies.bit_length() - 1
+        return {HOLDER + "o_valid": Held(1, 0), HOLDER + "left": Held(count, None), self.word: Held(None, None)}
+
+    @property
+    def ranges(self) -> Mapping[str, Ranges]:
+        """The counter by whether it is 0."""
+        return {HOLDER + "left": ((0, 0), (1, self.copies - 1))}
+
+    def wanted(self, now: Logic, name: str) -> Form:
+        """Return a new word where one can be taken, else one copy less where one leaves."""
+        valid, left = HOLDER + "o_valid", HOLDER + "left"
+        if name == "m_axis_tvalid":
+            return now.word(valid)
+        if name == "m_axis_tdata":
+            above = now.forms.floor(shifted(now.net(name), -self.port.bits))
+            return plus(now.forms.unsigned(now.word(self.word), self.port.bits), above, 1 << self.port.bits)
+        takes = not now.bit(valid) or (now.bit(SINK) and now.limits(left) == (0, 0))
+        if name in self.nets:
+            return constant(int(takes))
+        if not takes:
+            return plus(now.word(left), constant(-1)) if name == left and now.bit(SINK) else now.word(name)
+        if name == self.word:  # with the flags above
+            return now.result(now.after(name), self.port.bits)
+        return constant(self.copies - 1) if name == left else now.word(self.seams.valid)

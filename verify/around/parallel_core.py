@@ -1,0 +1,143 @@
+"""Proves a parallel core behind a decimator, and a parallel calibration before one, each by itself.
+
+Its ports are connected to those that a core with streams has, in a top that is made here::
+
+    s_axis_tdata: code, flags --> code  --> [ core. ] --> results, flags, channel --> m_axis_tdata, m_axis_tuser, ..
+                                  flags -->
+
+and that is proven like any parallel core (`sosmith.verify.parallel.check`). Which bit of a port leaves the core
+where is taken from what is around it, which `sosmith.verify.around.cic` proves: flags that the core behind makes
+are then proven to leave at their places. Flags of the inputs come with each result of the decimator, and the core must
+hand on those of the same sample.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from sosmith.verify.around.calibration import CHANNEL, CODE, FLAGS, layout_of
+from sosmith.verify.around.cic import Around, around
+from sosmith.verify.around.passed_flags import origins
+from sosmith.verify.around.seams import AHEAD, BEHIND, CIC, CLOCK, DATA, DEST, ahead_of
+from sosmith.verify.certificate_file import Certificate
+from sosmith.verify.decimation import at_lower_rate, calibration_alone
+from sosmith.verify.graph import require
+from sosmith.verify.parallel.check import FLAGS as LEAVING_FLAGS
+from sosmith.verify.parallel.check import OUTPUT, OUTPUT_DEST, HardwareVerdict, Inside, check_modules
+from sosmith.verify.parallel.control import RESET, SINK, SOURCE
+from sosmith.verify.parallel.text import Bits, Expression, Joined, Module, Number
+
+_TOP, _CORE = "", "core"
+_VALID, _READY = "m_axis_tvalid", "s_axis_tready"
+_BYTE = 8
+
+
+def check_behind(text: str, certificate: Certificate, channels: int = 1) -> HardwareVerdict:
+    """Prove that the parallel core behind a decimator computes the graph of its certificate.
+
+    Parameters
+    ----------
+    text : str
+        SystemVerilog of the core, of which `check_decimator` has accepted what is around it.
+    certificate : Certificate
+        Its certificate, with a decimator, which `verify` has accepted.
+    channels : int
+        Number of channels.
+
+    Raises
+    ------
+    RejectedError
+        If it computes anything else.
+    """
+    found, behind = around(text, certificate, channels), at_lower_rate(certificate)
+    (port,) = behind.inputs
+    whole = -(-port.bits // _BYTE) * _BYTE
+    told = found.netlist.widths[found.told]
+    supplied: dict[str, Expression] = {
+        RESET: Bits(RESET),
+        CIC + "o_data": Bits(DATA, 0, port.bits),
+        found.told: Bits(DATA, whole, told),
+        CIC + "o_valid": Bits(SOURCE),
+    }
+    widths = {DATA: whole + told}
+    if found.names is not None:
+        supplied[found.names.dest] = Bits(DEST)
+        (taken,) = (name for name, source in found.seams.entering.items() if source == found.names.dest)
+        widths[DEST] = found.netlist.widths[taken]
+    wires = {name: supplied[source] for name, source in found.seams.entering.items()}
+    wires |= {found.seams.ready: Bits(SINK), found.seams.taken: Bits(_READY), found.seams.valid: Bits(_VALID)}
+    top = _top(found, f"{certificate.name}_behind", BEHIND, wires, widths, _leaving(found))
+    return check_modules({_TOP: top, **found.modules}, behind, channels, Inside(f"{_CORE}.", told))
+
+
+def check_ahead(text: str, certificate: Certificate, channels: int = 1) -> HardwareVerdict:
+    """Prove that the parallel calibration before a decimator computes its graph; the rest is as of `check_behind`."""
+    found, alone = around(text, certificate, channels), calibration_alone(certificate)
+    assert alone is not None
+    port, count = alone.output, (channels - 1).bit_length()
+    name = f"{certificate.name}_ahead"
+    seams = ahead_of(found.netlist, found.modules.get(name), port.bits, count)
+    wires = {entry: Bits(source) for entry, source in seams.entering.items()}
+    wires |= {seams.offered: Bits(SOURCE), seams.taken: Bits(_READY)}
+    wires |= {seams.ready: Bits(SINK), seams.valid: Bits(_VALID)}
+    bits: dict[str, list[Expression]] = {}
+    for outlet, fields in layout_of(found.netlist, seams, port, count).items():
+        place = 0
+        for field in fields:
+            bits.setdefault(field.signal, []).extend(Bits(outlet, place + k, 1) for k in range(field.width))
+            place += field.width
+    code, zero = bits[CODE], Number(0, 1)
+    left = {OUTPUT: [*code, *[code[-1] if port.signed else zero] * (-port.bits % _BYTE)]}
+    left[LEAVING_FLAGS] = [*(bit for flag in FLAGS for bit in bits[flag]), *[zero] * (_BYTE - len(FLAGS))]
+    widths = {DATA: found.netlist.widths[DATA]}
+    if channels > 1:
+        left[OUTPUT_DEST] = [*bits[CHANNEL], *[zero] * (-count % _BYTE)]
+        widths[DEST] = found.netlist.widths[DEST]
+    top = _top(found, name, AHEAD, wires, widths, left)
+    return check_modules({_TOP: top, **found.modules}, alone, channels, Inside(f"{_CORE}."))
+
+
+def _leaving(found: Around) -> dict[str, list[Expression]]:
+    """Return the bits of the core behind that leave at each port."""
+    logic, left = origins(found.netlist, found.word)
+    leaving: dict[str, list[Expression]] = {}
+    for name, bits in left.items():
+        for bit in bits:
+            made = logic.made[bit]
+            own = bit == 0 or (made.kind.startswith(BEHIND) and not made.operands)
+            require(own, f"{name} must have bits of the core")
+            leaving.setdefault(name, []).append(Bits(made.kind, made.place, 1) if bit else Number(0, 1))
+    return leaving
+
+
+def _top(
+    found: Around,
+    box: str,
+    prefix: str,
+    wires: Mapping[str, Expression],
+    widths: Mapping[str, int],
+    left: Mapping[str, Sequence[Expression]],
+) -> Module:
+    """Make a top with the ports of a core with streams, and in it the core.
+
+    `wires` are what its ports have by their names with the `prefix`, but for the clock and for outputs that are words,
+    of which `left` has the bits that leave.
+    """
+    ports = {CLOCK: "input", RESET: "input", SOURCE: "input", SINK: "input", _READY: "output", _VALID: "output"}
+    ports |= dict.fromkeys(widths, "input") | dict.fromkeys(left, "output")
+    top = Module(ports=ports, widths={**dict.fromkeys(ports, 1), **widths})
+    connected: dict[str, Expression] = {}
+    for port, direction in found.modules[box].ports.items():
+        name = prefix + port
+        if name in wires:
+            connected[port] = wires[name]
+        elif direction == "output":
+            top.widths[name] = found.modules[box].widths[port]
+            connected[port] = Bits(name)
+        else:
+            connected[port] = Bits(CLOCK)
+    for name, bits in left.items():
+        top.widths[name] = len(bits)
+        top.assigns.append((Bits(name), Joined(tuple(reversed(bits)))))
+    top.instances.append((box, _CORE, connected))
+    return top

@@ -1,0 +1,213 @@
+"""Holds a certificate against the files that were written with it, by their SHA-256."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from sosmith.verify.certificate_file import AboutEntry, Certificate, certificate_text, sealed
+from sosmith.verify.graph import RejectedError, require
+
+
+def check_seal(certificate: Certificate, content: bytes) -> AboutEntry:
+    """Check that a certificate's file has the very bytes that were written, and say what it is about.
+
+    Parameters
+    ----------
+    certificate : Certificate
+    content : bytes
+        Content of its file.
+
+    Raises
+    ------
+    RejectedError
+        If a byte of the file was changed, or the certificate names neither specification nor files.
+    """
+    about = about_of(certificate)
+    own = sealed(certificate).about
+    assert own is not None  # as about is not
+    require(
+        about.certificate == own.certificate,
+        f"the SHA-256 of the certificate itself must be {own.certificate}, not {about.certificate}: it was changed",
+    )
+    require(
+        certificate_text(certificate).encode() == content,
+        "the certificate must have the layout in which it was written, not another one",
+    )
+    return about
+
+
+def about_of(certificate: Certificate) -> AboutEntry:
+    """Return what a certificate is about.
+
+    Raises
+    ------
+    RejectedError
+        If it does not say so, or not consistently.
+    """
+    about = certificate.about
+    if about is None:
+        raise RejectedError("the certificate must say which specification and files it is about, and does not")
+    found = sha256(about.specification.encode())
+    require(
+        found == about.sha256,
+        f"the SHA-256 of the specification in the certificate must be {found}, not {about.sha256}",
+    )
+    return about
+
+
+def check_files(about: AboutEntry, directory: Path) -> int:
+    """Check that all files in `directory` are those that were written with a certificate; return their number.
+
+    Raises
+    ------
+    RejectedError
+        If a file is missing or was changed.
+    """
+    for entry in about.files:
+        require(Path(entry.name).name == entry.name, f"{entry.name!r} must be the name of a file without a folder")
+        path = directory / entry.name
+        _compare(str(path), entry.sha256, _content(path))
+    return len(about.files)
+
+
+def check_text(about: AboutEntry, text: str) -> None:
+    """Check that a specification has the very text that a certificate was made from.
+
+    Raises
+    ------
+    RejectedError
+        If it does not.
+    """
+    require(
+        text == about.specification,
+        f"the specification must have the SHA-256 {about.sha256} of the text in the certificate, "
+        f"not {sha256(text.encode())}: it says the same in other words",
+    )
+
+
+def check_measurements(about: AboutEntry, path: Path) -> None:
+    """Check that the file of measurements is the one that the calibration was fitted to.
+
+    Raises
+    ------
+    RejectedError
+        If it cannot be read, or was changed.
+    """
+    assert about.measurements is not None
+    _compare(str(path), about.measurements.sha256, _content(path))
+
+
+_NO_MANIFEST = (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError)
+"""What is raised where a manifest has anything else."""
+
+
+class FixedArchitecture(NamedTuple):
+    """Architecture of a core that can be read, None for others; its number of channels, and samples of a beat."""
+
+    name: str | None
+    channels: int
+    lanes: int
+
+
+def fixed_architecture(path: Path) -> FixedArchitecture:
+    """Return what hardware there is from the manifest at `path`, which is known to be unchanged.
+
+    The architecture is None for a core whose constants can be loaded, or whose memories and states are protected.
+
+    Raises
+    ------
+    RejectedError
+        If it is no manifest, or the architecture is none that there is.
+    """
+    try:
+        manifest = json.loads(_content(path))
+        plain = manifest["reload"] is None and manifest["protect"] == "none"
+        channels, lanes = int(manifest["channels"]), int(manifest["streams"]["m_axis"].get("samples", 1))
+        if min(channels, lanes) < 1:
+            raise ValueError
+        architecture = str(manifest["architecture"])
+    except _NO_MANIFEST:
+        raise RejectedError(f"{path} must be the manifest of a core, not another file") from None
+    _check_known(architecture, (*_AHEAD, "online"), path)
+    return FixedArchitecture(architecture if plain else None, channels, lanes)
+
+
+_AHEAD = ("parallel", "folded", "serial")
+
+
+def _check_known(architecture: str, known: Sequence[str], path: Path) -> None:
+    named = ", ".join(known[:-1])
+    require(
+        architecture in known, f"the architecture in {path} must be {named} or {known[-1]}, not {architecture[:40]!r}"
+    )
+
+
+def core_text(path: Path) -> str:
+    """Return the SystemVerilog of a core.
+
+    Raises
+    ------
+    RejectedError
+        If there is none.
+    """
+    try:
+        return _content(path).decode("ascii")
+    except UnicodeDecodeError:
+        raise RejectedError(f"{path} must be ASCII") from None
+
+
+def architecture_ahead(path: Path) -> str | None:
+    """Return the architecture of the calibration before a decimator from the manifest at `path`; None without one.
+
+    Raises
+    ------
+    RejectedError
+        If it is no manifest, or the architecture is none that there is.
+    """
+    try:
+        found = (json.loads(_content(path))["decimation"] or {}).get("calibration")
+        architecture = None if found is None else str(found["architecture"])
+    except _NO_MANIFEST:
+        raise RejectedError(f"{path} must be the manifest of a core, not another file") from None
+    if architecture is not None:
+        _check_known(architecture, _AHEAD, path)
+    return architecture
+
+
+def check_texts(about: AboutEntry, texts: Mapping[str, str]) -> int:
+    """Check that `texts`, by the names of their files, are those written with a certificate; return their number.
+
+    Raises
+    ------
+    RejectedError
+        If one is missing, superfluous or different.
+    """
+    names = [entry.name for entry in about.files]
+    require(
+        sorted(names) == sorted(texts),
+        f"the files generated again must be {', '.join(names)}, not {', '.join(texts)}",
+    )
+    for entry in about.files:
+        _compare(f"{entry.name}, generated again,", entry.sha256, texts[entry.name].encode())
+    return len(names)
+
+
+def _content(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise RejectedError(f"{path} must be a file that can be read, not: {error.strerror}") from None
+
+
+def _compare(what: str, stated: str, content: bytes) -> None:
+    found = sha256(content)
+    require(found == stated, f"{what} must have the SHA-256 {stated} of the certificate, not {found}")
+
+
+def sha256(content: bytes) -> str:
+    """Return the SHA-256 as 64 hexadecimal digits."""
+    return hashlib.sha256(content).hexdigest()

@@ -1,0 +1,168 @@
+"""Proves the largest gain of a decimator and its filter in a whole band around a multiple of the lower rate.
+
+With ``x = cos(2 pi p)`` for the frequency p at the output, in units of the lower rate, the square of a filter's gain is
+a quotient of polynomials in x, and ``sin(pi p)**2`` is ``(1 - x) / 2``. So the square of the gain from the frequency
+``k - p`` at the input is at most G, a gain that is claimed, where::
+
+    ((1 - x) / 2)**N P(x) / Q(x)  <=  G**2 (R sin(pi (k - p) / R))**(2 N)
+
+and what comes from ``k + p`` is less. On an interval of x, the left side is at most the largest quotient of the two
+polynomials' Bernstein coefficients, which are exact, if all of those of the denominator are positive. The right side
+falls with p, and is the smallest at the interval's lower end. Intervals are halved until this proves G. Another
+quotient, in the interval's middle, disproves it where it is too small.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import reduce
+from operator import mul
+
+from flint import arb, arb_poly, ctx, fmpq, fmpq_poly
+
+from sosmith.verify.certificate_file import DecimationEntry, SectionEntry
+from sosmith.verify.graph import require
+from sosmith.verify.l1_response import UndecidedError, fraction
+
+_PRECISION = 256
+"""Bits to which sines are computed."""
+
+_SMALLEST = Fraction(1, 1 << 80)
+"""Shortest interval that is tried."""
+
+_EXCESS = Fraction(1, 1 << 9)
+"""Share by which a claimed gain may exceed one that is reached."""
+
+_GRID = Fraction(1, 1 << 63)
+"""What rounding adds to it at most."""
+
+
+@dataclass(frozen=True)
+class _Interval:
+    """Of an interval of x: a bound on the left side or None, its value in the middle, and the two frequencies."""
+
+    most: Fraction | None
+    middle: Fraction
+    lowest: arb
+    central: arb
+
+
+class _LeftSide:
+    """The left side for all bands, on every interval that was asked for."""
+
+    def __init__(self, sections: Sequence[SectionEntry], stages: int) -> None:
+        over = [_square(section.denominator) for section in sections]
+        under = [_square(section.numerator) for section in sections]
+        self._sections = list(zip(under, over, strict=True))
+        self._stages = stages
+        half = fmpq_poly([fmpq(1, 2), fmpq(-1, 2)])
+        self._over: fmpq_poly = reduce(mul, under, half**stages)
+        self._under: fmpq_poly = reduce(mul, over, fmpq_poly([1]))
+        self._degree = max(self._over.degree(), self._under.degree())
+        self._known: dict[tuple[Fraction, Fraction], _Interval] = {}
+
+    def on(self, low: Fraction, high: Fraction) -> _Interval:
+        """Bound it on an interval."""
+        found = self._known.get((low, high))
+        if found is None:
+            over, under = (self._bernstein(each, low, high) for each in (self._over, self._under))
+            middle = (low + high) / 2
+            positive = min(under) > 0
+            most = max(fraction(p / q) for p, q in zip(over, under, strict=True)) if positive else None
+            at = _fmpq(middle)
+            value = fraction(self._over(at) / self._under(at))
+            found = self._known[low, high] = _Interval(most, value, _frequency(low), _frequency(middle))
+        return found
+
+    def _bernstein(self, polynomial: fmpq_poly, low: Fraction, high: Fraction) -> list[fmpq]:
+        """Bernstein coefficients on an interval, each times a binomial coefficient."""
+        count = self._degree + 1
+        within = polynomial(fmpq_poly([_fmpq(low), _fmpq(high - low)])).coeffs()
+        mirrored = fmpq_poly((within + [fmpq(0)] * (count - len(within)))[::-1])
+        shifted: list[fmpq] = mirrored(fmpq_poly([1, 1])).coeffs()
+        return (shifted + [fmpq(0)] * (count - len(shifted)))[::-1]
+
+    def at(self, frequency: Fraction) -> arb:
+        """Enclose it at a frequency, section by section."""
+        x = arb.cos_pi_fmpq(_fmpq(2 * frequency))
+        value = ((1 - x) / 2) ** self._stages
+        for under, over in self._sections:
+            value *= arb_poly(under)(x) / arb_poly(over)(x)
+        return value
+
+
+def check_bands(entry: DecimationEntry, sections: Sequence[SectionEntry]) -> None:
+    """Check the gains that are claimed of whole bands; without any, nothing.
+
+    Raises
+    ------
+    RejectedError
+        If one is exceeded at some frequency, or is more than what is reached.
+    UndecidedError
+        If that cannot be decided.
+    """
+    if not entry.bands:
+        return
+    count = entry.factor // 2
+    require(len(entry.bands) == count, f"largest gains must be given of {count} bands, not {len(entry.bands)}")
+    left = _LeftSide(sections, entry.stages)
+    for band, claim in enumerate(entry.bands, start=1):
+        require(
+            0 <= claim.at <= Fraction(1, 2),
+            f"band {band} must have its largest gain at 0 to 1/2 of the lower rate, not at {claim.at}",
+        )
+        with ctx.workprec(_PRECISION):
+            right = _right_side(entry, band, arb(_fmpq(claim.at)))
+            reached = (left.at(claim.at) / right).sqrt()
+            tight = arb(_fmpq(claim.gain - _GRID)) <= reached * arb(_fmpq(1 + _EXCESS))
+            require(
+                tight,
+                f"the largest gain from band {band} must be that at {claim.at} of the lower rate, "
+                f"{float(reached):.6g}, or little more, not {float(claim.gain):.6g}",
+            )
+            _check_bound(left, entry, band, claim.gain)
+
+
+def _check_bound(left: _LeftSide, entry: DecimationEntry, band: int, gain: Fraction) -> None:
+    """Prove that no frequency has a larger gain."""
+    square = arb(_fmpq(gain**2))
+    left_to_do = [(Fraction(-1), Fraction(1))]
+    while left_to_do:
+        low, high = left_to_do.pop()
+        found = left.on(low, high)
+        least = square * _right_side(entry, band, found.lowest)
+        if found.most is not None and arb(_fmpq(found.most)) <= least:
+            continue
+        there = _right_side(entry, band, found.central)
+        reached = (arb(_fmpq(found.middle)) / there).sqrt()
+        require(
+            not reached > arb(_fmpq(gain)),
+            f"the largest gain from band {band} must be at least {float(reached):.6g}, which "
+            f"is reached at {float(found.central):.6g} of the lower rate, not {float(gain):.6g}",
+        )
+        if high - low <= _SMALLEST:
+            raise UndecidedError(f"the largest gain from band {band}")
+        middle = (low + high) / 2
+        left_to_do += [(low, middle), (middle, high)]
+
+
+def _right_side(entry: DecimationEntry, band: int, frequency: arb) -> arb:
+    """Right side for the gain 1: the denominator of the CIC filter's squared gain."""
+    return (entry.factor * ((band - frequency) / entry.factor).sin_pi()) ** (2 * entry.stages)
+
+
+def _square(taps: Sequence[Fraction]) -> fmpq_poly:
+    """Squared magnitude of up to three taps, in the cosine: ``cos 2 w`` is ``2 x**2 - 1``."""
+    b0, b1, b2 = (*taps, Fraction(0), Fraction(0))[:3]
+    return fmpq_poly([_fmpq(b0**2 + b1**2 + b2**2 - 2 * b0 * b2), _fmpq(2 * b1 * (b0 + b2)), _fmpq(4 * b0 * b2)])
+
+
+def _frequency(x: Fraction) -> arb:
+    """Frequency with the cosine x."""
+    return arb(_fmpq(x)).acos() / (2 * arb.pi())
+
+
+def _fmpq(value: Fraction) -> fmpq:
+    return fmpq(value.numerator, value.denominator)

@@ -1,0 +1,235 @@
+"""Proves that the hardware of a parallel core computes the graph of its certificate, for all inputs, stalls and resets.
+
+The core is read from its SystemVerilog, which is what tools synthesize, and nothing else is needed to read it
+(`sosmith.verify.parallel.text`). All its logic is then followed with normal forms in place of numbers::
+
+    certificate --> graph --> code of each node, a form of inputs and of what DELAY nodes hold ---+
+                                                                                                  v
+    core.sv --> netlist --> control: which clock moves which sample                             equal?
+                   |                          |                                                   ^
+                   +--> logic ----------------+--> what each register holds, for its sample ------+
+
+1. The valid bits and the output buffer move samples as a queue does: none is lost, repeated or overtaken, whatever
+   source, sink and reset do (`sosmith.verify.parallel.control`).
+2. What a register holds is a form of its own sample, and it is loaded exactly when a sample moves there; a register of
+   a recursion holds the code of a DELAY node, by induction over the clocks (`sosmith.verify.parallel.pipeline`).
+3. What leaves is the output of the graph, extended to whole bytes, with the flags input_at_rail, output_saturated and
+   settling, and 0 for flags that the core does not have.
+
+Sums and products are those of the hardware, modulo the width of each net; extensions by a sign or by zeros, and bits
+that are left out, change a value unless its range says otherwise. The only ranges are those of the certificate, which
+`sosmith.verify.verification` proves. Names of nets count in one place: the register of a recursion is looked for
+by the name of its DELAY node. Under a wrong name a proof is not found.
+"""
+
+from __future__ import annotations
+
+import sys
+import tomllib
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from sosmith.verify.certificate_file import Certificate, Operation
+from sosmith.verify.graph import RejectedError, require
+from sosmith.verify.parallel.channels import DEST, find_channels
+from sosmith.verify.parallel.control import find_control
+from sosmith.verify.parallel.evaluation import Evaluation
+from sosmith.verify.parallel.fault import fault
+from sosmith.verify.parallel.forms import Forms
+from sosmith.verify.parallel.graph_codes import GraphCodes, LanePorts
+from sosmith.verify.parallel.netlist import Netlist, flattened
+from sosmith.verify.parallel.pipeline import DATA, Pipeline
+from sosmith.verify.parallel.split import split
+from sosmith.verify.parallel.text import Module, read_modules
+from sosmith.verify.program.normal_form import Form, constant, plus
+
+CLOCK = "aclk"
+OUTPUT, FLAGS, OUTPUT_DEST = "m_axis_tdata", "m_axis_tuser", "m_axis_tdest"
+_PORTS = frozenset(
+    {CLOCK, "aresetn", DATA, "s_axis_tvalid", "s_axis_tready", OUTPUT, FLAGS, "m_axis_tvalid", "m_axis_tready"}
+)
+_AT_RAIL, _OUTSIDE, _SATURATED, _WEAR, _SETTLING, _NONE = 0, 1, 2, (3, 4), 5, (6, 7)
+"""Bits of the flags of a sample; those of `_NONE` are 0 without protection."""
+_FLAG_BITS = 8
+
+_DEEPEST = 20_000
+"""Most calls inside each other: the lanes of a section are followed back one through the other."""
+
+
+@dataclass(frozen=True)
+class HardwareVerdict:
+    """What the check of the hardware has found.
+
+    Attributes
+    ----------
+    registers, memories, states : int
+        Number of registers whose content was found, of memories, and of those of both that hold a DELAY node.
+    latency : int
+        Clocks from the edge that accepts a sample to the edge that can hand its result on, without a stall.
+    """
+
+    registers: int
+    memories: int
+    states: int
+    latency: int
+
+
+def check_hardware(text: str, certificate: Certificate, channels: int = 1, lanes: int = 1) -> HardwareVerdict:
+    """Prove that the hardware in a core's SystemVerilog computes the graph of a certificate.
+
+    Parameters
+    ----------
+    text : str
+        SystemVerilog of a parallel core.
+    certificate : Certificate
+        Its certificate, which `verify` has accepted.
+    channels : int
+        Number of channels, each of which has states of its own.
+    lanes : int
+        Samples of a beat; with several of them, there is one channel.
+
+    Returns
+    -------
+    HardwareVerdict
+        What was found.
+
+    Raises
+    ------
+    RejectedError
+        If the hardware computes anything else, or the text has anything that cannot be checked; the sentence names the
+        first node that is wrong, or the register that moves samples wrongly.
+    """
+    require("s_axil_" not in text, "the constants must be fixed to be checked, not loadable at run time")
+    modules = read_modules(text)
+    require(channels == 1 or lanes == 1, f"several samples a clock must be those of one channel, not of {channels}")
+    return check_modules(modules, certificate, channels, Inside(lanes=lanes))
+
+
+@dataclass(frozen=True)
+class Inside:
+    """What a core has inside.
+
+    Attributes
+    ----------
+    prefix : str
+        Prefix of its nets.
+    told : int
+        Number of flags of the inputs that come with a sample, above its fields, in place of what the ports say.
+    lanes : int
+        Samples of a beat.
+    """
+
+    prefix: str = ""
+    told: int = 0
+    lanes: int = 1
+
+
+def check_modules(
+    modules: Mapping[str, Module], certificate: Certificate, channels: int, inside: Inside
+) -> HardwareVerdict:
+    """Prove what modules compute, the top first; the rest is as of `check_hardware`."""
+    ports = set(next(iter(modules.values())).ports)
+    wanted = _PORTS if channels == 1 else _PORTS | {DEST, OUTPUT_DEST}
+    require(ports == wanted, f"the ports must be {', '.join(sorted(wanted))}, not {', '.join(sorted(ports))}")
+    with _deep_recursion():
+        return _checked(flattened(modules, CLOCK), certificate, channels, inside)
+
+
+@contextmanager
+def _deep_recursion() -> Iterator[None]:
+    """Let nets be followed back through as many lanes as there are, one after the other."""
+    before = sys.getrecursionlimit()
+    sys.setrecursionlimit(max(before, _DEEPEST))
+    try:
+        yield
+    finally:
+        sys.setrecursionlimit(before)
+
+
+def _checked(netlist: Netlist, certificate: Certificate, channels: int, inside: Inside) -> HardwareVerdict:
+    forms = Forms()
+    prefix = inside.prefix
+    words = {name: len(memory.first) for name, memory in netlist.memories.items()} if channels == 1 else {}
+    graph = GraphCodes(certificate, forms, inside.lanes, words, prefix)
+    netlist = split(netlist, {netlist.holder(graph.state_name(node)) or "" for node in graph.delays})
+    control = find_control(netlist) if channels == 1 else find_channels(netlist, channels, prefix)
+    pipeline = Pipeline(netlist, control, graph, forms, certificate, inside.told)
+    try:
+        pipeline.check_states()
+        _check_output(pipeline.buffered(), netlist, pipeline, graph, certificate)
+        if channels > 1:
+            dest = pipeline.buffered().net(OUTPUT_DEST)
+            right = pipeline.same(dest, pipeline.channel, netlist.widths[OUTPUT_DEST])
+            require(right, f"{OUTPUT_DEST} must be the channel of the sample, not another value")
+    except RejectedError as error:
+        raise fault(netlist, pipeline, graph) or error from None
+    memories = 0 if pipeline.memories is None else len(pipeline.memories.states)
+    latency = len(control.valid) + (channels > 1)
+    return HardwareVerdict(pipeline.registers, memories, len(pipeline.states) + memories, latency)
+
+
+def _check_output(
+    logic: Evaluation, netlist: Netlist, pipeline: Pipeline, graph: GraphCodes, certificate: Certificate
+) -> None:
+    """Check what leaves the core while `m_axis_tvalid` is 1."""
+    width = -(-certificate.output.bits // 8) * 8
+    for name, each in ((OUTPUT, width), (FLAGS, _FLAG_BITS)):
+        wanted = each * len(graph.lanes)
+        require(netlist.widths[name] == wanted, f"the port {name} must have {wanted} bits, not {netlist.widths[name]}")
+    told = pipeline.told
+    unused = [place for place in _unused(certificate) if place >= len(told)]
+    for number, lane in enumerate(graph.lanes):
+        label = graph.nodes[lane.output].label
+        data = logic.net(OUTPUT, width * number, width)
+        what = OUTPUT if len(graph.lanes) == 1 else f"sample {number} of {OUTPUT}"
+        require(pipeline.same(data, graph.seen(lane.output, ""), width), f"{what} must be {label}, not another value")
+        for bit in range(_FLAG_BITS * number, _FLAG_BITS * (number + 1)):
+            logic.net(FLAGS, bit, 1)  # of the sample whose beat it leaves with, also where nothing is said of its value
+        for place, flag, value in (
+            (_AT_RAIL, "input_at_rail", told[0] if told else _at_rail(graph, lane, certificate)),
+            *([(_OUTSIDE, "outside_calibration", told[1])] if len(told) > 1 else []),
+            (_SATURATED, "output_saturated", _saturated(graph, lane)),
+            (_SETTLING, "settling", {} if lane.settling is None else graph.forms.negative(graph.codes[lane.settling])),
+        ):
+            bit = _FLAG_BITS * number + place
+            require(
+                pipeline.same(logic.net(FLAGS, bit, 1), value, 1),
+                f"bit {bit} of {FLAGS} must be {flag}, as the ports and {label} say, not another value",
+            )
+        for place in unused:
+            bit = _FLAG_BITS * number + place
+            none = pipeline.same(logic.net(FLAGS, bit, 1), {}, 1)
+            require(none, f"bit {bit} of {FLAGS} must be 0, as there is no such flag, not another value")
+
+
+def _unused(certificate: Certificate) -> list[int]:
+    """Return the bits of flags that a core does not have; if the specification is not there, it may have wear."""
+    found = [*_NONE]
+    if certificate.ideal.polynomial is None:
+        found.append(_OUTSIDE)
+    if certificate.about is not None and "wear" not in tomllib.loads(certificate.about.specification):
+        found += _WEAR
+    return sorted(found)
+
+
+def _at_rail(graph: GraphCodes, lane: LanePorts, certificate: Certificate) -> Form:
+    """Whether an input has its lowest or its highest code."""
+    forms, inside = graph.forms, constant(1)
+    for node, port in zip(lane.inputs, certificate.inputs, strict=True):
+        code = graph.codes[node]
+        above = forms.negative(plus(constant(port.lowest), code, -1))
+        below = forms.negative(plus(code, constant(port.highest), -1))
+        inside = forms.times(inside, forms.times(above, below))
+    return plus(constant(1), inside, -1)
+
+
+def _saturated(graph: GraphCodes, lane: LanePorts) -> Form:
+    """Whether the output was limited to its range."""
+    node = graph.nodes[lane.output]
+    if node.entry.op is not Operation.CLAMP:
+        return {}
+    of = graph.seen(node.operands[0], node.stage)
+    below = graph.forms.negative(plus(of, constant(node.entry.low), -1))
+    above = graph.forms.negative(plus(constant(node.entry.high), of, -1))
+    return plus(below, above)

@@ -1,0 +1,77 @@
+"""Which registers and inputs the logic of a netlist depends on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence, Set
+
+from sosmith.verify.parallel.netlist import Netlist
+from sosmith.verify.parallel.text import Bits, Choice, Expression, Joined, Load, Operator, Statement, Word
+
+
+class Dependence:
+    """The registers and inputs that nets, and what registers take over, depend on within a clock.
+
+    Parameters
+    ----------
+    netlist : Netlist
+    cuts : set of str
+        Nets that are taken as inputs.
+    """
+
+    def __init__(self, netlist: Netlist, cuts: Set[str]) -> None:
+        self._netlist, self._cuts = netlist, cuts
+        self._reached: dict[str, frozenset[str]] = {}
+
+    def of_net(self, name: str) -> frozenset[str]:
+        """Return what a net depends on: itself, if it is a register or an input."""
+        if name not in self._reached:
+            drivers = None if name in self._cuts else self._netlist.drivers.get(name)
+            self._reached[name] = frozenset()  # within a loop, which `Evaluation` refuses
+            self._reached[name] = frozenset({name}) if drivers is None else self.of(driver.value for driver in drivers)
+        return self._reached[name]
+
+    def of(self, values: Iterable[Expression]) -> frozenset[str]:
+        """Return what expressions depend on; of a memory, what its address does."""
+        found: set[str] = set()
+        for value in values:
+            for name in _nets(value):
+                found |= self.of_net(name)
+        return frozenset(found)
+
+    def of_conditions(self, statements: Sequence[Statement]) -> frozenset[str]:
+        """Return what it depends on whether statements load anything."""
+        return self.of(_conditions(statements))
+
+    def of_loads(self, statements: Sequence[Statement]) -> frozenset[str]:
+        """Return what it depends on what statements load."""
+        return self.of(_values(statements))
+
+
+def _conditions(statements: Sequence[Statement]) -> list[Expression]:
+    found: list[Expression] = []
+    for statement in statements:
+        if isinstance(statement, Choice):
+            found += [statement.condition, *_conditions(statement.yes), *_conditions(statement.no)]
+    return found
+
+
+def _values(statements: Sequence[Statement]) -> list[Expression]:
+    found: list[Expression] = []
+    for statement in statements:
+        if isinstance(statement, Load):
+            found.append(statement.value)
+        else:
+            found += [statement.condition, *_values(statement.yes), *_values(statement.no)]
+    return found
+
+
+def _nets(value: Expression) -> list[str]:
+    if isinstance(value, Bits):
+        return [value.name]
+    if isinstance(value, Word):
+        return _nets(value.address)
+    if isinstance(value, Joined):
+        return [name for part in value.parts for name in _nets(part)]
+    if isinstance(value, Operator):
+        return [name for operand in value.operands for name in _nets(operand)]
+    return []

@@ -1,0 +1,331 @@
+r"""Reads the program of a folded or serial core from its SystemVerilog.
+
+::
+
+    reg [n-1:0] instructions [count-1:0]; instruction    n-1       2a+4   2a+3   a+4   a+3     4   3      0
+    reg [..] words0 [depth-1:0];       word, cut into +--------------+------------+-----------+--------+
+    reg [..] words8 [depth-1:0];       slices         |   constant   |   target   |  address  | opcode |
+    reg [..] total_low, total_high;    accumulator    +--------------+------------+-----------+--------+
+    reg [..] given0, given1, ..        result          signed, as wide  a bits       a bits    see OPCODES
+                                                       as a word
+
+A word has ``digit_bits + 1`` bits, the sum of the slices' widths; 2a is what is left of an instruction. A channel has
+``2**a`` words. What a TAKE stores is found by evaluating the logic before the words' write port for its instruction,
+with the bits of `s_axis_tdata` as unknowns.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import takewhile
+from typing import NamedTuple
+
+from sosmith.verify.graph import require
+from sosmith.verify.program.logic import Bit, Logic
+
+OPCODES = (
+    "multiply",
+    "store",
+    "drop",
+    "finish",
+    "give",
+    "judge",
+    "move",
+    "operand",
+    "product",
+    "product_store",
+    "product_drop",
+    "product_finish",
+    "take",
+)
+"""Opcodes by their codes."""
+
+_OPCODE_BITS = 4
+NUMBER_BITS = 8
+"""Bits of the constant that hold a digit's number."""
+
+
+class Instruction(NamedTuple):
+    """A decoded instruction."""
+
+    opcode: str
+    address: int
+    constant: int
+    target: int
+
+    @property
+    def end(self) -> str:
+        """What it does after its multiplication, as an opcode."""
+        return self.opcode.removeprefix("product_")
+
+    @property
+    def reads(self) -> bool:
+        """Whether its word counts: not if it is multiplied by 0."""
+        return self.opcode != "take" and (
+            self.constant != 0 or self.multiplies_words or self.opcode in {"move", "operand"}
+        )
+
+    @property
+    def writes(self) -> bool:
+        """Whether it writes a word."""
+        return self.end in {"store", "finish", "move", "take"}
+
+    @property
+    def is_early(self) -> bool:
+        """Whether it writes at the clock of the instruction before."""
+        return self.opcode in {"move", "take"}
+
+    @property
+    def multiplies_words(self) -> bool:
+        """Whether it multiplies by the operand register."""
+        return self.opcode.startswith("product")
+
+    def __str__(self) -> str:
+        return f"{self.opcode}, address {self.address}, constant {self.constant}, target {self.target}"
+
+
+@dataclass(frozen=True)
+class ProgramText:
+    """The program of a core, and what its hardware makes of it.
+
+    Attributes
+    ----------
+    codes : tuple of int
+        The instructions, in the order of their addresses.
+    code_bits : int
+        Bits of an instruction.
+    digit_bits : int
+        Bits of a digit, one less than those of a word.
+    words, channels : int
+        Words of a channel, and number of channels.
+    accumulator_bits : int
+        Width of the accumulator.
+    results : tuple of int
+        Width of each part of the result, the lowest first.
+    digits : tuple of list of Bit
+        What TAKE stores for each digit number: the bits of the word, the lowest first. Higher numbers are as the last.
+    """
+
+    codes: tuple[int, ...]
+    code_bits: int
+    digit_bits: int
+    words: int
+    channels: int
+    accumulator_bits: int
+    results: tuple[int, ...]
+    digits: tuple[list[Bit], ...]
+
+    @cached_property
+    def instructions(self) -> tuple[Instruction, ...]:
+        """The decoded instructions."""
+        return tuple(map(self.decoded, self.codes))
+
+    def decoded(self, code: int) -> Instruction:
+        """Decode an instruction; an opcode that does not exist multiplies."""
+        opcode = code % (1 << _OPCODE_BITS)
+        bits = self.words.bit_length() - 1
+        address, target = (code >> start & (self.words - 1) for start in (_OPCODE_BITS, _OPCODE_BITS + bits))
+        value = code >> (self.code_bits - self.digit_bits - 1)
+        return Instruction(
+            OPCODES[opcode] if opcode < len(OPCODES) else OPCODES[0],
+            address,
+            value - (value >> self.digit_bits << (self.digit_bits + 1)),
+            target,
+        )
+
+    def part(self, target: int) -> int | None:
+        """Return the part of the result that GIVE writes; None if there is no such part."""
+        if len(self.results) == 1:
+            return 0
+        return target if target < len(self.results) else None
+
+    def named(self, number: int) -> str:
+        """Name of an instruction, for messages."""
+        return f"instruction {number} ({self.instructions[number]})"
+
+
+def read_program(text: str) -> ProgramText:
+    """Read the program from a core's SystemVerilog.
+
+    Raises
+    ------
+    RejectedError
+        If the text has no program, one that can be loaded at run time, or one that cannot be decoded.
+    """
+    text = without_comments(text)
+    require("s_axil_" not in text, "the program must be fixed to be checked, not loadable at run time")
+    memories = _memories(text)
+    require("instructions" in memories, "the core must be folded or serial to have a program, not parallel")
+    codes, code_bits = memories["instructions"]
+    slices = sorted((int(name[5:]), *memory) for name, memory in memories.items() if re.fullmatch(r"words\d+", name))
+    widths = {name: int(top or 0) + 1 for top, name in _REGISTER.findall(text)}
+    widths = {name.lstrip("\\"): width for name, width in widths.items()}
+    accumulator = [widths[name] for name in ("total_low", "total_high") if name in widths]
+    require(bool(slices) and len(accumulator) == 2, "the core must have words and an accumulator beside its program")
+    word_bits = sum(width for _, _, width in slices)
+    address_bits, odd = divmod(code_bits - _OPCODE_BITS - word_bits, 2)
+    depth, words = len(slices[0][1]), 1 << max(address_bits, 0)
+    require(
+        address_bits > 0 and not odd and depth % words == 0 and all(len(held) == depth for _, held, _ in slices),
+        f"an instruction must have an opcode, two addresses and a constant as wide as a word, not {code_bits} bits "
+        f"for {depth} words of {word_bits} bits",
+    )
+    for address in range(depth):
+        held = sum(content[address] << low for low, content, _ in slices)
+        first = int(address % words == words - 1)
+        require(held == first, f"word {address} must hold {first} before the first sample, not {held}")
+    for number, code in enumerate(codes):
+        opcode = code % (1 << _OPCODE_BITS)
+        require(opcode < len(OPCODES), f"instruction {number} must have an opcode below {len(OPCODES)}, not {opcode}")
+    return ProgramText(
+        codes=tuple(codes),
+        code_bits=code_bits,
+        digit_bits=word_bits - 1,
+        words=words,
+        channels=depth // words,
+        accumulator_bits=sum(accumulator),
+        results=_results(widths),
+        digits=_digits(text, widths, word_bits, _OPCODE_BITS + 2 * address_bits),
+    )
+
+
+def _results(widths: Mapping[str, int]) -> tuple[int, ...]:
+    """Return the widths of the registers that hold a result: one that leaves as it is has the name of its port."""
+    found = tuple(widths[name] for name in sorted(widths, key=_number_of) if re.fullmatch(r"given\d+", name))
+    return found or tuple(width for name, width in widths.items() if name == _OUTPUT)
+
+
+def without_comments(text: str) -> str:
+    """Return a text without its comments.
+
+    Raises
+    ------
+    RejectedError
+        If anything else in it could hide words.
+    """
+    text = _COMMENT.sub("", text)
+    require(
+        _HIDING.search(text) is None,
+        "the text must have no comments over lines and no directives, which can hide words",
+    )
+    return text
+
+
+_COMMENT = re.compile(r"^ *(?://.*|/\*(?:(?!\*/).)*\*/)$", re.MULTILINE)  # that ends on its line
+_HIDING = re.compile(r"/\*|`")
+_MEMORY = re.compile(r"^ *reg (?:\[(\d+):0\] )?(\S+) *\[(\d+):0\];$", re.MULTILINE)
+_HELD = re.compile(r"^ *(\S+?) *\[(\d+)\] = (\d+'\w+);$", re.MULTILINE)
+_LOOP = re.compile(r"^ *for \(i = (\d+); i < (\d+); i = i \+ 1\) (\S+?) *\[i\] = (\d+'\w+);$", re.MULTILINE)
+_REGISTER = re.compile(r"^ *(?:output )?reg (?:\[(\d+):0\] )?(\S+) *(?:=.*)?;$", re.MULTILINE)
+
+
+_MAX_WORDS = 1 << 24
+_OUTPUT = "m_axis_tdata"
+
+
+def _words(text: str) -> Iterator[tuple[int, int, str, int]]:
+    """Yield the first address, the one behind the last, the memory and the value of words that are given together."""
+    for name, address, value in _HELD.findall(text):
+        yield int(address), int(address) + 1, name, _number(value)
+    for first, end, name, value in _LOOP.findall(text):
+        count = int(end) - int(first)
+        require(count <= _MAX_WORDS, f"a loop must be over at most {_MAX_WORDS} words, not {count}")
+        yield int(first), int(end), name, _number(value)
+
+
+def _memories(text: str) -> dict[str, tuple[list[int], int]]:
+    """Return the contents and the width of each memory."""
+    contents: dict[str, dict[int, int]] = {}
+    for first, end, name, value in _words(text):
+        held = contents.setdefault(name.lstrip("\\"), {})
+        for address in range(first, end):
+            require(address not in held, f"word {address} of {name} must be given once, not twice")
+            held[address] = value
+    found = {}
+    for top, name, last in _MEMORY.findall(text):
+        plain, depth, width = name.lstrip("\\"), int(last) + 1, int(top or 0) + 1
+        held = contents.get(plain, {})
+        require(plain not in found, f"the memory {plain} must be declared once, not twice")
+        require(sorted(held) == list(range(depth)), f"all {depth} words of {plain} must be given, not {len(held)}")
+        require(max(held.values()) < 1 << width, f"the words of {plain} must have {width} bits, not more")
+        found[plain] = [held[address] for address in range(depth)], width
+    return found
+
+
+def _number(token: str) -> int:
+    """Value of a sized constant."""
+    found = re.fullmatch(r"\d+'(?:h([0-9a-f]+)|d(\d+)|b([01]+))", token)
+    require(found is not None, f"the word of a memory must be a number, not {token}")
+    assert found is not None
+    return int(found[1], 16) if found[1] else int(found[2] or found[3], 10 if found[2] else 2)
+
+
+def _number_of(name: str) -> tuple[int, str]:
+    """Sort the registers of a family, whose names end in their numbers."""
+    return int(re.sub(r"\D", "", name) or 0), name
+
+
+def _digits(text: str, registers: Mapping[str, int], word_bits: int, shift: int) -> tuple[list[Bit], ...]:
+    """Return what a TAKE of each number stores, directly or through the register `moved`.
+
+    A register of one bit is 0, unless it says that there is an instruction: while words are cleared, one of them is 1.
+    """
+    logic = Logic(text)
+    slices = [int(low) for low in re.findall(r"^ *words(\d+)\[.*?\] <= ", text, re.MULTILINE)]
+    require(len(set(slices)) == len(slices), "the words must have one write port")
+    writes = [_written(text, rf"words{low}\[.*?\]") for low in sorted(slices)]
+    moved = _moved(text, word_bits) if "moved" in registers else []
+
+    def stored(number: int) -> list[Bit]:
+        code = OPCODES.index("take") | number << shift
+        bound = {
+            name: [int(re.fullmatch(r"valid\d+", name) is not None)] for name, width in registers.items() if width == 1
+        }
+        bound["aresetn"] = [1]
+        bound |= {
+            name: [code >> i & 1 for i in range(width)]
+            for name, width in registers.items()
+            if re.fullmatch(r"instruction\d+", name)
+        }
+        bits = [bit for write in writes for bit in write.bits(logic, bound)]
+        through = bits == [("moved", i) for i in range(word_bits)]
+        return [bit for write in moved for bit in write.bits(logic, bound)] if moved and through else bits
+
+    last = stored((1 << NUMBER_BITS) - 1)
+    return (*takewhile(lambda digit: digit != last, map(stored, range(1 << NUMBER_BITS))), last)
+
+
+class _Write(NamedTuple):
+    """What is written to a register or a memory: `value`, or with an `else`, `otherwise` unless `condition` holds."""
+
+    condition: str
+    value: str
+    otherwise: str
+
+    def bits(self, logic: Logic, bound: Mapping[str, Sequence[Bit]]) -> list[Bit]:
+        """Return the bits of it, with the given bits for some of the signals."""
+        is_other = self.otherwise and logic.value(self.condition, bound) == [0]
+        return logic.value(self.otherwise if is_other else self.value, bound)
+
+
+def _moved(text: str, word_bits: int) -> list[_Write]:
+    """Return what is written to `moved`, the lowest bits first: at once, or in slices where some may be cleared."""
+    slices = re.findall(r"^ *(?:if \(.*\) )?moved\[(\d+)(?::(\d+))?\] <= ", text, re.MULTILINE)
+    if not slices:
+        return [_written(text, "moved")]
+    ends = sorted((int(low or high), int(high)) for high, low in slices)
+    starts = [0, *(high + 1 for _, high in ends)]
+    whole = starts == [*(low for low, _ in ends), word_bits]
+    require(whole, f"each of the {word_bits} bits of moved must be written at one place")
+    return [_written(text, rf"moved\[{high}(?::{low})?\]") for low, high in ends]
+
+
+def _written(text: str, register: str) -> _Write:
+    """Return what is written to a register or a memory; the condition of a write without an `else` does not count."""
+    write = rf"^ *(?:if \((.*)\) )?{register} <= (.*);(?:\n *else {register} <= (.*);)?$"
+    found = re.findall(write, text, re.MULTILINE)
+    require(len(found) == 1, f"there must be one place where {register} is written, not {len(found)}")
+    return _Write(*found[0])

@@ -1,0 +1,167 @@
+"""Holds a certificate against the words of its specification, read by code of its own.
+
+The specification's numbers are taken as they are written, as decimal fractions. Ports, allowed error and calibration
+must equal the certificate's entries exactly. The filter is derived again from its words, by
+`sosmith.verify.specified.ideal_filter`; the certificate's rational sections must be so close to it that every
+claim holds against it as well.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+from fractions import Fraction
+from itertools import zip_longest
+from pathlib import Path
+from typing import Any
+
+from sosmith.verify.certificate_file import Certificate, PortEntry
+from sosmith.verify.graph import RejectedError, require
+from sosmith.verify.l1_response import UndecidedError
+from sosmith.verify.specified.filter_distance import distance
+from sosmith.verify.specified.ideal_filter import stated_filter
+from sosmith.verify.specified.sections_file import sections_in
+
+_CALIBRATED = {"voltage": "V", "temperature": "degC"}
+"""Inputs of a calibration, in the order of the ports, and their units."""
+
+_START = "steady"
+"""How a filter starts if the specification does not say."""
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """What of a specification a certificate was held against.
+
+    Attributes
+    ----------
+    core : str
+        "instrument", "filter" or "calibration": the part of the specification that the certificate is about.
+    distance : Fraction or None
+        Bound on the worst-case peak gain of the difference between the specified filter and the certificate's rational
+        one, without unit; None without a filter.
+    fitted : bool
+        Whether the calibration is fitted to measurements: its coefficients are then not in the specification.
+    """
+
+    core: str
+    distance: Fraction | None
+    fitted: bool
+
+
+def check_specification(certificate: Certificate, text: str, margin: Fraction, folder: Path = Path()) -> Agreement:
+    """Hold a proven certificate against the TOML `text` of a specification.
+
+    Parameters
+    ----------
+    certificate : Certificate
+    text : str
+        The specification, which has been found to be valid.
+    margin : Fraction
+        Peak gain by which the ideal filter may differ, from `sosmith.verify.verification.Verdict`.
+    folder : Path
+        Where the specification lies: the `sos_file` of its filter is relative to it.
+
+    Raises
+    ------
+    RejectedError
+        For the first disagreement.
+    """
+    try:
+        tree = tomllib.loads(text.removeprefix("\ufeff"), parse_float=Decimal)
+    except (ValueError, ArithmeticError, RecursionError):
+        raise RejectedError("the specification must be TOML") from None
+    try:
+        return _checked(certificate, tree, margin, folder)
+    except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
+        raise RejectedError(f"the specification must be valid and complete, not: {error!r}") from None
+
+
+def _checked(certificate: Certificate, tree: Mapping[str, Any], margin: Fraction, folder: Path) -> Agreement:
+    polynomial, sections = certificate.ideal.polynomial, certificate.ideal.sections
+    core = "filter" if polynomial is None else "instrument" if sections else "calibration"
+    calibration: Mapping[str, Any] | None = tree.get("calibration")
+    _equal("the name", certificate.name, tree["name"])
+    unit = tree["output"].get("unit", "")
+    output = _port("y" if calibration is None else "clearance", tree["output"], unit)
+    inputs = [
+        _port(name, tree["input"][name], unit if calibration is None else _CALIBRATED[name])
+        for name in (tree["input"] if calibration is None else _CALIBRATED)
+    ]
+    if core == "filter" and calibration is not None:  # the filter alone takes what the calibration would give it
+        inputs = [output.model_copy(update={"name": f"{output.name}_in"})]
+    _equal("the number of inputs", len(certificate.inputs), len(inputs))
+    for found, stated in zip((*certificate.inputs, certificate.output), (*inputs, output), strict=True):
+        for key in PortEntry.model_fields:
+            _equal(f"{key} of {stated.name}", getattr(found, key), getattr(stated, key))
+    allowed = tree["output"].get("max_error", "faithful")
+    _equal("max_error", certificate.max_error, output.lsb if allowed == "faithful" else _number(allowed))
+    fitted = False
+    if polynomial is not None:
+        if calibration is None:
+            raise RejectedError("the calibration must be left out as specified")
+        fitted = "data" in calibration
+        if not fitted:
+            _check_polynomial(polynomial, calibration["coefficients"])
+    require(bool(sections) or core == "calibration", "the filter must not be left out")
+    if sections:
+        stated = tree.get("hardware", {}).get("start", _START)
+        _equal("the start of the filter", certificate.ideal.start or "zero", stated)
+        flagged = certificate.claims.settling is not None
+        _equal("whether samples are flagged until the filter has settled", flagged, stated == "zero")
+    return Agreement(core, _filter_distance(certificate, tree, margin, folder) if sections else None, fitted)
+
+
+def _filter_distance(certificate: Certificate, tree: Mapping[str, Any], margin: Fraction, folder: Path) -> Fraction:
+    table, rate = dict(tree["filter"]), _number(tree["sample_rate"])
+    decimates, entry = table.pop("decimate", None), certificate.decimation
+    table.pop("hold", None)  # how often a result leaves, which changes none
+    correction = Fraction(0)
+    if decimates != "auto":
+        _equal("the factor of the decimator", 1 if entry is None else entry.factor, decimates or 1)
+    if entry is not None:
+        _equal("the edge of the pass band", entry.edge, _number(table["cutoff"]) / rate)
+        rate, correction = rate / entry.factor, entry.correction
+    if "sos_file" in table:
+        table["sos"] = sections_in(folder / table.pop("sos_file"))
+    try:
+        apart = distance(stated_filter(table, rate, correction), certificate.ideal.sections)
+    except UndecidedError as error:
+        raise RejectedError(f"the filter could not be compared with the specified one: {error}") from None
+    require(
+        apart <= margin,
+        f"the filter must be the specified one within a peak gain of {float(margin):.3g}, "
+        f"not differ from it by up to {float(apart):.3g}",
+    )
+    return apart
+
+
+def _check_polynomial(found: Sequence[Sequence[Fraction]], stated: Sequence[Sequence[Any]]) -> None:
+    for i, (row, words) in enumerate(zip_longest(found, stated, fillvalue=())):
+        for j, (value, word) in enumerate(zip_longest(row, words, fillvalue=0)):
+            _equal(f"coefficient [{i}][{j}] of the calibration", value, _number(word))
+
+
+def _port(name: str, table: Mapping[str, Any], unit: str) -> PortEntry:
+    bits, signed = table["bits"], table.get("signed", False)
+    low, high = map(_number, table["range"])
+    return PortEntry(
+        name=name,
+        bits=bits,
+        signed=signed,
+        lsb=(high - low) / 2**bits,
+        zero=Fraction(0) if signed else low,
+        unit=unit,
+    )
+
+
+def _number(word: Any) -> Fraction:
+    if isinstance(word, bool) or not isinstance(word, int | Decimal):
+        raise TypeError(f"{word!r} must be a number")
+    return Fraction(word)
+
+
+def _equal(what: str, found: object, stated: object) -> None:
+    require(found == stated, f"{what} must be {stated} as specified, not {found}")
