@@ -18,15 +18,15 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from benchmarks import upset_simulation
+from benchmarks.upset_simulation import Fate, Target
 from rich.progress import Progress
-from sosmith.benchmarks.upset_simulation import Fate, Target
 
 from sosmith.gen.architecture import Architecture
 from sosmith.gen.core import design_core
 from sosmith.gen.output.core_facts import StreamFacts
 from sosmith.gen.specification.specification import load
 from sosmith.hdl.plan.streams import dest_width, fields
-from sosmith.sim import upsets
 from sosmith.sim.stream_packing import pack, random_order
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -93,7 +93,7 @@ CORES = tuple(
 )
 
 
-def places_of(target: Target, kind: str) -> tuple[upsets.Place, ...]:
+def places_of(target: Target, kind: str) -> tuple[upset_simulation.Place, ...]:
     """Return the places of a kind; two bits are told only where one is corrected."""
     if kind == "memories":
         return target.memories
@@ -113,7 +113,7 @@ def built(core: Core, folder: Path) -> Target:
     chance = np.random.default_rng(1)
     codes = np.stack([chance.integers(p.lowest, p.highest + 1, (samples, core.channels)) for p in ports], axis=2)
     facts = StreamFacts(fields=fields(ports), dest_width=dest_width(core.channels))
-    return upsets.build(architecture, pack(codes, random_order(samples, core.channels, 1), facts), folder)
+    return upset_simulation.build(architecture, pack(codes, random_order(samples, core.channels, 1), facts), folder)
 
 
 def campaign(cores: tuple[Core, ...], most: int | None) -> list[dict[str, Any]]:
@@ -132,7 +132,9 @@ def campaign(cores: tuple[Core, ...], most: int | None) -> list[dict[str, Any]]:
                         places, runs, seed, double=kind.startswith("two"), progress=lambda *_: bar.advance(task)
                     )
                     bits = sum(place.depth * place.width for place in places)
-                    rows.append({**core._asdict(), "kind": kind, "bits": bits, "runs": runs, **upsets.counted(found)})
+                    rows.append(
+                        {**core._asdict(), "kind": kind, "bits": bits, "runs": runs, **upset_simulation.counted(found)}
+                    )
                 else:
                     bar.advance(task, runs)
     return rows

@@ -108,8 +108,8 @@ class Evidence:
     unsettled : ndarray of bool or None
         The samples that the hardware flagged as such; None if it has no flag for that.
     uncertainty : Mapping or None
-        The uncertainty budget of a reading, as `sosmith.instrument.uncertainty.instrument_budget.budget_json` has it; None if
-        nothing is known of what the calibration is worth.
+        The uncertainty budget of a reading, in the types of JSON; None if nothing is known of what the calibration is
+        worth.
     shown_channel : int or None
         Channel that the sample arrays are of, where they are of one of several.
     filter : FilterFacts or None

@@ -1,7 +1,7 @@
 """Scenario files: days of operation described in TOML, and the traces generated from them.
 
-The format is defined in `sosmith.instrument.scenarios.schema`. A trace is the concatenation of all excerpts; its true value
-is the clearance without vehicle motion.
+The format is defined in `sosmith.instrument.scenarios.schema`. A trace is the concatenation of all excerpts; its true
+value is the clearance without vehicle motion.
 """
 
 from __future__ import annotations

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from sosmith.gen.core import CoreDesign
+from sosmith.gen.stimuli.core import bench_of
 from sosmith.instrument.scenarios.catalogue import SCENARIOS, emulate
 from sosmith.instrument.scenarios.file import emulate_file, load_scenario, range_notes
 from sosmith.instrument.scenarios.vehicle_clearance import vehicle_clearance

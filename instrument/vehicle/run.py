@@ -58,8 +58,8 @@ def run(
 
     Springs, dampers and small motions of the contacts are linear and are solved exactly for forces that are linear
     between samples at `MIN_RATE` or more. The nonlinear model adds to these forces what the contacts exert beyond the
-    linear ones (`sosmith.instrument.vehicle.nonlinear_motion`): creep forces that friction limits, and flanges. The linear
-    model does without; `sosmith.instrument.vehicle.limits` reports where it would need them.
+    linear ones (`sosmith.instrument.vehicle.nonlinear_motion`): creep forces that friction limits, and flanges. The
+    linear model does without; `sosmith.instrument.vehicle.limits` reports where it would need them.
 
     Parameters
     ----------

@@ -5,8 +5,8 @@ r"""Models of converters on an SPI in a simulator under cocotb; they fail the te
     cs_n n, sck, mosi --> SpiBus: one model for each chip select --> miso
                             checks the times, tells the models       pulled up; wrong until the output is valid
 
-Figures of timing are those of `sosmith.model.converters.spi_converter`, which names the data sheets. What the models say
-in which clock is written here once more, from the data sheets, and shares nothing with the hardware.
+Figures of timing are those of `sosmith.model.converters.spi_converter`, which names the data sheets. What the models
+say in which clock is written here once more, from the data sheets, and shares nothing with the hardware.
 """
 
 from __future__ import annotations

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from sosmith.benchmarks.upset_simulation import Fate, Hit, Target
+from benchmarks.upset_simulation import Fate, Hit, Target
 from tests.formal.small import leaky, resonator
 from tests.gen.test_architecture import design_in
 

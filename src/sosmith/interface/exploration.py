@@ -175,6 +175,7 @@ def explore(
     >>> found
     <sosmith.Exploration sos_filter: 4 points, ... on the front>
     """
+    from sosmith.instrument.scenarios.traces import default_traces
     from sosmith.instrument.uncertainty.instrument_budget import budget_in_json
     from sosmith.sim.exploration.confirmation import confirmed
     from sosmith.sim.exploration.parameters import default_parameters
