@@ -28,6 +28,12 @@ def test_no_room_imports_from_one_above(room: str) -> None:
     assert upward == set()
 
 
+@pytest.mark.parametrize(("room", "other"), [("instrument", "sim"), ("sim", "instrument"), ("verify", "gen")])
+def test_rooms_side_by_side_know_nothing_of_each_other(room: str, other: str) -> None:
+    names = {name for path in modules() if path.parts[0] == room for name in imported(path)}
+    assert {name for name in names if name.startswith(f"sosmith.{other}.")} == set()
+
+
 @pytest.mark.parametrize("room", WITH_SUB_ROOMS)
 def test_sub_rooms_import_in_no_circle(room: str) -> None:
     parts = [part for floor in floors(room) for part in floor]
@@ -35,7 +41,7 @@ def test_sub_rooms_import_in_no_circle(room: str) -> None:
 
 
 def test_the_verifier_shares_nothing_with_what_it_checks() -> None:
-    inside = [path for path in modules() if path.parts[:2] == ("gen", "verifier")]
+    inside = [path for path in modules() if path.parts[0] == "verify"]
     assert len(inside) > 3
     allowed = ("sosmith.verify", "sosmith.model.errors")
     shared = {f"{path} from {name}" for path in inside for name in imported(path) if not name.startswith(allowed)}

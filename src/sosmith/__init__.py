@@ -2,7 +2,7 @@
 
 The public interface is the names in `__all__`; docs/python.md documents them. Everything is imported on first use, so
 that importing the package itself is fast. The rooms behind it, each importing only from those to its right:
-``cli -> studio -> interface -> host -> sim -> gen -> hdl -> model``.
+``cli -> studio -> interface -> host -> instrument, sim -> gen -> hdl, verify -> model``.
 """
 
 from __future__ import annotations

@@ -64,7 +64,7 @@ def run(folder: Path, source: str, name: str, job: dict[str, Any]) -> list[list[
     )
     with patch.object(sys, "path", [str(EXAMPLES.parent), *sys.path]):  # where the simulator's Python looks
         runner.test(
-            test_module="tests.sim.peers_bench",
+            test_module="tests.sim.peers.peers_bench",
             hdl_toplevel=name,
             build_dir=folder / "build",
             test_dir=folder,

@@ -12,7 +12,7 @@ from sosmith.gen.output.verilog import to_rtlil, to_verilog
 from sosmith.hdl.reload import ReloadPort
 from sosmith.sim.simulators import PLAIN_ASSERTIONS
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 
 @pytest.fixture(autouse=True)
@@ -29,7 +29,7 @@ def results(tmp_path: Path, verilog: str) -> tuple[int, int]:
     runner.build(sources=[source], hdl_toplevel="port", build_dir=tmp_path, timescale=("1ns", "1ps"))
     with contextlib.suppress(SystemExit):  # what the runner makes of a failed test
         runner.test(
-            test_module="tests.sim.axi_lite_peer",
+            test_module="tests.sim.peers.axi_lite_peer",
             hdl_toplevel="port",
             hdl_toplevel_lang="verilog",
             build_dir=tmp_path,
