@@ -139,10 +139,13 @@ def _fits(program: ProgramText, graph: Graph, state: State) -> bool:
 
 
 def _floors(graph: Graph, series: Mapping[int, list[int]], held: set[int], *, own_words: bool) -> dict[int, int]:
-    """Find the states that are the floor of one of those in words, at every sample."""
+    """Find the states that are the floor of one of those in words, at every sample.
+
+    Slow sections look alike in the samples of a run: what is a floor by the graph comes before what only looks like one.
+    """
     floors = {}
     for node in series.keys() - held:
-        for other in sorted(held):
+        for other in sorted(held, key=lambda other: (not _takes_floor(graph, node, other), other)):
             shift = graph.nodes[other].entry.frac - graph.nodes[node].entry.frac
             same = shift >= 0 and all(b >> shift == a for a, b in zip(series[node], series[other], strict=True))
             if same and (not own_words or _takes_floor(graph, node, other)):

@@ -111,6 +111,27 @@ def test_a_slow_filter(realization: str) -> None:
     assert core.check().instructions == len(core.program.instructions)
 
 
+def slow_audio(order: int, cutoff: str, architecture: str) -> Made:
+    text = (EXAMPLES / "audio_lowpass.toml").read_text(encoding="utf-8")
+    text = re.sub(r"order = \d+", f"order = {order}", re.sub(r"cutoff = [\d.]+", f"cutoff = {cutoff}", text))
+    return made(design_core(specified(text)), architecture)
+
+
+def test_sections_that_look_alike_for_a_long_time() -> None:
+    """What the graph says is the floor of a state is held by that one, not by one that is the same in the samples."""
+    core = slow_audio(10, "4.8", "folded")
+    assert core.check().instructions == len(core.program.instructions)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("architecture", ["folded", "serial"])
+@pytest.mark.parametrize("cutoff", ["2.4", "4.8", "24.0", "400.0", "6000.0"])
+@pytest.mark.parametrize("order", range(1, 13))
+def test_orders_and_cutoffs(order: int, cutoff: str, architecture: str) -> None:
+    core = slow_audio(order, cutoff, architecture)
+    assert core.check().instructions == len(core.program.instructions)
+
+
 NOTHING = re.sub(
     r"filter = .*",
     "filter = { sos = [[0.25, 0.5, 0.25, 1.0, -0.5, 0.25], [1.0, 0.0, 0.0, 1.0, 0.0, 0.0]] }",
