@@ -141,7 +141,7 @@ def _fits(program: ProgramText, graph: Graph, state: State) -> bool:
 def _floors(graph: Graph, series: Mapping[int, list[int]], held: set[int], *, own_words: bool) -> dict[int, int]:
     """Find the states that are the floor of one of those in words, at every sample.
 
-    Slow sections look alike in the samples of a run: what is a floor by the graph comes before what only looks like one.
+    Slow sections look alike in the samples of a run: a floor by the graph comes before what only looks like one.
     """
     floors = {}
     for node in series.keys() - held:
