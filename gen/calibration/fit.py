@@ -17,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
+from sosmith.gen.calibration.acceptance import REQUIRED_R
 from sosmith.gen.calibration.least_squares import Solution, Sums, Term
 from sosmith.model.arrays import Values
 from sosmith.model.errors import SpecificationError
@@ -25,9 +26,6 @@ from sosmith.model.tables.csv_table import CsvTable, check_rows, read_csv_table
 
 COLUMNS = ("clearance_mm", "voltage_V", "temperature_C")
 """Columns of a measurement file, in their documented order."""
-
-REQUIRED_R = 0.975
-"""Adjusted r at which a polynomial is accepted (the paper's section 2.2)."""
 
 MAX_ORDER = 6
 """Highest order tried: 28 terms. The paper needs order 2."""

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
+from sosmith.gen.calibration.acceptance import REQUIRED_R
 from sosmith.gen.calibration.fit import (
-    REQUIRED_R,
     Accept,
     Fit,
     Measurements,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from fractions import Fraction
 
-from sosmith.gen.calibration.fit import REQUIRED_R
+from sosmith.gen.calibration.acceptance import REQUIRED_R
 from sosmith.instrument.paper.comparison import Comparison, Part, compare, plain, table
 from sosmith.instrument.paper.figures import PaperFigures
 from sosmith.model.polynomial import Polynomial

@@ -9,24 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from sosmith.instrument.spectrum.peaks import peaks
 from sosmith.instrument.spectrum.prediction import Prediction
 from sosmith.instrument.spectrum.proposal import Proposal
 from sosmith.instrument.spectrum.settings import SpectrumSettings, Wish
-from sosmith.instrument.spectrum.spectra import Spectrum
+from sosmith.instrument.spectrum.spectra import FINER, Spectrum
 from sosmith.instrument.spectrum.trial import Trial
 from sosmith.model.traces.signal_file import SignalFile
-
-PEAKS = 3
-"""Number of largest amplitudes that are listed."""
-
-
-def peaks(found: Spectrum, count: int = PEAKS) -> list[tuple[float, float]]:
-    """Frequency (Hz) and amplitude of the largest local maxima of the amplitude spectrum, the largest first."""
-    height = found.amplitude / found.sides  # one-sided, so that a line at half the sample rate is a local maximum
-    after = np.append(height[2:], -np.inf)
-    local = np.flatnonzero((height[1:] > height[:-1]) & (height[1:] >= after)) + 1
-    largest = sorted(local, key=lambda k: (-found.amplitude[k], k))[:count]
-    return [(float(found.frequency[k]), float(found.amplitude[k])) for k in largest]
 
 
 def ripple(found: Spectrum, edge: float) -> tuple[float, float]:
@@ -35,7 +24,8 @@ def ripple(found: Spectrum, edge: float) -> tuple[float, float]:
     The dB value grows as the disturbance shrinks, and depends on the unit: with delta in mm it is the level of the
     unfiltered signal below 1 mm, not an attenuation that a filter must have. It is infinite if delta is 0.
     """
-    delta = float(np.max(found.amplitude[found.frequency >= edge], initial=0.0))
+    frequency = np.arange(len(found.fine_amplitude)) * found.step / FINER
+    delta = float(np.max(found.fine_amplitude[frequency >= edge], initial=0.0))
     return delta, -20 * math.log10(delta) if delta > 0 else math.inf
 
 

@@ -19,6 +19,13 @@ SEGMENTS = 8
 MIN_SEGMENT = 16
 """Smallest number of samples in a segment."""
 
+FINER = 8
+"""Amplitudes are also known at an eighth of the frequency step: a sine wave between two of these loses 0.3 % at most
+(1.2 % with the window boxcar), where one between two of the steps loses up to 15 % (36 %)."""
+
+_TRENDS = {"linear": 1, "constant": 0, "none": None}
+"""Degrees of the trends of the settings."""
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Spectrum:
@@ -36,6 +43,10 @@ class Spectrum:
     amplitude : ndarray
         Amplitude of a sine wave at that frequency, U; at half the sample rate, that of samples of alternating sign;
         at zero frequency, the mean.
+    fine_amplitude : ndarray, shape (FINER (n - 1) + 1,) or one less
+        The same at the frequencies ``k step / FINER``.
+    leakage : ndarray
+        Amplitude that a sine wave of amplitude 1 shows, at most, ``k step / FINER`` or more away from its frequency.
     averages : int
         Number of segments.
     degrees_of_freedom : float
@@ -48,6 +59,8 @@ class Spectrum:
     density: Array
     sides: npt.NDArray[np.int64]
     amplitude: Array
+    fine_amplitude: Array
+    leakage: Array
     averages: int
     degrees_of_freedom: float
     lower: float
@@ -96,26 +109,79 @@ def spectrum(values: Array, sample_rate: float, settings: SpectrumSettings) -> S
     """
     length = segment_length(len(values), sample_rate, settings)
     overlap = min(int(settings.overlap * length), length - 1)
-    detrend = False if settings.detrend == "none" else settings.detrend
-    common = {"fs": sample_rate, "window": settings.window, "nperseg": length, "noverlap": overlap, "detrend": detrend}
-    frequency, density = signal.welch(values, scaling="density", **common)
-    _, power = signal.welch(values, scaling="spectrum", **common)
-    sides = np.full(len(frequency), 2)
-    sides[[0, -1] if length % 2 == 0 else [0]] = 1
-    averages = 1 + (len(values) - length) // (length - overlap)
     window = signal.get_window(settings.window, length)
+    detrend = _TRENDS[settings.detrend]
+    common = {
+        "fs": sample_rate,
+        "window": window,
+        "noverlap": overlap,
+        "detrend": lambda segments: segments - trend(segments, detrend),
+    }
+    frequency, density = signal.welch(values, scaling="density", **common)
+    if detrend is not None:
+        density[0] = 0.0  # but for a residue
+    _, fine = signal.welch(values, scaling="spectrum", nfft=FINER * length, **common)
+    fine_amplitude = np.sqrt(_sides(len(fine), FINER * length) * fine)
+    averages = 1 + (len(values) - length) // (length - overlap)
     freedom = degrees_of_freedom(window, length - overlap, averages)
     tail = (1 - settings.confidence) / 2
     return Spectrum(
         frequency=frequency,
         density=density,
-        sides=sides,
-        amplitude=np.sqrt(sides * power),
+        sides=_sides(len(frequency), length),
+        amplitude=np.sqrt(_sides(len(frequency), length) * fine[::FINER]),
+        fine_amplitude=fine_amplitude,
+        leakage=_leakage(window),
         averages=averages,
         degrees_of_freedom=freedom,
         lower=float(freedom / stats.chi2.ppf(1 - tail, freedom)),
         upper=float(freedom / stats.chi2.ppf(tail, freedom)),
     )
+
+
+def _sides(count: int, length: int) -> npt.NDArray[np.int64]:
+    sides = np.full(count, 2)
+    sides[[0, -1] if length % 2 == 0 else [0]] = 1
+    return sides
+
+
+def _leakage(window: Array) -> Array:
+    """Magnitude of the window's transform relative to its peak, at most, from each frequency on."""
+    transform = np.abs(np.fft.rfft(window, FINER * len(window))) / np.sum(window)
+    return np.maximum.accumulate(transform[::-1])[::-1]
+
+
+def trend(segments: Array, degree: int | None, *, power: int = 2) -> Array:
+    """Fit a constant or a line to each segment, shape (..., n), by least squares weighted by a power of a Hann window.
+
+    A line that is fitted without weights takes a slope of up to 6 A / (pi k) from a sine wave with k cycles in the
+    segment, and subtracting that leaves a line in the spectrum that is not in the signal. With weights that fall to
+    zero, the slope of a sine wave falls with the power ``2 power + 1`` of k, next to nothing from four cycles on.
+    A higher power takes more of the noise for a trend: fitted lines of white noise have a mean square of 2 / n of its
+    own without weights, 3.3 / n with the first power, 6.5 / n with the second.
+
+    Parameters
+    ----------
+    degree : int or None
+        0 for a constant, 1 for a line; None for no trend, which is 0 throughout.
+    power : int
+        At least 0, which is no weights.
+
+    Returns
+    -------
+    ndarray, shape (..., n)
+    """
+    if degree is None:
+        return np.zeros_like(segments)
+    count = segments.shape[-1]
+    weights = signal.get_window("hann", count) ** power
+    weights = weights / np.sum(weights)
+    mean = np.sum(weights * segments, axis=-1, keepdims=True)
+    if degree == 0:
+        return np.broadcast_to(mean, segments.shape)
+    time = np.arange(count) - np.sum(weights * np.arange(count))
+    slope = np.sum(weights * time * segments, axis=-1, keepdims=True) / np.sum(weights * time**2)
+    return mean + slope * time
 
 
 def slow_rms(values: Array, length: int) -> float:
@@ -125,7 +191,7 @@ def slow_rms(values: Array, length: int) -> float:
     """
     count = len(values) // length
     cut = (values - np.mean(values))[: count * length].reshape(count, length)
-    return float(np.sqrt(np.mean((cut - signal.detrend(cut, axis=1)) ** 2)))
+    return float(np.sqrt(np.mean(trend(cut, 1, power=1) ** 2)))
 
 
 def degrees_of_freedom(window: Array, step: int, averages: int) -> float:

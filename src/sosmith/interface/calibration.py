@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from sosmith.gen.calibration.fit import REQUIRED_R, Fit, Measurements, fit, read_measurements, residuals
+from sosmith.gen.calibration.acceptance import REQUIRED_R
+from sosmith.gen.calibration.fit import Fit, Measurements, fit, read_measurements, residuals
 from sosmith.gen.specification.toml_text import toml_text
 from sosmith.instrument.calibration.uncertainty import Uncertainty, of_polynomial
 from sosmith.interface.notebook import table_html

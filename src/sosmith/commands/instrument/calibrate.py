@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from sosmith.gen.calibration.fit import REQUIRED_R
+from sosmith.gen.calibration.acceptance import REQUIRED_R
 from sosmith.gen.picture import format_of
 from sosmith.instrument.calibration.acceptance import DEFAULT_RANGES, METHODS, Method, Range
 from sosmith.model.errors import ShortfallError, SpecificationError

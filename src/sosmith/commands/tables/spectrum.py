@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from rich.markup import escape
 
 from sosmith.commands.tables.console import TableConsole, new_table
+from sosmith.instrument.spectrum.peaks import peaks
 from sosmith.instrument.spectrum.proposal import Proposal
-from sosmith.instrument.spectrum.report import peaks, ripple
+from sosmith.instrument.spectrum.report import ripple
 from sosmith.instrument.spectrum.survey import SignalSpectra
 from sosmith.instrument.spectrum.trial import Trial
 
