@@ -77,4 +77,5 @@ def _noise_amplitude(found: Spectrum) -> Array:
     median = np.append(0.0, np.median(around, axis=-1))
     rare = stats.chi2.isf(FALSE_LINES / len(found.fine_amplitude), freedom) / stats.chi2.ppf(0.5, freedom)
     per_density = found.amplitude[1:] ** 2 / np.where(found.density[1:] > 0, found.density[1:], np.inf)
-    return np.sqrt(rare * median * np.max(per_density))
+    limit: Array = np.sqrt(rare * median * np.max(per_density))
+    return limit

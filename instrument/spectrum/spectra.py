@@ -181,7 +181,8 @@ def trend(segments: Array, degree: int | None, *, power: int = 2) -> Array:
         return np.broadcast_to(mean, segments.shape)
     time = np.arange(count) - np.sum(weights * np.arange(count))
     slope = np.sum(weights * time * segments, axis=-1, keepdims=True) / np.sum(weights * time**2)
-    return mean + slope * time
+    line: Array = mean + slope * time
+    return line
 
 
 def slow_rms(values: Array, length: int) -> float:
