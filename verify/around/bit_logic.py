@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from sosmith.verify.graph import require
 from sosmith.verify.parallel.netlist import Driver, Netlist
-from sosmith.verify.parallel.text import Bits, Expression, Joined, Load, Number, Operator, Statement, Word
+from sosmith.verify.reader.syntax import Bits, Expression, Joined, Load, Number, Operator, Statement, Word
 
 _WIDENED = frozenset({"+", "-", "*", "&", "|", "^", "~", "?"})
 _COMPARED = frozenset({"==", "!=", "<", ">", "<=", ">="})

@@ -50,8 +50,8 @@ from sosmith.verify.certificate_file import Certificate, DecimationEntry, PortEn
 from sosmith.verify.graph import RejectedError, require
 from sosmith.verify.parallel.forms import shifted
 from sosmith.verify.parallel.netlist import Netlist
-from sosmith.verify.parallel.text import Bits, Choice, Module, Statement, Word
 from sosmith.verify.program.normal_form import Form, constant, plus
+from sosmith.verify.reader.syntax import Bits, Choice, Module, Statement, Word
 
 STATE = "state of the decimator"
 """Signal: which of the registers in `STATES` is 1."""

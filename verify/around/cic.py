@@ -55,8 +55,8 @@ from sosmith.verify.graph import require
 from sosmith.verify.parallel.control import SINK, SOURCE
 from sosmith.verify.parallel.forms import shifted
 from sosmith.verify.parallel.netlist import Netlist
-from sosmith.verify.parallel.text import Bits, Module
 from sosmith.verify.program.normal_form import Form, constant, plus
+from sosmith.verify.reader.syntax import Bits, Module
 
 _DATA_REGISTERS = frozenset({"sum", "comb", "difference", "o_data"})
 _NAME = re.compile(r"(\w*?)(\d*)(?:_control(\d))?")

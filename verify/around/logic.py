@@ -19,8 +19,8 @@ from sosmith.verify.parallel.equality import same_word
 from sosmith.verify.parallel.evaluation import Evaluation
 from sosmith.verify.parallel.forms import Forms, shifted
 from sosmith.verify.parallel.netlist import Netlist
-from sosmith.verify.parallel.text import Word
 from sosmith.verify.program.normal_form import Form, constant, plus
+from sosmith.verify.reader.syntax import Word
 
 Ranges = Sequence[tuple[int, int]]
 """Ranges that make up all values of a signal, told apart by the cases."""

@@ -25,7 +25,7 @@ from sosmith.verify.graph import require
 from sosmith.verify.parallel.check import FLAGS as LEAVING_FLAGS
 from sosmith.verify.parallel.check import OUTPUT, OUTPUT_DEST, HardwareVerdict, Inside, check_modules
 from sosmith.verify.parallel.control import RESET, SINK, SOURCE
-from sosmith.verify.parallel.text import Bits, Expression, Joined, Module, Number
+from sosmith.verify.reader.syntax import Bits, Expression, Joined, Module, Number
 
 _TOP, _CORE = "", "core"
 _VALID, _READY = "m_axis_tvalid", "s_axis_tready"

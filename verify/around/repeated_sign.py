@@ -21,7 +21,7 @@ from sosmith.verify.around.bit_logic import Bit, BitLogic
 from sosmith.verify.certificate_file import PortEntry
 from sosmith.verify.graph import require
 from sosmith.verify.parallel.netlist import flattened
-from sosmith.verify.parallel.text import Bits, Choice, Module, Statement
+from sosmith.verify.reader.syntax import Bits, Choice, Module, Statement
 
 _OUTPUT = "m_axis_tdata"
 

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 from sosmith.verify.graph import RejectedError, require
 from sosmith.verify.parallel.control import RESET
 from sosmith.verify.parallel.netlist import Netlist, flattened
-from sosmith.verify.parallel.text import Bits, Expression, Joined, Module, Number, read_modules
+from sosmith.verify.reader.source import read_source
+from sosmith.verify.reader.syntax import Bits, Expression, Joined, Module, Number
 
 AHEAD, BEHIND, CIC, HOLDER = "ahead.", "behind.", "decimator.", "holder."
 """Prefixes of ports of the calibration and of the core, and of nets of the decimator and of what holds results."""
@@ -22,8 +23,6 @@ OF_INPUT = 2
 """Flags that are told of inputs: input_at_rail and outside_calibration."""
 
 CLOCK, DATA, DEST = "aclk", "s_axis_tdata", "s_axis_tdest"
-_UNDEFINED = re.compile(r"\b(\d+)'hx+")
-_MODULE = re.compile(r"^module .*?^endmodule$", re.MULTILINE | re.DOTALL)
 
 
 @dataclass(frozen=True)
@@ -196,12 +195,9 @@ def read_core(text: str, name: str) -> dict[str, Module]:
     Raises
     ------
     RejectedError
-        If the first one has another name, or the text has anything that cannot be read.
+        If there is no such module, or the text has anything that cannot be read.
     """
-    modules = read_modules(_MODULE.sub(lambda found: _with_unknowns(found[0]), text))
-    first = next(iter(modules))
-    require(first == name, f"the first module must be {name}, not {first}")
-    return modules
+    return read_source(text, name).modules
 
 
 def read_around(modules: Mapping[str, Module], name: str) -> Netlist:
@@ -213,19 +209,6 @@ def read_around(modules: Mapping[str, Module], name: str) -> Netlist:
             boxes[inside] = Module(ports=ports, widths={port: modules[inside].widths[port] for port in ports})
     require(f"{name}_behind" in boxes, f"the core must have a module {name}_behind")
     return flattened({**modules, **boxes}, CLOCK)
-
-
-def _with_unknowns(module: str) -> str:
-    """Write an input that nothing drives in place of each undefined value."""
-    wires: list[str] = []
-
-    def unknown(found: re.Match[str]) -> str:
-        wires.append(f"  wire [{int(found[1]) - 1}:0] \\?{len(wires)} ;\n")
-        return f"\\?{len(wires) - 1} "
-
-    head, end, rest = module.partition(";\n")
-    rest = _UNDEFINED.sub(unknown, rest)
-    return head + end + "".join(wires) + rest
 
 
 def passed_on(netlist: Netlist, value: Expression) -> Iterator[str]:

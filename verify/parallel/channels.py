@@ -24,8 +24,8 @@ from sosmith.verify.graph import RejectedError, require
 from sosmith.verify.parallel.control import RESET, SINK, SOURCE, Buffer, Control, Entrance, Search
 from sosmith.verify.parallel.equality import same_word
 from sosmith.verify.parallel.netlist import Netlist
-from sosmith.verify.parallel.text import Bits, Expression, Load, Statement
 from sosmith.verify.program.normal_form import constant, plus
+from sosmith.verify.reader.syntax import Bits, Expression, Load, Statement
 
 DEST = "s_axis_tdest"
 _BUFFER = ("o_valid", "full", "i_valid", "o_ready")

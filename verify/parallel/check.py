@@ -1,7 +1,7 @@
 """Proves that the hardware of a parallel core computes the graph of its certificate, for all inputs, stalls and resets.
 
 The core is read from its SystemVerilog, which is what tools synthesize, and nothing else is needed to read it
-(`sosmith.verify.parallel.text`). All its logic is then followed with normal forms in place of numbers::
+(`sosmith.verify.reader.syntax`). All its logic is then followed with normal forms in place of numbers::
 
     certificate --> graph --> code of each node, a form of inputs and of what DELAY nodes hold ---+
                                                                                                   v
@@ -41,8 +41,9 @@ from sosmith.verify.parallel.graph_codes import GraphCodes, LanePorts
 from sosmith.verify.parallel.netlist import Netlist, flattened
 from sosmith.verify.parallel.pipeline import DATA, Pipeline
 from sosmith.verify.parallel.split import split
-from sosmith.verify.parallel.text import Module, read_modules
 from sosmith.verify.program.normal_form import Form, constant, plus
+from sosmith.verify.reader.source import read_modules
+from sosmith.verify.reader.syntax import Module
 
 CLOCK = "aclk"
 OUTPUT, FLAGS, OUTPUT_DEST = "m_axis_tdata", "m_axis_tuser", "m_axis_tdest"
@@ -101,7 +102,7 @@ def check_hardware(text: str, certificate: Certificate, channels: int = 1, lanes
         first node that is wrong, or the register that moves samples wrongly.
     """
     require("s_axil_" not in text, "the constants must be fixed to be checked, not loadable at run time")
-    modules = read_modules(text)
+    modules = read_modules(text, certificate.name)
     require(channels == 1 or lanes == 1, f"several samples a clock must be those of one channel, not of {channels}")
     return check_modules(modules, certificate, channels, Inside(lanes=lanes))
 

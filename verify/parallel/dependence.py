@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence, Set
 
 from sosmith.verify.parallel.netlist import Netlist
-from sosmith.verify.parallel.text import Bits, Choice, Expression, Joined, Load, Operator, Statement, Word
+from sosmith.verify.reader.syntax import Bits, Choice, Expression, Joined, Load, Operator, Statement, Word
 
 
 class Dependence:

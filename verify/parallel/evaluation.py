@@ -15,7 +15,8 @@ from sosmith.verify.graph import RejectedError, require
 from sosmith.verify.parallel.forms import Forms, shifted
 from sosmith.verify.parallel.netlist import Netlist
 from sosmith.verify.parallel.split import sliced
-from sosmith.verify.parallel.text import (
+from sosmith.verify.program.normal_form import ONE, Form, constant, plus
+from sosmith.verify.reader.syntax import (
     Bits,
     Choice,
     Expression,
@@ -26,7 +27,6 @@ from sosmith.verify.parallel.text import (
     Statement,
     Word,
 )
-from sosmith.verify.program.normal_form import ONE, Form, constant, plus
 
 Content = Callable[[str], Form]
 """What a register or an input holds, as a word of its width."""

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from sosmith.verify.graph import require
-from sosmith.verify.parallel.text import (
+from sosmith.verify.reader.syntax import (
     Bits,
     Choice,
     Expression,

@@ -37,9 +37,9 @@ from sosmith.verify.parallel.forms import Forms, shifted
 from sosmith.verify.parallel.graph_codes import GraphCodes
 from sosmith.verify.parallel.netlist import Netlist
 from sosmith.verify.parallel.state_memories import State, StateMemories
-from sosmith.verify.parallel.text import Statement
 from sosmith.verify.parallel.turn_memories import Counter, TurnMemories
 from sosmith.verify.program.normal_form import Form, constant, plus
+from sosmith.verify.reader.syntax import Statement
 
 DATA = "s_axis_tdata"
 

@@ -20,7 +20,7 @@ from itertools import pairwise
 from typing import TypeGuard
 
 from sosmith.verify.parallel.netlist import Netlist, Register, bits_name, retargeted
-from sosmith.verify.parallel.text import Bits, Expression, Joined, Load, Number, Operator, Statement
+from sosmith.verify.reader.syntax import Bits, Expression, Joined, Load, Number, Operator, Statement
 
 _FOLLOWED = 4
 """Most nets that are followed one after the other: from the output buffer there is one."""

@@ -27,8 +27,8 @@ from sosmith.verify.parallel.control import Case, Control, UndecidedError, cases
 from sosmith.verify.parallel.evaluation import Evaluation
 from sosmith.verify.parallel.graph_codes import GraphCodes
 from sosmith.verify.parallel.netlist import Memory, Netlist
-from sosmith.verify.parallel.text import Choice, Expression, Load, Statement, Word
 from sosmith.verify.program.normal_form import Form
+from sosmith.verify.reader.syntax import Choice, Expression, Load, Statement, Word
 
 NOWHERE = -2
 """A position before all samples."""

@@ -70,7 +70,11 @@ class ProgramVerdict:
 
 
 def check_program(
-    text: str, certificate: Certificate, *, calibrated: Sequence[tuple[int, int]] | None = None
+    text: str,
+    certificate: Certificate,
+    *,
+    top: str | None = None,
+    calibrated: Sequence[tuple[int, int]] | None = None,
 ) -> ProgramVerdict:
     """Prove that the program in a core's SystemVerilog computes the graph of a certificate.
 
@@ -80,6 +84,8 @@ def check_program(
         SystemVerilog of a folded or serial core.
     certificate : Certificate
         Its certificate, which `verify` has accepted.
+    top : str or None
+        Name of its module; None for that of the certificate.
     calibrated : sequence of (int, int) or None
         Smallest and largest code of each input that is not outside the calibration; None to take what the program has,
         since the certificate does not say.
@@ -95,7 +101,7 @@ def check_program(
         If the program computes anything else, or the text has no program that can be checked; the sentence names the
         first instruction that is wrong.
     """
-    program = read_program(text)
+    program = read_program(text, top or certificate.name)
     graph = joined(certificate)
     run = _proven(program, graph, certificate)
     ends = [(port.lowest, port.highest) for port in certificate.inputs]

@@ -17,7 +17,7 @@ with the bits of `s_axis_tdata` as unknowns.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import takewhile
@@ -25,6 +25,8 @@ from typing import NamedTuple
 
 from sosmith.verify.graph import require
 from sosmith.verify.program.logic import Bit, Logic
+from sosmith.verify.reader.source import read_source
+from sosmith.verify.reader.syntax import Module
 
 OPCODES = (
     "multiply",
@@ -147,22 +149,26 @@ class ProgramText:
         return f"instruction {number} ({self.instructions[number]})"
 
 
-def read_program(text: str) -> ProgramText:
-    """Read the program from a core's SystemVerilog.
+def read_program(text: str, top: str | None = None) -> ProgramText:
+    """Read the program from a core's SystemVerilog, whose module is `top`.
 
     Raises
     ------
     RejectedError
         If the text has no program, one that can be loaded at run time, or one that cannot be decoded.
     """
-    text = without_comments(text)
-    require("s_axil_" not in text, "the program must be fixed to be checked, not loadable at run time")
-    memories = _memories(text)
-    require("instructions" in memories, "the core must be folded or serial to have a program, not parallel")
-    codes, code_bits = memories["instructions"]
-    slices = sorted((int(name[5:]), *memory) for name, memory in memories.items() if re.fullmatch(r"words\d+", name))
-    widths = {name: int(top or 0) + 1 for top, name in _REGISTER.findall(text)}
-    widths = {name.lstrip("\\"): width for name, width in widths.items()}
+    source = read_source(text, top)
+    require("s_axil_" not in source.text, "the program must be fixed to be checked, not loadable at run time")
+    require(len(source.modules) == 1, f"a program must be in the only module, not in one of {len(source.modules)}")
+    (module,) = source.modules.values()
+    require("instructions" in module.depths, "the core must be folded or serial to have a program, not parallel")
+    codes, code_bits = _held(module, "instructions"), module.widths["instructions"]
+    slices = sorted(
+        (int(name[5:]), _held(module, name), module.widths[name])
+        for name in module.depths
+        if re.fullmatch(r"words\d+", name)
+    )
+    widths = {name: module.widths[name] for name in module.registers}
     accumulator = [widths[name] for name in ("total_low", "total_high") if name in widths]
     require(bool(slices) and len(accumulator) == 2, "the core must have words and an accumulator beside its program")
     word_bits = sum(width for _, _, width in slices)
@@ -188,7 +194,7 @@ def read_program(text: str) -> ProgramText:
         channels=depth // words,
         accumulator_bits=sum(accumulator),
         results=_results(widths),
-        digits=_digits(text, widths, word_bits, _OPCODE_BITS + 2 * address_bits),
+        digits=_digits(source.text, widths, word_bits, _OPCODE_BITS + 2 * address_bits),
     )
 
 
@@ -198,69 +204,12 @@ def _results(widths: Mapping[str, int]) -> tuple[int, ...]:
     return found or tuple(width for name, width in widths.items() if name == _OUTPUT)
 
 
-def without_comments(text: str) -> str:
-    """Return a text without its comments.
-
-    Raises
-    ------
-    RejectedError
-        If anything else in it could hide words.
-    """
-    text = _COMMENT.sub("", text)
-    require(
-        _HIDING.search(text) is None,
-        "the text must have no comments over lines and no directives, which can hide words",
-    )
-    return text
-
-
-_COMMENT = re.compile(r"^ *(?://.*|/\*(?:(?!\*/).)*\*/)$", re.MULTILINE)  # that ends on its line
-_HIDING = re.compile(r"/\*|`")
-_MEMORY = re.compile(r"^ *reg (?:\[(\d+):0\] )?(\S+) *\[(\d+):0\];$", re.MULTILINE)
-_HELD = re.compile(r"^ *(\S+?) *\[(\d+)\] = (\d+'\w+);$", re.MULTILINE)
-_LOOP = re.compile(r"^ *for \(i = (\d+); i < (\d+); i = i \+ 1\) (\S+?) *\[i\] = (\d+'\w+);$", re.MULTILINE)
-_REGISTER = re.compile(r"^ *(?:output )?reg (?:\[(\d+):0\] )?(\S+) *(?:=.*)?;$", re.MULTILINE)
-
-
-_MAX_WORDS = 1 << 24
 _OUTPUT = "m_axis_tdata"
 
 
-def _words(text: str) -> Iterator[tuple[int, int, str, int]]:
-    """Yield the first address, the one behind the last, the memory and the value of words that are given together."""
-    for name, address, value in _HELD.findall(text):
-        yield int(address), int(address) + 1, name, _number(value)
-    for first, end, name, value in _LOOP.findall(text):
-        count = int(end) - int(first)
-        require(count <= _MAX_WORDS, f"a loop must be over at most {_MAX_WORDS} words, not {count}")
-        yield int(first), int(end), name, _number(value)
-
-
-def _memories(text: str) -> dict[str, tuple[list[int], int]]:
-    """Return the contents and the width of each memory."""
-    contents: dict[str, dict[int, int]] = {}
-    for first, end, name, value in _words(text):
-        held = contents.setdefault(name.lstrip("\\"), {})
-        for address in range(first, end):
-            require(address not in held, f"word {address} of {name} must be given once, not twice")
-            held[address] = value
-    found = {}
-    for top, name, last in _MEMORY.findall(text):
-        plain, depth, width = name.lstrip("\\"), int(last) + 1, int(top or 0) + 1
-        held = contents.get(plain, {})
-        require(plain not in found, f"the memory {plain} must be declared once, not twice")
-        require(sorted(held) == list(range(depth)), f"all {depth} words of {plain} must be given, not {len(held)}")
-        require(max(held.values()) < 1 << width, f"the words of {plain} must have {width} bits, not more")
-        found[plain] = [held[address] for address in range(depth)], width
-    return found
-
-
-def _number(token: str) -> int:
-    """Value of a sized constant."""
-    found = re.fullmatch(r"\d+'(?:h([0-9a-f]+)|d(\d+)|b([01]+))", token)
-    require(found is not None, f"the word of a memory must be a number, not {token}")
-    assert found is not None
-    return int(found[1], 16) if found[1] else int(found[2] or found[3], 10 if found[2] else 2)
+def _held(module: Module, name: str) -> list[int]:
+    """Return what the words of a memory hold before the first clock."""
+    return [module.held[name][address] for address in range(module.depths[name])]
 
 
 def _number_of(name: str) -> tuple[int, str]:

@@ -175,7 +175,8 @@ class Certificate:
                 decimator = check_decimator(text, self.entries, channels)
             if architecture in {"folded", "serial"}:
                 progress("program", 0, 0)
-                program = check_program(behind_decimator(text, self.entries), at_lower_rate(self.entries))
+                behind = None if found is None else f"{self.name}_behind"
+                program = check_program(behind_decimator(text, self.entries), at_lower_rate(self.entries), top=behind)
             elif architecture == "online" and self.entries.claims.online is None:
                 raise RejectedError("the certificate of an online core must claim the residuals of its units")
             elif architecture == "parallel":
@@ -192,7 +193,7 @@ class Certificate:
                     before = check_ahead(text, self.entries, channels)
                 else:
                     progress("program of the calibration", 0, 0)
-                    before = check_program(module_in(text, ahead.name), ahead)
+                    before = check_program(module_in(text, self.name, ahead.name), ahead)
         if rebuild:
             from sosmith.gen.output.rebuild import rebuilt
 

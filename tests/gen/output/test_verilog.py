@@ -18,8 +18,7 @@ import sosmith
 from sosmith.gen.output.board_top import board_top
 from sosmith.gen.output.verilog import _MODULE, _with_plain_names, converted, to_rtlil, to_verilog
 from sosmith.verify.graph import RejectedError
-from sosmith.verify.parallel.text import read_modules
-from sosmith.verify.program.text import _memories
+from sosmith.verify.reader.source import read_modules
 
 WORDS = [3] * 2 + [7] * 20 + [1] + [0] * 30 + [2] * 7
 """Runs of every kind: short ones, long ones, a single word."""
@@ -37,7 +36,7 @@ class Table(Component):
 
     def elaborate(self, platform: object) -> Elaboratable:
         m = Module()
-        m.submodules.table = table = Memory(shape=4, depth=len(WORDS), init=WORDS)
+        m.submodules.lookup = table = Memory(shape=4, depth=len(WORDS), init=WORDS)
         port = table.read_port()
         m.d.comb += [port.addr.eq(self.address), self.word.eq(port.data)]
         return m
@@ -96,9 +95,7 @@ def test_long_runs_are_loops(text: str) -> None:
     assert len(re.findall(r"^ +\S+ ?\[\d+\] = ", text, re.MULTILINE)) == 2 + 1 + 7
 
 
-def test_both_readers_find_the_same_words(text: str) -> None:
-    ((found, bits),) = _memories(text).values()
-    assert (found, bits) == (WORDS, 4)
+def test_the_reader_finds_the_words(text: str) -> None:
     (held,) = (module.held for module in read_modules(text).values() if module.held)
     assert [words[address] for words in held.values() for address in sorted(words)] == WORDS
 
@@ -116,14 +113,11 @@ def test_both_readers_find_the_same_words(text: str) -> None:
 )
 def test_a_wrong_loop_is_rejected(right: str, wrong: str, message: str, text: str) -> None:
     assert right in text
-    for read in (_memories, read_modules):
-        with pytest.raises(RejectedError, match=f"^{message}$"):
-            read(text.replace(right, wrong))
+    with pytest.raises(RejectedError, match=f"^{message}$"):
+        read_modules(text.replace(right, wrong))
 
 
-def test_a_loop_in_other_steps_is_no_loop_to_either(text: str) -> None:
+def test_a_loop_in_other_steps_is_no_loop(text: str) -> None:
     other = text.replace("i = i + 1", "i = i + 2")
     with pytest.raises(RejectedError, match=r"^a loop over words must go in steps of 1$"):
         read_modules(other)
-    with pytest.raises(RejectedError, match=r"^all 60 words of \w+ must be given, not 10$"):
-        _memories(other)

@@ -70,7 +70,7 @@ def test_sentences() -> None:
     rejected(
         ".s_axis_tdata(s_axis_tdata),\n",
         ".s_axis_tdata(s_axis_tdata[30:0]),\n",
-        "ahead.s_axis_tdata must be what a decimator has there, not another value",
+        "the port s_axis_tdata of ahead must have 32 bits, not 31",
     )
     rejected(
         ".m_axis_tready(i_ready),",
@@ -112,7 +112,7 @@ def test_digits_that_are_wrong_are_rejected() -> None:
     rejected(text.replace(driven, "  assign port_486_0 = given1[9:1];\n"), digits)
     rejected(text.replace(driven, "  assign port_486_0 = added[8:0];\n"), digits)
     rejected(text.replace(driven, "  assign port_486_0 = total_high[8:0];\n"), digits)
-    rejected(text.replace(driven, ""), digits)
+    rejected(text.replace(driven, ""), "each bit of port_486_0 in plain_ahead that is read must be driven")
     rejected(
         text.replace(driven, "  assign port_486_0 = given0[8:0];\n"),
         "the digits of the calibration must be 0..1, each once",

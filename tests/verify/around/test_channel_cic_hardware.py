@@ -158,5 +158,5 @@ def test_a_port_that_is_too_narrow_for_the_channel_is_rejected() -> None:
     narrow = behind.replace(" [7:0] s_axis_tdest", " s_axis_tdest").replace(
         "s_axis_tdest[1:0]", "{ 1'h0, s_axis_tdest }"
     )
-    with pytest.raises(RejectedError, match=r"^behind\.s_axis_tdest must have 2 bits, not 1$"):
+    with pytest.raises(RejectedError, match=r"^the port s_axis_tdest of behind must have 1 bits, not 8$"):
         check_decimator(text.replace(behind, narrow), certificate, 3)

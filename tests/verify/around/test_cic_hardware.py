@@ -98,7 +98,7 @@ def test_sentences() -> None:
     wide = text.replace("reg [1:0] phase = 2'h0;", "reg [2:0] phase = 3'h0;").replace("= & phase;", "= & phase[1:0];")
     wide = re.sub(r"phase <= (n\d+)\[1:0\]", r"phase <= \1[2:0]", wide)
     check_rejected(CASES[0][0], wide, "decimator.phase must have 2 bits, not 3")
-    rejected("sum2 <= n38[11:0];", "sum2 <= sum3;", "decimator.sum3 must be declared to be used")
+    rejected("sum2 <= n38[11:0];", "sum2 <= sum3;", "sum3 must be declared in plain_decimator before it is used")
     other = designed(CASES[0][0]._replace(hold=False))[1]
     with pytest.raises(RejectedError, match=r"^results must not be held, as specified$"):
         check_decimator(text, other)

@@ -7,7 +7,8 @@ import random
 from collections.abc import Iterator, Mapping, Sequence
 
 from sosmith.verify.parallel.netlist import Netlist, flattened
-from sosmith.verify.parallel.text import (
+from sosmith.verify.reader.source import read_modules
+from sosmith.verify.reader.syntax import (
     Bits,
     Expression,
     Joined,
@@ -16,7 +17,6 @@ from sosmith.verify.parallel.text import (
     Operator,
     Statement,
     Word,
-    read_modules,
 )
 
 _COMPARISONS = {

@@ -15,8 +15,8 @@ from sosmith.verify.graph import RejectedError
 from sosmith.verify.parallel.equality import same_word
 from sosmith.verify.parallel.forms import Forms, shifted
 from sosmith.verify.parallel.netlist import flattened
-from sosmith.verify.parallel.text import read_modules
 from sosmith.verify.program.normal_form import ONE, Form, constant, plus
+from sosmith.verify.reader.source import read_modules
 
 Value = Callable[[list[int]], int]
 LIMITS = [(-8, 7), (0, 15), (-3, 100), (0, 1)]

@@ -8,7 +8,7 @@ from tests.verify.small_specifications import PLAIN, STEADY_INSTRUMENT
 from sosmith.verify.graph import RejectedError
 from sosmith.verify.parallel.netlist import Netlist, flattened
 from sosmith.verify.parallel.split import split
-from sosmith.verify.parallel.text import read_modules
+from sosmith.verify.reader.source import read_modules
 
 MODULE = """
 module top(clk, a, b, e, q);

@@ -1,4 +1,4 @@
-"""How the checker of programs reads SystemVerilog: numbers, write ports, and parts of what is assigned."""
+"""How the checker of programs reads SystemVerilog: write ports, and parts of what is assigned."""
 
 import re
 
@@ -10,12 +10,7 @@ from sosmith.hdl.plan.instructions import encoded
 from sosmith.model.dataflow.program import Opcode
 from sosmith.verify.graph import RejectedError
 from sosmith.verify.program.logic import Logic
-from sosmith.verify.program.text import _number, read_program
-
-
-@pytest.mark.parametrize(("token", "value"), [("4'b0110", 6), ("6'd10", 10), ("8'h1f", 31)])
-def test_numbers_in_every_base(token: str, value: int) -> None:
-    assert _number(token) == value
+from sosmith.verify.program.text import read_program
 
 
 def test_the_parts_of_a_sum_that_is_assigned_to_several_signals() -> None:
