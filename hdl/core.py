@@ -61,11 +61,10 @@ from sosmith.hdl.status import (
     OF_INPUT,
     at_rail,
     flag_count,
-    in_order,
     members_beside_decimator,
     outside_calibration,
+    status_of_result,
     with_fault,
-    worn,
 )
 from sosmith.model.dataflow.datapath import Datapath, Stage
 from sosmith.model.reload.constants import constants
@@ -223,10 +222,20 @@ class Core(wiring.Component):
             settling = flagged[0] if flagged else settling
             if guarded:
                 (fault,) = self._delayed(m, buffer.advance, [fault], "fault_judged")
-        wear = worn(m, self.datapath, code, last.channel, buffer.advance, self.protect)
-        flags = in_order(self.datapath, status, saturated, wear, settling)
+        found = status_of_result(
+            m,
+            self.datapath,
+            code,
+            inputs=status,
+            saturated=saturated,
+            settling=settling,
+            channel=last.channel,
+            enable=buffer.advance,
+            protect=self.protect,
+        )
+        flags = found.flags
         if guard is not None:
-            fault = fault | (valid & wear.failed)
+            fault = fault | (valid & found.failed)
             flags = Cat(flags, guard.fault | fault)
             m.submodules.guard = guard
             m.d.comb += guard.failed.eq(fault & buffer.advance)
@@ -235,7 +244,7 @@ class Core(wiring.Component):
             enters = (first.valid | first.scrub) & buffer.advance
             m.d.comb += empty.eq(self._restart(m, reduce(or_, causes), enters, stages, buffer.advance))
         if guard is not None and port is not None:
-            self._report(m, guard, port, stages, valid & wear.corrected & buffer.advance)
+            self._report(m, guard, port, stages, valid & found.corrected & buffer.advance)
         self._hand_out(m, buffer, valid, code, flags if len(flags) == live else flags[:live], channel)
         return m
 
