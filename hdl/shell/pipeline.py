@@ -16,28 +16,34 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from amaranth.hdl import Module, Signal, Value
+from amaranth.hdl import Const, Module, Signal, Value
 from amaranth.lib import wiring
+
+from sosmith.hdl.status import NEVER
 
 
 class Sample(NamedTuple):
-    """What goes through a pipeline with the codes of a sample; None for what a pipeline does not have.
+    """What goes through a pipeline with the codes of a sample.
 
     Attributes
     ----------
     valid : Value
         Whether there is a sample.
-    bank, channel : Value or None
-        Bank of constants that it uses, and its channel.
-    scrub, fault : Value or None
-        Whether there is a scrub in place of a sample, and whether a wrong bit was found for either.
+    bank : Value or None
+        Bank of constants that it uses; None if there is only one.
+    fault : Value
+        Whether a wrong bit was found for it.
+    channel : Value
+        Its channel; no bits if there is only one.
+    scrub : Value
+        Whether there is a scrub in place of a sample.
     """
 
     valid: Value
     bank: Value | None = None
-    fault: Value | None = None
-    channel: Value | None = None
-    scrub: Value | None = None
+    fault: Value = NEVER
+    channel: Value = Const(0, 0)
+    scrub: Value = NEVER
 
 
 def through(

@@ -176,11 +176,10 @@ class Shell(wiring.Component):
         if self.channels > 1:
             m.d.comb += self.m_axis_tdest.eq(handed.channel)
 
-    def join_port(self, m: Module, port: ReloadPort, *, may_swap: Value, shadow_free: Value) -> None:
-        """Connect the reload port to the registers' bus, and tell it when the bank may change."""
+    def join_port(self, m: Module, port: ReloadPort) -> None:
+        """Add the reload port, and connect it to `s_axil_*`."""
         m.submodules.reload_port = port
         forward_slave(m, self, port)
-        m.d.comb += [port.may_swap.eq(may_swap), port.shadow_free.eq(shadow_free)]
 
     @staticmethod
     def report(m: Module, guard: FaultGuard, port: ReloadPort | None, corrected: Value, failed: Value) -> None:
