@@ -16,11 +16,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from amaranth.hdl import Cat, Module, Signal, Value
-from amaranth.lib import wiring
+from amaranth.hdl import Cat, Module, Shape, Signal, Value
+from amaranth.lib import data, wiring
 from amaranth.lib.wiring import In, Out
 
-from sosmith.hdl.plan.streams import dest_width, width
+from sosmith.hdl.plan.streams import dest_width, fields, width
 from sosmith.model.dataflow.status import STATUS_BITS
 from sosmith.model.port import Port
 
@@ -41,6 +41,16 @@ def core_members(inputs: Sequence[Port], output: Port, channels: int = 1, *, lan
     if channels > 1:
         members |= {"s_axis_tdest": In(dest_width(channels)), "m_axis_tdest": Out(dest_width(channels))}
     return members
+
+
+def codes_of(ports: Sequence[Port], tdata: Value) -> list[Value]:
+    """Return the code of each port on ``tdata``: of whole bytes each, or of a single port as wide as its code."""
+    places = {
+        str(k): data.Field(Shape(field.port.bits, field.port.signed), field.offset)
+        for k, field in enumerate(fields(ports))
+    }
+    sample = data.View(data.FlexibleLayout(len(tdata), places), tdata)
+    return [sample[name] for name in places]
 
 
 def extended(code: Value, bits: int) -> Value:

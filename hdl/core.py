@@ -39,50 +39,29 @@ judges wear restarts with new ones, as it would with a fault::
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
 from functools import reduce
 from operator import or_
 from typing import NamedTuple
 
-from amaranth.hdl import Cat, ClockDomain, ClockSignal, Const, Module, Mux, ResetSignal, Signal, Value
-from amaranth.lib import wiring
+from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value
+from amaranth.lib import data
 
-from sosmith.hdl.axi_stream import StreamBuffer, core_members, extended
-from sosmith.hdl.bus.axi_lite import forward_slave, slave_members
-from sosmith.hdl.constant_banks import NO_CONSTANTS, ConstantBanks, Pair
+from sosmith.hdl.axi_stream import StreamBuffer
+from sosmith.hdl.constant_banks import NO_CONSTANTS, ConstantBanks
 from sosmith.hdl.fault_guard import FaultGuard
 from sosmith.hdl.pipelined_logic import banks_in_use
 from sosmith.hdl.plan.parallel_clocks import depths
-from sosmith.hdl.plan.streams import channel_bits, fields
+from sosmith.hdl.plan.streams import channel_bits
 from sosmith.hdl.reload import ReloadPort
+from sosmith.hdl.shell.pipeline import Sample, delayed, through
+from sosmith.hdl.shell.shell import Shell
 from sosmith.hdl.stages.interleaved import InterleavedStage
 from sosmith.hdl.stages.pipelined import PipelinedStage
-from sosmith.hdl.status import (
-    OF_INPUT,
-    at_rail,
-    flag_count,
-    in_order,
-    members_beside_decimator,
-    outside_calibration,
-    with_fault,
-    worn,
-)
-from sosmith.model.dataflow.datapath import Datapath, Stage
+from sosmith.hdl.status import NEVER, status_of_result, with_fault
+from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.reload.constants import constants
-from sosmith.model.reload.registers import ADDRESS_BITS
-
-
-class _Place(NamedTuple):
-    """What goes through the pipeline with the codes: whether there is a sample, its channel, and its bank.
-
-    Besides, whether there is a scrub instead, and whether a wrong bit was found for either.
-    """
-
-    valid: Value
-    channel: Value
-    bank: Value
-    scrub: Value = Const(0, 1)
-    fault: Value = Const(0, 1)
 
 
 class _Swap(NamedTuple):
@@ -105,7 +84,74 @@ class _Swap(NamedTuple):
         return self.pending & self.may
 
 
-class Core(wiring.Component):
+@dataclass(frozen=True)
+class _Parts:
+    """What a core is made of.
+
+    Attributes
+    ----------
+    advance : Value
+        Whether the pipeline moves.
+    stages : list of PipelinedStage or InterleavedStage
+        The stages.
+    banks : ConstantBanks or None
+        Constants that can be loaded.
+    bank, waiting : Signal
+        The bank of samples accepted now, and the banks that samples before the first stage use.
+    guard, swap : FaultGuard, _Swap or None
+        What restarts the core.
+    empty : Signal
+        Whether the pipeline is, if anything restarts the core.
+    """
+
+    advance: Value
+    stages: list[PipelinedStage | InterleavedStage]
+    banks: ConstantBanks | None
+    bank: Signal
+    waiting: Signal
+    guard: FaultGuard | None
+    swap: _Swap | None
+    empty: Signal
+
+    @property
+    def interleaved(self) -> list[InterleavedStage]:
+        """The stages for several channels."""
+        return [stage for stage in self.stages if isinstance(stage, InterleavedStage)]
+
+    @property
+    def causes(self) -> list[Value]:
+        """What clears the states, each of them for one clock."""
+        return [*([] if self.guard is None else [self.guard.restart]), *([] if self.swap is None else [self.swap.now])]
+
+    @property
+    def blocks(self) -> list[Value]:
+        """What keeps samples from entering."""
+        guard, swap = self.guard, self.swap
+        return [*([] if guard is None else [guard.broken]), *([] if swap is None else [swap.pending])]
+
+
+class _Result(NamedTuple):
+    """What leaves the last stage."""
+
+    valid: Value
+    code: Value
+    inputs: Value
+    saturated: Value
+    channel: Value
+    settling: Value
+
+    def later(self, m: Module, advance: Value) -> _Result:
+        """Return the same a clock of the pipeline later; the valid bit alone is reset."""
+        registers = [
+            Signal(value.shape(), name=f"judged{k}", reset_less=k > 0) if len(value) else value
+            for k, value in enumerate(self)
+        ]
+        with m.If(advance):
+            m.d.sync += [register.eq(value) for register, value in zip(registers, self, strict=True) if len(value)]
+        return _Result(*registers)
+
+
+class Core(Shell):
     """A datapath in the parallel architecture: every operation has its own hardware.
 
     Latency: `latency_cycles` of the datapath, without a stall. Throughput: one sample per clock. With several channels,
@@ -141,22 +187,8 @@ class Core(wiring.Component):
 
     Members
     -------
-    aclk : In(1)
-        Clock, rising edge.
-    aresetn : In(1)
-        Synchronous reset, active low.
-    s_axis_tdata, s_axis_tvalid, s_axis_tready
-        Input samples: one field per input port, each extended to whole bytes, the first one lowest.
-    s_axis_tuser : In(flags_given)
-        Flags of the sample; only if they are given.
-    m_axis_tdata, m_axis_tvalid, m_axis_tready
-        Output samples: one field, extended likewise.
-    m_axis_tuser : Out(8)
-        Status of the output sample; the bits are those of `sosmith.model.dataflow.status.Flag`.
-    s_axis_tdest, m_axis_tdest
-        Channel of the sample, in whole bytes; only with several channels.
-    s_axil_*
-        AXI4-Lite slave of a `sosmith.hdl.reload.ReloadPort`; only with a fingerprint.
+    aclk, aresetn, s_axis_*, m_axis_*, s_axil_*
+        As those of `sosmith.hdl.shell.shell.Shell`.
     """
 
     def __init__(
@@ -170,219 +202,135 @@ class Core(wiring.Component):
         flags_given: int = 0,
         before_decimator: bool = False,
     ) -> None:
-        self.protect = protect
         self.adders = adders or [()] * len(datapath.stages)
-        self.datapath = datapath
-        self.channels = channels
-        self.fingerprint = fingerprint
-        self.flags_given = flags_given
-        members = core_members(datapath.inputs, datapath.output, channels)
-        members |= members_beside_decimator(datapath, flags_given, before=before_decimator)
-        super().__init__(members if fingerprint is None else members | slave_members(ADDRESS_BITS))
+        super().__init__(
+            datapath,
+            channels,
+            fingerprint,
+            protect=protect,
+            flags_given=flags_given,
+            before_decimator=before_decimator,
+        )
 
-    def elaborate(self, platform: object) -> Module:
+    def fill(self, m: Module) -> None:
         """Build the pipeline."""
-        m = Module()
-        m.domains.sync = ClockDomain(local=True)
-        m.d.comb += [ClockSignal("sync").eq(self.aclk), ResetSignal("sync").eq(~self.aresetn)]
-        guarded = self.protect != "none"
-        live = min(flag_count(self.datapath) + guarded, len(self.m_axis_tuser))
-        buffer = m.submodules.output_buffer = StreamBuffer(len(self.m_axis_tdata) + live + channel_bits(self.channels))
-        loadable = constants(self.datapath)
-        banks = None if self.fingerprint is None else ConstantBanks(self.datapath, loadable, parity=guarded)
-        stages = [
-            self._stage(m, stage, NO_CONSTANTS if banks is None else banks.of_stage(k), self.adders[k], buffer.advance)
-            for k, stage in enumerate(self.datapath.stages)
-        ]
-        bank = Signal()
-        waiting = Signal(2)
-        guard = FaultGuard(max(1, channel_bits(self.channels))) if guarded else None
-        swap = _Swap(Signal(name="pending"), Signal(name="may_swap")) if self._restarts else None
-        empty = Signal()
-        first, data = self._source(m, stages, (buffer.advance, bank, waiting), (guard, swap), empty)
-        port = None
-        if banks is not None:
-            port = self._reload(m, banks, bank, Cat(waiting, *(component.uses for component in stages)), swap)
-        status = self._status(data)
-        last, (code, *counted) = self._chain(m, stages, first, data)
-        for k in range(sum(depths(self.datapath, self.channels, self.protect))):
-            held = Signal(len(status), name=f"status{k + 1}", reset_less=True)
-            with m.If(buffer.advance):
-                m.d.sync += held.eq(status)
-            status = held
-        saturated, fault = stages[-1].o_saturated, last.fault
-        settling = counted[0][-1] if self.datapath.settles else Const(0, 0)
-        if banks is not None and guarded:
-            fault = fault | (last.valid & Mux(last.bank, banks.wrong[1], banks.wrong[0]))
-        fault = fault & (last.valid | last.scrub)
-        valid, channel = last.valid, last.channel
-        if len(self.datapath.wear) > 1:  # it takes a clock to read the limits of the channel
-            valid, code, status, saturated, channel, *flagged = self._delayed(
-                m, buffer.advance, [valid, code, status, saturated, channel, *[settling] * self.datapath.settles]
+        buffer = self.output_buffer(m)
+        parts = self._parts(m, buffer.advance)
+        first, tdata, given = self._source(m, parts)
+        port = self._reload_port(m, parts)
+        inputs = self.status_of_inputs(tdata, given)
+        last, (code, *counted) = through(m, parts.stages, first, self.codes(tdata))
+        result = _Result(
+            last.valid,
+            code,
+            delayed(m, buffer.advance, inputs, self._depth_of_stages, "status"),
+            parts.stages[-1].o_saturated,
+            last.channel,
+            counted[0][-1] if self.datapath.settles else Const(0, 0),
+        )
+        fault = self._fault_of(m, parts, last)
+        if self._reads_limits:
+            result = result.later(m, buffer.advance)
+        found = status_of_result(
+            m,
+            self.datapath,
+            result.code,
+            inputs=result.inputs,
+            saturated=result.saturated,
+            settling=result.settling,
+            channel=last.channel,
+            enable=buffer.advance,
+            protect=self.protect,
+        )
+        flags = found.flags
+        if parts.guard is not None:
+            fault = fault | (result.valid & found.failed)
+            flags = with_fault(flags, parts.guard.fault | fault)
+            m.submodules.guard = parts.guard
+            corrected = Cat(
+                *(stage.corrected for stage in parts.interleaved), result.valid & found.corrected & buffer.advance
             )
-            settling = flagged[0] if flagged else settling
-            if guarded:
-                (fault,) = self._delayed(m, buffer.advance, [fault], "fault_judged")
-        wear = worn(m, self.datapath, code, last.channel, buffer.advance, self.protect)
-        flags = in_order(self.datapath, status, saturated, wear, settling)
-        if guard is not None:
-            fault = fault | (valid & wear.failed)
-            flags = Cat(flags, guard.fault | fault)
-            m.submodules.guard = guard
-            m.d.comb += guard.failed.eq(fault & buffer.advance)
-        causes = self._causes(guard, swap)
-        if causes:
-            enters = (first.valid | first.scrub) & buffer.advance
-            m.d.comb += empty.eq(self._restart(m, reduce(or_, causes), enters, stages, buffer.advance))
-        if guard is not None and port is not None:
-            self._report(m, guard, port, stages, valid & wear.corrected & buffer.advance)
-        self._hand_out(m, buffer, valid, code, flags if len(flags) == live else flags[:live], channel)
-        return m
+            self.report(m, parts.guard, port, corrected.any(), fault & buffer.advance)
+        self._restart(m, parts, first)
+        self.hand_out(m, buffer, result.valid, [(result.code, flags)], result.channel)
 
-    def _status(self, data: Value) -> Value:
-        """Return the flags that are known with a sample as it comes in."""
-        given = self._given
-        if given and self.channels > 1:
-            given = [data[len(self.s_axis_tdata) :]]  # has been in the buffer with it
-        if self.flags_given == OF_INPUT:
-            return given[0]
-        rail = given[0] if given else at_rail(self.datapath.inputs, data)
-        return Cat(rail, outside_calibration(self.datapath, data))
-
-    @property
-    def _given(self) -> list[Value]:
-        """Flags that come with a sample, if there are any."""
-        return [self.s_axis_tuser] if self.flags_given else []
+    def _parts(self, m: Module, advance: Value) -> _Parts:
+        """Make stages, and what loads and guards them."""
+        loadable = None if self.fingerprint is None else constants(self.datapath)
+        banks = None if loadable is None else ConstantBanks(self.datapath, loadable, parity=self.is_guarded)
+        stages: list[PipelinedStage | InterleavedStage] = []
+        for k, (stage, adders) in enumerate(zip(self.datapath.stages, self.adders, strict=True)):
+            pairs = NO_CONSTANTS if banks is None else banks.of_stage(k)
+            component = (
+                InterleavedStage(stage, self.channels, pairs, protect=self.protect, adders=adders)
+                if self.channels > 1
+                else PipelinedStage(stage, pairs, parity=self.is_guarded, clears=self.restarts, adders=adders)
+            )
+            m.submodules[stage.name] = component
+            m.d.comb += component.advance.eq(advance)
+            stages.append(component)
+        return _Parts(
+            advance,
+            stages,
+            banks,
+            bank=Signal(name="bank"),
+            waiting=Signal(2, name="waiting"),
+            guard=FaultGuard(max(1, channel_bits(self.channels))) if self.is_guarded else None,
+            swap=_Swap(Signal(name="pending"), Signal(name="may_swap")) if self.restarts else None,
+            empty=Signal(name="empty"),
+        )
 
     @property
-    def _restarts(self) -> bool:
-        """Whether the core restarts with other constants."""
-        return self.fingerprint is not None and self.datapath.restarts
+    def _depth_of_stages(self) -> int:
+        return sum(depths(self.datapath, self.channels, self.protect))
 
-    @staticmethod
-    def _causes(guard: FaultGuard | None, swap: _Swap | None) -> list[Value]:
-        """Return what clears the states, each of them for one clock."""
-        return [*([] if guard is None else [guard.restart]), *([] if swap is None else [swap.now])]
+    @property
+    def _reads_limits(self) -> bool:
+        """Whether each channel has limits of wear of its own: it takes a clock to read them."""
+        return len(self.datapath.wear) > 1
 
-    def _chain(
-        self, m: Module, stages: list[PipelinedStage | InterleavedStage], first: _Place, data: Value
-    ) -> tuple[_Place, list[Value]]:
-        """Connect the stages one behind the other; return what is behind the last one, and its outputs."""
-        place = first
-        codes: list[Value] = [data[f.offset : f.offset + f.port.bits] for f in fields(self.datapath.inputs)]
-        for component in stages:
-            m.d.comb += [getattr(component, f"i{k}").eq(code) for k, code in enumerate(codes)]
-            m.d.comb += [component.i_valid.eq(place.valid), component.i_bank.eq(place.bank)]
-            following = place._replace(valid=component.o_valid, bank=component.o_bank)
-            if self.protect != "none":
-                m.d.comb += component.i_fault.eq(place.fault)
-                following = following._replace(fault=component.o_fault)
-            if isinstance(component, InterleavedStage):
-                m.d.comb += component.i_channel.eq(place.channel)
-                following = following._replace(channel=component.o_channel)
-                if self.protect != "none":
-                    m.d.comb += component.i_scrub.eq(place.scrub)
-                    following = following._replace(scrub=component.o_scrub)
-            place, codes = following, [getattr(component, f"o{k}") for k in range(len(component.stage.graph.outputs))]
-        return place, codes
+    def _fault_of(self, m: Module, parts: _Parts, last: Sample) -> Value:
+        """Return whether a wrong bit was found for a result, when its flags are known."""
+        fault = last.fault
+        if not self.is_guarded:
+            return fault
+        if parts.banks is not None:
+            fault = fault | (last.valid & Mux(last.bank, parts.banks.wrong[1], parts.banks.wrong[0]))
+        fault = fault & (last.valid | last.scrub)
+        if not self._reads_limits:
+            return fault
+        judged = Signal(name="fault_judged0")
+        with m.If(parts.advance):
+            m.d.sync += judged.eq(fault)
+        return judged
 
-    def _hand_out(
-        self, m: Module, buffer: StreamBuffer, valid: Value, code: Value, flags: Value, channel: Value
-    ) -> None:
-        """Pass results through the output buffer."""
-        output = extended(code, len(self.m_axis_tdata))
-        m.d.comb += [
-            buffer.i_valid.eq(valid),
-            buffer.i_data.eq(Cat(output, flags, channel)),
-            self.m_axis_tvalid.eq(buffer.o_valid),
-            buffer.o_ready.eq(self.m_axis_tready),
-        ]
-        handed = buffer.o_data[len(output) : len(output) + len(flags)]
-        m.d.comb += [
-            self.m_axis_tdata.eq(buffer.o_data[: len(output)]),
-            self.m_axis_tuser.eq(handed if self.protect == "none" else with_fault(handed[:-1], handed[-1])),
-        ]
-        if self.channels > 1:
-            m.d.comb += self.m_axis_tdest.eq(buffer.o_data[len(output) + len(flags) :])
-
-    def _report(
-        self,
-        m: Module,
-        guard: FaultGuard,
-        port: ReloadPort,
-        stages: list[PipelinedStage | InterleavedStage],
-        corrected: Value,
-    ) -> None:
-        """Let the registers count what was corrected, in the stages and beside them, and what was not."""
-        found = [component.corrected for component in stages if isinstance(component, InterleavedStage)]
-        m.d.comb += [
-            port.corrected.eq(Cat(*found, corrected).any()),
-            port.failed.eq(guard.failed),
-            guard.acknowledge.eq(port.acknowledge),
-        ]
-
-    def _restart(
-        self,
-        m: Module,
-        clears: Value,
-        enters: Value,
-        stages: list[PipelinedStage | InterleavedStage],
-        advance: Value,
-    ) -> Signal:
-        """Clear registers at the clock of a restart; return whether the pipeline is empty, so that one may begin.
-
-        `enters` is whether a sample or a scrub is taken by the first stage at this clock.
-        """
-        remaining = Signal(range(self._depth + 1))
-        with m.If(enters):
-            m.d.sync += remaining.eq(self._depth)
-        with m.Elif(advance & remaining.any()):
+    def _restart(self, m: Module, parts: _Parts, first: Sample) -> None:
+        """Clear registers at the clock of a restart, which may begin when the pipeline is empty."""
+        if not parts.causes:
+            return
+        depth = self._depth_of_stages + self._reads_limits
+        remaining = Signal(range(depth + 1))
+        with m.If((first.valid | first.scrub) & parts.advance):
+            m.d.sync += remaining.eq(depth)
+        with m.Elif(parts.advance & remaining.any()):
             m.d.sync += remaining.eq(remaining - 1)
-        for component in stages:
-            if isinstance(component, PipelinedStage):
-                m.d.comb += component.clear.eq(clears)
-        empty = Signal()
-        m.d.comb += empty.eq(~remaining.any())
-        return empty
+        clears = reduce(or_, parts.causes)
+        for stage in parts.stages:
+            if isinstance(stage, PipelinedStage):
+                m.d.comb += stage.clear.eq(clears)
+        m.d.comb += parts.empty.eq(~remaining.any())
 
-    @property
-    def _depth(self) -> int:
-        """Clocks of the pipeline from the first stage to the output buffer."""
-        return sum(depths(self.datapath, self.channels, self.protect)) + (len(self.datapath.wear) > 1)
-
-    def _delayed(self, m: Module, advance: Value, values: list[Value], name: str = "judged") -> list[Value]:
-        """Return the values a clock of the pipeline later; the first is the valid bit, which alone is reset."""
-        later = [Signal(value.shape(), name=f"{name}{k}", reset_less=k > 0) for k, value in enumerate(values)]
-        with m.If(advance):
-            m.d.sync += [register.eq(value) for register, value in zip(later, values, strict=True)]
-        return list(later)
-
-    def _stage(
-        self, m: Module, stage: Stage, constants: Mapping[int, Pair], adders: Collection[int], advance: Value
-    ) -> PipelinedStage | InterleavedStage:
-        several = self.channels > 1
-        component = (
-            InterleavedStage(stage, self.channels, constants, protect=self.protect, adders=adders)
-            if several
-            else PipelinedStage(stage, constants, parity=self.protect != "none", clears=self._restarts, adders=adders)
-        )
-        m.submodules[stage.name] = component
-        m.d.comb += component.advance.eq(advance)
-        return component
-
-    def _reload(self, m: Module, banks: ConstantBanks, bank: Signal, uses: Value, swap: _Swap | None) -> ReloadPort:
-        """Connect the reload port to the banks, and return it.
-
-        `uses` are pairs of bits: whether samples use bank 0, and bank 1.
-        """
-        assert self.fingerprint is not None
+    def _reload_port(self, m: Module, parts: _Parts) -> ReloadPort | None:
+        """Make the reload port of the banks, and connect them."""
+        banks, swap = parts.banks, parts.swap
+        if banks is None or self.fingerprint is None:
+            return None
+        uses = Cat(parts.waiting, *(stage.uses for stage in parts.stages))  # pairs: of bank 0, of bank 1
         m.submodules.constant_banks = banks
-        m.submodules.reload_port = port = ReloadPort(
-            banks.words, design=self.fingerprint, protected=self.protect != "none"
-        )
-        forward_slave(m, self, port)
+        port = ReloadPort(banks.words, design=self.fingerprint, protected=self.is_guarded)
+        self.join_port(m, port)
         m.d.comb += [
-            bank.eq(port.bank),
+            parts.bank.eq(port.bank),
             port.may_swap.eq(1 if swap is None else swap.may),
             port.shadow_free.eq(~Mux(port.bank, uses[::2].any(), uses[1::2].any())),
             banks.write_enable.eq(port.write_enable),
@@ -394,69 +342,52 @@ class Core(wiring.Component):
             m.d.comb += swap.pending.eq(port.pending)
         return port
 
-    def _source(
-        self,
-        m: Module,
-        stages: list[PipelinedStage | InterleavedStage],
-        control: tuple[Value, Value, Signal],
-        restarts: tuple[FaultGuard | None, _Swap | None],
-        empty: Value,
-    ) -> tuple[_Place, Value]:
-        """Return what is there for the first stage, and the sample's codes.
+    def _source(self, m: Module, parts: _Parts) -> tuple[Sample, Value, Value | None]:
+        """Return what is there for the first stage, its codes as on `s_axis_tdata`, and the flags given with it."""
+        if self.channels > 1:
+            return self._source_of_channels(m, parts)
+        valid: Value = self.s_axis_tvalid
+        ready = parts.advance
+        if parts.blocks:
+            open_ = ~reduce(or_, parts.blocks)
+            valid, ready = valid & open_, ready & open_
+        m.d.comb += self.s_axis_tready.eq(ready)
+        if parts.guard is not None:
+            m.d.comb += parts.guard.idle.eq(parts.guard.broken & parts.empty)
+        if parts.swap is not None:
+            m.d.comb += parts.swap.may.eq(parts.empty)
+        return Sample(valid, parts.bank), self.s_axis_tdata, self.s_axis_tuser if self.flags_given else None
 
-        The control is `advance`; the bank of samples accepted now;
-        and a signal that is driven with the banks that waiting samples use. `empty` is whether the pipeline is.
-        """
-        (advance, bank, waiting), (guard, swap) = control, restarts
-        interleaved = [component for component in stages if isinstance(component, InterleavedStage)]
-        if not interleaved:
-            blocks = [*([] if guard is None else [guard.broken]), *([] if swap is None else [swap.pending])]
-            if not blocks:
-                m.d.comb += self.s_axis_tready.eq(advance)
-                return _Place(self.s_axis_tvalid, Const(0, 0), bank), self.s_axis_tdata
-            open_ = ~reduce(or_, blocks)
-            m.d.comb += self.s_axis_tready.eq(advance & open_)
-            if guard is not None:
-                m.d.comb += guard.idle.eq(guard.broken & empty)
-            if swap is not None:
-                m.d.comb += swap.may.eq(empty)
-            return _Place(self.s_axis_tvalid & open_, Const(0, 0), bank), self.s_axis_tdata
+    def _source_of_channels(self, m: Module, parts: _Parts) -> tuple[Sample, Value, Value | None]:
+        """Return the same of several channels, from behind an input buffer where samples wait for those before."""
+        guard, swap, advance = parts.guard, parts.swap, parts.advance
         bits = channel_bits(self.channels)
-        buffer = m.submodules.input_buffer = StreamBuffer(len(self.s_axis_tdata) + self.flags_given + bits + 1)
-        clearing = Signal(init=1)
-        cleared = Signal(bits)
+        word = {
+            "channel": self.s_axis_tdest[:bits],
+            "bank": parts.bank,
+            "tdata": self.s_axis_tdata,
+            "given": self.s_axis_tuser if self.flags_given else Const(0, 0),
+        }
+        layout = data.StructLayout({name: len(value) for name, value in word.items()})
+        buffer = m.submodules.input_buffer = StreamBuffer(layout.size)
+        held, next_ = data.View(layout, buffer.o_data), data.View(layout, buffer.o_next)
         exists = self.s_axis_tdest < self.channels
-        dest: Value = buffer.o_data[:bits]
-        scrubs: Value = Const(0, 1)
+        channel: Value = held.channel
+        scrubs = NEVER
         if guard is not None:
-            dest = Mux(buffer.o_valid, dest, guard.address)
+            channel = Mux(buffer.o_valid, channel, guard.address)
             scrubs = guard.scrubs & (guard.address < self.channels)
-        for cause in self._causes(guard, swap):
-            with m.If(cause):
-                m.d.sync += [clearing.eq(1), cleared.eq(0)]
-        with m.If(clearing):
-            m.d.sync += cleared.eq(cleared + 1)
-            with m.If(cleared == self.channels - 1):
-                m.d.sync += clearing.eq(0)
-        # Samples whose states may not have been written yet: as many of the last ones as the slowest stage asks.
-        waits: Value = Const(0, 1)
-        near: list[tuple[Value, Value]] = []
-        distance = max(component.schedule.distance for component in interleaved)
+        clearing, cleared = self._clear_channels(m, parts)
         valid = Signal()
-        for k in range(distance - 1):
-            before = near[-1] if near else (valid if guard is None else valid | scrubs, dest)
-            taken, channel = Signal(name=f"near{k}"), Signal(bits, name=f"near_channel{k}", reset_less=True)
-            with m.If(advance):
-                m.d.sync += [taken.eq(before[0]), channel.eq(before[1])]
-            near.append((taken, channel))
-            waits = waits | (taken & (channel == dest))
-        moves = ~waits if guard is None else ~waits & ~(guard.broken | clearing)
+        moves = ~self._waits(m, parts, valid if guard is None else valid | scrubs, channel)
+        if guard is not None:
+            moves = moves & ~(guard.broken | clearing)
         shut: Value = clearing if swap is None else clearing | swap.pending
         m.d.comb += [
             self.s_axis_tready.eq(buffer.advance & ~shut),
             buffer.i_valid.eq(self.s_axis_tvalid & exists & ~shut),
-            buffer.i_data.eq(Cat(self.s_axis_tdest[:bits], bank, self.s_axis_tdata, *self._given)),
-            waiting.eq(banks_in_use([buffer.o_valid, ~buffer.advance], [buffer.o_data[bits], buffer.o_next[bits]])),
+            buffer.i_data.eq(Cat(*word.values())),
+            parts.waiting.eq(banks_in_use([buffer.o_valid, ~buffer.advance], [held.bank, next_.bank])),
             valid.eq(buffer.o_valid & moves),
             buffer.o_ready.eq(advance & moves),
         ]
@@ -464,9 +395,39 @@ class Core(wiring.Component):
             free = advance & moves & ~buffer.o_valid
             if swap is not None:
                 free = free & ~swap.pending  # a scrub is inside like a sample
-            m.d.comb += guard.idle.eq(Mux(guard.broken, empty, free))
+            m.d.comb += guard.idle.eq(Mux(guard.broken, parts.empty, free))
         if swap is not None:
-            m.d.comb += swap.may.eq(empty & ~buffer.o_valid & ~clearing)
-        for component in interleaved:
-            m.d.comb += [component.clear.eq(clearing), component.clear_channel.eq(cleared)]
-        return _Place(valid, dest, buffer.o_data[bits], scrubs), buffer.o_data[bits + 1 :]
+            m.d.comb += swap.may.eq(parts.empty & ~buffer.o_valid & ~clearing)
+        for stage in parts.interleaved:
+            m.d.comb += [stage.clear.eq(clearing), stage.clear_channel.eq(cleared)]
+        sample = Sample(valid, held.bank, channel=channel, scrub=scrubs)
+        return sample, held.tdata, held.given if self.flags_given else None
+
+    def _clear_channels(self, m: Module, parts: _Parts) -> tuple[Signal, Signal]:
+        """Clear the states of all channels after a reset or restart; return whether it goes on, and the channel."""
+        clearing = Signal(init=1)
+        cleared = Signal(channel_bits(self.channels))
+        for cause in parts.causes:
+            with m.If(cause):
+                m.d.sync += [clearing.eq(1), cleared.eq(0)]
+        with m.If(clearing):
+            m.d.sync += cleared.eq(cleared + 1)
+            with m.If(cleared == self.channels - 1):
+                m.d.sync += clearing.eq(0)
+        return clearing, cleared
+
+    @staticmethod
+    def _waits(m: Module, parts: _Parts, enters: Value, channel: Value) -> Value:
+        """Return whether the sample in front must wait, as the states of its channel may not have been written yet.
+
+        They may not if it is the channel of one of the last samples, of as many as the slowest stage asks.
+        """
+        waits: Value = Const(0, 1)
+        before = enters, channel
+        for k in range(max(stage.schedule.distance for stage in parts.interleaved) - 1):
+            taken, near = Signal(name=f"near{k}"), Signal(len(channel), name=f"near_channel{k}", reset_less=True)
+            with m.If(parts.advance):
+                m.d.sync += [taken.eq(before[0]), near.eq(before[1])]
+            before = taken, near
+            waits = waits | (taken & (near == channel))
+        return waits

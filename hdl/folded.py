@@ -77,7 +77,7 @@ from sosmith.hdl.plan.folded_clocks import FOLDED_DEPTH, SERIAL_DEPTH, memory_de
 from sosmith.hdl.plan.instructions import address_bits, encoded, instruction_bits
 from sosmith.hdl.plan.streams import channel_bits, fields
 from sosmith.hdl.reload import ReloadPort
-from sosmith.hdl.status import OF_INPUT, at_rail, in_order, members_beside_decimator, with_fault, worn
+from sosmith.hdl.status import OF_INPUT, at_rail, members_beside_decimator, status_of_result, with_fault
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.graph import Op
 from sosmith.model.dataflow.program import (
@@ -596,9 +596,9 @@ class FoldedCore(wiring.Component):
         rail = Signal(reset_less=True)
         outside = Signal(reset_less=True)
         with m.If(begins):
-            found = self.s_axis_tuser if self.flags_given else at_rail(self.datapath.inputs, self.s_axis_tdata)
+            known = self.s_axis_tuser if self.flags_given else at_rail(self.datapath.inputs, self.s_axis_tdata)
             both = self.flags_given == OF_INPUT
-            m.d.sync += [rail.eq(found[0] if both else found), outside.eq(found[1] if both else 0)]
+            m.d.sync += [rail.eq(known[0] if both else known), outside.eq(known[1] if both else 0)]
         if self.fingerprint is not None or any(i.opcode is Opcode.JUDGE for i in self.program.instructions):
             judges = last.valid & last.has(Opcode.JUDGE) & added[-1]
             if self.datapath.settles:
@@ -616,14 +616,24 @@ class FoldedCore(wiring.Component):
         code, saturated = self._limited(given)
         # Without protection the limits are read again and again; with it just once, so that an upset changes no flag
         # of a result that waits for the sink.
-        wear = worn(m, self.datapath, code, channel, Const(1) if guard is None else ends, self.protect)
-        flags = in_order(self.datapath, judged, saturated, wear, settling)
+        found = status_of_result(
+            m,
+            self.datapath,
+            code,
+            inputs=judged,
+            saturated=saturated,
+            settling=settling,
+            channel=channel,
+            enable=Const(1) if guard is None else ends,
+            protect=self.protect,
+        )
+        flags = found.flags
         m.d.comb += [
             self.m_axis_tdata.eq(extended(code, len(self.m_axis_tdata))),
-            self.m_axis_tuser.eq(flags if guard is None else with_fault(flags, guard.fault | wear.failed)),
+            self.m_axis_tuser.eq(flags if guard is None else with_fault(flags, guard.fault | found.failed)),
         ]
         leaves = self.m_axis_tvalid & self.m_axis_tready
-        return leaves & wear.corrected, leaves & wear.failed
+        return leaves & found.corrected, leaves & found.failed
 
     def _settling(self, m: Module, advance: Signal, last: PipelinedInstruction, added: Signal) -> Value:
         """Return whether the program has judged that the sample comes before the filter has settled."""

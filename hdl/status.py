@@ -23,8 +23,8 @@ from amaranth.hdl import Cat, Const, Module, Value
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
+from sosmith.hdl.axi_stream import codes_of
 from sosmith.hdl.check_bits import CheckBits
-from sosmith.hdl.plan.streams import fields
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.status import Flag
 from sosmith.model.port import Port
@@ -33,11 +33,10 @@ from sosmith.model.port import Port
 def at_rail(inputs: Sequence[Port], tdata: Value) -> Value:
     """Whether an input's code is the lowest or the highest of its port, `Flag.INPUT_AT_RAIL`."""
     found: Value = Const(0, 1)
-    for field in fields(inputs):
-        code = tdata[field.offset : field.offset + field.port.bits]
+    for port, code in zip(inputs, codes_of(inputs, tdata), strict=True):
         body = code[:-1]
         # At a rail, all bits below the top one are equal; the top bit says which rail that would be.
-        ones, zeros = (code[-1], ~code[-1]) if not field.port.signed else (~code[-1], code[-1])
+        ones, zeros = (code[-1], ~code[-1]) if not port.signed else (~code[-1], code[-1])
         found = found | (body.all() & ones) | (~body.any() & zeros)
     return found
 
@@ -45,13 +44,13 @@ def at_rail(inputs: Sequence[Port], tdata: Value) -> Value:
 def outside_calibration(datapath: Datapath, tdata: Value) -> Value:
     """Whether an input lies outside the range of the calibration, `Flag.OUTSIDE_CALIBRATION`."""
     found: Value = Const(0, 1)
-    for field, (low, high) in zip(fields(datapath.inputs), datapath.calibrated, strict=True):
-        code = tdata[field.offset : field.offset + field.port.bits]
-        value = code.as_signed() if field.port.signed else code
-        if low > field.port.lowest:
-            found = found | (value < low)
-        if high < field.port.highest:
-            found = found | (value > high)
+    for port, code, (low, high) in zip(
+        datapath.inputs, codes_of(datapath.inputs, tdata), datapath.calibrated, strict=True
+    ):
+        if low > port.lowest:
+            found = found | (code < low)
+        if high < port.highest:
+            found = found | (code > high)
     return found
 
 
@@ -81,31 +80,20 @@ def members_beside_decimator(datapath: Datapath, given: int, *, before: bool) ->
     return members
 
 
-def in_order(datapath: Datapath, judged: Value, saturated: Value, wear: Wear, settling: Value) -> Value:
-    """Return `flag_count` flags in the bits of `Flag`, the first two of which are `judged`.
-
-    Wear is not told of a sample that comes before the filter has settled.
-    """
-    if not datapath.settles:
-        return Cat(judged, saturated, wear.flags)
-    worn = Cat(flag & ~settling for flag in wear.flags) if datapath.wear else Const(0, 2)
-    return Cat(judged, saturated, worn, settling)
-
-
 def with_fault(flags: Value, fault: Value) -> Value:
     """Return the flags of a protected core: `flag_count` of them, and `fault`, in the bits of `Flag`."""
     return Cat(flags, Const(0, Flag.FAULT - len(flags)), fault)
 
 
-class Wear(NamedTuple):
-    """What `worn` finds.
+class ResultStatus(NamedTuple):
+    """What is known of a result.
 
     Attributes
     ----------
     flags : Value
-        Whether the code has reached the warning, and the limit: two bits, or none without limits.
+        `flag_count` flags in the bits of `Flag`.
     corrected, failed : Value
-        Whether the limits just read had a wrong bit that was corrected, or one that could not be.
+        Whether the limits of wear just read had a wrong bit that was corrected, or one that could not be.
     """
 
     flags: Value
@@ -113,18 +101,62 @@ class Wear(NamedTuple):
     failed: Value
 
 
-def worn(m: Module, datapath: Datapath, code: Value, channel: Value, enable: Value, protect: str) -> Wear:
-    """Return the flags of wear of an output code.
+NEVER: Value = Const(0, 1)
+"""A flag that is never set, and the channel of a core that has one."""
 
-    If each channel has limits of its own, these are read from a memory, with check bits as `protect` asks: `code` must
-    belong to the channel that `channel` was at the last clock with `enable`.
+
+def status_of_result(
+    m: Module,
+    datapath: Datapath,
+    code: Value,
+    *,
+    inputs: Value,
+    saturated: Value,
+    settling: Value,
+    channel: Value = NEVER,
+    enable: Value = NEVER,
+    protect: str = "none",
+) -> ResultStatus:
+    """Return the flags of a result.
+
+    If each channel has limits of wear of its own, these are read from a memory, with check bits as `protect` asks:
+    `code` must belong to the channel that `channel` was at the last clock with `enable`. Wear is not told of a sample
+    that comes before the filter has settled.
+
+    Parameters
+    ----------
+    m : Module
+        Where the memory is made.
+    datapath : Datapath
+        What is computed.
+    code : Value
+        The output code.
+    inputs : Value
+        The first two flags, those of the inputs.
+    saturated, settling : Value
+        Flags of the output stage; the second has no bits if the filter is always settled.
+    channel, enable : Value
+        What the limits are read for.
+    protect : str
+        One of `sosmith.model.dataflow.protection.PROTECTIONS`.
     """
+    worn, corrected, failed = _worn(m, datapath, code, channel, enable, protect)
+    if datapath.settles and datapath.wear:
+        worn = Cat(flag & ~settling for flag in worn)
+    elif datapath.settles:
+        worn = Const(0, 2)
+    return ResultStatus(Cat(inputs, saturated, worn, settling), corrected, failed)
+
+
+def _worn(
+    m: Module, datapath: Datapath, code: Value, channel: Value, enable: Value, protect: str
+) -> tuple[Value, Value, Value]:
+    """Return whether a code has reached the warning and the limit, in two bits or none; and as in `ResultStatus`."""
     if not datapath.wear:
-        return Wear(Const(0, 0), Const(0, 1), Const(0, 1))
+        return Const(0, 0), NEVER, NEVER
     bits = datapath.output.bits
     limits: Sequence[Value]
-    corrected: Value = Const(0, 1)
-    failed: Value = Const(0, 1)
+    corrected = failed = NEVER
     if len(datapath.wear) == 1:
         limits = [Const(code_, code.shape()) for code_ in datapath.wear[0]]
     else:
@@ -138,4 +170,4 @@ def worn(m: Module, datapath: Datapath, code: Value, channel: Value, enable: Val
         limits = [data[:bits], data[bits:]]
         if datapath.output.signed:
             limits = [limit.as_signed() for limit in limits]
-    return Wear(Cat(*(code >= limit for limit in limits)), corrected, failed)
+    return Cat(*(code >= limit for limit in limits)), corrected, failed

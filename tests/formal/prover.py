@@ -4,9 +4,11 @@ import os
 import re
 import shutil
 import subprocess
+import sys
 import sysconfig
 from pathlib import Path
 from types import ModuleType
+from unittest.mock import patch
 
 from amaranth.back import rtlil
 from amaranth.hdl import Assume, ClockDomain, DomainRenamer, Elaboratable, Module, ResetInserter, ShapeLike, Signal
@@ -182,3 +184,9 @@ def broken(module: ModuleType, right: str, wrong: str, *more: tuple[str, str]) -
     result = ModuleType(module.__name__)
     exec(compile(source, str(module.__file__), "exec"), vars(result))
     return result
+
+
+def broken_beneath(module: ModuleType, beneath: ModuleType, right: str, wrong: str) -> ModuleType:
+    """Return a module that imports a broken one, as `broken` makes it, in place of `beneath`."""
+    with patch.dict(sys.modules, {beneath.__name__: broken(beneath, right, wrong)}):
+        return broken(module, "from __future__", "from __future__")

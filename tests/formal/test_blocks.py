@@ -60,10 +60,10 @@ def test_longer_turns_keep_the_rules_and_every_sample(turns: int, lanes: int, tm
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [
-        ("self.s_axis_tready.eq(buffer.advance)", "self.s_axis_tready.eq(1)"),  # beats taken and dropped
-        ("component.i_valid.eq(valid)", "component.i_valid.eq(1)"),  # beats out of nothing
+        ("self.s_axis_tready.eq(advance)", "self.s_axis_tready.eq(1)"),  # beats taken and dropped
+        ("Sample(self.s_axis_tvalid)", "Sample(Const(1, 1))"),  # beats out of nothing
         ("samples = [self.s_axis_tdata[size * k : size * (k + 1)]", "samples = [self.s_axis_tdata[:size]"),
-        ("buffer.i_data.eq(Cat(*results, *flags))", "buffer.i_data.eq(Cat(*results[::-1], *flags))"),
+        ("self.hand_out(m, buffer, beat.valid, results)", "self.hand_out(m, buffer, beat.valid, results[::-1])"),
     ],
 )
 def test_a_broken_core_is_found_out(right: str, wrong: str, tmp_path: Path) -> None:

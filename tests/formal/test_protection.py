@@ -76,8 +76,14 @@ def test_what_has_no_flag_is_right(upsets: bool, tmp_path: Path) -> None:
         *(
             pytest.param(*changes, marks=pytest.mark.slow)
             for changes in (
-                ([("Cat(flags, guard.fault | fault)", "Cat(flags, guard.fault)")], []),  # the first has no flag
-                ([("Cat(flags, guard.fault | fault)", "Cat(flags, fault)")], []),  # none behind the restart has
+                (
+                    [("parts.guard.fault | fault", "parts.guard.fault")],
+                    [],
+                ),  # the first has no flag
+                (
+                    [("parts.guard.fault | fault", "fault")],
+                    [],
+                ),  # none behind the restart has
                 ([], [("parity.eq(_fitting(following, state).xor())", "parity.eq(state.as_unsigned().xor())")]),
             )
         ),

@@ -64,14 +64,14 @@ class RestartRules(StreamRules):
 
 
 def test_a_parallel_core_begins_anew(tmp_path: Path) -> None:
-    assert prove(RestartRules(broken(core, "swap.may.eq(empty)", "swap.may.eq(empty)")), tmp_path) == "PASS"
+    assert prove(RestartRules(broken(core, "swap.may.eq(parts.empty)", "swap.may.eq(parts.empty)")), tmp_path) == "PASS"
 
 
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [
-        ("component.clear.eq(clears)", "component.clear.eq(0)"),
-        pytest.param("swap.may.eq(empty)", "swap.may.eq(1)", marks=pytest.mark.slow),
+        ("stage.clear.eq(clears)", "stage.clear.eq(0)"),
+        pytest.param("swap.may.eq(parts.empty)", "swap.may.eq(1)", marks=pytest.mark.slow),
         pytest.param("[swap.pending])]", "[Const(0, 1)])]", marks=pytest.mark.slow),
     ],
 )

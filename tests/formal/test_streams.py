@@ -258,8 +258,8 @@ def test_a_broken_buffer_is_found_out(right: str, wrong: str, tmp_path: Path) ->
     ("right", "wrong"),
     [
         ("component.advance.eq(advance)", "component.advance.eq(1)"),  # the pipeline moves into a full buffer
-        ("component.i_valid.eq(place.valid)", "component.i_valid.eq(1)"),  # samples out of nothing
-        ("self.s_axis_tready.eq(advance)", "self.s_axis_tready.eq(1)"),  # samples taken and dropped
+        ("valid: Value = self.s_axis_tvalid", "valid: Value = Const(1, 1)"),  # samples out of nothing
+        ("self.s_axis_tready.eq(ready)", "self.s_axis_tready.eq(1)"),  # samples taken and dropped
     ],
 )
 def test_a_broken_core_is_found_out(right: str, wrong: str, tmp_path: Path) -> None:

@@ -1,9 +1,10 @@
 """Parallel cores beside a decimator: proven, and rejected when anything in them is wrong."""
 
 import re
+from types import ModuleType
 
 import pytest
-from tests.formal.prover import broken
+from tests.formal.prover import broken, broken_beneath
 from tests.verify.around.decimators import Case, Instrument, designed, written
 from tests.verify.parallel.edits import random_edits, swept
 from tests.verify.parallel.simulated import outputs
@@ -11,6 +12,7 @@ from tests.verify.parallel.simulated import outputs
 from sosmith.gen.output.verilog import to_rtlil, to_verilog
 from sosmith.hdl import core as hardware
 from sosmith.hdl.decimation import decimator
+from sosmith.hdl.shell import pipeline, shell
 from sosmith.verify.around.cic import check_decimator
 from sosmith.verify.around.parallel_core import check_ahead, check_behind
 from sosmith.verify.graph import RejectedError
@@ -53,32 +55,29 @@ def rejection(case: Case | Instrument, text: str) -> str:
     return ""
 
 
-HOLDS = "\n                m.d.sync += held.eq(status)"
+HOLDS = "\n            m.d.sync += later.eq(value)"
+STATUS = 'delayed(m, buffer.advance, inputs, self._depth_of_stages, "status")'
 BROKEN = [
-    (PLAIN, "a flag of another sample", "m.d.sync += held.eq(status)", "m.d.sync += held.eq(self._status(data))"),
-    (
-        PLAIN,
-        "a flag that gets lost",
-        "self.s_axis_tuser] if self.flags_given",
-        "self.s_axis_tuser & 0] if self.flags_given",
-    ),
-    (HELD, "flags that do not stand still", f"with m.If(buffer.advance):{HOLDS}", f"with m.If(Const(1, 1)):{HOLDS}"),
-    (INSTRUMENT, "flags the wrong way round", "return given[0]\n", "return given[0][::-1]\n"),
-    (INSTRUMENT, "a rail that is not told", "else at_rail(self.datapath.inputs, data)", "else Const(0, 1)"),
-    (SEVERAL, "a flag that passes the buffer", "given = [data[len(self.s_axis_tdata) :]]", "pass"),
-    (SEVERAL, "a sample that does not wait", "waits = waits | (taken & (channel == dest))", "pass"),
+    (PLAIN, "a flag of another sample", hardware, STATUS, "inputs"),
+    (PLAIN, "a flag that gets lost", hardware, "self.s_axis_tuser if self.flags_given else None\n", "NEVER\n"),
+    (HELD, "flags that do not stand still", pipeline, f"with m.If(advance):{HOLDS}", f"with m.If(Const(1, 1)):{HOLDS}"),
+    (INSTRUMENT, "flags the wrong way round", shell, "return given\n", "return given[::-1]\n"),
+    (INSTRUMENT, "a rail that is not told", shell, "at_rail(self.datapath.inputs, tdata) if", "Const(0, 1) if"),
+    (SEVERAL, "a flag that passes the buffer", hardware, "held.given if", "self.s_axis_tuser if"),
+    (SEVERAL, "a sample that does not wait", hardware, "waits = waits | (taken & (near == channel))", "pass"),
 ]
 
 
 @pytest.mark.parametrize(
-    ("case", "right", "wrong"), [pytest.param(case, *edit, id=subject) for case, subject, *edit in BROKEN]
+    ("case", "where", "right", "wrong"), [pytest.param(case, *edit, id=subject) for case, subject, *edit in BROKEN]
 )
 def test_a_core_that_is_wrong_is_rejected(
-    case: Case | Instrument, right: str, wrong: str, monkeypatch: pytest.MonkeyPatch
+    case: Case | Instrument, where: ModuleType, right: str, wrong: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made, _ = designed(case)
     assert not rejection(case, written(case))
-    monkeypatch.setattr(hardware, "Core", broken(hardware, right, wrong).Core)
+    module = broken(hardware, right, wrong) if where is hardware else broken_beneath(hardware, where, right, wrong)
+    monkeypatch.setattr(hardware, "Core", module.Core)
     text = to_verilog(to_rtlil(made.architecture.component(), made.datapath.name))
     assert text != written(case)
     assert re.search(r"\bmust\b", rejection(case, text))

@@ -1,0 +1,89 @@
+"""The way of a sample through stages in a pipeline that moves as one.
+
+::
+
+    valid, codes --> stage --> stage -- .. --> stage --> valid, codes
+                       ^         ^               ^
+    advance -----------+---------+---------------+
+                       v         v               v
+    status --------> [status1] [status2]  ..  [statusN] --> status     one register for each clock
+
+Latency: that of the stages; `delayed` takes as many clocks as it is told.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from amaranth.hdl import Const, Module, Signal, Value
+from amaranth.lib import wiring
+
+from sosmith.hdl.status import NEVER
+
+
+class Sample(NamedTuple):
+    """What goes through a pipeline with the codes of a sample.
+
+    Attributes
+    ----------
+    valid : Value
+        Whether there is a sample.
+    bank : Value or None
+        Bank of constants that it uses; None if there is only one.
+    fault : Value
+        Whether a wrong bit was found for it.
+    channel : Value
+        Its channel; no bits if there is only one.
+    scrub : Value
+        Whether there is a scrub in place of a sample.
+    """
+
+    valid: Value
+    bank: Value | None = None
+    fault: Value = NEVER
+    channel: Value = Const(0, 0)
+    scrub: Value = NEVER
+
+
+def through(
+    m: Module, stages: Sequence[wiring.Component], sample: Sample, codes: Sequence[Value]
+) -> tuple[Sample, list[Value]]:
+    """Connect stages one behind the other.
+
+    Parameters
+    ----------
+    m : Module
+        Where the stages are.
+    stages : sequence of Component
+        Those of `sosmith.hdl.stages`. What a sample has beside its codes goes through a stage that takes it, and past
+        one that does not.
+    sample, codes : Sample, sequence of Value
+        What comes in.
+
+    Returns
+    -------
+    sample, codes : Sample, list of Value
+        What is behind the last stage.
+    """
+    codes = list(codes)
+    for stage in stages:
+        members = stage.signature.members
+        beside = {
+            name: value for name, value in sample._asdict().items() if value is not None and f"i_{name}" in members
+        }
+        m.d.comb += [getattr(stage, f"i{k}").eq(code) for k, code in enumerate(codes)]
+        m.d.comb += [getattr(stage, f"i_{name}").eq(value) for name, value in beside.items()]
+        sample = sample._replace(**{name: getattr(stage, f"o_{name}") for name in beside})
+        codes = [getattr(stage, f"o{k}") for k in range(len(members)) if f"o{k}" in members]
+    return sample, codes
+
+
+def delayed(m: Module, advance: Value, value: Value, clocks: int, name: str) -> Value:
+    """Return a value so many clocks of the pipeline later; it is not reset."""
+    for k in range(clocks):
+        later = Signal(len(value), name=f"{name}{k + 1}", reset_less=True)
+        with m.If(advance):
+            m.d.sync += later.eq(value)
+        value = later
+    return value
