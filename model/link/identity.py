@@ -6,6 +6,7 @@ the range that docs/protocol.md states, so that nothing behind it has to look ag
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Sequence
 from fractions import Fraction
@@ -125,7 +126,14 @@ class Identity(BaseModel):
             raise ValueError("Names of inputs should differ")
         if len(set(self.flags.values())) < len(self.flags):
             raise ValueError("Bits of flags should differ")
+        if self.source == "converter" and not CONVERTER_FLAGS.keys() <= self.flags.keys():
+            raise ValueError("Flags of a device with converters should have fault")
         return self
+
+    @property
+    def digest(self) -> str:
+        """Twelve hexadecimal digits that are others for another identity."""
+        return hashlib.sha256(self.memory).hexdigest()[:12]
 
     @property
     def input_ports(self) -> tuple[Port, ...]:

@@ -107,7 +107,7 @@ def _ranges() -> str:
         "zero": f"{-gate.MAX_VALUE:g} to {gate.MAX_VALUE:g}",
         "LSB": f"{gate.MIN_LSB:g} to {gate.MAX_VALUE:g}",
         "unit": f"printable text of {gate.MAX_UNIT} characters at most, none of them a control character",
-        "bits of `flags`": "0 to 7, each once",
+        "bits of `flags`": "0 to 7, each once; with converters, `fault` is one of the flags",
     }
     return "| key | value |\n|---|---|\n" + "".join(f"| {key} | {value} |\n" for key, value in rows.items())
 

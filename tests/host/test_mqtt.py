@@ -100,8 +100,8 @@ def test_what_is_published_and_what_stays(tmp_path: Path) -> None:
     readings = gauge()
     with running(tmp_path) as broker, Subscriber(broker.port, "sosmith/#") as reader:
         with Publisher(Broker("127.0.0.1", broker.port, False, ""), readings, 1000.0) as publisher:
-            feed(readings)
-            publisher.alarm(Alarm("wear_critical", 1, 200, 3.25))
+            feed(readings, start=1000.0)
+            publisher.alarm(Alarm("wear_critical", 1, 200, 3.25, 1002.0))
             publisher.update()
             readings.state = "lost"
             publisher.update()
@@ -191,7 +191,7 @@ def test_tls_and_a_password(tmp_path: Path) -> None:
     with running(tmp_path, *lines) as broker:
         good = Broker("127.0.0.1", broker.port, True, "", "ann", "secret", certificate)
         with Publisher(good, gauge(), 0.0) as publisher:
-            publisher.alarm(Alarm("fault", 0, 0, 0.0))
+            publisher.alarm(Alarm("fault", 0, 0, 0.0, 0.0))
         for bad, reason in (
             (
                 Broker("127.0.0.1", broker.port, True, "", "ann", "wrong", certificate),

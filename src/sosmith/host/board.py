@@ -282,10 +282,10 @@ class Board:
         body = self._session.request(Type.POLL, check=lambda body: self._sound(body[1:]))
         if not body or (len(body) - 1) % self._identity.result_bytes:
             raise LinkError(f"the board must answer with whole results, not with {len(body)} bytes")
-        if body[0] >= self._identity.channels:
-            raise LinkError(f"the board must name a channel below {self._identity.channels}, not {body[0]}")
         if len(body) == 1:
             return None
+        if body[0] >= self._identity.channels:
+            raise LinkError(f"the board must name a channel below {self._identity.channels}, not {body[0]}")
         rows = np.frombuffer(body[1:], np.uint8).reshape(-1, self._identity.result_bytes)
         codes = codes_of(rows[:, :-1].tobytes(), [self._identity.output_port])[:, 0]
         flags = dict(self._identity.flags)

@@ -12,7 +12,6 @@ import threading
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from types import TracebackType
@@ -20,6 +19,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from urllib.parse import urlsplit
 
 from sosmith.host.alarms import Alarm
+from sosmith.host.clock import utc_text
 from sosmith.host.readings import Readings
 from sosmith.model.errors import SpecificationError, ToolError
 
@@ -156,7 +156,7 @@ class Publisher:
     readings : Readings
         What is published; read in the thread that calls `update` and `close`.
     start : float
-        Time of sample 0, in seconds since 1970.
+        When this run began, in seconds since 1970: alarms of different runs have the same numbers.
 
     Raises
     ------
@@ -187,7 +187,7 @@ class Publisher:
                 self._publish(
                     f"channel/{one.channel}",
                     {
-                        "time": self._utc(readings.samples - 1),
+                        "time": utc_text(readings.utc, "milliseconds"),
                         "sample": readings.samples - 1,
                         "quantity": readings.identity.output_port.name,
                         "unit": readings.identity.output_port.unit,
@@ -204,8 +204,8 @@ class Publisher:
         self._number += 1
         made = {
             "number": self._number,
-            "since": self._utc(0),
-            "time": self._utc(alarm.sample),
+            "since": utc_text(self._start, "milliseconds"),
+            "time": utc_text(alarm.utc, "milliseconds"),
             "sample": alarm.sample,
             "channel": alarm.channel,
             "flag": alarm.flag,
@@ -303,10 +303,6 @@ class Publisher:
     def _publish(self, topic: str, made: dict[str, Any], *, retain: bool = False) -> int:
         text = json.dumps(made, ensure_ascii=False, allow_nan=False)
         return self._client.publish(f"{self._topic}/{topic}", text, _QOS, retain=retain).mid
-
-    def _utc(self, sample: int) -> str:
-        seconds = self._start + sample / self._readings.identity.sample_rate
-        return datetime.fromtimestamp(seconds, UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
 
 
 def _drained(queue: SimpleQueue[Item]) -> list[Item]:

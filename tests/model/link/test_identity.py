@@ -76,6 +76,7 @@ REFUSED = [
     ({"flags": {"fault": 8}}, "flags.fault: Input should be less than or equal to 7"),
     ({"flags": {"fault": 0, "settling": 0}}, "text: Bits of flags should differ"),
     ({"inputs": [["x", 8, False, 0.0, 1.0, "V"]] * 2}, "text: Names of inputs should differ"),
+    ({"source": "converter", "flags": {}}, "text: Flags of a device with converters should have fault"),
     ({"inputs": []}, "inputs: Tuple should have at least 1 item after validation, not 0"),
     ({"reload": {"design": -1, "words": 1}}, "reload.design: Input should be greater than or equal to 0"),
 ]
