@@ -66,6 +66,15 @@ REFRESHES = 8
     metavar="FILE",
     help="Certificates that mqtts:// trusts.  [default: the system's]",
 )
+@click.option(
+    "--mqtt-plain-text", is_flag=True, help="Send user and password over mqtt://, which others on the line can read."
+)
+@click.option(
+    "--mqtt-keep",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="File that keeps alarms until the broker has acknowledged them, over restarts and kills.",
+)
 @click.option("--influx", is_flag=True, help="Print every result in the line protocol of InfluxDB.")
 @BAUD
 @output_option("Recording: a CSV file, or a Parquet file if its name ends so; CSV is continued.")
@@ -80,6 +89,8 @@ def monitor_command(
     mqtt: str | None,
     mqtt_credentials: Path | None,
     mqtt_ca: Path | None,
+    mqtt_plain_text: bool,
+    mqtt_keep: Path | None,
     influx: bool,
     baud: int,
     output: Path | None,
@@ -114,8 +125,8 @@ def monitor_command(
         from sosmith.host.mqtt import Broker, paho
 
         paho()
-        broker = Broker.at(mqtt, credentials=mqtt_credentials, authorities=mqtt_ca)
-    asked = _Asked(port, files, alarms or ALARMS, hook, page, broker, influx, output)
+        broker = Broker.at(mqtt, credentials=mqtt_credentials, authorities=mqtt_ca, plain_text=mqtt_plain_text)
+    asked = _Asked(port, files, alarms or ALARMS, hook, page, broker, mqtt_keep, influx, output)
     with ExitStack() as stack:
         shown = stack.enter_context(_Monitor(asked))
         for event in watch(
@@ -148,6 +159,7 @@ class _Asked:
     hook: str | None
     page: bool
     broker: Broker | None
+    keep: Path | None
     influx: bool
     output: Path | None
 
@@ -228,7 +240,9 @@ class _Monitor:
         if asked.broker is not None:
             from sosmith.host.mqtt import Publisher
 
-            self._publisher = self._stack.enter_context(Publisher(asked.broker, self._readings, time.time()))
+            self._publisher = self._stack.enter_context(
+                Publisher(asked.broker, self._readings, time.time(), asked.keep)
+            )
             self._told.append(self._publisher.alarm)
             self._views.append(self._publisher.update)
         if asked.page:
