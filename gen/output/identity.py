@@ -5,12 +5,14 @@ from __future__ import annotations
 import hashlib
 from typing import Literal
 
+from pydantic import ValidationError
+
 from sosmith.gen.core import CoreDesign, refuse_decimated_channels
 from sosmith.gen.output.core_facts import interface_facts
 from sosmith.gen.reload.register_writes import bank_size
 from sosmith.gen.version import __version__
 from sosmith.model.errors import SpecificationError
-from sosmith.model.link.identity import CONVERTER_FLAGS, Identity, Quantity, Reload
+from sosmith.model.link.identity import CONVERTER_FLAGS, Identity, Quantity, Reload, first_fault
 from sosmith.model.link.protocol import VERSION, samples_per_message
 from sosmith.model.port import Port
 
@@ -36,9 +38,21 @@ def identity(
     Raises
     ------
     SpecificationError
-        If beats of the core hold several samples, or there is not a result for each sample.
+        If beats of the core hold several samples, there is not a result for each sample, or a host would refuse the
+        identity, as it does with a rate or an LSB outside the ranges of docs/protocol.md.
     """
     _check(design)
+    try:
+        return _identity(design, verilog, baud, clock, source)
+    except ValidationError as error:
+        raise SpecificationError(
+            f"{design.spec.path}: a board must have an identity as in docs/protocol.md, not: {first_fault(error)}"
+        ) from None
+
+
+def _identity(
+    design: CoreDesign, verilog: str, baud: int, clock: float, source: Literal["link", "converter"]
+) -> Identity:
     datapath, fingerprint = design.datapath, design.architecture.fingerprint
     words, _ = (0, 0) if fingerprint is None else bank_size(design.architecture)
     made = Identity(

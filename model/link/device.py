@@ -51,6 +51,11 @@ class Device:
         What it does with samples.
     window : int
         How many requests it allows to be without a response.
+
+    Raises
+    ------
+    LinkError
+        If a host would refuse the identity.
     """
 
     def __init__(self, identity: Identity, core: Core, *, window: int = 4) -> None:
@@ -59,6 +64,7 @@ class Device:
         self.counters = [0] * len(Counter)
         self._identity, self._core, self._window = identity, core, window
         self._memory = identity.memory
+        Identity.of_memory(self._memory)
         self._receiver = Receiver()
         self._next: int | None = None  # before the first session
         self._retained: deque[Message] = deque(maxlen=window)

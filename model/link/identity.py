@@ -1,24 +1,53 @@
-"""The identity of a board: the JSON text in its memory that says which core it has, and what its samples mean."""
+"""The identity of a board: the JSON text in its memory that says which core it has, and what its samples mean.
+
+It is the gate for what a device says of itself: past it, every name is plain and printable, and every number is within
+the range that docs/protocol.md states, so that nothing behind it has to look again.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import json
+from collections.abc import Sequence
 from fractions import Fraction
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from sosmith.model.dataflow.status import Flag
 from sosmith.model.errors import LinkError, SpecificationError
-from sosmith.model.link.protocol import BLOCK_BYTES, MAX_IDENTITY, samples_per_message
+from sosmith.model.link.protocol import BLOCK_BYTES, MAX_IDENTITY, VERSION, samples_per_message
 from sosmith.model.port import Port
 
-Name = Annotated[str, Field(max_length=200)]
+MAX_NAME = 64
+"""Most characters of a name, as in a specification."""
+
+MAX_UNIT = 16
+"""Most characters of a unit, as in a specification."""
+
+MIN_RATE, MAX_RATE = 1e-6, 1e12
+"""Range of sample rate and clock in Hz: from a sample in 11 days to 1 THz."""
+
+MIN_LSB, MAX_VALUE = 1e-30, 1e30
+"""Smallest LSB, and the largest LSB and amount of a zero, in the unit of the port: sums and products stay finite."""
+
+
+def _printable(text: str) -> str:
+    if not text.isprintable():
+        raise ValueError("Text should be printable")
+    return text
+
+
+Name = Annotated[str, Field(pattern=f"^[A-Za-z_][A-Za-z0-9_]{{0,{MAX_NAME - 1}}}$")]
+Unit = Annotated[str, Field(max_length=MAX_UNIT), AfterValidator(_printable)]
+Release = Annotated[str, Field(pattern=f"^[A-Za-z0-9.+_-]{{1,{MAX_NAME}}}$")]
 Count = Annotated[int, Field(ge=1, lt=1 << 32)]
 Word = Annotated[int, Field(ge=0, lt=1 << 32)]
-Rate = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-Number = Annotated[float, Field(allow_inf_nan=False)]
-Quantity = tuple[Name, Annotated[int, Field(ge=2, le=32)], bool, Number, Rate, Name]
+Bits = Annotated[int, Field(ge=2, le=32)]
+Rate = Annotated[float, Field(ge=MIN_RATE, le=MAX_RATE)]
+Step = Annotated[float, Field(ge=MIN_LSB, le=MAX_VALUE)]
+Offset = Annotated[float, Field(ge=-MAX_VALUE, le=MAX_VALUE)]
+Quantity = tuple[Name, Bits, bool, Offset, Step, Unit]
 """Name, bits, signed, zero, LSB and unit of a port."""
 
 
@@ -74,10 +103,10 @@ class Identity(BaseModel):
 
     model_config = ConfigDict(frozen=True, strict=True, extra="ignore")
 
-    protocol: Count
+    protocol: Annotated[int, Field(ge=VERSION, le=VERSION)]
     name: Name
     core: Name
-    sosmith: Name
+    sosmith: Release
     design: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
     architecture: Name
     channels: Annotated[int, Field(ge=1, le=256)]
@@ -90,6 +119,21 @@ class Identity(BaseModel):
     output: Quantity
     flags: dict[Name, Annotated[int, Field(ge=0, le=7)]]
     reload: Reload | None
+
+    @model_validator(mode="after")
+    def _each_once(self) -> Identity:
+        if len({quantity[0] for quantity in self.inputs}) < len(self.inputs):
+            raise ValueError("Names of inputs should differ")
+        if len(set(self.flags.values())) < len(self.flags):
+            raise ValueError("Bits of flags should differ")
+        if self.source == "converter" and not CONVERTER_FLAGS.keys() <= self.flags.keys():
+            raise ValueError("Flags of a device with converters should have fault")
+        return self
+
+    @property
+    def digest(self) -> str:
+        """Twelve hexadecimal digits that are others for another identity."""
+        return hashlib.sha256(self.memory).hexdigest()[:12]
 
     @property
     def input_ports(self) -> tuple[Port, ...]:
@@ -137,20 +181,40 @@ class Identity(BaseModel):
         LinkError
             If it is no identity, or one that contradicts itself.
         """
+        text = memory.split(b"\0", 1)[0]
         try:
-            found = Identity.model_validate_json(memory.split(b"\0", 1)[0])
+            found = Identity.model_validate_json(text)
         except ValidationError as error:
-            first = error.errors(include_url=False, include_input=False)[0]
-            place = ".".join(map(str, first["loc"])) or "text"
             raise LinkError(
-                f"the board's identity must be the JSON of docs/protocol.md, not: {place}: {first['msg']}"
+                f"the board's identity must be the JSON of docs/protocol.md, not: {first_fault(error)}"
             ) from None
+        json.loads(text, object_pairs_hook=_each_key_once)
         fitting = samples_per_message(found.sample_bytes, found.result_bytes)
         if found.samples > fitting:
             raise LinkError(
                 f"the board's identity must have at most {fitting} samples in a message, not {found.samples}"
             )
         return found
+
+
+def first_fault(error: ValidationError) -> str:
+    """Return the first thing that is wrong with an identity; what stands there itself is shown in plain ASCII."""
+    first = error.errors(include_url=False, include_input=False)[0]
+    place = _plain(".".join(map(str, first["loc"]))) or "text"
+    return f"{place}: {first['msg'].removeprefix('Value error, ')}"
+
+
+def _each_key_once(pairs: Sequence[tuple[str, Any]]) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for key, value in pairs:
+        if key in found:
+            raise LinkError(f"the board's identity must have each key once, not {_plain(key)} twice")
+        found[key] = value
+    return found
+
+
+def _plain(text: str) -> str:
+    return ascii(text[:MAX_NAME])[1:-1]
 
 
 def _port(quantity: Quantity) -> Port:

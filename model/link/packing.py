@@ -17,7 +17,11 @@ def bytes_of(codes: Codes, sizes: Sequence[int]) -> bytes:
 
 
 def codes_of(data: bytes, ports: Sequence[Port]) -> Codes:
-    """Return the codes in `data`, shape (n, ports); bits beyond those of a code are ignored, as the hardware does."""
+    """Return the codes in `data`, shape (n, ports).
+
+    Bits beyond those of a code are ignored, as the hardware does with samples; `bytes_of` the codes tells whether they
+    are those of the sign, as they are in results.
+    """
     rows = np.frombuffer(data, np.uint8).reshape(-1, sum(port.bytes for port in ports)).astype(np.int64)
     codes = np.zeros((len(rows), len(ports)), dtype=np.int64)
     start = 0

@@ -102,7 +102,7 @@ class _LogStep(Step):
         if name != self._name:
             self._name = name
             minutes, seconds = divmod(int(time.monotonic() - self._began), 60)
-            click.echo(f"[{minutes}:{seconds:02}] {_shown(name)}", err=True)
+            click.echo(f"[{minutes}:{seconds:02}] {printable(name)}", err=True)
 
 
 class _BarStep(Step):
@@ -184,15 +184,15 @@ def show_progress(*, remaining: bool = False) -> Iterator[Step]:
             step.finish()
 
 
-def _shown(text: str) -> str:
-    """Escape what a terminal would not show: the text may come from a file."""
+def printable(text: str) -> str:
+    """Escape what a terminal would not show, or would obey: the text may come from a file or a device."""
     return "".join(c if c.isprintable() or c in "\n\t" else ascii(c)[1:-1] for c in text)
 
 
 def note(text: str) -> None:
     """Print a message on stderr."""
     with undisturbed():
-        click.echo(f"sosmith: {_shown(text)}", err=True)
+        click.echo(f"sosmith: {printable(text)}", err=True)
 
 
 def print_json(tree: Any) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from functools import partial
 from pathlib import Path
@@ -58,6 +59,25 @@ def test_one_trace_drives_all_channels(tmp_path: Path) -> None:
     assert [int(line.split(",")[3]) for line in lines] == made.core.datapath.compute(codes).reshape(-1).tolist()
     assert [line.split(",")[1] for line in lines] == ["0", "1"] * len(first)
     assert second.codes.shape == first.codes.shape
+
+
+@pytest.mark.parametrize("command", ["stream", "monitor"])
+def test_a_trace_is_not_replaced_by_its_results(tmp_path: Path, command: str) -> None:
+    trace = tmp_path / "a.csv"
+    trace.write_text("x\n1\n")
+    expected = f"{trace}: the output must be another file than the input {trace}, not the same"
+    given = (str(trace),) if command == "stream" else ("--trace", str(trace))
+    Invocation(command).refused(expected, "/dev/nothing", *given, "-o", str(trace))
+    assert trace.read_text() == "x\n1\n"
+
+
+@pytest.mark.parametrize("command", ["stream", "monitor"])
+def test_a_device_or_a_fifo_is_no_output(tmp_path: Path, command: str) -> None:
+    given = ("x.csv",) if command == "stream" else ("--trace", "x.csv")
+    os.mkfifo(tmp_path / "fifo")
+    for path, kind in ((Path("/dev/full"), "device"), (tmp_path / "fifo", "FIFO")):
+        expected = f"{path}: the output must be a regular file, not a {kind}"
+        Invocation(command).refused(expected, "/dev/nothing", *given, "-o", str(path))
 
 
 def test_a_port_without_a_board(tmp_path: Path) -> None:
@@ -147,9 +167,9 @@ def test_monitor_records_and_tells_alarms(ramp: Path) -> None:
         ),
     ]
     header, *lines = (ramp.parent / "out.csv").read_text().splitlines()
-    assert header == "utc,time_s,session,channel,clearance_mm,clearance_code,status"
-    assert [int(line.split(",")[5]) for line in lines] == expected.reshape(-1).tolist()
-    assert {line.split(",")[2] for line in lines} == {"1"}
+    assert header == "utc,time_s,run,session,channel,clearance_mm,clearance_code,status,board"
+    assert [int(line.split(",")[6]) for line in lines] == expected.reshape(-1).tolist()
+    assert {tuple(line.split(",")[2:4]) for line in lines} == {("1", "1")}
     assert len(result.stdout.splitlines()) == 200
     assert result.stdout.startswith("gauge,channel=0 clearance=")
 

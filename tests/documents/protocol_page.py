@@ -7,11 +7,13 @@ from tests.interface.small import instrument_design
 
 from sosmith.gen.output.identity import identity
 from sosmith.model.converters.spi_converter import ReadingFault
+from sosmith.model.errors import LinkError
+from sosmith.model.link import identity as gate
 from sosmith.model.link.device import Device
 from sosmith.model.link.frames import Message
 from sosmith.model.link.identity import Identity
 from sosmith.model.link.integer_core import IntegerCore
-from sosmith.model.link.protocol import LAYOUTS, Counter, Status, Type, samples_per_message
+from sosmith.model.link.protocol import LAYOUTS, VERSION, Counter, Status, Type, samples_per_message
 
 _PART = re.compile(r"<!-- (?P<what>[a-z]+) -->\n.*?<!-- end of (?P=what) -->", re.DOTALL)
 _BITS = 10
@@ -25,6 +27,9 @@ def with_parts(text: str) -> str:
         "requests": _requests,
         "statuses": _statuses,
         "identity": _identity,
+        "ranges": _ranges,
+        "refused": _refused,
+        "stray": _stray,
         "counters": _counters,
         "readings": _readings,
         "session": _session,
@@ -81,6 +86,61 @@ def _counters() -> str:
 def _identity() -> str:
     made, _ = _board()
     return f"```json\n{json.dumps(made.model_dump(mode='json'))}\n```\n"
+
+
+def _ranges() -> str:
+    name = f"a letter or underscore, then letters, digits and underscores; {gate.MAX_NAME} characters at most"
+    whole = "1 to 4294967295"
+    rows = {
+        "`protocol`": str(VERSION),
+        "`name`, `core`, `architecture`, names of inputs, output and flags": name,
+        "`sosmith`": f"1 to {gate.MAX_NAME} letters, digits and `.+_-`",
+        "`design`": "64 hexadecimal digits, small letters",
+        "`channels`": "1 to 256",
+        "`sample_rate`, `clock`": f"{gate.MIN_RATE:g} to {gate.MAX_RATE:g} Hz",
+        "`baud`, `words` of `reload`": whole,
+        "`design` of `reload`": "0 to 4294967295",
+        "`source`": "`link` or `converter`",
+        "`samples`": "1 to 255, and as many as fit",
+        "`inputs`": "1 to 16, with different names",
+        "bits": "2 to 32",
+        "zero": f"{-gate.MAX_VALUE:g} to {gate.MAX_VALUE:g}",
+        "LSB": f"{gate.MIN_LSB:g} to {gate.MAX_VALUE:g}",
+        "unit": f"printable text of {gate.MAX_UNIT} characters at most, none of them a control character",
+        "bits of `flags`": "0 to 7, each once; with converters, `fault` is one of the flags",
+    }
+    return "| key | value |\n|---|---|\n" + "".join(f"| {key} | {value} |\n" for key, value in rows.items())
+
+
+def _refused() -> str:
+    text = json.dumps(_board()[0].model_dump(mode="json"))
+    edits = (
+        ('"sample_rate": 100.0', '"sample_rate": 1e-12'),
+        ('"name": "gauge"', r'"name": "gauge\u001b[2J"'),
+        ('0.00390625, "mm"', r'0.00390625, "m\u0007"'),
+        ('0.00390625, "mm"', '1e308, "mm"'),
+        ('"channels": 2', '"channels": 2, "channels": 3'),
+    )
+    rows = []
+    for before, after in edits:
+        assert text.count(before) == 1
+        try:
+            Identity.of_memory(text.replace(before, after).encode() + b"\0")
+        except LinkError as error:
+            rows.append(f"    {before}  becomes  {after}\n        {error}\n")
+    assert len(rows) == len(edits)
+    return "\n".join(rows)
+
+
+def _stray() -> str:
+    output = _board()[0].output_port
+    assert (output.bits, output.signed, output.bytes) == (12, False, 2)
+    rows = (
+        ("C4 02 03", "code 0x2C4, flags 0 and 1"),
+        ("C4 12 03", "damaged: bit 12"),
+        ("C4 02 83", "damaged: no flag"),
+    )
+    return "".join(f"    {data}   {text}\n" for data, text in rows)
 
 
 def _session() -> str:

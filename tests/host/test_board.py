@@ -243,3 +243,71 @@ def test_a_port_that_does_not_exist() -> None:
     expected = r"^/nowhere must be a serial port that is free, not: No such file or directory$"
     with pytest.raises(sosmith.ToolError, match=expected):
         Board("/nowhere")
+
+
+class StrayLine(BadLine):
+    """A line to a board that sets bits of its results, of some of the first responses with samples or of all."""
+
+    def __init__(self, device: Device, place: int, bits: int, times: int) -> None:
+        super().__init__(device)
+        self._place, self._bits, self._times = place, bits, times
+
+    def read(self, timeout: float) -> bytes:
+        found = [each for each in Receiver().feed(super().read(timeout)) if isinstance(each, Message)]
+        return b"".join(self._changed(each).frame for each in found)
+
+    def _changed(self, message: Message) -> Message:
+        if message.type != Type.SAMPLES | 0x80 or not self._times:
+            return message
+        self._times -= 1
+        body = bytearray(message.body)
+        body[self._place] ^= self._bits
+        return Message(message.type, message.sequence, bytes(body))
+
+
+STRAY = [(1, 0x40), (1, 0x80), (1, 0x10), (2, 0x80)]
+"""A bit of the code's extension to whole bytes, and one that is no flag's."""
+
+
+@pytest.mark.parametrize(("place", "bits"), STRAY)
+def test_bits_outside_of_their_field_are_damage_and_are_asked_for_again(place: int, bits: int) -> None:
+    made = filter_design()
+    codes = random_codes(made, 300)
+    with Board.on(StrayLine(plain_device(), place, bits, 2)) as board:
+        assert np.array_equal(board.run_codes(codes).codes, made.core.datapath.compute(codes)[:, 0])
+        assert board.faults["damaged"] == 2
+
+
+@pytest.mark.parametrize(("place", "bits"), STRAY)
+def test_a_board_whose_results_are_always_damaged_is_given_up(place: int, bits: int) -> None:
+    expected = r"^the board must answer SAMPLES with values within their fields, not 3 times with bits outside of them$"
+    with Board.on(StrayLine(plain_device(), place, bits, -1)) as board:
+        with pytest.raises(sosmith.LinkError, match=expected):
+            board.run_codes(random_codes(filter_design(), 3))
+        assert board.faults["damaged"] == 3
+
+
+def test_bits_of_a_flag_are_no_damage() -> None:
+    with Board.on(StrayLine(plain_device(), 2, 0x40, -1)) as board:
+        assert board.run_codes(random_codes(filter_design(), 3)).flag("fault")[0]
+        assert board.faults["damaged"] == 0
+
+
+def test_blocks_of_an_identity_are_whole() -> None:
+    block = Message(0x82, 1, b"{" + b"\0").frame
+    expected = r"^the board's identity must come in blocks of 64 bytes, not 1$"
+    with pytest.raises(sosmith.LinkError, match=expected):
+        Board.on(ScriptedLine(Message(0x81, 0, bytes([1, 4, 0])).frame, block))
+
+
+def test_a_response_has_a_result_for_each_sample() -> None:
+    class ShortLine(StrayLine):
+        def _changed(self, message: Message) -> Message:
+            wrong = message.type == Type.SAMPLES | 0x80
+            return Message(message.type, message.sequence, message.body[3:]) if wrong else message
+
+    with (
+        Board.on(ShortLine(plain_device(), 0, 0, 0)) as board,
+        pytest.raises(sosmith.LinkError, match=r"^the board must return 80 results, not 79$"),
+    ):
+        board.run_codes(random_codes(filter_design(), 100))

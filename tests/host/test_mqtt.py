@@ -58,7 +58,7 @@ def test_credentials_are_read_from_a_file_of_the_owner_only(tmp_path: Path) -> N
     file = tmp_path / "credentials"
     file.write_text("ann:se:cret\n")
     file.chmod(0o600)
-    found = Broker.at("mqtt://depot", credentials=file, environment={"SOSMITH_MQTT_USER": "bob"})
+    found = Broker.at("mqtts://depot", credentials=file, environment={"SOSMITH_MQTT_USER": "bob"})
     assert (found.user, found.password) == ("ann", "se:cret")
     for mode in (0o640, 0o604, 0o620):
         file.chmod(mode)
@@ -73,6 +73,35 @@ def test_credentials_are_read_from_a_file_of_the_owner_only(tmp_path: Path) -> N
         Broker.at("mqtt://depot", credentials=file)
     with pytest.raises(SpecificationError, match=r"must be a text that can be read, not: No such file or directory$"):
         Broker.at("mqtt://depot", credentials=tmp_path / "none")
+
+
+def test_credentials_go_over_a_plain_line_only_with_a_word_from_the_user() -> None:
+    known = {"SOSMITH_MQTT_USER": "ann", "SOSMITH_MQTT_PASSWORD": "secret"}
+    expected = (
+        "--mqtt must be mqtts://depot... with user and password, not mqtt://, which sends them in plain text: "
+        "--mqtt-plain-text allows it"
+    )
+    with pytest.raises(SpecificationError) as caught:
+        Broker.at("mqtt://depot/fleet", environment=known)
+    assert str(caught.value) == expected
+    assert Broker.at("mqtt://depot", plain_text=True, environment=known).password == "secret"
+    for here in ("localhost", "127.0.0.1", "127.1.2.3", "[::1]"):
+        assert Broker.at(f"mqtt://{here}", environment=known).password == "secret"
+    for there in ("127.0.0.1.example", "10.0.0.1", "localhost.example"):
+        with pytest.raises(SpecificationError, match=r"plain text"):
+            Broker.at(f"mqtt://{there}", environment=known)
+
+
+@pytest.mark.parametrize("name", ["fleet/#", "a+", "a\0", "\x1b[2J", "a" * 1000])
+def test_a_topic_that_is_none_is_told_at_once(name: str) -> None:
+    """Even if such an identity had passed the gate."""
+    readings = gauge(name=name)
+    with pytest.raises(SpecificationError) as caught:
+        Publisher(Broker("127.0.0.1", 1, False, ""), readings, 0.0)
+    shown = ascii(f"sosmith/{name}"[:1000])[1:-1]
+    assert str(caught.value) == (
+        f"the topic must be printable, of 1000 bytes at most, and without # and +, not {shown}"
+    )
 
 
 def test_without_paho_a_sentence_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -100,15 +129,15 @@ def test_what_is_published_and_what_stays(tmp_path: Path) -> None:
     readings = gauge()
     with running(tmp_path) as broker, Subscriber(broker.port, "sosmith/#") as reader:
         with Publisher(Broker("127.0.0.1", broker.port, False, ""), readings, 1000.0) as publisher:
-            feed(readings)
-            publisher.alarm(Alarm("wear_critical", 1, 200, 3.25))
+            feed(readings, start=1000.0)
+            publisher.alarm(Alarm("wear_critical", 1, 200, 3.25, 1002.0))
             publisher.update()
             readings.state = "lost"
             publisher.update()
-            reader.until(lambda: changes(reader) == ["connected", "lost"])
+            reader.until(lambda: publisher.update() or changes(reader) == ["connected", "lost"])
             # A connection that breaks off: the broker says so, until this side is back.
             publisher._client.socket().shutdown(socket.SHUT_RDWR)  # type: ignore[union-attr]
-            reader.until(lambda: changes(reader) == ["connected", "lost", "offline", "lost"])
+            reader.until(lambda: publisher.update() or changes(reader) == ["connected", "lost", "offline", "lost"])
         reader.until(lambda: changes(reader)[4:] == ["ended"])
         assert publisher.news() == [
             f"the broker at 127.0.0.1:{broker.port} is gone; waiting for it",
@@ -191,7 +220,7 @@ def test_tls_and_a_password(tmp_path: Path) -> None:
     with running(tmp_path, *lines) as broker:
         good = Broker("127.0.0.1", broker.port, True, "", "ann", "secret", certificate)
         with Publisher(good, gauge(), 0.0) as publisher:
-            publisher.alarm(Alarm("fault", 0, 0, 0.0))
+            publisher.alarm(Alarm("fault", 0, 0, 0.0, 0.0))
         for bad, reason in (
             (
                 Broker("127.0.0.1", broker.port, True, "", "ann", "wrong", certificate),

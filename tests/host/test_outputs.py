@@ -35,16 +35,18 @@ def results(values: Any, status: Any) -> Results:
 
 
 def test_every_rise_of_a_flag_is_one_alarm() -> None:
-    alarms = Alarms(["wear_critical"], FLAGS)
-    assert alarms.rises(results([1.0, 2.0, 3.0, 4.0], [0, 16, 24, 8]), 100) == [Alarm("wear_critical", 0, 101, 2.0)]
-    assert alarms.rises(results([5.0, 6.0], [16, 16]), 104) == [Alarm("wear_critical", 0, 104, 5.0)]
-    assert alarms.rises(results([7.0], [16]), 106) == []
+    alarms = Alarms(["wear_critical"], FLAGS, 10.0)
+    assert alarms.rises(results([1.0, 2.0, 3.0, 4.0], [0, 16, 24, 8]), 100, 1000.0) == [
+        Alarm("wear_critical", 0, 101, 2.0, 1010.1)
+    ]
+    assert alarms.rises(results([5.0, 6.0], [16, 16]), 104, 1000.0) == [Alarm("wear_critical", 0, 104, 5.0, 1010.4)]
+    assert alarms.rises(results([7.0], [16]), 106, 1000.0) == []
 
 
 def test_channels_and_flags_have_alarms_of_their_own() -> None:
-    alarms = Alarms(["wear_critical", "wear_warning"], FLAGS)
-    found = alarms.rises(results([[1, 2], [3, 4]], [[0, 8], [16, 8]]), 0)
-    assert found == [Alarm("wear_warning", 1, 0, 2.0), Alarm("wear_critical", 0, 1, 3.0)]
+    alarms = Alarms(["wear_critical", "wear_warning"], FLAGS, 10.0)
+    found = alarms.rises(results([[1, 2], [3, 4]], [[0, 8], [16, 8]]), 0, 0.0)
+    assert found == [Alarm("wear_warning", 1, 0, 2.0, 0.0), Alarm("wear_critical", 0, 1, 3.0, 0.1)]
 
 
 def test_an_alarm_is_a_flag_of_the_board() -> None:
@@ -52,21 +54,21 @@ def test_an_alarm_is_a_flag_of_the_board() -> None:
         r"^an alarm must be one of wear_warning, wear_critical, not wear_critcal \(did you mean wear_critical\?\)$"
     )
     with pytest.raises(SpecificationError, match=expected):
-        Alarms(["wear_critcal"], FLAGS)
+        Alarms(["wear_critcal"], FLAGS, 10.0)
 
 
 def test_a_hook_is_told_what_has_happened(tmp_path: Path) -> None:
     code = "import os, pathlib, sys; pathlib.Path(sys.argv[1]).write_text(os.environ['SOSMITH_FLAG']"
     code += "+ ' '.join(os.environ['SOSMITH_' + key] for key in ('', 'CHANNEL', 'SAMPLE', 'VALUE', 'UNIT') if key))"
     hook = Hook(f"{sys.executable} -c \"{code}\" '{tmp_path}/told here'", "mm")
-    hook.run(Alarm("fault", 2, 77, 1.25))
+    hook.run(Alarm("fault", 2, 77, 1.25, 0.0))
     hook.finish()
     assert (tmp_path / "told here").read_text() == "fault2 77 1.25 mm"
 
 
 def test_a_hook_that_cannot_be_run() -> None:
     with pytest.raises(ToolError, match=r"^the hook must be a command that can be run, not /none: No such file or "):
-        Hook("/none", "mm").run(Alarm("fault", 0, 0, 0.0))
+        Hook("/none", "mm").run(Alarm("fault", 0, 0, 0.0, 0.0))
 
 
 def test_lines_for_influxdb() -> None:
@@ -117,6 +119,19 @@ def test_the_live_view_without_wear_and_with_much_to_show() -> None:
     assert text.startswith("plain at port: lost, 20,000 samples, 20.0 s, 2 alarms")
     assert "+3600.000" in text
     assert "█" in text
+
+
+def test_the_live_view_obeys_nobody() -> None:
+    """Even if such an identity had passed the gate."""
+    evil = "\x1b]0;owned\x07\x1b[2J\r\x9b"
+    good = identity(filter_design())
+    output = (evil, *good.output[1:5], evil)
+    about = good.model_copy(update={"name": evil, "output": output, "flags": {evil: 3}})
+    view = Readings(about, None, evil)
+    view.add(results(np.ones(10), np.full(10, 8)), 0)
+    text = shown(view)
+    assert "x1b]0;owned" in text
+    assert all(line.isprintable() for line in text.split("\n"))
 
 
 def test_a_history_that_is_thinned_out_keeps_the_flags() -> None:

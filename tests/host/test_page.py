@@ -32,13 +32,13 @@ def gauge(**changes: Any) -> Readings:
     return Readings(about, MANIFEST, "/dev/ttyUSB1")
 
 
-def feed(readings: Readings, count: int = 1000) -> None:
+def feed(readings: Readings, count: int = 1000, start: float = 0.0) -> None:
     """Add results whose first channel rises by 36 mm/h, and whose second has a warning once."""
     first = readings.samples
     numbers = np.arange(first, first + count)
     values = np.stack([1 + numbers / 10_000, np.full(count, 2.0)], axis=1)
     status = np.stack([np.zeros(count), np.where(numbers == 500, 8, 0)], axis=1).astype(np.uint8)
-    readings.add(Results(values, values.astype(np.int64), status, FLAGS), first)
+    readings.add(Results(values, values.astype(np.int64), status, FLAGS), first, start)
 
 
 @pytest.fixture
@@ -52,7 +52,7 @@ def test_what_the_page_is_sent() -> None:
     readings = gauge()
     assert picture(readings, "connected")["now"] == []
     feed(readings)
-    readings.alarm(Alarm("wear_critical", 1, 200, 3.25))
+    readings.alarm(Alarm("wear_critical", 1, 200, 3.25, 1002.0))
     sent = picture(readings, "lost")
     assert {key: sent[key] for key in ("state", "samples", "seconds", "alarms")} == {
         "state": "lost",
@@ -123,7 +123,7 @@ def test_the_page_in_a_browser(live: tuple[Readings, LivePage], tmp_path: Path) 
         tab.open(page.address)
         tab.until("document.getElementById('state')?.textContent === 'No alarm, connected'")
         feed(readings)
-        readings.alarm(Alarm("wear_critical", 1, 200, 3.25))
+        readings.alarm(Alarm("wear_critical", 1, 200, 3.25, 1002.0))
         readings.state = "lost"
         page.update()
         tab.until("document.getElementById('state').textContent === '1 alarm, board lost, waiting for it'")

@@ -1,5 +1,6 @@
 """Recordings: every row in the file at once, continued after a kill, complete Parquet files."""
 
+import csv
 import os
 import signal
 import subprocess
@@ -8,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from sosmith.host.recording import recording
+from sosmith.host.recording import check_output, recording
 from sosmith.model.errors import SpecificationError
 
 COLUMNS = ("time_s", "clearance_mm", "status")
@@ -58,11 +59,92 @@ def test_a_place_that_cannot_be_written(tmp_path: Path) -> None:
         recording(tmp_path / "none" / "rows.csv", COLUMNS)
 
 
+def test_nobody_else_records_to_a_file_that_is_recorded(tmp_path: Path) -> None:
+    path = tmp_path / "rows.csv"
+    expected = f"{path}: the recording must be a file that nobody else writes, not: written by another process"
+    with recording(path, COLUMNS) as made:
+        made.add([(0.0, 1.5, 0)])
+        code = """
+import sys, pathlib
+from sosmith.host.recording import check_output, recording
+try:
+    recording(pathlib.Path(sys.argv[1]), ("time_s", "clearance_mm", "status"))
+except Exception as error:
+    print(error)
+"""
+        said = subprocess.run([sys.executable, "-c", code, str(path)], capture_output=True, text=True, check=True)
+        with pytest.raises(SpecificationError) as caught:
+            recording(path, COLUMNS)
+        made.add([(0.01, 1.25, 4)])
+    assert (said.stdout.rstrip(), str(caught.value)) == (expected, expected)
+    assert path.read_text() == TEXT
+    with recording(path, COLUMNS):
+        pass
+
+
+@pytest.mark.parametrize("suffix", ["", ".csv"])
+def test_what_is_no_regular_file_is_refused(tmp_path: Path, suffix: str) -> None:
+    fifo, folder = tmp_path / f"fifo{suffix}", tmp_path / f"folder{suffix}"
+    os.mkfifo(fifo)
+    folder.mkdir()
+    cases = ((fifo, "FIFO"), (folder, "folder"), (Path("/dev/full"), "device"), (Path("/dev/null"), "device"))
+    for path, kind in cases:
+        with pytest.raises(SpecificationError) as caught:
+            check_output(path)
+        assert str(caught.value) == f"{path}: the output must be a regular file, not a {kind}"
+        with pytest.raises(SpecificationError, match=f"^{path}: the recording must be a (regular )?file"):
+            recording(path, COLUMNS)
+
+
+def test_an_output_is_none_of_the_inputs(tmp_path: Path) -> None:
+    trace = tmp_path / "trace.csv"
+    check_output(trace, trace, None)  # none of them exists
+    trace.write_text("x\n")
+    (tmp_path / "link.csv").symlink_to(trace)
+    for output in (trace, tmp_path / "link.csv"):
+        with pytest.raises(SpecificationError) as caught:
+            check_output(output, trace)
+        assert str(caught.value) == f"{output}: the output must be another file than the input {trace}, not the same"
+    check_output(tmp_path / "other.csv", trace)
+
+
+def test_a_full_disk_is_told_with_the_file(tmp_path: Path) -> None:
+    """By the limit of a file's size, at which the system refuses to write as on a full disk."""
+    code = """
+import resource, sys, pathlib
+from sosmith.host.recording import check_output, recording
+resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
+with recording(pathlib.Path(sys.argv[1]), ("n", "value")) as made:
+    try:
+        for n in range(1000):
+            made.add([(n, n / 3)])
+    except Exception as error:
+        print(type(error).__name__, error)
+"""
+    path = tmp_path / "rows.csv"
+    said = subprocess.run([sys.executable, "-c", code, str(path)], capture_output=True, text=True, check=True)
+    assert said.stdout == f"ToolError {path}: the disk must take the recording, not: File too large\n"
+    with recording(path, ("n", "value")):
+        pass
+    assert path.read_text().splitlines()[1:] == [
+        f"{n},{n / 3!r}" for n in range(len(path.read_text().splitlines()) - 1)
+    ]
+
+
+def test_names_and_texts_are_quoted(tmp_path: Path) -> None:
+    columns = ("time, s", 'a "b"', "c\nd")
+    path = tmp_path / "rows.csv"
+    with recording(path, columns) as made:
+        made.add([(0.5, "x,y", 1)])
+    with path.open(newline="") as file:
+        assert list(csv.reader(file)) == [list(columns), ["0.5", "x,y", "1"]]
+
+
 def test_a_kill_leaves_every_row(tmp_path: Path) -> None:
     path = tmp_path / "rows.csv"
     code = """
 import sys, pathlib
-from sosmith.host.recording import recording
+from sosmith.host.recording import check_output, recording
 with recording(pathlib.Path(sys.argv[1]), ("n", "value")) as made:
     for n in range(10**9):
         made.add([(n, n / 3)])

@@ -7,7 +7,6 @@ import time
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,10 +18,10 @@ from sosmith.terminal import live, note, output_option
 
 if TYPE_CHECKING:
     from sosmith.host.alarms import Alarm
-    from sosmith.host.monitor import Event
+    from sosmith.host.monitor import Event, Received
     from sosmith.host.mqtt import Broker, Publisher
     from sosmith.host.readings import Readings
-    from sosmith.host.recording import Recording
+    from sosmith.host.run_recording import RunRecording
     from sosmith.model.arrays import Codes
     from sosmith.model.link.identity import Identity
 
@@ -67,6 +66,15 @@ REFRESHES = 8
     metavar="FILE",
     help="Certificates that mqtts:// trusts.  [default: the system's]",
 )
+@click.option(
+    "--mqtt-plain-text", is_flag=True, help="Send user and password over mqtt://, which others on the line can read."
+)
+@click.option(
+    "--mqtt-keep",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="File that keeps alarms until the broker has acknowledged them, over restarts and kills.",
+)
 @click.option("--influx", is_flag=True, help="Print every result in the line protocol of InfluxDB.")
 @BAUD
 @output_option("Recording: a CSV file, or a Parquet file if its name ends so; CSV is continued.")
@@ -81,6 +89,8 @@ def monitor_command(
     mqtt: str | None,
     mqtt_credentials: Path | None,
     mqtt_ca: Path | None,
+    mqtt_plain_text: bool,
+    mqtt_keep: Path | None,
     influx: bool,
     baud: int,
     output: Path | None,
@@ -89,11 +99,12 @@ def monitor_command(
 
     The samples of --trace are fed at the board's sample rate; a board with converters measures by itself. The board
     must have the core whose manifest and certificate are in --files. After it was unplugged, it is waited for; its
-    filter then starts from reset, and the recording has the next session. Every alarm is told once, when its flag
-    rises. Exits with 1 if there was one.
+    filter then starts from reset, and the recording has the next session. Another board at its place ends the monitor.
+    Every alarm is told once, when its flag rises. Exits with 1 if there was one.
 
-    The recording has the columns utc, time_s, session, channel if there are several, the result with its unit, its code
-    and its status. Ctrl-C and even a kill leave every row that was received.
+    The recording has the columns utc, time_s, run, session, channel if there are several, the result with its unit, its
+    code, its status, and board, a digest of what the board says that it is; only the same board continues it. Ctrl-C
+    and even a kill leave every row that was received.
 
     --mqtt publishes TOPIC/status, TOPIC/channel/0 and so on, which are retained, and TOPIC/alarm, all with QoS 1.
     Alarms wait while the broker is away. TOPIC is sosmith/NAME, by the name of the core, unless the URL has one.
@@ -105,14 +116,17 @@ def monitor_command(
     from sosmith.host.alarms import ALARMS
     from sosmith.host.board import Board
     from sosmith.host.monitor import watch
+    from sosmith.host.recording import check_output
 
+    if output is not None:
+        check_output(output, trace)
     broker = None
     if mqtt is not None:
         from sosmith.host.mqtt import Broker, paho
 
         paho()
-        broker = Broker.at(mqtt, credentials=mqtt_credentials, authorities=mqtt_ca)
-    asked = _Asked(port, files, alarms or ALARMS, hook, page, broker, influx, output)
+        broker = Broker.at(mqtt, credentials=mqtt_credentials, authorities=mqtt_ca, plain_text=mqtt_plain_text)
+    asked = _Asked(port, files, alarms or ALARMS, hook, page, broker, mqtt_keep, influx, output)
     with ExitStack() as stack:
         shown = stack.enter_context(_Monitor(asked))
         for event in watch(
@@ -145,6 +159,7 @@ class _Asked:
     hook: str | None
     page: bool
     broker: Broker | None
+    keep: Path | None
     influx: bool
     output: Path | None
 
@@ -158,7 +173,7 @@ class _Monitor:
         self._stack = ExitStack()
         self._start = 0.0
         self._readings: Readings | None = None
-        self._recording: Recording | None = None
+        self._recording: RunRecording | None = None
         self._publisher: Publisher | None = None
         self._told: list[Callable[[Alarm], None]] = []
         self._views: list[Callable[[], None]] = []
@@ -187,7 +202,7 @@ class _Monitor:
 
     def take(self, event: Event) -> None:
         """Show, record and judge what happened."""
-        from sosmith.host.monitor import Changed, Connected, Lost, Received
+        from sosmith.host.monitor import Changed, Connected, Idle, Lost, Received
 
         if isinstance(event, Connected):
             if self._readings is None:
@@ -204,28 +219,30 @@ class _Monitor:
             for (channel, name), faults in event.readings.items():
                 wrong = ", ".join(faults).replace("_", " ") or "good again"
                 note(f"the converter of {name}, channel {channel}: {wrong}")
+        elif isinstance(event, Idle) and self._readings is not None:
+            self._show(self._readings.state)
 
     def _begin(self, identity: Identity) -> None:
         from sosmith.host.alarms import Alarms, Hook
         from sosmith.host.readings import Readings
-        from sosmith.host.recording import recording
-        from sosmith.host.rows import columns
+        from sosmith.host.run_recording import RunRecording
 
-        asked, self._identity, self._start = self._asked, identity, time.time()
-        self._alarms = Alarms(asked.flags, identity.flags)
+        asked, self._identity = self._asked, identity
+        self._alarms = Alarms(asked.flags, identity.flags, identity.sample_rate)
         self._readings = Readings(identity, self._manifest, asked.port)
         self._told += [self._note, self._readings.alarm]
         if asked.hook is not None:
             hook = Hook(asked.hook, identity.output_port.unit)
             self._stack.callback(hook.finish)
             self._told.append(hook.run)
-        first, *rest = columns(identity)
         if asked.output is not None:
-            self._recording = self._stack.enter_context(recording(asked.output, ("utc", first, "session", *rest)))
+            self._recording = self._stack.enter_context(RunRecording(asked.output, identity))
         if asked.broker is not None:
             from sosmith.host.mqtt import Publisher
 
-            self._publisher = self._stack.enter_context(Publisher(asked.broker, self._readings, self._start))
+            self._publisher = self._stack.enter_context(
+                Publisher(asked.broker, self._readings, time.time(), asked.keep)
+            )
             self._told.append(self._publisher.alarm)
             self._views.append(self._publisher.update)
         if asked.page:
@@ -249,22 +266,20 @@ class _Monitor:
         self._stack.enter_context(live(view))
         return lambda: view.update(render(readings, console.width))
 
-    def _received(self, event: Any) -> None:
+    def _received(self, event: Received) -> None:
         from sosmith.host.line_protocol import influx_lines
-        from sosmith.host.rows import rows
 
         assert self._readings is not None
         results = event.results
         if self._recording is not None:
-            made = rows(self._identity, results, event.first)
-            self._recording.add((self._utc(row[0]), row[0], event.session, *row[1:]) for row in made)
+            self._recording.add(event)
         if self._asked.influx:
-            click.echo("\n".join(influx_lines(self._identity, results, event.first, self._start)))
+            click.echo("\n".join(influx_lines(self._identity, results, event.first, event.start)))
             sys.stdout.flush()
-        for alarm in self._alarms.rises(results, event.first):
+        for alarm in self._alarms.rises(results, event.first, event.start):
             for tell in self._told:
                 tell(alarm)
-        self._readings.add(results, event.first)
+        self._readings.add(results, event.first, event.start)
         self._show("connected")
 
     def _note(self, alarm: Alarm) -> None:
@@ -279,8 +294,3 @@ class _Monitor:
             renew()
         for text in self._publisher.news() if self._publisher is not None else ():
             note(text)
-
-    def _utc(self, seconds: float) -> str:
-        return (
-            datetime.fromtimestamp(self._start + seconds, UTC).isoformat(timespec="microseconds").replace("+00:00", "Z")
-        )

@@ -26,25 +26,27 @@ def stream_command(port: str, trace: Path, baud: int, output: Path | None) -> No
         sosmith stream /dev/ttyUSB1 ramp.csv -o results.csv
     """
     from sosmith.host.board import Board
-    from sosmith.host.recording import recording
+    from sosmith.host.recording import as_csv, check_output, recording
     from sosmith.host.rows import columns, rows
     from sosmith.host.trace_samples import samples_for
     from sosmith.model.text_files import write_files
 
+    if output is not None:
+        check_output(output, trace)
     with show_progress() as step, Board(port, baud=baud) as board:
         about = board.identity
         step(f"reading {trace}")
         codes = samples_for(about, trace)
         results = board.run_codes(codes, lambda done, total: step("streaming", done, total))
         faults = {name: count for name, count in board.faults.items() if count}
-    lines = ((",".join(map(str, row))) for row in [columns(about), *rows(about, results)])
+    text = as_csv([columns(about), *rows(about, results)])
     if output is None:
-        click.echo("\n".join(lines))
+        click.echo(text, nl=False)
     elif output.suffix.lower() == ".parquet":
         with recording(output, columns(about)) as made:
             made.add(rows(about, results))
     else:
-        write_files(output.parent, {output.name: "\n".join(lines) + "\n"})
+        write_files(output.parent, {output.name: text})
     if output is not None:
         note(f"wrote {output}: {results.codes.size} results of {about.name}")
     if faults:

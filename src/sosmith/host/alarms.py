@@ -33,12 +33,15 @@ class Alarm:
         Number of the sample.
     value : float
         The result, in the unit of the output.
+    utc : float
+        Time of the sample, in seconds since 1970.
     """
 
     flag: str
     channel: int
     sample: int
     value: float
+    utc: float
 
 
 class Alarms:
@@ -50,6 +53,8 @@ class Alarms:
         Names of the flags.
     known : dict of str to int
         Bits of all flags of the board.
+    rate : float
+        Samples of a channel in a second.
 
     Raises
     ------
@@ -57,16 +62,16 @@ class Alarms:
         If the board has no such flag.
     """
 
-    def __init__(self, flags: Sequence[str], known: dict[str, int]) -> None:
+    def __init__(self, flags: Sequence[str], known: dict[str, int], rate: float) -> None:
         for flag in flags:
             if flag not in known:
                 hint = did_you_mean(flag, known)
                 raise SpecificationError(f"an alarm must be one of {', '.join(known)}, not {flag}{hint}")
-        self._flags = tuple(flags)
+        self._flags, self._rate = tuple(flags), rate
         self._raised: dict[str, npt.NDArray[np.bool_]] = {}
 
-    def rises(self, results: Results, first: int) -> list[Alarm]:
-        """Return the rises in results, the first of which is of sample number `first`."""
+    def rises(self, results: Results, first: int, start: float) -> list[Alarm]:
+        """Return the rises in results, the first of which is of sample number `first`; sample 0 was at `start`."""
         found = []
         values = results.values.reshape(len(results.values), -1)
         for flag in self._flags:
@@ -75,8 +80,11 @@ class Alarms:
             before = np.concatenate([last[np.newaxis], now[:-1]])
             self._raised[flag] = now[-1]
             for n, channel in np.argwhere(now & ~before).tolist():
-                found.append(Alarm(flag, channel, first + n, float(values[n, channel])))
+                found.append(self._alarm(flag, channel, first + n, float(values[n, channel]), start))
         return sorted(found, key=lambda alarm: (alarm.sample, alarm.channel))
+
+    def _alarm(self, flag: str, channel: int, sample: int, value: float, start: float) -> Alarm:
+        return Alarm(flag, channel, sample, value, start + sample / self._rate)
 
 
 class Hook:

@@ -216,12 +216,26 @@ class Board:
         total = block.shape[0] * block.shape[1]
         received = bytearray()
         size = self._identity.result_bytes
-        for results in self._session.exchange(self._requests(block.reshape(total, -1))):
+        for results in self._session.exchange(self._requests(block.reshape(total, -1)), self._sound):
+            asked = min(total - len(received) // size, self._identity.samples)
+            if len(results) != asked * size:
+                raise LinkError(f"the board must return {asked} results, not {len(results) / size:g}")
             received += results
             progress(len(received) // size, total)
-        if len(received) != total * size:
-            raise LinkError(f"the board must return {total} results, not {len(received) / size:g}")
         return self._results(bytes(received))
+
+    def _sound(self, results: bytes) -> bool:
+        """Tell whether no bit of results lies outside its field: those of codes repeat the sign, those of flags are 0.
+
+        Incomplete results are another matter.
+        """
+        size = self._identity.result_bytes
+        if len(results) % size:
+            return True
+        port, no_flag = self._identity.output_port, 0xFF - sum(1 << bit for bit in self._identity.flags.values())
+        rows = np.frombuffer(results, np.uint8).reshape(-1, size)
+        codes = rows[:, :-1].tobytes()
+        return bytes_of(codes_of(codes, [port]), [port.bytes]) == codes and not np.any(rows[:, -1] & no_flag)
 
     def _requests(self, rows: Codes) -> Iterator[Request]:
         """Give requests with the samples of all channels in turn."""
@@ -265,11 +279,13 @@ class Board:
 
         None if there are none yet. The arrays have the shape (results,), whatever the number of channels.
         """
-        body = self._session.request(Type.POLL)
+        body = self._session.request(Type.POLL, check=lambda body: self._sound(body[1:]))
         if not body or (len(body) - 1) % self._identity.result_bytes:
             raise LinkError(f"the board must answer with whole results, not with {len(body)} bytes")
         if len(body) == 1:
             return None
+        if body[0] >= self._identity.channels:
+            raise LinkError(f"the board must name a channel below {self._identity.channels}, not {body[0]}")
         rows = np.frombuffer(body[1:], np.uint8).reshape(-1, self._identity.result_bytes)
         codes = codes_of(rows[:, :-1].tobytes(), [self._identity.output_port])[:, 0]
         flags = dict(self._identity.flags)
@@ -352,7 +368,8 @@ class Board:
         while b"\0" not in memory:
             if len(memory) >= MAX_IDENTITY:
                 raise LinkError(f"the board's identity must end within {MAX_IDENTITY} bytes")
-            memory += self._session.request(Type.IDENTITY, bytes([len(memory) // BLOCK_BYTES])).ljust(
-                BLOCK_BYTES, b"\0"
-            )
+            block = self._session.request(Type.IDENTITY, bytes([len(memory) // BLOCK_BYTES]))
+            if len(block) != BLOCK_BYTES:
+                raise LinkError(f"the board's identity must come in blocks of {BLOCK_BYTES} bytes, not {len(block)}")
+            memory += block
         return memory

@@ -13,6 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from sosmith.host.readings import Reading, Readings
+from sosmith.terminal import printable
 
 _BLOCKS = " ▁▂▃▄▅▆▇█"
 
@@ -34,10 +35,10 @@ def plot(values: Sequence[float] | npt.NDArray[np.float64], width: int, height: 
 def render(readings: Readings, width: int = 80) -> Group:
     """Return what to print, for a terminal of `width` characters."""
     about, now = readings.identity, readings.now
-    unit = about.output_port.unit
+    quantity, unit = printable(about.output_port.name), printable(about.output_port.unit)
     table = Table(box=None, pad_edge=False, header_style="bold")
     wear = [f"wear, {unit}", f"{unit}/h"] if readings.initial is not None else [f"{unit or 'steps'}/h"]
-    for name in ("channel", f"{about.output_port.name}{f', {unit}' if unit else ''}", *wear):
+    for name in ("channel", f"{quantity}{f', {unit}' if unit else ''}", *wear):
         table.add_column(escape(name), justify="right")
     table.add_column("flags")
     for one in now:
@@ -45,8 +46,8 @@ def render(readings: Readings, width: int = 80) -> Group:
         depth = [] if one.wear is None else [f"{one.wear:.3f}"]
         table.add_row(str(one.channel), f"{one.value:.4f}", *depth, per_hour, _shown(one.flags))
     head = Text.assemble(
-        (about.name, "bold"),
-        f" at {readings.port}: {readings.state}, {readings.samples:,} samples, {readings.seconds:,.1f} s",
+        (printable(about.name), "bold"),
+        f" at {printable(readings.port)}: {readings.state}, {readings.samples:,} samples, {readings.seconds:,.1f} s",
         (f", {readings.alarms} alarms" if readings.alarms else "", "bold red"),
     )
     return Group(head, "", table, "", *_plotted(readings, now, width))
@@ -59,10 +60,10 @@ def _plotted(readings: Readings, now: list[Reading], width: int) -> list[Text]:
     values = readings.histories[worst].values
     rows = plot(values, max(width - 12, 20), 6)
     labels = [f"{values.max():10.4f} ", *[" " * 11] * (len(rows) - 2), f"{values.min():10.4f} "]
-    title = f"channel {worst}" if len(now) > 1 else readings.identity.output_port.name
+    title = f"channel {worst}" if len(now) > 1 else printable(readings.identity.output_port.name)
     return [Text(f"{title:>10}"), *(Text(label + row) for label, row in zip(labels, rows, strict=True))]
 
 
 def _shown(flags: Sequence[str]) -> Text:
     style = "red" if {"wear_critical", "fault"} & set(flags) else "yellow"
-    return Text(", ".join(flags).replace("_", " ") or "-", style=style if flags else "")
+    return Text(printable(", ".join(flags)).replace("_", " ") or "-", style=style if flags else "")

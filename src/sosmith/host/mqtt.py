@@ -12,7 +12,7 @@ import threading
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
+from ipaddress import ip_address
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from types import TracebackType
@@ -20,6 +20,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from urllib.parse import urlsplit
 
 from sosmith.host.alarms import Alarm
+from sosmith.host.clock import utc_text
+from sosmith.host.outbox import MOST, Outbox
 from sosmith.host.readings import Readings
 from sosmith.model.errors import SpecificationError, ToolError
 
@@ -34,6 +36,9 @@ PATIENCE = 10.0
 
 KEEP_ALIVE = 15
 """Seconds after which a silent connection is tried; after half as many again, the broker publishes the last will."""
+
+MAX_TOPIC = 1000
+"""Most bytes of the beginning of all topics."""
 
 Item = TypeVar("Item")
 
@@ -76,6 +81,7 @@ class Broker:
         *,
         credentials: Path | None = None,
         authorities: Path | None = None,
+        plain_text: bool = False,
         environment: Mapping[str, str] = os.environ,
     ) -> Broker:
         """Return the broker at ``mqtt://HOST[:PORT][/TOPIC]``, or ``mqtts://`` for TLS.
@@ -89,13 +95,15 @@ class Broker:
             SOSMITH_MQTT_PASSWORD.
         authorities : Path or None
             File with the certificates to trust instead of the system's.
+        plain_text : bool
+            Whether user and password may go over a line that is not encrypted; to this computer they may.
         environment : mapping
             Where the variables are.
 
         Raises
         ------
         SpecificationError
-            If the address is none, or the file with the credentials is open to others.
+            If the address is none, or the credentials are open to others in their file or on the line.
         """
         try:
             parts = urlsplit(url)
@@ -114,11 +122,24 @@ class Broker:
         if credentials is not None:
             user, password = _credentials(credentials)
         tls = parts.scheme == "mqtts"
+        if user is not None and not (tls or plain_text or _is_here(host)):
+            raise SpecificationError(
+                f"--mqtt must be mqtts://{host}... with user and password, not mqtt://, which sends them in plain "
+                "text: --mqtt-plain-text allows it"
+            )
         return cls(host, port or _PORTS[parts.scheme], tls, topic, user, password, authorities)
 
     def __str__(self) -> str:
         """Return what a message calls it."""
         return f"{self.host}:{self.port}"
+
+
+def _is_here(host: str) -> bool:
+    """Tell whether a host is this computer."""
+    try:
+        return host == "localhost" or ip_address(host).is_loopback
+    except ValueError:
+        return False
 
 
 def _credentials(path: Path) -> tuple[str, str]:
@@ -147,7 +168,8 @@ class Publisher:
       this program is gone or does not answer.
     - ``T/channel/K``, retained: the newest reading of channel K as JSON, once a second, while there is a connection.
     - ``T/alarm``: each alarm as JSON. Alarms wait for the broker's acknowledgement, through any number of connections;
-      the same one may come twice, with the same ``number``.
+      the same one may come twice, with the same ``number``. As many as `sosmith.host.outbox.MOST` wait; those that come
+      then are left out, and missing among the numbers.
 
     Parameters
     ----------
@@ -156,64 +178,75 @@ class Publisher:
     readings : Readings
         What is published; read in the thread that calls `update` and `close`.
     start : float
-        Time of sample 0, in seconds since 1970.
+        When this run began, in seconds since 1970: alarms of different runs have the same numbers.
+    keep : Path or None
+        File that keeps alarms over restarts until they are acknowledged; None for memory.
 
     Raises
     ------
+    SpecificationError
+        If the topic has a sign that topics must not have, or the file cannot be used.
     ToolError
         If paho-mqtt is missing, or the broker does not accept the connection within 10 s; later it is waited for.
     """
 
-    def __init__(self, broker: Broker, readings: Readings, start: float) -> None:
-        self._broker, self._readings, self._start = broker, readings, start
-        self._topic = broker.topic or f"sosmith/{readings.identity.name}"
-        self._number, self._due, self._state = 0, -math.inf, readings.state
-        # By their numbers: the library's own objects fail for what is published while there is no connection.
-        self._waiting: set[int] = set()
+    def __init__(self, broker: Broker, readings: Readings, start: float, keep: Path | None = None) -> None:
+        self._broker, self._readings, self._start, self._keep = broker, readings, start, keep
+        self._topic = _topic(broker.topic or f"sosmith/{readings.identity.name}")
+        self._number, self._due, self._state, self._left_out = 0, -math.inf, "", 0
+        # What the client's thread tells the one of the monitor.
         self._acknowledged: SimpleQueue[int] = SimpleQueue()
         self._news: SimpleQueue[str] = SimpleQueue()
-        self._answered, self._refusal = threading.Event(), ""
-        self._client = self._connected()
+        self._answered, self._again, self._refusal = threading.Event(), threading.Event(), ""
+        self._outbox = Outbox(keep)
+        try:
+            self._client = self._connected()
+        except BaseException:
+            self._outbox.close()
+            raise
+        self.update()
 
     def update(self) -> None:
-        """Publish what is new: a change of the state at once, readings once a second."""
+        """Publish what is new: a change of the state at once, readings once a second; take what is acknowledged."""
         readings = self._readings
-        if readings.state != self._state:
+        if readings.state != self._state or self._again.is_set():
+            self._again.clear()  # after an absence, the last will stands there
             self._state = readings.state
-            self._status(self._state)
+            self._outbox.show(f"{self._topic}/status", self._state)
         if time.monotonic() >= self._due and self._client.is_connected():
             self._due = time.monotonic() + INTERVAL
             for one in readings.now:
-                self._publish(
-                    f"channel/{one.channel}",
-                    {
-                        "time": self._utc(readings.samples - 1),
-                        "sample": readings.samples - 1,
-                        "quantity": readings.identity.output_port.name,
-                        "unit": readings.identity.output_port.unit,
-                        "value": one.value,
-                        "wear": one.wear,
-                        "per_hour": one.per_hour,
-                        "flags": one.flags,
-                    },
-                    retain=True,
-                )
+                made = {
+                    "time": utc_text(readings.utc, "milliseconds"),
+                    "sample": readings.samples - 1,
+                    "quantity": readings.identity.output_port.name,
+                    "unit": readings.identity.output_port.unit,
+                    "value": one.value,
+                    "wear": one.wear,
+                    "per_hour": one.per_hour,
+                    "flags": one.flags,
+                }
+                self._outbox.show(f"{self._topic}/channel/{one.channel}", _json(made))
+        self._turn()
 
     def alarm(self, alarm: Alarm) -> None:
         """Publish an alarm, now or when the broker is back."""
         self._number += 1
         made = {
             "number": self._number,
-            "since": self._utc(0),
-            "time": self._utc(alarm.sample),
+            "since": utc_text(self._start, "milliseconds"),
+            "time": utc_text(alarm.utc, "milliseconds"),
             "sample": alarm.sample,
             "channel": alarm.channel,
             "flag": alarm.flag,
             "value": alarm.value,
             "unit": self._readings.identity.output_port.unit,
         }
-        self._waiting.add(self._publish("alarm", made))
-        self._take_acknowledgements()
+        self._outbox.put(f"{self._topic}/alarm", _json(made))
+        if self._outbox.left_out and not self._left_out:
+            self._news.put(f"{MOST} alarms wait for the broker at {self._broker}; further ones are left out")
+        self._left_out = self._outbox.left_out
+        self._turn()
 
     def news(self) -> list[str]:
         """Return what has happened to the connection since the last call, a sentence each."""
@@ -225,20 +258,33 @@ class Publisher:
         Raises
         ------
         ToolError
-            If alarms are not acknowledged within 10 s.
+            If alarms are not acknowledged within 10 s, or were left out.
         """
         self._due = -math.inf
         self.update()
-        last = self._status("ended")
-        self._waiting.add(last)
+        self._outbox.show(f"{self._topic}/status", "ended")
         end = time.monotonic() + PATIENCE
-        while self._waiting and time.monotonic() < end:
+        while True:
+            self._turn()
+            if self._outbox.empty or time.monotonic() > end:
+                break
             time.sleep(0.01)
-            self._take_acknowledgements()
         self._client.disconnect()
         self._client.loop_stop()
-        if left := self._waiting - {last}:
-            raise ToolError(f"the broker at {self._broker} must acknowledge every alarm, not leave out {len(left)}")
+        self._outbox.close()
+        if left := self._outbox.waiting + self._left_out:
+            kept = "" if self._keep is None else f"; {self._outbox.waiting} wait in {self._keep} for the next start"
+            raise ToolError(f"the broker at {self._broker} must acknowledge every alarm, not leave out {left}{kept}")
+
+    def _turn(self) -> None:
+        """Take what is acknowledged, and give the client what it may have now."""
+        for number in _drained(self._acknowledged):
+            self._outbox.acknowledged(number)
+        if self._client.is_connected():
+            self._outbox.hand_over(self._hand)
+
+    def _hand(self, topic: str, text: str, retain: bool) -> int:
+        return self._client.publish(topic, text, _QOS, retain=retain).mid
 
     def __enter__(self) -> Publisher:
         """Return the publisher."""
@@ -282,31 +328,28 @@ class Publisher:
             self._refusal = str(reason)
             if again:
                 self._news.put(f"the broker at {self._broker} refuses: {reason}; trying again")
-        else:
-            # After an absence, the last will stands there.
-            client.publish(f"{self._topic}/status", self._state, _QOS, retain=True)
-            if again:
-                self._news.put(f"the broker at {self._broker} is connected again")
+        elif again:
+            self._again.set()
+            self._news.put(f"the broker at {self._broker} is connected again")
         self._answered.set()
 
     def _on_disconnect(self, client: Client, data: Any, flags: Any, reason: Any, properties: Any) -> None:
         if reason.is_failure and self._answered.is_set():
             self._news.put(f"the broker at {self._broker} is gone; waiting for it")
 
-    def _take_acknowledgements(self) -> None:
-        acknowledged: list[int] = _drained(self._acknowledged)
-        self._waiting.difference_update(acknowledged)
 
-    def _status(self, state: str) -> int:
-        return self._client.publish(f"{self._topic}/status", state, _QOS, retain=True).mid
+def _topic(text: str) -> str:
+    """Check the beginning of all topics."""
+    if not text.isprintable() or set("#+") & set(text) or len(text.encode()) > MAX_TOPIC:
+        raise SpecificationError(
+            f"the topic must be printable, of {MAX_TOPIC} bytes at most, and without # and +, "
+            f"not {ascii(text[:MAX_TOPIC])[1:-1]}"
+        )
+    return text
 
-    def _publish(self, topic: str, made: dict[str, Any], *, retain: bool = False) -> int:
-        text = json.dumps(made, ensure_ascii=False, allow_nan=False)
-        return self._client.publish(f"{self._topic}/{topic}", text, _QOS, retain=retain).mid
 
-    def _utc(self, sample: int) -> str:
-        seconds = self._start + sample / self._readings.identity.sample_rate
-        return datetime.fromtimestamp(seconds, UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
+def _json(made: dict[str, Any]) -> str:
+    return json.dumps(made, ensure_ascii=False, allow_nan=False)
 
 
 def _drained(queue: SimpleQueue[Item]) -> list[Item]:

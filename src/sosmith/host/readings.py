@@ -132,6 +132,8 @@ class Readings:
         The last ones of them.
     samples : int
         Samples of a channel so far.
+    utc : float
+        Time of the newest sample, in seconds since 1970.
     histories : tuple of History
         The past of each channel.
     initial : tuple of float or None
@@ -143,6 +145,7 @@ class Readings:
     def __init__(self, identity: Identity, manifest: Mapping[str, Any] | None, port: str) -> None:
         self.identity, self.port = identity, port
         self.state, self.alarms, self.samples = "connected", 0, 0
+        self.utc = 0.0
         self.newest_alarms: deque[Alarm] = deque(maxlen=ALARMS)
         self.histories = tuple(History() for _ in range(identity.channels))
         wear = (manifest or {}).get("spec", {}).get("wear")
@@ -153,14 +156,15 @@ class Readings:
             if wear and wear.get(key) is not None
         }
 
-    def add(self, results: Results, first: int) -> None:
-        """Take the newest results, the first of sample number `first`."""
+    def add(self, results: Results, first: int, start: float = 0.0) -> None:
+        """Take the newest results, the first of sample number `first`; sample 0 was at `start`, in s since 1970."""
         shape = (-1, self.identity.channels)
         values, status = results.values.reshape(shape), results.status.reshape(shape)
         for channel, history in enumerate(self.histories):
             history.add(first, values[:, channel], status[:, channel])
         self._last = list(zip(values[-1].tolist(), status[-1].tolist(), strict=True))
         self.samples = first + len(values)
+        self.utc = start + (self.samples - 1) / self.identity.sample_rate
 
     def alarm(self, one: Alarm) -> None:
         """Take an alarm."""

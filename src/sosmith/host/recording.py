@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import csv
+import fcntl
+import io
 import os
+import stat
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from types import TracebackType
@@ -13,12 +17,24 @@ from sosmith.model.errors import SpecificationError, ToolError
 _JOURNAL = ".rows.csv"
 """What is added to the name of a Parquet file while it is recorded."""
 
+_LONGEST = 1 << 20
+"""Most bytes of a line that is read back."""
+
 
 class Recording(Protocol):
     """Where rows go."""
 
+    @property
+    def last(self) -> dict[str, str] | None:
+        """The last row that was there before, by its columns; None if there was none."""
+        ...
+
     def add(self, rows: Iterable[Sequence[object]]) -> None:
         """Add rows, each a value for every column; they are in the file when this returns."""
+        ...
+
+    def give_back(self) -> None:
+        """Leave the file as it is, for others."""
         ...
 
     def __enter__(self) -> Recording:
@@ -38,18 +54,34 @@ def recording(path: Path, columns: Sequence[str]) -> Recording:
     Raises
     ------
     SpecificationError
-        If the file cannot be written, has other columns, or is a complete Parquet file.
+        If the file cannot be written, is no regular one, is written by another process, has other columns, or is a
+        complete Parquet file.
     ToolError
         If Parquet is asked for, and pyarrow is missing.
     """
     return ParquetRecording(path, columns) if path.suffix.lower() == ".parquet" else CsvRecording(path, columns)
 
 
+def check_output(path: Path, *inputs: Path | None) -> None:
+    """Check that a file may be written: that it is a regular one or none yet, and none of the inputs.
+
+    Raises
+    ------
+    SpecificationError
+        If it may not.
+    """
+    if path.exists() and not path.is_file():
+        raise SpecificationError(f"{path}: the output must be a regular file, not a {_kind(path.stat().st_mode)}")
+    for given in inputs:
+        if given is not None and path.exists() and given.exists() and path.samefile(given):
+            raise SpecificationError(f"{path}: the output must be another file than the input {given}, not the same")
+
+
 class CsvRecording:
     """Rows in a CSV file; one that exists is continued.
 
     A row that a kill or a crash has cut short at the end of the file is removed. Rows are handed to the system at
-    once, so that a kill of this process loses none.
+    once, so that a kill of this process loses none. While it is recorded, no other process may do so.
 
     Parameters
     ----------
@@ -58,40 +90,52 @@ class CsvRecording:
     columns : sequence of str
         Names of the columns.
 
+    Attributes
+    ----------
+    last : dict of str to str, or None
+        The last row that was there before.
+
     Raises
     ------
     SpecificationError
-        If the file cannot be written or has other columns.
+        If the file cannot be written, is no regular one, is written by another process, or has other columns.
     """
 
     def __init__(self, path: Path, columns: Sequence[str]) -> None:
-        header = ",".join(columns).encode()
+        self._path, header = path, as_csv([columns]).encode()
         try:
-            self._file = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+            # Without waiting: a FIFO would block until somebody reads it.
+            self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NONBLOCK, 0o666)
         except OSError as error:
             raise SpecificationError(
                 f"{path}: the recording must be a file that can be written, not: {error.strerror}"
             ) from None
         try:
+            self._take()
             with os.fdopen(os.dup(self._file), "rb") as reader:
-                first = reader.readline().rstrip(b"\n")
+                first = reader.readline(_LONGEST)
                 if first not in {b"", header} and not header.startswith(first):
-                    shown = first.decode(errors="replace")[:200]
+                    shown = first.decode(errors="replace").rstrip("\n")[:200]
                     raise SpecificationError(
-                        f"{path}: the columns must be {header.decode()} to be continued, not {shown}"
+                        f"{path}: the columns must be {header.decode().rstrip()} to be continued, not {shown}"
                     )
             complete = _complete_lines(path)
             os.ftruncate(self._file, complete)
             os.lseek(self._file, 0, os.SEEK_END)
+            self.last = self._last_row(columns, complete)
             if not complete:
-                self._write(header + b"\n")
+                self._write(header)
         except BaseException:
             os.close(self._file)
             raise
 
     def add(self, rows: Iterable[Sequence[object]]) -> None:
         """Add rows, each a value for every column."""
-        self._write("".join(",".join(map(_text, row)) + "\n" for row in rows).encode())
+        self._write(as_csv(rows).encode())
+
+    def give_back(self) -> None:
+        """Close the file."""
+        os.close(self._file)
 
     def __enter__(self) -> CsvRecording:
         """Return the recording."""
@@ -101,14 +145,40 @@ class CsvRecording:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Close the file."""
-        os.close(self._file)
+        self.give_back()
+
+    def _take(self) -> None:
+        """Check that the file is a regular one, and lock it."""
+        mode = os.fstat(self._file).st_mode
+        if not stat.S_ISREG(mode):
+            raise SpecificationError(f"{self._path}: the recording must be a regular file, not a {_kind(mode)}")
+        try:
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            reason = "written by another process" if isinstance(error, BlockingIOError) else error.strerror
+            raise SpecificationError(
+                f"{self._path}: the recording must be a file that nobody else writes, not: {reason}"
+            ) from None
+
+    def _last_row(self, columns: Sequence[str], size: int) -> dict[str, str] | None:
+        """Read the last complete row."""
+        start = max(size - _LONGEST, 0)
+        *_, before, last = b"", b"", *os.pread(self._file, size - start, start).splitlines()
+        if not before:  # the last line is the header, or there is none
+            return None
+        values = next(csv.reader([last.decode(errors="replace")]), [])
+        if len(values) != len(columns):
+            raise SpecificationError(
+                f"{self._path}: the last row must have {len(columns)} values to be continued, not {len(values)}"
+            )
+        return dict(zip(columns, values, strict=True))
 
     def _write(self, data: bytes) -> None:
         while data:
             try:
                 data = data[os.write(self._file, data) :]
             except OSError as error:
-                raise ToolError(f"the disk must take the recording, not: {error.strerror}") from None
+                raise ToolError(f"{self._path}: the disk must take the recording, not: {error.strerror}") from None
 
 
 class ParquetRecording:
@@ -127,9 +197,18 @@ class ParquetRecording:
         self._path, self._journal = path, path.with_name(path.name + _JOURNAL)
         self._rows = CsvRecording(self._journal, columns)
 
+    @property
+    def last(self) -> dict[str, str] | None:
+        """The last row that a kill has left."""
+        return self._rows.last
+
     def add(self, rows: Iterable[Sequence[object]]) -> None:
         """Add rows, each a value for every column."""
         self._rows.add(rows)
+
+    def give_back(self) -> None:
+        """Leave the rows beside the file."""
+        self._rows.give_back()
 
     def __enter__(self) -> ParquetRecording:
         """Return the recording."""
@@ -139,11 +218,22 @@ class ParquetRecording:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Write the Parquet file, and remove the rows beside it."""
-        from pyarrow import csv, parquet
+        try:
+            self._convert()
+        except OSError as failure:
+            raise ToolError(
+                f"{self._path}: the disk must take the recording, not: {failure.strerror or failure}; "
+                f"its rows are in {self._journal}"
+            ) from None
+        finally:
+            self._rows.give_back()
 
-        self._rows.__exit__(kind, error, trace)
+    def _convert(self) -> None:
+        from pyarrow import csv as arrow
+        from pyarrow import parquet
+
         unfinished = self._path.with_name(self._path.name + ".part")
-        with csv.open_csv(self._journal) as batches, parquet.ParquetWriter(unfinished, batches.schema) as writer:
+        with arrow.open_csv(self._journal) as batches, parquet.ParquetWriter(unfinished, batches.schema) as writer:
             for batch in batches:
                 writer.write_batch(batch)
         unfinished.replace(self._path)
@@ -165,5 +255,14 @@ def _complete_lines(path: Path) -> int:
     return 0
 
 
-def _text(value: object) -> str:
-    return repr(value) if isinstance(value, float) else str(value)
+def as_csv(rows: Iterable[Sequence[object]]) -> str:
+    """Return rows as CSV; floats have the digits that give them back."""
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    return text.getvalue()
+
+
+def _kind(mode: int) -> str:
+    """Name what is no regular file."""
+    kinds = {stat.S_ISDIR: "folder", stat.S_ISFIFO: "FIFO", stat.S_ISSOCK: "socket", stat.S_ISCHR: "device"}
+    return next((name for test, name in kinds.items() if test(mode)), "device")

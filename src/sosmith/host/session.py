@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import asdict, dataclass, field
 
 from sosmith.host.line import Line
@@ -18,11 +18,21 @@ MAX_ATTEMPTS = 32
 OPEN_ATTEMPTS = 6
 """The same of the first request, which meets a board that may not be there."""
 
+MAX_DAMAGED = 3
+"""Copies of a response whose content is damaged, though its CRC is not, after which the board counts as faulty."""
+
 _SHORTEST, _LONGEST, _FIRST = 0.02, 1.0, 0.3
 """Limits of the time in s to wait for a response before asking again, and what is waited for the first one."""
 
 Request = tuple[Type, bytes]
 """Type and body."""
+
+Check = Callable[[bytes], bool]
+"""Tells whether the body of a response, without its status, can be right."""
+
+
+def _anything(body: bytes) -> bool:
+    return True
 
 
 @dataclass
@@ -32,7 +42,7 @@ class Faults:
     Attributes
     ----------
     damaged : int
-        Frames that arrived damaged.
+        Frames that arrived damaged, and responses whose content is.
     unexpected : int
         Messages that nothing was waiting for, such as second copies.
     gaps : int
@@ -57,7 +67,9 @@ class _Pending:
 
     message: Message
     sent: float
+    check: Check = _anything
     again: bool = field(default=False)
+    damaged: int = field(default=0)
 
 
 class Session:
@@ -93,8 +105,10 @@ class Session:
             raise LinkError(f"the board must speak version {VERSION} of the protocol, not answer with {body.hex(' ')}")
         self.window = body[1]
 
-    def request(self, kind: Type, body: bytes = b"") -> bytes:
+    def request(self, kind: Type, body: bytes = b"", check: Check = _anything) -> bytes:
         """Send one request; return the body of its response without the status.
+
+        A response that does not pass `check` is damage, as one with a wrong CRC, and is asked for again.
 
         Raises
         ------
@@ -102,11 +116,13 @@ class Session:
             If the status is not ``OK``.
         LinkLostError
             If no response comes, or the line is gone.
+        LinkError
+            If the response is still damaged when it came three times.
         """
-        (response,) = self.exchange([(kind, body)])
+        (response,) = self.exchange([(kind, body)], check)
         return response
 
-    def exchange(self, requests: Iterable[Request]) -> Iterator[bytes]:
+    def exchange(self, requests: Iterable[Request], check: Check = _anything) -> Iterator[bytes]:
         """Send requests, as many at once as the board allows; give the bodies of the responses, in order.
 
         Errors are those of `request`. Requests are drawn as they are sent.
@@ -122,16 +138,16 @@ class Session:
                 if request is None:
                     more = False
                 else:
-                    self._send(*request)
+                    self._send(*request, check)
             if not self._pending:
                 return
             request_message, body = self._next()
             yield _accepted(request_message, body)
 
-    def _send(self, kind: Type, body: bytes) -> None:
+    def _send(self, kind: Type, body: bytes, check: Check) -> None:
         message = Message(kind, self._sequence, body)
         self._sequence = (self._sequence + 1) % SEQUENCES
-        self._pending.append(_Pending(message, time.monotonic()))
+        self._pending.append(_Pending(message, time.monotonic(), check))
         self._line.write(message.frame)
 
     def _next(self) -> tuple[Message, bytes]:
@@ -169,11 +185,24 @@ class Session:
             return None
         for place, pending in enumerate(self._pending):
             if (found.type, found.sequence) == (pending.message.type | RESPONSE, pending.message.sequence):
-                if found.body:
+                if not found.body:
+                    break
+                if found.body[-1] != Status.OK or pending.check(found.body[:-1]):
                     return place
-                break
+                self._damaged(pending)
+                return None
         self.faults.unexpected += 1
         return None
+
+    def _damaged(self, pending: _Pending) -> None:
+        self.faults.damaged += 1
+        pending.damaged += 1
+        if pending.damaged == MAX_DAMAGED:
+            name = Type(pending.message.type).name
+            raise LinkError(
+                f"the board must answer {name} with values within their fields, not {MAX_DAMAGED} times with bits "
+                "outside of them"
+            )
 
     def _finished(self, response: Message) -> tuple[Message, bytes]:
         pending = self._pending.popleft()
