@@ -14,6 +14,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import IO, Any
 from xml.etree import ElementTree
+from xml.parsers import expat
 
 from openpyxl.reader.excel import ExcelReader
 from openpyxl.styles.numbers import BUILTIN_FORMATS, is_date_format, is_timedelta_format
@@ -66,8 +67,8 @@ def workbook_rows(path: Path, content: bytes) -> list[tuple[int, Sequence[Any]]]
     Raises
     ------
     SpecificationError
-        If the workbook is damaged, has no visible worksheet, unpacks to more than `MAX_UNPACKED` bytes or `MAX_TAGS`
-        tags, or has a value beyond `MAX_ROWS` or `MAX_COLUMNS`.
+        If the workbook is damaged, has no visible worksheet, defines a document type in any part, unpacks to more than
+        `MAX_UNPACKED` bytes or `MAX_TAGS` tags, or has a value beyond `MAX_ROWS` or `MAX_COLUMNS`.
     """
     if content.startswith(_OLE):
         raise SpecificationError(f"{path} must be an XLSX workbook without a password, not an encrypted or older one")
@@ -91,8 +92,10 @@ def _check_unpacked(path: Path, archive: zipfile.ZipFile) -> None:
     for entry in archive.infolist():
         if entry.compress_type not in {zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED}:
             raise ValueError(f"{entry.filename} is compressed in a way that workbooks are not")
+        check = _TypeCheck(path)
         with archive.open(entry) as part:
             while piece := part.read(1 << 20):
+                check.feed(piece)
                 unpacked += len(piece)
                 tags += piece.count(b"<")
                 if unpacked > MAX_UNPACKED or tags > MAX_TAGS:
@@ -100,6 +103,32 @@ def _check_unpacked(path: Path, archive: zipfile.ZipFile) -> None:
                         f"{path} must unpack to at most {MAX_UNPACKED >> 20} MiB with {MAX_TAGS:,} XML tags, not more; "
                         "keep the measurements in a workbook of their own, without pictures and other sheets"
                     )
+
+
+class _TypeCheck:
+    """Refuses a part with a document type, in whatever encoding: its entities expand to any size when they are read."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._parser: expat.XMLParserType | None = expat.ParserCreate()
+        self._parser.StartDoctypeDeclHandler = self._refuse
+
+    def feed(self, piece: bytes) -> None:
+        """Read on; what is no XML is read no further."""
+        if self._parser is None:
+            return
+        try:
+            self._parser.Parse(piece, False)
+        except expat.ExpatError as error:
+            # Another parser might know an encoding that this one does not.
+            if error.code == expat.errors.codes[expat.errors.XML_ERROR_UNKNOWN_ENCODING]:
+                raise
+            self._parser = None
+
+    def _refuse(self, *_declared: object) -> None:
+        raise SpecificationError(
+            f"{self._path} must be a workbook of plain XML, not define a document type: no spreadsheet program does"
+        )
 
 
 def _rows(path: Path, content: bytes) -> Iterator[tuple[int, list[Any]]]:

@@ -133,6 +133,36 @@ def test_a_sheet_of_more_tags_than_one_can_wait_for() -> None:
     refused(content, TOO_LARGE)
 
 
+ENTITIES = '<?xml version="1.0" encoding="{}"?><!DOCTYPE x [<!ENTITY a "{}">]>'
+TYPED = "m.xlsx must be a workbook of plain XML, not define a document type: no spreadsheet program does"
+
+
+@pytest.mark.parametrize("part", [SHEET, STYLES, "xl/workbook.xml", "docProps/core.xml", "[Content_Types].xml"])
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16", "iso-8859-1"])
+def test_a_document_type_in_any_part_and_encoding(part: str, encoding: str) -> None:
+    def typed(old: bytes) -> bytes:
+        body = old.decode().partition("?>")[2] if old.startswith(b"<?xml") else old.decode()
+        return (ENTITIES.format(encoding, "a" * 100) + body).encode(encoding)
+
+    refused(changed(written(FORTY), {part: typed}), TYPED)
+
+
+def test_entities_that_expand_to_gigabytes_are_not_expanded() -> None:
+    cells = "".join(f'<row r="{k}"><c r="A{k}" t="inlineStr"><is><t>{"&a;" * 10}</t></is></c></row>' for k in (1, 2))
+    content = of_xml(cells)
+    bomb = changed(content, {SHEET: lambda old: ENTITIES.format("utf-8", "a" * 200_000).encode() + old})
+    assert len(bomb) < 20_000
+    refused(bomb, TYPED)
+
+
+def test_an_encoding_that_cannot_be_looked_into() -> None:
+    part = {STYLES: lambda old: b'<?xml version="1.0" encoding="no-such"?>' + old.partition(b"?>")[2]}
+    with pytest.raises(
+        SpecificationError, match=r"^m.xlsx must be an XLSX workbook, not damaged \(unknown encoding: .*\)$"
+    ):
+        workbook_rows(PATH, changed(written(FORTY), part))
+
+
 def test_a_part_that_is_larger_than_the_archive_states() -> None:
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
