@@ -20,7 +20,7 @@ from sosmith.gen.output.core_facts import CoreFacts, core_facts
 from sosmith.gen.output.manifest import manifest
 from sosmith.gen.quantity import number
 from sosmith.gen.word_lengths.cost import Cost
-from sosmith.interface.inputs import codes_of, encoded, traces_of
+from sosmith.interface.inputs import codes_of, encoded, real_numbers, traces_of
 from sosmith.interface.notebook import table_html
 from sosmith.interface.quantity import Quantity
 from sosmith.interface.specification import Specification, specification_of
@@ -251,11 +251,13 @@ class Design:
         Raises
         ------
         SpecificationError
-            If the design has no filter.
+            If the design has no filter, or a frequency is not a finite real number.
         """
         if not self.core.quantized.sections:
             raise SpecificationError("the design must have a filter for a frequency response, not only a calibration")
-        frequencies = np.asarray(f, dtype=np.float64)
+        frequencies = real_numbers(f, "frequencies")
+        if not np.isfinite(frequencies).all():
+            raise SpecificationError(f"frequencies must be finite, not {frequencies[~np.isfinite(frequencies)][0]}")
         sos, decimation = self.sos if ideal else self.quantized_sos, self.core.quantized.decimation
         if decimation is None:
             return complex_response(sos, frequencies, self.specification.sample_rate)
@@ -268,7 +270,7 @@ class Design:
         ----------
         **inputs : array_like, shape (samples,) or (samples, channels)
             Physical values of each input, by its name. As in a converter, they are rounded to codes and limited to the
-            range of the input. Shapes are broadcast: a number is a constant input.
+            range of the input. Shapes are broadcast: a number is a constant input, numbers alone are one sample.
 
         Returns
         -------
@@ -278,7 +280,7 @@ class Design:
         Raises
         ------
         SpecificationError
-            If an input is missing, unknown or not finite, or the shapes do not fit.
+            If an input is missing, unknown, masked, complex or not finite, or the shapes do not fit.
         """
         return self.core.datapath.output.decode(self._computed(encoded(self.core, inputs)))
 
