@@ -189,6 +189,11 @@ def _trace(table: CsvTable, columns: _Columns, ports: tuple[Port, ...], sample_r
         _read_codes(table, port, physical, code)
         for port, physical, code in zip(ports, columns.physical, columns.codes, strict=True)
     ]
+    coded = [code in table for code in columns.codes]
+    limited = [
+        0 if given else port.outside(table.column(physical))
+        for given, port, physical in zip(coded, ports, columns.physical, strict=True)
+    ]
     return Trace(
         name=table.path.stem,
         ports=ports,
@@ -196,6 +201,7 @@ def _trace(table: CsvTable, columns: _Columns, ports: tuple[Port, ...], sample_r
         codes=np.stack(codes, axis=1),
         truth=table.column(columns.truth) if columns.truth in table else None,
         reading=_read_flags(table, columns.reading) if columns.reading in table else None,
+        limited=tuple(limited),
     )
 
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from os import PathLike, fspath
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -55,7 +56,7 @@ _NO_REAL_NUMBERS = {"c": "complex ones", "U": "text", "S": "bytes", "M": "dates"
 
 def _array(values: npt.ArrayLike, what: str) -> npt.NDArray[np.generic]:
     """Return an array of any numbers: what numpy would ignore or refuse in its own words is refused here."""
-    masked = np.ma.count_masked(values) if isinstance(values, np.ma.MaskedArray) else 0
+    masked = int(np.sum(values.mask)) if isinstance(values, np.ma.MaskedArray) else 0
     if masked:
         raise SpecificationError(f"{what} must all be known, not masked ({masked} of {np.size(values)}): fill the gaps")
     try:
@@ -111,10 +112,16 @@ def traces_of(
         raise SpecificationError("seconds must come with the name of a built-in trace, not with arrays")
     codes, channels = encoded(design, trace), design.spec.channels
     ports, rate = design.datapath.inputs, design.spec.sample_rate
+    values = [real_numbers(each, "values") for each in _in_one_shape(design, trace)]
+
+    def one(of: Callable[[npt.NDArray[Any]], npt.NDArray[Any]]) -> Trace:
+        limited = tuple(port.outside(of(each)) for port, each in zip(ports, values, strict=True))
+        return Trace(name="arrays", ports=ports, sample_rate=rate, codes=of(codes), limited=limited)
+
     if codes.ndim == 2:
-        first = Trace(name="arrays", ports=ports, sample_rate=rate, codes=codes)
+        first = one(lambda array: array)
         return tuple(first.delayed(k) for k in range(channels))
-    return tuple(Trace(name="arrays", ports=ports, sample_rate=rate, codes=codes[:, k]) for k in range(channels))
+    return tuple(one(lambda array, k=k: array[:, k]) for k in range(channels))  # type: ignore[misc]
 
 
 def _in_one_shape(design: CoreDesign, inputs: Mapping[str, npt.ArrayLike]) -> list[npt.NDArray[np.generic]]:
