@@ -45,7 +45,7 @@ REFRESHES = 8
     "--files",
     type=click.Path(path_type=Path),
     metavar="DIR",
-    help="Folder with manifest and certificate of the core that must be there.  [default: build/<name>, if any]",
+    help="Folder with manifest and certificate of the core that must be there.  [default: build/<name> or a folder in it, if any]",
 )
 @click.option(
     "--alarm", "alarms", multiple=True, metavar="FLAG", help="Flag that is an alarm.  [default: wear_critical, fault]"
@@ -176,11 +176,12 @@ class _Monitor:
 
     def check(self, identity: Identity) -> None:
         """Hold a board against the files of its core."""
-        from sosmith.host.identity_check import check_files
+        from sosmith.host.identity_check import check_files, folder_of
 
-        folder = self._asked.files or default_folder(identity.name)
-        if self._asked.files is None and not (folder / f"{identity.name}.json").exists():
-            note(f"the board has the core {identity.name}; it was not checked, as there is no {folder}: see --files")
+        folder = self._asked.files or folder_of(identity, default_folder(identity.name))
+        if folder is None:
+            place = default_folder(identity.name)
+            note(f"the board has the core {identity.name}; it was not checked, as there is no {place}: see --files")
             return
         self._manifest = check_files(identity, folder)
         note(f"the board has the core {identity.name} of {folder}")

@@ -466,7 +466,7 @@ class Design:
         board : str
             Name of the board.
         folder : path
-            Folder for the files, ``build/<name>`` by default.
+            Folder for the files, ``build/<name>/<board>`` by default.
         rate : int
             Rate of the serial line in baud, at most a fourth of the board's clock.
         progress : callable
@@ -490,7 +490,7 @@ class Design:
         from sosmith.interface.build import Build
 
         target = find_board(board, BUILDABLE)
-        place = Path("build") / self.core.spec.name if folder is None else Path(fspath(folder))
+        place = Path("build") / self.core.spec.name / target.name if folder is None else Path(fspath(folder))
         made = build_board(self.core, target, rate=rate, progress=lambda step: progress(step, 0, 0))
         return Build.written(made, place)
 
@@ -509,7 +509,7 @@ class Design:
         board : str
             Name of the board: ``"arty_a7"`` or ``"cmod_s7"``.
         folder : path
-            Folder for the files, ``build/<name>`` by default.
+            Folder for the files, ``build/<name>/<board>`` by default.
         rate : int
             Rate of the serial line in baud, at most a fourth of the board's clock.
         progress : callable
@@ -531,7 +531,7 @@ class Design:
         from sosmith.gen.output.board_project import board_project
 
         target = find_board(board, PROJECTS)
-        place = Path("build") / self.core.spec.name if folder is None else Path(fspath(folder))
+        place = Path("build") / self.core.spec.name / target.name if folder is None else Path(fspath(folder))
         made = board_project(self.core, target, rate=rate, progress=lambda step: progress(step, 0, 0))
         made.write(place)
         return made.summary

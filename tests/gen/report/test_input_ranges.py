@@ -33,8 +33,8 @@ def test_a_trace_that_was_clipped_does_not_pass(design: sosmith.Design, tmp_path
     assert not report.passed
     (reason,) = report.shortfalls
     assert reason == (
-        f"The input x must stay in its range, −1.00 to 1.00: {beyond:.3g} % of the values in the trace do not, and were "
-        "limited to it: scale the trace, or widen input.x.range."
+        f"The input x must stay in its range, −1.00 to 1.00: {beyond:.3g} % of the values in the trace do not, "
+        "and were limited to it: scale the trace, or widen input.x.range."
     )
     assert report.summary["inputs"][0]["limited"] == pytest.approx(beyond / 100)
     assert reason in (tmp_path / "report.html").read_text(encoding="utf-8")
