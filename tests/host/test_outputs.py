@@ -116,8 +116,18 @@ def test_the_live_view_without_wear_and_with_much_to_show() -> None:
     view.state, view.alarms = "lost", 2
     text = shown(view)
     assert text.startswith("plain at port: lost, 20,000 samples, 20.0 s, 2 alarms")
-    assert "+3600.000" in text
+    assert "/h" not in text  # the output of a plain filter has no rate of wear
+    assert "+3600.000" not in text
     assert "█" in text
+
+
+def test_the_live_view_of_a_measured_quantity_has_its_change_per_hour() -> None:
+    view = Readings(identity(instrument_design()).model_copy(update={"flags": FLAGS}), None, "port")
+    values = np.stack([np.linspace(0, 1, 101), np.zeros(101)], axis=1)
+    view.add(results(values, np.zeros((101, 2))), 0)
+    text = shown(view)
+    assert "mm/h" in text
+    assert "+3600.000" in text
 
 
 def test_a_history_that_is_thinned_out_keeps_the_flags() -> None:
