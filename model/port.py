@@ -90,6 +90,16 @@ class Port:
         """Return the physical values of `codes` in `unit`, in double precision."""
         return float(self.zero) + float(self.lsb) * codes.astype("float64")
 
+    def outside(self, values: Values) -> int:
+        """Return how many physical values are out of the range, by more than half an LSB beyond its codes.
+
+        The end of a range, such as 1 of -1 to 1, is in it, though the highest code is an LSB below.
+        """
+        import numpy as np
+
+        steps = (np.asarray(values, dtype=np.float64) - float(self.zero)) / float(self.lsb)
+        return int(np.count_nonzero((steps < self.lowest - 0.5) | (steps > self.highest + 1.5)))
+
     def encode(self, values: Values) -> Codes:
         """Return the codes nearest to physical `values`, saturated to the format.
 

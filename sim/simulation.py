@@ -23,6 +23,7 @@ from sosmith.gen.output.generate import generate
 from sosmith.gen.output.vectors import Vectors, vector_files, whole_beats
 from sosmith.gen.report.evidence import Alternative, Evidence
 from sosmith.gen.report.filter_facts import filter_facts
+from sosmith.gen.report.input_ranges import input_ranges
 from sosmith.gen.report.provenance import provenance_of
 from sosmith.gen.report.recursion import recursion_of
 from sosmith.gen.specification.choices import ERROR_FEEDBACK
@@ -185,6 +186,7 @@ def _evidence(
     sos = None if quantized.filter is None else quantized.filter.sos
     entering = [entering_filter(t.codes, datapath, quantized.polynomial) for t in traces]
     golden = np.stack([filtered(column, sos, output, steady=quantized.steady) for column in entering], axis=1)
+    ranges = input_ranges(traces)
     if datapath.decimator is not None:  # what is told of a sample is told of those that bring a result
         traces = [trace.every(datapath.decimator.factor) for trace in traces]
     unfiltered = np.stack([calibrated(t.codes, datapath.inputs, quantized.polynomial) for t in traces], axis=1)
@@ -237,6 +239,7 @@ def _evidence(
         alternatives=_alternatives(quantized, codes, golden),
         provenance=provenance,
         specification=design.spec.path.name,
+        input_ranges=ranges,
     )
     return evidence.of_channel(0) if len(traces) == 1 else evidence
 

@@ -14,6 +14,7 @@ from sosmith.gen.filter.response import FilterFacts
 from sosmith.gen.fpga.synthesis import Netlist
 from sosmith.gen.output.core_facts import LimitCycleFacts, NodeFormat, SectionFacts, SettlingFacts
 from sosmith.gen.output.decimation_facts import DecimationFacts
+from sosmith.gen.report.input_ranges import InputRange
 from sosmith.gen.report.provenance import Provenance
 from sosmith.gen.report.recursion import Recursion
 
@@ -128,6 +129,8 @@ class Evidence:
         Date of the run as the user gave it; None if none was given, so that two runs are the same.
     zero : float or None
         Value of the output's code 0; None if it is `low`.
+    input_ranges : sequence of InputRange
+        How the codes lie in the ranges of the inputs; empty if unknown.
     """
 
     name: str
@@ -180,6 +183,7 @@ class Evidence:
     files: Mapping[str, str] = field(default_factory=dict)
     date: str | None = None
     zero: float | None = None
+    input_ranges: Sequence[InputRange] = ()
 
     def __post_init__(self) -> None:
         for name in ("lsb", "max_error"):

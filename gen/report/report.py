@@ -14,6 +14,7 @@ from sosmith.gen.quantity import quantity
 from sosmith.gen.report.behaviour import behaviour, behaviour_entry, readings_of
 from sosmith.gen.report.curves import error_over_time, error_spectrum, filter_curve
 from sosmith.gen.report.evidence import Evidence
+from sosmith.gen.report.input_ranges import inputs_at_an_end, limited_inputs
 from sosmith.gen.report.mask import mask_shortfalls
 from sosmith.gen.report.page import render_page
 from sosmith.gen.report.provenance import Provenance
@@ -39,7 +40,7 @@ def _shortfalls(evidence: Evidence, max_abs: float, measures: ResponseMeasures |
         found.append(f"The largest error is {error}, more than the {asked} that the specification allows.")
     if evidence.filter is not None and measures is not None:
         found += mask_shortfalls(evidence.filter, measures)
-    return found
+    return [*found, *limited_inputs(evidence.input_ranges)]
 
 
 def _notes(evidence: Evidence) -> list[str]:
@@ -56,7 +57,7 @@ def _notes(evidence: Evidence) -> list[str]:
             f"{quantity(evidence.max_error, evidence.unit)} that the specification allows: other inputs "
             "could exceed the allowance."
         )
-    return notes
+    return [*notes, *inputs_at_an_end(evidence.input_ranges)]
 
 
 def _accuracy(evidence: Evidence) -> dict[str, float | None]:
@@ -95,15 +96,15 @@ def summarise(evidence: Evidence) -> dict[str, Any]:
         ``true_error.{max_abs,rms,mean,readings}`` (hardware against the true value at the readings),
         ``delay.{seconds,frequency}`` (group delay, and where it is taken), ``settling.{seconds,half_lsb_seconds,
         overshoot_percent}`` (after a step, to 1 %, and to half an LSB over the whole range), ``shortfalls`` (why it did
-        not pass), ``notes``,
+        not pass), ``notes``, ``inputs`` (the shares of codes ``at_end`` of the range and of values ``limited`` to it),
         ``provenance.{specification,specification_sha256,
         reference_sha256,trace_sha256,datapath_sha256,cycles_per_sample,cost}`` (see
         `sosmith.gen.report.provenance.Provenance`) and ``curves.{error,spectrum,filter}`` (see
         `sosmith.gen.report.curves`). Lengths are in samples or cycles, errors in
         ``error.unit``. What is unknown or not finite is None.
         ``passed`` is true if hardware and integer model agree bit for bit, the largest error is within
-        ``error.bound`` and ``max_error``, and the quantized filter is stable and meets the specification's
-        mask (see `mask_shortfalls`).
+        ``error.bound`` and ``max_error``, no value of the trace was outside its
+        input's range, and the quantized filter is stable and meets the specification's mask (see `mask_shortfalls`).
     """
     statistics = error_statistics(evidence.error)
     measures = None if evidence.filter is None else measure_response(evidence.filter)
@@ -115,6 +116,7 @@ def summarise(evidence: Evidence) -> dict[str, Any]:
         "passed": not shortfalls,
         "shortfalls": shortfalls,
         "notes": _notes(evidence),
+        "inputs": [found.entry for found in evidence.input_ranges],
         "samples": evidence.samples,
         "channels": evidence.channels,
         "cycles": evidence.cycles,

@@ -32,6 +32,8 @@ class Trace:
         Samples at which the measurement is compared with `truth`.
     seed : int, optional
         Seed of a generated trace.
+    limited : tuple of int
+        Number of values of each input that were out of its range before they became codes; empty if none can have been.
 
     Raises
     ------
@@ -47,6 +49,7 @@ class Trace:
     truth: Values | None = None
     reading: npt.NDArray[np.bool_] | None = None
     seed: int | None = None
+    limited: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         if self.sample_rate <= 0:

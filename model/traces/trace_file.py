@@ -26,6 +26,9 @@ PHYSICAL_COLUMNS = {"voltage": "voltage_V", "temperature": "temperature_C"}
 TIME_TOLERANCE = 0.01
 """Largest relative deviation of a time step from the sample period in a file."""
 
+LAST_DIGIT_TOLERANCE = 1e-9
+"""Largest deviation of a time stamp from a multiple of its last digit, as a share of it, beside that of doubles."""
+
 
 @dataclass(frozen=True)
 class _Columns:
@@ -128,8 +131,8 @@ def read_traces(path: Path, ports: tuple[Port, ...], sample_rate: Fraction, chan
     SpecificationError
         As for `read_csv_table`; if an input has no column; if a code is not an integer, is out of range, or contradicts
         the physical value; if time_s does not increase by one sample period per row of a channel, within
-        `TIME_TOLERANCE`; if reading is neither 0 nor 1; if a channel number is not an integer from 0 to
-        ``channels - 1``; if a channel has no row, or more rows than another.
+        `TIME_TOLERANCE` or the last digit of the time stamps; if reading is neither 0 nor 1; if a channel number is not
+        an integer from 0 to ``channels - 1``; if a channel has no row, or more rows than another.
     """
     columns = _Columns.of(ports)
     table = read_csv_table(path, columns.all)
@@ -186,6 +189,11 @@ def _trace(table: CsvTable, columns: _Columns, ports: tuple[Port, ...], sample_r
         _read_codes(table, port, physical, code)
         for port, physical, code in zip(ports, columns.physical, columns.codes, strict=True)
     ]
+    coded = [code in table for code in columns.codes]
+    limited = [
+        0 if given else port.outside(table.column(physical))
+        for given, port, physical in zip(coded, ports, columns.physical, strict=True)
+    ]
     return Trace(
         name=table.path.stem,
         ports=ports,
@@ -193,6 +201,7 @@ def _trace(table: CsvTable, columns: _Columns, ports: tuple[Port, ...], sample_r
         codes=np.stack(codes, axis=1),
         truth=table.column(columns.truth) if columns.truth in table else None,
         reading=_read_flags(table, columns.reading) if columns.reading in table else None,
+        limited=tuple(limited),
     )
 
 
@@ -201,11 +210,30 @@ def _check_time(table: CsvTable, time: Values, sample_rate: Fraction) -> None:
     step = np.concatenate([[period], np.diff(time)])
     before = "the previous row of this channel" if CHANNEL in table else "the previous row"
     check_rows(table, step <= 0, lambda k: f"time_s must be above {time[k - 1]}, the value in {before}, not {time[k]}")
+    digit = _last_digit(time)
+    # Instants that were rounded or cut to a digit are whole numbers of it apart, next below or next above a period.
+    rounded = (step > (np.floor(period / digit) - 0.5) * digit) & (step < (np.ceil(period / digit) + 0.5) * digit)
     check_rows(
         table,
-        np.abs(step - period) > TIME_TOLERANCE * period,
+        (np.abs(step - period) > TIME_TOLERANCE * period) & ~rounded,
         lambda k: f"time_s must be {period:.6g} s after {before}, not {step[k]:.6g} s",
     )
+    passed, due = time - time[0], np.arange(len(time)) * period
+    check_rows(
+        table,
+        np.abs(passed - due) > TIME_TOLERANCE * due + digit,
+        lambda k: f"time_s must be {due[k]:.6g} s after the first row at {1 / period:g} Hz, not {passed[k]:.6g} s",
+    )
+
+
+def _last_digit(time: Values) -> float:
+    """Return the decimal digit that time stamps in s end with, down to a picosecond: 1e-6 for microseconds."""
+    doubles = float(np.spacing(np.abs(time).max()))
+    for places in range(12):
+        digits, tolerance = time * 10.0**places, LAST_DIGIT_TOLERANCE + 2 * doubles * 10.0**places
+        if np.all(np.abs(digits - np.round(digits)) < tolerance):
+            return 10.0**-places
+    return 1e-12
 
 
 def _read_codes(table: CsvTable, port: Port, physical: str, code: str) -> Codes:

@@ -50,8 +50,8 @@ def test_a_build_prints_cells_and_timing_and_writes_its_files(programs: dict[str
     assert "plain on iCEstick" in result.stdout
     assert "7 of 1,280, 1 %" in result.stdout
     assert "closes: 70.12 MHz, of which 12.00 MHz are needed" in result.stdout
-    assert "sosmith: bitstream: build/plain/plain_board_icestick.bin\n" in result.stderr
-    assert {path.name for path in Path("build/plain").iterdir()} >= {
+    assert "sosmith: bitstream: build/plain/icestick/plain_board_icestick.bin\n" in result.stderr
+    assert {path.name for path in Path("build/plain/icestick").iterdir()} >= {
         "build.json",
         "build.log",
         "plain.sv",
@@ -127,6 +127,6 @@ def test_a_project_for_a_vendors_tools_says_that_nothing_was_built(programs: dic
         "sosmith: no flow was run and no bitstream written; in that folder, "
         "vivado -mode batch -source plain_board_cmod_s7.tcl makes one\n"
     )
-    assert {path.suffix for path in Path("build/plain").glob("plain_board*")} == {".sv", ".v", ".xdc", ".tcl"}
+    assert {path.suffix for path in Path("build/plain/cmod_s7").glob("plain_board*")} == {".sv", ".v", ".xdc", ".tcl"}
     message = "--program must be left out for cmod_s7: no bitstream is made for it"
     BUILD.refused(message, "plain.toml", "--board", "cmod_s7", "--program")

@@ -6,6 +6,7 @@ import os
 import re
 from functools import partial
 from pathlib import Path
+from urllib.request import urlopen
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ import sosmith
 from sosmith.gen.output.generate import generated
 from sosmith.host.board import Board
 from sosmith.host.model_line import ModelLine, model_of
+from sosmith.host.page import LivePage
 from sosmith.host.port_run import run_on
 from sosmith.instrument.scenarios.traces import traces_for
 from sosmith.model.errors import ShortfallError, SpecificationError, ToolError
@@ -180,10 +182,23 @@ def test_monitor_without_an_alarm(ramp: Path) -> None:
     assert result.stdout == ""
 
 
-def test_monitor_tells_where_its_page_is(ramp: Path) -> None:
+def test_monitor_tells_where_its_page_is_and_keeps_it(ramp: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    seen = []
+
+    def stay(page: LivePage) -> None:
+        """Come after the trace has ended, as a browser may."""
+        with urlopen(page.address) as answer:
+            seen.append((page.address, answer.status))
+
+    monkeypatch.setattr(LivePage, "stay", stay)
     with plugged(model_of(instrument_design().core)) as port:
         result = MONITOR.good(port, "--trace", "ramp.csv", "--speed", "0", "--page")
-    assert re.search(r"^sosmith: the live view is at http://127\.0\.0\.1:\d+/[\w-]{32}/$", result.stderr, re.MULTILINE)
+    told = re.search(
+        r"^sosmith: the live view is at (http://127\.0\.0\.1:\d+/[\w-]{32}/)$", result.stderr, re.MULTILINE
+    )
+    assert told is not None
+    assert seen == [(told[1], 200)]
+    assert result.stderr.endswith("sosmith: the trace has ended; the live view stays until Ctrl-C\n")
 
 
 def test_monitor_checks_the_board(ramp: Path) -> None:

@@ -1,6 +1,7 @@
 """What is made of results: alarms, hooks, lines for InfluxDB, plots, the live view, and the check of an identity."""
 
 import json
+import re
 import sys
 from pathlib import Path
 from typing import Any
@@ -9,13 +10,13 @@ import numpy as np
 import pytest
 from rich.console import Console
 from tests.host.lines import device_of
-from tests.interface.small import filter_design, instrument_design
+from tests.interface.small import INSTRUMENT, filter_design, instrument_design
 
 import sosmith
 from sosmith.gen.output.identity import identity as identity_of
 from sosmith.host.alarms import Alarm, Alarms, Hook
 from sosmith.host.board import Results
-from sosmith.host.identity_check import check_files
+from sosmith.host.identity_check import check_files, folder_of
 from sosmith.host.line_protocol import influx_lines
 from sosmith.host.live_view import plot, render
 from sosmith.host.readings import History, Readings
@@ -117,7 +118,8 @@ def test_the_live_view_without_wear_and_with_much_to_show() -> None:
     view.state, view.alarms = "lost", 2
     text = shown(view)
     assert text.startswith("plain at port: lost, 20,000 samples, 20.0 s, 2 alarms")
-    assert "+3600.000" in text
+    assert "/h" not in text  # the output of a plain filter has no rate of wear
+    assert "+3600.000" not in text
     assert "█" in text
 
 
@@ -132,6 +134,15 @@ def test_the_live_view_obeys_nobody() -> None:
     text = shown(view)
     assert "x1b]0;owned" in text
     assert all(line.isprintable() for line in text.split("\n"))
+
+
+def test_the_live_view_of_a_measured_quantity_has_its_change_per_hour() -> None:
+    view = Readings(identity(instrument_design()).model_copy(update={"flags": FLAGS}), None, "port")
+    values = np.stack([np.linspace(0, 1, 101), np.zeros(101)], axis=1)
+    view.add(results(values, np.zeros((101, 2))), 0)
+    text = shown(view)
+    assert "mm/h" in text
+    assert "+3600.000" in text
 
 
 def test_a_history_that_is_thinned_out_keeps_the_flags() -> None:
@@ -176,6 +187,24 @@ def test_an_identity_fits_its_files(folder: Path) -> None:
 def test_an_identity_that_does_not_fit(change: dict[str, Any], message: str, folder: Path) -> None:
     with pytest.raises(ShortfallError, match=f"^{message}$"):
         check_files(made_identity(folder).model_copy(update=change), folder)
+
+
+def test_the_files_of_a_board_are_found_among_those_of_several(folder: Path, tmp_path: Path) -> None:
+    """As `sosmith generate` and `sosmith build` for two boards leave them."""
+    about = made_identity(folder)
+    assert folder_of(about, tmp_path) is None
+    other = sosmith.design(INSTRUMENT | {"hardware": {"realization": "df1", "architecture": "parallel"}})
+    other.generate(tmp_path)
+    other.generate(tmp_path / "icebreaker")
+    expected = (
+        rf"^one of the folders {re.escape(str(tmp_path))}, {re.escape(str(tmp_path))}/icebreaker must have the files "
+        rf"of the board's core, gauge with the design {about.design[:12]}, not of other designs only: run `sosmith "
+        r"generate` on its specification with the options of the board, or name the folder with --files$"
+    )
+    with pytest.raises(ShortfallError, match=expected):
+        folder_of(about, tmp_path)
+    instrument_design().generate(tmp_path / "ulx3s_25f")
+    assert folder_of(about, tmp_path) == tmp_path / "ulx3s_25f"
 
 
 def test_files_that_are_none(folder: Path, tmp_path: Path) -> None:

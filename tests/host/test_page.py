@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import signal
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -13,7 +15,7 @@ import numpy as np
 import pytest
 from tests.host.browser import BROWSER, browser
 from tests.host.lines import device_of
-from tests.interface.small import instrument_design
+from tests.interface.small import filter_design, instrument_design
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
@@ -70,6 +72,28 @@ def test_what_the_page_is_sent() -> None:
     assert sent["rates"][0][:40] == [None] * 40
     assert sent["rates"][0][40:] == pytest.approx([36.0] * 360)
     assert sum(sent["status"][1]) == 8
+
+
+def test_it_stays_until_ctrl_c(live: tuple[Readings, LivePage]) -> None:
+    readings, page = live
+    feed(readings)
+
+    def browse() -> None:
+        with connect(page.address.replace("http", "ws") + "live") as reader:
+            while json.loads(reader.recv())["state"] != "ended":
+                pass
+        signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
+
+    browser = threading.Thread(target=browse)
+    browser.start()
+    page.stay()
+    browser.join()
+
+
+def test_a_plain_filter_has_no_rate() -> None:
+    about = device_of(filter_design())._identity
+    assert 'value="1" data-what="rate"' not in html(Readings(about, None, "port"), "once")
+    assert 'data-what="rate"' in html(gauge(), "once")
 
 
 def test_only_who_knows_the_address_sees_anything(live: tuple[Readings, LivePage]) -> None:

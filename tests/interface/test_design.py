@@ -81,24 +81,42 @@ REFUSED = {
         r"the inputs must be voltage and temperature, not temprature \(did you mean temperature\?\)",
     ),
     "not finite": ({"voltage": [np.inf], "temperature": [1.0]}, "values of voltage must be finite, not .*inf.*"),
-    "text": ({"voltage": ["high"], "temperature": [1.0]}, "could not convert string to float: .*"),
-    "no samples": (
-        {"voltage": [], "temperature": []},
-        r"the inputs must have the shape \(samples,\) or \(samples, 2\), not \(0,\)",
+    "text": ({"voltage": ["high"], "temperature": [1.0]}, "values of voltage must be real numbers, not text"),
+    "complex": ({"voltage": [1 + 2j], "temperature": 1.0}, "values of voltage must be real numbers, not complex ones"),
+    "masked": (
+        {"voltage": np.ma.array([1.0, 2.0], mask=[False, True]), "temperature": 1.0},
+        r"values of voltage must all be known, not masked \(1 of 2\): fill the gaps",
     ),
+    "ragged": (
+        {"voltage": [[1.0], [1.0, 2.0]], "temperature": 1.0},
+        "values of voltage must be in rows of one length, not in rows of different ones",
+    ),
+    "too large": (
+        {"voltage": [10**400], "temperature": 1.0},
+        "values of voltage must be real numbers in the range of a double, not other objects",
+    ),
+    "no samples": ({"voltage": [], "temperature": []}, "the inputs must have at least one sample, not none"),
     "channels": (
         {"voltage": np.ones((4, 3)), "temperature": 20.0},
-        r"the inputs must have the shape \(samples,\) or \(samples, 2\), not \(4, 3\)",
-    ),
-    "scalars": (
-        {"voltage": 1.0, "temperature": 2.0},
-        r"the inputs must have the shape \(samples,\) or \(samples, 2\), not \(\)",
+        r"the inputs must have the shape \(samples,\) or \(samples, 2\), not \(4, 3\) and \(\)",
     ),
     "lengths": (
         {"voltage": np.ones(3), "temperature": np.ones(4)},
         r"the inputs must have shapes that broadcast, not \(3,\) and \(4,\)",
     ),
 }
+
+
+def test_numbers_are_one_sample_and_a_column_is_the_same_for_every_channel() -> None:
+    design = instrument_design()
+    assert np.array_equal(
+        design.run(voltage=5.0, temperature=20.0), design.run(voltage=[5.0] * 3, temperature=20.0)[:1]
+    )
+    voltage, temperature = NOISE.uniform(0, 10, (2, 2)), NOISE.uniform(0, 100, 2)
+    assert np.array_equal(
+        design.run(voltage=voltage, temperature=temperature),
+        design.run(voltage=voltage, temperature=np.stack([temperature, temperature], axis=1)),
+    )
 
 
 @pytest.mark.parametrize(("inputs", "message"), REFUSED.values(), ids=REFUSED)
@@ -110,12 +128,29 @@ def test_inputs_that_do_not_fit(inputs: dict[str, object], message: str) -> None
 
 @pytest.mark.parametrize(
     ("codes", "message"),
-    [([0.5], "codes of x must be integers, not float64"), ([0, 512], r"codes of x must be in -512..511, not 0..512")],
-    ids=["float", "above"],
+    [
+        ([0.5], "codes of x must be integers, not float64"),
+        ([0, 512], r"codes of x must be in -512..511, not 0..512"),
+        ([2**70], f"codes of x must be in -512..511, not {2**70}..{2**70}"),
+    ],
+    ids=["float", "above", "far above"],
 )
 def test_codes_that_do_not_fit(codes: list[float], message: str) -> None:
     with pytest.raises(SpecificationError, match=f"^{message}$"):
         filter_design().run_codes(x=codes)
+
+
+@pytest.mark.parametrize(
+    ("frequencies", "message"),
+    [
+        ("ten", "frequencies must be real numbers, not text"),
+        ([1j], "frequencies must be real numbers, not complex ones"),
+        ([1.0, float("nan")], "frequencies must be finite, not nan"),
+    ],
+)
+def test_frequencies_that_are_none(frequencies: object, message: str) -> None:
+    with pytest.raises(SpecificationError, match=f"^{message}$"):
+        filter_design().frequency_response(frequencies)  # type: ignore[arg-type]
 
 
 EDGES = {"passband_edge": 100.0, "stopband_edge": 101.0, "passband_loss": 0.01, "stopband_loss": 90.0}

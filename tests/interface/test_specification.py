@@ -72,6 +72,14 @@ def test_bad_sections_are_refused(sos: object, options: dict[str, object], messa
         Specification.from_sos(sos, 1000.0, **options)  # type: ignore[arg-type]
 
 
+def test_frequencies_that_are_no_numbers_are_refused() -> None:
+    sos = scipy.signal.butter(2, 100.0, fs=1000.0, output="sos")
+    with pytest.raises(SpecificationError, match=r"^sample_rate must be a number of Hz, not '1 kHz'$"):
+        Specification.from_sos(sos, "1 kHz")  # type: ignore[arg-type]
+    with pytest.raises(SpecificationError, match=r"^clock must be a number of Hz, not None$"):
+        Specification.from_sos(sos, 1000.0, clock=None)  # type: ignore[arg-type]
+
+
 def test_a_changed_dict_changes_no_specification() -> None:
     spec = Specification.load(INSTRUMENT)
     spec.as_dict()["output"]["bits"] = 3

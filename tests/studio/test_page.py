@@ -174,6 +174,22 @@ def test_numbers_are_typed_and_a_wrong_one_is_told(tab: Tab, page: Session) -> N
     assert asked(page, "cutoff") == 60
 
 
+@pytest.mark.parametrize(("wrong", "told"), [("40", "Not a filter yet"), ("2k", "")])
+def test_the_number_before_a_wrong_one_is_taken_as_soon_as_it_is_entered(
+    tab: Tab, page: Session, wrong: str, told: str
+) -> None:
+    field = "document.querySelector('[data-key=\"filter.order\"]')"
+    typed(tab, '[data-key="filter.order"]', wrong)
+    if told:
+        tab.until(f"document.getElementById('state').textContent === {told!r}")
+    else:
+        tab.until(f"{field}.getAttribute('aria-invalid') === 'true'")
+    typed(tab, '[data-key="filter.order"]', "2")
+    tab.value(f"{field}.dispatchEvent(new Event('change', {{ bubbles: true }}))")
+    tab.until(f"{PROVEN} && !{field}.hasAttribute('aria-invalid')")
+    assert asked(page, "order") == 2
+
+
 def test_a_family_and_a_kind_are_chosen(tab: Tab, page: Session) -> None:
     for key, name in (("family", "elliptic"), ("kind", "bandpass")):
         tab.value(

@@ -35,7 +35,7 @@ from sosmith.terminal import JSON_OPTION, note, output_option, print_json, show_
 )
 @click.option("--program", is_flag=True, help="Load the bitstream into the board, with openFPGALoader.")
 @JSON_OPTION
-@output_option("Folder for the files.  [default: build/<name>]")
+@output_option("Folder for the files.  [default: build/<name>/<board>]")
 def build_command(
     spec: Path,
     core: str | None,
@@ -66,7 +66,7 @@ def build_command(
     if program and board in PROJECTS:
         raise SpecificationError(f"--program must be left out for {board}: no bitstream is made for it")
     asked = Specification.load(spec)
-    folder = output or default_folder(asked.name)
+    folder = output or default_folder(asked.name) / board
     with show_progress() as step:
         from sosmith.interface.design import design
 

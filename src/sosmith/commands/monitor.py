@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from sosmith.host.alarms import Alarm
     from sosmith.host.monitor import Event, Received
     from sosmith.host.mqtt import Broker, Publisher
+    from sosmith.host.page import LivePage
     from sosmith.host.readings import Readings
     from sosmith.host.run_recording import RunRecording
     from sosmith.model.arrays import Codes
@@ -44,7 +45,7 @@ REFRESHES = 8
     "--files",
     type=click.Path(path_type=Path),
     metavar="DIR",
-    help="Folder with manifest and certificate of the core that must be there.  [default: build/<name>, if any]",
+    help="Folder with the manifest and certificate of the core.  [default: build/<name> or a folder in it, if any]",
 )
 @click.option(
     "--alarm", "alarms", multiple=True, metavar="FLAG", help="Flag that is an alarm.  [default: wear_critical, fault]"
@@ -52,7 +53,11 @@ REFRESHES = 8
 @click.option(
     "--hook", metavar="COMMAND", help="Command to run for each alarm; SOSMITH_FLAG, SOSMITH_CHANNEL, ... tell it why."
 )
-@click.option("--page", is_flag=True, help="Show the same in a browser, at a local address that is told on stderr.")
+@click.option(
+    "--page",
+    is_flag=True,
+    help="Show the same in a browser, at a local address that is printed; it stays until Ctrl-C.",
+)
 @click.option("--mqtt", metavar="URL", help="Publish to the broker at mqtt://HOST[:PORT][/TOPIC], or mqtts:// for TLS.")
 @click.option(
     "--mqtt-credentials",
@@ -136,6 +141,7 @@ def monitor_command(
             speed=speed,
         ):
             shown.take(event)
+        shown.stay()
     if shown.raised:
         sys.exit(1)
 
@@ -177,12 +183,19 @@ class _Monitor:
         self._publisher: Publisher | None = None
         self._told: list[Callable[[Alarm], None]] = []
         self._views: list[Callable[[], None]] = []
+        self._page: LivePage | None = None
 
     def __enter__(self) -> _Monitor:
         return self
 
     def __exit__(self, *error: object) -> None:
         self._stack.close()
+
+    def stay(self) -> None:
+        """Leave the page open after the last sample: a browser may come later than a short trace ends."""
+        if self._page is not None:
+            note("the trace has ended; the live view stays until Ctrl-C")
+            self._page.stay()
 
     @property
     def raised(self) -> int:
@@ -191,11 +204,12 @@ class _Monitor:
 
     def check(self, identity: Identity) -> None:
         """Hold a board against the files of its core."""
-        from sosmith.host.identity_check import check_files
+        from sosmith.host.identity_check import check_files, folder_of
 
-        folder = self._asked.files or default_folder(identity.name)
-        if self._asked.files is None and not (folder / f"{identity.name}.json").exists():
-            note(f"the board has the core {identity.name}; it was not checked, as there is no {folder}: see --files")
+        folder = self._asked.files or folder_of(identity, default_folder(identity.name))
+        if folder is None:
+            place = default_folder(identity.name)
+            note(f"the board has the core {identity.name}; it was not checked, as there is no {place}: see --files")
             return
         self._manifest = check_files(identity, folder)
         note(f"the board has the core {identity.name} of {folder}")
@@ -248,9 +262,9 @@ class _Monitor:
         if asked.page:
             from sosmith.host.page import LivePage
 
-            page = self._stack.enter_context(LivePage(self._readings))
-            note(f"the live view is at {page.address}")
-            self._views.append(page.update)
+            self._page = self._stack.enter_context(LivePage(self._readings))
+            note(f"the live view is at {self._page.address}")
+            self._views.append(self._page.update)
         if sys.stderr.isatty():
             self._views.append(self._on_terminal(self._readings))
 

@@ -59,6 +59,35 @@ def check_files(identity: Identity, folder: Path) -> dict[str, Any]:
     return manifest
 
 
+def folder_of(identity: Identity, folder: Path) -> Path | None:
+    """Return where the files of a board's core are: `folder`, or a folder in it, as `sosmith build` makes for a board.
+
+    Returns
+    -------
+    Path or None
+        The first folder with the files of this very design; None if there is none.
+
+    Raises
+    ------
+    ShortfallError
+        If there are files of a core of this name, but of other designs only.
+    """
+    name = f"{identity.name}.certificate.json"
+    found = [place.parent for place in (folder / name, *sorted(folder.glob(f"*/{name}"))) if place.exists()]
+    for place in found:
+        certificate = read_certificate(place / name)
+        files = {} if certificate.about is None else {file.name: file.sha256 for file in certificate.about.files}
+        if files.get(f"{identity.name}.sv") == identity.design:
+            return place
+    if found:
+        raise ShortfallError(
+            f"one of the folders {', '.join(map(str, found))} must have the files of the board's core, "
+            f"{identity.name} with the design {identity.design[:12]}, not of other designs only: run `sosmith "
+            "generate` on its specification with the options of the board, or name the folder with --files"
+        )
+    return None
+
+
 def _check(identity: Identity, key: str, expected: Any, found: Any) -> None:
     if expected != found:
         raise ShortfallError(f"the board's {key} must be {expected}, not {found}; its core is {identity.name}")

@@ -90,7 +90,7 @@ function tiles(picture) {
     };
     column(0, facts.quantity, (value) => withUnit(fixed(value, facts.digits), facts.unit));
     if (facts.initial) column(1, "wear", (value) => withUnit(fixed(value, 3), facts.unit));
-    column(2, "rate", (value) => withUnit(signed(value, 2), perHour));
+    if (facts.rated) column(2, "rate", (value) => withUnit(signed(value, 2), perHour));
   }
   made.push(tile("time", duration(picture.seconds), `${picture.samples.toLocaleString("en")} samples`));
   byId("tiles").replaceChildren(...made);
@@ -127,7 +127,7 @@ function channels(picture) {
   picture.now.forEach(([value, wear, rate, flags], k) => {
     const cells = [fixed(value, facts.digits)];
     if (facts.initial) cells.push(fixed(wear, 3));
-    cells.push(signed(rate, 3));
+    if (facts.rated) cells.push(signed(rate, 3));
     const made = cells.map((text) => element("td", text, { class: "number" }));
     const row = body.rows[k];
     while (row.cells.length > 1) row.deleteCell(-1); // the first one stays, as it may have the focus
@@ -323,7 +323,7 @@ header("channels", [
   ["channel", false],
   [withUnit(facts.quantity, facts.unit && `(${facts.unit})`), true],
   ...(facts.initial ? [[`wear (${facts.unit})`, true]] : []),
-  [`rate (${perHour})`, true],
+  ...(facts.rated ? [[`rate (${perHour})`, true]] : []),
   ["flags", false],
 ]);
 header("alarms", [["time", false], ["channel", true], [withUnit(facts.quantity, facts.unit && `(${facts.unit})`), true], ["flag", false]]);

@@ -37,14 +37,15 @@ def render(readings: Readings, width: int = 80) -> Group:
     about, now = readings.identity, readings.now
     quantity, unit = printable(about.output_port.name), printable(about.output_port.unit)
     table = Table(box=None, pad_edge=False, header_style="bold")
-    wear = [f"wear, {unit}", f"{unit}/h"] if readings.initial is not None else [f"{unit or 'steps'}/h"]
+    wear = [f"wear, {unit}"] if readings.initial is not None else []
+    wear += [f"{unit or 'steps'}/h"] if readings.rated else []
     for name in ("channel", f"{quantity}{f', {unit}' if unit else ''}", *wear):
         table.add_column(escape(name), justify="right")
     table.add_column("flags")
     for one in now:
-        per_hour = "-" if one.per_hour is None else f"{one.per_hour:+.3f}"
+        per_hour = ["-" if one.per_hour is None else f"{one.per_hour:+.3f}"] if readings.rated else []
         depth = [] if one.wear is None else [f"{one.wear:.3f}"]
-        table.add_row(str(one.channel), f"{one.value:.4f}", *depth, per_hour, _shown(one.flags))
+        table.add_row(str(one.channel), f"{one.value:.4f}", *depth, *per_hour, _shown(one.flags))
     head = Text.assemble(
         (printable(about.name), "bold"),
         f" at {printable(readings.port)}: {readings.state}, {readings.samples:,} samples, {readings.seconds:,.1f} s",

@@ -82,6 +82,14 @@ class LivePage:
         if time.monotonic() >= self._due or self._readings.state != self._state:
             self._show(self._readings.state)
 
+    def stay(self) -> None:
+        """Show the last readings as those of a trace that has ended, until Ctrl-C."""
+        try:
+            self._show("ended")
+            threading.Event().wait()
+        except KeyboardInterrupt:
+            pass
+
     def close(self) -> None:
         """Send the last readings, and end; a second call does nothing."""
         if self._ended:
@@ -160,6 +168,7 @@ def page(readings: Readings, nonce: str) -> str:
         "flags": about.flags,
         "initial": readings.initial,
         "limits": readings.limits,
+        "rated": readings.rated,
     }
     return render(
         ("sosmith.host", "sosmith.gen.report"),
@@ -168,7 +177,12 @@ def page(readings: Readings, nonce: str) -> str:
         port=readings.port,
         facts=facts,
         nonce=nonce,
-        quantities=[output.name, *(["wear"] if readings.initial is not None else []), "rate"],
+        quantities=[
+            output.name,
+            *(["wear"] if readings.initial is not None else []),
+            *(["rate"] if readings.rated else []),
+        ],
+        rated=readings.rated,
     )
 
 

@@ -138,6 +138,8 @@ class Readings:
         The past of each channel.
     initial : tuple of float or None
         Result of each channel without wear; None if the specification has no ``[wear]``.
+    rated : bool
+        Whether its change per hour is shown: that of a measured quantity, not of a plain filter's output.
     limits : dict of str to float
         Wear at which to warn and at which it is critical, by ``warning`` and ``critical``; empty without ``[wear]``.
     """
@@ -150,6 +152,7 @@ class Readings:
         self.histories = tuple(History() for _ in range(identity.channels))
         wear = (manifest or {}).get("spec", {}).get("wear")
         self.initial = _initial(wear, identity.channels) if wear else None
+        self.rated = identity.core != "filter" or self.initial is not None
         self.limits = {
             name: float(wear[key])
             for name, key in (("warning", "warning"), ("critical", "limit"))

@@ -20,7 +20,7 @@ from sosmith.gen.output.core_facts import CoreFacts, core_facts
 from sosmith.gen.output.manifest import manifest
 from sosmith.gen.quantity import number
 from sosmith.gen.word_lengths.cost import Cost
-from sosmith.interface.inputs import codes_of, encoded, traces_of
+from sosmith.interface.inputs import codes_of, encoded, real_numbers, traces_of
 from sosmith.interface.notebook import table_html
 from sosmith.interface.quantity import Quantity
 from sosmith.interface.specification import Specification, specification_of
@@ -251,11 +251,13 @@ class Design:
         Raises
         ------
         SpecificationError
-            If the design has no filter.
+            If the design has no filter, or a frequency is not a finite real number.
         """
         if not self.core.quantized.sections:
             raise SpecificationError("the design must have a filter for a frequency response, not only a calibration")
-        frequencies = np.asarray(f, dtype=np.float64)
+        frequencies = real_numbers(f, "frequencies")
+        if not np.isfinite(frequencies).all():
+            raise SpecificationError(f"frequencies must be finite, not {frequencies[~np.isfinite(frequencies)][0]}")
         sos, decimation = self.sos if ideal else self.quantized_sos, self.core.quantized.decimation
         if decimation is None:
             return complex_response(sos, frequencies, self.specification.sample_rate)
@@ -268,7 +270,7 @@ class Design:
         ----------
         **inputs : array_like, shape (samples,) or (samples, channels)
             Physical values of each input, by its name. As in a converter, they are rounded to codes and limited to the
-            range of the input. Shapes are broadcast: a number is a constant input.
+            range of the input. Shapes are broadcast: a number is a constant input, numbers alone are one sample.
 
         Returns
         -------
@@ -278,7 +280,7 @@ class Design:
         Raises
         ------
         SpecificationError
-            If an input is missing, unknown or not finite, or the shapes do not fit.
+            If an input is missing, unknown, masked, complex or not finite, or the shapes do not fit.
         """
         return self.core.datapath.output.decode(self._computed(encoded(self.core, inputs)))
 
@@ -464,7 +466,7 @@ class Design:
         board : str
             Name of the board.
         folder : path
-            Folder for the files, ``build/<name>`` by default.
+            Folder for the files, ``build/<name>/<board>`` by default.
         rate : int
             Rate of the serial line in baud, at most a fourth of the board's clock.
         progress : callable
@@ -488,7 +490,7 @@ class Design:
         from sosmith.interface.build import Build
 
         target = find_board(board, BUILDABLE)
-        place = Path("build") / self.core.spec.name if folder is None else Path(fspath(folder))
+        place = Path("build") / self.core.spec.name / target.name if folder is None else Path(fspath(folder))
         made = build_board(self.core, target, rate=rate, progress=lambda step: progress(step, 0, 0))
         return Build.written(made, place)
 
@@ -507,7 +509,7 @@ class Design:
         board : str
             Name of the board: ``"arty_a7"`` or ``"cmod_s7"``.
         folder : path
-            Folder for the files, ``build/<name>`` by default.
+            Folder for the files, ``build/<name>/<board>`` by default.
         rate : int
             Rate of the serial line in baud, at most a fourth of the board's clock.
         progress : callable
@@ -529,7 +531,7 @@ class Design:
         from sosmith.gen.output.board_project import board_project
 
         target = find_board(board, PROJECTS)
-        place = Path("build") / self.core.spec.name if folder is None else Path(fspath(folder))
+        place = Path("build") / self.core.spec.name / target.name if folder is None else Path(fspath(folder))
         made = board_project(self.core, target, rate=rate, progress=lambda step: progress(step, 0, 0))
         made.write(place)
         return made.summary

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from os import PathLike, fspath
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -21,15 +22,47 @@ def encoded(design: CoreDesign, inputs: Mapping[str, npt.ArrayLike]) -> Codes:
     Raises
     ------
     SpecificationError
-        If an input is missing, unknown, not a number or not finite, or the shapes do not match.
+        If an input is missing, unknown, masked, not a real number or not finite, or the shapes do not match.
     """
     columns = []
     for port, values in zip(design.datapath.inputs, _in_one_shape(design, inputs), strict=True):
         try:
-            columns.append(port.encode(np.asarray(values, dtype=np.float64)))
-        except (TypeError, ValueError) as error:
+            columns.append(port.encode(real_numbers(values, f"values of {port.name}")))
+        except ValueError as error:
             raise SpecificationError(str(error)) from None
     return np.stack(columns, axis=-1)
+
+
+def real_numbers(values: npt.ArrayLike, what: str) -> npt.NDArray[np.float64]:
+    """Return an array of `values` in double precision; `what` begins the sentence that refuses others.
+
+    Raises
+    ------
+    SpecificationError
+        If a value is masked or not a real number, or rows differ in length.
+    """
+    array = _array(values, what)
+    if array.dtype.kind in _NO_REAL_NUMBERS:
+        raise SpecificationError(f"{what} must be real numbers, not {_NO_REAL_NUMBERS[array.dtype.kind]}")
+    try:
+        return array.astype(np.float64)
+    except (TypeError, ValueError, OverflowError):  # an array of objects: fractions are numbers, others are not
+        raise SpecificationError(f"{what} must be real numbers in the range of a double, not other objects") from None
+
+
+_NO_REAL_NUMBERS = {"c": "complex ones", "U": "text", "S": "bytes", "M": "dates", "m": "durations", "V": "records"}
+"""What arrays hold that numpy would convert to other numbers than are meant, or to none, by the kind of their type."""
+
+
+def _array(values: npt.ArrayLike, what: str) -> npt.NDArray[np.generic]:
+    """Return an array of any numbers: what numpy would ignore or refuse in its own words is refused here."""
+    masked = int(np.sum(values.mask)) if isinstance(values, np.ma.MaskedArray) else 0
+    if masked:
+        raise SpecificationError(f"{what} must all be known, not masked ({masked} of {np.size(values)}): fill the gaps")
+    try:
+        return np.asarray(values)
+    except ValueError:
+        raise SpecificationError(f"{what} must be in rows of one length, not in rows of different ones") from None
 
 
 def codes_of(design: CoreDesign, inputs: Mapping[str, npt.ArrayLike]) -> Codes:
@@ -42,13 +75,18 @@ def codes_of(design: CoreDesign, inputs: Mapping[str, npt.ArrayLike]) -> Codes:
     """
     columns = []
     for port, values in zip(design.datapath.inputs, _in_one_shape(design, inputs), strict=True):
-        if not np.issubdtype(values.dtype, np.integer):
+        if not np.issubdtype(values.dtype, np.integer) and not _whole(values):
             raise SpecificationError(f"codes of {port.name} must be integers, not {values.dtype}")
         if values.min() < port.lowest or values.max() > port.highest:
             found = f"{values.min()}..{values.max()}"
             raise SpecificationError(f"codes of {port.name} must be in {port.lowest}..{port.highest}, not {found}")
         columns.append(values.astype(np.int64))
     return np.stack(columns, axis=-1)
+
+
+def _whole(values: npt.NDArray[np.generic]) -> bool:
+    """Whether an array of objects has integers only: those that are too long for the types of numpy."""
+    return values.dtype.kind == "O" and all(type(value) is int for value in values.ravel().tolist())
 
 
 def traces_of(
@@ -74,10 +112,16 @@ def traces_of(
         raise SpecificationError("seconds must come with the name of a built-in trace, not with arrays")
     codes, channels = encoded(design, trace), design.spec.channels
     ports, rate = design.datapath.inputs, design.spec.sample_rate
+    values = [real_numbers(each, "values") for each in _in_one_shape(design, trace)]
+
+    def one(of: Callable[[npt.NDArray[Any]], npt.NDArray[Any]]) -> Trace:
+        limited = tuple(port.outside(of(each)) for port, each in zip(ports, values, strict=True))
+        return Trace(name="arrays", ports=ports, sample_rate=rate, codes=of(codes), limited=limited)
+
     if codes.ndim == 2:
-        first = Trace(name="arrays", ports=ports, sample_rate=rate, codes=codes)
+        first = one(lambda array: array)
         return tuple(first.delayed(k) for k in range(channels))
-    return tuple(Trace(name="arrays", ports=ports, sample_rate=rate, codes=codes[:, k]) for k in range(channels))
+    return tuple(one(lambda array, k=k: array[:, k]) for k in range(channels))  # type: ignore[misc]
 
 
 def _in_one_shape(design: CoreDesign, inputs: Mapping[str, npt.ArrayLike]) -> list[npt.NDArray[np.generic]]:
@@ -89,12 +133,18 @@ def _in_one_shape(design: CoreDesign, inputs: Mapping[str, npt.ArrayLike]) -> li
     missing = [name for name in names if name not in inputs]
     if missing:
         raise SpecificationError(f"the inputs must be {' and '.join(names)}, not without {' and '.join(missing)}")
+    arrays = [_array(inputs[name], f"values of {name}") for name in names]
+    shapes = " and ".join(str(array.shape) for array in arrays)
+    # A column of samples is the same for every channel; numpy would take it for a row of one value a channel.
+    samples = {len(array) for array in arrays if array.ndim == 2}
+    columns = [array[:, np.newaxis] if array.ndim == 1 and samples == {len(array)} else array for array in arrays]
     try:
-        arrays = np.broadcast_arrays(*(np.asarray(inputs[name]) for name in names))
+        together = np.broadcast_arrays(*columns)
     except ValueError:
-        shapes = " and ".join(str(np.shape(inputs[name])) for name in names)
         raise SpecificationError(f"the inputs must have shapes that broadcast, not {shapes}") from None
-    shape, channels = arrays[0].shape, design.spec.channels
-    if len(shape) not in {1, 2} or not arrays[0].size or shape[1:] not in {(), (channels,)}:
-        raise SpecificationError(f"the inputs must have the shape (samples,) or (samples, {channels}), not {shape}")
-    return list(arrays)
+    shape, channels = together[0].shape or (1,), design.spec.channels
+    if len(shape) not in {1, 2} or shape[1:] not in {(), (channels,)}:
+        raise SpecificationError(f"the inputs must have the shape (samples,) or (samples, {channels}), not {shapes}")
+    if not shape[0]:
+        raise SpecificationError("the inputs must have at least one sample, not none")
+    return [array.reshape(shape) for array in together]

@@ -185,13 +185,13 @@ class Specification:
         return cls.load(
             {
                 "name": name,
-                "sample_rate": float(sample_rate),
+                "sample_rate": _float(sample_rate, "sample_rate"),
                 "channels": channels,
                 "input": {"x": _format(input_bits, input_range)},
                 "filter": {"sos": sos},
                 "output": _format(output_bits or input_bits, output_range or input_range)
                 | {"unit": unit, "max_error": max_error},
-                "hardware": {"realization": realization, "architecture": architecture, "clock": float(clock)},
+                "hardware": {"realization": realization, "architecture": architecture, "clock": _float(clock, "clock")},
             }
         )
 
@@ -302,6 +302,13 @@ class Specification:
 def specification_of(source: Specification | str | PathLike[str] | Mapping[str, Any]) -> Specification:
     """Return `source` itself if it is a specification, otherwise load it with `Specification.load`."""
     return source if isinstance(source, Specification) else Specification.load(source)
+
+
+def _float(value: float, name: str) -> float:
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        raise SpecificationError(f"{name} must be a number of Hz, not {value!r}") from None
 
 
 def _format(bits: int, ends: Sequence[float]) -> dict[str, Any]:

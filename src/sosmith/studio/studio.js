@@ -112,7 +112,9 @@ byId("controls").addEventListener("change", (event) => {
   if (field.name === "form") { reform(field.value); return; }
   if (!field.dataset.key) return;
   clearTimeout(typing);
-  if (field.tagName === "SELECT" || read(field) !== numbers(asked(field.dataset.key))[Number(field.dataset.at || 0)]) commit(field);
+  // After a refusal, what the page knows is older than what was sent: the number before is a change again.
+  const refused = known.preview.error !== null || field.hasAttribute("aria-invalid");
+  if (refused || field.tagName === "SELECT" || read(field) !== numbers(asked(field.dataset.key))[Number(field.dataset.at || 0)]) commit(field);
 });
 byId("controls").addEventListener("submit", (event) => event.preventDefault());
 

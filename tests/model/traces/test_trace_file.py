@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import replace
 from fractions import Fraction
@@ -161,6 +162,43 @@ def test_time_steps_within_one_per_cent_are_taken(tmp_path: Path) -> None:
 def same(one: Trace, other: Trace) -> bool:
     parts = ((one.codes, other.codes), (one.truth, other.truth), (one.reading, other.reading))
     return all((a is None and b is None) or np.array_equal(np.array(a), np.array(b)) for a, b in parts)
+
+
+def _stamped(tmp_path: Path, stamps: list[str], rate: int) -> Trace:
+    path = tmp_path / "t.csv"
+    path.write_text("time_s,audio_code\n" + "".join(f"{stamp},0\n" for stamp in stamps), encoding="utf-8")
+    return read_traces(path, (AUDIO,), Fraction(rate))[0]
+
+
+@pytest.mark.parametrize(("rate", "places"), [(48000, 6), (44100, 5), (44100, 6), (192000, 6), (3, 1), (1, 0)])
+def test_time_stamps_may_be_rounded_or_cut_to_their_last_digit(tmp_path: Path, rate: int, places: int) -> None:
+    for rounded in (round, math.floor):
+        stamps = [rounded(Fraction(k, rate) * 10**places) for k in range(7, 1000)]
+        texts = [f"{stamp / 10**places:.{places}f}" for stamp in stamps] if places else [*map(str, stamps)]
+        assert len(_stamped(tmp_path, texts, rate)) == 993
+
+
+@pytest.mark.parametrize(
+    ("rate", "stamps", "message"),
+    [
+        (1, ["0", "1", "3"], "line 4: time_s must be 1 s after the previous row, not 2 s"),
+        (48000, ["0.000000", "0.000021", "0.000062"], r"line 4: time_s must be 2.08333e-05 s after .*, not 4.1e-05 s"),
+        (
+            48000,
+            [f"{k * 20e-6:.6f}" for k in range(100)],
+            "line 19: time_s must be 0.000354167 s after the first row at 48000 Hz, not 0.00034 s",
+        ),
+        (48000, ["0.0000", "0.0000", "0.0000"], "line 3: time_s must be above 0.0, the value in .*, not 0.0"),
+    ],
+    ids=["a second late", "a sample missing", "50 kHz", "a digit longer than the period"],
+)
+def test_time_stamps_that_do_not_fit_the_rate(tmp_path: Path, rate: int, stamps: list[str], message: str) -> None:
+    with pytest.raises(SpecificationError, match=message):
+        _stamped(tmp_path, stamps, rate)
+
+
+def test_time_stamps_since_1970_are_as_fine_as_doubles_are(tmp_path: Path) -> None:
+    assert len(_stamped(tmp_path, [f"{1700000000 + k / 48000:.6f}" for k in range(1000)], 48000)) == 1000
 
 
 def test_channels_go_by_time_and_come_back_in_any_order(tmp_path: Path) -> None:

@@ -20,6 +20,8 @@ def print_summary(summary: dict[str, Any]) -> None:
         table.add_row(name, escape(words))
     for reason in summary["shortfalls"]:
         table.add_row("[red]short[/]", escape(reason))
+    for reason in summary["notes"]:
+        table.add_row("note", escape(reason))
     table.add_row("simulated by", escape(_speed(summary)))
     TableConsole().print(table)
 
