@@ -26,7 +26,6 @@ from sosmith.interface.quantity import Quantity
 from sosmith.interface.specification import Specification, specification_of
 from sosmith.interface.trace import Trace
 from sosmith.model.errors import SpecificationError, falling_short
-from sosmith.model.reference.golden import entering_filter, filtered
 
 if TYPE_CHECKING:
     from sosmith.gen.output.decimation_facts import RateCosts
@@ -298,19 +297,8 @@ class Design:
         Parameters, result and errors are those of `run`.
         """
         codes = encoded(self.core, inputs)
-        quantized, datapath = self.core.quantized, self.core.datapath
-        sos = None if quantized.filter is None else quantized.filter.sos
         block = codes.reshape(len(codes), -1, codes.shape[-1])
-        columns = [
-            filtered(
-                entering_filter(block[:, k], datapath, quantized.polynomial),
-                sos,
-                datapath.output,
-                steady=quantized.steady,
-            )
-            for k in range(block.shape[1])
-        ]
-        return np.stack(columns, axis=1).reshape(-1, *codes.shape[1:-1])
+        return self.core.quantized.exact(block).golden.reshape(-1, *codes.shape[1:-1])
 
     @property
     def scenarios(self) -> dict[str, str]:
@@ -661,7 +649,7 @@ class Design:
                 progress=progress,
             )
         progress("writing the report", 0, 0)
-        return Report.written(self.core, traces, evidence, place)
+        return Report.written(self.core, evidence, place)
 
     @cached_property
     def facts(self) -> CoreFacts:
