@@ -17,7 +17,7 @@ import numpy as np
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.fpga.boards import Board
 from sosmith.gen.fpga.synthesis import synthesize
-from sosmith.gen.output.core_facts import InterfaceFacts, core_facts
+from sosmith.gen.output.core_facts import CoreFacts, InterfaceFacts, core_facts
 from sosmith.gen.output.generate import generate
 from sosmith.gen.output.vectors import Vectors, vector_files, whole_beats
 from sosmith.gen.report.evidence import Alternative, Evidence
@@ -35,6 +35,7 @@ from sosmith.sim.cosimulate import CosimulationResult, cosimulate, first_copies
 from sosmith.sim.gate_level import with_cell_models
 from sosmith.sim.simulator_bench import SimulatorBench
 from sosmith.sim.simulators import check_name
+from sosmith.verify.certificate_file import Certificate
 
 Progress = Callable[[str, int, int], None]
 """Called with the name of the step, the amount done and the total; the total is 0 if it is not known."""
@@ -58,6 +59,8 @@ def simulate(
     hardware: Hardware | None = None,
     date: str | None = None,
     uncertainty: dict[str, Any] | None = None,
+    facts: CoreFacts | None = None,
+    claims: Certificate | None = None,
     progress: Progress = lambda step, done, total: None,
 ) -> Evidence:
     """Generate the core into `directory`, run `traces` through it, and compare it with model and golden chain.
@@ -66,7 +69,7 @@ def simulate(
     synthesized for that board; with `hardware`, that runs the core, and nothing is simulated. With `vectors`, what went
     in and what came out is written to that file, in the format of its suffix
     (`sosmith.gen.output.vectors.vector_files`). `uncertainty` is the budget of the instrument, in the types of JSON,
-    for the report; None where there is none.
+    for the report; None where there is none. `facts` and `claims` are what `sosmith.gen.output.generate.generate` takes.
 
     Raises
     ------
@@ -82,8 +85,10 @@ def simulate(
     with _alone_in(directory):
         for stale in ("report.json", "report.html"):  # of a run of another core, in case this run fails
             (directory / stale).unlink(missing_ok=True)
-        facts = core_facts(design)
-        made = generate(design, directory, lambda step: progress(f"generating {step}", 0, 0), facts=facts)
+        facts = facts or core_facts(design)
+        made = generate(
+            design, directory, lambda step: progress(f"generating {step}", 0, 0), facts=facts, claims=claims
+        )
         source, build_dir, netlist = directory / f"{design.datapath.name}.sv", directory / "simulation", None
         codes = np.stack([trace.codes for trace in traces], axis=1)
         sent = whole_beats(codes, facts.interface.inputs)

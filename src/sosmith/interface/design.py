@@ -404,7 +404,13 @@ class Design:
         """
         from sosmith.gen.output.generate import generate  # Amaranth is slow to import
 
-        return generate(self.core, Path(fspath(folder)), lambda step: progress(step, 0, 0))
+        return generate(
+            self.core,
+            Path(fspath(folder)),
+            lambda step: progress(step, 0, 0),
+            facts=self.facts,
+            claims=self.certificate.entries,
+        )
 
     def package(
         self,
@@ -646,6 +652,8 @@ class Design:
                 vectors=None if vectors is None else Path(fspath(vectors)),
                 date=date,
                 uncertainty=budget_in_json(self.core),
+                facts=self.facts,
+                claims=self.certificate.entries,
                 progress=progress,
             )
         progress("writing the report", 0, 0)
