@@ -10,37 +10,33 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.fpga.boards import Board
-from sosmith.gen.fpga.synthesis import Netlist, synthesize
+from sosmith.gen.fpga.synthesis import synthesize
 from sosmith.gen.output.core_facts import CoreFacts, InterfaceFacts, core_facts
 from sosmith.gen.output.generate import generate
 from sosmith.gen.output.vectors import Vectors, vector_files, whole_beats
 from sosmith.gen.report.evidence import Alternative, Evidence
-from sosmith.gen.report.filter_facts import filter_facts
 from sosmith.gen.report.input_ranges import input_ranges
 from sosmith.gen.report.provenance import provenance_of
 from sosmith.gen.report.recursion import recursion_of
+from sosmith.gen.report.run import Run, run_of
 from sosmith.gen.specification.choices import ERROR_FEEDBACK
 from sosmith.gen.word_lengths.other_realization import with_realization
 from sosmith.gen.word_lengths.quantized import Quantized
-from sosmith.model.arrays import Codes, Values
-from sosmith.model.dataflow.status import Flag
+from sosmith.model.arrays import Codes
 from sosmith.model.errors import SpecificationError
-from sosmith.model.reference.golden import calibrated, entering_filter, filtered
 from sosmith.model.text_files import write_contents, write_files
 from sosmith.model.traces.trace import Trace
 from sosmith.sim.cosimulate import CosimulationResult, cosimulate, first_copies
 from sosmith.sim.gate_level import with_cell_models
 from sosmith.sim.simulator_bench import SimulatorBench
 from sosmith.sim.simulators import check_name
-
-_Kind = TypeVar("_Kind", bound=np.generic)
+from sosmith.verify.certificate_file import Certificate
 
 Progress = Callable[[str, int, int], None]
 """Called with the name of the step, the amount done and the total; the total is 0 if it is not known."""
@@ -64,6 +60,8 @@ def simulate(
     hardware: Hardware | None = None,
     date: str | None = None,
     uncertainty: dict[str, Any] | None = None,
+    facts: CoreFacts | None = None,
+    claims: Certificate | None = None,
     progress: Progress = lambda step, done, total: None,
 ) -> Evidence:
     """Generate the core into `directory`, run `traces` through it, and compare it with model and golden chain.
@@ -72,7 +70,8 @@ def simulate(
     synthesized for that board; with `hardware`, that runs the core, and nothing is simulated. With `vectors`, what went
     in and what came out is written to that file, in the format of its suffix
     (`sosmith.gen.output.vectors.vector_files`). `uncertainty` is the budget of the instrument, in the types of JSON,
-    for the report; None where there is none.
+    for the report; None where there is none. `facts` and `claims` are what `sosmith.gen.output.generate.generate`
+    takes.
 
     Raises
     ------
@@ -88,8 +87,10 @@ def simulate(
     with _alone_in(directory):
         for stale in ("report.json", "report.html"):  # of a run of another core, in case this run fails
             (directory / stale).unlink(missing_ok=True)
-        facts = core_facts(design)
-        made = generate(design, directory, lambda step: progress(f"generating {step}", 0, 0), facts=facts)
+        facts = facts or core_facts(design)
+        made = generate(
+            design, directory, lambda step: progress(f"generating {step}", 0, 0), facts=facts, claims=claims
+        )
         source, build_dir, netlist = directory / f"{design.datapath.name}.sv", directory / "simulation", None
         codes = np.stack([trace.codes for trace in traces], axis=1)
         sent = whole_beats(codes, facts.interface.inputs)
@@ -131,11 +132,24 @@ def simulate(
             taken = replace(taken, responses=taken.responses[: len(sent)], status=taken.status[: len(sent)])
         write_contents(vectors.parent, vector_files(vectors, taken, facts.interface, design.spec.sample_rate))
     progress("comparing", 0, 0)
-    return replace(
-        _evidence(design, facts, traces, result, netlist, seed=seed, wall_seconds=time.monotonic() - started),
+    run = run_of(design, traces, result.codes[:, :, 0], result.status, cycles=result.cycles)
+    return Evidence(
+        facts=facts,
+        run=run,
+        simulator=result.simulator,
+        seed=seed,
+        tools=result.tools if netlist is None else {**result.tools, "yosys": netlist.version},
+        wall_seconds=time.monotonic() - started,
+        cycles_per_second=result.cycles_per_second,
+        gates=netlist,
+        recursions=tuple(recursion_of(section.name, section.graph) for section in design.quantized.sections),
+        alternatives=_alternatives(design.quantized, run),
+        uncertainty=uncertainty,
+        provenance=provenance_of(design, traces, netlist),
+        specification=design.spec.path.name,
         files={path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in made},
         date=date,
-        uncertainty=uncertainty,
+        input_ranges=input_ranges(traces),
     )
 
 
@@ -166,91 +180,7 @@ def _taken(codes: Codes, result: CosimulationResult, interface: InterfaceFacts) 
     )
 
 
-def _evidence(
-    design: CoreDesign,
-    facts: CoreFacts,
-    traces: Sequence[Trace],
-    result: CosimulationResult,
-    netlist: Netlist | None,
-    *,
-    seed: int,
-    wall_seconds: float,
-) -> Evidence:
-    quantized, datapath = design.quantized, design.datapath
-    output = datapath.output
-    codes = np.stack([trace.codes for trace in traces], axis=1)
-    expected, provenance = datapath.compute(codes), provenance_of(design, traces, netlist)
-    received, status = result.codes[: len(expected), :, 0], result.status[: len(expected)]  # not what fills a beat
-    differs = (expected != received) | (datapath.compute_status(codes) != status)
-    wrong = np.flatnonzero(differs.any(axis=1))
-    sos = None if quantized.filter is None else quantized.filter.sos
-    entering = [entering_filter(t.codes, datapath, quantized.polynomial) for t in traces]
-    golden = np.stack([filtered(column, sos, output, steady=quantized.steady) for column in entering], axis=1)
-    ranges = input_ranges(traces)
-    if datapath.decimator is not None:  # what is told of a sample is told of those that bring a result
-        traces = [trace.every(datapath.decimator.factor) for trace in traces]
-    unfiltered = np.stack([calibrated(t.codes, datapath.inputs, quantized.polynomial) for t in traces], axis=1)
-    trace = traces[0]
-    low, high = output.decode(np.array([output.lowest, output.highest]))
-    evidence = Evidence(
-        name=datapath.name,
-        core=design.core,
-        description="" if quantized.filter is None else quantized.filter.describe,
-        scenario=trace.name,
-        unit=output.unit,
-        lsb=float(output.lsb),
-        low=float(low),
-        high=float(high),
-        zero=float(output.zero),
-        bound=facts.error_bound,
-        bound_parts=facts.error_parts,
-        proven=True,
-        max_error=float(design.spec.max_error),
-        time=trace.time,
-        truth=_stacked([trace.truth for trace in traces]),
-        reading=_stacked([trace.reading for trace in traces]),
-        unfiltered=None if sos is None else unfiltered,
-        golden=golden,
-        hardware=output.decode(received),
-        mismatches=int(np.count_nonzero(differs)),
-        first_mismatch=int(wrong[0]) if len(wrong) else None,
-        samples=received.size,
-        taken=len(codes) * len(traces),
-        channels=len(traces),
-        cycles=result.cycles,
-        latency_cycles=facts.interface.latency_cycles,
-        simulator=result.simulator,
-        seed=seed,
-        gates=netlist,
-        tools=result.tools if netlist is None else {**result.tools, "yosys": netlist.version},
-        wall_seconds=wall_seconds,
-        cycles_per_second=result.cycles_per_second,
-        realization=facts.realization or "none",
-        architecture=facts.architecture,
-        why=" ".join(f"{chosen[0].upper()}{chosen[1:]} {reason}." for chosen, reason in facts.reasons.items()),
-        formats=facts.formats,
-        sections=facts.sections,
-        recursions=tuple(recursion_of(section.name, section.graph) for section in quantized.sections),
-        limit_cycles=facts.limit_cycles,
-        settling=facts.settling,
-        unsettled=(status >> Flag.SETTLING & 1).astype(np.bool_) if datapath.settles else None,
-        filter=filter_facts(quantized),
-        decimation=facts.decimation,
-        alternatives=_alternatives(quantized, codes, golden),
-        provenance=provenance,
-        specification=design.spec.path.name,
-        input_ranges=ranges,
-    )
-    return evidence.of_channel(0) if len(traces) == 1 else evidence
-
-
-def _stacked(columns: Sequence[npt.NDArray[_Kind] | None]) -> npt.NDArray[_Kind] | None:
-    """Columns of all channels side by side, or None if there are none."""
-    present = [column for column in columns if column is not None]
-    return np.stack(present, axis=1) if present else None
-
-
-def _alternatives(quantized: Quantized, codes: Codes, golden: Values) -> list[Alternative]:
+def _alternatives(quantized: Quantized, run: Run) -> list[Alternative]:
     """Run the integer model of every other realization on the same input, with the same word lengths."""
     if quantized.realization not in ERROR_FEEDBACK or not quantized.sections:
         return []
@@ -259,7 +189,8 @@ def _alternatives(quantized: Quantized, codes: Codes, golden: Values) -> list[Al
         if realization == quantized.realization:
             continue
         other = with_realization(quantized, realization).datapath
-        error = other.output.decode(other.compute(codes)) - golden
+        values = other.output.decode(other.compute(run.codes))
+        error = values - run.golden.reshape(values.shape)
         rows.append(
             Alternative(name=realization, max_abs=float(np.abs(error).max()), rms=float(np.sqrt(np.mean(error**2))))
         )

@@ -7,8 +7,11 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
+import numpy as np
+
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.filter.impulse_invariance import Aliasing
+from sosmith.gen.filter.response import FilterFacts
 from sosmith.gen.output.decimation_facts import DecimationFacts, decimation_facts
 from sosmith.gen.proof.limit_cycles import limit_cycles, recursions
 from sosmith.gen.proof.linear_model import linear_model
@@ -243,6 +246,14 @@ class CoreFacts:
     ----------
     core : str
         One of `sosmith.gen.core.CORES`.
+    description : str
+        The filter in words; empty without one.
+    output : Port
+        Format, range and unit of the output.
+    max_error : float
+        Largest error that the specification allows, in `unit`.
+    filter : FilterFacts or None
+        The filter as specified and as realized; None without one.
     spec : dict
         The specification as read, in the types of JSON.
     channels : int
@@ -279,8 +290,6 @@ class CoreFacts:
         Proven bound on the error, in `unit`.
     error_parts : mapping of str to float
         Its parts.
-    unit : str
-        Unit of the output.
     limit_cycles : tuple of LimitCycleFacts
         One for each of `sections`.
     aliasing : Aliasing or None
@@ -292,6 +301,10 @@ class CoreFacts:
     """
 
     core: str
+    description: str
+    output: Port
+    max_error: float
+    filter: FilterFacts | None
     spec: dict[str, Any]
     channels: int
     interface: InterfaceFacts
@@ -310,7 +323,6 @@ class CoreFacts:
     formats: tuple[NodeFormat, ...]
     error_bound: float
     error_parts: Mapping[str, float]
-    unit: str
     limit_cycles: tuple[LimitCycleFacts, ...]
     aliasing: Aliasing | None
     decimation: DecimationFacts | None
@@ -321,6 +333,27 @@ class CoreFacts:
         """Name of the core."""
         return self.interface.name
 
+    @property
+    def unit(self) -> str:
+        """Unit of the output."""
+        return self.output.unit
+
+    @property
+    def lsb(self) -> float:
+        """One step of the output's code, in `unit`."""
+        return float(self.output.lsb)
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """Smallest and largest value of the output, in `unit`."""
+        low, high = self.output.decode(np.array([self.output.lowest, self.output.highest]))
+        return float(low), float(high)
+
+    @property
+    def why(self) -> str:
+        """The reasons in sentences."""
+        return " ".join(f"{chosen[0].upper()}{chosen[1:]} {reason}." for chosen, reason in self.reasons.items())
+
 
 def core_facts(design: CoreDesign) -> CoreFacts:
     """Collect the facts about a core."""
@@ -329,6 +362,10 @@ def core_facts(design: CoreDesign) -> CoreFacts:
     parts = [pair for section in quantized.sections for pair in recursions(section).items()]
     return CoreFacts(
         core=design.core,
+        description="" if quantized.filter is None else quantized.filter.describe,
+        output=output,
+        max_error=float(design.spec.max_error),
+        filter=quantized.filter_facts,
         spec=design.spec.source,
         channels=design.spec.channels,
         interface=interface_facts(design),
@@ -347,7 +384,6 @@ def core_facts(design: CoreDesign) -> CoreFacts:
         formats=tuple(row for each in _in_order(datapath) for stage in each.stages for row in _formats(stage, each)),
         error_bound=float(quantized.bound * output.lsb),
         error_parts={part: float(value * output.lsb) for part, value in quantized.budget.items()},
-        unit=output.unit,
         limit_cycles=tuple(_limit_cycles(name, graph, output) for name, graph in parts),
         aliasing=None if quantized.filter is None else quantized.filter.aliasing,
         decimation=decimation_facts(design),

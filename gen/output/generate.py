@@ -15,7 +15,7 @@ from sosmith.gen.reload.register_map import c_registers, systemrdl
 from sosmith.gen.reload.register_writes import bank_size
 from sosmith.model.dataflow.c_model import c_header, c_source
 from sosmith.model.text_files import to_json, write_files
-from sosmith.verify.certificate_file import certificate_text
+from sosmith.verify.certificate_file import Certificate, certificate_text, sealed
 
 
 def generate(
@@ -24,6 +24,7 @@ def generate(
     progress: Callable[[str], None] = lambda step: None,
     *,
     facts: CoreFacts | None = None,
+    claims: Certificate | None = None,
 ) -> list[Path]:
     """Write SystemVerilog, RTLIL, manifest, certificate and C model; return the paths of the files.
 
@@ -40,6 +41,8 @@ def generate(
         Called with the name of each step.
     facts : CoreFacts or None
         The facts about the core, if they have been collected already.
+    claims : Certificate or None
+        Its certificate, if it has been made already; what is written names the files too.
 
     Raises
     ------
@@ -48,11 +51,15 @@ def generate(
     SpecificationError
         If the folder cannot be written.
     """
-    return write_files(directory, generated(design, progress, facts=facts))
+    return write_files(directory, generated(design, progress, facts=facts, claims=claims))
 
 
 def generated(
-    design: CoreDesign, progress: Callable[[str], None] = lambda step: None, *, facts: CoreFacts | None = None
+    design: CoreDesign,
+    progress: Callable[[str], None] = lambda step: None,
+    *,
+    facts: CoreFacts | None = None,
+    claims: Certificate | None = None,
 ) -> dict[str, str]:
     """Return the texts that `generate` writes, by the names of the files; parameters and errors as there."""
     name, datapath = design.spec.name, design.datapath
@@ -67,9 +74,9 @@ def generated(
     }
     rest = {f"{name}.c": c_source(datapath), f"{name}.h": c_header(datapath), **_register_files(design)}
     progress("certificate")
-    told = about(design, {**first, **rest})
-    proven = certificate(design.quantized, design.spec.max_error, told, design.architecture.online)
-    return {**first, f"{name}.certificate.json": certificate_text(proven), **rest}
+    proven = claims or certificate(design.quantized, design.spec.max_error, online=design.architecture.online)
+    named = sealed(proven.model_copy(update={"about": about(design, {**first, **rest})}))
+    return {**first, f"{name}.certificate.json": certificate_text(named), **rest}
 
 
 def _register_files(design: CoreDesign) -> dict[str, str]:

@@ -13,7 +13,8 @@ from sosmith.gen.filter.decimation import decimated_step
 from sosmith.gen.filter.response import FilterFacts, group_delay, passbands
 from sosmith.gen.filter.step_response import SETTLED, StepResponse, step_response
 from sosmith.gen.output.decimation_facts import DecimationFacts
-from sosmith.gen.report.evidence import Evidence, Mask
+from sosmith.gen.report.evidence import Evidence
+from sosmith.gen.report.run import Mask
 from sosmith.model.reference.accuracy import ErrorStatistics, error_statistics
 
 
@@ -53,11 +54,15 @@ class Behaviour:
 def behaviour(evidence: Evidence) -> Behaviour:
     """Measure a run and its filter; of several channels, all count for the error against the true value."""
     error = true_error(evidence)
-    facts, span = evidence.filter, evidence.high - evidence.low
-    step = None if facts is None else _step(facts, evidence.lsb, span, evidence.decimation)
+    facts, (low, high) = evidence.facts.filter, evidence.facts.range
+    span = high - low
+    step = None if facts is None else _step(facts, evidence.facts.lsb, span, evidence.facts.decimation)
     delay = None if facts is None else _delay(facts)
-    if delay is not None and evidence.decimation is not None:
-        delay = evidence.decimation.delay, delay[1]  # of decimator and filter, at zero frequency as the filter's own
+    if delay is not None and evidence.facts.decimation is not None:
+        delay = (
+            evidence.facts.decimation.delay,
+            delay[1],
+        )  # of decimator and filter, at zero frequency as the filter's own
     return Behaviour(
         true_error=None if error is None else error_statistics(error),
         readings=0 if error is None else error.size,
@@ -65,16 +70,16 @@ def behaviour(evidence: Evidence) -> Behaviour:
         delay_hz=None if delay is None else delay[1],
         step=step,
         settling=None if step is None else step.samples_to(SETTLED) / step.sample_rate,
-        settling_to_lsb=None if step is None else step.samples_to(evidence.lsb / 2 / span) / step.sample_rate,
+        settling_to_lsb=None if step is None else step.samples_to(evidence.facts.lsb / 2 / span) / step.sample_rate,
         transient=_transient(evidence),
     )
 
 
 def true_error(evidence: Evidence) -> Any:
     """Hardware minus true value at the readings, shape (readings,); None if there are none."""
-    if evidence.truth is None:
+    if evidence.run.truth is None:
         return None
-    error, reading = evidence.hardware - evidence.truth, readings_of(evidence)
+    error, reading = evidence.run.hardware - evidence.run.truth, readings_of(evidence)
     counted = error.ravel() if reading is None else error[reading]
     return counted if counted.size else None
 
@@ -84,16 +89,16 @@ def readings_of(evidence: Evidence) -> Mask | None:
 
     Those that the trace marks, else all that the hardware does not flag as settling.
     """
-    if evidence.reading is not None or evidence.unsettled is None:
-        return evidence.reading  # readings are marked where a scenario holds them settled
-    return ~evidence.unsettled
+    if evidence.run.reading is not None or evidence.run.unsettled is None:
+        return evidence.run.reading  # readings are marked where a scenario holds them settled
+    return ~evidence.run.unsettled
 
 
 def _transient(evidence: Evidence) -> int:
     """Count the samples before the first one that is settled in all channels."""
-    if evidence.unsettled is None:
+    if evidence.run.unsettled is None:
         return 0
-    flagged = evidence.unsettled.reshape(len(evidence.time), -1).any(axis=1)
+    flagged = evidence.run.unsettled.reshape(len(evidence.run.time), -1).any(axis=1)
     return int(np.argmin(np.append(flagged, False)))
 
 

@@ -33,11 +33,11 @@ def error_over_time(evidence: Evidence) -> dict[str, Any]:
         ``time``: where each stretch starts, in s; ``low`` and ``high``: its smallest and largest hardware minus exact
         calculation, in the output's unit. All lists have one length, at most `STRETCHES`.
     """
-    error = evidence.error.reshape(len(evidence.time), -1)
+    error = evidence.run.error.reshape(len(evidence.run.time), -1)
     edges = np.linspace(0, len(error), min(STRETCHES, len(error)) + 1).astype(int)
     stretches = [error[start:stop] for start, stop in itertools.pairwise(edges)]
     return {
-        "time": _rounded(evidence.time[edges[:-1]]),
+        "time": _rounded(evidence.run.time[edges[:-1]]),
         "low": _rounded(np.array([part.min() for part in stretches])),
         "high": _rounded(np.array([part.max() for part in stretches])),
     }
@@ -52,10 +52,10 @@ def error_spectrum(evidence: Evidence) -> dict[str, Any] | None:
         ``frequency`` in Hz, without zero; ``density`` in the output's unit per square root of Hz. None for fewer than
         32 samples.
     """
-    error = evidence.of_channel(evidence.worst_channel).error
+    error = evidence.shown.run.error
     if len(error) < 32:
         return None
-    rate = (len(error) - 1) / float(evidence.time[-1] - evidence.time[0])
+    rate = (len(error) - 1) / float(evidence.run.time[-1] - evidence.run.time[0])
     frequency, power = signal.welch(error, fs=rate, nperseg=min(_SEGMENT, len(error)))
     return {"frequency": _rounded(frequency[1:]), "density": _rounded(np.sqrt(power[1:]))}
 

@@ -18,7 +18,6 @@ from sosmith.gen.filter.response import (
 )
 from sosmith.gen.picture import picture
 from sosmith.gen.quantity import scale
-from sosmith.gen.report.filter_facts import filter_facts
 from sosmith.gen.report.plots import forbidden_areas, frequency_axis
 from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.model.port import Port
@@ -41,7 +40,7 @@ def design_plot(quantized: Quantized, file_format: str) -> bytes:
     file_format : str
         One of `sosmith.gen.picture.FORMATS`.
     """
-    facts = filter_facts(quantized)
+    facts = quantized.filter_facts
     count = 2 * (facts is not None) + (quantized.polynomial is not None)
 
     def paint(figure: Figure) -> None:

@@ -74,34 +74,36 @@ def _reasons(evidence: Evidence, summary: Summary) -> list[str]:
     if not summary["passed"]:
         return list(summary["shortfalls"])
     unit = ErrorUnit.of(evidence)
-    error, bound = (unit.amount(value) for value in (summary["error"]["max_abs"], evidence.bound))
+    error, bound = (unit.amount(value) for value in (summary["error"]["max_abs"], evidence.facts.error_bound))
     ran = "hardware" if evidence.gates is None else f"netlist for the {evidence.gates.board.title}"
     return [
         f"The simulated {ran} agrees with its integer model bit for bit, and stays within {error} "
-        f"of the exact calculation; the {'proven' if evidence.proven else 'estimated'} limit is {bound}."
+        f"of the exact calculation; the proven limit is {bound}."
     ]
 
 
 def _trace_figure(evidence: Evidence, transient: int) -> Figure:
     legend = [("golden", "broad", "exact calculation"), ("hardware", "dashed", "hardware")]
-    if evidence.truth is not None:
+    if evidence.run.truth is not None:
         legend.append(("truth", "broad", "true value"))
-    if evidence.unfiltered is not None:
+    if evidence.run.unfiltered is not None:
         legend.append(("unfiltered", "", "without the filter"))
-    if evidence.settling is not None:
-        legend.append(("muted", "area", f"settling from the start at zero, {quantity(evidence.settling.seconds, 's')}"))
+    if evidence.facts.settling is not None:
+        legend.append(
+            ("muted", "area", f"settling from the start at zero, {quantity(evidence.facts.settling.seconds, 's')}")
+        )
     caption = (
         "The hardware, in blue, should lie on the orange line of the exact calculation "
         "(double precision, unrounded coefficients, the same input codes)."
     )
-    if evidence.truth is not None and evidence.filter is not None:
+    if evidence.run.truth is not None and evidence.facts.filter is not None:
         caption += (
             " Below, hardware minus true value: the noise that the filter lets through, and its delay. "
             "Rounding has next to no part in it."
         )
-    if evidence.shown_channel is not None:
+    if evidence.run.shown_channel is not None:
         caption += (
-            f" All pictures show channel {evidence.shown_channel:,}, the one of {evidence.channels:,} "
+            f" All pictures show channel {evidence.run.shown_channel:,}, the one of {evidence.run.channels:,} "
             "with the largest error; the figures above are of all channels."
         )
     return Figure(
@@ -119,7 +121,7 @@ def _close_up_figure(evidence: Evidence) -> Figure:
         drawing=plots.close_up_figure(evidence, plots.WIDE),
         narrow=plots.close_up_figure(evidence, plots.NARROW),
         caption=f"{count(near.stop - near.start, 'sample')} of the same curves; the dotted line marks the largest "
-        f"error. The output moves in steps of {amount(evidence.lsb, evidence.unit)}.",
+        f"error. The output moves in steps of {amount(evidence.facts.lsb, evidence.facts.unit)}.",
         legend=[("golden", "broad", "exact calculation"), ("hardware", "dot", "hardware")],
     )
 
@@ -127,9 +129,9 @@ def _close_up_figure(evidence: Evidence) -> Figure:
 def _looks(evidence: Evidence) -> Figure:
     """Legend and caption of the viewer, which has no drawing of its own."""
     known = [("golden", "broad", "exact calculation", True), ("hardware", "", "hardware", True)]
-    known.append(("truth", "broad", "true value", evidence.truth is not None))
-    known.append(("unfiltered", "", "without the filter", evidence.unfiltered is not None))
-    stride = -(-len(evidence.time) // MAX_POINTS)
+    known.append(("truth", "broad", "true value", evidence.run.truth is not None))
+    known.append(("unfiltered", "", "without the filter", evidence.run.unfiltered is not None))
+    stride = -(-len(evidence.run.time) // MAX_POINTS)
     thinned = "" if stride == 1 else f" Of each {stride} samples, the one with the largest error is held here."
     return Figure(
         drawing="",
@@ -152,14 +154,14 @@ def _error_figure(evidence: Evidence) -> Figure:
         for limit in inside
     ]
     caption = "The curve must stay between the limits."
-    if len(evidence.error) > plots.WIDE // 2:
+    if len(evidence.run.error) > plots.WIDE // 2:
         caption = "Smallest and largest error of each stretch of time; both must stay between the limits."
     if outside:
         names = " and ".join(f"{limit.words} ±{unit.amount(limit.value)}" for limit in outside)
         caption += f" Too far out to draw: {names}."
-    if evidence.first_mismatch is not None:
+    if evidence.run.first_mismatch is not None:
         caption += (
-            f" The upright line marks sample {evidence.first_mismatch:,}, "
+            f" The upright line marks sample {evidence.run.first_mismatch:,}, "
             "the first at which hardware and integer model differ."
         )
     return Figure(
@@ -175,8 +177,8 @@ def _histogram_figure(evidence: Evidence) -> Figure:
     return Figure(
         title="How often each error occurs",
         drawing=plots.histogram_figure(evidence),
-        caption=f"One LSB is {amount(evidence.lsb, evidence.unit)}. Rounding the output spreads the error evenly "
-        "between the dotted lines at ±½\u00a0LSB; what lies beyond them comes from inside.",
+        caption=f"One LSB is {amount(evidence.facts.lsb, evidence.facts.unit)}. Rounding the output spreads the "
+        "error evenly between the dotted lines at ±½\u00a0LSB; what lies beyond them comes from inside.",
     )
 
 
@@ -195,7 +197,7 @@ def _alternatives_table(evidence: Evidence, summary: Summary) -> Table:
     found += [(other.name, other.max_abs, other.rms) for other in evidence.rivals]
     unit = ErrorUnit.of(evidence)
     rows = [
-        (name, unit.number(largest), plain_number(largest / evidence.lsb), unit.number(rms))
+        (name, unit.number(largest), plain_number(largest / evidence.facts.lsb), unit.number(rms))
         for name, largest, rms in found
     ]
     head = ("realization", unit.titled("largest error"), "in LSB", unit.titled("RMS"))
@@ -203,11 +205,13 @@ def _alternatives_table(evidence: Evidence, summary: Summary) -> Table:
 
 
 def _budget_table(evidence: Evidence) -> Table:
-    seen = {name: value for name, value in evidence.bound_parts.items() if value >= evidence.lsb * LEAST_PART}
+    seen = {
+        name: value for name, value in evidence.facts.error_parts.items() if value >= evidence.facts.lsb * LEAST_PART
+    }
     parts = [(name.replace("_", " "), value) for name, value in seen.items()]
-    parts += [("limit", evidence.bound), ("allowed by the specification", evidence.max_error)]
+    parts += [("limit", evidence.facts.error_bound), ("allowed by the specification", evidence.facts.max_error)]
     unit = ErrorUnit.of(evidence)
-    rows = [(name, unit.number(value), plain_number(value / evidence.lsb)) for name, value in parts]
+    rows = [(name, unit.number(value), plain_number(value / evidence.facts.lsb)) for name, value in parts]
     return Table(head=("contribution", unit.titled("at most"), "in LSB"), rows=rows, numbers=(1, 2))
 
 
@@ -249,15 +253,15 @@ def _uncertainty_caption(found: Mapping[str, Any]) -> str:
 def _limit_cycles_table(evidence: Evidence) -> Table:
     """Tell what each section's rounding can sustain by itself, at the section's own output."""
     rows, unit = [], ErrorUnit.of(evidence)
-    for found in evidence.limit_cycles:
+    for found in evidence.facts.limit_cycles:
         weights = [f"{float(weight):.4g}" for weight in found.lyapunov or ()]
         rows.append(
             (
                 found.section,
                 "0, comes to rest" if found.none else unit.number(found.largest),
-                "0" if found.none else plain_number(found.largest / evidence.lsb),
+                "0" if found.none else plain_number(found.largest / evidence.facts.lsb),
                 unit.number(found.dead_band),
-                plain_number(found.dead_band / evidence.lsb),
+                plain_number(found.dead_band / evidence.facts.lsb),
                 ", ".join(weights) or "not needed",
             )
         )
@@ -405,7 +409,7 @@ def _realized(recursion: Recursion) -> Realized:
 
 def _coefficient_table(evidence: Evidence) -> Table:
     rows = []
-    for section in evidence.sections:
+    for section in evidence.facts.sections:
         for index, coefficient in enumerate(section.coefficients):
             rows.append(
                 (
@@ -423,7 +427,7 @@ def _coefficient_table(evidence: Evidence) -> Table:
 def _format_table(evidence: Evidence) -> Table:
     """List the formats by stage."""
     rows, previous = [], ""
-    for row in evidence.formats:
+    for row in evidence.facts.formats:
         title = "" if row.stage == previous else row.stage
         rows.append((title, row.node, row.format, amount(row.low, row.unit), amount(row.high, row.unit)))
         previous = row.stage
@@ -447,7 +451,7 @@ def _evidence_tables(evidence: Evidence) -> tuple[Table, Table]:
         ]
     certificate = [name for name in evidence.files if name.endswith(".certificate.json")]
     told += [("certificate", name, evidence.files[name]) for name in certificate]
-    told += [] if known is None else [("trace", evidence.scenario, known.trace_sha256)]
+    told += [] if known is None else [("trace", evidence.run.scenario, known.trace_sha256)]
     others = [name for name in evidence.files if name not in certificate]
     derived += [("" if k else "generated files", name, evidence.files[name]) for k, name in enumerate(others)]
     head = ("", "", "SHA-256")
@@ -460,18 +464,18 @@ def _evidence_facts(evidence: Evidence) -> list[tuple[str, str]]:
 
 
 def _run_facts(evidence: Evidence) -> list[tuple[str, str]]:
-    span = float(evidence.time[-1] - evidence.time[0])
+    span = float(evidence.run.time[-1] - evidence.run.time[0])
     return [
-        ("trace", f"{evidence.scenario}, {duration(span)}"),
-        ("samples", f"{evidence.samples:,}"),
-        ("channels", f"{evidence.channels:,}"),
-        ("clock cycles", f"{evidence.cycles:,}"),
-        ("latency", count(evidence.latency_cycles, "cycle")),
+        ("trace", f"{evidence.run.scenario}, {duration(span)}"),
+        ("samples", f"{evidence.run.samples:,}"),
+        ("channels", f"{evidence.run.channels:,}"),
+        ("clock cycles", f"{evidence.run.cycles:,}"),
+        ("latency", count(evidence.facts.interface.latency_cycles, "cycle")),
         ("realization", evidence.realization),
-        ("architecture", evidence.architecture),
+        ("architecture", evidence.facts.architecture),
         (
             "output range",
-            f"{plain_number(evidence.low)} to {plain_number(evidence.high)} {unit_symbol(evidence.unit)}".rstrip(),
+            f"{' to '.join(map(plain_number, evidence.facts.range))} {unit_symbol(evidence.facts.unit)}".rstrip(),
         ),
         ("simulator", evidence.simulator),
         *([] if evidence.gates is None else [("what ran", _netlist_in_words(evidence.gates))]),
@@ -480,7 +484,7 @@ def _run_facts(evidence: Evidence) -> list[tuple[str, str]]:
 
 def render_page(evidence: Evidence, summary: Summary) -> str:
     """Whole report page; `summary` is what `sosmith.gen.report.report.summarise` makes of `evidence`."""
-    shown = evidence.of_channel(evidence.worst_channel)
+    shown = evidence.shown
     found = behaviour(evidence)
     told_by, derived = _evidence_tables(shown)
     parts: dict[str, Any] = {}
@@ -490,13 +494,13 @@ def render_page(evidence: Evidence, summary: Summary) -> str:
     if shown.rivals:
         parts["alternatives"] = _alternatives_figure(shown)
         parts["alternatives_table"] = _alternatives_table(shown, summary)
-    if shown.filter is not None:
-        parts |= _filter_figures(shown.filter, evidence.decimation)
+    if shown.facts.filter is not None:
+        parts |= _filter_figures(shown.facts.filter, evidence.facts.decimation)
         parts["step"] = None if found.step is None else _step_figure(found.step)
-        parts["response"] = _response_table(shown.filter, summary["frequency_response"])
-    if evidence.decimation is not None:
-        parts["decimation"] = _decimation_table(evidence.decimation)
-        parts["decimation_caption"] = _decimation_caption(evidence.decimation, evidence.unit)
+        parts["response"] = _response_table(shown.facts.filter, summary["frequency_response"])
+    if evidence.facts.decimation is not None:
+        parts["decimation"] = _decimation_table(evidence.facts.decimation)
+        parts["decimation_caption"] = _decimation_caption(evidence.facts.decimation, evidence.facts.unit)
     return render(
         "sosmith.gen.report",
         "report.html.jinja",

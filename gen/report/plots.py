@@ -171,30 +171,30 @@ def trace_figure(evidence: Evidence, transient: int, width: int) -> str:
 
     The first `transient` samples are shaded; they do not set the scale of the lower panel.
     """
-    compared = evidence.truth is not None
+    compared = evidence.run.truth is not None
 
     def paint(figure: Figure) -> None:
         panels = figure.subplots(1 + compared, 1, sharex=True, squeeze=False, height_ratios=(2, 1)[: 1 + compared])
         axes, lowest = panels[0, 0], panels[-1, 0]
-        factor, _ = time_axis(lowest, evidence.time)
-        traces = (evidence.unfiltered, evidence.truth, evidence.golden, evidence.hardware)
+        factor, _ = time_axis(lowest, evidence.run.time)
+        traces = (evidence.run.unfiltered, evidence.run.truth, evidence.run.golden, evidence.run.hardware)
         shown = [values for values in traces if values is not None]
-        scaling, unit = scale(max(float(np.max(np.abs(v))) for v in shown), evidence.unit)
+        scaling, unit = scale(max(float(np.max(np.abs(v))) for v in shown), evidence.facts.unit)
         # dashes along a curve that fills an area would make a pattern that is not in the data
-        real = {"lw": 0.7} if _fills_area(evidence.hardware, width) else REAL_LINE
+        real = {"lw": 0.7} if _fills_area(evidence.run.hardware, width) else REAL_LINE
         layers = (
-            (evidence.unfiltered, "unfiltered", {"lw": 0.8}),
-            (evidence.truth, "truth", {"lw": 5.0}),
-            (evidence.golden, "golden", IDEAL_LINE),
-            (evidence.hardware, "hardware", real),
+            (evidence.run.unfiltered, "unfiltered", {"lw": 0.8}),
+            (evidence.run.truth, "truth", {"lw": 5.0}),
+            (evidence.run.golden, "golden", IDEAL_LINE),
+            (evidence.run.hardware, "hardware", real),
         )
         for order, (values, role, line) in enumerate(layers, start=2):
             if values is not None:
-                thin_time, thin_values = envelope(evidence.time, values, width // 2)
+                thin_time, thin_values = envelope(evidence.run.time, values, width // 2)
                 axes.plot(thin_time * factor, thin_values * scaling, color=COLOUR[role], zorder=order, **line)
         axes.set_ylim(*_range_of(np.concatenate(shown) * scaling, margin=0.06))
         axes.set_ylabel(f"output in {unit}" if unit else "output")
-        if evidence.truth is not None:
+        if evidence.run.truth is not None:
             _paint_true_error(lowest, evidence, transient, factor, width)
         for panel in panels[:, 0]:
             _shade_transient(panel, evidence, transient, factor)
@@ -203,11 +203,11 @@ def trace_figure(evidence: Evidence, transient: int, width: int) -> str:
 
 
 def _paint_true_error(axes: Axes, evidence: Evidence, transient: int, factor: float, width: int) -> None:
-    assert evidence.truth is not None  # the caller has seen it
-    error = evidence.hardware - evidence.truth
+    assert evidence.run.truth is not None  # the caller has seen it
+    error = evidence.run.hardware - evidence.run.truth
     settled = error[transient:] if transient < len(error) else error
-    scaling, unit = scale(float(np.max(np.abs(settled))) or evidence.lsb, evidence.unit)
-    time, low, high = stretches(evidence.time, error * scaling, width)
+    scaling, unit = scale(float(np.max(np.abs(settled))) or evidence.facts.lsb, evidence.facts.unit)
+    time, low, high = stretches(evidence.run.time, error * scaling, width)
     axes.fill_between(time * factor, low, high, color=COLOUR["hardware"], lw=0.8)
     axes.axhline(0, color=COLOUR["truth"], lw=1.2)
     axes.set_ylim(*_range_of(np.append(settled, 0.0) * scaling, margin=0.08))
@@ -217,8 +217,8 @@ def _paint_true_error(axes: Axes, evidence: Evidence, transient: int, factor: fl
 
 def _shade_transient(axes: Axes, evidence: Evidence, transient: int, factor: float) -> None:
     if transient:
-        last = min(transient, len(evidence.time) - 1)
-        ends = (float(evidence.time[0]) * factor, float(evidence.time[last]) * factor)
+        last = min(transient, len(evidence.run.time) - 1)
+        ends = (float(evidence.run.time[0]) * factor, float(evidence.run.time[last]) * factor)
         axes.axvspan(*ends, facecolor=COLOUR["muted"], alpha=0.14, lw=0)
 
 
@@ -243,8 +243,8 @@ def _fills_area(values: Array, width: int) -> bool:
 
 def close_up(evidence: Evidence, samples: int = 60) -> slice:
     """At most `samples` samples around the first of those with the largest error."""
-    count = len(evidence.hardware)
-    start = int(np.argmax(np.abs(evidence.error))) - samples // 2
+    count = len(evidence.run.hardware)
+    start = int(np.argmax(np.abs(evidence.run.error))) - samples // 2
     start = min(max(start, 0), max(count - samples, 0))
     return slice(start, min(start + samples, count))
 
@@ -255,10 +255,10 @@ def close_up_figure(evidence: Evidence, width: int) -> str:
     def paint(figure: Figure) -> None:
         axes = figure.subplots()
         near = close_up(evidence)
-        time, golden, hardware = evidence.time[near], evidence.golden[near], evidence.hardware[near]
+        time, golden, hardware = evidence.run.time[near], evidence.run.golden[near], evidence.run.hardware[near]
         factor, _ = time_axis(axes, time)
         both = np.concatenate([golden, hardware])
-        scaling, unit = scale(float(np.max(np.abs(both))), evidence.unit)
+        scaling, unit = scale(float(np.max(np.abs(both))), evidence.facts.unit)
         axes.plot(time * factor, golden * scaling, color=COLOUR["golden"], **IDEAL_LINE)
         axes.plot(time * factor, hardware * scaling, color=COLOUR["hardware"], ls="", marker="o", ms=4.5)
         axes.set_ylim(*_range_of(both * scaling, margin=0.1))
@@ -284,16 +284,16 @@ def error_limits(evidence: Evidence) -> tuple[list[Limit], list[Limit]]:
 
     A limit beyond six times the largest error would squeeze the curve to a line.
     """
-    limits = [Limit(evidence.bound, "limit", "--", "limit")]
-    if not np.isclose(evidence.max_error, evidence.bound, rtol=1e-3):
-        limits.append(Limit(evidence.max_error, "asked", ":", "allowed by the specification"))
+    limits = [Limit(evidence.facts.error_bound, "limit", "--", "limit")]
+    if not np.isclose(evidence.facts.max_error, evidence.facts.error_bound, rtol=1e-3):
+        limits.append(Limit(evidence.facts.max_error, "asked", ":", "allowed by the specification"))
     reach = 6 * _error_peak(evidence)
     return [limit for limit in limits if limit.value <= reach], [limit for limit in limits if limit.value > reach]
 
 
 def _error_peak(evidence: Evidence) -> float:
     """Largest error, at least half a step of the output, so that no axis is empty."""
-    return max(float(np.max(np.abs(evidence.error))), evidence.lsb / 2)
+    return max(float(np.max(np.abs(evidence.run.error))), evidence.facts.lsb / 2)
 
 
 def error_figure(evidence: Evidence, width: int) -> str:
@@ -301,11 +301,11 @@ def error_figure(evidence: Evidence, width: int) -> str:
 
     def paint(figure: Figure) -> None:
         axes = figure.subplots()
-        factor, _ = time_axis(axes, evidence.time)
+        factor, _ = time_axis(axes, evidence.run.time)
         inside, _outside = error_limits(evidence)
         top = 1.25 * max([_error_peak(evidence), *(limit.value for limit in inside)])
-        scaling, unit = scale(top, evidence.unit)
-        time, low, high = stretches(evidence.time, evidence.error * scaling, width // 4)
+        scaling, unit = scale(top, evidence.facts.unit)
+        time, low, high = stretches(evidence.run.time, evidence.run.error * scaling, width // 4)
         if low is high:
             axes.plot(time * factor, low, color=COLOUR["hardware"], lw=0.9)
         else:
@@ -316,8 +316,8 @@ def error_figure(evidence: Evidence, width: int) -> str:
         for limit in inside:
             for value in (-limit.value, limit.value):
                 axes.axhline(value * scaling, color=COLOUR[limit.role], ls=limit.dashes, lw=1.6)
-        if evidence.first_mismatch is not None:
-            axes.axvline(evidence.time[evidence.first_mismatch] * factor, color=COLOUR["limit"], lw=1.6)
+        if evidence.run.first_mismatch is not None:
+            axes.axvline(evidence.run.time[evidence.run.first_mismatch] * factor, color=COLOUR["limit"], lw=1.6)
         axes.set_ylabel(f"error in {unit}" if unit else "error")
 
     return draw("error", "Error of the hardware against time", width, 270, paint)
@@ -328,8 +328,8 @@ def histogram_figure(evidence: Evidence) -> str:
 
     def paint(figure: Figure) -> None:
         axes = figure.subplots()
-        steps = evidence.error / evidence.lsb
-        reach = 1.2 * _error_peak(evidence) / evidence.lsb
+        steps = evidence.run.error / evidence.facts.lsb
+        reach = 1.2 * _error_peak(evidence) / evidence.facts.lsb
         counts, edges = np.histogram(steps, bins=np.linspace(-reach, reach, 52))
         axes.stairs(100 * counts / len(steps), edges, fill=True, color=COLOUR["hardware"])
         for limit in (-0.5, 0.5):
@@ -388,11 +388,11 @@ def clip(name: str, longest: int) -> str:
 
 def alternatives_figure(evidence: Evidence) -> str:
     """Largest errors of this design and its alternatives, with one LSB and the allowed error marked."""
-    own = float(np.max(np.abs(evidence.error)))
+    own = float(np.max(np.abs(evidence.run.error)))
     rows = [(evidence.realization, own, "hardware")]
     rows += [(other.name, other.max_abs, "golden") for other in evidence.rivals]
-    marks = [(evidence.lsb, "muted"), (evidence.max_error, "asked")]
-    return ranking_figure(rows, marks, evidence.unit, NARROW)
+    marks = [(evidence.facts.lsb, "muted"), (evidence.facts.max_error, "asked")]
+    return ranking_figure(rows, marks, evidence.facts.unit, NARROW)
 
 
 def frequency_axis(axes: Axes, frequency: Array) -> None:

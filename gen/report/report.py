@@ -26,35 +26,34 @@ from sosmith.model.text_files import to_json, write_files
 def _shortfalls(evidence: Evidence, max_abs: float, measures: ResponseMeasures | None) -> list[str]:
     """Reasons why the run did not pass, one sentence each; none if it did."""
     found = []
-    if evidence.mismatches:
-        where = "" if evidence.first_mismatch is None else f", first at sample {evidence.first_mismatch:,}"
+    facts, run = evidence.facts, evidence.run
+    if run.mismatches:
+        where = "" if run.first_mismatch is None else f", first at sample {run.first_mismatch:,}"
         found.append(
-            f"The hardware differs from the integer model at {evidence.mismatches:,} "
-            f"of {evidence.samples:,} samples{where}."
+            f"The hardware differs from the integer model at {run.mismatches:,} of {run.samples:,} samples{where}."
         )
-    error = quantity(max_abs, evidence.unit)
-    if max_abs > evidence.bound:
-        found.append(f"The largest error is {error}, over the limit of {quantity(evidence.bound, evidence.unit)}.")
-    if max_abs > evidence.max_error:
-        asked = quantity(evidence.max_error, evidence.unit)
+    error = quantity(max_abs, facts.unit)
+    if max_abs > facts.error_bound:
+        found.append(f"The largest error is {error}, over the limit of {quantity(facts.error_bound, facts.unit)}.")
+    if max_abs > facts.max_error:
+        asked = quantity(facts.max_error, facts.unit)
         found.append(f"The largest error is {error}, more than the {asked} that the specification allows.")
-    if evidence.filter is not None and measures is not None:
-        found += mask_shortfalls(evidence.filter, measures)
+    if facts.filter is not None and measures is not None:
+        found += mask_shortfalls(facts.filter, measures)
     return [*found, *limited_inputs(evidence.input_ranges)]
 
 
 def _notes(evidence: Evidence) -> list[str]:
     """Say what a reader must know to judge the verdict, one sentence each."""
     notes = []
+    facts = evidence.facts
     if evidence.gates is not None and evidence.gates.excess:
         board = evidence.gates.board
         notes.append(f"The netlist takes more than the {board.title} has: {', '.join(evidence.gates.excess)}.")
-    if not evidence.proven:
-        notes.append("The error limit is estimated in double precision, not yet proven.")
-    if evidence.bound > evidence.max_error:
+    if facts.error_bound > facts.max_error:
         notes.append(
-            f"The error limit {quantity(evidence.bound, evidence.unit)} is wider than the "
-            f"{quantity(evidence.max_error, evidence.unit)} that the specification allows: other inputs "
+            f"The error limit {quantity(facts.error_bound, facts.unit)} is wider than the "
+            f"{quantity(facts.max_error, facts.unit)} that the specification allows: other inputs "
             "could exceed the allowance."
         )
     return [*notes, *inputs_at_an_end(evidence.input_ranges)]
@@ -63,11 +62,11 @@ def _notes(evidence: Evidence) -> list[str]:
 def _accuracy(evidence: Evidence) -> dict[str, float | None]:
     """Accuracy of each trace by the paper's equation 7, None where there is no truth to measure against."""
     traces = {
-        "unfiltered": evidence.unfiltered,
-        "golden": evidence.golden,
-        "hardware": evidence.hardware,
+        "unfiltered": evidence.run.unfiltered,
+        "golden": evidence.run.golden,
+        "hardware": evidence.run.hardware,
     }
-    truth, reading = evidence.truth, readings_of(evidence)
+    truth, reading = evidence.run.truth, readings_of(evidence)
     if truth is None:
         return dict.fromkeys(traces)
     counted = truth if reading is None else truth[reading]
@@ -106,54 +105,55 @@ def summarise(evidence: Evidence) -> dict[str, Any]:
         ``error.bound`` and ``max_error``, no value of the trace was outside its
         input's range, and the quantized filter is stable and meets the specification's mask (see `mask_shortfalls`).
     """
-    statistics = error_statistics(evidence.error)
-    measures = None if evidence.filter is None else measure_response(evidence.filter)
+    facts, run = evidence.facts, evidence.run
+    statistics = error_statistics(run.error)
+    measures = None if facts.filter is None else measure_response(facts.filter)
     shortfalls = _shortfalls(evidence, statistics.max_abs, measures)
     summary = {
-        "name": evidence.name,
-        "core": evidence.core,
-        "scenario": evidence.scenario,
+        "name": facts.name,
+        "core": facts.core,
+        "scenario": run.scenario,
         "passed": not shortfalls,
         "shortfalls": shortfalls,
         "notes": _notes(evidence),
         "inputs": [found.entry for found in evidence.input_ranges],
-        "samples": evidence.samples,
-        "channels": evidence.channels,
-        "cycles": evidence.cycles,
-        "cycles_per_sample": evidence.cycles / (evidence.taken or evidence.samples),
-        "latency_cycles": evidence.latency_cycles,
+        "samples": run.samples,
+        "channels": run.channels,
+        "cycles": run.cycles,
+        "cycles_per_sample": run.cycles / (run.taken or run.samples),
+        "latency_cycles": facts.interface.latency_cycles,
         "simulator": evidence.simulator,
         "gates": None if evidence.gates is None else evidence.gates.board.name,
         "seed": evidence.seed,
-        "bit_exact": evidence.mismatches == 0,
-        "mismatches": evidence.mismatches,
-        "first_mismatch": evidence.first_mismatch,
+        "bit_exact": run.mismatches == 0,
+        "mismatches": run.mismatches,
+        "first_mismatch": run.first_mismatch,
         "error": {
             "max_abs": statistics.max_abs,
-            "max_lsb": statistics.max_abs / evidence.lsb,
+            "max_lsb": statistics.max_abs / facts.lsb,
             "rms": statistics.rms,
             "mean": statistics.mean,
-            "bound": evidence.bound,
-            "proven": evidence.proven,
-            "parts": dict(evidence.bound_parts),
-            "unit": evidence.unit,
+            "bound": facts.error_bound,
+            "proven": True,
+            "parts": dict(facts.error_parts),
+            "unit": facts.unit,
         },
         **behaviour_entry(behaviour(evidence)),
-        "max_error": evidence.max_error,
-        "lsb": evidence.lsb,
-        "range": [evidence.low, evidence.high],
-        "sqnr_db": sqnr_db(evidence.golden, evidence.error),
+        "max_error": facts.max_error,
+        "lsb": facts.lsb,
+        "range": list(facts.range),
+        "sqnr_db": sqnr_db(run.golden, run.error),
         "frequency_response": _response_summary(measures),
-        "decimation": None if evidence.decimation is None else evidence.decimation.entries,
+        "decimation": None if facts.decimation is None else facts.decimation.entries,
         "accuracy_percent": _accuracy(evidence),
         "uncertainty": evidence.uncertainty,
-        "start_up": None if evidence.settling is None else asdict(evidence.settling),
+        "start_up": None if facts.settling is None else asdict(facts.settling),
         "alternatives": [
             {"name": other.name, "max_abs": other.max_abs, "rms": other.rms} for other in evidence.alternatives
         ],
-        "limit_cycles": [limit_cycle_entry(found) for found in evidence.limit_cycles],
+        "limit_cycles": [limit_cycle_entry(found) for found in facts.limit_cycles],
         "realization": evidence.realization,
-        "architecture": evidence.architecture,
+        "architecture": facts.architecture,
         "cycles_per_second": evidence.cycles_per_second,
         "wall_seconds": evidence.wall_seconds,
         "sosmith_version": __version__,
@@ -164,7 +164,7 @@ def summarise(evidence: Evidence) -> dict[str, Any]:
         "curves": {
             "error": error_over_time(evidence),
             "spectrum": error_spectrum(evidence),
-            "filter": filter_curve(evidence.filter),
+            "filter": filter_curve(facts.filter),
         },
     }
     cleaned: dict[str, Any] = _without_infinities(summary)

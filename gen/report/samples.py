@@ -29,27 +29,26 @@ def viewer_data(evidence: Evidence, transient: int) -> dict[str, Any]:
         shown. ``limits``: of the error, with their colours. ``focus``: first and last sample to show at first;
         ``transient``: samples to shade.
     """
-    index = _chosen(evidence.error)
-    zero = evidence.low if evidence.zero is None else evidence.zero
-    code = np.rint((evidence.hardware[index] - zero) / evidence.lsb)
+    facts, run = evidence.facts, evidence.run
+    index = _chosen(run.error)
     near, (inside, _outside) = close_up(evidence), error_limits(evidence)
-    time, samples = evidence.time, len(evidence.time)
-    apart = None if evidence.truth is None else (evidence.hardware - evidence.truth)[min(transient, samples - 1) :]
+    time, samples = run.time, len(run.time)
+    apart = None if run.truth is None else (run.hardware - run.truth)[min(transient, samples - 1) :]
     return {
         "start": float(time[0]),
         "step": float(time[-1] - time[0]) / max(samples - 1, 1),
         "samples": samples,
         "stride": -(-samples // MAX_POINTS),
-        "lsb": evidence.lsb,
-        "zero": zero,
+        "lsb": facts.lsb,
+        "zero": float(facts.output.zero),
         "index": packed(index.astype(np.float64), exact=True),
-        "code": packed(code, exact=True),
-        "error": packed(evidence.error[index]),
-        "truth": None if evidence.truth is None else packed(evidence.truth[index]),
-        "unfiltered": None if evidence.unfiltered is None else packed(evidence.unfiltered[index]),
-        "value": _shown(evidence.hardware, evidence.unit),
-        "fine": list(scale(evidence.bound or evidence.lsb, evidence.unit)),
-        "true_error": None if apart is None else _shown(apart, evidence.unit),
+        "code": packed(run.received[index].astype(np.float64), exact=True),
+        "error": packed(run.error[index]),
+        "truth": None if run.truth is None else packed(run.truth[index]),
+        "unfiltered": None if run.unfiltered is None else packed(run.unfiltered[index]),
+        "value": _shown(run.hardware, facts.unit),
+        "fine": list(scale(facts.error_bound or facts.lsb, facts.unit)),
+        "true_error": None if apart is None else _shown(apart, facts.unit),
         "limits": [[limit.value, limit.role] for limit in inside],
         "focus": [near.start, near.stop - 1],
         "transient": transient,

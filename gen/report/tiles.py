@@ -51,7 +51,7 @@ class ErrorUnit:
     @classmethod
     def of(cls, evidence: Evidence) -> ErrorUnit:
         """Choose it for a run."""
-        return cls(*scale(evidence.bound or evidence.lsb, evidence.unit))
+        return cls(*scale(evidence.facts.error_bound or evidence.facts.lsb, evidence.facts.unit))
 
     def number(self, value: float) -> str:
         """Return a value in this unit, without it."""
@@ -87,30 +87,34 @@ def _truth(evidence: Evidence, summary: Summary, found: Behaviour) -> Tile | Non
     if error is None:
         return None
     asides = [
-        f"RMS {_in(error.rms, evidence.unit)} · mean {_in(error.mean, evidence.unit)}, "
+        f"RMS {_in(error.rms, evidence.facts.unit)} · mean {_in(error.mean, evidence.facts.unit)}, "
         f"over {count(found.readings, 'reading')}"
     ]
     accuracy = summary["accuracy_percent"]
     if accuracy["hardware"] is not None:
-        without = accuracy["unfiltered"] if evidence.filter is not None else None
+        without = accuracy["unfiltered"] if evidence.facts.filter is not None else None
         beside = "" if without is None else f", without the filter {_percent(without)}"
         asides.append(f"accuracy by the paper's measure {_percent(accuracy['hardware'])}{beside}")
-    return Tile("Largest error against the true value", _in(error.max_abs, evidence.unit), asides)
+    return Tile("Largest error against the true value", _in(error.max_abs, evidence.facts.unit), asides)
 
 
 def _passband(evidence: Evidence, summary: Summary) -> Tile | None:
     """Tile of the filter's accuracy, where no true value is known."""
     deviation = summary["frequency_response"]["max_deviation_db_passband"]
-    if deviation is None or evidence.truth is not None:
+    if deviation is None or evidence.run.truth is not None:
         return None
     return Tile("Change of the gain in the passband", decibels(deviation), ["by rounding the coefficients"])
 
 
 def _delay(evidence: Evidence, found: Behaviour) -> Tile | None:
-    clocks = f"{count(evidence.latency_cycles, 'clock cycle')} from input to output"
-    if found.delay is None or found.delay_hz is None or evidence.filter is None:
-        return Tile("Delay", count(evidence.latency_cycles, "clock cycle"), ["from input to output; no filter"])
-    rate = evidence.filter.sample_rate * (1 if evidence.decimation is None else evidence.decimation.factor)
+    clocks = f"{count(evidence.facts.interface.latency_cycles, 'clock cycle')} from input to output"
+    if found.delay is None or found.delay_hz is None or evidence.facts.filter is None:
+        return Tile(
+            "Delay", count(evidence.facts.interface.latency_cycles, "clock cycle"), ["from input to output; no filter"]
+        )
+    rate = evidence.facts.filter.sample_rate * (
+        1 if evidence.facts.decimation is None else evidence.facts.decimation.factor
+    )
     samples = f"{plain_number(found.delay * rate)} samples"
     where = "of slow changes" if found.delay_hz == 0 else f"at {amount(found.delay_hz, 'Hz')}"
     return Tile("Delay", amount(found.delay, "s"), [f"{where}: {samples}; the hardware takes {clocks}"])
@@ -128,34 +132,32 @@ def _settling(found: Behaviour) -> Tile | None:
 
 def _arithmetic(evidence: Evidence, summary: Summary) -> list[Tile]:
     error, unit = summary["error"], ErrorUnit.of(evidence)
-    share = error["max_abs"] / evidence.bound if evidence.bound else None
-    limit = f"{'proven' if evidence.proven else 'estimated'} limit"
-    if share is not None:
-        limit = f"{100 * share:.0f} % of the {limit}"
-    compared = "bit for bit" if summary["bit_exact"] else f"of {count(evidence.samples, 'sample')}"
-    if evidence.channels > 1:
-        compared += f", {count(evidence.channels, 'channel')}"
+    share = error["max_abs"] / evidence.facts.error_bound if evidence.facts.error_bound else None
+    limit = "proven limit" if share is None else f"{100 * share:.0f} % of the proven limit"
+    compared = "bit for bit" if summary["bit_exact"] else f"of {count(evidence.run.samples, 'sample')}"
+    if evidence.run.channels > 1:
+        compared += f", {count(evidence.run.channels, 'channel')}"
     return [
         Tile(
             "Largest error of the arithmetic",
             unit.amount(error["max_abs"]),
-            [f"{lsb(error['max_lsb'])} · {limit} {unit.amount(evidence.bound)}"],
+            [f"{lsb(error['max_lsb'])} · {limit} {unit.amount(evidence.facts.error_bound)}"],
             share,
         ),
         Tile(
             "Typical error (RMS)",
             unit.amount(error["rms"]),
-            [f"{lsb(error['rms'] / evidence.lsb)} · mean {unit.amount(error['mean'])}"],
+            [f"{lsb(error['rms'] / evidence.facts.lsb)} · mean {unit.amount(error['mean'])}"],
         ),
         Tile(
             "Samples equal to the integer model",
-            f"all {evidence.samples:,}" if summary["bit_exact"] else f"all but {evidence.mismatches:,}",
+            f"all {evidence.run.samples:,}" if summary["bit_exact"] else f"all but {evidence.run.mismatches:,}",
             [compared],
         ),
         Tile(
             "Signal to error",
             decibels(summary["sqnr_db"]) if error["rms"] else "no error at all",
-            [f"one LSB is {unit.amount(evidence.lsb)}"],
+            [f"one LSB is {unit.amount(evidence.facts.lsb)}"],
         ),
     ]
 
@@ -163,11 +165,11 @@ def _arithmetic(evidence: Evidence, summary: Summary) -> list[Tile]:
 def _speed(evidence: Evidence) -> Tile:
     """Tile of the simulation: its own time, and that of the run with all that was made before and after it."""
     gate_by_gate = "" if evidence.gates is None else ", gate by gate"
-    clocks = f"{count(evidence.cycles, 'clock cycle')} with {evidence.simulator}{gate_by_gate}"
+    clocks = f"{count(evidence.run.cycles, 'clock cycle')} with {evidence.simulator}{gate_by_gate}"
     whole = f"the whole run, with generating, compiling and comparing, took {duration(evidence.wall_seconds)}"
     if not 0 < evidence.cycles_per_second < float("inf"):
         return Tile("Speed", "not measured", [clocks, whole])
-    simulated = duration(evidence.cycles / evidence.cycles_per_second)
+    simulated = duration(evidence.run.cycles / evidence.cycles_per_second)
     return Tile("Speed", f"{amount(evidence.cycles_per_second, 'Hz')} clock", [f"{clocks} in {simulated}", whole])
 
 

@@ -13,15 +13,18 @@ import numpy.typing as npt
 
 from sosmith.gen.filter.decimation import Decimation
 from sosmith.gen.filter.design import Filter
+from sosmith.gen.filter.response import FilterFacts
 from sosmith.gen.proof.cascade_proof import CascadeProof
 from sosmith.gen.proof.linear_model import linear_models
 from sosmith.gen.realizations.effective import effective_sections
 from sosmith.gen.realizations.registry import Section
 from sosmith.gen.word_lengths.input_stage import InputStage
 from sosmith.gen.word_lengths.output_stage import output_stage
+from sosmith.model.arrays import Codes
 from sosmith.model.dataflow.datapath import Datapath, Stage
 from sosmith.model.polynomial import Polynomial
 from sosmith.model.port import Port
+from sosmith.model.reference.golden import Exact, exact_chain
 from sosmith.model.sections.horner import HornerStep
 from sosmith.model.sections.output import Held, OutputStage
 from sosmith.model.sections.start import PassingStage, StartStage
@@ -99,6 +102,30 @@ class Quantized:
     def settling(self) -> int:
         """Samples after a start that are flagged as settling; 0 without the flag."""
         return cast("OutputStage", self.datapath.stages[-1]).settling
+
+    def exact(self, codes: Codes) -> Exact:
+        """Compute what the datapath approximates, in double precision; `codes` are (samples, channels, inputs)."""
+        sos = None if self.filter is None else self.filter.sos
+        return exact_chain(codes, self.datapath, self.polynomial, sos, steady=self.steady)
+
+    @cached_property
+    def filter_facts(self) -> FilterFacts | None:
+        """The filter as specified and as realized, for its measures and pictures; None without one."""
+        ideal = self.filter
+        if ideal is None:
+            return None
+        return FilterFacts(
+            sample_rate=ideal.sample_rate,
+            ideal_sos=ideal.sos,
+            quantized_sos=self.quantized_sos,
+            kind=ideal.kind,
+            passband_edge=ideal.passband_edge,
+            stopband_edge=ideal.stopband_edge,
+            passband_loss=ideal.passband_loss,
+            stopband_loss=ideal.stopband_loss,
+            cutoff=ideal.cutoff,
+            cutoff_of_stopband=ideal.cutoff_of_stopband,
+        )
 
     @cached_property
     def quantized_sos(self) -> Array:

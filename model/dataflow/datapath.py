@@ -6,8 +6,9 @@ This object is the one source of truth: the software (`Datapath.compute`), the C
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +19,8 @@ from sosmith.model.dataflow.decimator import Decimator
 from sosmith.model.dataflow.graph import Graph
 from sosmith.model.dataflow.status import Flag
 from sosmith.model.port import Port
+
+_Kind = TypeVar("_Kind", bound=np.generic)
 
 _OF_INPUT = 1 << Flag.INPUT_AT_RAIL | 1 << Flag.OUTSIDE_CALIBRATION
 """Flags that are told of the inputs."""
@@ -188,19 +191,26 @@ class Datapath:
         Parameters, errors and the shape of the result are those of `compute`. If each channel has its own limits of
         wear, there must be as many channels. The bits are those of `sosmith.model.dataflow.status.Flag`.
         """
+        return self.compute_with_status(codes)[1]
+
+    def compute_with_status(self, codes: Codes) -> tuple[Codes, npt.NDArray[np.uint8]]:
+        """Compute the output codes and the status of each sample in one pass; see `compute` and `compute_status`."""
         checked = self._checked(codes)
         block = checked[:, np.newaxis, :] if checked.ndim == 2 else checked
         if len(self.wear) not in {0, 1, block.shape[1]}:
             raise ValueError(
                 f"codes must be of {len(self.wear)} channels, for each of which wear is judged, not {block.shape[1]}"
             )
-        entering = self._entering(block)
-        behind = block_for(self.behind_decimator, entering.shape[0] * entering.shape[1])
-        _, status = behind(entering, with_status=True)
-        if self.decimator is not None:
+        if self.decimator is None:
+            result, status = block_for(self, block.shape[0] * block.shape[1])(block, with_status=True)
+        else:
+            taken, flags = self._flagged(block)
+            entering = _in_columns(self.decimator.compute, taken)[:, :, np.newaxis]
+            behind = block_for(self.behind_decimator, entering.shape[0] * entering.shape[1])
+            result, status = behind(entering, with_status=True)
             status &= ~np.uint8(_OF_INPUT)
-            status |= self._gathered(block, self.decimator)
-        return status[:, 0] if checked.ndim == 2 else status
+            status |= _in_columns(self.decimator.gathered, flags)
+        return (result[:, 0], status[:, 0]) if checked.ndim == 2 else (result, status)
 
     def compute_exact(self, codes: Codes) -> list[int]:
         """Compute one channel in exact integers, from reset, and check every node's range; slow.
@@ -223,22 +233,21 @@ class Datapath:
             results.append(wires[0])
         return results
 
-    def _gathered(self, block: Codes, decimator: Decimator) -> npt.NDArray[np.uint8]:
-        """Gather the flags of the inputs, for each result, of any sample since the result before."""
-        if self.ahead is None:
-            rails = (block[:, :, 0] == decimator.input.lowest) | (block[:, :, 0] == decimator.input.highest)
-            flags = rails * np.uint8(1 << Flag.INPUT_AT_RAIL)
-        else:
-            flags = self.ahead.compute_status(block) & np.uint8(_OF_INPUT)
-        return np.stack([decimator.gathered(flags[:, k]) for k in range(block.shape[1])], axis=1)
+    def _flagged(self, block: Codes) -> tuple[Codes, npt.NDArray[np.uint8]]:
+        """Codes that the decimator takes, and the flags of the inputs behind them; both (samples, channels)."""
+        if self.ahead is not None:
+            taken, flags = self.ahead.compute_with_status(block)
+            return taken, flags & np.uint8(_OF_INPUT)
+        taken, port = block[:, :, 0], self.inputs[0]
+        at_rail = (taken == port.lowest) | (taken == port.highest)
+        return taken, at_rail * np.uint8(1 << Flag.INPUT_AT_RAIL)
 
     def _entering(self, block: Codes) -> Codes:
         """Codes that the first stage takes, for input codes of shape (samples, channels, inputs)."""
         if self.decimator is None:
             return block
         taken = block[:, :, 0] if self.ahead is None else self.ahead.compute(block)
-        columns = [self.decimator.compute(taken[:, k]) for k in range(block.shape[1])]
-        return np.stack(columns, axis=1)[:, :, np.newaxis]
+        return _in_columns(self.decimator.compute, taken)[:, :, np.newaxis]
 
     def _checked(self, codes: Codes) -> Codes:
         array = np.asarray(codes)
@@ -256,6 +265,11 @@ class Datapath:
                     f"codes of {port.name} must be in {port.lowest}..{port.highest}, not {column.min()}..{column.max()}"
                 )
         return array.astype(np.int64, copy=False)
+
+
+def _in_columns(of: Callable[[npt.NDArray[Any]], npt.NDArray[_Kind]], block: npt.NDArray[Any]) -> npt.NDArray[_Kind]:
+    """Apply a function to each column of `block`."""
+    return np.stack([of(block[:, k]) for k in range(block.shape[1])], axis=1)
 
 
 def _check_seam(before: Stage, after: Stage) -> None:

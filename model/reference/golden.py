@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,6 +12,44 @@ from sosmith.model.arrays import Codes, Values
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.polynomial import Polynomial
 from sosmith.model.port import Port
+
+
+@dataclass(frozen=True, eq=False)
+class Exact:
+    """What the exact chain makes of the input codes; both arrays have the shape (results, channels).
+
+    Attributes
+    ----------
+    calibrated : ndarray
+        The calibration alone, at the samples that bring a result.
+    golden : ndarray
+        Behind the filter too, limited to the range of the output.
+    """
+
+    calibrated: Values
+    golden: Values
+
+
+def exact_chain(
+    codes: Codes, datapath: Datapath, polynomial: Polynomial | None, sos: Values | None, *, steady: bool
+) -> Exact:
+    """Compute what the hardware of `datapath` approximates: calibration, decimator and filter from the input codes.
+
+    Parameters
+    ----------
+    codes : int64 array, shape (samples, channels, inputs)
+        Input codes.
+    datapath : Datapath
+        Whose ports and decimator count.
+    polynomial, sos, steady
+        As for `calibrated` and `filtered`.
+    """
+    factor = 1 if datapath.decimator is None else datapath.decimator.factor
+    channels = [codes[:, k] for k in range(codes.shape[1])]
+    entering = [entering_filter(channel, datapath, polynomial) for channel in channels]
+    golden = [filtered(column, sos, datapath.output, steady=steady) for column in entering]
+    before = [calibrated(channel[::factor], datapath.inputs, polynomial) for channel in channels]
+    return Exact(np.stack(before, axis=1), np.stack(golden, axis=1))
 
 
 def calibrated(codes: Codes, inputs: Sequence[Port], polynomial: Polynomial | None) -> Values:

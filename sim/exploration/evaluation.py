@@ -12,12 +12,11 @@ from sosmith.gen.filter.response import measure_response
 from sosmith.gen.fpga.boards import find_board
 from sosmith.gen.quantity import quantity
 from sosmith.gen.report.comparison.choice import cost_unit, hardware_cost
-from sosmith.gen.report.filter_facts import filter_facts
 from sosmith.gen.report.mask import mask_shortfalls
 from sosmith.gen.report.provenance import provenance_of
+from sosmith.gen.report.run import run_of
 from sosmith.model.errors import ShortfallError, SpecificationError
 from sosmith.model.reference.accuracy import error_statistics, sqnr_db
-from sosmith.model.reference.golden import entering_filter, filtered
 from sosmith.model.traces.trace import Trace
 from sosmith.sim.exploration.grid import Task
 from sosmith.sim.exploration.synthesis import synthesized
@@ -60,19 +59,9 @@ def traces_of(design: CoreDesign, task: Task) -> tuple[Trace, ...]:
 
 
 def _measured(design: CoreDesign, traces: tuple[Trace, ...], task: Task) -> Point:
-    quantized, datapath = design.quantized, design.datapath
-    output = datapath.output
-    codes = np.stack([trace.codes for trace in traces], axis=1)
-    sos = None if quantized.filter is None else quantized.filter.sos
-    golden = np.stack(
-        [
-            filtered(entering_filter(t.codes, datapath, quantized.polynomial), sos, output, steady=quantized.steady)
-            for t in traces
-        ],
-        axis=1,
-    )
-    error = output.decode(datapath.compute(codes)) - golden
-    statistics = error_statistics(error)
+    quantized, output = design.quantized, design.datapath.output
+    run = run_of(design, traces)
+    statistics = error_statistics(run.error)
     bound, allowed = float(quantized.bound * output.lsb), float(design.spec.max_error)
     shortfalls = [
         f"The largest error is {quantity(statistics.max_abs, output.unit)}, more than the "
@@ -80,7 +69,7 @@ def _measured(design: CoreDesign, traces: tuple[Trace, ...], task: Task) -> Poin
         for limit, words in ((bound, "proven"), (allowed, "allowed"))
         if statistics.max_abs > limit
     ]
-    facts = filter_facts(quantized)
+    facts = quantized.filter_facts
     response = None if facts is None else measure_response(facts)
     if facts is not None and response is not None:
         shortfalls += mask_shortfalls(facts, response)
@@ -95,7 +84,7 @@ def _measured(design: CoreDesign, traces: tuple[Trace, ...], task: Task) -> Poin
         "realization": quantized.realization if quantized.sections else "none",
         "architecture": design.architecture.name,
         "error": {"bound": bound, "max_abs": statistics.max_abs, "rms": statistics.rms, "unit": output.unit},
-        "sqnr_db": _finite(sqnr_db(golden, error)),
+        "sqnr_db": _finite(sqnr_db(run.golden, run.error)),
         "stopband_attenuation_db": None if response is None else _finite(response.stopband_attenuation_db),
         "cycles_per_sample": provenance.cycles_per_sample,
         "samples_per_clock": design.architecture.samples_per_clock,

@@ -93,7 +93,7 @@ def test_a_board_that_computes_what_it_must(tmp_path: Path) -> None:
     traces = traces_for(made.core, "sweep", seed=1, seconds=0.5)
     with Board.on(ModelLine(board_of(made))) as client:
         evidence = simulate(made.core, traces, tmp_path / "out", hardware=partial(run_on, client))
-    assert (evidence.mismatches, evidence.samples, evidence.simulator) == (0, 500, "board")
+    assert (evidence.run.mismatches, evidence.run.samples, evidence.simulator) == (0, 500, "board")
 
 
 @pytest.mark.slow
@@ -116,7 +116,7 @@ def test_a_board_that_computes_something_else_falls_short(tmp_path: Path) -> Non
     traces = traces_for(made.core, "sweep", seed=1, seconds=0.5)
     with Board.on(ModelLine(board)) as client:
         evidence = simulate(made.core, traces, tmp_path / "out", hardware=partial(run_on, client))
-    assert evidence.mismatches > 0
+    assert evidence.run.mismatches > 0
 
 
 def test_a_board_with_another_core_is_not_tried(tmp_path: Path) -> None:

@@ -220,4 +220,4 @@ def test_a_protected_core_keeps_the_rules_of_its_streams(
     traces = [replace(t, codes=t.codes[:60], truth=None, reading=None) for t in traces_for(made, "noise", seed=1)]
     for gates in (None, "ulx3s_25f") if (architecture, channels) == ("folded", 1) else (None,):
         evidence = simulate(made, traces, tmp_path / str(gates), seed=1, gates=gates)
-        assert (evidence.mismatches, evidence.samples) == (0, 60 * channels)
+        assert (evidence.run.mismatches, evidence.run.samples) == (0, 60 * channels)

@@ -62,7 +62,7 @@ def test_the_accuracy_suite_takes_each_result_once(tmp_path: Path) -> None:
     with Board.on(ModelLine(device)) as board:
         run = partial(run_on, board)
         evidence = simulate(made.core, traces, tmp_path, hardware=run, vectors=tmp_path / "some.hex")
-    assert (evidence.mismatches, evidence.samples, evidence.simulator) == (0, 51, "board")
+    assert (evidence.run.mismatches, evidence.run.samples, evidence.simulator) == (0, 51, "board")
     lines = (tmp_path / "some_responses.hex").read_text(encoding="utf-8").split()
     assert [int(line.split("_")[1], 16) for line in lines] == (held(traces[0].codes)[0] % 65536).tolist()
 

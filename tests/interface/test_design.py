@@ -15,6 +15,7 @@ from tests.interface.small import FILTER, filter_design, instrument_design
 
 import sosmith
 from sosmith import SpecificationError
+from sosmith.gen.output import generate as writing
 from sosmith.gen.report.comparison.report_file import load_report
 
 NOISE = np.random.default_rng(1)
@@ -284,3 +285,14 @@ def test_quantities_keep_their_unit() -> None:
         assert (other, other.unit) == (0.25, "mm")
     assert repr(bound) == "Quantity(0.25, 'mm')"
     assert str(sosmith.Quantity(3.0)) == "3"
+
+
+def test_facts_and_certificate_are_made_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What `generate` writes is made of those of the design, and is the same as if it made them itself."""
+    made = sosmith.design(FILTER)
+    expected = writing.generated(made.core)
+    assert (made.facts.name, made.certificate.name) == (made.name, made.name)
+    monkeypatch.setattr(writing, "core_facts", None)
+    monkeypatch.setattr(writing, "certificate", None)
+    written = {path.name: path.read_text(encoding="utf-8") for path in made.generate(tmp_path)}
+    assert written == expected

@@ -57,7 +57,7 @@ def test_worst_cases_stay_within_the_proof(simulator: str, scenario: str, bits: 
     assert report["bit_exact"]
     assert 0.4 * made.quantized.bound < report["error"]["max_lsb"] <= made.quantized.bound
     exact = made.datapath.compute_exact(traces[0].codes)
-    assert made.datapath.output.decode(np.array(exact)).tolist() == evidence.hardware.tolist()
+    assert made.datapath.output.decode(np.array(exact)).tolist() == evidence.run.hardware.tolist()
 
 
 def test_a_short_run_in_icarus(tmp_path: Path) -> None:
@@ -65,8 +65,8 @@ def test_a_short_run_in_icarus(tmp_path: Path) -> None:
     (trace,) = traces_for(made, "worst_case_errors", seed=2)
     trace = replace(trace, codes=trace.codes[-60:], truth=None, reading=None)
     evidence = simulate(made, [trace], tmp_path, seed=2, simulator="icarus", idle=0.8, stall=0.5)
-    assert evidence.mismatches == 0
-    assert evidence.samples == 60
+    assert evidence.run.mismatches == 0
+    assert evidence.run.samples == 60
 
 
 @pytest.mark.parametrize("realization", [pytest.param("df1", marks=pytest.mark.slow), "df1_ef2"])

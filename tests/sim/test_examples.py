@@ -67,14 +67,14 @@ def run_of(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, str], Run
 @pytest.mark.parametrize(("example", "scenario"), EVERY)
 def test_hardware_equals_the_integer_model(example: str, scenario: str, run_of: Callable[[str, str], Run]) -> None:
     evidence, report = run_of(example, scenario)
-    assert evidence.mismatches == 0
-    assert evidence.samples == len(evidence.hardware) >= 4000
-    assert evidence.cycles > 1.5 * evidence.samples  # idle and stall of 0.3 each were in force
+    assert evidence.run.mismatches == 0
+    assert evidence.run.samples == len(evidence.run.hardware) >= 4000
+    assert evidence.run.cycles > 1.5 * evidence.run.samples  # idle and stall of 0.3 each were in force
     assert report["error"]["max_lsb"] <= 1
     assert report["shortfalls"] == []
     assert report["passed"]
     accuracy = report["accuracy_percent"]
-    if evidence.truth is None:
+    if evidence.run.truth is None:
         assert set(accuracy.values()) == {None}
     elif accuracy["hardware"] is not None:  # not where a true value of 0 forbids a relative error
         assert abs(accuracy["hardware"] - accuracy["golden"]) < 0.01
@@ -92,7 +92,7 @@ def test_worst_cases_stay_within_the_proof(example: str, run_of: Callable[[str, 
     (trace,) = traces_for(made, "worst_case_errors", seed=1)
     codes = trace.codes
     exact = made.datapath.compute_exact(codes)
-    assert made.datapath.output.decode(np.array(exact)).tolist() == evidence.hardware.tolist()
+    assert made.datapath.output.decode(np.array(exact)).tolist() == evidence.run.hardware.tolist()
 
 
 @pytest.mark.slow
@@ -110,7 +110,7 @@ def test_worst_cases_in_every_realization(example: str, realization: str, tmp_pa
     assert report["error"]["max_lsb"] <= made.quantized.bound
     # The response of the plain form is longer than the default trace: twice the length then begins otherwise.
     exact = made.datapath.compute_exact(trace.codes[: len(once)])
-    assert made.datapath.output.decode(np.array(exact)).tolist() == evidence.hardware[: len(exact)].tolist()
+    assert made.datapath.output.decode(np.array(exact)).tolist() == evidence.run.hardware[: len(exact)].tolist()
 
 
 MEASURED = [
@@ -132,7 +132,7 @@ def test_accuracy_is_printed_for_every_run_of_the_instruments(
 def test_enough_samples_under_different_handshakes(run_of: Callable[[str, str], Run]) -> None:
     assert len(MEASURED) == 8
     runs = [run_of(*case)[0] for case in CASES if case not in LONG]
-    assert sum(evidence.samples for evidence in runs) >= SAMPLES_ASKED
+    assert sum(evidence.run.samples for evidence in runs) >= SAMPLES_ASKED
     assert len({evidence.seed for evidence in runs}) == len(runs)
 
 
@@ -141,7 +141,7 @@ def test_icarus_agrees(example: str, tmp_path: Path) -> None:
     made = parallel_design(example)
     trace = short(traces_for(made, "worst_case", seed=3)[0], 1200)
     evidence = simulate(made, [trace], tmp_path, simulator="icarus", seed=7, idle=0.1, stall=0.5)
-    assert (evidence.mismatches, evidence.samples) == (0, 1200)
+    assert (evidence.run.mismatches, evidence.run.samples) == (0, 1200)
     assert summarise(evidence)["passed"]
 
 
@@ -152,10 +152,10 @@ def test_every_pace_of_the_streams(example: str, tmp_path: Path) -> None:
     for seed, (idle, stall) in enumerate([(0.0, 0.0), (0.95, 0.0), (0.0, 0.95), (0.5, 0.5), (0.9, 0.9)]):
         (trace,) = traces_for(made, "worst_case", seed=seed)
         evidence = simulate(made, [trace], tmp_path, seed=seed, idle=idle, stall=stall)
-        assert evidence.mismatches == 0
+        assert evidence.run.mismatches == 0
         assert summarise(evidence)["passed"]
         if idle == stall == 0:
-            assert evidence.cycles <= evidence.samples + evidence.latency_cycles + 1
+            assert evidence.run.cycles <= evidence.run.samples + evidence.facts.interface.latency_cycles + 1
 
 
 @pytest.mark.slow

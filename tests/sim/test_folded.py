@@ -57,8 +57,8 @@ def check(made: CoreDesign, simulator: str, tmp_path: Path) -> None:
     start = max(0, len(trace.codes) // 2 - 30)  # where the sign pattern turns over
     trace = replace(trace, codes=trace.codes[start : start + 60], truth=None, reading=None)
     evidence = simulate(made, [trace], tmp_path, seed=5, simulator=simulator)
-    assert evidence.mismatches == 0
-    assert evidence.samples == 60
+    assert evidence.run.mismatches == 0
+    assert evidence.run.samples == 60
 
 
 @pytest.mark.parametrize("architecture", ["folded", "serial"])
@@ -73,4 +73,4 @@ def test_samples_come_at_the_rate_that_is_stated(architecture: str, tmp_path: Pa
     stated = made.architecture
     after_the_last = stated.latency_cycles - stated.cycles_per_sample
     cleared = reset_cycles(program, 1)
-    assert evidence.cycles == cleared + 1 + stated.cycles_per_sample * evidence.samples + after_the_last
+    assert evidence.run.cycles == cleared + 1 + stated.cycles_per_sample * evidence.run.samples + after_the_last

@@ -60,7 +60,7 @@ def test_a_netlist_computes_what_the_integer_model_does(
     board: str, architecture: str, simulator: str, kinds: set[str], tmp_path: Path
 ) -> None:
     evidence = run(little(architecture, tmp_path), board, tmp_path, samples=24, simulator=simulator)
-    assert (evidence.mismatches, evidence.samples) == (0, 24)
+    assert (evidence.run.mismatches, evidence.run.samples) == (0, 24)
     assert evidence.gates is not None
     assert evidence.gates.cells.keys() >= kinds
     report = summarise(evidence)
@@ -92,7 +92,7 @@ def made_in(example: str, architecture: str, *, channels: int = 1) -> CoreDesign
 def test_every_example_in_every_architecture(example: str, architecture: str, board: str, tmp_path: Path) -> None:
     made = made_in(example, architecture)
     evidence = run(made, board, tmp_path, samples=2000 if architecture == "parallel" else 100, simulator="verilator")
-    assert evidence.mismatches == 0
+    assert evidence.run.mismatches == 0
     assert summarise(evidence)["passed"]
 
 
@@ -104,7 +104,7 @@ def test_every_example_in_every_architecture(example: str, architecture: str, bo
 def test_several_channels(board: str, architecture: str, channels: int, tmp_path: Path) -> None:
     made = made_in("audio_lowpass.toml", architecture, channels=channels)
     evidence = run(made, board, tmp_path, samples=40, simulator="icarus")
-    assert (evidence.mismatches, evidence.samples) == (0, 40 * channels)
+    assert (evidence.run.mismatches, evidence.run.samples) == (0, 40 * channels)
 
 
 Break = Callable[[str], str]

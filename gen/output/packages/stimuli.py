@@ -58,11 +58,12 @@ def bench_stimuli(design: CoreDesign, interface: InterfaceFacts) -> Stimuli:
     lagging = np.maximum(np.arange(len(first))[:, np.newaxis] - np.arange(channels), 0)
     codes = whole_beats(first[lagging], interface.inputs)
     filling = len(codes) - len(first)
+    responses, status = design.datapath.compute_with_status(codes)
     return Stimuli(
         vectors=Vectors(
             stimuli=codes,
-            responses=np.repeat(design.datapath.compute(codes), interface.copies_per_result, axis=0),
-            status=np.repeat(design.datapath.compute_status(codes), interface.copies_per_result, axis=0),
+            responses=np.repeat(responses, interface.copies_per_result, axis=0),
+            status=np.repeat(status, interface.copies_per_result, axis=0),
         ),
         parts=(
             *(f"{len(part)} samples: {what}{remark}" for what, part, remark in pieces),

@@ -26,7 +26,6 @@ from sosmith.interface.quantity import Quantity
 from sosmith.interface.specification import Specification, specification_of
 from sosmith.interface.trace import Trace
 from sosmith.model.errors import SpecificationError, falling_short
-from sosmith.model.reference.golden import entering_filter, filtered
 
 if TYPE_CHECKING:
     from sosmith.gen.output.decimation_facts import RateCosts
@@ -300,19 +299,8 @@ class Design:
         Parameters, result and errors are those of `run`.
         """
         codes = encoded(self.core, inputs)
-        quantized, datapath = self.core.quantized, self.core.datapath
-        sos = None if quantized.filter is None else quantized.filter.sos
         block = codes.reshape(len(codes), -1, codes.shape[-1])
-        columns = [
-            filtered(
-                entering_filter(block[:, k], datapath, quantized.polynomial),
-                sos,
-                datapath.output,
-                steady=quantized.steady,
-            )
-            for k in range(block.shape[1])
-        ]
-        return np.stack(columns, axis=1).reshape(-1, *codes.shape[1:-1])
+        return self.core.quantized.exact(block).golden.reshape(-1, *codes.shape[1:-1])
 
     @property
     def scenarios(self) -> dict[str, str]:
@@ -418,7 +406,13 @@ class Design:
         """
         from sosmith.gen.output.generate import generate  # Amaranth is slow to import
 
-        return generate(self.core, Path(fspath(folder)), lambda step: progress(step, 0, 0))
+        return generate(
+            self.core,
+            Path(fspath(folder)),
+            lambda step: progress(step, 0, 0),
+            facts=self.facts,
+            claims=self.certificate.entries,
+        )
 
     def package(
         self,
@@ -660,10 +654,12 @@ class Design:
                 vectors=None if vectors is None else Path(fspath(vectors)),
                 date=date,
                 uncertainty=budget_in_json(self.core),
+                facts=self.facts,
+                claims=self.certificate.entries,
                 progress=progress,
             )
         progress("writing the report", 0, 0)
-        return Report.written(self.core, traces, evidence, place)
+        return Report.written(self.core, evidence, place)
 
     @cached_property
     def facts(self) -> CoreFacts:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,6 @@ from sosmith.gen.report.evidence import Evidence
 from sosmith.gen.report.report import write_report
 from sosmith.interface.notebook import table_html
 from sosmith.interface.quantity import Quantity
-from sosmith.model.traces.trace import Trace
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,19 +50,19 @@ class Report:
     unit: str
 
     @classmethod
-    def written(cls, design: CoreDesign, traces: Sequence[Trace], evidence: Evidence, folder: Path) -> Report:
+    def written(cls, design: CoreDesign, evidence: Evidence, folder: Path) -> Report:
         """Write ``report.json`` and ``report.html`` into `folder`, and return their content."""
-        codes = np.stack([trace.codes for trace in traces], axis=1)
-        channels = codes[:, 0] if len(traces) == 1 else codes
+        run = evidence.run
+        codes = run.codes[:, 0] if run.channels == 1 else run.codes
         return cls(
             summary=write_report(evidence, folder),
             folder=folder,
-            time=evidence.time,
-            input_codes={port.name: channels[..., k] for k, port in enumerate(design.datapath.inputs)},
-            hardware_codes=design.datapath.output.encode(evidence.hardware),
-            hardware=evidence.hardware,
-            exact=evidence.golden,
-            unit=evidence.unit,
+            time=run.time,
+            input_codes={port.name: codes[..., k] for k, port in enumerate(design.datapath.inputs)},
+            hardware_codes=run.received,
+            hardware=run.hardware,
+            exact=run.golden,
+            unit=evidence.facts.unit,
         )
 
     @property

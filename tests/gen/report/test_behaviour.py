@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
 from scipy import signal
-from tests.gen.report.test_report import F7, LSB, Page, bandpass, evidence, facts, page_of, plain
+from tests.gen.report.test_report import F7, LSB, Page, bandpass, changed, evidence, facts, page_of, plain
 
 from sosmith.cli import cli
 from sosmith.commands.tables.report import print_summary
@@ -100,7 +99,7 @@ def test_error_against_the_true_value_counts_the_readings() -> None:
         "mean": pytest.approx(0.2),
         "readings": 2,
     }
-    assert summarise(replace(run, reading=None))["true_error"]["readings"] == 4
+    assert summarise(changed(run, reading=None))["true_error"]["readings"] == 4
     assert summarise(plain())["true_error"] is None
 
 
@@ -122,13 +121,13 @@ def test_settling_is_told_to_one_percent_and_to_half_a_step_of_the_output() -> N
 
 def test_the_transient_is_what_the_hardware_flags_at_the_beginning() -> None:
     assert behaviour(evidence()).transient == 0
-    samples = np.arange(len(evidence().time))
+    samples = np.arange(len(evidence().run.time))
     assert behaviour(evidence(unsettled=samples < 1250)).transient == 1250
     assert behaviour(evidence(unsettled=(samples < 1250) | (samples == 2000))).transient == 1250
     assert behaviour(evidence(unsettled=samples >= 0)).transient == len(samples)
     ones = np.ones((3, 2))
     several = plain(
-        filter=facts(), channels=2, time=np.arange(3.0), golden=ones, hardware=ones,
+        filter=facts(), time=np.arange(3.0), golden=ones, hardware=ones,
         unsettled=np.array([[True, True], [False, True], [False, False]]),
     )  # fmt: skip
     assert behaviour(several).transient == 2
@@ -148,7 +147,7 @@ def test_the_measurement_comes_first_and_the_speed_last(words: str) -> None:
 
 def test_without_a_true_value_the_gain_stands_in_its_place() -> None:
     assert tiles_of(bandpass()).startswith("The measurement Largest error against the true value")
-    assert tiles_of(replace(bandpass(), truth=None)).startswith("The measurement Change of the gain in the passband")
+    assert tiles_of(changed(bandpass(), truth=None)).startswith("The measurement Change of the gain in the passband")
     assert tiles_of(plain()).startswith("The measurement Delay 23 clock cycles from input to output; no filter The ar")
 
 

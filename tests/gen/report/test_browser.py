@@ -47,15 +47,13 @@ def _accuracy(tmp_path_factory: pytest.TempPathFactory) -> Path:
     hardware[WORST] = np.round(golden[WORST] / LSB + 0.5) * LSB + LSB
     run = evidence(
         time=time,
-        samples=SAMPLES,
         truth=truth,
         reading=time > 10,
         golden=golden,
         hardware=hardware,
         unfiltered=golden + generator.standard_normal(SAMPLES),
-        bound=0.0006,
+        error_bound=0.0006,
         max_error=0.0007,
-        proven=True,
         provenance=told(),
         files={f"wear.{suffix}": "5" * 64 for suffix in ("sv", "il", "json", "certificate.json", "c", "h")},
     )

@@ -70,12 +70,12 @@ def test_cost_by_its_origin(tmp_path: Path) -> None:
 
 def test_error_over_time_keeps_every_peak() -> None:
     run = evidence()
-    error = run.hardware - run.golden
+    error = run.run.hardware - run.run.golden
     curve = error_over_time(run)
     assert [len(values) for values in curve.values()] == [STRETCHES] * 3
     assert (min(curve["low"]), max(curve["high"])) == pytest.approx((error.min(), error.max()), rel=1e-5)
-    start = int(np.searchsorted(run.time, curve["time"][7]))
-    stop = int(np.searchsorted(run.time, curve["time"][8]))
+    start = int(np.searchsorted(run.run.time, curve["time"][7]))
+    stop = int(np.searchsorted(run.run.time, curve["time"][8]))
     assert curve["high"][7] == pytest.approx(error[start:stop].max(), rel=1e-5)
 
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import base64
 import json
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from tests.gen.designs import example_design
 from tests.gen.report.test_behaviour import told
-from tests.gen.report.test_report import LSB, evidence, page_of, plain
+from tests.gen.report.test_report import LSB, OUTPUT, evidence, page_of, plain
 
 from sosmith.gen.report.recursion import recursion_of
 from sosmith.gen.report.samples import MAX_POINTS, packed, viewer_data
@@ -39,17 +40,17 @@ def test_a_short_run_is_held_whole() -> None:
     data = viewer_data(run, 12)
     assert json.loads(json.dumps(data, allow_nan=False)) == data
     codes = unpacked(data["code"])
-    assert (data["zero"] + data["lsb"] * codes).tolist() == run.hardware.tolist()
+    assert (data["zero"] + data["lsb"] * codes).tolist() == run.run.hardware.tolist()
     assert unpacked(data["index"]).tolist() == list(range(3000))
     assert (data["stride"], data["samples"], data["transient"]) == (1, 3000, 12)
-    assert data["start"] + data["step"] * 2999 == pytest.approx(run.time[-1])
+    assert data["start"] + data["step"] * 2999 == pytest.approx(run.run.time[-1])
     assert viewer_data(plain(), 0)["truth"] is None
 
 
 def test_codes_of_an_output_around_zero() -> None:
     """Code 0 is not the lowest one of a signed output."""
     values = np.array([-2.0, 0.0, 1.0]) * LSB
-    run = plain(time=np.arange(3.0), golden=values, hardware=values, low=-8.0, high=8.0 - LSB, zero=0.0)
+    run = plain(time=np.arange(3.0), golden=values, hardware=values, output=replace(OUTPUT, signed=True))
     assert unpacked(viewer_data(run, 0)["code"]).tolist() == [-2.0, 0.0, 1.0]
 
 
@@ -76,18 +77,15 @@ def test_the_page_of_the_largest_run_is_below_a_megabyte() -> None:
     one = evidence()
     run = evidence(
         time=time,
-        samples=samples * channels,
-        channels=channels,
         truth=truth,
         reading=np.full((samples, channels), fill_value=True),
         golden=golden,
         hardware=np.round(golden / LSB) * LSB,
         unfiltered=golden + generator.standard_normal((samples, channels)),
-        proven=True,
         provenance=told(),
-        formats=one.formats * 80,
-        sections=one.sections * 6,
-        limit_cycles=one.limit_cycles[:1] * 6,
+        formats=one.facts.formats * 80,
+        sections=one.facts.sections * 6,
+        limit_cycles=one.facts.limit_cycles[:1] * 6,
         recursions=(recursion_of(section.name, section.graph),) * 6,
     )
     size = len(page_of(run).encode())

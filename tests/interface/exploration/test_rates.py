@@ -86,8 +86,8 @@ def test_clocks_a_sample_are_an_average_behind_a_decimator(tmp_path: Path) -> No
     assert provenance_of(made, [trace]).cycles_per_sample == made.architecture.clocks_per_sample == 8.5
     assert str(design_of("plain").core.architecture.clocks_per_sample) == "1"
     evidence = simulate(made, [trace], tmp_path, simulator="icarus")
-    assert evidence.samples == 51
-    assert summarise(evidence)["cycles_per_sample"] == evidence.cycles / 202
+    assert evidence.run.samples == 51
+    assert summarise(evidence)["cycles_per_sample"] == evidence.run.cycles / 202
     assert "<td>8.5</td>" in design_of("sparse")._repr_html_()
 
 

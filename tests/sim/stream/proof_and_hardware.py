@@ -28,5 +28,5 @@ def check_proof_and_hardware(
     count = 60 * datapath.decimator.factor + number % 7
     trace = samples_of(made, count)
     evidence = simulate(made, [trace.delayed(k) for k in range(spec.channels)], folder, seed=number)
-    assert evidence.mismatches == 0
-    assert evidence.samples == datapath.results(count) * spec.channels
+    assert evidence.run.mismatches == 0
+    assert evidence.run.samples == datapath.results(count) * spec.channels

@@ -24,7 +24,7 @@ def worst(made: CoreDesign, kind: str, samples: int, folder: Path, simulator: st
     (trace,) = traces_for(made, kind, seed=3)
     end = replace(trace, codes=trace.codes[-samples:], truth=None, reading=None)
     evidence = simulate(made, [end], folder, seed=7, simulator=simulator)
-    assert (evidence.mismatches, evidence.samples) == (0, len(end.codes))
+    assert (evidence.run.mismatches, evidence.run.samples) == (0, len(end.codes))
     assert write_report(evidence, folder)["passed"]
 
 
@@ -73,7 +73,7 @@ def test_vectors_of_beats(tmp_path: Path) -> None:
     simulate(made, [short], tmp_path, vectors=tmp_path / "some.csv")
     assert len((tmp_path / "some.csv").read_text(encoding="utf-8").splitlines()) == 31
     evidence = simulate(made, [short], tmp_path, vectors=tmp_path / "some.hex")
-    assert (evidence.mismatches, evidence.samples) == (0, 30)
+    assert (evidence.run.mismatches, evidence.run.samples) == (0, 30)
     filled = np.concatenate([short.codes, short.codes[-1:], short.codes[-1:]])
     lines = (tmp_path / "some_stimuli.hex").read_text(encoding="utf-8").split()
     sent = [line[16 - 4 * lane : 20 - 4 * lane] for line in lines for lane in (1, 2, 3, 4)]

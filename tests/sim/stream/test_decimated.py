@@ -61,9 +61,9 @@ def settling_of(made: CoreDesign) -> float:
 def test_hardware_equals_the_integer_model(architecture: str, simulator: str, tmp_path: Path) -> None:
     made = locomotive(architecture=architecture)
     evidence = simulate(made, [samples_of(made, 900)], tmp_path, seed=5, simulator=simulator)
-    assert evidence.mismatches == 0
-    assert evidence.samples == len(evidence.time) == 57
-    assert evidence.time[1] == 0.16
+    assert evidence.run.mismatches == 0
+    assert evidence.run.samples == len(evidence.run.time) == 57
+    assert evidence.run.time[1] == 0.16
     summary = write_report(evidence, tmp_path)
     assert summary["passed"]
     assert summary["decimation"]["factor"] == 16
@@ -85,7 +85,7 @@ def test_held_results_come_as_often_as_samples(architecture: str, simulator: str
     assert (made.architecture.copies_per_result, bare.copies_per_result) == (16, 1)
     assert made.architecture.cycles_per_result == bare.cycles_per_result
     evidence = simulate(made, [samples_of(made, 500)], tmp_path, seed=5, simulator=simulator)
-    assert (evidence.mismatches, evidence.samples) == (0, 32)
+    assert (evidence.run.mismatches, evidence.run.samples) == (0, 32)
     manifest = json.loads((tmp_path / f"{made.spec.name}.json").read_text(encoding="utf-8"))
     assert manifest["decimation"]["held"]
     write_report(evidence, tmp_path)
@@ -117,7 +117,7 @@ def test_held_results_take_no_longer(tmp_path: Path) -> None:
     assert decimator is not None
     evidence = simulate(made, [samples_of(made, 801)], tmp_path, seed=1, idle=0.0, stall=0.0)
     last = stated.cycles_per_result * 50 + stated.latency_cycles + decimator.factor - 1
-    assert evidence.cycles == decimator.warm_up + 1 + last
+    assert evidence.run.cycles == decimator.warm_up + 1 + last
 
 
 def test_results_come_at_the_rate_that_is_stated(tmp_path: Path) -> None:
@@ -125,9 +125,9 @@ def test_results_come_at_the_rate_that_is_stated(tmp_path: Path) -> None:
     stated, decimator = made.architecture, made.datapath.decimator
     assert decimator is not None
     evidence = simulate(made, [samples_of(made, 801)], tmp_path, seed=1, idle=0.0, stall=0.0)
-    assert evidence.samples == 51
+    assert evidence.run.samples == 51
     # The first sample is offered while the decimator fills; then results come one after the other.
-    assert evidence.cycles == decimator.warm_up + 1 + stated.cycles_per_result * 50 + stated.latency_cycles
+    assert evidence.run.cycles == decimator.warm_up + 1 + stated.cycles_per_result * 50 + stated.latency_cycles
 
 
 DESIGNS = 40

@@ -64,10 +64,10 @@ def samples_of(made: CoreDesign, count: int) -> Trace:
 def test_hardware_equals_the_integer_model(architecture: str, simulator: str, tmp_path: Path) -> None:
     made = whole(architecture)
     evidence = simulate(made, [samples_of(made, 600)], tmp_path, seed=5, simulator=simulator)
-    assert evidence.mismatches == 0
-    assert evidence.samples == len(evidence.time) == 38
+    assert evidence.run.mismatches == 0
+    assert evidence.run.samples == len(evidence.run.time) == 38
     chosen = ("Decimation by ", " Realization ", " Architecture ", " Calibration before the decimator ")
-    assert all(evidence.why.count(words) == 1 for words in chosen)
+    assert all(evidence.facts.why.count(words) == 1 for words in chosen)
     summary = write_report(evidence, tmp_path)
     assert summary["passed"]
     assert summary["error"]["max_abs"] <= summary["error"]["bound"] <= 0.00025
@@ -86,7 +86,7 @@ def test_the_locomotive_on_its_worst_case(simulator: str, tmp_path: Path) -> Non
     for scenario in ("worst_case", "worst_case_errors"):
         (trace,) = traces_for(made, scenario, seed=1)
         evidence = simulate(made, [trace], tmp_path / scenario, seed=5, simulator=simulator)
-        assert evidence.mismatches == 0
+        assert evidence.run.mismatches == 0
         assert worst_error(made, trace.codes) <= float(made.quantized.bound)
         assert write_report(evidence, tmp_path / scenario)["passed"]
 
@@ -98,7 +98,7 @@ def test_wear_held_and_judged(tmp_path: Path) -> None:
     (trace,) = traces_for(made, "worst_case", seed=1)
     codes = np.repeat(np.array([[20000, 20000], [32000, 20000], [60000, 20000]]), 700, axis=0)
     evidence = simulate(made, [replace(trace, codes=codes, truth=None, reading=None)], tmp_path, seed=2)
-    assert (evidence.mismatches, evidence.samples) == (0, 132)
+    assert (evidence.run.mismatches, evidence.run.samples) == (0, 132)
     assert {status >> 3 & 3 for status in made.datapath.compute_status(codes).tolist()} == {0, 1, 3}
     assert json.loads((tmp_path / f"{made.spec.name}.json").read_text(encoding="utf-8"))["decimation"]["held"]
 
@@ -116,7 +116,7 @@ def test_channels_in_any_order(architecture: str, core: str, simulator: str, tmp
     codes = [np.repeat(rng.integers(0, 1024, (12, trace.codes.shape[1])), 20, axis=0) for _ in range(5)]
     traces = [replace(trace, codes=each, truth=None, reading=None) for each in codes]
     evidence = simulate(made, traces, tmp_path, seed=5, simulator=simulator)
-    assert (evidence.mismatches, evidence.samples) == (0, 5 * 60)
+    assert (evidence.run.mismatches, evidence.run.samples) == (0, 5 * 60)
     assert write_report(evidence, tmp_path)["passed"]
     text = tmp_path / f"{made.spec.name}.sv"
     assert lint(text, made.spec.name, tmp_path / "lint") == []
@@ -129,7 +129,7 @@ def test_readings_are_held_against_the_truth(tmp_path: Path) -> None:
     made = whole("folded")
     (trace,) = traces_for(made, "wear_ramp", seed=1, seconds=40)
     evidence = simulate(made, [trace], tmp_path, seed=2)
-    assert evidence.mismatches == 0
+    assert evidence.run.mismatches == 0
     summary = write_report(evidence, tmp_path)
     assert summary["passed"]
     assert summary["true_error"]["readings"] > 0
@@ -142,7 +142,7 @@ def test_results_come_at_the_rate_that_is_stated(tmp_path: Path) -> None:
     # The last sample is found as many clocks before it is accepted as the first.
     assert (
         stated.cycles_per_result * 20
-        < evidence.cycles - stated.reset_cycles
+        < evidence.run.cycles - stated.reset_cycles
         <= (stated.cycles_per_result * 20 + stated.latency_cycles + 1)
     )
 

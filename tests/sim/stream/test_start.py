@@ -52,14 +52,14 @@ def test_flags_of_wear_are_right_once_settled(architecture: str, start: str, tmp
         Trace(name="start", ports=ports, sample_rate=rate, codes=np.tile(codes, (samples, 1))) for codes in constant
     ]
     evidence = simulate(made, traces, tmp_path, seed=1)
-    assert evidence.mismatches == 0  # codes and flags are those of the integer model
-    assert evidence.samples == CHANNELS * samples
+    assert evidence.run.mismatches == 0  # codes and flags are those of the integer model
+    assert evidence.run.samples == CHANNELS * samples
     status = datapath.compute_status(np.broadcast_to(constant, (samples, *constant.shape)))
     warned = (status >> Flag.WEAR_WARNING & 1).astype(bool)
     assert not warned[:settled].any()
     unsettled = np.tile(np.arange(samples)[:, None] < settled, (1, CHANNELS))
     assert np.array_equal(status >> Flag.SETTLING & 1, unsettled)
-    assert np.array_equal(evidence.unsettled, unsettled) if settled else evidence.unsettled is None
+    assert np.array_equal(evidence.run.unsettled, unsettled) if settled else evidence.run.unsettled is None
     right = warned == (values > WARNING)
     assert right[settled:].all()
     assert right[:settled].all() == (start == "steady")
