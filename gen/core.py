@@ -119,13 +119,19 @@ def design_core(
         architecture=architecture,
         reasons={**decimates, "realization": reason, "architecture": why, **calibrates},
         fit=response.fit,
-        options=_told(core=core, realization=realization, widths_of=widths_of, board=board and board.name),
+        options=_given(core, realization, widths_of, board),
     )
 
 
-def _told(**options: str | None) -> dict[str, str]:
-    """Return the options that were given."""
-    return {key: value for key, value in options.items() if value is not None}
+def _given(core: str | None, realization: str | None, widths_of: str | None, board: Board | None) -> dict[str, str]:
+    """Return the options that were given, by name."""
+    names = {
+        "core": core,
+        "realization": realization,
+        "widths_of": widths_of,
+        "board": None if board is None else board.name,
+    }
+    return {key: name for key, name in names.items() if name is not None}
 
 
 def _response(spec: Specification, kind: str, progress: Progress) -> tuple[Response, dict[str, str]]:
