@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from benchmarks.upset_simulation import Fate, Hit, Target
 from tests.formal.small import leaky, resonator
-from tests.gen.test_architecture import design_in
+from tests.gen.architectures.test_architecture import design_in
 
 from sosmith.gen.architectures.architecture import Architecture
 from sosmith.gen.architectures.registry import ARCHITECTURES
