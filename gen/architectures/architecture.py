@@ -37,7 +37,7 @@ class Architecture(ABC):
     terms : Terms
         Of the class: its name, and which specifications it takes.
     checked : str
-        Of the class: what `sosmith verify --files` reads in the SystemVerilog, a phrase.
+        Of the class: what `sosmith verify --files` proves of a core with fixed constants and no protection, a sentence.
     datapath : Datapath
         The datapath.
     channels : int

@@ -26,7 +26,7 @@ class Online(Architecture):
     """Sections work on signed digits, the most significant first."""
 
     terms = ONLINE
-    checked = "that its file is the one of the certificate, which proves that no residual leaves its range"
+    checked = "the file is that of the certificate, which proves that no residual of its units leaves its range"
 
     @classmethod
     def is_tried(cls, blocks: Blocks) -> bool:

@@ -25,7 +25,7 @@ class Parallel(Architecture):
     """Every operation has its own hardware."""
 
     terms = PARALLEL
-    checked = "its pipeline, register by register, as the datapath's graphs"
+    checked = "the pipeline computes the datapath's graphs, register by register, in every lane and for each channel"
 
     @classmethod
     def is_tried(cls, blocks: Blocks) -> bool:

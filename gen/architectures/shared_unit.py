@@ -40,7 +40,7 @@ class SharedUnit(Architecture):
     """
 
     bit_serial: ClassVar[bool]
-    checked = "its program, instruction by instruction, as the datapath's graphs"
+    checked = "the program computes the datapath's graphs, instruction by instruction"
 
     @classmethod
     def objective(cls, board: Board | None, *, adders: bool = False) -> Objective:

@@ -24,9 +24,11 @@ from tests.house import ROOMS, WITH_SUB_ROOMS, file_table, picture
 
 from sosmith.cli import cli
 from sosmith.commands.tables import combinations
+from sosmith.gen.architectures.registry import ARCHITECTURES
 from sosmith.gen.output.core_facts import core_facts
 from sosmith.gen.output.manifest import manifest
 from sosmith.gen.reload.register_map import markdown
+from sosmith.gen.specification.combinations import TERMS
 from sosmith.instrument.calibration.measurement_store import SCHEMA
 from sosmith.instrument.vehicle.parameters import built_in
 from sosmith.instrument.vehicle.vehicle_report import parameters_json
@@ -56,6 +58,7 @@ NEEDS_A_BOARD = re.compile(r"\./run (board|monitor|stream) .*|\./run simulate .*
 """Lines that run until they are interrupted, or whose port is only known then; the tests of these commands run them."""
 
 _COMBINATIONS = re.compile(r"(?<=<!-- combinations -->\n).*?(?=<!-- end of combinations -->)", re.DOTALL)
+_PROOFS = re.compile(r"(?<=<!-- proofs -->\n).*?(?=<!-- end of proofs -->)", re.DOTALL)
 _FIELDS = re.compile(r"(?<=<!-- fields -->\n).*?(?=<!-- end of fields -->)", re.DOTALL)
 _OUTPUT = re.compile(r"(?<=```text\n).*?(?=```)", re.DOTALL)
 _PARAMETERS = re.compile(r"(?<=<!-- parameters -->\n).*?(?=<!-- end of parameters -->)", re.DOTALL)
@@ -203,6 +206,16 @@ def combination_table() -> str:
     return combinations.markdown(Specification.combinations())
 
 
+def proof_table() -> str:
+    """Return what is proven of each architecture from its files, in Markdown."""
+    rows = "".join(f"| `{name}` | {ARCHITECTURES[name].checked} |\n" for name in TERMS)
+    return f"| architecture | proven from the files |\n|---|---|\n{rows}"
+
+
+def test_what_is_proven_of_an_architecture_is_what_its_class_says() -> None:
+    assert _PROOFS.findall(HARDWARE.read_text(encoding="utf-8")) == [proof_table()]
+
+
 def test_the_table_of_combinations_is_that_of_the_command() -> None:
     assert _COMBINATIONS.findall(HARDWARE.read_text(encoding="utf-8")) == [combination_table()]
 
@@ -292,6 +305,7 @@ if __name__ == "__main__":
     COMMANDS.write_text(commands_page.page(), encoding="utf-8")
     renew(HARDWARE, _FIELDS, field_table())
     renew(HARDWARE, _COMBINATIONS, combination_table())
+    renew(HARDWARE, _PROOFS, proof_table())
     renew(REGISTERS, _REGISTERS, markdown())
     PROTOCOL.write_text(with_parts(PROTOCOL.read_text(encoding="utf-8")), encoding="utf-8")
     renew(CALIBRATION, _SCHEMA, schema())

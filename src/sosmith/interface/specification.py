@@ -17,6 +17,8 @@ from sosmith.gen.specification.specification import example, from_text, from_tre
 from sosmith.interface.quantity import Quantity
 from sosmith.model.errors import SpecificationError
 
+__all__ = ["Combination", "Specification"]
+
 if TYPE_CHECKING:
     import numpy.typing as npt
 
