@@ -42,7 +42,7 @@ from benchmarks.cost_page import (
 )
 from benchmarks.synthesis import TARGETS, Area, place, placer, synthesize, title, version
 
-from sosmith.gen.architecture import Architecture
+from sosmith.gen.architectures.architecture import Architecture
 from sosmith.gen.output.verilog import converted, to_rtlil, to_verilog
 
 

@@ -12,7 +12,9 @@ from typing import Any
 
 from benchmarks.synthesis import TARGETS, title
 
-from sosmith.gen.architecture import Architecture, blocks_for, objective_of
+from sosmith.gen.architectures import registry
+from sosmith.gen.architectures.architecture import Architecture
+from sosmith.gen.architectures.blocks import blocks_for
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.specification.specification import from_text, load
 from sosmith.gen.word_lengths.objective import Objective
@@ -158,7 +160,7 @@ Job = tuple[Core, str]
 def objective_on(architecture: str, key: str) -> Objective:
     """Return what a core is designed for on a target: digits as wide as its multipliers take, adders without any."""
     target = TARGETS[key]
-    return objective_of(architecture, target, adders=not target.device.multipliers)
+    return registry.ARCHITECTURES[architecture].objective(target, adders=not target.device.multipliers)
 
 
 @cache

@@ -22,7 +22,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import NamedTuple
 
-from sosmith.gen.architecture import Architecture
+from sosmith.gen.architectures.architecture import Architecture
 from sosmith.gen.output.verilog import to_rtlil, to_verilog
 from sosmith.model.errors import ToolError
 from sosmith.sim.beats import Beats

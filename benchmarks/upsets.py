@@ -22,7 +22,7 @@ from benchmarks import upset_simulation
 from benchmarks.upset_simulation import Fate, Target
 from rich.progress import Progress
 
-from sosmith.gen.architecture import Architecture
+from sosmith.gen.architectures.architecture import Architecture
 from sosmith.gen.core import design_core
 from sosmith.gen.output.core_facts import StreamFacts
 from sosmith.gen.specification.specification import load

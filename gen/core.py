@@ -2,43 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache, partial
 
-from sosmith.gen.architecture import (
-    Architecture,
-    Blocks,
-    Budget,
-    blocks_for,
-    candidates,
-    fitting,
-    objective_of,
-    reason_for,
-)
+from sosmith.gen.architectures.architecture import Architecture
+from sosmith.gen.architectures.blocks import Blocks, blocks_for
+from sosmith.gen.architectures.budget import Budget
+from sosmith.gen.architectures.registry import candidates, fitting, reason_for
 from sosmith.gen.calibration.fit import Fit, fit, read_measurements
 from sosmith.gen.filter.design import Filter, design
 from sosmith.gen.fpga.boards import Board
-from sosmith.gen.realizations.registry import LOOK_AHEAD, REALIZATIONS
-from sosmith.gen.specification.choices import CORES, ERROR_FEEDBACK
+from sosmith.gen.realizations.registry import ERROR_FEEDBACK, REALIZATIONS
+from sosmith.gen.search import AskedRealization, Response, Search
+from sosmith.gen.specification.choices import AUTO, CORES
+from sosmith.gen.specification.combinations import asked_by
 from sosmith.gen.specification.specification import Specification
 from sosmith.gen.word_lengths.decimator import Front, front_of
-from sosmith.gen.word_lengths.objective import FEW_ADDERS
-from sosmith.gen.word_lengths.other_realization import with_realization
-from sosmith.gen.word_lengths.quantize import Plan, least_size, plan, prove
 from sosmith.gen.word_lengths.quantized import Quantized
-from sosmith.gen.word_lengths.selection import Selection
-from sosmith.gen.word_lengths.settling import samples_to_settle, with_settling
+from sosmith.gen.word_lengths.selection import Progress
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.errors import ShortfallError, SpecificationError
 from sosmith.model.polynomial import Polynomial
 from sosmith.model.port import Port
 from sosmith.model.suggestion import did_you_mean
-
-AUTO = "auto"
-"""Value of the realization that selects the cheapest proven one."""
-
-Progress = Callable[[str], None]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -112,76 +98,78 @@ def design_core(
     ShortfallError
         If no formats meet the specification.
     """
-    asked = {
+    kind = _chosen_core(spec, core)
+    source = "in the specification" if realization is None else "on the command line"
+    asked = AskedRealization(_known(realization or spec.hardware.realization), source, widths_of)
+    response, decimates = _response(spec, kind, progress)
+    _check_realization(spec, asked, response)
+    ahead, budget, calibrates = _ahead(spec, response, _budget(spec, response.front, board), board)
+    search = Search(
+        spec=spec, response=response, asked=asked, budget=budget, ahead=ahead, board=board, progress=progress
+    )
+    wanted = spec.hardware.architecture
+    kinds = candidates(wanted, budget.blocks, asked_by(spec))
+    (quantized, reason, architecture), refused = search.first_that_keeps_up(kinds)
+    why = reason_for(architecture, budget, asked=wanted != AUTO, board=board, refused=refused)
+    whole = quantized if response.front is None else response.front.counted(quantized)
+    return CoreDesign(
+        spec=spec,
+        core=kind,
+        quantized=replace(whole, datapath=architecture.datapath),
+        architecture=architecture,
+        reasons={**decimates, "realization": reason, "architecture": why, **calibrates},
+        fit=response.fit,
+        options=_given(core, realization, widths_of, board),
+    )
+
+
+def _given(core: str | None, realization: str | None, widths_of: str | None, board: Board | None) -> dict[str, str]:
+    """Return the options that were given, by name."""
+    names = {
         "core": core,
         "realization": realization,
         "widths_of": widths_of,
         "board": None if board is None else board.name,
     }
-    kind = _chosen_core(spec, core)
-    wanted = _known(realization or spec.hardware.realization)
+    return {key: name for key, name in names.items() if name is not None}
+
+
+def _response(spec: Specification, kind: str, progress: Progress) -> tuple[Response, dict[str, str]]:
+    """Design what a core computes, and say why it decimates if it does.
+
+    Raises
+    ------
+    SpecificationError
+        If the measurements are unsuitable, or the filter needs an order that is too high.
+    ShortfallError
+        If the decimator lets too much fold into the pass band, or a pole lies too close to the unit circle.
+    """
+    polynomial, fitted = None, None
     if kind != "filter":
         progress("calibration")
-    polynomial, fitted = polynomial_of(spec) if kind != "filter" else (None, None)
+        polynomial, fitted = polynomial_of(spec)
     progress("filter design")
     front, decimates = front_in(spec, kind, polynomial)
-    ideal = None if kind == "calibration" else filter_of(spec) if front is None else front.filter
-    inputs = _inputs(spec, kind) if front is None else (front.decimator.output,)
-    codes = () if fitted is None else calibrated_codes(_inputs(spec, kind), fitted)
+    inputs = _inputs(spec, kind)
+    if front is not None:
+        ideal: Filter | None = front.filter
+    else:
+        ideal = None if kind == "calibration" else filter_of(spec)
+    made = Response(
+        inputs=inputs if front is None else (front.decimator.output,),
+        codes=() if fitted is None else calibrated_codes(inputs, fitted),
+        polynomial=polynomial,
+        fit=fitted,
+        front=front,
+        ideal=ideal,
+    )
+    return made, decimates
 
-    @cache  # for all architectures that are tried
-    def plan_of(name: str) -> Plan:
-        progress(f"word lengths, {name}" if ideal is not None else "word lengths")
-        return plan(
-            name=spec.name,
-            inputs=inputs,
-            output=spec.output,
-            max_error=spec.max_error - (0 if front is None else front.error * spec.output.lsb),
-            ideal=ideal,
-            polynomial=polynomial if front is None else None,
-            realization=name,
-            steady=spec.hardware.start == "steady",
-        )
 
-    def select(architecture: str) -> tuple[Quantized, str]:
-        """Choose the realization and its word lengths for an architecture."""
-        if ideal is None:
-            return prove(plan_of(next(iter(REALIZATIONS)))), "none: a calibration has no filter sections"
-        objective = objective_of(architecture, board, adders=budget.adders or looks_ahead)
-        selection = Selection(
-            lambda name: plan_of(name).under(objective),
-            lambda name: least_size(ideal, name, objective),
-            objective,
-            progress,
-        )
-        if widths_of is not None:
-            if wanted not in ERROR_FEEDBACK:
-                raise SpecificationError(
-                    f"the realization at the widths of {widths_of} must be {', '.join(ERROR_FEEDBACK)}, not {wanted}"
-                )
-            quantized = with_realization(selection.proven(widths_of), wanted)
-            return quantized, f"{wanted} at the word lengths chosen for {widths_of}, as asked"
-        if wanted == AUTO:
-            return selection.cheapest(partial(in_hardware, architecture))
-        source = "on the command line" if realization is not None else "in the specification"
-        return selection.proven(wanted), f"{wanted}: asked for {source}"
-
+def _budget(spec: Specification, front: Front | None, board: Board | None) -> Budget:
+    """Return the time and the multiplier blocks that there are for a core."""
     hardware = spec.hardware
-    looks_ahead = hardware.pipeline == "look-ahead"
-    _check_realization(spec, wanted, widths_of, front)
-
-    def in_hardware(name: str, datapath: Datapath, *, look_ahead: bool = looks_ahead) -> Architecture:
-        """Architecture with what costs a program instructions: the calibrated range, limits of wear, and settling."""
-        wear = () if spec.wear is None else spec.wear.codes(spec.output)
-        # Constants that are loaded may make the filter slower, and the count is not among them.
-        spare = 3 if hardware.reload else 1
-        flagged = with_settling(datapath, spare * samples_to_settle(datapath))
-        judged = replace(flagged, wear=wear)
-        if front is None:
-            return fitting(name, budget, replace(judged, calibrated=codes), board, look_ahead=look_ahead)
-        return fitting(name, budget, front.before(judged, codes), board, ahead=ahead)
-
-    budget = Budget(
+    return Budget(
         clock=hardware.clock,
         sample_rate=spec.sample_rate,
         channels=spec.channels,
@@ -191,130 +179,34 @@ def design_core(
         decimate=1 if front is None else front.decimator.factor,
         samples_per_clock=hardware.samples_per_clock,
         hold=front is not None and spec.filter.hold,
-        folds=hardware.multipliers != 0,
-    )
-    before = None if front is None else front.ahead(codes)
-    ahead, budget, calibrates = _ahead(before, hardware.architecture, budget, board)
-
-    def made_in(name: str) -> _Made:
-        """Choose everything for an architecture."""
-        with_look_ahead = partial(in_hardware, "parallel", look_ahead=True)
-        if looks_ahead and ideal is not None:
-            return _looking_ahead(plan_of, with_look_ahead, budget)
-        quantized, reason = select(name)
-        plain = quantized, reason, in_hardware(name, quantized.datapath)
-        asked = hardware.pipeline != AUTO or wanted != AUTO or ideal is None or hardware.multipliers
-        return plain if asked or name != "parallel" else _faster(plain, plan_of, with_look_ahead, budget)
-
-    several = looks_ahead or hardware.samples_per_clock > 1
-    names = ("parallel",) if several else candidates(hardware.architecture, budget.blocks, folds=budget.folds)
-    (quantized, reason, architecture), refused = _first_that_keeps_up(names, made_in)
-    asked_for = len(names) == 1 and hardware.architecture != AUTO
-    why = reason_for(architecture, budget, asked=asked_for, board=board, refused=refused)
-    return CoreDesign(
-        spec=spec,
-        core=kind,
-        quantized=replace(quantized if front is None else front.counted(quantized), datapath=architecture.datapath),
-        architecture=architecture,
-        reasons={**decimates, "realization": reason, "architecture": why, **calibrates},
-        fit=fitted,
-        options={key: value for key, value in asked.items() if value is not None},
     )
 
 
-_Made = tuple[Quantized, str, Architecture]
-"""A proven design, the reason for its realization, and its architecture."""
-
-
-def _check_realization(spec: Specification, wanted: str, widths_of: str | None, front: Front | None) -> None:
-    """Check that no realization is asked for beside look-ahead, which has its own, or that no decimated filter has."""
-    if front is not None and "lattice_wdf" in {wanted, widths_of}:
-        raise SpecificationError(
-            f"{spec.path}: the realization must be another one with filter.decimate = {front.decimator.factor}, not "
-            "lattice_wdf: with its droop corrected, the filter is no sum of two allpass filters"
-        )
-    if spec.hardware.pipeline == "look-ahead" and (wanted != AUTO or widths_of is not None):
-        raise SpecificationError(
-            f'{spec.path}: the realization must be auto with hardware.pipeline = "look-ahead", not '
-            f"{widths_of or wanted}"
-        )
-
-
-def _first_that_keeps_up(names: Sequence[str], made_in: Callable[[str], _Made]) -> tuple[_Made, str]:
-    """Return the first design that keeps up, and why the one before did not, if there was one."""
-    refused = ""
-    for name in names[:-1]:
-        try:
-            return made_in(name), refused
-        except ShortfallError as error:
-            refused = str(error)
-    return made_in(names[-1]), refused
-
-
-def _faster(
-    plain: _Made, plan_of: Callable[[str], Plan], in_hardware: Callable[[Datapath], Architecture], budget: Budget
-) -> _Made:
-    """Return a design with look-ahead, if a core must take a beat at each clock and its plain loops are too slow.
-
-    Speeds are those of the estimate for an ECP5. The plain design stays if look-ahead cannot meet the specification, or
-    is no faster.
-    """
-    single = budget.channels == 1 and not budget.reload and budget.protect == "none" and budget.decimate == 1
-    reached = plain[2].clock_estimate
-    if not single or budget.cycles > 1 or reached >= budget.clock:
-        return plain
-    try:
-        quantized, reason, architecture = _looking_ahead(plan_of, in_hardware, budget, patient=False)
-    except ShortfallError:
-        return plain
-    if architecture.clock_estimate <= reached:
-        return plain
-    return quantized, f"{reason}; plain loops reach {reached / 1e6:.0f} MHz", architecture
-
-
-def _looking_ahead(
-    plan_of: Callable[[str], Plan],
-    in_hardware: Callable[[Datapath], Architecture],
-    budget: Budget,
-    *,
-    patient: bool = True,
-) -> _Made:
-    """Choose how far recursions look ahead: as little as the clock allows, by the estimate for an ECP5.
-
-    If not `patient`, responses so long that their design takes minutes are refused.
+def _check_realization(spec: Specification, asked: AskedRealization, response: Response) -> None:
+    """Check that the realization that is asked for goes together with the rest.
 
     Raises
     ------
-    ShortfallError
-        If no sections with look-ahead meet the specification.
+    SpecificationError
+        If it has no such filter behind a decimator, stands beside look-ahead, which has its own, or has no other one's
+        word lengths.
     """
-    best: _Made | None = None
-    refused = ShortfallError("look-ahead must have more samples than a beat, and responses that are not too long")
-    for samples, realization in LOOK_AHEAD.items():
-        if samples <= budget.samples_per_clock:
-            continue
-        planned = plan_of(realization.name).under(FEW_ADDERS)
-        if planned.is_long and not patient:
-            continue
-        try:
-            quantized = prove(planned if planned.is_long else planned.trimmed())
-        except ShortfallError as error:
-            refused = error
-            continue
-        architecture = in_hardware(quantized.datapath)
-        estimate = architecture.clock_estimate
-        reached = estimate >= budget.clock
-        reason = (
-            f"{realization.name}: {'the shortest look-ahead that reaches' if reached else 'comes closest to'} a clock "
-            f"of {float(budget.clock) / 1e6:,.6g} MHz on an ECP5, by an estimate of {estimate / 1e6:.0f} MHz"
+    named = [name for name in (asked.name, asked.widths_of) if name in REALIZATIONS]
+    factor = 1 if response.front is None else response.front.decimator.factor
+    for name in named:
+        if factor > 1 and (reason := REALIZATIONS[name].not_decimated):
+            raise SpecificationError(
+                f"{spec.path}: the realization must be another one with filter.decimate = {factor}, not {name}: "
+                f"{reason}"
+            )
+    if spec.hardware.pipeline == "look-ahead" and named:
+        raise SpecificationError(
+            f'{spec.path}: the realization must be auto with hardware.pipeline = "look-ahead", not {named[-1]}'
         )
-        if best is None or estimate > best[2].clock_estimate:
-            best = quantized, reason, architecture
-        if reached:
-            break
-    if best is None:
-        raise refused
-    return best
+    if response.ideal is not None and asked.widths_of is not None and asked.name not in ERROR_FEEDBACK:
+        raise SpecificationError(
+            f"the realization at the widths of {asked.widths_of} must be {', '.join(ERROR_FEEDBACK)}, not {asked.name}"
+        )
 
 
 def _chosen_core(spec: Specification, core: str | None) -> str:
@@ -352,7 +244,7 @@ def front_in(spec: Specification, core: str, polynomial: Polynomial | None) -> t
 
 
 def _ahead(
-    datapath: Datapath | None, wanted: str, budget: Budget, board: Board | None
+    spec: Specification, response: Response, budget: Budget, board: Board | None
 ) -> tuple[Architecture | None, Budget, dict[str, str]]:
     """Choose the architecture of the calibration before a decimator: that of the filter, or the smallest that keeps up.
 
@@ -363,14 +255,14 @@ def _ahead(
     ShortfallError
         If none keeps up with all samples.
     """
+    datapath = None if response.front is None else response.front.ahead(response.codes)
     if datapath is None:
         return None, budget, {}
-    each = replace(budget, decimate=1, hold=False)
-    names = candidates(wanted, budget.blocks, folds=budget.folds)
+    wanted, each = spec.hardware.architecture, replace(budget, decimate=1, hold=False)
     refused = ""
-    for name in names:
+    for kind in candidates(wanted, budget.blocks, asked_by(spec)):
         try:
-            made = fitting(name, each, datapath, board)
+            made = fitting(kind, each, datapath, board)
         except ShortfallError as error:
             refused = f"before the decimator, {error}"
         else:

@@ -1,7 +1,12 @@
 """The house: imports run one way among rooms and among the sub-rooms of a room, and no floor is crowded."""
 
+import ast
+from pathlib import Path
+
 import pytest
 
+from sosmith.gen.architectures.registry import ARCHITECTURES
+from sosmith.gen.realizations.registry import REALIZATIONS
 from tests.house import ROOMS, ROOT, WITH_SUB_ROOMS, arrows, floors, imported, modules
 
 ABOVE = ("cli", "commands", "studio", "interface", "host", "terminal")
@@ -55,6 +60,47 @@ def test_the_studio_computes_with_the_public_interface_only() -> None:
     allowed = ("sosmith.studio", "sosmith.model.templates", "sosmith.model.text_files", "sosmith.gen.report")
     others = {f"{path.name} from {name}" for path in inside for name in imported(path) if not name.startswith(allowed)}
     assert others == set()
+
+
+def compared_texts(path: Path) -> set[str]:
+    """Texts that the code at `path` compares something with, or looks up by, one by one or in a collection."""
+    places = [
+        node
+        for node in ast.walk(ast.parse((ROOT / path).read_text(encoding="utf-8")))
+        if isinstance(node, (ast.Compare, ast.MatchValue, ast.Subscript))
+    ]
+    inside = [part for place in places for part in ast.walk(place)]
+    return {part.value for part in inside if isinstance(part, ast.Constant) and isinstance(part.value, str)}
+
+
+def test_only_registries_tell_architectures_and_realizations_apart() -> None:
+    """Everything else asks the class: a new one is then registered, and nothing else changes."""
+    names = {
+        **dict.fromkeys(ARCHITECTURES, "gen/architectures"),
+        **dict.fromkeys((realization.name for realization in REALIZATIONS.values()), "gen/realizations"),
+    }
+    top = ROOT / "src" / "sosmith"
+    above = [
+        path.relative_to(ROOT) for part in ABOVE for path in (*top.glob(f"{part}.py"), *top.glob(f"{part}/**/*.py"))
+    ]
+    places = {path: compared_texts(path) for path in (*modules(), *above)}
+    apart = {
+        f"{path.as_posix()}: {name}"
+        for path, texts in places.items()
+        for name in texts & names.keys()
+        if not path.as_posix().startswith(names[name]) and path.parts[0] not in _KNOW_FILES_ALONE
+    }
+    assert apart - _OTHER_MEANINGS == set()
+
+
+_KNOW_FILES_ALONE = ("verify",)
+"""Rooms that share nothing with the registries."""
+
+_OTHER_MEANINGS = {
+    "instrument/uncertainty/budget.py: normal",  # a distribution
+    # which proof reads which files, until `verify` has one door
+    *(f"src/sosmith/interface/certificate.py: {name}" for name in ARCHITECTURES),
+}
 
 
 @pytest.mark.parametrize("folder", [*ROOMS, "src/sosmith/commands", "tests"])

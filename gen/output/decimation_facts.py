@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
 from typing import Any
 
-from sosmith.gen.architecture import Architecture
+from sosmith.gen.architectures.architecture import Architecture
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.filter.decimation import group_delay, nearest_db, own_delay
 from sosmith.gen.filter.design import design

@@ -58,6 +58,11 @@ class Realization:
         ShortfallError if the filter has no such realization.
     cascade : bool
         Whether every stage is one of the ideal sections, in any order.
+    feedback_order : int or None
+        Order of its error feedback, where that is all it differs in from others, so that they can be compared at the
+        same word lengths; None otherwise.
+    not_decimated : str
+        Why a filter that corrects a decimator's droop is not made so, half a sentence; empty if it is.
     """
 
     name: str
@@ -65,6 +70,8 @@ class Realization:
     build: Callable[[Any, SectionFormat, str], Section]
     parts: Callable[[Sequence[Row]], Sequence[Any]] = tuple
     cascade: bool = True
+    feedback_order: int | None = None
+    not_decimated: str = ""
 
 
 def _section(make: Callable[..., Section], **options: Any) -> Callable[[Row, SectionFormat, str], Section]:
@@ -97,20 +104,17 @@ def _lattice(part: Part, form: SectionFormat, name: str) -> Section:
     )
 
 
+def _with_error_feedback(name: str, title: str, order: int) -> Realization:
+    build = _section(direct_form, feedback_order=order)
+    return Realization(name=name, title=title, build=build, feedback_order=order)
+
+
 REALIZATIONS: dict[str, Realization] = {
     realization.name: realization
     for realization in (
-        Realization(name="df1", title="direct form I", build=_section(direct_form, feedback_order=0)),
-        Realization(
-            name="df1_ef1",
-            title="direct form I, first-order error feedback",
-            build=_section(direct_form, feedback_order=1),
-        ),
-        Realization(
-            name="df1_ef2",
-            title="direct form I, second-order error feedback",
-            build=_section(direct_form, feedback_order=2),
-        ),
+        _with_error_feedback("df1", "direct form I", 0),
+        _with_error_feedback("df1_ef1", "direct form I, first-order error feedback", 1),
+        _with_error_feedback("df1_ef2", "direct form I, second-order error feedback", 2),
         Realization(name="df2t", title="transposed direct form II", build=_section(transposed_form, delta=False)),
         Realization(
             name="delta", title="transposed direct form II, delta operator", build=_section(transposed_form, delta=True)
@@ -131,6 +135,7 @@ REALIZATIONS: dict[str, Realization] = {
             build=_lattice,
             parts=lattice_parts,
             cascade=False,
+            not_decimated="with its droop corrected, the filter is no sum of two allpass filters",
         ),
     )
 }
@@ -155,6 +160,9 @@ def realization_of(name: str) -> Realization:
 
 CASCADES = tuple(name for name, realization in REALIZATIONS.items() if realization.cascade)
 """Names of the realizations whose stages are the ideal sections."""
+
+ERROR_FEEDBACK = tuple(name for name, realization in REALIZATIONS.items() if realization.feedback_order is not None)
+"""Names of the realizations that differ only in their error feedback."""
 
 BEST_KEPT = "df1_ef2"
 """Realization that needs the fewest bits at low cutoffs: if it fails too, its reason is the most informative."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import zlib
 from typing import Any
 
-from sosmith.gen.architecture import Architecture
+from sosmith.gen.architectures.architecture import Architecture
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.proof.fading import RESIDUE
 from sosmith.gen.reload.reload import OtherSet, Swap, parallel_bank

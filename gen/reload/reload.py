@@ -11,7 +11,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
-from sosmith.gen.architecture import Budget, structure
+from sosmith.gen.architectures.budget import Budget
+from sosmith.gen.architectures.fingerprint import structure
+from sosmith.gen.architectures.shared_unit import SharedUnit
 from sosmith.gen.core import CoreDesign, calibrated_codes, filter_of, polynomial_of
 from sosmith.gen.filter.design import Filter
 from sosmith.gen.quantity import quantity
@@ -21,7 +23,6 @@ from sosmith.gen.reload.transient import transient
 from sosmith.gen.specification.specification import Specification
 from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.gen.word_lengths.settling import samples_to_settle
-from sosmith.hdl.plan import folded_clocks
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.folding import program
 from sosmith.model.dataflow.graph import Node, Op
@@ -313,20 +314,20 @@ def _ends(ranges: tuple[tuple[int, int], ...]) -> str:
 
 def _fitted(hardware: CoreDesign, datapath: Datapath, what: str) -> Program | None:
     """Check that the hardware can run `datapath`; return its program, if there is one. `what` names it in messages."""
-    before = hardware.architecture.program
+    architecture, spec = hardware.architecture, hardware.spec
     limited = [_is_limited(made) for made in (hardware.datapath, datapath)]
     if limited[1] and not limited[0]:
         raise ShortfallError(f"the {what} must keep the output within its range, as the hardware does not limit it")
-    if before is None:
+    if not isinstance(architecture, SharedUnit):
         _check_parallel(hardware.datapath, datapath, what)
         return None
+    before = architecture.program
     try:
         made = program(datapath, before.digit_bits, like=before).padded(len(before.instructions))
     except ValueError as error:  # FoldingError is one
         raise ShortfallError(f"the {what} must fit the hardware: {error}") from None
-    spec, architecture = hardware.spec, hardware.architecture
     budget = Budget(clock=spec.hardware.clock, sample_rate=spec.sample_rate, channels=architecture.channels)
-    needed = folded_clocks.cycles_per_sample(made, serial=architecture.name == "serial", protect=architecture.protect)
+    needed = architecture.clocks_of(made)
     if needed > budget.cycles:
         raise ShortfallError(f"the {what} must take at most {budget.cycles:,} clocks a sample, not {needed:,}")
     return made

@@ -5,6 +5,11 @@ Those of `hardware.protect` are in `sosmith.model.dataflow.protection`.
 
 from fractions import Fraction
 
+from sosmith.gen.specification.combinations import TERMS
+
+AUTO = "auto"
+"""Value of a key that leaves the choice to the design."""
+
 FAMILIES = ("butterworth", "chebyshev1", "chebyshev2", "elliptic", "bessel")
 KINDS = ("lowpass", "highpass", "bandpass", "bandstop")
 LOSSES = {
@@ -16,8 +21,10 @@ LOSSES = {
 
 METHODS = ("bilinear", "impulse_invariant")
 REALIZATIONS = ("auto", "df1", "df1_ef1", "df1_ef2", "df2t", "delta", "state_space", "normal", "lattice_wdf")
+"""Names in the registry, `sosmith.gen.realizations.registry`, in its order."""
+
 STARTS = ("steady", "zero")
-ARCHITECTURES = ("auto", "parallel", "folded", "serial", "online")
+ARCHITECTURES = ("auto", *TERMS)
 PIPELINES = ("auto", "plain", "look-ahead")
 SAMPLES_PER_CLOCK = (1, 2, 4, 8, 16)
 LOOK_AHEAD = (2, 4, 8, 16)
@@ -26,14 +33,8 @@ LOOK_AHEAD = (2, 4, 8, 16)
 CORES = ("instrument", "filter", "calibration")
 """What can be generated from a specification: the whole instrument, or one part."""
 
-ERROR_FEEDBACK = ("df1", "df1_ef1", "df1_ef2")
-"""Realizations that differ only in their error feedback, so that they can be compared at the same word lengths."""
-
 CALIBRATION_INPUTS = ("voltage", "temperature")
 """Inputs of the calibration polynomial, in the order of its indices."""
-
-AUTO = "auto"
-"""Value of `filter.decimate` that leaves the factor to the design."""
 
 MAX_DECIMATION = 1024
 """Largest factor by which samples are decimated before a filter; all are powers of two."""

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from fractions import Fraction
 
 from sosmith.gen.specification.choices import AUTO, CALIBRATION_INPUTS, FAMILIES, KINDS, LOOK_AHEAD, LOSSES, MAX_RATIO
+from sosmith.gen.specification.combinations import check_combinations
 from sosmith.gen.specification.schema import MAX_ORDER, Document, FilterTable, InputTable
 from sosmith.gen.specification.uncertainty import check_coefficients
 from sosmith.gen.specification.values import UnfitError, identifier, key_text, listed, literal, one_of
@@ -55,70 +56,23 @@ def check(document: Document) -> None:
             literal(document.hardware.clock),
             where="hardware.clock",
         )
-    _check_online(document)
-    _check_block(document)
-    if document.hardware.architecture == "folded" and document.hardware.multipliers == 0:
-        expected = '"auto" or at least 1 with hardware.architecture = "folded", which has one'
-        raise UnfitError(expected, "0", where="hardware.multipliers")
-    if document.hardware.reload and document.hardware.multipliers is not None:
-        raise UnfitError(
-            '"auto" with hardware.reload = true: adders multiply by constants that are fixed',
-            literal(document.hardware.multipliers),
-            where="hardware.multipliers",
-        )
+    check_combinations(document)
+    _check_pipeline(document)
 
 
-def _check_online(document: Document) -> None:
-    """Check that nothing is asked of the online architecture that it does not have."""
-    if document.hardware.architecture != "online":
-        return
-    blocks = document.hardware.multipliers
-    asked = {
-        "channels": (document.channels, 1),
-        "hardware.reload": (document.hardware.reload, False),
-        "hardware.protect": (document.hardware.protect, "none"),
-        "hardware.multipliers": (AUTO if blocks is None else blocks, AUTO),
-    }
-    for where, (found, only) in asked.items():
-        if found != only:
-            raise UnfitError(f'{literal(only)} with hardware.architecture = "online"', literal(found), where=where)
-
-
-def _check_block(document: Document) -> None:
-    """Check that nothing is asked of several samples a clock, or of look-ahead, that they do not have."""
-    hardware = document.hardware
-    asked: list[tuple[str, object, tuple[object, ...]]] = [
-        ("hardware.architecture", hardware.architecture, ("auto", "parallel")),
-        ("channels", document.channels, (1,)),
-        ("hardware.reload", hardware.reload, (False,)),
-        ("hardware.protect", hardware.protect, ("none",)),
-    ]
-    looks_ahead = hardware.pipeline == "look-ahead"
-    if looks_ahead:
-        asked.append(("hardware.realization", hardware.realization, ("auto",)))
-        if hardware.multipliers is not None:
-            asked.append(("hardware.multipliers", hardware.multipliers, ("auto", 0)))
-        most = max(LOOK_AHEAD) // 2
-        if hardware.samples_per_clock > most:
-            raise UnfitError(
-                f'at most {most} with hardware.pipeline = "look-ahead"',
-                literal(hardware.samples_per_clock),
-                where="hardware.samples_per_clock",
-            )
-    if hardware.samples_per_clock == 1 and not looks_ahead:
-        return
-    found = 'pipeline = "look-ahead"' if looks_ahead else f"samples_per_clock = {hardware.samples_per_clock}"
-    for where, value, possible in asked:
-        if value not in possible:
-            raise UnfitError(
-                f"{' or '.join(map(literal, possible))} with hardware.{found}", literal(value), where=where
-            )
-    if document.filter.decimate is not None:
-        left_out = f"left out with hardware.{found}"
-        raise UnfitError(left_out, literal(document.filter.decimate), where="filter.decimate", later=True)
+def _check_pipeline(document: Document) -> None:
+    """Check what look-ahead and several samples a clock exclude beside other options of the hardware."""
+    hardware, most = document.hardware, max(LOOK_AHEAD) // 2
+    if hardware.pipeline == "look-ahead" and hardware.realization != AUTO:
+        expected = "'auto' with hardware.pipeline = \"look-ahead\""
+        raise UnfitError(expected, literal(hardware.realization), where="hardware.realization")
+    if hardware.pipeline == "look-ahead" and hardware.samples_per_clock > most:
+        expected = f'at most {most} with hardware.pipeline = "look-ahead"'
+        raise UnfitError(expected, literal(hardware.samples_per_clock), where="hardware.samples_per_clock")
     if hardware.samples_per_clock > 1 and document.converter:
+        expected = f"left out with hardware.samples_per_clock = {hardware.samples_per_clock}"
         tables = ", ".join(map(literal, document.converter))
-        raise UnfitError(f"left out with hardware.{found}", tables, where="converter", later=True)
+        raise UnfitError(expected, tables, where="converter", later=True)
 
 
 def _check_inputs(document: Document) -> None:
@@ -354,7 +308,7 @@ def _relation(kind: str, passband: Sequence[Fraction], stopband: Sequence[Fracti
 
 def _check_decimation(document: Document) -> None:
     """Check that what else is asked for is there behind a decimator."""
-    table, hardware = document.filter, document.hardware
+    table = document.filter
     if table.decimate is None and table.hold:
         raise UnfitError("false without filter.decimate, as every sample has a result", "true", where="filter.hold")
     if table.decimate is None:
@@ -376,17 +330,6 @@ def _check_decimation(document: Document) -> None:
             found,
             where=where,
         )
-    beside: tuple[tuple[str, object, object], ...] = (
-        ("hardware.reload", hardware.reload, False),
-        ("hardware.protect", hardware.protect, "none"),
-        ("hardware.start", hardware.start, "steady"),
-    )
-    for key, value, only in beside:
-        if value != only:
-            raise UnfitError(f"{literal(only)} with filter.decimate", literal(value), where=key, later=True)
-    if hardware.architecture == "online":
-        others = 'one of "auto", "folded", "serial", "parallel" with filter.decimate'
-        raise UnfitError(others, literal("online"), where="hardware.architecture", later=True)
     if document.converter:
         tables = ", ".join(map(literal, document.converter))
         raise UnfitError("left out with filter.decimate", tables, where="converter", later=True)

@@ -105,7 +105,7 @@ class HardwareSpec:
     realization : str
         "auto" or a key of `sosmith.gen.realizations.registry.REALIZATIONS`.
     architecture : str
-        "auto", "parallel", "folded", "serial" or "online".
+        "auto" or a key of `sosmith.gen.specification.combinations.TERMS`.
     clock : Fraction
         In Hz, at least the sample rate.
     reload : bool

@@ -142,13 +142,16 @@ class ShortProgram:
     Attributes
     ----------
     architecture : str
-        "folded" or "serial". In folded, an instruction takes one clock; in serial, one for each bit of its factor.
+        Its name, for sentences.
     digit_bits : int
         Width of a digit.
+    bit_serial : bool
+        Whether an instruction takes a clock for each bit of its factor, instead of one.
     """
 
     architecture: str
     digit_bits: int
+    bit_serial: bool = False
 
     few_digits = False
     beyond = "longer even with one digit for each value"
@@ -158,11 +161,7 @@ class ShortProgram:
     @property
     def best(self) -> str:
         """What the smallest design has, for a sentence."""
-        return "the fewest clocks of multiplication" if self._serial else "the shortest program"
-
-    @property
-    def _serial(self) -> bool:
-        return self.architecture == "serial"
+        return "the fewest clocks of multiplication" if self.bit_serial else "the shortest program"
 
     def of_graph(self, graph: Graph) -> float:
         """Count the clocks of the graph's products, each with a little of its area; infinite if it cannot be folded."""
@@ -181,7 +180,7 @@ class ShortProgram:
             made = program(datapath, self.digit_bits)
         except FoldingError:
             return math.inf
-        clocks = made.serial_cycles if self._serial else len(made.instructions)
+        clocks = made.serial_cycles if self.bit_serial else len(made.instructions)
         return float(clocks + made.words * _WORDS + made.accumulator_bits * _ACCUMULATOR_BITS)
 
     def least(self, graphs: Sequence[Graph]) -> float:
@@ -201,12 +200,12 @@ class ShortProgram:
     def told(self, datapath: Datapath) -> str:
         """Return the length of the program, its memory and its accumulator in words."""
         made = program(datapath, self.digit_bits)
-        length = f"at most {made.serial_cycles:,}" if self._serial else f"{len(made.instructions):,} instructions"
+        length = f"at most {made.serial_cycles:,}" if self.bit_serial else f"{len(made.instructions):,} instructions"
         return f"{length}, {made.words:,} words of memory, an accumulator of {made.accumulator_bits} bits"
 
     def _clocks(self, column: Column) -> int:
         """Clocks of a column's instructions; one without products still takes one, which ends it."""
-        if not self._serial:
+        if not self.bit_serial:
             return max(1, len(column.products))
         clocks = [
             self.digit_bits + 1 if product.other is not None else serial_clocks(product.constant)

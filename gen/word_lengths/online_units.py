@@ -6,6 +6,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from sosmith.gen.realizations.registry import ERROR_FEEDBACK
+from sosmith.gen.specification.values import listed
 from sosmith.gen.word_lengths.cost import Cost, area_of, cost_of_graphs
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.graph import Graph, Op
@@ -84,7 +86,7 @@ class OnlineUnits:
 def unsuitable_online(error: OnlineError) -> str:
     """Return the sentence for a datapath that has no on-line form."""
     return (
-        f"the sections must suit the online architecture, as recursive ones in df1, df1_ef1 and df1_ef2 do: {error}; "
+        f"the sections must suit the online architecture, as recursive ones in {listed(ERROR_FEEDBACK)} do: {error}; "
         "parallel takes every realization"
     )
 

@@ -10,7 +10,11 @@ from dataclasses import dataclass
 from decimal import Decimal
 from typing import Any
 
-from sosmith.gen.specification.choices import REALIZATIONS
+from sosmith.gen.architectures.blocks import NO_LIMIT
+from sosmith.gen.architectures.registry import candidates
+from sosmith.gen.realizations.registry import REALIZATIONS
+from sosmith.gen.specification.choices import AUTO
+from sosmith.gen.specification.combinations import asked_by
 from sosmith.gen.specification.specification import Specification
 from sosmith.model.errors import SpecificationError
 
@@ -43,9 +47,10 @@ def default_parameters(spec: Specification) -> dict[str, Values]:
     allowed, looks_ahead = spec.max_error, spec.hardware.pipeline == "look-ahead"
     parameters: dict[str, Values] = {}
     if not looks_ahead:
-        parameters["hardware.realization"] = [name for name in REALIZATIONS if name != "auto"]
-        if spec.hardware.samples_per_clock == 1:
-            parameters["hardware.architecture"] = ["parallel", "folded"]
+        parameters["hardware.realization"] = list(REALIZATIONS)
+        fastest_first = [kind.terms.name for kind in reversed(candidates(AUTO, NO_LIMIT, asked_by(spec)))]
+        if len(fastest_first) > 1:
+            parameters["hardware.architecture"] = fastest_first
     return {**parameters, "output.max_error": [float(allowed * factor) for factor in (1, 2, 4)]}
 
 

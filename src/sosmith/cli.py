@@ -38,6 +38,9 @@ _COMMANDS = {
     "import": _Command(
         "import_filter", "import_command", "Write a specification with the filter of another tool's FILE."
     ),
+    "combinations": _Command(
+        "combinations", "combinations_command", "Show which architectures and options of a specification go together."
+    ),
     "design": _Command(
         "design",
         "design_command",

@@ -9,10 +9,12 @@ from tests.commands.command_line import FILTER, Command, Outcome, refused, reloa
 
 from sosmith import __version__
 from sosmith.gen.specification.specification import example
+from sosmith.interface.specification import Specification
 
 NEEDED = {
     "init": ("[FILE]", "flange_wear.toml", "--example NAME", "--list", "--force"),
     "import": ("FILE", "--sample-rate", "--signs", "--range", "disagree on the signs"),
+    "combinations": ("go together", "--markdown", "--json"),
     "design": ("SPEC", "--core", "--realization", "--widths-of", "--plot", "--json"),
     "generate": ("SPEC", "SystemVerilog", "-o, --output", "build/<name>"),
     "package": (
@@ -306,3 +308,18 @@ def test_the_example_workflow(sosmith: Command) -> None:
     assert outcomes["broken"].stdout.startswith("## ❌ plain falls short beside the baseline\n\n- largest error: ")
     assert outcomes["better"].stdout.startswith("## ✅ plain is not worse than the baseline")
     assert Path("build/comparison.html").exists()
+
+
+def test_the_table_of_combinations_is_the_same_in_all_forms(sosmith: Command) -> None:
+    shown = sosmith("combinations")
+    assert (shown.status, shown.stderr) == (0, "")
+    assert "folded with multipliers 0: its program needs one\n" in shown.stdout
+    rows = json.loads(sosmith("combinations", "--json").stdout)
+    assert rows == [each._asdict() for each in Specification.combinations()]
+    text = sosmith("combinations", "--markdown").stdout
+    assert "| multipliers 0 | ok | refused | ok | not yet | reload (refused) |\n" in text
+    assert "- folded with multipliers 0: its program needs one\n" in text
+
+
+def test_the_table_of_combinations_in_one_form_at_a_time(sosmith: Command) -> None:
+    refused(sosmith("combinations", "--json", "--markdown"), "--markdown must come without --json, not with it")

@@ -23,12 +23,16 @@ from tests.gen.designs import example_design
 from tests.house import ROOMS, WITH_SUB_ROOMS, file_table, picture
 
 from sosmith.cli import cli
+from sosmith.commands.tables import combinations
+from sosmith.gen.architectures.registry import ARCHITECTURES
 from sosmith.gen.output.core_facts import core_facts
 from sosmith.gen.output.manifest import manifest
 from sosmith.gen.reload.register_map import markdown
+from sosmith.gen.specification.combinations import TERMS
 from sosmith.instrument.calibration.measurement_store import SCHEMA
 from sosmith.instrument.vehicle.parameters import built_in
 from sosmith.instrument.vehicle.vehicle_report import parameters_json
+from sosmith.interface.specification import Specification
 
 ROOT = Path(__file__).parents[2]
 README = ROOT / "README.md"
@@ -53,6 +57,8 @@ NEEDS_SIMULATION = ("./run simulate ", "./run compare ")
 NEEDS_A_BOARD = re.compile(r"\./run (board|monitor|stream) .*|\./run simulate .* --port .*|\./run build .* --program")
 """Lines that run until they are interrupted, or whose port is only known then; the tests of these commands run them."""
 
+_COMBINATIONS = re.compile(r"(?<=<!-- combinations -->\n).*?(?=<!-- end of combinations -->)", re.DOTALL)
+_PROOFS = re.compile(r"(?<=<!-- proofs -->\n).*?(?=<!-- end of proofs -->)", re.DOTALL)
 _FIELDS = re.compile(r"(?<=<!-- fields -->\n).*?(?=<!-- end of fields -->)", re.DOTALL)
 _OUTPUT = re.compile(r"(?<=```text\n).*?(?=```)", re.DOTALL)
 _PARAMETERS = re.compile(r"(?<=<!-- parameters -->\n).*?(?=<!-- end of parameters -->)", re.DOTALL)
@@ -195,6 +201,25 @@ def test_the_names_of_the_fields_are_those_of_the_manifest() -> None:
     assert _FIELDS.findall(HARDWARE.read_text(encoding="utf-8")) == [field_table()]
 
 
+def combination_table() -> str:
+    """Return what `sosmith combinations --markdown` prints."""
+    return combinations.markdown(Specification.combinations())
+
+
+def proof_table() -> str:
+    """Return what is proven of each architecture from its files, in Markdown."""
+    rows = "".join(f"| `{name}` | {ARCHITECTURES[name].checked} |\n" for name in TERMS)
+    return f"| architecture | proven from the files |\n|---|---|\n{rows}"
+
+
+def test_what_is_proven_of_an_architecture_is_what_its_class_says() -> None:
+    assert _PROOFS.findall(HARDWARE.read_text(encoding="utf-8")) == [proof_table()]
+
+
+def test_the_table_of_combinations_is_that_of_the_command() -> None:
+    assert _COMBINATIONS.findall(HARDWARE.read_text(encoding="utf-8")) == [combination_table()]
+
+
 @pytest.mark.parametrize("document", PRINTING, ids=lambda path: path.name)
 def test_commands_print_what_is_shown(document: Path, folder: Path) -> None:
     shown = document.read_text(encoding="utf-8")
@@ -279,6 +304,8 @@ if __name__ == "__main__":
     PYTHON.write_text(page(), encoding="utf-8")
     COMMANDS.write_text(commands_page.page(), encoding="utf-8")
     renew(HARDWARE, _FIELDS, field_table())
+    renew(HARDWARE, _COMBINATIONS, combination_table())
+    renew(HARDWARE, _PROOFS, proof_table())
     renew(REGISTERS, _REGISTERS, markdown())
     PROTOCOL.write_text(with_parts(PROTOCOL.read_text(encoding="utf-8")), encoding="utf-8")
     renew(CALIBRATION, _SCHEMA, schema())

@@ -8,7 +8,7 @@ from amaranth.hdl import Assert, Module, Mux, Signal, signed
 from amaranth.lib.wiring import Component, In, Out
 from tests.formal.prover import INDUCTION, Proof, broken, prove
 
-from sosmith.gen.architecture import DIGIT_BITS
+from sosmith.gen.architectures.architecture import DIGIT_BITS
 from sosmith.hdl import folded
 
 SHORT_DIGIT_BITS = 3

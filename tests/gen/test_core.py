@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from tests.gen.designs import EXAMPLES
 
-from sosmith.gen import core
+from sosmith.gen import search
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.realizations.registry import REALIZATIONS
 from sosmith.gen.specification.specification import Specification, load
@@ -73,7 +73,7 @@ def test_what_is_dropped_could_not_win(
     spec = replace(spec, max_error=output.lsb, filter=asked)
     made = design_core(spec)
     assert "more in multiplier blocks alone" in made.reasons["realization"]
-    monkeypatch.setattr(core, "least_size", lambda ideal, name, objective: 0)
+    monkeypatch.setattr(search, "least_size", lambda ideal, name, objective: 0)
     every = design_core(spec)
     assert "more in multiplier blocks alone" not in every.reasons["realization"]
     assert made.quantized.realization == every.quantized.realization
@@ -128,7 +128,7 @@ def test_those_that_fall_short_are_told(spec: Specification) -> None:
 
 def test_the_only_one_that_is_left(spec: Specification, monkeypatch: pytest.MonkeyPatch) -> None:
     fail(monkeypatch, {name: "it must fit, and does not" for name in REALIZATIONS if name != "delta"})
-    monkeypatch.setattr(core, "least_size", lambda ideal, name, objective: 0)
+    monkeypatch.setattr(search, "least_size", lambda ideal, name, objective: 0)
     others = [name for name in REALIZATIONS if name != "delta"]
     reason = design_core(spec).reasons["realization"]
     assert re.fullmatch(
@@ -146,7 +146,7 @@ def fail(monkeypatch: pytest.MonkeyPatch, sentences: dict[str, str]) -> None:
             raise ShortfallError(sentences[options["realization"]])
         return plan(**options)
 
-    monkeypatch.setattr(core, "plan", failing)
+    monkeypatch.setattr(search, "plan", failing)
 
 
 def test_none_for_one_reason(spec: Specification) -> None:

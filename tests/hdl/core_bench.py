@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from amaranth.hdl import ClockDomain, ClockSignal, Module
 from amaranth.sim import Simulator
 
-from sosmith.gen.architecture import Architecture
+from sosmith.gen.architectures.architecture import Architecture
 from sosmith.hdl.plan.streams import fields, width
 from sosmith.model.dataflow.status import STATUS_BITS
 

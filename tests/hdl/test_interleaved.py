@@ -11,7 +11,7 @@ from tests.formal.small import leaky, limiter
 from tests.gen.designs import example_design
 from tests.hdl.core_bench import Pace, run_core
 
-from sosmith.gen.architecture import Architecture
+from sosmith.gen.architectures.registry import ARCHITECTURES
 from sosmith.hdl.check_bits import CheckBits, Read
 from sosmith.hdl.plan.interleaving import schedule
 from sosmith.hdl.stages import interleaved
@@ -61,7 +61,7 @@ def test_every_channel_has_a_state_of_its_own(channels: int) -> None:
     for channel, (code,) in samples:
         expected.append((channel, min(max(code + before[channel], -2), 1)))
         before[channel] = code
-    found = run_core(Architecture("parallel", limiter(), channels), samples, Pace())
+    found = run_core(ARCHITECTURES["parallel"](limiter(), channels), samples, Pace())
     assert [(beat.channel, beat.code) for beat in found] == expected
 
 

@@ -12,7 +12,8 @@ from amaranth.sim import Simulator
 from tests.formal.small import port
 from tests.hdl.core_bench import Pace, run_core
 
-from sosmith.gen.architecture import Architecture, Blocks
+from sosmith.gen.architectures.blocks import Blocks
+from sosmith.gen.architectures.registry import ARCHITECTURES
 from sosmith.gen.output.verilog import to_rtlil, to_verilog
 from sosmith.hdl.adders import multiples
 from sosmith.hdl.pipelined_logic import banks_in_use, limits
@@ -99,7 +100,7 @@ def datapath() -> Datapath:
 @pytest.mark.parametrize("channels", [1, 3])
 def test_a_core_computes_what_its_graph_computes(channels: int) -> None:
     chance = random.Random(1)
-    core = Architecture("parallel", datapath(), channels, blocks=Blocks(0))
+    core = ARCHITECTURES["parallel"](datapath(), channels, blocks=Blocks(0))
     assert list(map(len, core.adders)) == [3]
     samples = [(chance.randrange(channels), [chance.choice((-128, 127, chance.randint(-128, 127)))]) for _ in range(90)]
     states = [recursion().reset() for _ in range(channels)]
@@ -108,14 +109,14 @@ def test_a_core_computes_what_its_graph_computes(channels: int) -> None:
 
 
 def test_the_text_names_the_sums_and_has_no_product() -> None:
-    text = to_verilog(to_rtlil(Architecture("parallel", datapath(), blocks=Blocks(0)).component(), "small"))
+    text = to_verilog(to_rtlil(ARCHITECTURES["parallel"](datapath(), blocks=Blocks(0)).component(), "small"))
     assert "*" not in re.sub(r"\(\*.*?\*\)|/\*.*?\*/", "", text)
     for name in ("v1_times_11", "v1_times_minus_7", "x_times_43"):
         assert re.search(rf"\(\* keep = .*\*\)\n *wire (?:signed )?\[\d+:0\] {name};", text), name
 
 
 def test_a_loadable_constant_needs_a_multiplier() -> None:
-    assert not any(Architecture("parallel", datapath(), reload=True, blocks=Blocks(0)).adders)
+    assert not any(ARCHITECTURES["parallel"](datapath(), reload=True, blocks=Blocks(0)).adders)
 
 
 def test_sums_may_have_more_than_63_bits() -> None:

@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 from benchmarks.upset_simulation import Fate, Hit, Target
 from tests.formal.small import leaky, resonator
-from tests.gen.test_architecture import design_in
+from tests.gen.architectures.test_architecture import design_in
 
-from sosmith.gen.architecture import Architecture
+from sosmith.gen.architectures.architecture import Architecture
+from sosmith.gen.architectures.registry import ARCHITECTURES
 from sosmith.gen.core import design_core
 from sosmith.gen.output.core_facts import StreamFacts
 from sosmith.hdl.plan.streams import dest_width, fields
@@ -42,7 +43,7 @@ class Case(NamedTuple):
         """The core itself."""
         made = {"leaky": leaky, "resonator": resonator, "audio": audio, "steady": steady}[self.datapath]()
         named = replace(made, name="core")  # "small" is a word of Verilog
-        return Architecture(self.architecture, named, self.channels, self.reload, self.protect)
+        return ARCHITECTURES[self.architecture](named, self.channels, self.reload, self.protect)
 
 
 def steady() -> Datapath:

@@ -12,7 +12,7 @@ from tests.gen.word_lengths.test_quantize import butterworth, plain
 from tests.hdl.core_bench import Pace, run_core, simulate
 from tests.hdl.stage_bench import run
 
-from sosmith.gen.architecture import Architecture
+from sosmith.gen.architectures.registry import ARCHITECTURES
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.port import Port
 
@@ -52,7 +52,7 @@ def test_every_channel_starts_from_its_own_first_sample(
 ) -> None:
     chance = random.Random(2)
     samples = [(chance.randrange(channels), [chance.randrange(64)]) for _ in range(30 * channels)]
-    found = run_core(Architecture(architecture, datapath(), channels, reload, protect), samples, Pace())
+    found = run_core(ARCHITECTURES[architecture](datapath(), channels, reload, protect), samples, Pace())
     for channel in range(channels):
         codes = np.array([codes for own, codes in samples if own == channel])
         results = [beat for beat in found if beat.channel == channel]
@@ -63,7 +63,7 @@ def test_every_channel_starts_from_its_own_first_sample(
 @pytest.mark.parametrize("architecture", ["parallel", "folded"])
 def test_every_reset_begins_with_a_new_first_sample(architecture: str) -> None:
     chance = random.Random(3)
-    dut: Any = Architecture(architecture, datapath()).component()
+    dut: Any = ARCHITECTURES[architecture](datapath()).component()
     runs = [[[chance.randrange(64)] for _ in range(chance.randint(1, 6))] for _ in range(12)]
     results: list[list[int]] = []
 

@@ -13,7 +13,7 @@ import pytest
 from tests.gen.designs import EXAMPLES
 from tests.hdl.core_bench import Pace, run_core
 
-from sosmith.gen.architecture import Architecture
+from sosmith.gen.architectures.architecture import Architecture
 from sosmith.gen.core import design_core
 from sosmith.gen.specification.specification import load
 from sosmith.gen.word_lengths.settling import samples_to_settle

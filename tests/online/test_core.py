@@ -12,7 +12,7 @@ from tests.formal.prover import broken
 from tests.gen.designs import EXAMPLES
 from tests.hdl.core_bench import Pace, run_core, simulate
 
-from sosmith.gen.architecture import Architecture
+from sosmith.gen.architectures.architecture import Architecture
 from sosmith.gen.core import design_core
 from sosmith.gen.specification.specification import from_text, load
 from sosmith.hdl.online import cascade

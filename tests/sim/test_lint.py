@@ -12,7 +12,7 @@ import pytest
 from tests.gen.designs import ALL, example_design
 from tests.sim.lint import icarus_check, lint
 
-from sosmith.gen.architecture import Architecture
+from sosmith.gen.architectures.registry import ARCHITECTURES
 from sosmith.gen.core import design_core
 from sosmith.gen.fpga.yowasp import compile_first
 from sosmith.gen.output.generate import generate
@@ -40,7 +40,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @cache
 def emitted(folder: Path, example: str, core: str, realization: str, architecture: str) -> Path:
     made = example_design(example, core=core, realization=realization)
-    made = replace(made, architecture=Architecture(architecture, made.datapath))
+    made = replace(made, architecture=ARCHITECTURES[architecture](made.datapath))
     return generate(made, folder / f"{made.spec.name}_{core}_{realization}_{architecture}")[0]
 
 

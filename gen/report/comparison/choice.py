@@ -6,12 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from sosmith.gen.architectures.registry import ARCHITECTURES
 from sosmith.gen.quantity import plain_number, quantity
 from sosmith.gen.report.comparison.fairness import fairness
 from sosmith.gen.report.comparison.report_file import Report, fact
 from sosmith.gen.word_lengths.cost import LUTS_OF_A_BLOCK
 
-SMALLEST_FIRST = ("serial", "folded", "parallel", "online")
+SMALLEST_FIRST = tuple(ARCHITECTURES)
 """Architectures by the hardware that they take where multiplications are many: no multiplier block, one, many."""
 
 

@@ -10,11 +10,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from sosmith.gen.specification.choices import ARCHITECTURES, FAMILIES, KINDS, LOSSES, METHODS, REALIZATIONS, STARTS
+from sosmith.gen.specification.combinations import Combination, combinations
 from sosmith.gen.specification.exact_values import exact
 from sosmith.gen.specification.specification import Specification as Checked
 from sosmith.gen.specification.specification import example, from_text, from_tree, load
 from sosmith.interface.quantity import Quantity
 from sosmith.model.errors import SpecificationError
+
+__all__ = ["Combination", "Specification", "specification_of"]
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -235,6 +238,22 @@ class Specification:
             "hardware.architecture": ARCHITECTURES,
             "hardware.start": STARTS,
         }
+
+    @staticmethod
+    def combinations() -> tuple[Combination, ...]:
+        """Return whether each two things that a specification can ask of the hardware go together.
+
+        Of an architecture and an option, then of two options: `row` and `option` name them, `verdict` is "ok", "no
+        use", "refused" for a reason of principle or "not yet", and `reason` says why, or is empty.
+
+        Examples
+        --------
+        >>> import sosmith
+        >>> one = sosmith.Specification.combinations()[0]
+        >>> one.row, one.option, one.verdict
+        ('parallel', 'channels', 'ok')
+        """
+        return combinations()
 
     @staticmethod
     def losses(family: str) -> tuple[str, ...]:

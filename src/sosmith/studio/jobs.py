@@ -235,7 +235,7 @@ def _cost(made: Design) -> dict[str, Any]:
         sizes: Sequence[Sequence[int]] = made.manifest["cost"]["multipliers"]
         return {"multipliers": len(sizes), "luts": made.cost.luts, "instructions": None, "words": None}
     return {
-        "multipliers": 0 if made.architecture == "serial" else 1,
+        "multipliers": made.core.architecture.multiplier_blocks,
         "luts": None,
         "instructions": len(schedule["instructions"]),
         "words": schedule["words"],

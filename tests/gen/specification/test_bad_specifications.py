@@ -489,19 +489,20 @@ BAD = [
         "several samples a clock folded",
         CLOCK,
         CLOCK + '\nsamples_per_clock = 2\narchitecture = "folded"',
-        "hardware.architecture must be 'auto' or 'parallel' with hardware.samples_per_clock = 2, not 'folded'",
+        "hardware.architecture must be 'auto' or 'parallel' with hardware.samples_per_clock = 2, as folded takes "
+        "several clocks for each sample, not 'folded'",
     ),
     (
         "several samples a clock with loadable constants",
         CLOCK,
         CLOCK + "\nsamples_per_clock = 2\nreload = true",
-        "hardware.reload must be false with hardware.samples_per_clock = 2, not true",
+        "not yet available: hardware.reload must be false with hardware.samples_per_clock = 2, not true",
     ),
     (
         "look-ahead with protection",
         CLOCK,
         CLOCK + '\npipeline = "look-ahead"\nprotect = "detect"',
-        "hardware.protect must be 'none' with hardware.pipeline = \"look-ahead\", not 'detect'",
+        "not yet available: hardware.protect must be 'none' with hardware.pipeline = \"look-ahead\", not 'detect'",
     ),
     (
         "look-ahead of a realization",
@@ -519,7 +520,8 @@ BAD = [
         "look-ahead with multipliers",
         CLOCK,
         CLOCK + '\npipeline = "look-ahead"\nmultipliers = 4',
-        "hardware.multipliers must be 'auto' or 0 with hardware.pipeline = \"look-ahead\", not 4",
+        "hardware.multipliers must be 'auto' or 0 with hardware.pipeline = \"look-ahead\", as all its products by "
+        "constants are made of adders, not 4",
     ),
     (
         "a factor that is no power of two",
@@ -585,7 +587,7 @@ BAD = [
         "decimation before on-line arithmetic",
         CLOCK,
         f'{CLOCK}\narchitecture = "online"\n{DECIMATED}',
-        'not yet available: hardware.architecture must be one of "auto", "folded", "serial", "parallel" with '
+        "not yet available: hardware.architecture must be one of 'auto', 'parallel', 'folded', 'serial' with "
         "filter.decimate, not 'online'",
     ),
     (
@@ -927,7 +929,7 @@ BAD = [
         "no multipliers for loadable constants",
         CLOCK,
         CLOCK + "\nreload = true\nmultipliers = 0",
-        'hardware.multipliers must be "auto" with hardware.reload = true: adders multiply by constants that are '
+        "hardware.multipliers must be 'auto' with hardware.reload = true, as adders multiply by constants that are "
         "fixed, not 0",
     ),
     (
@@ -940,31 +942,32 @@ BAD = [
         "several channels digit by digit",
         BASE,
         BASE.replace(RATE, RATE + "\nchannels = 2").replace(CLOCK, CLOCK + '\narchitecture = "online"'),
-        'channels must be 1 with hardware.architecture = "online", not 2',
+        'not yet available: channels must be 1 with hardware.architecture = "online", not 2',
     ),
     (
         "constants loaded digit by digit",
         CLOCK,
         CLOCK + '\narchitecture = "online"\nreload = true',
-        'hardware.reload must be false with hardware.architecture = "online", not true',
+        'not yet available: hardware.reload must be false with hardware.architecture = "online", not true',
     ),
     (
         "protection digit by digit",
         CLOCK,
         CLOCK + '\narchitecture = "online"\nprotect = "detect"',
-        "hardware.protect must be 'none' with hardware.architecture = \"online\", not 'detect'",
+        "not yet available: hardware.protect must be 'none' with hardware.architecture = \"online\", not 'detect'",
     ),
     (
         "online within a number of multipliers",
         CLOCK,
         CLOCK + '\narchitecture = "online"\nmultipliers = 0',
-        "hardware.multipliers must be 'auto' with hardware.architecture = \"online\", not 0",
+        "not yet available: hardware.multipliers must be 'auto' with hardware.architecture = \"online\", not 0",
     ),
     (
         "folded without a multiplier",
         CLOCK,
         CLOCK + '\narchitecture = "folded"\nmultipliers = 0',
-        'hardware.multipliers must be "auto" or at least 1 with hardware.architecture = "folded", which has one, not 0',
+        "hardware.multipliers must be 'auto' or at least 1 with hardware.architecture = \"folded\", as its program "
+        "needs one, not 0",
     ),
     (
         "reload is a text",

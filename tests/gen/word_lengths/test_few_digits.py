@@ -6,9 +6,12 @@ import pytest
 from tests.verify.parallel.cores import specified
 from tests.verify.small_specifications import PLAIN
 
-from sosmith.gen.architecture import Blocks, Budget, blocks_for, candidates, objective_of
+from sosmith.gen.architectures.blocks import Blocks, blocks_for
+from sosmith.gen.architectures.budget import Budget
+from sosmith.gen.architectures.registry import ARCHITECTURES, candidates
 from sosmith.gen.core import design_core
 from sosmith.gen.fpga.boards import find_board
+from sosmith.gen.specification.combinations import NO_MULTIPLIERS, SEVERAL, Option
 from sosmith.gen.word_lengths.cost import area_by_digits, cost_of_graphs, products_from_adders, scalings
 from sosmith.gen.word_lengths.objective import FEW_ADDERS, SMALL_AREA
 from sosmith.gen.word_lengths.search import _with_fewer_digits
@@ -70,17 +73,22 @@ def test_without_multipliers_nothing_is_folded(multipliers: int | None, chosen: 
     assert bool(made.architecture.multiplier_blocks) == (chosen == "folded")
 
 
+def tried(blocks: Blocks, *options: Option) -> list[str]:
+    return [kind.terms.name for kind in candidates("auto", blocks, options)]
+
+
 def test_the_board_and_the_specification_say_how_many_blocks_there_are() -> None:
     hx8k, up5k = find_board("ice40_hx8k_b_evn"), find_board("icebreaker")
     assert blocks_for(None, None) == Blocks(None)
     assert blocks_for(None, hx8k) == Blocks(0)
     assert blocks_for(None, up5k) == Blocks(8, 16)
     assert blocks_for(3, up5k) == Blocks(3, 16)
-    assert candidates("auto", Blocks(0)) == ("serial", "folded", "parallel")
-    assert candidates("auto", Blocks(8)) == ("folded", "parallel")
-    assert candidates("auto", Blocks(0), folds=False) == ("serial", "parallel")
-    assert objective_of("parallel", hx8k, adders=True) == FEW_ADDERS
-    assert objective_of("parallel", up5k) == SMALL_AREA
+    assert tried(Blocks(0)) == ["serial", "folded", "parallel"]
+    assert tried(Blocks(8)) == ["folded", "parallel"]
+    assert tried(Blocks(0), NO_MULTIPLIERS) == ["serial", "parallel"]
+    assert tried(Blocks(0), SEVERAL) == ["parallel"]
+    assert ARCHITECTURES["parallel"].objective(hx8k, adders=True) == FEW_ADDERS
+    assert ARCHITECTURES["parallel"].objective(up5k) == SMALL_AREA
     budget = Budget(clock=specified(PLAIN).hardware.clock, sample_rate=specified(PLAIN).sample_rate, blocks=Blocks(0))
     assert budget.adders
     assert not replace(budget, reload=True).adders

@@ -6,7 +6,7 @@ import re
 import pytest
 from tests.gen.designs import ALL, example_design, parallel_design
 
-from sosmith.gen.architecture import objective_of
+from sosmith.gen.architectures.registry import ARCHITECTURES
 from sosmith.gen.fpga.boards import find_board
 from sosmith.gen.word_lengths.objective import SMALL_AREA, Objective, ShortProgram
 from sosmith.gen.word_lengths.online_units import OnlineUnits
@@ -15,7 +15,12 @@ from sosmith.model.dataflow.graph import GraphBuilder
 from sosmith.model.dataflow.program import serial_clocks
 from sosmith.model.errors import ShortfallError
 
-OBJECTIVES = [SMALL_AREA, ShortProgram("folded", 15), ShortProgram("folded", 17), ShortProgram("serial", 15)]
+OBJECTIVES = [
+    SMALL_AREA,
+    ShortProgram("folded", 15),
+    ShortProgram("folded", 17),
+    ShortProgram("serial", 15, bit_serial=True),
+]
 
 
 def estimated(objective: Objective, datapath: Datapath) -> float:
@@ -54,7 +59,7 @@ def test_what_cannot_be_folded() -> None:
     g = GraphBuilder()
     x = g.input("x", frac=3, low=-8, high=7)
     graph = g.build([g.floor(g.truncate(x, 1, "cut"), 0, "y")])
-    objective = ShortProgram("serial", 15)
+    objective = ShortProgram("serial", 15, bit_serial=True)
     assert objective.of_graph(graph) == math.inf
     sentence = (
         "the realization must suit the serial architecture: the datapath must not truncate inside to be folded; "
@@ -89,8 +94,8 @@ def test_clocks_of_a_serial_multiplication(factor: int, clocks: int) -> None:
         ("parallel", "ulx3s_85f", SMALL_AREA),
         ("folded", None, ShortProgram("folded", 15)),
         ("folded", "ulx3s_85f", ShortProgram("folded", 17)),
-        ("serial", "ulx3s_85f", ShortProgram("serial", 15)),
+        ("serial", "ulx3s_85f", ShortProgram("serial", 15, bit_serial=True)),
     ],
 )
 def test_the_objective_is_that_of_the_architecture(architecture: str, board: str | None, objective: Objective) -> None:
-    assert objective_of(architecture, None if board is None else find_board(board)) == objective
+    assert ARCHITECTURES[architecture].objective(None if board is None else find_board(board)) == objective

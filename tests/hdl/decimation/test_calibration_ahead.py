@@ -13,7 +13,7 @@ from tests.formal.prover import broken
 from tests.gen.word_lengths.decimated import small
 from tests.hdl.core_bench import Pace, simulate
 
-from sosmith.gen.architecture import Architecture
+from sosmith.gen.architectures.architecture import Architecture
 from sosmith.hdl.decimation import decimator as hardware
 from sosmith.hdl.plan import folded_clocks
 from sosmith.hdl.plan.streams import fields

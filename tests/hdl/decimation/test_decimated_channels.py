@@ -12,7 +12,7 @@ from tests.hdl import core_bench
 from tests.hdl.core_bench import Pace, run_core
 from tests.hdl.decimation.test_calibration_ahead import LIMITS, run
 
-from sosmith.gen.architecture import Architecture
+from sosmith.gen.architectures.architecture import Architecture
 from sosmith.hdl.decimation import decimator as hardware
 from sosmith.hdl.plan import folded_clocks
 

@@ -11,7 +11,8 @@ from typing import NamedTuple
 
 from tests.verify.small_specifications import PLAIN
 
-from sosmith.gen.architecture import NO_LIMIT, Architecture, Blocks
+from sosmith.gen.architectures.blocks import NO_LIMIT, Blocks
+from sosmith.gen.architectures.registry import ARCHITECTURES
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.output.certificate import certificate
 from sosmith.gen.output.verilog import to_rtlil, to_verilog
@@ -48,8 +49,7 @@ def made(
     blocks: Blocks = NO_LIMIT,
     look_ahead: bool = False,
 ) -> Made:
-    core = Architecture(
-        "parallel",
+    core = ARCHITECTURES["parallel"](
         design.datapath,
         channels,
         reload=reload,

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 from tests.verify.parallel.cores import ODD, Made, made, small_design, specified
 
-from sosmith.gen.architecture import Blocks
+from sosmith.gen.architectures.blocks import Blocks
 from sosmith.gen.core import design_core
 from sosmith.verify.graph import RejectedError
 

@@ -17,7 +17,7 @@ import pytest
 from tests.gen.designs import ALL, EXAMPLES
 from tests.verify.small_specifications import INSTRUMENT, PLAIN
 
-from sosmith.gen.architecture import Architecture
+from sosmith.gen.architectures.registry import ARCHITECTURES
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.output.certificate import certificate
 from sosmith.gen.output.verilog import to_rtlil, to_verilog
@@ -49,7 +49,7 @@ def specified(text: str) -> Specification:
 
 
 def made(design: CoreDesign, architecture: str, channels: int = 1) -> Made:
-    core = Architecture(architecture, design.datapath, channels)
+    core = ARCHITECTURES[architecture](design.datapath, channels)
     assert core.program is not None
     text = to_verilog(to_rtlil(core.component(), design.datapath.name))
     read = json.loads(certificate_text(certificate(design.quantized, design.spec.max_error)))
@@ -269,7 +269,7 @@ def test_cores_without_a_fixed_program_are_refused() -> None:
     core = small(PLAIN)
     with pytest.raises(RejectedError, match=r"^the core must be folded or serial to have a program, not parallel$"):
         core.check("module plain();\nendmodule\n")
-    loadable = Architecture("folded", core.design.datapath, reload=True)
+    loadable = ARCHITECTURES["folded"](core.design.datapath, reload=True)
     text = to_verilog(to_rtlil(loadable.component(), "plain"))
     with pytest.raises(RejectedError, match=r"^the program must be fixed to be checked, not loadable at run time$"):
         core.check(text)

@@ -11,7 +11,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from sosmith.commands.tables.console import TableConsole, new_table
-from sosmith.gen.architecture import Architecture
+from sosmith.gen.architectures.architecture import Architecture
 from sosmith.gen.calibration.fit import Fit, read_measurements
 from sosmith.gen.output.core_facts import LimitCycleFacts
 from sosmith.gen.output.decimation_facts import RateCosts
@@ -172,7 +172,7 @@ def _hardware_rows(architecture: Architecture) -> list[tuple[str, str]]:
         sizes = f"{cost.adder_bits}, {cost.register_bits}"
         return [latency, ("multipliers", cost.multiplier_sizes), ("adder bits, state and register bits", sizes)]
     word = program.digit_bits + 1
-    multiplier = "none, shifts and additions" if architecture.name == "serial" else f"1 of {word} x {word}"
+    multiplier = "none, shifts and additions" if architecture.multiplier_blocks == 0 else f"1 of {word} x {word}"
     memory = f"{program.words:,} words of {word} bits a channel, {program.states:,} of them states"
     accumulator = f"{program.accumulator_bits} bits"
     return [

@@ -9,7 +9,8 @@ import pytest
 from tests.formal.small import limiter
 from tests.gen.designs import EXAMPLES, example_design
 
-from sosmith.gen.architecture import Architecture, Budget, fitting
+from sosmith.gen.architectures.budget import Budget
+from sosmith.gen.architectures.registry import ARCHITECTURES, fitting
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.fpga.boards import find_board
 from sosmith.gen.output.core_facts import core_facts
@@ -91,17 +92,17 @@ def test_digits_are_as_wide_as_the_multipliers_of_the_board(
     architecture: str, board: str | None, digit_bits: int
 ) -> None:
     budget = Budget(clock=Fraction(10**8), sample_rate=Fraction(48_000))
-    made = fitting(architecture, budget, limiter(), None if board is None else find_board(board))
+    made = fitting(ARCHITECTURES[architecture], budget, limiter(), None if board is None else find_board(board))
     assert made.program is not None
     assert made.program.digit_bits == digit_bits
 
 
 def test_an_instruction_that_can_be_loaded_fits_a_register() -> None:
     datapath = example_design("flange_wear_locomotive.toml", realization="df1_ef2").datapath
-    made = Architecture("folded", datapath, reload=True, digit_bits=17).program
+    made = ARCHITECTURES["folded"](datapath, reload=True, digit_bits=17).program
     assert made is not None
     assert (made.digit_bits, instruction_bits(made)) == (15, 32)
-    fixed = Architecture("folded", datapath, digit_bits=17).program
+    fixed = ARCHITECTURES["folded"](datapath, digit_bits=17).program
     assert fixed is not None
     assert (fixed.digit_bits, instruction_bits(fixed)) == (17, 34)
 
@@ -168,7 +169,7 @@ def test_a_realization_that_cannot_be_folded_is_refused() -> None:
         match=r"^the realization must suit the folded architecture: "
         r"the datapath must not truncate inside to be folded; parallel takes every realization$",
     ):
-        fitting("folded", Budget(clock=Fraction(10**8), sample_rate=Fraction(48_000)), datapath)
+        fitting(ARCHITECTURES["folded"], Budget(clock=Fraction(10**8), sample_rate=Fraction(48_000)), datapath)
 
 
 def test_what_the_instructions_are_there_for() -> None:
@@ -188,11 +189,11 @@ def test_what_the_instructions_are_there_for() -> None:
 )
 def test_cores_in_the_field_keep_their_fingerprint(architecture: str, expected: int) -> None:
     """A core compares this number with that of a set: it must not follow the names in this code."""
-    assert Architecture(architecture, limiter(), reload=True).fingerprint == expected
+    assert ARCHITECTURES[architecture](limiter(), reload=True).fingerprint == expected
 
 
 def test_digits_of_another_width_make_another_core() -> None:
-    found = {Architecture("folded", limiter(), reload=True, digit_bits=bits).fingerprint for bits in (14, 15, 17)}
+    found = {ARCHITECTURES["folded"](limiter(), reload=True, digit_bits=bits).fingerprint for bits in (14, 15, 17)}
     assert len(found) == 3
 
 

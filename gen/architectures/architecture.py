@@ -1,0 +1,294 @@
+"""What every architecture of a datapath's hardware has: its terms, its plan of clocks, its size, and its component."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, ClassVar
+
+from sosmith.gen.architectures.blocks import NO_LIMIT, Blocks
+from sosmith.gen.architectures.fingerprint import fingerprint
+from sosmith.gen.fpga.boards import Board
+from sosmith.gen.specification.combinations import Terms
+from sosmith.gen.word_lengths.cost import Cost, cost_of_graphs, products_from_adders
+from sosmith.gen.word_lengths.objective import Objective
+from sosmith.hdl.plan import decimator_clocks
+from sosmith.hdl.plan.unfolding import unfolded_stages
+from sosmith.model.dataflow.datapath import Datapath
+from sosmith.model.dataflow.decimator import Decimator
+from sosmith.model.dataflow.graph import Graph
+from sosmith.model.dataflow.program import Program
+from sosmith.model.sections.online import OnlineSchedule
+
+if TYPE_CHECKING:
+    from amaranth.lib.wiring import Component
+
+DIGIT_BITS = 15
+"""Width of a digit without a board: factors of 16 bits, a sign included, suit every multiplier block that is known."""
+
+
+@dataclass(frozen=True)
+class Architecture(ABC):
+    """A datapath and the hardware that an architecture makes of it.
+
+    Attributes
+    ----------
+    terms : Terms
+        Of the class: its name, and which specifications it takes.
+    checked : str
+        Of the class: what `sosmith verify --files` proves of a core with fixed constants and no protection, a sentence.
+    datapath : Datapath
+        The datapath.
+    channels : int
+        Number of channels.
+    reload : bool
+        Whether constants can be loaded at run time.
+    protect : str
+        One of `sosmith.model.dataflow.protection.PROTECTIONS`.
+    digit_bits : int
+        Width of a digit of the program, one bit less than a factor of the multiplier; less if an instruction must fit
+        a register to be loadable.
+    blocks : Blocks
+        Multiplier blocks that there are for the products of the parallel architecture.
+    samples_per_clock : int
+        Samples in a beat of the streams; more than one in the parallel architecture only.
+    look_ahead : bool
+        Whether the loops of the parallel architecture, which go back several samples, are pipelined through those
+        between. All products by constants are then made of adders.
+    hold : bool
+        Whether each result behind a decimator is handed out once for each of its samples.
+    ahead : Architecture or None
+        That of the calibration before a decimator; None without one.
+    """
+
+    terms: ClassVar[Terms]
+    checked: ClassVar[str]
+
+    datapath: Datapath
+    channels: int = 1
+    reload: bool = False
+    protect: str = "none"
+    digit_bits: int = DIGIT_BITS
+    blocks: Blocks = NO_LIMIT
+    samples_per_clock: int = 1
+    look_ahead: bool = False
+    hold: bool = False
+    ahead: Architecture | None = None
+
+    @classmethod
+    @abstractmethod
+    def is_tried(cls, blocks: Blocks) -> bool:
+        """Say whether an automatic choice tries it, where there are so many multiplier blocks."""
+
+    @classmethod
+    @abstractmethod
+    def objective(cls, board: Board | None, *, adders: bool = False) -> Objective:
+        """Return what word lengths and a realization are chosen for.
+
+        `adders` says that no product by a constant may take a multiplier block, where each product has its own.
+        """
+
+    @classmethod
+    def digit_bits_on(cls, board: Board | None) -> int:
+        """Width of a digit, where there is a program: by the multiplier block of the board if it takes one."""
+        del board
+        return DIGIT_BITS
+
+    @property
+    def name(self) -> str:
+        """As in the specification."""
+        return self.terms.name
+
+    @property
+    def program(self) -> Program | None:
+        """Program of a shared unit; None without one.
+
+        Raises
+        ------
+        ShortfallError
+            If the datapath cannot be folded.
+        """
+        return None
+
+    @property
+    def online(self) -> OnlineSchedule | None:
+        """Clocks of units that work on digits; None without them.
+
+        Raises
+        ------
+        ShortfallError
+            If a section is not one for on-line arithmetic.
+        """
+        return None
+
+    @property
+    def decimator(self) -> Decimator | None:
+        """What stands before the datapath's first stage; None if all samples go in."""
+        return self.datapath.decimator
+
+    @property
+    def copies_per_result(self) -> int:
+        """Times that each result is handed out."""
+        return self.decimator.factor if self.hold and self.decimator is not None else 1
+
+    @property
+    def restarts(self) -> bool:
+        """Whether the hardware restarts with constants that are loaded."""
+        return self.reload and self.datapath.restarts
+
+    @cached_property
+    def fingerprint(self) -> int | None:
+        """CRC-32 of everything about the hardware except its constants: sets are loadable if this is equal.
+
+        None if the hardware is not reloadable.
+        """
+        if not self.reload:
+            return None
+        return fingerprint(
+            self.name, self.datapath, self.channels, self.program, protect=self.protect, restarts=self.restarts
+        )
+
+    # Size.
+
+    @cached_property
+    def graphs(self) -> list[Graph]:
+        """What stages with hardware for each operation compute at a clock."""
+        return [stage.graph for stage in unfolded_stages(self.datapath, self.samples_per_clock)]
+
+    @cached_property
+    def adders(self) -> tuple[frozenset[int], ...]:
+        """Products by constants that are made of adders, by stage: for which there are no multiplier blocks left.
+
+        With several samples a clock, those of the unfolded stages. None of them if the constants can be loaded, and
+        where products share a unit.
+        """
+        return products_from_adders(self.graphs, None, self.blocks.bits)
+
+    @property
+    def cost(self) -> Cost:
+        """Operators before synthesis, where a program would run as if each had its own hardware; no decimator's.
+
+        Those of a calibration before a decimator are among them, unless that alone has a program.
+        """
+        own = cost_of_graphs(self.graphs, self.adders)
+        apart = self.ahead is None or (self.program is None and self.ahead.program is not None)
+        return own if self.ahead is None or apart else self.ahead.cost.beside(own)
+
+    @property
+    def multiplier_blocks(self) -> int:
+        """Multiplier blocks that it takes, without what stands before a decimator."""
+        sizes = cost_of_graphs(self.graphs, self.adders).multiplications
+        return sum(product.blocks_of(self.blocks.bits) for product in sizes)
+
+    @property
+    def memory_bits(self) -> int | None:
+        """Bits of memory, with those of what stands before a decimator; None if nothing has any."""
+        programs = [each.program for each in (self.ahead, self) if each is not None and each.program is not None]
+        return sum(each.words * (each.digit_bits + 1) for each in programs) if programs else None
+
+    # Clocks. Those with an underscore are of what stands behind a decimator alone.
+
+    @property
+    @abstractmethod
+    def _latency_cycles(self) -> int:
+        """Clocks from the edge that accepts a sample to the edge that can output it."""
+
+    @property
+    @abstractmethod
+    def _cycles_per_sample(self) -> int:
+        """Clocks between samples at the highest rate."""
+
+    @property
+    def _cleared_cycles(self) -> int:
+        """Clocks after a reset until the first sample is accepted, while memories are cleared."""
+        return 0
+
+    @property
+    def _taken_cycles(self) -> int:
+        """Clocks from the edge that finds a sample to the one that accepts it: 0 if it is accepted at once."""
+        return 0
+
+    @property
+    def latency_cycles(self) -> int:
+        """Clocks from the edge that accepts a sample to the edge that can output it; an upper limit in serial."""
+        before = 0 if self.ahead is None else self.ahead.latency_cycles
+        if self.decimator is not None:
+            before += decimator_clocks.latency_cycles(self.decimator, self.channels) + self.hold
+        return before + self._latency_cycles
+
+    @property
+    def clock_estimate(self) -> float | None:
+        """Estimate of the highest clock for one channel, on an ECP5, in Hz; None where no loop closes in one clock."""
+        return None
+
+    @property
+    def reset_cycles(self) -> int:
+        """Clocks after a reset until the first sample is accepted, while memories are cleared or a decimator fills."""
+        if self.decimator is None:
+            return self._cleared_cycles
+        filled = decimator_clocks.reset_cycles(self.decimator, self.channels)
+        if self.ahead is not None and self.channels > 1:
+            return max(self._cleared_cycles, filled, self.ahead.reset_cycles)
+        if self.ahead is not None:  # which gives the first sample that the decimator fills with
+            filled += self.ahead.reset_cycles + self.ahead.latency_cycles + decimator_clocks.FIRST_SAMPLE
+        return max(self._cleared_cycles, filled)
+
+    @property
+    def cycles_per_sample(self) -> int:
+        """Clocks between samples at the highest rate, an upper limit in serial.
+
+        Rounded up behind a decimator, and with several samples a clock.
+        """
+        return -(-self.cycles_per_result // (1 if self.decimator is None else self.decimator.factor))
+
+    @property
+    def clocks_per_sample(self) -> float:
+        """Clocks between samples at the highest rate, on average; an upper limit in serial.
+
+        A whole number but behind a decimator, and with several samples a clock.
+        """
+        share = self.samples_per_clock if self.decimator is None else self.decimator.factor
+        clocks = self.cycles_per_result
+        return clocks / share if clocks % share else clocks // share
+
+    @property
+    def cycles_per_result(self) -> int:
+        """Clocks between results at the highest rate; an upper limit in serial."""
+        behind = self._cycles_per_sample
+        if self.decimator is None:
+            return behind
+        each = 1 if self.ahead is None else self.ahead.cycles_per_result
+        if self.channels > 1:
+            return max(decimator_clocks.cycles_per_result_of_many(self.decimator, each=each), behind)
+        return max(decimator_clocks.cycles_per_result(self.decimator, self._taken_cycles, each=each), behind)
+
+    # Hardware.
+
+    @abstractmethod
+    def _core(self, *, before: bool = False) -> Component:
+        """Make what works on the datapath's own stages, `before` a decimator or behind it."""
+
+    def component(self) -> Component:
+        """Make the hardware; the top module has the name of the datapath."""
+        made = self._core()
+        if self.decimator is None:
+            return made
+        from sosmith.hdl.decimation.decimator import DecimatedCore  # only what makes hardware loads Amaranth
+
+        ahead = None if self.ahead is None else self.ahead._core(before=True)
+        return DecimatedCore(self.datapath, made, ahead, hold=self.hold, opens=self._cleared_cycles)
+
+    @property
+    def _flags_given(self) -> int:
+        """Flags of a sample that a decimator hands on to what stands behind it."""
+        from sosmith.hdl.status import OF_INPUT, RAIL_ALONE
+
+        return 0 if self.decimator is None else RAIL_ALONE if self.ahead is None else OF_INPUT
+
+    # Words.
+
+    def reason(self, why: str, available: int) -> str:
+        """Say in a sentence that it was chosen and `why`, with `available` clocks for each result."""
+        per = "a sample" if self.decimator is None else f"for {self.decimator.factor} samples"
+        return f"{self.name}: {why}; takes {self.cycles_per_result:,} of {available:,} clocks {per}"

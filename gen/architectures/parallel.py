@@ -1,0 +1,112 @@
+"""The parallel architecture: every operation has its own hardware, and a beat goes in at every clock."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+from sosmith.gen.architectures.architecture import Architecture
+from sosmith.gen.architectures.blocks import Blocks
+from sosmith.gen.fpga.boards import Board
+from sosmith.gen.specification.combinations import PARALLEL
+from sosmith.gen.word_lengths.cost import products_from_adders, scalings
+from sosmith.gen.word_lengths.objective import FEW_ADDERS, SMALL_AREA, Objective
+from sosmith.hdl.plan import parallel_clocks
+from sosmith.model.dataflow.datapath import Datapath
+from sosmith.model.reload.constants import with_room
+
+if TYPE_CHECKING:
+    from amaranth.lib.wiring import Component
+
+
+@dataclass(frozen=True)
+class Parallel(Architecture):
+    """Every operation has its own hardware."""
+
+    terms = PARALLEL
+    checked = "the pipeline computes the datapath's graphs, register by register, in every lane and for each channel"
+
+    @classmethod
+    def is_tried(cls, blocks: Blocks) -> bool:
+        """Return True: it is the fastest."""
+        del blocks
+        return True
+
+    @classmethod
+    def objective(cls, board: Board | None, *, adders: bool = False) -> Objective:
+        """Return the estimated area of the operators."""
+        del board
+        return FEW_ADDERS if adders else SMALL_AREA
+
+    @cached_property
+    def adders(self) -> tuple[frozenset[int], ...]:
+        """Products by constants that are made of adders, by stage: all with look-ahead, none with constants to load."""
+        if self.look_ahead:
+            return tuple(map(scalings, self.graphs))
+        return products_from_adders(self.graphs, None if self.reload else self.blocks.available, self.blocks.bits)
+
+    @cached_property
+    def built(self) -> Datapath:
+        """The datapath with the widths of the hardware."""
+        return with_room(self.datapath) if self.reload else self.datapath
+
+    @property
+    def _is_block(self) -> bool:
+        """Whether the hardware is a `sosmith.hdl.block_core.BlockCore`."""
+        return self.look_ahead or self.samples_per_clock > 1
+
+    @property
+    def _latency_cycles(self) -> int:
+        if self._is_block:
+            lanes = self.samples_per_clock
+            return parallel_clocks.block_latency_cycles(self.datapath, lanes, look_ahead=self.look_ahead)
+        return parallel_clocks.latency_cycles(self.built, self.channels, protect=self.protect)
+
+    @property
+    def _cycles_per_sample(self) -> int:
+        return 1
+
+    @property
+    def _cleared_cycles(self) -> int:
+        return self.channels if self.channels > 1 else 0
+
+    @property
+    def clock_estimate(self) -> float:
+        """Estimate of the highest clock for one channel, on an ECP5, in Hz."""
+        lanes = self.samples_per_clock
+        return parallel_clocks.clock_estimate(self.datapath, lanes, look_ahead=self.look_ahead)
+
+    def _core(self, *, before: bool = False) -> Component:
+        from sosmith.hdl.block_core import BlockCore  # only what makes hardware loads Amaranth
+        from sosmith.hdl.core import Core
+
+        if self._is_block:
+            adders = () if self.look_ahead else self.adders
+            return BlockCore(self.datapath, self.samples_per_clock, look_ahead=self.look_ahead, adders=adders)
+        return Core(
+            self.built.behind_decimator,
+            self.channels,
+            fingerprint=self.fingerprint,
+            protect=self.protect,
+            adders=self.adders,
+            flags_given=self._flags_given,
+            before_decimator=before,
+        )
+
+    def reason(self, why: str, available: int) -> str:
+        """Say in a sentence that it was chosen and `why`, and which products are made of adders."""
+        del available
+        lanes = self.samples_per_clock
+        several = f", {lanes} samples a clock" if lanes > 1 else ""
+        return f"{self.name}: {why}{several}{self._made_of_adders()}"
+
+    def _made_of_adders(self) -> str:
+        count, there = sum(map(len, self.adders)), self.blocks.available
+        if not count:
+            return ""
+        products = f"{count} product{'s' * (count > 1)} by constants made of adders"
+        if self.look_ahead:
+            return f"; its {products}, with registers between them"
+        blocks = "without multiplier blocks" if not there else f"with at most {there} multiplier blocks"
+        return f"; {blocks}, {products}"

@@ -1,0 +1,76 @@
+"""The registry of architectures: what hardware a datapath can get.
+
+Each architecture is a class of its own, registered once, here; its terms stand in
+`sosmith.gen.specification.combinations`. Search, proof, report, comparison and exploration ask the class.
+"""
+
+from __future__ import annotations
+
+from sosmith.gen.architectures.architecture import Architecture
+from sosmith.gen.architectures.blocks import Blocks
+from sosmith.gen.architectures.budget import Budget
+from sosmith.gen.architectures.folded import Folded
+from sosmith.gen.architectures.online import Online
+from sosmith.gen.architectures.parallel import Parallel
+from sosmith.gen.architectures.serial import Serial
+from sosmith.gen.fpga.boards import Board
+from sosmith.gen.specification.choices import AUTO
+from sosmith.gen.specification.combinations import Option
+from sosmith.model.dataflow.datapath import Datapath
+
+SMALLEST_FIRST: tuple[type[Architecture], ...] = (Serial, Folded, Parallel, Online)
+"""All architectures by the hardware that they take where multiplications are many: no multiplier block, one, many."""
+
+ARCHITECTURES: dict[str, type[Architecture]] = {each.terms.name: each for each in SMALLEST_FIRST}
+"""All architectures that a specification can name, by name, the smallest first."""
+
+
+def candidates(wanted: str, blocks: Blocks, options: tuple[Option, ...] = ()) -> tuple[type[Architecture], ...]:
+    """Architectures to try for the one that the specification asks for beside `options`, the smallest first."""
+    if wanted != AUTO:
+        return (ARCHITECTURES[wanted],)
+    return tuple(each for each in SMALLEST_FIRST if each.is_tried(blocks) and each.terms.takes(options))
+
+
+def fitting(
+    kind: type[Architecture],
+    budget: Budget,
+    datapath: Datapath,
+    board: Board | None = None,
+    *,
+    look_ahead: bool = False,
+    ahead: Architecture | None = None,
+) -> Architecture:
+    """Return the hardware that an architecture makes of `datapath`, for a board if there is one.
+
+    `ahead` is that of the calibration before its decimator.
+
+    Raises
+    ------
+    ShortfallError
+        If the datapath cannot be folded, or the architecture does not keep up.
+    """
+    architecture = kind(
+        datapath,
+        budget.channels,
+        budget.reload,
+        budget.protect,
+        kind.digit_bits_on(board),
+        budget.blocks,
+        budget.samples_per_clock,
+        look_ahead,
+        budget.hold,
+        ahead,
+    )
+    budget.check(architecture)
+    return architecture
+
+
+def reason_for(architecture: Architecture, budget: Budget, *, asked: bool, board: Board | None, refused: str) -> str:
+    """Explain the choice of an architecture; `refused` says why a smaller one was rejected, if one was tried."""
+    smallest = "the smallest that keeps up"
+    if board is not None:
+        there = f"{board.device.multipliers} multipliers" if board.device.multipliers else "no multipliers"
+        smallest += f" on {board.name}, whose {board.device.title} has {there}"
+    why = "asked for in the specification" if asked else refused or smallest
+    return architecture.reason(why, budget.cycles)

@@ -1,0 +1,304 @@
+"""What combines in a specification: architectures and options of the hardware, and why the rest is refused.
+
+The one table of it: the rules of a specification walk it, the automatic choice of an architecture asks it, and
+`sosmith combinations` prints it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+from itertools import combinations as pairs
+from typing import Any, NamedTuple, Protocol
+
+from sosmith.gen.specification.values import UnfitError, literal
+
+
+class Specified(Protocol):
+    """What options are read from: a document, or the specification made of it."""
+
+    @property
+    def channels(self) -> int:
+        """Number of channels."""
+
+    @property
+    def filter(self) -> Any:
+        """The table [filter]."""
+
+    @property
+    def hardware(self) -> Any:
+        """The table [hardware]."""
+
+
+class Verdict(Enum):
+    """Whether two things that a specification can ask for go together."""
+
+    OK = "ok"
+    NO_USE = "no use"
+    """Refused: the one takes away what the other is for."""
+    REFUSED = "refused"
+    """For a reason of principle."""
+    LATER = "not yet"
+    """Nothing stands against it, but this version lacks it."""
+
+
+class Refusal(NamedTuple):
+    """Why two things do not go together.
+
+    Attributes
+    ----------
+    verdict : Verdict
+        Any but OK.
+    reason : str
+        Why; follows "as" in messages. Empty for what is not there yet.
+    only : str
+        What the key at fault must be instead; empty for what it is if nothing is asked for.
+    """
+
+    verdict: Verdict
+    reason: str = ""
+    only: str = ""
+
+
+LATER = Refusal(Verdict.LATER)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Option:
+    """What a specification can ask of the hardware beside a filter for one channel.
+
+    Attributes
+    ----------
+    name : str
+        Heading of its column.
+    key : str
+        Path of its key.
+    of : callable
+        Returns the value of the key in a specification.
+    without : str
+        What the key must be for the option not to be asked for.
+    asks : callable
+        Says whether a value asks for it.
+    shows_value : bool
+        Whether messages about other keys tell its value.
+    first : bool
+        Whether a message about an architecture that lacks it names the architecture as the key at fault.
+    """
+
+    name: str
+    key: str
+    of: Callable[[Specified], object]
+    without: str
+    asks: Callable[[object], bool]
+    shows_value: bool = True
+    first: bool = False
+
+    def asked(self, spec: Specified) -> bool:
+        """Say whether a specification asks for it."""
+        return self.asks(self.of(spec))
+
+    def phrase(self, spec: Specified) -> str:
+        """Return how messages about other keys name it, such as ``hardware.reload = true``."""
+        value = self.of(spec)
+        shown = f'"{value}"' if isinstance(value, str) else literal(value)
+        return f"{self.key} = {shown}" if self.shows_value else self.key
+
+
+CHANNELS = Option(
+    name="channels", key="channels", of=lambda d: d.channels, without="1", asks=lambda value: value != 1
+)  # fmt: skip
+RELOAD = Option(name="reload", key="hardware.reload", of=lambda d: d.hardware.reload, without="false", asks=bool)
+PROTECT = Option(
+    name="protect",
+    key="hardware.protect",
+    of=lambda d: d.hardware.protect,
+    without="'none'",
+    asks=lambda value: value != "none",
+)
+DECIMATE = Option(
+    name="decimate",
+    key="filter.decimate",
+    of=lambda d: d.filter.decimate,
+    without="left out",
+    asks=lambda value: value is not None,
+    shows_value=False,
+    first=True,
+)
+SEVERAL = Option(
+    name="samples_per_clock",
+    key="hardware.samples_per_clock",
+    of=lambda d: d.hardware.samples_per_clock,
+    without="1",
+    asks=lambda value: value != 1,
+    first=True,
+)
+LOOK_AHEAD = Option(
+    name="look-ahead",
+    key="hardware.pipeline",
+    of=lambda d: d.hardware.pipeline,
+    without="'auto' or 'plain'",
+    asks=lambda value: value == "look-ahead",
+    first=True,
+)
+ZERO = Option(
+    name="start zero",
+    key="hardware.start",
+    of=lambda d: d.hardware.start,
+    without="'steady'",
+    asks=lambda value: value == "zero",
+)
+NO_MULTIPLIERS = Option(
+    name="multipliers 0",
+    key="hardware.multipliers",
+    of=lambda d: d.hardware.multipliers,
+    without="'auto'",
+    asks=lambda value: value == 0,
+)
+FEW_MULTIPLIERS = Option(
+    name="multipliers 1 or more",
+    key="hardware.multipliers",
+    of=lambda d: d.hardware.multipliers,
+    without="'auto'",
+    asks=lambda value: value not in {None, 0},
+)
+
+OPTIONS = (CHANNELS, RELOAD, PROTECT, DECIMATE, SEVERAL, LOOK_AHEAD, ZERO, NO_MULTIPLIERS, FEW_MULTIPLIERS)
+"""All options, in the order in which tables show them."""
+
+
+@dataclass(frozen=True, eq=False)
+class Terms:
+    """What an architecture takes.
+
+    Attributes
+    ----------
+    name : str
+        As in the specification.
+    lacks : Mapping of Option to Refusal
+        The options that it does not take, and why.
+    """
+
+    name: str
+    lacks: Mapping[Option, Refusal] = field(default_factory=dict)
+
+    def takes(self, options: Iterator[Option] | tuple[Option, ...]) -> bool:
+        """Say whether it takes all of the options."""
+        return not any(option in self.lacks for option in options)
+
+
+_SLOW = Refusal(Verdict.NO_USE, "{name} takes several clocks for each sample")
+_ONE_BLOCK = Refusal(Verdict.REFUSED, "its program needs one", only="'auto' or at least 1")
+
+PARALLEL = Terms("parallel")
+FOLDED = Terms("folded", {SEVERAL: _SLOW, LOOK_AHEAD: _SLOW, NO_MULTIPLIERS: _ONE_BLOCK})
+SERIAL = Terms("serial", {SEVERAL: _SLOW, LOOK_AHEAD: _SLOW})
+ONLINE = Terms(
+    "online",
+    {SEVERAL: _SLOW, LOOK_AHEAD: _SLOW}
+    | dict.fromkeys((CHANNELS, RELOAD, PROTECT, DECIMATE, NO_MULTIPLIERS, FEW_MULTIPLIERS), LATER),
+)
+
+TERMS = {terms.name: terms for terms in (PARALLEL, FOLDED, SERIAL, ONLINE)}
+"""All architectures by name; `sosmith.gen.architectures.registry` has a class for each."""
+
+_FIXED = Refusal(Verdict.REFUSED, "adders multiply by constants that are fixed")
+
+_APART: dict[tuple[Option, Option], Refusal] = {
+    **dict.fromkeys(((DECIMATE, each) for each in (RELOAD, PROTECT, ZERO)), LATER),
+    **dict.fromkeys(((SEVERAL, each) for each in (CHANNELS, RELOAD, PROTECT, DECIMATE)), LATER),
+    **dict.fromkeys(((LOOK_AHEAD, each) for each in (CHANNELS, PROTECT, DECIMATE)), LATER),
+    (LOOK_AHEAD, RELOAD): _FIXED,
+    (LOOK_AHEAD, FEW_MULTIPLIERS): Refusal(
+        Verdict.REFUSED, "all its products by constants are made of adders", only="'auto' or 0"
+    ),
+    **dict.fromkeys(((RELOAD, each) for each in (NO_MULTIPLIERS, FEW_MULTIPLIERS)), _FIXED),
+}
+"""Options that do not go together, in the order in which messages tell them: of the second one's key."""
+
+
+def asked_by(spec: Specified) -> tuple[Option, ...]:
+    """Return the options that a specification asks for."""
+    return tuple(option for option in OPTIONS if option.asked(spec))
+
+
+def excluded(option: Option, spec: Specified) -> bool:
+    """Say whether a specification asks for options that do not go together with this one."""
+    asked = asked_by(spec)
+    return any((option, other) in _APART or (other, option) in _APART for other in asked)
+
+
+def check_combinations(spec: Specified) -> None:
+    """Check that what a specification asks for goes together.
+
+    Raises
+    ------
+    UnfitError
+        For the first finding.
+    """
+    asked = asked_by(spec)
+    terms = TERMS.get(spec.hardware.architecture)
+    for option in asked if terms is not None else ():
+        assert terms is not None
+        if (lacking := terms.lacks.get(option)) is not None:
+            raise _without_option(spec, terms, option, lacking)
+    for (kept, other), refusal in _APART.items():
+        if kept in asked and other in asked:
+            raise _unfit(refusal, other.without, kept.phrase(spec), other.key, literal(other.of(spec)))
+
+
+def _without_option(spec: Specified, terms: Terms, option: Option, refusal: Refusal) -> UnfitError:
+    """Return the error about an architecture that lacks an option: of the key that is easier to do without."""
+    told = refusal._replace(reason=refusal.reason.format(name=terms.name))
+    if not option.first:
+        beside = f'hardware.architecture = "{terms.name}"'
+        return _unfit(told, option.without, beside, option.key, literal(option.of(spec)))
+    others = ["auto", *(name for name, each in TERMS.items() if each.takes((option,)))]
+    expected = " or ".join(map(literal, others)) if len(others) < 3 else f"one of {', '.join(map(literal, others))}"
+    return _unfit(told, expected, option.phrase(spec), "hardware.architecture", literal(terms.name))
+
+
+def _unfit(refusal: Refusal, expected: str, beside: str, where: str, value: str) -> UnfitError:
+    why = f", as {refusal.reason}" if refusal.reason else ""
+    sentence = f"{refusal.only or expected} with {beside}{why}"
+    return UnfitError(sentence, value, where=where, later=refusal.verdict is Verdict.LATER)
+
+
+class Combination(NamedTuple):
+    """Whether an architecture, or an option, goes together with an option.
+
+    Attributes
+    ----------
+    row : str
+        Name of the architecture or the option.
+    option : str
+        Name of the option beside it.
+    verdict : str
+        "ok", "no use", "refused" for a reason of principle, or "not yet".
+    reason : str
+        Why it is of no use, or refused; otherwise empty.
+    """
+
+    row: str
+    option: str
+    verdict: str
+    reason: str
+
+
+def combinations() -> tuple[Combination, ...]:
+    """Return all pairs: of an architecture and an option, and of two options of different keys."""
+    with_architecture = [
+        _combination(terms.name, option, terms.lacks.get(option)) for terms in TERMS.values() for option in OPTIONS
+    ]
+    of_options = [
+        _combination(one.name, other, _APART.get((one, other)) or _APART.get((other, one)))
+        for one, other in pairs(OPTIONS, 2)
+        if one.key != other.key
+    ]
+    return (*with_architecture, *of_options)
+
+
+def _combination(row: str, option: Option, refusal: Refusal | None) -> Combination:
+    if refusal is None:
+        return Combination(row, option.name, Verdict.OK.value, "")
+    return Combination(row, option.name, refusal.verdict.value, refusal.reason.format(name=row))

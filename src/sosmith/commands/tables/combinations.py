@@ -1,0 +1,64 @@
+"""What combines in a specification, as a table: architectures, and what each option goes together with."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from rich.console import Console
+
+from sosmith.commands.tables.console import new_table
+from sosmith.interface.specification import Combination
+
+_OK = "ok"
+
+
+def table_rows(found: Sequence[Combination]) -> tuple[list[str], list[list[str]]]:
+    """Return the heading and the rows of the table: a row for each option, a column for each architecture.
+
+    The last column has the options that it does not go together with.
+    """
+    options = list(dict.fromkeys(each.option for each in found))
+    names = [name for name in dict.fromkeys(each.row for each in found) if name not in options]
+    verdicts = {(each.row, each.option): each.verdict for each in found}
+    rows = [
+        [option, *(verdicts[name, option] for name in names), "; ".join(_not_beside(option, found))]
+        for option in options
+    ]
+    return ["", *names, "not together with"], rows
+
+
+def _not_beside(option: str, found: Sequence[Combination]) -> Iterator[str]:
+    """List the options that one does not go together with, by the verdict."""
+    options = {each.option for each in found}
+    pairs = [each for each in found if each.row in options and option in {each.row, each.option}]
+    for verdict in dict.fromkeys(each.verdict for each in pairs if each.verdict != _OK):
+        others = [each.option if each.row == option else each.row for each in pairs if each.verdict == verdict]
+        yield f"{', '.join(others)} ({verdict})"
+
+
+def reasons(found: Sequence[Combination]) -> list[str]:
+    """Return why combinations are refused or of no use, one sentence for each reason."""
+    subjects: dict[tuple[str, str], list[str]] = {}
+    for each in found:
+        if each.reason:
+            subjects.setdefault((each.row, each.reason), []).append(each.option)
+    return [f"{row} with {' or '.join(options)}: {reason}" for (row, reason), options in subjects.items()]
+
+
+def print_combinations(console: Console, found: Sequence[Combination]) -> None:
+    """Print the table and the reasons."""
+    heading, rows = table_rows(found)
+    table = new_table("What combines", heading)
+    for row in rows:
+        table.add_row(*row)
+    console.print(table)
+    for reason in reasons(found):
+        console.print(reason)
+
+
+def markdown(found: Sequence[Combination]) -> str:
+    """Return the table and the reasons in Markdown."""
+    heading, rows = table_rows(found)
+    lines = [heading, ["---"] * len(heading), *rows]
+    table = "".join(f"| {' | '.join(line)} |\n" for line in lines)
+    return "\n".join([table, *(f"- {reason}" for reason in reasons(found)), ""])

@@ -1,0 +1,68 @@
+"""The table of combinations: it says what the rules of a specification and the design do."""
+
+import tomllib
+from decimal import Decimal
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from sosmith.gen.core import design_core
+from sosmith.gen.specification.choices import PIPELINES
+from sosmith.gen.specification.combinations import OPTIONS, TERMS, Combination, combinations
+from sosmith.gen.specification.specification import Specification, from_tree
+from sosmith.model.errors import SpecificationError
+
+SMALL = """
+name = "smallest"
+sample_rate = 100.0
+input.x = { bits = 8, signed = true, range = [-1.0, 1.0] }
+filter = { family = "butterworth", kind = "lowpass", method = "bilinear", order = 2, cutoff = 10.0 }
+output = { bits = 8, signed = true, range = [-1.0, 1.0], unit = "", max_error = 0.02 }
+"""
+ASKED: dict[str, tuple[str, str, Any]] = {
+    "channels": ("", "channels", 2),
+    "reload": ("hardware", "reload", True),
+    "protect": ("hardware", "protect", "correct"),
+    "decimate": ("filter", "decimate", 2),
+    "samples_per_clock": ("hardware", "samples_per_clock", 2),
+    "look-ahead": ("hardware", "pipeline", "look-ahead"),
+    "start zero": ("hardware", "start", "zero"),
+    "multipliers 0": ("hardware", "multipliers", 0),
+    "multipliers 1 or more": ("hardware", "multipliers", 1),
+}
+"""Table, key and value that ask for each option."""
+
+
+def asking_for(*names: str) -> Specification:
+    tree = tomllib.loads(SMALL, parse_float=Decimal)
+    for name in names:
+        table, key, value = ASKED.get(name, ("hardware", "architecture", name))
+        (tree.setdefault(table, {}) if table else tree)[key] = value
+    return from_tree(tree, Path("small.toml"))
+
+
+def test_every_option_and_every_architecture_is_there() -> None:
+    assert [option.name for option in OPTIONS] == list(ASKED)
+    pairs = {(each.row, each.option) for each in combinations()}
+    assert pairs >= {(name, option) for name in TERMS for option in ASKED}
+    beside = [(one, other) for k, one in enumerate(ASKED) for other in [*ASKED][k + 1 :]]
+    assert {pair for pair in beside if pair not in pairs} == {("multipliers 0", "multipliers 1 or more")}
+
+
+@pytest.mark.parametrize("pair", combinations(), ids=lambda pair: f"{pair.row}-{pair.option}")
+def test_what_the_table_says_is_what_happens(pair: Combination) -> None:
+    if pair.verdict == "ok":
+        made = design_core(asking_for(pair.row, pair.option))
+        assert pair.row not in TERMS or made.architecture.name == pair.row
+        return
+    with pytest.raises(SpecificationError) as refused:
+        asking_for(pair.row, pair.option)
+    assert ("not yet available: " in str(refused.value)) == (pair.verdict == "not yet")
+    assert pair.reason in str(refused.value)
+    assert bool(pair.reason) == (pair.verdict in {"no use", "refused"})
+
+
+def test_a_pipeline_without_look_ahead_is_no_option() -> None:
+    """What messages ask for instead of look-ahead is what there is."""
+    assert [f"'{name}'" for name in PIPELINES if name != "look-ahead"] == ["'auto'", "'plain'"]
