@@ -2,10 +2,8 @@
 
 import errno
 import os
-import signal
 import sqlite3
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -50,7 +48,7 @@ class Disk:
 
 
 @pytest.fixture
-def disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Disk]:
+def disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Disk:
     """Start in a folder with the inputs of all commands."""
     monkeypatch.chdir(tmp_path)
     Path("plain.toml").write_text(FILTER, encoding="utf-8")
@@ -60,10 +58,7 @@ def disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Disk]:
     write_csv(Path("a.csv"), readings(400))
     write_csv(Path("b.csv"), readings(400, seed=2))
     Path("examples").symlink_to(ROOT / "examples")
-    handlers = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGHUP)}
-    yield Disk(tmp_path, monkeypatch)
-    for number, handler in handlers.items():
-        signal.signal(number, handler)
+    return Disk(tmp_path, monkeypatch)
 
 
 def status(monkeypatch: pytest.MonkeyPatch, *arguments: str) -> int:

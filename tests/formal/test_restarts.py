@@ -87,6 +87,7 @@ def test_a_folded_core_begins_anew(serial: bool, tmp_path: Path) -> None:
     assert prove(RestartRules(module, is_folded=True, serial=serial), tmp_path) == "PASS"
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [

@@ -213,11 +213,13 @@ def channel_rules(module: ModuleType, serial: bool | None = None) -> StreamRules
     return StreamRules(design, 1, source_waits=True)
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize(("module", "serial"), [(core, None), (folded, False), (folded, True)])
 def test_channels_stay_with_their_samples(module: ModuleType, serial: bool | None, tmp_path: Path) -> None:
     assert prove(channel_rules(module, serial), tmp_path) == "PASS"
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(("module", "serial"), [(core, None), (folded, False)])
 def test_a_channel_too_many_is_found_out(module: ModuleType, serial: bool | None, tmp_path: Path) -> None:
     wrong = broken(module, "self.s_axis_tdest < self.channels", "self.s_axis_tdest <= self.channels")
@@ -240,6 +242,7 @@ def test_the_folded_core_computes_a_recursion(serial: bool, tmp_path: Path) -> N
     assert prove(folded_rules(serial=serial, datapath=leaky()), tmp_path, timeout=1200) == "PASS"
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [
@@ -254,6 +257,7 @@ def test_a_broken_buffer_is_found_out(right: str, wrong: str, tmp_path: Path) ->
     assert prove(buffer_rules(broken(axi_stream, right, wrong)), tmp_path) == "FAIL"
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [
@@ -266,6 +270,7 @@ def test_a_broken_core_is_found_out(right: str, wrong: str, tmp_path: Path) -> N
     assert prove(core_rules(broken(core, right, wrong)), tmp_path) == "FAIL"
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("serial", [False, True])
 @pytest.mark.parametrize(
     ("right", "wrong"),
@@ -279,6 +284,7 @@ def test_a_broken_folded_core_is_found_out(right: str, wrong: str, serial: bool,
     assert prove(folded_rules(broken(folded, right, wrong), serial=serial), tmp_path) == "FAIL"
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("make", [core_rules, partial(folded_rules, progress=True)], ids=["parallel", "folded"])
 def test_a_latency_that_is_too_short_is_found_out(make: Callable[[], StreamRules], tmp_path: Path) -> None:
     rules = make()

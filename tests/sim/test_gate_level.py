@@ -146,6 +146,7 @@ WRONG = {
 }
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("break_it", WRONG.values(), ids=WRONG)
 def test_a_wrong_bit_in_the_netlist_is_found(break_it: Break, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     break_netlist(break_it, monkeypatch)

@@ -304,6 +304,7 @@ def wrongly_accepted(tree: Any, chosen: list[tuple[PLACE, Any]]) -> list[tuple[P
     return result
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("realization", ["df1_ef2", "delta"])
 def test_one_unit_off_in_any_number_is_rejected(realization: str) -> None:
     tree = tree_of(BENCH, realization)

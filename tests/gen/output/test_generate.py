@@ -20,6 +20,7 @@ from sosmith.model.errors import SpecificationError
 from sosmith.model.text_files import write_files
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=[pytest.mark.slow] if "locomotive" in name else []) for name in ALL]
 )

@@ -53,6 +53,7 @@ def stay_apart(escaped: str, plain: str) -> bool:
     return [*map(len, declared[0])] == [*map(len, declared[1])]
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("options", [{}, {"channels": 3, "protect": "correct", "reload": True}], ids=["plain", "all"])
 @pytest.mark.parametrize("architecture", ["parallel", "folded", "serial"])
 def test_names_need_no_escape_and_stay_apart(architecture: str, options: dict[str, Any]) -> None:

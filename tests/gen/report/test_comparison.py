@@ -278,6 +278,7 @@ def test_reports_of_earlier_versions_need_not_tell_their_architecture() -> None:
     assert "<svg" in comparison_page([untold, folded(100, 0.0002)], [])
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("extreme", [5e-324, 1e-300, 1e300])
 def test_extreme_errors_are_drawn(extreme: float) -> None:
     """Nothing warns that the labels of an axis have no room; warnings are errors here."""

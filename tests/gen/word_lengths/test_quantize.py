@@ -132,6 +132,7 @@ CASES = [
 with twelve poles next to z = 1, whose peak gains take minutes a design."""
 
 
+@pytest.mark.sweep(4)
 @pytest.mark.parametrize(("kind", "order", "cutoff", "realization"), CASES)
 def test_designs_stay_within_their_bound(kind: str, order: int, cutoff: float, realization: str) -> None:
     quantized = plain(butterworth(order, cutoff, kind), realization)

@@ -109,6 +109,7 @@ def expected(made: CoreDesign, codes: np.ndarray, order: np.ndarray) -> list[lis
     return found
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize(("architecture", "realization", "channels"), CASES)
 def test_peers_of_another_maker(architecture: str, realization: str, channels: int, tmp_path: Path) -> None:
     made = made_of(architecture, realization, channels)

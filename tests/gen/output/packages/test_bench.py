@@ -24,6 +24,7 @@ def stimuli_of(name: str) -> Stimuli:
     return bench_stimuli(design_of(name).core, interface_of(name))
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize(
     ("way", "name"),
     [("c", name) for name in SPECIFICATIONS]
