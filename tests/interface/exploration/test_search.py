@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.extras import needs
 from tests.interface.small import FILTER
 
 import sosmith
@@ -17,6 +18,8 @@ from sosmith.instrument.scenarios.traces import default_traces
 from sosmith.sim.exploration.grid import Task
 from sosmith.sim.exploration.parameters import Parameters, Span
 from sosmith.sim.exploration.run import Outcome, explore
+
+pytestmark = needs("optuna")
 
 SPEC = Specification.load(FILTER).checked
 

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from amaranth.hdl import Module, Value
 from cocotb_tools.runner import Icarus
+from tests.extras import needs
 from tests.gen.designs import EXAMPLES
 
 from sosmith.gen.core import CoreDesign, design_core
@@ -23,6 +24,8 @@ from sosmith.hdl.check_bits import CheckBits
 from sosmith.hdl.folded import FoldedCore
 from sosmith.hdl.plan.streams import fields
 from sosmith.sim.simulators import PLAIN_ASSERTIONS
+
+pytestmark = needs("cocotbext.axi")
 
 UNFOLDABLE = {"normal", "lattice_wdf"}
 SAMPLES = {"parallel": 120, "folded": 24, "serial": 8}

@@ -6,11 +6,14 @@ import sysconfig
 from pathlib import Path
 
 import pytest
+from tests.extras import needs
 from tests.gen.output.packages.made import SPECIFICATIONS, called, design_of, unpacked
 
 from sosmith.gen.output.packages.package import packed
 from sosmith.gen.output.packages.vlnv import Vlnv
 from sosmith.model.errors import SpecificationError
+
+pytestmark = needs("fusesoc")
 
 FUSESOC = Path(sysconfig.get_path("scripts")) / "fusesoc"
 

@@ -6,7 +6,10 @@ import sys
 from pathlib import Path
 
 import pytest
+from tests.extras import needs
 from tests.gen.output.packages.made import called, spoil, unpacked
+
+pytestmark = needs("litex")
 
 SCRIPT = """
 from litex.build.generic_platform import Pins

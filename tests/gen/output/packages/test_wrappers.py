@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.extras import needs
 from tests.gen.output.packages.made import called, design_of, unpacked
 
 from sosmith.gen.output.core_facts import StreamFacts
@@ -67,6 +68,7 @@ top = Top()
 print(convert(top, ios=set(top.pins.values()), name="wrapped"))
 """
 MAKERS = {"amaranth": AMARANTH, "litex": LITEX}
+EVERY_MAKER = [pytest.param(maker, marks=needs(maker)) for maker in MAKERS]
 
 
 def pins_of(name: str) -> tuple[Pin, ...]:
@@ -99,7 +101,7 @@ def wrapped(maker: str, name: str, folder: Path) -> str:
 
 
 @pytest.mark.parametrize("name", ["plain", "gauge", "wide", "held"])
-@pytest.mark.parametrize("maker", MAKERS)
+@pytest.mark.parametrize("maker", EVERY_MAKER)
 def test_the_bench_passes_with_the_wrapper_around_the_core(maker: str, name: str, tmp_path: Path) -> None:
     folder = unpacked(name, tmp_path)
     bench = folder / "bench" / f"{name}_bench.sv"
@@ -115,7 +117,7 @@ def test_the_bench_passes_with_the_wrapper_around_the_core(maker: str, name: str
     )
 
 
-@pytest.mark.parametrize("maker", MAKERS)
+@pytest.mark.parametrize("maker", EVERY_MAKER)
 def test_wrappers_of_a_reloadable_core_have_its_bus(maker: str, tmp_path: Path) -> None:
     folder = unpacked("tunable", tmp_path)
     text = wrapped(maker, "tunable", folder)
@@ -123,6 +125,7 @@ def test_wrappers_of_a_reloadable_core_have_its_bus(maker: str, tmp_path: Path) 
         assert re.search(rf"\.{pin.name}\s*\(", text), pin.name
 
 
+@needs("litex")
 @pytest.mark.parametrize(
     ("name", "registers"),
     [
