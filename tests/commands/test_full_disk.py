@@ -89,6 +89,7 @@ COMMANDS = {
 """The last word of each is the folder or the file that it writes; such a file is there before."""
 
 
+@pytest.mark.sweep(8)
 @pytest.mark.parametrize("line", COMMANDS.values(), ids=list(COMMANDS))
 def test_a_command_on_a_full_disk(
     line: str, disk: Disk, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
@@ -112,6 +113,7 @@ def test_a_command_on_a_full_disk(
     assert disk.files() == before
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("name", ["sent.npy", "report.json"])
 def test_a_disk_that_becomes_full_during_a_simulation(
     name: str, disk: Disk, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

@@ -272,6 +272,7 @@ class Interrupting:
         raise self._interrupt
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize(("interrupt", "status"), [(KeyboardInterrupt(), 130), (SystemExit(143), 143)])
 def test_a_signal_while_a_library_makes_a_class(
     interrupt: BaseException, status: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

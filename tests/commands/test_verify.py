@@ -58,6 +58,7 @@ def test_against_everything(folder: Path) -> None:
     assert found["program_instructions"] > 50
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize(
     ("channels", "key"),
     [

@@ -81,6 +81,7 @@ def test_a_parallel_core_that_keeps_states_or_lets_samples_in_is_found_out(
     assert prove(RestartRules(broken(core, right, wrong)), tmp_path) == "FAIL"
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("serial", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_a_folded_core_begins_anew(serial: bool, tmp_path: Path) -> None:
     module = broken(folded, "waits = waits | pending", "waits = waits | pending")

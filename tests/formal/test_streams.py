@@ -179,11 +179,13 @@ def test_a_core_of_three_pipeline_stages_computes_its_recursion(tmp_path: Path) 
     assert prove(core_rules(datapath=resonator()), tmp_path, timeout=1200) == "PASS"
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("serial", [False, True])
 def test_the_folded_core_keeps_the_rules(serial: bool, tmp_path: Path) -> None:
     assert prove(folded_rules(serial=serial, progress=not serial), tmp_path) == "PASS"
 
 
+@pytest.mark.slow
 def test_samples_that_overlap_keep_the_rules(tmp_path: Path) -> None:
     assert prove(overlapping_rules(), tmp_path) == "PASS"
 
@@ -231,6 +233,7 @@ def test_a_channel_that_is_lost_is_found_out(tmp_path: Path) -> None:
     assert prove(channel_rules(wrong, serial=False), tmp_path) == "FAIL"
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("serial", [False, True])
 def test_the_folded_core_computes_a_limited_sum(serial: bool, tmp_path: Path) -> None:
     assert prove(folded_rules(serial=serial, datapath=limiter()), tmp_path) == "PASS"

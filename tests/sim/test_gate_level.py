@@ -157,6 +157,7 @@ def test_a_wrong_bit_in_the_netlist_is_found(break_it: Break, folder: Path, monk
     assert report["mismatches"] > 0
 
 
+@pytest.mark.slow
 def test_a_flip_flop_without_its_reset_is_found(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def without_reset(text: str) -> str:
         broken, count = re.subn(r"(\) \\section0\.v1_TRELLIS_FF_Q\w* [^;]*?\.LSR\()[^)]*", r"\g<1>1'h0", text)

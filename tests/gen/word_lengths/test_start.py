@@ -59,6 +59,7 @@ def error(made: Quantized, codes: np.ndarray) -> float:
     return float(np.abs(datapath.output.decode(datapath.compute(codes)) - exact).max() / float(datapath.output.lsb))
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize("realization", REALIZATIONS)
 @pytest.mark.parametrize("kind", ["lowpass", "highpass", "bandpass", "bandstop"])
 def test_error_and_ranges_of_every_realization(kind: str, realization: str) -> None:

@@ -67,6 +67,7 @@ def test_tools_read_the_text_without_a_warning(lanes: int, pipeline: str, tmp_pa
     assert icarus_check(path, made.spec.name) == []
 
 
+@pytest.mark.slow
 def test_vectors_of_beats(tmp_path: Path) -> None:
     """Sample by sample in CSV; in words of the bus with all that the bus had, the filling of the last beat too."""
     made = design_core(from_text(text(4, pipeline="plain", base=SIMPLE), Path("simple.toml")))

@@ -114,6 +114,7 @@ def test_vectors_have_a_result_for_every_16th_sample(hold: bool, tmp_path: Path)
     assert len((tmp_path / "some_stimuli.hex").read_text(encoding="utf-8").split()) == 40
 
 
+@pytest.mark.slow
 def test_held_results_take_no_longer(tmp_path: Path) -> None:
     made = locomotive(architecture="folded", hold=True)
     stated, decimator = made.architecture, made.datapath.decimator

@@ -137,6 +137,7 @@ def test_readings_are_held_against_the_truth(tmp_path: Path) -> None:
     assert summary["true_error"]["readings"] > 0
 
 
+@pytest.mark.slow
 def test_results_come_at_the_rate_that_is_stated(tmp_path: Path) -> None:
     made = whole("folded")
     stated = made.architecture

@@ -100,6 +100,7 @@ def wrapped(maker: str, name: str, folder: Path) -> str:
     return result.stdout
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize("name", ["plain", "gauge", "wide", "held"])
 @pytest.mark.parametrize("maker", EVERY_MAKER)
 def test_the_bench_passes_with_the_wrapper_around_the_core(maker: str, name: str, tmp_path: Path) -> None:
@@ -210,6 +211,7 @@ def driven(name: str, folder: Path) -> tuple[list[tuple[int, int, float, list[st
     return results, registers
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("name", ["plain", "gauge", "tunable"])
 def test_cocotb_drives_the_core_in_physical_units(name: str, tmp_path: Path) -> None:
     folder, design = unpacked(name, tmp_path), design_of(name)
@@ -224,6 +226,7 @@ def test_cocotb_drives_the_core_in_physical_units(name: str, tmp_path: Path) -> 
     assert registers == ([[MAGIC, True], False, True] if name == "tunable" else [])
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(("name", "samples", "copies"), [("wide", 16, 1), ("sparse", 13, 1), ("held", 6, 4)])
 def test_cocotb_gets_the_results_of_a_beat_or_of_several_samples(
     name: str, samples: int, copies: int, tmp_path: Path
