@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from tests.sweeps import covering
+from tests.suite.sweeps import covering
 
 pytest_plugins = ["pytester"]
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from tests.gen.specification.test_bad_specifications import BASE
+from tests.gen.specification.bad_specifications import BASE
 
 FILTER = """\
 name = "plain"

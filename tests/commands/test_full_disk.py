@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 from tests.commands.command_line import FILTER, reloadable
-from tests.gen.report.test_comparison import report
+from tests.gen.report.reports import report
 from tests.instrument.calibration.measuring import readings, write_csv
 
 from sosmith.cli import main

@@ -20,7 +20,7 @@ import pytest
 import scipy.io
 from tests.commands.command_line import FILTER, INSTRUMENT
 from tests.commands.spoilt_files import Spoil, spoilt, spoilt_store, spoilt_workbook
-from tests.gen.report.test_comparison import report
+from tests.gen.report.reports import report
 from tests.house import ROOT
 from tests.instrument.scenarios.scenario_texts import CALIBRATION, FAULT, PLAIN
 

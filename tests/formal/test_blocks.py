@@ -7,7 +7,7 @@ import pytest
 from amaranth.hdl import Cat, Module, Value
 from tests.formal.prover import broken, prove
 from tests.formal.small import distant, leaky, limiter, reference_of_beats
-from tests.formal.test_streams import StreamRules
+from tests.formal.stream_rules import StreamRules
 
 from sosmith.hdl import block_core
 from sosmith.hdl.plan import look_ahead as plan

@@ -10,7 +10,7 @@ from amaranth.hdl import Assert, Assume, Module, Mux, Signal, signed
 from amaranth.lib.wiring import Component, In, Out
 from tests.formal.prover import INDUCTION, Proof, broken, combinational_outputs, prove
 from tests.formal.small import port
-from tests.formal.test_streams import StreamRules
+from tests.formal.stream_rules import StreamRules
 
 from sosmith.hdl.online import cascade, core, residual
 from sosmith.hdl.plan import online_clocks

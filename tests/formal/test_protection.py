@@ -8,7 +8,7 @@ import pytest
 from amaranth.hdl import Assert, Assume, Const, Module, Mux, Signal
 from tests.formal.prover import broken, prove
 from tests.formal.small import leaky
-from tests.formal.test_streams import StreamRules
+from tests.formal.stream_rules import StreamRules
 
 from sosmith.hdl import core
 from sosmith.hdl.plan import parallel_clocks

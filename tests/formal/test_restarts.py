@@ -11,7 +11,7 @@ import pytest
 from amaranth.hdl import Module, Signal
 from tests.formal.prover import broken, prove
 from tests.formal.small import leaky, limiter
-from tests.formal.test_streams import DIGIT_BITS, StreamRules
+from tests.formal.stream_rules import DIGIT_BITS, StreamRules
 
 from sosmith.hdl import core, folded, reload
 from sosmith.hdl.plan import parallel_clocks

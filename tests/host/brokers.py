@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from tests.extras import needed
+from tests.suite.extras import needed
 
 mqtt = needed("paho.mqtt.client")
 

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from tests.extras import needed
+from tests.suite.extras import needed
 
 from sosmith.host.recording import check_output, recording
 from sosmith.model.errors import SpecificationError

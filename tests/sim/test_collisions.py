@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 import pytest
-from tests.sim.peers.test_peers import expected, made_of, run, stimulus, words
+from tests.sim.peers.peer_runs import expected, made_of, run, stimulus, words
 
 from sosmith.gen.output.verilog import to_rtlil, to_verilog
 

@@ -11,7 +11,7 @@ import pytest
 from click.testing import CliRunner
 from scipy import linalg, signal
 from tests.gen.designs import EXAMPLES, example_design
-from tests.gen.word_lengths.test_quantize import errors, plain, stimulus
+from tests.gen.word_lengths.filters import errors, plain, stimulus
 
 from sosmith.cli import cli
 from sosmith.gen.core import design_core

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests.gen.designs import ALL, EXAMPLES, example_design
-from tests.gen.word_lengths.test_quantize import stimulus
+from tests.gen.word_lengths.filters import stimulus
 
 from sosmith.gen.output.generate import generate
 from sosmith.model.dataflow.c_model import c_header, state_bytes

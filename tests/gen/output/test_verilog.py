@@ -12,7 +12,7 @@ from amaranth.hdl import Elaboratable, Module, Signal, unsigned
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import Component, In, Out
 from tests.gen.designs import EXAMPLES, parallel_design
-from tests.gen.output.test_converters import SPEC
+from tests.gen.output.converter_board import SPEC
 
 import sosmith
 from sosmith.gen.output.board_top import board_top

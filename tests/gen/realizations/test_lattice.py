@@ -14,9 +14,9 @@ from scipy import signal
 from tests.gen.designs import EXAMPLES, with_rows
 from tests.gen.proof.cycle_search import search_cycles
 from tests.gen.proven_stages import run
-from tests.gen.word_lengths.test_quantize import OUT, SIGNED, butterworth, errors, plain, stimulus
-from tests.gen.word_lengths.test_sweep import REFUSED
-from tests.verify.test_certificate import all_edits, proven, wrongly_accepted
+from tests.gen.word_lengths.filters import OUT, SIGNED, butterworth, errors, plain, stimulus
+from tests.gen.word_lengths.sweep_designs import REFUSED
+from tests.verify.certificate_edits import all_edits, proven, wrongly_accepted
 
 from sosmith.gen.core import design_core
 from sosmith.gen.filter.design import Filter

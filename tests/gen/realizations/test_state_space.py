@@ -24,7 +24,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import signal
 from tests.gen.designs import with_rows
-from tests.gen.word_lengths.test_quantize import butterworth, errors, plain, stimulus
+from tests.gen.word_lengths.filters import butterworth, errors, plain, stimulus
 from tests.hdl.stage_bench import run
 
 from sosmith.gen.proof.linear_model import linear_model

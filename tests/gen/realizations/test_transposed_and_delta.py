@@ -11,7 +11,7 @@ import pytest
 from scipy import signal
 from tests.gen.designs import with_rows
 from tests.gen.proven_stages import Ranges, datapath_of, proven_cascade
-from tests.gen.word_lengths.test_quantize import butterworth, errors, plain, stimulus
+from tests.gen.word_lengths.filters import butterworth, errors, plain, stimulus
 from tests.hdl.stage_bench import run as run_hardware
 
 from sosmith.gen.proof.linear_model import linear_model

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.extras import needed
+from tests.suite.extras import needed
 
 from sosmith.gen.reload.register_map import c_registers, markdown, systemrdl
 from sosmith.model.reload.registers import (

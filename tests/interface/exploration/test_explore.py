@@ -20,8 +20,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.extras import needed
 from tests.interface.small import FILTER
+from tests.suite.extras import needed
 
 import sosmith
 from sosmith import SpecificationError, ToolError

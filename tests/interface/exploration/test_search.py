@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.extras import needs
 from tests.interface.small import FILTER
+from tests.suite.extras import needs
 
 import sosmith
 from sosmith import Specification, SpecificationError, ToolError

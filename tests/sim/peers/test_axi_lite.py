@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 from cocotb_tools.check_results import get_results
 from cocotb_tools.runner import Icarus
-from tests.extras import needs
 from tests.sim.lint import icarus_check, lint
+from tests.suite.extras import needs
 
 from sosmith.gen.output.verilog import to_rtlil, to_verilog
 from sosmith.hdl.reload import ReloadPort

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.gen.blocks.specifications import AUDIO, designed, text
+from tests.gen.block_specifications import AUDIO, designed, text
 from tests.sim.lint import icarus_check, lint
 
 from sosmith.gen.core import CoreDesign, design_core

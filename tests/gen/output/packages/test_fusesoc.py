@@ -6,8 +6,8 @@ import sysconfig
 from pathlib import Path
 
 import pytest
-from tests.extras import needs
 from tests.gen.output.packages.made import SPECIFICATIONS, called, design_of, unpacked
+from tests.suite.extras import needs
 
 from sosmith.gen.output.packages.package import packed
 from sosmith.gen.output.packages.vlnv import Vlnv

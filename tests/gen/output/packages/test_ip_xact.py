@@ -4,8 +4,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.extras import needed
 from tests.gen.output.packages.made import SPECIFICATIONS, design_of, package_of
+from tests.suite.extras import needed
 
 from sosmith.gen.output.packages.facts import package_facts
 from sosmith.model.reload.registers import DESIGN, ID, MAGIC, PROTECTED_REGISTERS

@@ -6,8 +6,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from tests.extras import needs
 from tests.gen.output.packages.made import called, spoil, unpacked
+from tests.suite.extras import needs
 
 pytestmark = needs("litex")
 

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 from tests.commands.invocation import Invocation
-from tests.extras import needed
 from tests.gen.output.packages.made import SPECIFICATIONS, design_of, package_of
+from tests.suite.extras import needed
 
 import sosmith
 from sosmith.gen.output.generate import generated

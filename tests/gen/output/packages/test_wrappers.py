@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.extras import needs
 from tests.gen.output.packages.made import called, design_of, unpacked
+from tests.suite.extras import needs
 
 from sosmith.gen.output.core_facts import StreamFacts
 from sosmith.gen.output.packages.facts import package_facts

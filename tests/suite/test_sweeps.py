@@ -3,8 +3,7 @@
 from itertools import combinations, product
 
 import pytest
-
-from tests.sweeps import covering
+from tests.suite.sweeps import covering
 
 SIZES = {"architecture": 3, "simulator": 3, "channels": 2, "protect": 2}
 GRID = [dict(zip(SIZES, indices, strict=True)) for indices in product(*map(range, SIZES.values()))]

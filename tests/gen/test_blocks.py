@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from benchmarks.random_designs import random_specification
 from tests.formal.prover import broken
-from tests.gen.blocks.specifications import AUDIO, designed, text
+from tests.gen.block_specifications import AUDIO, designed, text
 from tests.gen.designs import EXAMPLES
 from tests.hdl.core_bench import Pace, run_core
 
