@@ -20,6 +20,7 @@ def modules() -> tuple[Path, ...]:
     return tuple(path.relative_to(ROOT) for room in ROOMS for path in sorted((ROOT / room).rglob("*.py")))
 
 
+@cache
 def imported(path: Path) -> set[str]:
     """Modules of the package that the file at `path` names in its imports, with dots."""
     found = set()
@@ -35,6 +36,7 @@ def imported(path: Path) -> set[str]:
     return {name for name in found if name.startswith("sosmith.") and is_module(name)}
 
 
+@cache
 def is_module(name: str) -> bool:
     """Whether `name`, with dots, is a module or a package of the rooms or beside them."""
     parts = name.split(".")[1:]
@@ -47,6 +49,7 @@ def part_of(path: Path) -> str:
     return path.parts[1].removesuffix(".py") if len(path.parts) > 1 else ""
 
 
+@cache
 def arrows(room: str) -> dict[str, set[str]]:
     """For each part of `room`, the other parts that it imports from."""
     found: dict[str, set[str]] = {}
@@ -72,6 +75,7 @@ def floors(room: str) -> list[list[str]]:
     return [sorted(part for part in level if level[part] == height) for height in range(max(level.values()) + 1)]
 
 
+@cache
 def summary(path: Path) -> str:
     """First line of the module's docstring, without its full stop."""
     text = ast.get_docstring(ast.parse((ROOT / path).read_text(encoding="utf-8")))

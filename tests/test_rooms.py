@@ -1,6 +1,7 @@
 """The house: imports run one way among rooms and among the sub-rooms of a room, and no floor is crowded."""
 
 import ast
+import re
 from pathlib import Path
 
 import pytest
@@ -116,3 +117,26 @@ def test_every_sub_room_says_what_it_holds() -> None:
     texts = [(ROOT / folder / "__init__.py").read_text(encoding="utf-8") for folder in sorted(folders)]
     assert all(text.startswith('"""') for text in texts)
     assert len(set(texts)) == len(texts)
+
+
+def test_helpers_stand_in_modules_of_their_own() -> None:
+    """No file of tests imports from another one: to find, move or delete one is then to know all of it."""
+    named = re.compile(r"^\s*(?:from|import) (tests\.(?:\w+\.)*test_\w+)", re.MULTILINE)
+    paths = [*(ROOT / "tests").rglob("*.py"), *(ROOT / "benchmarks").rglob("*.py")]
+    assert len(paths) > 400
+    found = {f"{p.relative_to(ROOT)}: {name}" for p in paths for name in named.findall(p.read_text(encoding="utf-8"))}
+    assert found == set()
+
+
+OF_NO_ROOM = ("documents", "edge", "formal", "machines", "sim/peers", "suite")
+"""Folders of tests of no one part of the source: documents, proofs and peers across rooms, machines, the suite."""
+
+
+def test_tests_lie_where_their_subject_lies() -> None:
+    folders = {path.parent.relative_to(ROOT / "tests") for path in (ROOT / "tests").rglob("test_*.py")}
+    inside = sorted(folder for folder in folders if folder.parts and not str(folder).startswith(OF_NO_ROOM))
+    assert len(inside) > 40
+    homes = (ROOT, ROOT / "src" / "sosmith")
+    named = [home / folder for folder in inside for home in homes]
+    found = {path.relative_to(ROOT) for path in named if path.is_dir() or path.with_suffix(".py").exists()}
+    assert [str(folder) for folder in inside if not {folder, Path("src/sosmith", folder)} & found] == []

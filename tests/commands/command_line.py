@@ -1,7 +1,6 @@
 """What the tests of the command line share: specifications, outcomes, processes."""
 
 import re
-import signal
 import subprocess
 import time
 from collections.abc import Callable
@@ -9,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from tests.gen.specification.test_bad_specifications import BASE
+from tests.gen.specification.bad_specifications import BASE
 
 FILTER = """\
 name = "plain"
@@ -36,8 +35,6 @@ max_error = "faithful"
 INSTRUMENT = BASE.replace("order = 7", "order = 1").replace(
     "[[1.16, -0.0036], [0.3672]]", "[[1.16, -0.0036], [0.3672, 0.0006618], [0.05812]]"
 )
-
-STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 HANGS = 1200
 """Seconds after which a process is taken to hang, on however busy a machine."""

@@ -14,7 +14,6 @@ import pytest
 from tests.commands.command_line import (
     FILTER,
     INSTRUMENT,
-    STOPPING,
     Command,
     Outcome,
     Start,
@@ -25,12 +24,11 @@ from sosmith.cli import main
 
 
 @pytest.fixture
-def sosmith(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Iterator[Command]:
+def sosmith(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Command:
     """Run commands in this process, in an empty folder with the specifications plain.toml and demo.toml."""
     monkeypatch.chdir(tmp_path)
     Path("plain.toml").write_text(FILTER, encoding="utf-8")
     Path("demo.toml").write_text(INSTRUMENT, encoding="utf-8")
-    handlers = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGHUP)}
 
     def run(*arguments: str) -> Outcome:
         monkeypatch.setattr(sys, "argv", ["cli.py", *arguments])
@@ -40,33 +38,21 @@ def sosmith(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capt
         printed = capsys.readouterr()
         return Outcome(int(exit_of.value.code or 0), printed.out, printed.err)
 
-    yield run
-    for number, handler in handlers.items():
-        signal.signal(number, handler)
+    return run
 
 
 @pytest.fixture
 def process(tmp_path: Path) -> Iterator[Start]:
-    """Start commands as processes of their own, in the test's folder; nothing they start outlives the test.
-
-    They take signals as they do by default, even where the tests themselves ignore some: under nohup, or in a shell's
-    background.
-    """
+    """Start commands as processes of their own, in the test's folder; nothing they start outlives the test."""
     mark = {"SOSMITH_TEST": str(tmp_path)}
     with contextlib.ExitStack() as started:
 
         def start(*arguments: str, **options: Any) -> subprocess.Popen[str]:
             command = [sys.executable, "-m", "sosmith.cli", *arguments]
             pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE} | options
-            # A signal ignored here would be ignored by the child too; one with a handler is at its default there.
-            before = {number: signal.signal(number, signal.default_int_handler) for number in STOPPING}
-            try:
-                return started.enter_context(
-                    subprocess.Popen(command, cwd=tmp_path, text=True, env=os.environ | mark, **pipes)
-                )
-            finally:
-                for number, handler in before.items():
-                    signal.signal(number, handler)
+            return started.enter_context(
+                subprocess.Popen(command, cwd=tmp_path, text=True, env=os.environ | mark, **pipes)
+            )
 
         yield start
         while left := processes_with("SOSMITH_TEST", tmp_path):

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from tests.commands.invocation import Invocation
-from tests.gen.fpga.test_bitstream import REPORT, Stub
+from tests.gen.fpga.stubs import REPORT, Stub
 
 from sosmith.gen.fpga import bitstream
 from sosmith.gen.fpga.boards import BUILDABLE, PROJECTS

@@ -234,6 +234,7 @@ PASSING = ("scenario", "wall_seconds", "cycles_per_second")
 """Keys of a report that differ between two runs on the same codes."""
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize(
     ("spec", "scenario"), [("demo", "wear_ramp"), pytest.param("plain", "noise", marks=pytest.mark.slow)]
 )

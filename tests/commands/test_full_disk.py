@@ -2,16 +2,14 @@
 
 import errno
 import os
-import signal
 import sqlite3
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 from tests.commands.command_line import FILTER, reloadable
-from tests.gen.report.test_comparison import report
+from tests.gen.report.reports import report
 from tests.instrument.calibration.measuring import readings, write_csv
 
 from sosmith.cli import main
@@ -50,7 +48,7 @@ class Disk:
 
 
 @pytest.fixture
-def disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Disk]:
+def disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Disk:
     """Start in a folder with the inputs of all commands."""
     monkeypatch.chdir(tmp_path)
     Path("plain.toml").write_text(FILTER, encoding="utf-8")
@@ -60,10 +58,7 @@ def disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Disk]:
     write_csv(Path("a.csv"), readings(400))
     write_csv(Path("b.csv"), readings(400, seed=2))
     Path("examples").symlink_to(ROOT / "examples")
-    handlers = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGHUP)}
-    yield Disk(tmp_path, monkeypatch)
-    for number, handler in handlers.items():
-        signal.signal(number, handler)
+    return Disk(tmp_path, monkeypatch)
 
 
 def status(monkeypatch: pytest.MonkeyPatch, *arguments: str) -> int:
@@ -94,6 +89,7 @@ COMMANDS = {
 """The last word of each is the folder or the file that it writes; such a file is there before."""
 
 
+@pytest.mark.sweep(8)
 @pytest.mark.parametrize("line", COMMANDS.values(), ids=list(COMMANDS))
 def test_a_command_on_a_full_disk(
     line: str, disk: Disk, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
@@ -117,6 +113,7 @@ def test_a_command_on_a_full_disk(
     assert disk.files() == before
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("name", ["sent.npy", "report.json"])
 def test_a_disk_that_becomes_full_during_a_simulation(
     name: str, disk: Disk, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from tests.commands.command_line import INSTRUMENT, Command, refused
-from tests.gen.specification.test_bad_specifications import BAD, with_fault
+from tests.gen.specification.bad_specifications import BAD, with_fault
 
 USAGE = {
     "no command": ((), "Usage: sosmith [OPTIONS] COMMAND [ARGS]..."),

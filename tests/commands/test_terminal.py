@@ -116,6 +116,7 @@ IN_THE_MIDDLE = {
 }
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("command", IN_THE_MIDDLE)
 def test_a_terminal_is_left_whole(command: str, on_terminal: OnTerminal, tmp_path: Path) -> None:
     arguments, step = IN_THE_MIDDLE[command]
@@ -271,18 +272,14 @@ class Interrupting:
         raise self._interrupt
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize(("interrupt", "status"), [(KeyboardInterrupt(), 130), (SystemExit(143), 143)])
 def test_a_signal_while_a_library_makes_a_class(
     interrupt: BaseException, status: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(cli, "cli", SimpleNamespace(main=lambda **_: type("Made", (), {"it": Interrupting(interrupt)})))
-    handlers = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGHUP)}
-    try:
-        with pytest.raises(SystemExit) as ended:
-            cli.main()
-    finally:
-        for number, handler in handlers.items():
-            signal.signal(number, handler)
+    with pytest.raises(SystemExit) as ended:
+        cli.main()
     assert ended.value.code == status
     assert capsys.readouterr().err == ("sosmith: interrupted\n" if status == 130 else "")
 
@@ -334,6 +331,7 @@ def test_the_cache_can_be_emptied(sosmith: Command, tmp_path: Path, monkeypatch:
     assert (outcome.status, outcome.messages) == (0, ["sosmith: there is no cache folder that can be written"])
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize(
     ("number", "status", "messages"),
     [
@@ -366,7 +364,7 @@ def test_two_runs_in_one_folder_at_once(process: Start, tmp_path: Path) -> None:
     """The second is refused at once, and the first, held up meanwhile, is none the worse for it."""
     parallel = f'{FILTER}\n[hardware]\narchitecture = "parallel"\n'  # many clocks a second
     (tmp_path / "plain.toml").write_text(parallel, encoding="utf-8")
-    arguments = ["simulate", "plain.toml", "--trace", "noise", "--seconds", "1", "--simulator", "icarus", "-o", "out"]
+    arguments = ["simulate", "plain.toml", "--trace", "noise", "--seconds", "0.2", "--simulator", "icarus", "-o", "out"]
     first = process(*arguments)
     wait_for((tmp_path / "out" / "simulation").exists)
     first.send_signal(signal.SIGSTOP)

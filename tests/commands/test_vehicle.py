@@ -123,6 +123,8 @@ def test_motion_goes_to_a_csv_file() -> None:
     assert Path("out/motion.csv").read_bytes() == first
 
 
+@pytest.mark.slow
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("name", ["motion.svg", pytest.param("motion.PNG", marks=pytest.mark.slow)])
 def test_a_plot_is_the_same_bytes_every_time(name: str) -> None:
     arguments = ("short.toml", "--plot", name, "--irregularities", "high", "--model", "linear")

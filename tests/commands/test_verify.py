@@ -58,6 +58,7 @@ def test_against_everything(folder: Path) -> None:
     assert found["program_instructions"] > 50
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize(
     ("channels", "key"),
     [
@@ -135,6 +136,7 @@ def test_a_certificate_without_a_subject_cannot_be_held_against_one(folder: Path
         )
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("core", ["filter", "instrument"])
 def test_the_decimator_of_several_channels_is_read(core: str, tmp_path: Path) -> None:
     generate(small("channels = 3\n", core), tmp_path)

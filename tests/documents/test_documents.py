@@ -15,10 +15,10 @@ from pathlib import Path
 
 import click
 import pytest
-from click.testing import CliRunner
 from tests.documents import commands_page
 from tests.documents.protocol_page import with_parts
 from tests.documents.python_page import first_example, page
+from tests.documents.shown import _SHOWN, ROOT, furnish, run, with_output
 from tests.gen.designs import example_design
 from tests.house import ROOMS, WITH_SUB_ROOMS, file_table, picture
 
@@ -34,7 +34,6 @@ from sosmith.instrument.vehicle.parameters import built_in
 from sosmith.instrument.vehicle.vehicle_report import parameters_json
 from sosmith.interface.specification import Specification
 
-ROOT = Path(__file__).parents[2]
 README = ROOT / "README.md"
 ARCHITECTURE = ROOT / "docs" / "architecture.md"
 CALIBRATION = ROOT / "docs" / "calibration.md"
@@ -64,8 +63,6 @@ _OUTPUT = re.compile(r"(?<=```text\n).*?(?=```)", re.DOTALL)
 _PARAMETERS = re.compile(r"(?<=<!-- parameters -->\n).*?(?=<!-- end of parameters -->)", re.DOTALL)
 _REGISTERS = re.compile(r"(?<=<!-- registers -->\n).*?(?=<!-- end of registers -->)", re.DOTALL)
 _SCHEMA = re.compile(r"(?<=<!-- schema -->\n).*?(?=<!-- end of schema -->)", re.DOTALL)
-_SHOWN = re.compile(r"```sh\n(?P<lines>[^`]*)```\n\n```text\n(?P<output>[^`]*)```")
-"""Lines of a shell, directly followed by what they print."""
 _HOUSE = re.compile(r"<!-- (?P<what>picture|files) of (?P<room>\w+) -->\n.*?<!-- end -->", re.DOTALL)
 """Parts of the architecture that are read off the code."""
 
@@ -74,18 +71,6 @@ def shell_lines() -> list[str]:
     """All lines of the README's shell blocks, a here-document as one."""
     blocks = re.findall(r"```sh\n(.*?)```", README.read_text(encoding="utf-8"), flags=re.DOTALL)
     return re.findall(r"^(?:cat > (?s:.*?)\nEND|.+)$", "\n".join(blocks), flags=re.MULTILINE)
-
-
-def run(line: str, folder: Path) -> str:
-    """Carry out a line of the README in `folder`; return what it prints on stdout."""
-    if written := re.fullmatch(r"cat > (\S+) <<'END'\n(.*\n)END", line, flags=re.DOTALL):
-        (folder / written[1]).write_text(written[2], encoding="utf-8")
-        return ""
-    command, *arguments = shlex.split(line)
-    assert command == "./run"
-    result = CliRunner(env={"COLUMNS": "100"}).invoke(cli, arguments)
-    assert result.exit_code == 0, f"{line}: {result.output}{result.exception!r}"
-    return result.stdout
 
 
 def worked_example(folder: Path) -> str:
@@ -97,26 +82,9 @@ def worked_example(folder: Path) -> str:
     return printed.strip() + "\n"
 
 
-def with_output(text: str, folder: Path) -> str:
-    """Renew what the lines of a document's shell blocks print, one block after another in the same folder."""
-
-    def renewed(block: re.Match[str]) -> str:
-        printed = "".join(run(line, folder) for line in block["lines"].splitlines())
-        shown = "".join(f"{line.rstrip()}\n" for line in printed.strip().splitlines())
-        return f"```sh\n{block['lines']}```\n\n```text\n{shown}```"
-
-    return _SHOWN.sub(renewed, text)
-
-
 def schema() -> str:
     """Statements that make the store of measurements, as SQL."""
     return "```sql\n" + "".join(f"{textwrap.dedent('    ' + statement)};\n" for statement in SCHEMA) + "```\n"
-
-
-def furnish(folder: Path) -> Path:
-    """Put the examples where a clone of the repository has them."""
-    (folder / "examples").symlink_to(ROOT / "examples")
-    return folder
 
 
 def with_house(text: str) -> str:

@@ -10,7 +10,7 @@ import tempfile
 from pathlib import Path
 
 import pytest
-from tests.documents.test_documents import ROOT, furnish, with_output
+from tests.documents.shown import ROOT, furnish, with_output
 
 RECIPES = ROOT / "docs" / "recipes"
 PAGES = sorted(page.stem for page in RECIPES.glob("*.md") if page.stem != "README")

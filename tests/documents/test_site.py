@@ -9,7 +9,7 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
-from tests.documents.test_documents import ROOT
+from tests.documents.shown import ROOT
 
 _STYLE = re.compile(r"""url\(\s*["']?([^"')]+)|@import\s+["']([^"']+)""")
 _LOADING = {"script": "src", "img": "src", "source": "src", "iframe": "src", "object": "data", "link": "href"}

@@ -119,6 +119,7 @@ def test_a_filter_that_is_not_exact_is_called_so() -> None:
     assert "NOT" not in document(outcome())
 
 
+@pytest.mark.slow
 def test_the_bench_from_depot_to_hardware(tmp_path: Path) -> None:
     settings = tomllib.loads((HERE / "campaign.toml").read_text(encoding="utf-8"))
     settings |= {"seeds": 2, "simulator": "icarus"}

@@ -73,6 +73,7 @@ def test_a_sample_in_work_keeps_its_bank(tmp_path: Path) -> None:
     assert prove(OneBank(broken(folded, "kept.eq(port.bank)", "kept.eq(port.bank)")), tmp_path) == "PASS"
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [

@@ -7,7 +7,7 @@ import pytest
 from amaranth.hdl import Cat, Module, Value
 from tests.formal.prover import broken, prove
 from tests.formal.small import distant, leaky, limiter, reference_of_beats
-from tests.formal.test_streams import StreamRules
+from tests.formal.stream_rules import StreamRules
 
 from sosmith.hdl import block_core
 from sosmith.hdl.plan import look_ahead as plan
@@ -38,6 +38,7 @@ def rules(
     return BlockRules(design, latency + 1, patience=latency, datapath=datapath if order else None)
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize(
     ("datapath", "lanes", "ahead"),
     [
@@ -57,6 +58,7 @@ def test_longer_turns_keep_the_rules_and_every_sample(turns: int, lanes: int, tm
     assert prove(rules(distant(turns), lanes, ahead=True), tmp_path, timeout=2400) == "PASS"
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [
@@ -71,6 +73,7 @@ def test_a_broken_core_is_found_out(right: str, wrong: str, tmp_path: Path) -> N
     assert prove(rules(leaky(), 2, ahead=False, module=wrong_core), tmp_path, timeout=600) == "FAIL"
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [

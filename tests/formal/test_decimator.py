@@ -107,6 +107,7 @@ def small(factor: int = 2, stages: int = 1, dropped: int = 1) -> Decimator:
     return Decimator(input=port, factor=factor, stages=stages, dropped=dropped)
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("dropped", [0, 1])
 def test_results_are_moving_sums(dropped: int, tmp_path: Path) -> None:
     assert prove(MovingSums(small(dropped=dropped), hardware, values=True), tmp_path) == "PASS"
@@ -121,6 +122,7 @@ def test_flags_that_come_with_samples_are_gathered(tmp_path: Path) -> None:
     assert prove(MovingSums(small(), hardware, values=True, flags=2), tmp_path) == "PASS"
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [
@@ -132,6 +134,7 @@ def test_flags_lost_are_found_out(right: str, wrong: str, tmp_path: Path) -> Non
     assert prove(MovingSums(small(), broken(hardware, right, wrong), values=True, flags=2), tmp_path) == "FAIL"
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [

@@ -10,7 +10,7 @@ from amaranth.hdl import Assert, Assume, Module, Mux, Signal, signed
 from amaranth.lib.wiring import Component, In, Out
 from tests.formal.prover import INDUCTION, Proof, broken, combinational_outputs, prove
 from tests.formal.small import port
-from tests.formal.test_streams import StreamRules
+from tests.formal.stream_rules import StreamRules
 
 from sosmith.hdl.online import cascade, core, residual
 from sosmith.hdl.plan import online_clocks
@@ -96,6 +96,7 @@ FAULTS = {
 }
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("fault", FAULTS.values(), ids=FAULTS)
 def test_a_fault_is_found(fault: tuple[str, str], tmp_path: Path) -> None:
     assert prove(Invariant(ResidualAlone(broken(residual, *fault))), tmp_path, INDUCTION) != "PASS"
@@ -161,6 +162,7 @@ def test_a_core_that_computes_something_else_is_found_out(
     assert prove(core_rules(computes=True), tmp_path, timeout=1200) == "FAIL"
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [

@@ -8,7 +8,7 @@ import pytest
 from amaranth.hdl import Assert, Assume, Const, Module, Mux, Signal
 from tests.formal.prover import broken, prove
 from tests.formal.small import leaky
-from tests.formal.test_streams import StreamRules
+from tests.formal.stream_rules import StreamRules
 
 from sosmith.hdl import core
 from sosmith.hdl.plan import parallel_clocks
@@ -64,6 +64,7 @@ class OneUpset(StreamRules):
                 m.d.comb += Assert(~self.excused)
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("upsets", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_what_has_no_flag_is_right(upsets: bool, tmp_path: Path) -> None:
     assert prove(OneUpset(upsets=upsets), tmp_path) == "PASS"

@@ -11,7 +11,7 @@ import pytest
 from amaranth.hdl import Module, Signal
 from tests.formal.prover import broken, prove
 from tests.formal.small import leaky, limiter
-from tests.formal.test_streams import DIGIT_BITS, StreamRules
+from tests.formal.stream_rules import DIGIT_BITS, StreamRules
 
 from sosmith.hdl import core, folded, reload
 from sosmith.hdl.plan import parallel_clocks
@@ -81,12 +81,14 @@ def test_a_parallel_core_that_keeps_states_or_lets_samples_in_is_found_out(
     assert prove(RestartRules(broken(core, right, wrong)), tmp_path) == "FAIL"
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("serial", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_a_folded_core_begins_anew(serial: bool, tmp_path: Path) -> None:
     module = broken(folded, "waits = waits | pending", "waits = waits | pending")
     assert prove(RestartRules(module, is_folded=True, serial=serial), tmp_path) == "PASS"
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [

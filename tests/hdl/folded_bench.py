@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 from amaranth.hdl import Module
-from tests.hdl.axi_lite_bench import OKAY
+from tests.hdl.bus.axi_lite_bench import OKAY
 
 from sosmith.hdl.folded import FoldedCore
 from sosmith.hdl.plan.streams import fields

@@ -5,8 +5,8 @@ from typing import Any
 
 from amaranth.hdl import Shape
 from tests.formal.small import leaky
-from tests.hdl.axi_lite_bench import OKAY, SLVERR
-from tests.hdl.test_reload import Bench, benched, crc_of
+from tests.hdl.bus.axi_lite_bench import OKAY, SLVERR
+from tests.hdl.bus.reload_benches import Bench, benched, crc_of
 
 from sosmith.hdl.bus.axi_lite import SerialSlave
 from sosmith.hdl.bus.serial_crc import SerialCrc

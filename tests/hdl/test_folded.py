@@ -10,9 +10,9 @@ from typing import Any
 
 import pytest
 from tests.formal.small import leaky, limiter
+from tests.hdl.bus.reload_benches import crc_of
 from tests.hdl.core_bench import simulate
 from tests.hdl.folded_bench import Line, Model, Probed, Result, Sample
-from tests.hdl.test_reload import crc_of
 
 from sosmith.hdl.plan import folded_clocks
 from sosmith.hdl.plan.instructions import encoded

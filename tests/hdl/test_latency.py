@@ -5,8 +5,8 @@ from collections.abc import Callable
 import pytest
 from tests.formal.small import limiter, resonator
 from tests.gen.designs import example_design
-from tests.hdl.streams.stream_bench import run
-from tests.hdl.test_status import A, B, adder
+from tests.hdl.axi_stream.adders import A, B, adder
+from tests.hdl.axi_stream.stream_bench import run
 
 from sosmith.hdl.core import Core
 from sosmith.hdl.folded import FoldedCore

@@ -9,9 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from benchmarks import upset_simulation as upsets
 from benchmarks.upset_simulation import Fate, Hit, Target
 from tests.formal.small import leaky, resonator
-from tests.gen.architectures.test_architecture import design_in
+from tests.gen.architectures.one_filter import design_in
 
 from sosmith.gen.architectures.architecture import Architecture
 from sosmith.gen.architectures.registry import ARCHITECTURES
@@ -21,7 +22,6 @@ from sosmith.hdl.plan.streams import dest_width, fields
 from sosmith.instrument.scenarios.traces import traces_for
 from sosmith.model.arrays import Codes
 from sosmith.model.dataflow.datapath import Datapath
-from sosmith.sim import upsets
 from sosmith.sim.beats import Beats
 from sosmith.sim.simulation import simulate
 from sosmith.sim.stream_packing import Order, pack, random_order, unpack

@@ -4,7 +4,7 @@ import doctest
 
 import pytest
 from tests.gen.designs import ALL, example_design
-from tests.gen.word_lengths.test_quantize import stimulus
+from tests.gen.word_lengths.filters import stimulus
 from tests.hdl.stage_bench import run
 
 from sosmith.gen.realizations.registry import REALIZATIONS

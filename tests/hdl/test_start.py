@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.gen.word_lengths.test_quantize import butterworth, plain
+from tests.gen.word_lengths.filters import butterworth, plain
 from tests.hdl.core_bench import Pace, run_core, simulate
 from tests.hdl.stage_bench import run
 

@@ -14,7 +14,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from paho.mqtt import client as mqtt
+from tests.suite.extras import needed
+
+mqtt = needed("paho.mqtt.client")
 
 MOSQUITTO = shutil.which("mosquitto", path=f"{os.environ.get('PATH', '')}:/usr/sbin:/usr/local/sbin")
 PATIENCE = 60.0
@@ -117,5 +119,5 @@ class Subscriber:
     def _on_subscribe(self, *_: Any) -> None:
         self._subscribed = True
 
-    def _on_message(self, client: Any, data: Any, message: mqtt.MQTTMessage) -> None:
+    def _on_message(self, client: Any, data: Any, message: Any) -> None:
         self.messages.append((message.topic, message.payload.decode(), message.retain))

@@ -15,9 +15,9 @@ from pathlib import Path
 import pytest
 from tests.commands.invocation import Invocation
 from tests.host.brokers import MOSQUITTO, Subscriber, running
+from tests.host.gauges import feed, gauge
 from tests.host.lines import device_of
 from tests.host.ports import plugged
-from tests.host.test_page import feed, gauge
 from tests.interface.small import instrument_design
 
 from sosmith.host.alarms import Alarm

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from tests.suite.extras import needed
 
 from sosmith.host.recording import check_output, recording
 from sosmith.model.errors import SpecificationError
@@ -162,7 +163,7 @@ with recording(pathlib.Path(sys.argv[1]), ("n", "value")) as made:
 
 
 def test_parquet_has_the_rows_and_leaves_nothing_beside_it(tmp_path: Path) -> None:
-    parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed")
+    parquet = needed("pyarrow.parquet")
     path = tmp_path / "rows.parquet"
     with recording(path, COLUMNS) as made:
         made.add([(0.0, 1.5, 0), (0.01, 1.25, 4)])
@@ -180,7 +181,7 @@ def test_parquet_has_the_rows_and_leaves_nothing_beside_it(tmp_path: Path) -> No
 
 
 def test_parquet_after_a_kill_has_the_rows_before_it(tmp_path: Path) -> None:
-    parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed")
+    parquet = needed("pyarrow.parquet")
     path = tmp_path / "rows.parquet"
     (tmp_path / "rows.parquet.rows.csv").write_text(TEXT + "0.0")
     with recording(path, COLUMNS) as made:
@@ -189,7 +190,7 @@ def test_parquet_after_a_kill_has_the_rows_before_it(tmp_path: Path) -> None:
 
 
 def test_an_interruption_leaves_a_complete_recording(tmp_path: Path) -> None:
-    parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed")
+    parquet = needed("pyarrow.parquet")
     path = tmp_path / "rows.parquet"
 
     def record() -> None:

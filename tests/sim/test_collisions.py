@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 import pytest
-from tests.sim.peers.test_peers import expected, made_of, run, stimulus, words
+from tests.sim.peers.peer_runs import expected, made_of, run, stimulus, words
 
 from sosmith.gen.output.verilog import to_rtlil, to_verilog
 
@@ -34,6 +34,7 @@ def _spoilt_module(module: str, *, always: bool) -> str:
     return module
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize(
     ("architecture", "realization", "channels"),
     [("folded", "df1_ef2", 3), ("serial", "df2t", 3), ("parallel", "df1_ef2", 17), ("parallel", "delta", 17)],

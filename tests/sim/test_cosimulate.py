@@ -52,6 +52,7 @@ def test_a_sound_core_passes(simulator: str, tmp_path: Path) -> None:
     assert seen[-1] == (300, 300)
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("idle_and_stall", [(0.0, 0.0), (0.9, 0.0), (0.0, 0.9), (0.6, 0.6)])
 def test_any_pace(idle_and_stall: tuple[float, float], tmp_path: Path) -> None:
     idle, stall = idle_and_stall

@@ -64,6 +64,7 @@ def run_of(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, str], Run
     return run
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize(("example", "scenario"), EVERY)
 def test_hardware_equals_the_integer_model(example: str, scenario: str, run_of: Callable[[str, str], Run]) -> None:
     evidence, report = run_of(example, scenario)
@@ -80,6 +81,7 @@ def test_hardware_equals_the_integer_model(example: str, scenario: str, run_of: 
         assert abs(accuracy["hardware"] - accuracy["golden"]) < 0.01
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("example", ALL)
 def test_worst_cases_stay_within_the_proof(example: str, run_of: Callable[[str, str], Run]) -> None:
     """The inputs that drive the filter, and the way of every rounding error, furthest: hardware and exact graph."""
@@ -120,6 +122,7 @@ MEASURED = [
 ]
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize(("example", "scenario"), MEASURED)
 def test_accuracy_is_printed_for_every_run_of_the_instruments(
     example: str, scenario: str, run_of: Callable[[str, str], Run]
@@ -129,6 +132,7 @@ def test_accuracy_is_printed_for_every_run_of_the_instruments(
     assert 80 < accuracy["unfiltered"] < accuracy["golden"] < 100
 
 
+@pytest.mark.slow
 def test_enough_samples_under_different_handshakes(run_of: Callable[[str, str], Run]) -> None:
     assert len(MEASURED) == 8
     runs = [run_of(*case)[0] for case in CASES if case not in LONG]
@@ -136,6 +140,7 @@ def test_enough_samples_under_different_handshakes(run_of: Callable[[str, str], 
     assert len({evidence.seed for evidence in runs}) == len(runs)
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("example", ALL)
 def test_icarus_agrees(example: str, tmp_path: Path) -> None:
     made = parallel_design(example)
@@ -236,6 +241,7 @@ def spoil_emitted_file(spoil: Callable[[str], str], monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(simulation, "generate", spoiled)
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize(("example", "spoil"), WRONG.values(), ids=WRONG)
 def test_a_wrong_bit_in_the_hardware_is_found(
     example: str, spoil: Callable[[str], str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch

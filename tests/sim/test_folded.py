@@ -4,7 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from tests.gen.architectures.test_architecture import design_in
+from tests.gen.architectures.one_filter import design_in
 
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.fpga.boards import find_board
@@ -35,6 +35,7 @@ def made_in(example: str, architecture: str, realization: str, board: str | None
     return design_core(wanted, board=None if board is None else find_board(board))
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize(("example", "architecture", "realization", "simulator"), CASES)
 def test_hardware_equals_the_integer_model(
     example: str, architecture: str, realization: str, simulator: str, tmp_path: Path
@@ -61,6 +62,7 @@ def check(made: CoreDesign, simulator: str, tmp_path: Path) -> None:
     assert evidence.run.samples == 60
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("architecture", ["folded", "serial"])
 def test_samples_come_at_the_rate_that_is_stated(architecture: str, tmp_path: Path) -> None:
     made = design_in(architecture)

@@ -146,6 +146,7 @@ WRONG = {
 }
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("break_it", WRONG.values(), ids=WRONG)
 def test_a_wrong_bit_in_the_netlist_is_found(break_it: Break, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     break_netlist(break_it, monkeypatch)
@@ -156,6 +157,7 @@ def test_a_wrong_bit_in_the_netlist_is_found(break_it: Break, folder: Path, monk
     assert report["mismatches"] > 0
 
 
+@pytest.mark.slow
 def test_a_flip_flop_without_its_reset_is_found(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def without_reset(text: str) -> str:
         broken, count = re.subn(r"(\) \\section0\.v1_TRELLIS_FF_Q\w* [^;]*?\.LSR\()[^)]*", r"\g<1>1'h0", text)

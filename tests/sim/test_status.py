@@ -68,6 +68,7 @@ def test_judging_the_range_takes_clocks_that_count(tmp_path: Path) -> None:
             design_core(replace(made.spec, hardware=hardware))
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("architecture", ["parallel", "folded", "serial"])
 def test_every_flag_is_seen_and_right(architecture: str, tmp_path: Path) -> None:
     made = made_in(tmp_path, architecture)
@@ -112,6 +113,7 @@ def worn(architecture: str, channels: int, initial: tuple[str, ...], *, signed: 
     )
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("architecture", ["parallel", "folded", pytest.param("serial", marks=pytest.mark.slow)])
 @pytest.mark.parametrize(
     ("channels", "initial"), [(1, ("1.5",)), (3, ("1.5",)), (3, ("1.5", "2", "0.5"))], ids=["1", "3", "3-different"]
@@ -140,6 +142,7 @@ def test_limits_of_another_channel_are_noticed(tmp_path: Path) -> None:
     assert simulate(broken, traces, tmp_path, simulator="icarus").mismatches > 0
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("architecture", ["parallel", "folded", "serial"])
 @pytest.mark.parametrize(("channels", "initial"), [(1, ("1.5",)), (3, ("1.5", "2", "0.5"))], ids=["1", "3-different"])
 def test_wear_leaves_nothing_for_a_linter_or_a_compiler(

@@ -20,8 +20,8 @@ from urllib.request import Request, urlopen
 
 import pytest
 from tests.interface.small import FILTER
+from tests.studio.lives import lives
 from tests.studio.sessions import PATIENCE, file_in, proven, session_in, state, until
-from tests.studio.test_session import lives
 from websockets.exceptions import ConnectionClosedError, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 

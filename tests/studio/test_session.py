@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.interface.small import FILTER, INSTRUMENT
+from tests.studio.lives import lives
 from tests.studio.sessions import TEXT, file_in, proven, session_in, state, until
 
 import sosmith
@@ -29,14 +30,6 @@ def _session(tmp_path: Path) -> Iterator[Session]:
 def change(session: Session, changes: dict[str, Any], **more: Any) -> None:
     """Say what a page says when something was changed."""
     session.handle({"do": "change", "changes": changes, **more}, "page")
-
-
-def lives(pid: int) -> bool:
-    """Whether there is such a process, and more of it than its entry in the table."""
-    try:
-        return (Path("/proc") / str(pid) / "stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except OSError:
-        return False
 
 
 def test_what_is_shown_is_what_the_interface_computes(session: Session) -> None:

@@ -39,6 +39,7 @@ def test_the_locomotive_is_proven_again() -> None:
     assert check_specification(certificate, held, verdict.margin) == agreement
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("architecture", ["folded", "serial"])
 def test_the_program_is_proven_from_the_text(architecture: str, tmp_path: Path) -> None:
     made = locomotive(architecture=architecture)

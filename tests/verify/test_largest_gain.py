@@ -6,7 +6,7 @@ from types import ModuleType
 
 import pytest
 from tests.formal.prover import broken
-from tests.gen.filter.test_largest_gain import CASES, made
+from tests.gen.filter.gains import CASES, made
 
 from sosmith.gen.filter import largest_gain
 from sosmith.verify.certificate_file import BandEntry, DecimationEntry, SectionEntry, on_grid

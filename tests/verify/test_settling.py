@@ -91,6 +91,7 @@ def test_a_filter_from_its_first_sample_has_no_flag() -> None:
         verify(certified(design, 10))
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("architecture", ["parallel", "folded", "serial"])
 def test_hardware_that_flags_one_sample_less_is_found(architecture: str) -> None:
     """The text of another core, whose counter ends a sample early, against the certificate."""

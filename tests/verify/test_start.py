@@ -12,13 +12,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.gen.word_lengths.test_quantize import butterworth, plain
-from tests.gen.word_lengths.test_start import CURRENT, ripple, steady_design
+from tests.gen.word_lengths.filters import butterworth, plain
+from tests.gen.word_lengths.steady import CURRENT, ripple, steady_design
+from tests.verify.certificate_edits import all_edits, proven, rejected, wrongly_accepted
 from tests.verify.parallel.cores import made as parallel
 from tests.verify.parallel.cores import small as small_parallel
-from tests.verify.program.test_check import small as small_folded
+from tests.verify.program.programs import small as small_folded
 from tests.verify.small_specifications import PLAIN, STEADY, STEADY_INSTRUMENT
-from tests.verify.test_certificate import all_edits, proven, rejected, wrongly_accepted
 
 from sosmith.gen.core import design_core
 from sosmith.gen.output.certificate import certificate

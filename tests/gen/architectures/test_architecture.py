@@ -7,27 +7,18 @@ from fractions import Fraction
 
 import pytest
 from tests.formal.small import limiter
+from tests.gen.architectures.one_filter import design_in
 from tests.gen.designs import EXAMPLES, example_design
 
 from sosmith.gen.architectures.budget import Budget
 from sosmith.gen.architectures.registry import ARCHITECTURES, fitting
-from sosmith.gen.core import CoreDesign, design_core
+from sosmith.gen.core import design_core
 from sosmith.gen.fpga.boards import find_board
 from sosmith.gen.output.core_facts import core_facts
 from sosmith.gen.output.manifest import manifest
 from sosmith.gen.specification.specification import load
 from sosmith.hdl.plan.instructions import instruction_bits
 from sosmith.model.errors import ShortfallError
-
-
-def design_in(
-    architecture: str, example: str = "audio_lowpass.toml", *, clock: int = 100_000_000, start: str = "zero"
-) -> CoreDesign:
-    spec = load(EXAMPLES / example)
-    hardware = replace(
-        spec.hardware, architecture=architecture, clock=Fraction(clock), realization="df1_ef2", start=start
-    )
-    return design_core(replace(spec, hardware=hardware))
 
 
 @pytest.mark.parametrize("architecture", ["folded", "serial"])

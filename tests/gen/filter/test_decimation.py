@@ -6,6 +6,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from tests.gen.filter.decimations import RATE, decimation, lowpass
 
 from sosmith.gen.filter.decimation import (
     Decimation,
@@ -16,32 +17,11 @@ from sosmith.gen.filter.decimation import (
     stages_for,
 )
 from sosmith.gen.filter.design import design, impulse_response
-from sosmith.gen.specification.specification import FilterSpec
 from sosmith.model.dataflow.decimator import Decimator
 from sosmith.model.errors import ShortfallError
 from sosmith.model.port import Port
 
-
-def lowpass(order: int = 7, cutoff: str = "0.2587802", decimate: int | str = "auto", **options: str) -> FilterSpec:
-    return FilterSpec(
-        **{"family": "butterworth", "kind": "lowpass", "method": "bilinear"} | options,
-        order=order,
-        cutoff=(Fraction(cutoff),),
-        passband_edge=None,
-        stopband_edge=None,
-        passband_loss=Fraction(1, 2),
-        stopband_loss=Fraction(50),
-        sos=None,
-        decimate=decimate,
-    )
-
-
-RATE = Fraction(100)
 EXACT = Fraction(1, 32000)  # a quarter of a micrometre of 8 mm
-
-
-def decimation(factor: int = 16, stages: int = 4, edge: str = "0.2587802") -> Decimation:
-    return Decimation(factor=factor, stages=stages, sample_rate=RATE, edge=Fraction(edge))
 
 
 def response_at(made: Decimation, frequency: np.ndarray) -> np.ndarray:

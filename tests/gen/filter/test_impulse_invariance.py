@@ -11,7 +11,7 @@ import pytest
 from click.testing import CliRunner
 from scipy import linalg, signal
 from tests.gen.designs import EXAMPLES, example_design
-from tests.gen.word_lengths.test_quantize import errors, plain, stimulus
+from tests.gen.word_lengths.filters import errors, plain, stimulus
 
 from sosmith.cli import cli
 from sosmith.gen.core import design_core
@@ -202,6 +202,7 @@ def test_from_the_specification_to_the_manifest(tmp_path: Path) -> None:
     assert f"at most {deviation} % of the gain, {dc} % at zero frequency" in shown
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize(
     ("family", "order", "cutoff", "realization"),
     [

@@ -6,27 +6,14 @@ from types import ModuleType
 import numpy as np
 import pytest
 from tests.formal.prover import broken
-from tests.gen.filter.test_decimation import RATE, decimation, lowpass
+from tests.gen.filter.decimations import RATE, lowpass
+from tests.gen.filter.gains import CASES, made
 
 from sosmith.gen.filter import largest_gain
-from sosmith.gen.filter.decimation import Decimation, decimated
+from sosmith.gen.filter.decimation import Decimation
 from sosmith.gen.filter.design import Filter, design
 from sosmith.gen.filter.largest_gain import TOLERANCE, LargestGain
 from sosmith.gen.filter.response import complex_response
-
-CASES = [
-    ("butterworth", 7, 16, 4, "0.2587802"),
-    ("butterworth", 1, 2, 3, "0.3"),
-    ("chebyshev1", 4, 4, 2, "3"),
-    ("chebyshev2", 5, 8, 3, "1"),
-    ("elliptic", 8, 16, 5, "0.1"),
-    ("bessel", 2, 8, 3, "1"),
-]
-
-
-def made(family: str, order: int, factor: int, stages: int, cutoff: str) -> tuple[Decimation, Filter]:
-    found = decimation(factor, stages, cutoff)
-    return found, decimated(lowpass(order, cutoff, family=family), found)
 
 
 def gains_in(found: Decimation, filter_: Filter, frequencies: np.ndarray) -> np.ndarray:

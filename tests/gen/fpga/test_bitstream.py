@@ -3,12 +3,12 @@
 import json
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.gen.fpga.stubs import REPORT, Stub
 from tests.interface.small import filter_design
 
 import sosmith
@@ -19,50 +19,7 @@ from sosmith.gen.fpga.tools import Tool, find_tool
 from sosmith.gen.output.board_top import board_verilog, top_name
 from sosmith.model.errors import ShortfallError, SpecificationError, ToolError
 
-REPORT = {
-    "fmax": {"board.clk": {"achieved": 70.123, "constraint": 12.0}},
-    "utilization": {"ICESTORM_LC": {"used": 7, "available": 1280}, "TBUF": {"used": 4, "available": 0}},
-    "critical_paths": [
-        {
-            "from": "posedge board.clk",
-            "to": "posedge board.clk",
-            "path": [
-                {"type": "clk-to-q", "delay": 1.5, "to": {"cell": "a"}},
-                {"type": "setup", "delay": 0.25, "to": {"cell": "b"}},
-            ],
-        },
-        {
-            "from": "<async>",
-            "to": "posedge board.clk",
-            "path": [{"type": "routing", "delay": 9.0, "to": {"cell": "c"}}],
-        },
-    ],
-}
 TOP = "module tiny(input clk, rst, rx, output tx, output [2:0] leds); assign tx = rx; assign leds = 0; endmodule\n"
-
-
-@dataclass(frozen=True)
-class Stub:
-    """Stands for a program: leaves what nextpnr and a packer leave, or fails with some words."""
-
-    name: str
-    calls: list[list[str]]
-    report: dict[str, Any]
-    fails: str | None = None
-    version: str = "1.2"
-
-    def run(self, arguments: list[str], folder: Path, log: Path) -> int:
-        self.calls.append([self.name, *arguments])
-        with log.open("a", encoding="utf-8") as output:
-            output.write(f"$ {self.name} {' '.join(arguments)}\n{self.fails or 'well'}\n")
-        for place, following in zip(arguments, [*arguments[1:], ""], strict=True):
-            if place == "--report":
-                (folder / following).write_text(json.dumps(self.report), encoding="utf-8")
-        for suffix in ("bin", "bit", "fs"):
-            for file in folder.glob("*.json"):
-                if file.name.startswith("build_"):
-                    (folder / f"{file.stem.removeprefix('build_')}.{suffix}").write_bytes(b"bits")
-        return 0 if self.fails is None else 1
 
 
 Install = Callable[..., list[list[str]]]

@@ -5,6 +5,7 @@ from dataclasses import replace
 from fractions import Fraction
 
 import pytest
+from tests.gen.output.converter_board import SPEC
 
 import sosmith
 from sosmith.gen.core import CoreDesign, design_core
@@ -13,17 +14,6 @@ from sosmith.gen.output.board_top import schedule_of, selects_of
 from sosmith.model.errors import SpecificationError
 
 CLOCK = Fraction(12_000_000)
-SPEC = {
-    "name": "gauge",
-    "sample_rate": 100,
-    "channels": 5,
-    "input": {"voltage": {"bits": 16, "range": [0.0, 10.0]}, "temperature": {"bits": 12, "range": [-32.0, 96.0]}},
-    "calibration": {"coefficients": [[1.16, -0.0036], [0.3672]]},
-    "filter": {"family": "butterworth", "kind": "lowpass", "order": 1, "cutoff": 10.0},
-    "output": {"bits": 12, "range": [0.0, 16.0], "unit": "mm"},
-    "converter": {"voltage": {"device": "mcp3204", "range": [0.0, 10.0]}, "temperature": {"device": "max31855"}},
-    "hardware": {"realization": "df1_ef1", "architecture": "parallel"},
-}
 
 
 @pytest.fixture(scope="module")

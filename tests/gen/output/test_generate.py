@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests.gen.designs import ALL, EXAMPLES, example_design
-from tests.gen.word_lengths.test_quantize import stimulus
+from tests.gen.word_lengths.filters import stimulus
 
 from sosmith.gen.output.generate import generate
 from sosmith.model.dataflow.c_model import c_header, state_bytes
@@ -20,6 +20,7 @@ from sosmith.model.errors import SpecificationError
 from sosmith.model.text_files import write_files
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=[pytest.mark.slow] if "locomotive" in name else []) for name in ALL]
 )

@@ -53,6 +53,7 @@ def test_the_ports_are_those_of_the_module(design: CoreDesign) -> None:
         assert int(declared[1] or 0) + 1 == int(width)
 
 
+@pytest.mark.slow
 def test_the_instance_is_one(design: CoreDesign, tmp_path: Path) -> None:
     instance = header_of(design).split("Instance:\n")[1]
     stated = re.findall(r"^  (\w+) +(?:input|output) +(\d+)  ", header_of(design), re.MULTILINE)

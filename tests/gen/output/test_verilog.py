@@ -12,7 +12,7 @@ from amaranth.hdl import Elaboratable, Module, Signal, unsigned
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import Component, In, Out
 from tests.gen.designs import EXAMPLES, parallel_design
-from tests.gen.output.test_converters import SPEC
+from tests.gen.output.converter_board import SPEC
 
 import sosmith
 from sosmith.gen.output.board_top import board_top
@@ -53,6 +53,7 @@ def stay_apart(escaped: str, plain: str) -> bool:
     return [*map(len, declared[0])] == [*map(len, declared[1])]
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("options", [{}, {"channels": 3, "protect": "correct", "reload": True}], ids=["plain", "all"])
 @pytest.mark.parametrize("architecture", ["parallel", "folded", "serial"])
 def test_names_need_no_escape_and_stay_apart(architecture: str, options: dict[str, Any]) -> None:

@@ -14,9 +14,9 @@ from scipy import signal
 from tests.gen.designs import EXAMPLES, with_rows
 from tests.gen.proof.cycle_search import search_cycles
 from tests.gen.proven_stages import run
-from tests.gen.word_lengths.test_quantize import OUT, SIGNED, butterworth, errors, plain, stimulus
-from tests.gen.word_lengths.test_sweep import REFUSED
-from tests.verify.test_certificate import all_edits, proven, wrongly_accepted
+from tests.gen.word_lengths.filters import OUT, SIGNED, butterworth, errors, plain, stimulus
+from tests.gen.word_lengths.sweep_designs import REFUSED
+from tests.verify.certificate_edits import all_edits, proven, wrongly_accepted
 
 from sosmith.gen.core import design_core
 from sosmith.gen.filter.design import Filter
@@ -224,6 +224,7 @@ LARGEST = {("bandpass", 5, 0.002), ("bandstop", 5, 0.002), ("bandstop", 3, 0.002
 """Up to a minute each: rationals of the most digits."""
 
 
+@pytest.mark.sweep(8)
 @pytest.mark.parametrize(
     ("kind", "order", "cutoff"),
     [
@@ -271,6 +272,7 @@ def evaluated(polynomial: tuple[Fraction, ...], w: Complex) -> Complex:
 # Rounding noise.
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize(
     ("kind", "order", "cutoff"),
     [("lowpass", 3, 0.02), ("lowpass", 5, 0.1), ("highpass", 3, 0.05), ("bandpass", 1, 0.05), ("lowpass", 7, 0.2)],
@@ -325,6 +327,7 @@ def loops(kind: str, order: int, cutoff: float, bits: int = 6) -> list[Graph]:
 SEARCHED = [("lowpass", 3, 0.05), ("lowpass", 5, 0.2), ("highpass", 3, 0.1), ("highpass", 5, 0.4), ("bandpass", 3, 0.1)]
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize("bits", [3, 6])
 @pytest.mark.parametrize(("kind", "order", "cutoff"), SEARCHED)
 def test_every_section_comes_to_rest(kind: str, order: int, cutoff: float, bits: int) -> None:
@@ -362,6 +365,7 @@ def test_energy_is_that_of_the_port_conductances() -> None:
 # Certificates, manifest.
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize(
     ("order", "cutoff"),

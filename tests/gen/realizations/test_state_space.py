@@ -24,7 +24,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import signal
 from tests.gen.designs import with_rows
-from tests.gen.word_lengths.test_quantize import butterworth, errors, plain, stimulus
+from tests.gen.word_lengths.filters import butterworth, errors, plain, stimulus
 from tests.hdl.stage_bench import run
 
 from sosmith.gen.proof.linear_model import linear_model
@@ -244,6 +244,7 @@ def cycles(graph: Graph, reach: int) -> set[tuple[int, ...]]:
     return found
 
 
+@pytest.mark.sweep(4)
 @pytest.mark.parametrize("name", [*POLES, *REAL_POLES])
 @pytest.mark.parametrize("bits", [6, 12])
 def test_truncated_states_come_to_rest_and_rounded_ones_do_not(name: str, bits: int) -> None:
@@ -308,6 +309,7 @@ CASES = [
 """All designs in both realizations; the fast tests take every other of the smaller ones, each realization in turn."""
 
 
+@pytest.mark.sweep(5)
 @pytest.mark.parametrize(("realization", "kind", "order", "cutoff"), CASES)
 def test_designs_stay_within_their_bound(realization: str, kind: str, order: int, cutoff: float) -> None:
     quantized = plain(butterworth(order, cutoff, kind), realization)
@@ -317,6 +319,7 @@ def test_designs_stay_within_their_bound(realization: str, kind: str, order: int
     assert quantized.datapath.compute_exact(part) == quantized.datapath.compute(part).tolist()
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize("realization", ["state_space", "normal"])
 @pytest.mark.parametrize("name", ["low-pass", "two real poles", "two real poles on both sides", "delays only"])
 def test_hardware_equals_its_graph(name: str, realization: str) -> None:

@@ -6,7 +6,7 @@ import random
 from dataclasses import replace
 
 import pytest
-from tests.gen.word_lengths.test_quantize import butterworth
+from tests.gen.word_lengths.filters import butterworth
 
 from sosmith.gen.proof.linear_model import quantizers
 from sosmith.gen.realizations.registry import CASCADES, REALIZATIONS, Section

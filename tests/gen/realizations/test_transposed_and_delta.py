@@ -11,7 +11,7 @@ import pytest
 from scipy import signal
 from tests.gen.designs import with_rows
 from tests.gen.proven_stages import Ranges, datapath_of, proven_cascade
-from tests.gen.word_lengths.test_quantize import butterworth, errors, plain, stimulus
+from tests.gen.word_lengths.filters import butterworth, errors, plain, stimulus
 from tests.hdl.stage_bench import run as run_hardware
 
 from sosmith.gen.proof.linear_model import linear_model
@@ -109,6 +109,7 @@ def full_scale(samples: int) -> np.ndarray:
     return codes
 
 
+@pytest.mark.sweep(4)
 @pytest.mark.parametrize("design", DESIGNS)
 def test_delta_with_exact_states_is_second_order_error_feedback(design: Design) -> None:
     """THEORY 3.5, bit for bit in the compiled model; and in the interpreter, which checks all ranges."""
@@ -125,6 +126,7 @@ def test_delta_with_exact_states_is_second_order_error_feedback(design: Design) 
     assert one.compute_exact(few) == other.compute_exact(few)
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("design", DESIGNS[1:9:2])
 def test_hardware_of_delta_with_exact_states_is_second_order_error_feedback(design: Design) -> None:
     samples = full_scale(160).reshape(-1, 1).tolist()

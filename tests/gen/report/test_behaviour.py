@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from scipy import signal
-from tests.gen.report.test_report import F7, LSB, Page, bandpass, changed, evidence, facts, page_of, plain
+from tests.gen.report.behaviours import told
+from tests.gen.report.evidences import F7, LSB, Page, bandpass, changed, evidence, facts, page_of, plain
 
 from sosmith.cli import cli
 from sosmith.commands.tables.report import print_summary
@@ -19,7 +20,6 @@ from sosmith.gen.filter.step_response import step_response
 from sosmith.gen.output.core_facts import SettlingFacts
 from sosmith.gen.report.behaviour import behaviour
 from sosmith.gen.report.evidence import Evidence
-from sosmith.gen.report.provenance import Provenance
 from sosmith.gen.report.report import summarise
 from sosmith.gen.report.tiles import tile_rows
 
@@ -172,13 +172,6 @@ def test_settling_is_shaded(words: str) -> None:
     assert "settling from the start at zero, 12.5 s" in shaded
     assert "settling from the start at zero" not in words
     assert "date not given" in shaded
-
-
-def told() -> Provenance:
-    names = ("specification", "reference", "trace", "datapath")
-    return Provenance(
-        specification={}, cycles_per_sample=1, cost={}, **{f"{name}_sha256": name[0] * 64 for name in names}
-    )
 
 
 def test_evidence_is_named_with_digests(words: str) -> None:

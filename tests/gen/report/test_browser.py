@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.gen.report.test_behaviour import told
-from tests.gen.report.test_comparison import WORSE, report
-from tests.gen.report.test_report import LSB, evidence, page_of
+from tests.gen.report.behaviours import told
+from tests.gen.report.evidences import LSB, evidence, page_of
+from tests.gen.report.reports import WORSE, report
 from tests.host.browser import BROWSER, Tab, browser
 
 from sosmith.gen.report.comparison.baseline import judge

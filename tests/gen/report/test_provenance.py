@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.commands.command_line import FILTER
-from tests.gen.report.test_report import evidence
+from tests.gen.report.evidences import evidence
 
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.fpga.boards import find_board

@@ -9,7 +9,7 @@ from fractions import Fraction
 
 import pytest
 from tests.gen.designs import example_design
-from tests.gen.report.test_report import Page, evidence, page_of
+from tests.gen.report.evidences import Page, evidence, page_of
 
 from sosmith.gen.report.diagram import diagram
 from sosmith.gen.report.recursion import Coefficient, Equation, Recursion, Term, recursion_of

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.gen.designs import example_design
-from tests.gen.report.test_behaviour import told
-from tests.gen.report.test_report import LSB, OUTPUT, evidence, page_of, plain
+from tests.gen.report.behaviours import told
+from tests.gen.report.evidences import LSB, OUTPUT, evidence, page_of, plain
 
 from sosmith.gen.report.recursion import recursion_of
 from sosmith.gen.report.samples import MAX_POINTS, packed, viewer_data

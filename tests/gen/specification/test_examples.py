@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from tests.made_files import ROOT
+from tests.machines.made_files import ROOT
 
 from sosmith.gen.specification import examples, specification
 from sosmith.model.errors import SpecificationError

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from scipy import signal
 from tests.gen.designs import with_rows
-from tests.gen.word_lengths.test_quantize import butterworth as butterworth_filter
-from tests.gen.word_lengths.test_quantize import plain
+from tests.gen.word_lengths.filters import butterworth as butterworth_filter
+from tests.gen.word_lengths.filters import plain
 
 from sosmith.gen.filter.design import decay_length
 from sosmith.gen.proof.linear_model import linear_model

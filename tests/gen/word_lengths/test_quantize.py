@@ -10,53 +10,15 @@ import numpy as np
 import pytest
 from scipy import signal
 from tests.gen.designs import ALL, example_design, with_rows
+from tests.gen.word_lengths.filters import OUT, SIGNED, butterworth, errors, plain, stimulus
 
 from sosmith.gen.filter.design import Filter, design
 from sosmith.gen.realizations.registry import CASCADES, REALIZATIONS
 from sosmith.gen.specification.specification import FilterSpec
 from sosmith.gen.word_lengths.other_realization import with_realization
 from sosmith.gen.word_lengths.quantize import quantize
-from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.model.polynomial import Polynomial
 from sosmith.model.port import Port
-from sosmith.model.reference.golden import calibrated, filtered
-
-SIGNED = Port.from_range("x", 16, Fraction(-1), Fraction(1), signed=True)
-OUT = Port.from_range("y", 16, Fraction(-1), Fraction(1), signed=True)
-
-
-def butterworth(order: int, cutoff: float, kind: str = "lowpass") -> Filter:
-    band = (Fraction(cutoff),) if kind in {"lowpass", "highpass"} else (Fraction(cutoff), Fraction(cutoff * 1.3))
-    return design(
-        FilterSpec(
-            family="butterworth",
-            kind=kind,
-            method="bilinear",
-            order=order,
-            cutoff=band,
-            passband_edge=None,
-            stopband_edge=None,
-            passband_loss=None,
-            stopband_loss=None,
-            sos=None,
-        ),
-        1.0,
-    )
-
-
-def plain(
-    ideal: Filter, realization: str = "df1_ef2", inputs: Port = SIGNED, output: Port = OUT, *, steady: bool = False
-) -> Quantized:
-    return quantize(
-        name="test",
-        inputs=(inputs,),
-        output=output,
-        max_error=output.lsb,
-        ideal=ideal,
-        polynomial=None,
-        realization=realization,
-        steady=steady,
-    )
 
 
 def given(*rows: Sequence[str]) -> Filter:
@@ -76,25 +38,6 @@ def given(*rows: Sequence[str]) -> Filter:
         ),
         Fraction(1),
     )
-
-
-def stimulus(ports: tuple[Port, ...], seed: int, samples: int = 30000) -> np.ndarray:
-    """Random codes, then both rails, then a small step: what finds overflow, gain errors and dead bands."""
-    rng = np.random.default_rng(seed)
-    codes = np.stack([rng.integers(p.lowest, p.highest + 1, samples) for p in ports], axis=1)
-    for part, pick in ((1, "highest"), (2, "lowest")):
-        codes[samples * part // 4 : samples * (part + 1) // 4] = [getattr(p, pick) for p in ports]
-    codes[samples * 3 // 4 :] = [(p.lowest + p.highest) // 2 + 5 for p in ports]
-    return codes
-
-
-def errors(quantized: Quantized, codes: np.ndarray) -> np.ndarray:
-    """Integer model minus golden chain, in output LSBs."""
-    datapath = quantized.datapath
-    before = calibrated(codes, datapath.inputs, quantized.polynomial)
-    sos = None if quantized.filter is None else quantized.filter.sos
-    golden = filtered(before, sos, datapath.output, steady=quantized.steady)
-    return (datapath.output.decode(datapath.compute(codes)) - golden) / float(datapath.output.lsb)
 
 
 def case(name: str, realization: str) -> Any:
@@ -132,6 +75,7 @@ CASES = [
 with twelve poles next to z = 1, whose peak gains take minutes a design."""
 
 
+@pytest.mark.sweep(4)
 @pytest.mark.parametrize(("kind", "order", "cutoff", "realization"), CASES)
 def test_designs_stay_within_their_bound(kind: str, order: int, cutoff: float, realization: str) -> None:
     quantized = plain(butterworth(order, cutoff, kind), realization)

@@ -6,7 +6,7 @@ from fractions import Fraction
 
 import pytest
 from tests.gen.designs import with_rows
-from tests.gen.word_lengths.test_quantize import OUT, SIGNED, butterworth, plain
+from tests.gen.word_lengths.filters import OUT, SIGNED, butterworth, plain
 
 from sosmith.gen.filter.design import Filter
 from sosmith.gen.realizations.registry import CASCADES, REALIZATIONS, Row

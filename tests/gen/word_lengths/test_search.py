@@ -10,7 +10,7 @@ from functools import cache
 import numpy as np
 import pytest
 from tests.gen.designs import ALL, example_design
-from tests.gen.word_lengths.test_quantize import OUT, SIGNED, butterworth
+from tests.gen.word_lengths.filters import OUT, SIGNED, butterworth
 
 from sosmith.gen.filter.design import Filter
 from sosmith.gen.proof.linear_model import Source, linear_model

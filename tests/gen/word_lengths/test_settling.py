@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy import signal
 from tests.gen.designs import example_design, zero_design
-from tests.gen.word_lengths.test_quantize import butterworth, plain
-from tests.gen.word_lengths.test_start import steady_design
+from tests.gen.word_lengths.filters import butterworth, plain
+from tests.gen.word_lengths.steady import steady_design
 
 from sosmith.gen.output.core_facts import core_facts
 from sosmith.gen.output.manifest import manifest

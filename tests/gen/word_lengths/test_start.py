@@ -2,18 +2,17 @@
 
 from dataclasses import replace
 from fractions import Fraction
-from functools import cache
 
 import numpy as np
 import pytest
 from scipy import signal
 from tests.gen.designs import EXAMPLES
-from tests.gen.word_lengths.test_quantize import OUT, SIGNED, butterworth, plain
+from tests.gen.word_lengths.filters import OUT, SIGNED, butterworth, plain
+from tests.gen.word_lengths.steady import CURRENT, ripple, steady_design
 
 from sosmith.gen.core import CoreDesign, design_core
-from sosmith.gen.filter.design import Filter, design
 from sosmith.gen.realizations.registry import REALIZATIONS
-from sosmith.gen.specification.specification import FilterSpec, load
+from sosmith.gen.specification.specification import load
 from sosmith.gen.word_lengths.other_realization import with_realization
 from sosmith.gen.word_lengths.quantized import START, Quantized
 from sosmith.model.dataflow.status import Flag
@@ -21,33 +20,7 @@ from sosmith.model.port import Port
 from sosmith.model.reference.golden import calibrated, filtered
 from sosmith.model.sections.start import PassingStage, StartStage
 
-CURRENT = Port.from_range("i", 12, Fraction(4), Fraction(20))
-"""A range that does not contain 0."""
-
 WEAR = Flag.WEAR_WARNING, Flag.WEAR_CRITICAL
-
-
-@cache
-def steady_design(name: str, **hardware: object) -> CoreDesign:
-    spec = load(EXAMPLES / name)
-    return design_core(replace(spec, hardware=replace(spec.hardware, start="steady", **hardware)))
-
-
-def ripple() -> Filter:
-    """Design a filter of even order, whose gain at zero frequency is not 1."""
-    given = FilterSpec(
-        family="chebyshev1",
-        kind="lowpass",
-        method="bilinear",
-        order=4,
-        cutoff=(Fraction(1, 20),),
-        passband_edge=None,
-        stopband_edge=None,
-        passband_loss=Fraction(1),
-        stopband_loss=None,
-        sos=None,
-    )
-    return design(given, 1.0)
 
 
 def error(made: Quantized, codes: np.ndarray) -> float:
@@ -59,6 +32,7 @@ def error(made: Quantized, codes: np.ndarray) -> float:
     return float(np.abs(datapath.output.decode(datapath.compute(codes)) - exact).max() / float(datapath.output.lsb))
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize("realization", REALIZATIONS)
 @pytest.mark.parametrize("kind", ["lowpass", "highpass", "bandpass", "bandstop"])
 def test_error_and_ranges_of_every_realization(kind: str, realization: str) -> None:

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from tests.gen.word_lengths.sweep_designs import REFUSED
 
 from sosmith.gen.filter.design import decay_length, design, impulse_response
 from sosmith.gen.realizations.registry import CASCADES, REALIZATIONS
@@ -196,13 +197,6 @@ def test_no_input_exceeds_the_certificate(numbered: tuple[int, Quantized]) -> No
         assert error <= float(quantized.bound) + 1e-6
         worst = max(worst, float(error))
     assert worst >= 0.4 * float(quantized.bound)
-
-
-REFUSED = (
-    "lattice_wdf must have a filter that is half the sum or difference of two allpass filters, as Butterworth, "
-    "Chebyshev and elliptic filters of odd order are, or a band-pass or band-stop made from one: choose an odd order "
-    "or another realization"
-)
 
 
 @pytest.mark.parametrize("number", [k for k, wanted in enumerate(DESIGNS) if not is_lattice(wanted)])

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.formal.prover import broken
+from tests.hdl.decimation.decimators import decimator
 from tests.hdl.decimation.restarted import simulate
-from tests.hdl.decimation.test_decimator import decimator
 
 from sosmith.hdl.decimation import channel_decimator as hardware
 from sosmith.hdl.plan.decimator_clocks import cycles_per_result_of_many, latency_cycles, reset_cycles

@@ -10,7 +10,7 @@ from tests.formal.prover import broken
 from tests.gen.word_lengths.decimated import small
 from tests.hdl import core_bench
 from tests.hdl.core_bench import Pace, run_core
-from tests.hdl.decimation.test_calibration_ahead import LIMITS, run
+from tests.hdl.decimation.calibrated import LIMITS, run
 
 from sosmith.gen.architectures.architecture import Architecture
 from sosmith.hdl.decimation import decimator as hardware

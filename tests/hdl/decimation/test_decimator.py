@@ -2,23 +2,17 @@
 """The decimator in Amaranth's own simulator: equal to its model, at any pace, and after a reset in mid-run."""
 
 import random
-from fractions import Fraction
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pytest
+from tests.hdl.decimation.decimators import decimator
 from tests.hdl.decimation.restarted import simulate
 
 from sosmith.hdl.decimation.decimator import CicDecimator
 from sosmith.hdl.plan.decimator_clocks import cycles_per_result, latency_cycles, reset_cycles
 from sosmith.model.dataflow.decimator import Decimator
-from sosmith.model.port import Port
-
-
-def decimator(factor: int, stages: int, dropped: int, *, signed: bool = True) -> Decimator:
-    port = Port(name="x", bits=6, signed=signed, lsb=Fraction(1), zero=Fraction(0))
-    return Decimator(input=port, factor=factor, stages=stages, dropped=dropped)
 
 
 def codes_for(made: Decimator, count: int, seed: int) -> list[int]:

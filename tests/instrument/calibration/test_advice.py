@@ -4,7 +4,7 @@ from statistics import NormalDist
 
 import numpy as np
 import pytest
-from tests.instrument.calibration.test_bayesian_fit import FIRST, RANGES, TYPE, fitted, measured
+from tests.instrument.calibration.bayesian import FIRST, RANGES, TYPE, fitted, measured
 
 from sosmith.instrument.calibration.advice import advise
 from sosmith.instrument.calibration.bayesian_fit import BayesianFit

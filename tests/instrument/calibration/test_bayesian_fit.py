@@ -4,32 +4,13 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from tests.instrument.calibration.bayesian import FIRST, RANGES, TRUE, TYPE, fitted, measured
 
 from sosmith.gen.calibration.fit import Measurements
-from sosmith.instrument.calibration.bayesian_fit import BayesianFit, bayesian_fit, lowest_slope, stays_within
+from sosmith.instrument.calibration.bayesian_fit import bayesian_fit, lowest_slope, stays_within
 from sosmith.instrument.calibration.covered_region import CoveredRegion
-from sosmith.instrument.calibration.sensor_type import SENSOR_TYPES
 from sosmith.model.errors import SpecificationError
 from sosmith.model.polynomial import EQUATION_5A, Polynomial
-
-TYPE = SENSOR_TYPES["equation_5a"]
-RANGES = ((0.0, 16.0), (0.0, 10.0), (0.0, 128.0))
-FIRST = 738000
-TRUE = TYPE.polynomial((0.6, -0.8, 0.4, 0.1, 0.5))
-
-
-def measured(
-    days: int, each: int, *, scatter: float = 0.3, systematic: float = 0.0, seed: int = 1, curve: Polynomial = TRUE
-) -> Measurements:
-    """Measurements of a sensor whose day has an error of one period of 8 mm, of random phase."""
-    generator = np.random.default_rng(seed)
-    day = np.repeat(np.arange(days), each)
-    V, T = generator.uniform(0.5, 9.5, days * each), generator.uniform(20.0, 98.0, days * each)
-    clearance = curve(V, T)
-    phase = generator.uniform(0, 2 * np.pi, days)[day]
-    error = np.sqrt(2) * systematic * np.sin(2 * np.pi * clearance / 8.0 + phase)
-    d = np.maximum(clearance + error + generator.normal(0, scatter, len(day)), 0)
-    return Measurements(d, V, T, "m.csv", tuple((FIRST + day).tolist()))
 
 
 def picked(measurements: Measurements, index: np.ndarray) -> Measurements:  # type: ignore[type-arg]
@@ -37,10 +18,6 @@ def picked(measurements: Measurements, index: np.ndarray) -> Measurements:  # ty
     m = measurements
     days = tuple(np.array(m.days)[index].tolist())
     return Measurements(m.clearance[index], m.voltage[index], m.temperature[index], m.source, days)
-
-
-def fitted(measurements: Measurements, date: int | None = None) -> BayesianFit:
-    return bayesian_fit(measurements, TYPE, max(measurements.days) if date is None else date, RANGES)
 
 
 def test_many_measurements_give_the_sensor_and_its_scatters() -> None:

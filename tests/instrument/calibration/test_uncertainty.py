@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from tests.instrument.calibration.bayesian import FIRST, RANGES, TRUE, TYPE, measured
 from tests.instrument.calibration.measuring import as_arrays, readings
-from tests.instrument.calibration.test_bayesian_fit import FIRST, RANGES, TRUE, TYPE, measured
 
 from sosmith.gen.calibration.fit import Measurements, fit
 from sosmith.instrument.calibration.bayesian_fit import bayesian_fit

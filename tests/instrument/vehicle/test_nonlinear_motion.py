@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from tests.instrument.vehicle.test_wheel_rail_contact import cooperrider
+from tests.instrument.vehicle.contacts import cooperrider
 
 from sosmith.instrument.vehicle import nonlinear_motion
 from sosmith.instrument.vehicle.linear_motion import Array, LinearSystem

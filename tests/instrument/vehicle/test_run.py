@@ -157,6 +157,7 @@ def test_creep_force_is_kalkers(steady: tuple[Motion, int]) -> None:
     assert limit * found.friction_used[k] == pytest.approx(np.hypot(along, across), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_the_body_rolls_with_the_cant_deficiency(steady: tuple[Motion, int]) -> None:
     """At the speed for which the cant was made, gravity and centrifugal force add up across the track to nothing."""
     balanced = float(np.sqrt(GRAVITY * 0.09 / (2 * 0.7465) * 350))
@@ -167,6 +168,7 @@ def test_the_body_rolls_with_the_cant_deficiency(steady: tuple[Motion, int]) -> 
     assert steady[0].body_roll[steady[1]] > 3e-3
 
 
+@pytest.mark.slow
 def test_motion_is_in_proportion_to_the_irregularity() -> None:
     """Mirrored, the irregularity gives the mirrored motion; doubled, the double."""
     table = replace(GIVEN.track, irregularity=0.01)
@@ -179,6 +181,7 @@ def test_motion_is_in_proportion_to_the_irregularity() -> None:
     assert np.abs(once.clearance_mm).max() > 0.1
 
 
+@pytest.mark.slow
 def test_samples_inside_are_fine_enough() -> None:
     """Four times as many change the motion by less than a hundredth of a millimetre."""
     short = curved_track(replace(GIVEN.track, curve=20.0, run_out=0.0))
@@ -301,6 +304,7 @@ def test_limits_tell_where_flanges_and_friction_would_act(motion: Motion) -> Non
     assert -0.009 < small.beyond_flange[0] < 0
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("level", ["low", "high"])
 def test_the_model_holds_over_random_irregularities_of_a_straight_track(level: str) -> None:
     straight = tangent_track(replace(GIVEN.track, irregularity=0.0))

@@ -20,8 +20,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from pyarrow import parquet
 from tests.interface.small import FILTER
+from tests.suite.extras import needed
 
 import sosmith
 from sosmith import SpecificationError, ToolError
@@ -99,6 +99,7 @@ def test_files(found: sosmith.Exploration) -> None:
 
 
 def test_points_as_parquet(found: sosmith.Exploration, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    parquet = needed("pyarrow.parquet")
     rows = parquet.read_table(found.to_parquet(tmp_path / "points.parquet")).to_pylist()
     assert [row["error.bound"] for row in rows] == [point.get("error", {}).get("bound") for point in found.points]
     assert sum(row["on_front"] for row in rows) == len(found.front)
@@ -161,7 +162,7 @@ def test_a_design_that_another_sweep_has_made_is_shown_with_the_changes_of_this_
 
 
 def test_an_address_that_is_none_leaves_no_client_behind(tmp_path: Path) -> None:
-    pytest.importorskip("distributed", reason="the package distributed is not installed")
+    needed("distributed")
     before = set(threading.enumerate())
     with pytest.raises(ToolError, match=r"^a Dask scheduler must answer at nowhere, not: missing port number in "):
         explored(tmp_path, jobs=None, scheduler="nowhere")

@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 from tests.interface.small import FILTER
+from tests.suite.extras import needs
 
 import sosmith
 from sosmith import Specification, SpecificationError, ToolError
@@ -17,6 +18,8 @@ from sosmith.instrument.scenarios.traces import default_traces
 from sosmith.sim.exploration.grid import Task
 from sosmith.sim.exploration.parameters import Parameters, Span
 from sosmith.sim.exploration.run import Outcome, explore
+
+pytestmark = needs("optuna")
 
 SPEC = Specification.load(FILTER).checked
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.model.dataflow.test_decimator import decimated
+from tests.model.dataflow.decimators import decimated
 from tests.model.datapaths import INPUT
 
 from sosmith.model.dataflow.c_model import c_header, c_source

@@ -11,11 +11,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.model.datapaths import INPUT, butterworth, cascade
+from tests.model.dataflow.decimators import decimated
+from tests.model.datapaths import INPUT
 
 from sosmith.model.dataflow import decimator as decimator_module
 from sosmith.model.dataflow.c_model import c_header, c_source
-from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.decimator import Decimator
 from sosmith.model.dataflow.status import Flag
 from sosmith.model.port import Port
@@ -98,12 +98,6 @@ def test_the_response_at_the_higher_rate() -> None:
     expected = np.convolve([1, 2, 3, 4, 3, 2, 1], [1, 0, 0, 0, 0, 0, 0, 0, -0.5]) / 16
     assert np.allclose(response[: len(expected)], expected, rtol=0, atol=1e-15)
     assert not response[len(expected) :].any()
-
-
-def decimated(factor: int = 8, stages: int = 3, dropped: int = 9) -> Datapath:
-    datapath = cascade(butterworth(3, 0.05))
-    made = Decimator(input=INPUT, factor=factor, stages=stages, dropped=dropped)
-    return replace(datapath, decimator=made, calibrated=())
 
 
 def test_a_datapath_behind_a_decimator() -> None:

@@ -4,7 +4,7 @@ import doctest
 
 import numpy as np
 import pytest
-from tests.gen.word_lengths.test_quantize import butterworth, plain
+from tests.gen.word_lengths.filters import butterworth, plain
 
 from sosmith.model.dataflow.graph import Range
 from sosmith.model.sections import start

@@ -7,10 +7,13 @@ import pytest
 from cocotb_tools.check_results import get_results
 from cocotb_tools.runner import Icarus
 from tests.sim.lint import icarus_check, lint
+from tests.suite.extras import needs
 
 from sosmith.gen.output.verilog import to_rtlil, to_verilog
 from sosmith.hdl.reload import ReloadPort
 from sosmith.sim.simulators import PLAIN_ASSERTIONS
+
+pytestmark = needs("cocotbext.axi")
 
 ROOT = Path(__file__).parents[3]
 

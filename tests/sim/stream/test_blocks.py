@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.gen.blocks.specifications import AUDIO, designed, text
+from tests.gen.block_specifications import AUDIO, designed, text
 from tests.sim.lint import icarus_check, lint
 
 from sosmith.gen.core import CoreDesign, design_core
@@ -28,6 +28,7 @@ def worst(made: CoreDesign, kind: str, samples: int, folder: Path, simulator: st
     assert write_report(evidence, folder)["passed"]
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize(
     ("lanes", "simulator"),
     [
@@ -54,6 +55,7 @@ def test_the_fastest_cores_hold_their_bound(kind: str, lanes: int, clock: str, s
     worst(designed(lanes, clock=clock), kind, 1 << 20, tmp_path, simulator)
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     ("lanes", "pipeline"), [(1, "look-ahead"), (2, "plain"), pytest.param(2, "look-ahead", marks=pytest.mark.slow)]
 )
@@ -65,6 +67,7 @@ def test_tools_read_the_text_without_a_warning(lanes: int, pipeline: str, tmp_pa
     assert icarus_check(path, made.spec.name) == []
 
 
+@pytest.mark.slow
 def test_vectors_of_beats(tmp_path: Path) -> None:
     """Sample by sample in CSV; in words of the bus with all that the bus had, the filling of the last beat too."""
     made = design_core(from_text(text(4, pipeline="plain", base=SIMPLE), Path("simple.toml")))

@@ -54,6 +54,7 @@ def settling_of(made: CoreDesign) -> float:
     return float((outside[-1] + 1) * decimator.factor / made.spec.sample_rate)
 
 
+@pytest.mark.sweep(1)
 @without_pictures
 @pytest.mark.parametrize(
     ("architecture", "simulator"), [("folded", "icarus"), ("parallel", "verilator"), ("serial", "cxxrtl")]
@@ -77,6 +78,7 @@ def test_hardware_equals_the_integer_model(architecture: str, simulator: str, tm
     assert "That adds 300\xa0ms." in page
 
 
+@pytest.mark.sweep(1)
 @without_pictures
 @pytest.mark.parametrize(("architecture", "simulator"), [("folded", "verilator"), ("parallel", "icarus")])
 def test_held_results_come_as_often_as_samples(architecture: str, simulator: str, tmp_path: Path) -> None:
@@ -92,6 +94,7 @@ def test_held_results_come_as_often_as_samples(architecture: str, simulator: str
     assert "16 samples make one result, which leaves as many times" in (tmp_path / "report.html").read_text("utf-8")
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("hold", [False, True])
 def test_vectors_have_a_result_for_every_16th_sample(hold: bool, tmp_path: Path) -> None:
     """The last of three groups is not complete: its result is there, and as often as the others if it is held."""
@@ -111,6 +114,7 @@ def test_vectors_have_a_result_for_every_16th_sample(hold: bool, tmp_path: Path)
     assert len((tmp_path / "some_stimuli.hex").read_text(encoding="utf-8").split()) == 40
 
 
+@pytest.mark.slow
 def test_held_results_take_no_longer(tmp_path: Path) -> None:
     made = locomotive(architecture="folded", hold=True)
     stated, decimator = made.architecture, made.datapath.decimator
@@ -181,6 +185,7 @@ def test_random_designs(number: int, tmp_path: Path) -> None:
     check_proof_and_hardware(made, samples_of, number, tmp_path)
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("architecture", ["folded", "parallel"])
 def test_tools_read_the_text_without_a_warning(architecture: str, tmp_path: Path) -> None:
     made = locomotive(architecture=architecture)

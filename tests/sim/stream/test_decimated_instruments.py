@@ -57,6 +57,7 @@ def samples_of(made: CoreDesign, count: int) -> Trace:
     return replace(trace, codes=codes, truth=None, reading=None)
 
 
+@pytest.mark.sweep(1)
 @without_pictures
 @pytest.mark.parametrize(
     ("architecture", "simulator"), [("folded", "icarus"), ("parallel", "verilator"), ("serial", "cxxrtl")]
@@ -103,6 +104,7 @@ def test_wear_held_and_judged(tmp_path: Path) -> None:
     assert json.loads((tmp_path / f"{made.spec.name}.json").read_text(encoding="utf-8"))["decimation"]["held"]
 
 
+@pytest.mark.sweep(1)
 @without_pictures
 @pytest.mark.parametrize(
     ("architecture", "core", "simulator"),
@@ -135,6 +137,7 @@ def test_readings_are_held_against_the_truth(tmp_path: Path) -> None:
     assert summary["true_error"]["readings"] > 0
 
 
+@pytest.mark.slow
 def test_results_come_at_the_rate_that_is_stated(tmp_path: Path) -> None:
     made = whole("folded")
     stated = made.architecture
@@ -147,6 +150,7 @@ def test_results_come_at_the_rate_that_is_stated(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("architecture", ["folded", "parallel"])
 def test_tools_read_the_text_without_a_warning(architecture: str, tmp_path: Path) -> None:
     made = whole(architecture)

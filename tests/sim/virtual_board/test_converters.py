@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.sim.virtual_board.test_netlist import SocketLine
+from tests.sim.virtual_board.socket_line import SocketLine
 
 import sosmith
 from sosmith.gen.core import CoreDesign

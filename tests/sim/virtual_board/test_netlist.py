@@ -1,7 +1,6 @@
 """The netlist of a board's top in Verilator: bit for bit the integer model, at line rate, whatever the line does."""
 
 import random
-import select
 import socket
 import threading
 from collections.abc import Iterator
@@ -14,8 +13,8 @@ import numpy as np
 import pytest
 from tests.gen.designs import EXAMPLES
 from tests.gen.output.packages.made import HELD
-from tests.host.lines import ScriptedLine
 from tests.interface.small import FILTER, filter_design, instrument_design
+from tests.sim.virtual_board.socket_line import SocketLine
 
 import sosmith
 from sosmith.gen.core import CoreDesign, design_core
@@ -31,24 +30,6 @@ from sosmith.sim.virtual_board.netlist import Damage, Netlist, build, forward
 from sosmith.sim.virtual_board.terminal import Terminal
 
 BUILT: dict[Path, Netlist] = {}
-
-
-class SocketLine(ScriptedLine):
-    """A line over a socket, to a board without a pseudo-terminal."""
-
-    def __init__(self, end: socket.socket) -> None:
-        super().__init__()
-        self._socket = end
-
-    def write(self, data: bytes) -> None:
-        self._socket.sendall(data)
-
-    def read(self, timeout: float) -> bytes:
-        ready, _, _ = select.select([self._socket], [], [], max(timeout, 0))
-        return self._socket.recv(1 << 16) if ready else b""
-
-    def close(self) -> None:
-        self._socket.close()
 
 
 @pytest.fixture(scope="module")

@@ -30,6 +30,7 @@ ENTERS = (
 )
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("case", CASES)
 def test_a_decimator_behind_a_calibration_is_proven(case: Instrument) -> None:
     _, certificate = designed(case)
@@ -135,6 +136,7 @@ BROKEN = [
 ]
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize(("right", "wrong"), [pytest.param(*case, id=subject) for subject, *case in BROKEN])
 def test_hardware_that_is_wrong_is_rejected(right: str, wrong: str, monkeypatch: pytest.MonkeyPatch) -> None:
     written(CASES[0])  # what is right, before anything is broken

@@ -36,6 +36,7 @@ CASES: list[Case | Instrument] = [
 ]
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     "case", [CASES[0], CASES[4], *(pytest.param(case, marks=pytest.mark.slow) for case in (*CASES[1:4], *CASES[5:]))]
 )
@@ -105,6 +106,7 @@ BROKEN_AROUND = [
 ROUNDED = Case(signed=False, output_bits=9, cutoff=20, error=0.02, hold=False, architecture="folded", channels=2)
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [
@@ -118,6 +120,7 @@ def test_hardware_that_is_wrong_is_rejected(right: str, wrong: str, monkeypatch:
     check_rejected_as_made(ROUNDED)
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize(("right", "wrong"), [pytest.param(*case, id=subject) for subject, *case in BROKEN_AROUND])
 def test_wires_that_are_wrong_are_rejected(right: str, wrong: str, monkeypatch: pytest.MonkeyPatch) -> None:
     written(SMALL)  # what is right, before anything is broken

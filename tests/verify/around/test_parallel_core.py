@@ -31,6 +31,7 @@ CASES = [
 ]
 
 
+@pytest.mark.sweep(4)
 @pytest.mark.parametrize("case", CASES)
 def test_a_core_beside_a_decimator_is_proven(case: Case | Instrument) -> None:
     _, certificate = designed(case)
@@ -68,6 +69,7 @@ BROKEN = [
 ]
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize(
     ("case", "where", "right", "wrong"), [pytest.param(case, *edit, id=subject) for case, subject, *edit in BROKEN]
 )

@@ -1,13 +1,11 @@
 """The hardware of parallel cores: proven against the certificate's graph, rejected when it computes anything else."""
 
 import re
-from collections import Counter
 
 import pytest
 from tests.gen.designs import ALL, parallel_design
 from tests.verify.parallel.cores import ODD, Made, made, small, specified
-from tests.verify.parallel.edits import random_edits, swept
-from tests.verify.parallel.simulated import outputs
+from tests.verify.parallel.rejections import NODE, rejection, sweep
 from tests.verify.small_specifications import INSTRUMENT, PLAIN, STEADY_INSTRUMENT, UNSIGNED
 
 from sosmith.gen.core import design_core
@@ -91,16 +89,6 @@ def test_reloadable_cores_are_refused() -> None:
         small().check(text)
 
 
-def rejection(core: Made, text: str) -> str:
-    """Return the sentence of a rejection; nothing if a text is accepted."""
-    try:
-        core.check(text)
-    except RejectedError as error:
-        return str(error)
-    return ""
-
-
-NODE = r"node \d+ \(.+\) of "
 BREAKS = {
     "a coefficient": (
         r"(product_A2 = .*\* \$signed\(\d+'h\w*)(\w)\)",
@@ -346,21 +334,6 @@ def test_names_of_registers_do_not_make_a_proof() -> None:
 
 
 # Random edits.
-
-
-def proven(seen: list[dict[str, int]], lanes: int) -> list[dict[str, int]]:
-    """Return outputs without the flags that no certificate speaks of."""
-    flags = int.from_bytes([5] * lanes)
-    return [{name: value & flags if name == "m_axis_tuser" else value for name, value in row.items()} for row in seen]
-
-
-def sweep(core: Made, count: int, seed: int, clocks: int) -> Counter[str]:
-    """Edit at random; what is accepted must be the same in simulation, and what is rejected must have a sentence."""
-
-    def seen(text: str) -> object:
-        return proven(outputs(text, clocks, seed, core.channels), core.lanes)
-
-    return swept(random_edits(core.text, count, seed), lambda text: rejection(core, text), seen, core.text, NODE)
 
 
 def test_a_calibration_of_several_channels() -> None:

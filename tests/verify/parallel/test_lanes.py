@@ -5,9 +5,9 @@ import re
 from pathlib import Path
 
 import pytest
-from tests.gen.blocks.specifications import designed
+from tests.gen.block_specifications import designed
 from tests.verify.parallel.cores import ODD, Made, made, small
-from tests.verify.parallel.test_check import NODE, rejection, sweep
+from tests.verify.parallel.rejections import NODE, rejection, sweep
 from tests.verify.small_specifications import INSTRUMENT, PLAIN, STEADY, STEADY_INSTRUMENT, WIDE
 
 from sosmith.gen.realizations.registry import REALIZATIONS

@@ -3,9 +3,9 @@
 import re
 
 import pytest
-from tests.gen.blocks.specifications import designed
+from tests.gen.block_specifications import designed
 from tests.verify.parallel.cores import Made, looking_ahead, made
-from tests.verify.parallel.test_check import NODE, rejection, sweep
+from tests.verify.parallel.rejections import NODE, rejection, sweep
 from tests.verify.small_specifications import INSTRUMENT, NARROW, PLAIN, STEADY, STEADY_INSTRUMENT
 
 from sosmith.hdl.plan.parallel_clocks import block_latency_cycles

@@ -3,7 +3,7 @@
 import re
 
 import pytest
-from tests.verify.program.test_check import changed, number_of, small
+from tests.verify.program.programs import changed, number_of, small
 from tests.verify.small_specifications import PLAIN
 
 from sosmith.hdl.plan.instructions import encoded

@@ -24,6 +24,7 @@ def stimuli_of(name: str) -> Stimuli:
     return bench_stimuli(design_of(name).core, interface_of(name))
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize(
     ("way", "name"),
     [("c", name) for name in SPECIFICATIONS]
@@ -43,6 +44,7 @@ IN_HARDWARE = r"\* \$signed\(\d+'(h)([0-9a-f]+)\)"
 SPOILT = {"icarus": ("sv", IN_HARDWARE), "c": ("c", r"(C)\((\d{3,4})\)")}
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("name", ["plain", "wide", "held"])
 @pytest.mark.parametrize("way", SPOILT)
 def test_one_unit_in_one_coefficient_fails(way: str, name: str, tmp_path: Path) -> None:
@@ -118,6 +120,7 @@ def spoil_result(folder: Path, name: str) -> None:
     path.write_text("\n".join([*lines, f"{last[:-1]}{int(last[-1], 16) ^ 1:x}", ""]), encoding="utf-8")
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("name", ["wide", "sparse", "held"])
 @pytest.mark.parametrize("way", ["icarus", "c"])
 def test_the_last_result_is_compared_too(way: str, name: str, tmp_path: Path) -> None:

@@ -7,10 +7,13 @@ from pathlib import Path
 
 import pytest
 from tests.gen.output.packages.made import SPECIFICATIONS, called, design_of, unpacked
+from tests.suite.extras import needs
 
 from sosmith.gen.output.packages.package import packed
 from sosmith.gen.output.packages.vlnv import Vlnv
 from sosmith.model.errors import SpecificationError
+
+pytestmark = needs("fusesoc")
 
 FUSESOC = Path(sysconfig.get_path("scripts")) / "fusesoc"
 
@@ -23,6 +26,7 @@ def run(target: str, name: str, folder: Path, *options: str) -> subprocess.Compl
     return called(FUSESOC, *command, at=empty, simulator="verilator" if target == "lint" else "icarus")
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("name", SPECIFICATIONS)
 def test_lint(name: str, tmp_path: Path) -> None:
     result = run("lint", name, unpacked(name, tmp_path))

@@ -7,6 +7,9 @@ from pathlib import Path
 
 import pytest
 from tests.gen.output.packages.made import called, spoil, unpacked
+from tests.suite.extras import needs
+
+pytestmark = needs("litex")
 
 SCRIPT = """
 from litex.build.generic_platform import Pins

@@ -8,9 +8,9 @@ import sys
 from pathlib import Path
 
 import pytest
-from lxml import etree
 from tests.commands.invocation import Invocation
 from tests.gen.output.packages.made import SPECIFICATIONS, design_of, package_of
+from tests.suite.extras import needed
 
 import sosmith
 from sosmith.gen.output.generate import generated
@@ -36,6 +36,7 @@ def test_two_runs_write_the_same_bytes(tmp_path: Path) -> None:
         assert (tmp_path / "one" / path).read_bytes() == (tmp_path / "two" / path).read_bytes()
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize("name", SPECIFICATIONS)
 def test_the_core_is_the_one_that_generate_writes(name: str) -> None:
     core = {path.removeprefix("core/"): text for path, text in package_of(name).items() if path.startswith("core/")}
@@ -99,6 +100,6 @@ def test_the_timing_diagram_shows_two_samples_and_their_results(name: str) -> No
     latency, head = design_of(name).latency_cycles, source["head"]["text"]
     words, told = TIMES[name]
     assert f"{latency} clocks after {words}" in head
-    picture = etree.fromstring(package_of(name)[f"doc/{name}_timing.svg"].encode())
+    picture = needed("lxml.etree").fromstring(package_of(name)[f"doc/{name}_timing.svg"].encode())
     shown = {text for text in picture.itertext() if text.strip()}
     assert {*waves, *told} <= shown

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 from tests.gen.output.packages.made import called, design_of, unpacked
+from tests.suite.extras import needs
 
 from sosmith.gen.output.core_facts import StreamFacts
 from sosmith.gen.output.packages.facts import package_facts
@@ -67,6 +68,7 @@ top = Top()
 print(convert(top, ios=set(top.pins.values()), name="wrapped"))
 """
 MAKERS = {"amaranth": AMARANTH, "litex": LITEX}
+EVERY_MAKER = [pytest.param(maker, marks=needs(maker)) for maker in MAKERS]
 
 
 def pins_of(name: str) -> tuple[Pin, ...]:
@@ -98,8 +100,9 @@ def wrapped(maker: str, name: str, folder: Path) -> str:
     return result.stdout
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize("name", ["plain", "gauge", "wide", "held"])
-@pytest.mark.parametrize("maker", MAKERS)
+@pytest.mark.parametrize("maker", EVERY_MAKER)
 def test_the_bench_passes_with_the_wrapper_around_the_core(maker: str, name: str, tmp_path: Path) -> None:
     folder = unpacked(name, tmp_path)
     bench = folder / "bench" / f"{name}_bench.sv"
@@ -115,7 +118,7 @@ def test_the_bench_passes_with_the_wrapper_around_the_core(maker: str, name: str
     )
 
 
-@pytest.mark.parametrize("maker", MAKERS)
+@pytest.mark.parametrize("maker", EVERY_MAKER)
 def test_wrappers_of_a_reloadable_core_have_its_bus(maker: str, tmp_path: Path) -> None:
     folder = unpacked("tunable", tmp_path)
     text = wrapped(maker, "tunable", folder)
@@ -123,6 +126,7 @@ def test_wrappers_of_a_reloadable_core_have_its_bus(maker: str, tmp_path: Path) 
         assert re.search(rf"\.{pin.name}\s*\(", text), pin.name
 
 
+@needs("litex")
 @pytest.mark.parametrize(
     ("name", "registers"),
     [
@@ -207,6 +211,7 @@ def driven(name: str, folder: Path) -> tuple[list[tuple[int, int, float, list[st
     return results, registers
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("name", ["plain", "gauge", "tunable"])
 def test_cocotb_drives_the_core_in_physical_units(name: str, tmp_path: Path) -> None:
     folder, design = unpacked(name, tmp_path), design_of(name)
@@ -221,6 +226,7 @@ def test_cocotb_drives_the_core_in_physical_units(name: str, tmp_path: Path) -> 
     assert registers == ([[MAGIC, True], False, True] if name == "tunable" else [])
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(("name", "samples", "copies"), [("wide", 16, 1), ("sparse", 13, 1), ("held", 6, 4)])
 def test_cocotb_gets_the_results_of_a_beat_or_of_several_samples(
     name: str, samples: int, copies: int, tmp_path: Path

@@ -14,8 +14,7 @@ import venv
 from pathlib import Path
 
 import pytest
-
-from tests.made_files import ROOT
+from tests.machines.made_files import ROOT
 
 pytestmark = pytest.mark.slow
 

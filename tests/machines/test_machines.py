@@ -8,8 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
-
-from tests.made_files import ROOT, SUBJECTS
+from tests.machines.made_files import ROOT, SUBJECTS
 
 # X86_V4 is AVX-512, X86_V3 has AVX2 and FMA: OpenBLAS and numpy each choose their kernels by what they find.
 SETTINGS = {
@@ -24,7 +23,7 @@ def made(folder: Path, setting: str, *subjects: str) -> dict[str, bytes]:
     """Make `subjects` in a process of its own; return the content of every file by its path."""
     environment = {name: value for name, value in os.environ.items() if not name.startswith(("OPENBLAS_", "NPY_"))}
     subprocess.run(
-        [sys.executable, "-m", "tests.made_files", str(folder), *subjects],
+        [sys.executable, "-m", "tests.machines.made_files", str(folder), *subjects],
         cwd=ROOT,
         env=environment | SETTINGS[setting],
         check=True,

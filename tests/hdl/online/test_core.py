@@ -57,6 +57,7 @@ def check(architecture: Architecture, count: int, pace: Pace) -> None:
     assert [beat.status for beat in found] == datapath.compute_status(codes).tolist()
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("pace", PACES.values(), ids=PACES)
 @pytest.mark.parametrize("realization", ["df1", "df1_ef1", "df1_ef2"])
 def test_results_are_those_of_the_graph(realization: str, pace: Pace) -> None:
@@ -190,6 +191,7 @@ FAULTS = {
 }
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("fault", FAULTS.values(), ids=FAULTS)
 def test_a_fault_is_found(fault: tuple[str, str], monkeypatch: pytest.MonkeyPatch) -> None:
     wrong: ModuleType = broken(cascade, *fault)

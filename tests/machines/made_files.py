@@ -1,6 +1,6 @@
 """Makes the files and pictures that must not depend on the machine, into a folder: for comparison between machines.
 
-Run as a script: ``python -m tests.made_files FOLDER [SUBJECT ...]`` makes all subjects, or those named.
+Run as a script: ``python -m tests.machines.made_files FOLDER [SUBJECT ...]`` makes all subjects, or those named.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from click.testing import CliRunner
 
 from sosmith.cli import cli
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 
 _PLAIN = """
 name = "{name}"

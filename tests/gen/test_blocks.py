@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from benchmarks.random_designs import random_specification
 from tests.formal.prover import broken
-from tests.gen.blocks.specifications import AUDIO, designed, text
+from tests.gen.block_specifications import AUDIO, designed, text
 from tests.gen.designs import EXAMPLES
 from tests.hdl.core_bench import Pace, run_core
 
@@ -80,6 +80,7 @@ def test_an_unstable_section_is_refused() -> None:
         build([0.0, 0.0, 0.0, 1.0, -0.5, 0.0], SectionFormat(coefficient_bits=12), "section0")
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize(("clock", "order", "distance"), [("48.0e6", 5, 4), ("150.0e6", 5, 8), ("400.0e6", 2, 8)])
 def test_the_shortest_look_ahead_that_reaches_the_clock_is_chosen(clock: str, order: int, distance: int) -> None:
     made = designed(clock=clock, order=order)
@@ -180,6 +181,7 @@ def codes_of(made: CoreDesign, count: int) -> np.ndarray:
     return codes
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize(
     "pace",
     [

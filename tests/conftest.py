@@ -1,0 +1,55 @@
+"""What holds for every test: which cases of a sweep run always, and how signals are taken."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Iterator
+
+import pytest
+
+from tests.suite.sweeps import covering
+
+pytest_plugins = ["pytester"]
+
+
+@pytest.hookimpl(tryfirst=True)  # before `-m` takes its choice
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark the cases of a sweep that do not run always as slow."""
+    sweeps: dict[str, list[pytest.Function]] = {}
+    for item in items:
+        if isinstance(item, pytest.Function) and item.get_closest_marker("sweep") and hasattr(item, "callspec"):
+            sweeps.setdefault(item.nodeid.partition("[")[0], []).append(item)
+    for cases in sweeps.values():
+        mark = cases[0].get_closest_marker("sweep")
+        assert mark is not None
+        # Those that are slow for another reason cover nothing for the fast part.
+        fast = [case for case in cases if not case.get_closest_marker("slow")]
+        kept = covering([case.callspec.indices for case in fast], *mark.args)
+        for number, case in enumerate(fast):
+            if number not in kept:
+                case.add_marker(pytest.mark.slow)
+
+
+def _unmoved(number: int, frame: object) -> None:
+    """Take a signal as if it were ignored; but unlike one that is, programs started from here do not inherit that."""
+
+
+IGNORED = signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
+"""Whether hang-ups are ignored by who started the tests, as under nohup."""
+
+SIGNALS = {
+    signal.SIGINT: signal.default_int_handler,
+    signal.SIGTERM: signal.SIG_DFL,
+    signal.SIGHUP: _unmoved if IGNORED else signal.SIG_DFL,
+}
+"""How each test finds the signals, and every process that it starts, whoever ignores some: nohup, a script's job."""
+
+
+@pytest.fixture(autouse=True)
+def _signals() -> Iterator[None]:
+    """Put the signals right before a test, and what commands in this process make of them afterwards."""
+    for number, handler in SIGNALS.items():
+        signal.signal(number, handler)
+    yield
+    for number, handler in SIGNALS.items():
+        signal.signal(number, handler)

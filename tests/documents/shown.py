@@ -1,0 +1,44 @@
+"""What documents show, renewed."""
+
+import re
+import shlex
+from pathlib import Path
+
+from click.testing import CliRunner
+
+from sosmith.cli import cli
+
+ROOT = Path(__file__).parents[2]
+
+
+_SHOWN = re.compile(r"```sh\n(?P<lines>[^`]*)```\n\n```text\n(?P<output>[^`]*)```")
+"""Lines of a shell, directly followed by what they print."""
+
+
+def run(line: str, folder: Path) -> str:
+    """Carry out a line of the README in `folder`; return what it prints on stdout."""
+    if written := re.fullmatch(r"cat > (\S+) <<'END'\n(.*\n)END", line, flags=re.DOTALL):
+        (folder / written[1]).write_text(written[2], encoding="utf-8")
+        return ""
+    command, *arguments = shlex.split(line)
+    assert command == "./run"
+    result = CliRunner(env={"COLUMNS": "100"}).invoke(cli, arguments)
+    assert result.exit_code == 0, f"{line}: {result.output}{result.exception!r}"
+    return result.stdout
+
+
+def with_output(text: str, folder: Path) -> str:
+    """Renew what the lines of a document's shell blocks print, one block after another in the same folder."""
+
+    def renewed(block: re.Match[str]) -> str:
+        printed = "".join(run(line, folder) for line in block["lines"].splitlines())
+        shown = "".join(f"{line.rstrip()}\n" for line in printed.strip().splitlines())
+        return f"```sh\n{block['lines']}```\n\n```text\n{shown}```"
+
+    return _SHOWN.sub(renewed, text)
+
+
+def furnish(folder: Path) -> Path:
+    """Put the examples where a clone of the repository has them."""
+    (folder / "examples").symlink_to(ROOT / "examples")
+    return folder
