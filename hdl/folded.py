@@ -63,21 +63,22 @@ is high at edge 9 + 5 = 14.
 
 from __future__ import annotations
 
-from amaranth.hdl import Cat, ClockDomain, ClockSignal, Const, Module, Mux, ResetSignal, Signal, Value, signed
-from amaranth.lib import wiring
+from typing import NamedTuple
+
+from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value, signed
 from amaranth.lib.memory import Memory
 
-from sosmith.hdl.axi_stream import core_members, extended
-from sosmith.hdl.bus.axi_lite import forward_slave, slave_members
+from sosmith.hdl.axi_stream import extended
 from sosmith.hdl.check_bits import CheckBits
 from sosmith.hdl.fault_guard import FaultGuard
 from sosmith.hdl.instruction import PipelinedInstruction
 from sosmith.hdl.pipelined_logic import limits
 from sosmith.hdl.plan.folded_clocks import FOLDED_DEPTH, SERIAL_DEPTH, memory_depth, overlaps
 from sosmith.hdl.plan.instructions import address_bits, encoded, instruction_bits
-from sosmith.hdl.plan.streams import channel_bits, fields
+from sosmith.hdl.plan.streams import channel_bits
 from sosmith.hdl.reload import ReloadPort
-from sosmith.hdl.status import OF_INPUT, at_rail, members_beside_decimator, status_of_result, with_fault
+from sosmith.hdl.shell.shell import Shell
+from sosmith.hdl.status import OF_INPUT, at_rail, status_of_result, with_fault
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.graph import Op
 from sosmith.model.dataflow.program import (
@@ -92,7 +93,6 @@ from sosmith.model.dataflow.program import (
     Opcode,
     Program,
 )
-from sosmith.model.reload.registers import ADDRESS_BITS
 
 _NO_COLLISIONS = {"no_rw_check": 1}
 """Attribute of memories: no word is used that is read at the clock at which it is written.
@@ -107,7 +107,46 @@ _SLICES = {256: 16, 512: 8, 1024: 4, 2048: 2}
 """Width of an iCE40's block RAM, by its number of words."""
 
 
-class FoldedCore(wiring.Component):
+class _Control:
+    """What a core is doing.
+
+    Attributes
+    ----------
+    advance : Signal
+        Whether the pipeline moves at this clock.
+    clearing : Signal
+        Whether words are cleared.
+    start : Signal
+        Whether a sample has been found.
+    busy : Signal
+        Whether one is in work.
+    channel : Signal
+        Channel of the sample in work, or of the word that is cleared.
+    """
+
+    def __init__(self, channel_bits: int) -> None:
+        self.advance = Signal(name="advance")
+        self.clearing = Signal(name="clearing", init=1)
+        self.start = Signal(name="start")
+        self.busy = Signal(name="busy")
+        self.channel = Signal(channel_bits, name="channel")
+
+
+class _Position(NamedTuple):
+    """Where the core is in its program: the address of an instruction, and whether it is read for a sample."""
+
+    counter: Signal
+    fetches: Signal
+
+
+class _Reload(NamedTuple):
+    """The reload port, and the bank that the sample in work uses."""
+
+    port: ReloadPort
+    bank: Signal
+
+
+class FoldedCore(Shell):
     """A datapath on one multiply-accumulate unit, for any number of channels in any order.
 
     Latency: `latency_cycles`. Throughput: one sample, of any channel, every `cycles_per_sample` clocks. After a reset
@@ -144,10 +183,8 @@ class FoldedCore(wiring.Component):
 
     Members
     -------
-    aclk, aresetn, s_axis_*, m_axis_*
-        As in `sosmith.hdl.core.Core`.
-    s_axil_*
-        AXI4-Lite slave of a `sosmith.hdl.reload.ReloadPort`; only with a fingerprint.
+    aclk, aresetn, s_axis_*, m_axis_*, s_axil_*
+        As those of `sosmith.hdl.shell.shell.Shell`.
     """
 
     def __init__(
@@ -162,96 +199,72 @@ class FoldedCore(wiring.Component):
         flags_given: int = 0,
         before_decimator: bool = False,
     ) -> None:
-        self.datapath = datapath
         self.program = program
         self.serial = serial
-        self.channels = channels
-        self.fingerprint = fingerprint
-        self.protect = protect
-        self.flags_given = flags_given
-        members = core_members(datapath.inputs, datapath.output, channels)
-        members |= members_beside_decimator(datapath, flags_given, before=before_decimator)
-        super().__init__(members if fingerprint is None else members | slave_members(ADDRESS_BITS))
+        super().__init__(
+            datapath,
+            channels,
+            fingerprint,
+            protect=protect,
+            flags_given=flags_given,
+            before_decimator=before_decimator,
+        )
 
-    def elaborate(self, platform: object) -> Module:
+    def fill(self, m: Module) -> None:
         """Build control, pipeline and memories."""
-        m = Module()
-        m.domains.sync = ClockDomain(local=True)
-        m.d.comb += [ClockSignal("sync").eq(self.aclk), ResetSignal("sync").eq(~self.aresetn)]
-        advance = Signal()
-        clearing = Signal(init=1)
-        start = Signal()
-        busy = Signal()
+        control = _Control(channel_bits(self.channels))
+        advance, clearing, busy = control.advance, control.clearing, control.busy
         dropped = Signal()
-        guard = self._guard(m, busy, clearing)
+        guard = self._guard(m, control)
         leaves = self.m_axis_tvalid & self.m_axis_tready
         if self._overlaps:
             waits = busy | clearing
         else:
             waits = (busy & ~leaves) | clearing if guard is None else busy | clearing | guard.broken
         pending = Signal()
-        if self._restarts:
+        if self.restarts:
             waits = waits | pending
-        channel = self._channel(m, waits, dropped, start)
-        counter, fetching = self._control(m, (advance, clearing, start, busy), channel, early=guard is None)
-        reload = self._reload(m, start, busy, clearing)
-        pipeline, fetched = self._fetch(m, advance, (counter, fetching, clearing), reload, guard)
+        self._accept(m, control, waits, dropped)
+        position = self._count(m, control, early=guard is None)
+        reload = self._reload(m, control)
+        pipeline, fetched = self._fetch(m, control, position, reload, guard)
         read = Signal(signed(self._word))
         added = Signal(signed(self.program.accumulator_bits))
         moved = self._accumulate(m, advance, pipeline, (read, added))
-        remembered = self._remember(m, (advance, clearing), (added, read, moved, channel), pipeline, guard)
+        remembered = self._remember(m, control, (added, read, moved), pipeline, guard)
         ends = advance & pipeline[-1].valid & (self._gives_last(pipeline) if self._overlaps else ~pipeline[-2].valid)
         taken = Signal()
-        begins = taken if self._overlaps else start
-        limits = self._hand_out(m, (advance, begins, ends), (added, channel), pipeline, guard)
+        begins = taken if self._overlaps else control.start
+        limits = self._give(m, control, (begins, ends), added, pipeline, guard)
         if guard is None:
             reading = self._reading(pipeline)
             last_digit = reading.is_for(sum(location.digits for location in self.program.inputs) - 1)
             m.d.sync += taken.eq(advance & reading.valid & reading.has(Opcode.TAKE) & last_digit)
         else:
             m.d.sync += taken.eq(ends)
-            self._restart(m, guard.restart, (clearing, channel))
-            self._report(m, guard, reload, [fetched, remembered, limits])
-        if reload is not None and self._restarts:
-            port, _ = reload
-            m.d.comb += pending.eq(port.pending)
-            self._restart(m, port.pending & port.may_swap, (clearing, channel))
+            self._restart(m, control, guard.restart)
+            memories = (fetched, remembered, limits)
+            corrected, failed = (Cat(found).any() for found in zip(*memories, strict=True))
+            self.report(m, guard, None if reload is None else reload.port, corrected, failed)
+        if reload is not None and self.restarts:
+            m.d.comb += pending.eq(reload.port.pending)
+            self._restart(m, control, reload.port.pending & reload.port.may_swap)
         m.d.comb += self.s_axis_tready.eq(taken | dropped)
-        return m
 
-    @property
-    def _restarts(self) -> bool:
-        """Whether the core restarts with another program."""
-        return self.fingerprint is not None and self.datapath.restarts
-
-    def _guard(self, m: Module, busy: Signal, clearing: Signal) -> FaultGuard | None:
+    def _guard(self, m: Module, control: _Control) -> FaultGuard | None:
         """Return the guard of the memories; None without protection."""
-        if self.protect == "none":
+        if not self.is_guarded:
             return None
         depth = max(len(self.program.instructions), memory_depth(self.program, self.channels))
         m.submodules.guard = guard = FaultGuard((depth - 1).bit_length())
-        m.d.comb += guard.idle.eq(~busy & ~clearing)
+        m.d.comb += guard.idle.eq(~control.busy & ~control.clearing)
         return guard
 
-    def _restart(self, m: Module, cause: Value, cleared: tuple[Signal, Signal]) -> None:
+    @staticmethod
+    def _restart(m: Module, control: _Control, cause: Value) -> None:
         """Clear what a damaged program or word, or another program, may have left: the words, as after a reset."""
-        clearing, channel = cleared
         with m.If(cause):
-            m.d.sync += [clearing.eq(1), channel.eq(0)]
-
-    def _report(
-        self, m: Module, guard: FaultGuard, reload: tuple[ReloadPort, Signal] | None, found: list[tuple[Value, Value]]
-    ) -> None:
-        """Tell the guard, and the registers if there are any, what was corrected and what was not, at this clock."""
-        corrected, failed = (Cat(*sides).any() for sides in zip(*found, strict=True))
-        m.d.comb += guard.failed.eq(failed)
-        if reload is not None:
-            port, _ = reload
-            m.d.comb += [
-                port.corrected.eq(corrected),
-                port.failed.eq(failed),
-                guard.acknowledge.eq(port.acknowledge),
-            ]
+            m.d.sync += [control.clearing.eq(1), control.channel.eq(0)]
 
     @property
     def _overlaps(self) -> bool:
@@ -264,27 +277,22 @@ class FoldedCore(wiring.Component):
         """Width of a word."""
         return self.program.digit_bits + 1
 
-    def _channel(self, m: Module, busy: Value, dropped: Signal, start: Signal) -> Signal:
-        """Start on a sample if its channel exists, otherwise drop it; return the channel of the sample in work."""
-        found = self.s_axis_tvalid & ~busy
-        channel = Signal(channel_bits(self.channels))
+    def _accept(self, m: Module, control: _Control, waits: Value, dropped: Signal) -> None:
+        """Start on a sample if its channel exists, otherwise drop it."""
+        found = self.s_axis_tvalid & ~waits
         if self.channels == 1:
-            m.d.comb += start.eq(found)
-            return channel
+            m.d.comb += control.start.eq(found)
+            return
         exists = self.s_axis_tdest < self.channels
-        m.d.comb += [start.eq(found & exists), self.m_axis_tdest.eq(channel)]
+        m.d.comb += [control.start.eq(found & exists), self.m_axis_tdest.eq(control.channel)]
         m.d.sync += dropped.eq(found & ~exists & ~dropped)
-        with m.If(start):
-            m.d.sync += channel.eq(self.s_axis_tdest)
-        return channel
+        with m.If(control.start):
+            m.d.sync += control.channel.eq(self.s_axis_tdest)
 
-    def _control(
-        self, m: Module, control: tuple[Signal, Signal, Signal, Signal], channel: Signal, *, early: bool
-    ) -> tuple[Signal, Signal]:
+    def _count(self, m: Module, control: _Control, *, early: bool) -> _Position:
         """Count through all words after a reset, to clear them, and through the program for each sample.
 
-        Return the address of an instruction, and whether it is read for a sample. If that is to be `early`, the first
-        one is read at the clock that finds the sample.
+        If an instruction is to be read `early`, the first one is at the clock that finds the sample.
 
         While words are cleared, their channel and their address in the last pipeline stage follow the counter a clock
         late.
@@ -292,58 +300,55 @@ class FoldedCore(wiring.Component):
         Where samples overlap, the core is busy only while it reads the program, and waits before it computes a result
         as long as the one before has not left. The accumulator is then empty.
         """
-        advance, clearing, start, busy = control
         count, bits = len(self.program.instructions), address_bits(self.program)
-        counter = Signal(max((count - 1).bit_length(), bits + max(1, len(channel))))
+        counter = Signal(max((count - 1).bit_length(), bits + max(1, len(control.channel))))
         fetching = Signal()
         fetches = Signal()
-        m.d.comb += fetches.eq(fetching | start if early else fetching)
+        m.d.comb += fetches.eq(fetching | control.start if early else fetching)
         leaves: Value = self.m_axis_tvalid & self.m_axis_tready
         if self._overlaps:
             held = (counter == self.program.result_start) & self.m_axis_tvalid & ~self.m_axis_tready
-            m.d.comb += fetches.eq(start | (fetching & ~held))
+            m.d.comb += fetches.eq(control.start | (fetching & ~held))
             leaves = fetches & (counter == count - 1)
-        is_last = channel == self.channels - 1
-        with m.If(clearing):
-            m.d.sync += [counter.eq(counter + 1), channel.eq(counter[bits:])]
+        is_last = control.channel == self.channels - 1
+        with m.If(control.clearing):
+            m.d.sync += [counter.eq(counter + 1), control.channel.eq(counter[bits:])]
             with m.If(counter[bits] if self.channels == 1 else is_last & ~counter[:bits].any()):
-                m.d.sync += [clearing.eq(0), counter.eq(0)]
-        with m.Elif(fetches & advance):
+                m.d.sync += [control.clearing.eq(0), counter.eq(0)]
+        with m.Elif(fetches & control.advance):
             m.d.sync += [counter.eq(counter + 1), fetching.eq(1)]
             with m.If(counter == count - 1):
                 m.d.sync += [fetching.eq(0), counter.eq(0)]
-        with m.If(start):
-            m.d.sync += [busy.eq(1), fetching.eq(1)]
+        with m.If(control.start):
+            m.d.sync += [control.busy.eq(1), fetching.eq(1)]
         with m.Elif(leaves):
-            m.d.sync += busy.eq(0)
-        return counter, fetches
+            m.d.sync += control.busy.eq(0)
+        return _Position(counter, fetches)
 
-    def _reload(self, m: Module, start: Signal, busy: Signal, clearing: Signal) -> tuple[ReloadPort, Signal] | None:
+    def _reload(self, m: Module, control: _Control) -> _Reload | None:
         """Return the reload port, and the bank that the sample in work uses."""
         if self.fingerprint is None:
             return None
         depth, bits = len(self.program.instructions), instruction_bits(self.program)
-        m.submodules.reload_port = port = ReloadPort(
-            depth, bits=bits, design=self.fingerprint, protected=self.protect != "none"
-        )
-        forward_slave(m, self, port)
+        port = ReloadPort(depth, bits=bits, design=self.fingerprint, protected=self.is_guarded)
+        self.join_port(m, port)
         kept = Signal(reset_less=True)
         bank = Signal()
-        with m.If(start):
+        with m.If(control.start):
             m.d.sync += kept.eq(port.bank)
         m.d.comb += [
-            bank.eq(Mux(start, port.bank, kept)),
-            port.may_swap.eq(~busy & ~clearing if self._restarts else 1),
-            port.shadow_free.eq(~busy | (kept == port.bank)),
+            bank.eq(Mux(control.start, port.bank, kept)),
+            port.may_swap.eq(~control.busy & ~control.clearing if self.restarts else 1),
+            port.shadow_free.eq(~control.busy | (kept == port.bank)),
         ]
-        return port, bank
+        return _Reload(port, bank)
 
     def _fetch(
         self,
         m: Module,
-        advance: Signal,
-        position: tuple[Signal, Signal, Signal],
-        reload: tuple[ReloadPort, Signal] | None,
+        control: _Control,
+        position: _Position,
+        reload: _Reload | None,
         guard: FaultGuard | None,
     ) -> tuple[list[PipelinedInstruction], tuple[Value, Value]]:
         """Read the program; return the instructions in the pipeline stages, the one just read first.
@@ -352,7 +357,7 @@ class FoldedCore(wiring.Component):
 
         Return besides whether a wrong bit was corrected at this clock, and whether one was found that could not be.
         """
-        counter, fetching, clearing = position
+        advance = control.advance
         codes = [encoded(instruction, self.program) for instruction in self.program.instructions]
         count = len(codes)
         if reload is not None:
@@ -363,7 +368,7 @@ class FoldedCore(wiring.Component):
             shape=check.width, depth=len(codes), init=[check.word(code) for code in codes], attrs=_NO_COLLISIONS
         )
         fetch = program.read_port()
-        index, bank = self._program_address(m, counter, count, reload, guard)
+        index, bank = self._program_address(m, position.counter, count, reload, guard)
         m.d.comb += [fetch.addr.eq(Cat(index, bank)), fetch.en.eq(advance)]
         found = check.read(m, fetch.data, "instruction1")
         valid = Signal(name="valid1")
@@ -378,14 +383,14 @@ class FoldedCore(wiring.Component):
         self._write_program(m, program, check, reload, (rewrites, fetched, found.data))
         pipeline = [PipelinedInstruction(found.data, valid, self.program)]
         with m.If(advance):
-            m.d.sync += valid.eq(fetching)
+            m.d.sync += valid.eq(position.fetches)
             for k in range(2, SERIAL_DEPTH + 1 if self.serial else FOLDED_DEPTH + 1):
                 code = Signal(len(found.data), name=f"instruction{k}", reset_less=True)
                 valid = Signal(name=f"valid{k}")
                 m.d.sync += [code.eq(pipeline[-1].code), valid.eq(pipeline[-1].valid)]
                 pipeline.append(PipelinedInstruction(code, valid, self.program))
-            with m.If(clearing):  # in place of a target, the address of the word to clear
-                m.d.sync += pipeline[-1].target.eq(counter[: address_bits(self.program)])
+            with m.If(control.clearing):  # in place of a target, the address of the word to clear
+                m.d.sync += pipeline[-1].target.eq(position.counter[: address_bits(self.program)])
         return pipeline, (looks & found.corrected, looks & found.failed)
 
     def _program_address(
@@ -393,17 +398,17 @@ class FoldedCore(wiring.Component):
         m: Module,
         counter: Signal,
         count: int,
-        reload: tuple[ReloadPort, Signal] | None,
+        reload: _Reload | None,
         guard: FaultGuard | None,
     ) -> tuple[Value, Value]:
         """Return the instruction to read, and its bank: that of the sample in work, or one that is scrubbed."""
         bits = (count - 1).bit_length()
         index: Value = counter
-        bank: Value = Const(0, 0) if reload is None else reload[1]
+        bank: Value = Const(0, 0) if reload is None else reload.bank
         if guard is not None:
             index = Mux(guard.scrubs & (guard.address < count), guard.address[:bits], counter[:bits])
             if reload is not None:
-                bank = Mux(guard.scrubs, reload[0].bank, bank)
+                bank = Mux(guard.scrubs, reload.port.bank, bank)
         if reload is not None:
             index = Cat(index[:bits], Const(0, max(0, bits - len(index))))
         return index, bank
@@ -413,7 +418,7 @@ class FoldedCore(wiring.Component):
         m: Module,
         program: Memory,
         check: CheckBits,
-        reload: tuple[ReloadPort, Signal] | None,
+        reload: _Reload | None,
         rewrite: tuple[Value, Value, Value],
     ) -> None:
         """Write the idle bank from the reload port, and otherwise what was corrected."""
@@ -423,7 +428,7 @@ class FoldedCore(wiring.Component):
         write = program.write_port()
         enable, address, data = rewrites, fetched, check.written(corrected)
         if reload is not None:
-            port, _ = reload
+            port = reload.port
             index_bits = len(write.addr) - 1
             loaded = Cat(port.write_address, Const(0, index_bits - len(port.write_address)), ~port.bank)
             if self.protect == "correct":
@@ -494,8 +499,8 @@ class FoldedCore(wiring.Component):
     def _remember(
         self,
         m: Module,
-        control: tuple[Signal, Signal],
-        values: tuple[Signal, Signal, Value, Signal],
+        control: _Control,
+        values: tuple[Signal, Signal, Value],
         pipeline: list[PipelinedInstruction],
         guard: FaultGuard | None,
     ) -> tuple[Value, Value]:
@@ -503,13 +508,13 @@ class FoldedCore(wiring.Component):
 
         Return whether a wrong bit was corrected at this clock, and whether one was found that could not be.
         """
-        (advance, clearing), (added, read, moved, channel) = control, values
+        (added, read, moved), advance, clearing = values, control.advance, control.clearing
         addressing, present, last = pipeline[-3 if self.serial else -4], pipeline[-2], pipeline[-1]
         moves = present.valid & present.has(*EARLY_WRITES)
         stores = last.valid & last.has(*LATE_WRITES)
         finishes = last.valid & last.has(*FINISHES)
-        address: Value = Cat(addressing.address, channel)
-        where: Value = Cat(Mux(moves, present.target, last.target), channel)
+        address: Value = Cat(addressing.address, control.channel)
+        where: Value = Cat(Mux(moves, present.target, last.target), control.channel)
         sign = self._word - 1
         # One LUT4 for each bit, since the sum is late: nothing is moved while something is stored.
         what = Cat(Mux(stores, added[:sign], moved[:sign]), Mux(finishes, added[sign], moved[sign]))
@@ -570,11 +575,12 @@ class FoldedCore(wiring.Component):
             slices.append(reader.data)
         return Cat(*slices)
 
-    def _hand_out(
+    def _give(
         self,
         m: Module,
-        control: tuple[Signal, Signal, Value],
-        values: tuple[Signal, Signal],
+        control: _Control,
+        sample: tuple[Value, Value],
+        added: Signal,
         pipeline: list[PipelinedInstruction],
         guard: FaultGuard | None,
     ) -> tuple[Value, Value]:
@@ -582,7 +588,7 @@ class FoldedCore(wiring.Component):
 
         Return whether a wrong bit in the limits of wear was corrected, and whether one was found that could not be.
         """
-        (advance, begins, ends), (added, channel) = control, values
+        (begins, ends), advance = sample, control.advance
         last, parts = pipeline[-1], self.program.output.parts
         widths = [self.program.digit_bits] * (parts - 1) + [self._last_part_bits]
         given = [Signal(width, name=f"given{k}", reset_less=True) for k, width in enumerate(widths)]
@@ -623,7 +629,7 @@ class FoldedCore(wiring.Component):
             inputs=judged,
             saturated=saturated,
             settling=settling,
-            channel=channel,
+            channel=control.channel,
             enable=Const(1) if guard is None else ends,
             protect=self.protect,
         )
@@ -679,11 +685,10 @@ class FoldedCore(wiring.Component):
         """Return the digit of the input sample that a TAKE asks for; digits are numbered through all ports."""
         graph = self.datapath.stages[0].graph
         digits: list[Value] = []
-        ports = zip(fields(self.datapath.inputs), graph.inputs, self.program.inputs, strict=True)
-        for field, node, location in ports:
-            code = self.s_axis_tdata[field.offset : field.offset + field.port.bits]
+        codes = self.codes(self.s_axis_tdata)
+        for code, node, location in zip(codes, graph.inputs, self.program.inputs, strict=True):
             padded = Cat(Const(0, location.frac - graph.nodes[node].frac), code)
-            digits += self._split(padded, location, sign=padded[-1] if field.port.signed else Const(0, 1))
+            digits += self._split(padded, location, sign=padded[-1] if code.shape().signed else Const(0, 1))
         found = digits[-1]
         for k, digit in enumerate(digits[:-1]):
             found = Mux(instruction.is_for(k), digit, found)

@@ -77,7 +77,7 @@ def test_a_sample_in_work_keeps_its_bank(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [
-        ("port.shadow_free.eq(~busy | (kept == port.bank))", "port.shadow_free.eq(1)"),
+        ("port.shadow_free.eq(~control.busy | (kept == port.bank))", "port.shadow_free.eq(1)"),
         ("kept.eq(port.bank)", "kept.eq(~port.bank)"),
     ],
 )

@@ -92,9 +92,9 @@ def test_a_folded_core_begins_anew(serial: bool, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [
-        ("port.pending & port.may_swap", "Const(0, 1)"),
+        ("reload.port.pending & reload.port.may_swap", "Const(0, 1)"),
         pytest.param("waits = waits | pending", "waits = waits | Const(0, 1)", marks=pytest.mark.slow),
-        pytest.param("~busy & ~clearing if self._restarts else 1", "1", marks=pytest.mark.slow),
+        pytest.param("~control.busy & ~control.clearing if self.restarts else 1", "1", marks=pytest.mark.slow),
     ],
 )
 def test_a_folded_core_that_keeps_words_or_goes_on_is_found_out(right: str, wrong: str, tmp_path: Path) -> None:
