@@ -33,6 +33,9 @@ LOOK_AHEAD = (2, 4, 8, 16)
 CORES = ("instrument", "filter", "calibration")
 """What can be generated from a specification: the whole instrument, or one part."""
 
+ERROR_FEEDBACK = ("df1", "df1_ef1", "df1_ef2")
+"""Those that differ only in their error feedback, so that they can be compared at the same word lengths."""
+
 CALIBRATION_INPUTS = ("voltage", "temperature")
 """Inputs of the calibration polynomial, in the order of its indices."""
 

@@ -9,8 +9,7 @@ from typing import Any
 import click
 
 from sosmith.gen.fpga.boards import BOARDS, find_board
-from sosmith.gen.realizations.registry import ERROR_FEEDBACK
-from sosmith.gen.specification.choices import CORES, REALIZATIONS
+from sosmith.gen.specification.choices import CORES, ERROR_FEEDBACK, REALIZATIONS
 from sosmith.model.suggestion import did_you_mean
 
 

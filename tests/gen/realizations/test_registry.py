@@ -6,6 +6,7 @@ from sosmith.gen.specification import choices
 
 def test_the_names_are_those_that_a_specification_can_name() -> None:
     assert ("auto", *REALIZATIONS) == choices.REALIZATIONS
+    assert ERROR_FEEDBACK == choices.ERROR_FEEDBACK
 
 
 def test_what_is_asked_of_the_registry() -> None:
