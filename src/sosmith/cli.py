@@ -129,7 +129,7 @@ _COMMANDS = {
 """The commands in the order they are used; the module of each one is imported when the command is called."""
 
 _GROUPS = {
-    "Filter": ("init", "import", "design", "studio", "explore", "demo"),
+    "Filter": ("init", "import", "design", "combinations", "studio", "explore", "demo"),
     "Hardware": ("generate", "package", "simulate", "emulate", "reload"),
     "Board": ("build", "board", "stream", "monitor"),
     "Instrument": ("calibrate", "spectrum", "vehicle", "wear", "paper"),
