@@ -245,6 +245,10 @@ _TABLES: dict[str, type[Table]] = {
 }
 
 
+MAX_SHOWN = 12
+"""Most errors that are shown beside the first one."""
+
+
 def parse(tree: dict[str, Any]) -> Document:
     """Check the shape of a specification.
 
@@ -256,20 +260,18 @@ def parse(tree: dict[str, Any]) -> Document:
     Raises
     ------
     UnfitError
-        For the first error in the order of the file; the message says how many more there are.
+        For all errors, in the order of the file.
     """
     try:
         return Document.model_validate(tree)
     except ValidationError as error:
         findings = sorted(error.errors(), key=lambda finding: _position(tree, finding["loc"]))
-    unfit = _unfit(findings[0])
-    if len(findings) > 1:
-        unfit = UnfitError(
-            unfit.expected,
-            f"{unfit.found} (and {len(findings) - 1} more)",
-            where=unfit.where,
-            later=unfit.later,
-        )
+    unfit, *others = map(_unfit, findings)
+    if others:
+        # A sentence each, on lines of their own: a typing error often makes two, a wrong key and a missing one.
+        rest = "".join(f"\n  {other}" for other in others[:MAX_SHOWN])
+        rest += f"\n  and {len(others) - MAX_SHOWN} more" if len(others) > MAX_SHOWN else ""
+        unfit = UnfitError(unfit.expected, unfit.found + rest, where=unfit.where, later=unfit.later)
     raise unfit
 
 

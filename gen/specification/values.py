@@ -78,6 +78,20 @@ def literal(value: object) -> str:
     return shown if len(shown) <= 60 else f"{shown[:56]} ..."
 
 
+_PREFIXES = {"k": 1000, "K": 1000, "M": 10**6, "G": 10**9, "m": Fraction(1, 1000)}
+_NUMBER = r"[-+]?[0-9]{1,18}(?:[.,][0-9]{1,18})?(?:[eE][-+]?[0-9]{1,2})?"
+_WITH_UNIT = re.compile(rf"({_NUMBER})\s*([kKMGm]?)(?:[Hh]z|dB|V|mm|degC|sps|S/s|bits?)?")
+
+
+def as_number(value: object) -> str:
+    """Return how to write a text such as ``1 kHz`` as a number, for the end of a sentence; empty for other values."""
+    found = _WITH_UNIT.fullmatch(value.strip()) if isinstance(value, str) else None
+    if found is None:
+        return ""
+    exact = Fraction(found[1].replace(",", ".")) * _PREFIXES.get(found[2], 1)
+    return f": write {repr(float(exact)).removesuffix('.0')}, without quotes and unit"
+
+
 def number(value: object, expected: str = "a number") -> Fraction:
     """Read a finite number exactly: 0.0036 becomes ``Fraction(36, 10000)``.
 
@@ -89,7 +103,7 @@ def number(value: object, expected: str = "a number") -> Fraction:
         If `value` is not a finite number, has more than `MAX_DIGITS` digits or is too large or small.
     """
     if isinstance(value, bool) or not isinstance(value, int | Decimal):
-        raise UnfitError(expected, literal(value))
+        raise UnfitError(expected, literal(value) + as_number(value))
     exact = Decimal(value)
     if not exact.is_finite():
         raise UnfitError("a finite number", literal(value))
@@ -135,7 +149,7 @@ def whole(low: int, high: int) -> Callable[[object], int]:
 
     def read(value: object) -> int:
         if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
-            raise UnfitError(f"a whole number from {low} to {high}", literal(value))
+            raise UnfitError(f"a whole number from {low} to {high}", literal(value) + as_number(value))
         return value
 
     return read
@@ -144,7 +158,9 @@ def whole(low: int, high: int) -> Callable[[object], int]:
 def flag(value: object) -> bool:
     """Read true or false."""
     if not isinstance(value, bool):
-        raise UnfitError("true or false", literal(value))
+        known = str(value).strip().lower() if isinstance(value, str | int) else ""
+        meant = {"true": "true", "yes": "true", "1": "true", "false": "false", "no": "false", "0": "false"}.get(known)
+        raise UnfitError("true or false", literal(value) + (f": write {meant}" if meant else ""))
     return value
 
 

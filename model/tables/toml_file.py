@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Callable
+from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
@@ -89,4 +90,42 @@ def _syntax_error(message: str, text: str) -> str:
     problem, _, place = message.removesuffix(")").rpartition(" (at ")
     if not re.fullmatch(r"line \d+, column \d+", place):
         place = f"line {max(len(text.splitlines()), 1)}"  # "end of document"
+    if problem.startswith(('Expected "\'"', "Illegal character '\\n'", "Expected '\"'")):  # it may be told at the end
+        open_quote = next((at for at, line in enumerate(text.splitlines(), 1) if _odd_quotes(line)), None)
+        if open_quote is not None:
+            return f"line {open_quote} must end its text with the quote that begins it"
+    cure = _cure(text, place)
+    if cure:
+        return f"{place.split(',')[0]} must be {cure}"
     return f"{place} must be valid TOML, not a syntax error: {problem[:1].lower()}{problem[1:]}"
+
+
+_PREFIXES = {"k": 3, "K": 3, "M": 6, "G": 9, "m": -3}
+_KEY, _END = r"\s*([A-Za-z][A-Za-z0-9_.-]{0,60})\s*=\s*", r"\s*(?:#.*)?"
+_UNIT = re.compile(
+    rf"{_KEY}([-+]?[0-9][0-9_]{{0,17}}(?:\.[0-9]{{1,18}})?)\s*([kKMGm]?)([A-Za-z][A-Za-z/]{{0,20}})?{_END}"
+)
+_WORD = re.compile(rf"{_KEY}([A-Za-z][A-Za-z0-9_-]{{0,60}}){_END}")
+_FLAGS = {"yes": "true", "on": "true", "True": "true", "TRUE": "true", "no": "false", "off": "false"}
+_FLAGS |= {"False": "false", "FALSE": "false"}
+
+
+def _odd_quotes(line: str) -> bool:
+    code = line.split("#", maxsplit=1)[0]
+    return bool(code.count('"') % 2 or code.count("'") % 2)
+
+
+def _cure(text: str, place: str) -> str:
+    """Return what the line of a syntax error must be, where it is one of the usual slips; empty elsewhere."""
+    number = re.match(r"line (\d+)", place)
+    lines = text.splitlines()
+    line = lines[int(number[1]) - 1] if number and int(number[1]) <= len(lines) else ""
+    if (found := _UNIT.fullmatch(line)) and (found[3] or found[4]):
+        value = Decimal(found[2].replace("_", "")).scaleb(_PREFIXES.get(found[3], 0))
+        return f"a number without a unit: {found[1]} = {value:f}"
+    if found := _WORD.fullmatch(line):
+        known = _FLAGS.get(found[2])
+        return f"true or false: {found[1]} = {known}" if known else f'a text in quotes: {found[1]} = "{found[2]}"'
+    if re.match(r"\s*[\w.-]+\s*:", line):
+        return "a key, an equals sign and a value, as in order = 4: TOML has no colons there"
+    return ""

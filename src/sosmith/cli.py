@@ -128,6 +128,15 @@ _COMMANDS = {
 }
 """The commands in the order they are used; the module of each one is imported when the command is called."""
 
+_GROUPS = {
+    "Filter": ("init", "import", "design", "combinations", "studio", "explore", "demo"),
+    "Hardware": ("generate", "package", "simulate", "emulate", "reload"),
+    "Board": ("build", "board", "stream", "monitor"),
+    "Instrument": ("calibrate", "spectrum", "vehicle", "wear", "paper"),
+    "Evidence": ("verify", "compare"),
+}
+"""The commands by their subject, as the help lists them."""
+
 _INTERRUPTED = 130
 
 
@@ -148,8 +157,10 @@ class _Commands(click.Group):
         raise click.UsageError(f"No such command {cmd_name!r}{did_you_mean(cmd_name, _COMMANDS)}.", ctx)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        with formatter.section("Commands"):
-            formatter.write_dl([(name, command.summary) for name, command in _COMMANDS.items()])
+        widest = max(map(len, _COMMANDS))
+        for title, names in _GROUPS.items():
+            with formatter.section(title):
+                formatter.write_dl([(f"{name:{widest}}", _COMMANDS[name].summary) for name in names])
 
     def invoke(self, ctx: click.Context) -> Any:
         with reader_may_leave():

@@ -18,7 +18,13 @@ from typing import Any
 
 import numpy as np
 
-from sosmith.gen.specification.coefficients.content import Complex, Content, StatedSections, ZerosAndPoles
+from sosmith.gen.specification.coefficients.content import (
+    Complex,
+    Content,
+    StatedSections,
+    TransferFunction,
+    ZerosAndPoles,
+)
 from sosmith.gen.specification.coefficients.mat_file import matrices
 from sosmith.gen.specification.coefficients.text import of_rows
 from sosmith.model.errors import SpecificationError
@@ -100,10 +106,45 @@ def _matlab(path: Path) -> Content:
             raise SpecificationError(f"{path}: {names['sos']} must have 6 columns, not {len(matrix[0])}")
         stated = f"MATLAB's {names['sos']}" + ("" if scale is None else f" and {scale}")
         return StatedSections(format=stated, rows=tuple(matrix), gains=gains)
+    if {"z", "p", "k"} <= names.keys():
+        return _zeros_poles_gain(path, *(held[names[name]] for name in ("z", "p", "k")))
+    if {"b", "a"} <= names.keys():
+        return _numerator_and_denominator(path, held[names["b"]], held[names["a"]])
     if "ba" in names:
         return of_rows(path, _matrix(path, held[names["ba"]]), kind=f"{names['ba']} in a MAT file")
     raise SpecificationError(
-        f"{path}: variables must have SOS, with or without G, not only {', '.join(held) or 'none'}"
+        f"{path}: variables must be SOS, with or without G, or b and a, or z, p and k, not only "
+        f"{', '.join(held) or 'none'}{_FIR if 'h' in names or 'num' in names or 'b' in names else ''}"
+    )
+
+
+_FIR = ": an FIR filter is not read, as cores are made of second-order sections"
+
+
+def _numerator_and_denominator(path: Path, b: np.ndarray[Any, Any], a: np.ndarray[Any, Any]) -> TransferFunction:
+    """Read a transfer function; the coefficients are divided by a0."""
+    upper, lower = ([value for row in _matrix(path, array) for value in row] for array in (b, a))
+    if not lower[0]:
+        raise SpecificationError(f"{path}: a must begin with a number other than 0, not 0")
+    if not any(lower[1:]):
+        raise SpecificationError(f"{path}: a must be the denominator of an IIR filter, not only its first one{_FIR}")
+    longest = max(len(upper), len(lower))
+    rows = [[value / lower[0] for value in side] + [Fraction(0)] * (longest - len(side)) for side in (upper, lower)]
+    return TransferFunction(format="b and a in a MAT file", numerator=tuple(rows[0]), denominator=tuple(rows[1]))
+
+
+def _zeros_poles_gain(path: Path, *arrays: np.ndarray[Any, Any]) -> ZerosAndPoles:
+    for name, array in zip("zpk", arrays, strict=True):
+        if array.dtype.kind not in "cfiu" or array.size > _MAX_NUMBERS or not np.isfinite(array.astype(complex)).all():
+            raise SpecificationError(f"{path}: {name} must be finite numbers, not of type {array.dtype}")
+    z, p, k = (array.astype(complex).ravel().tolist() for array in arrays)
+    if len(k) != 1 or k[0].imag:
+        raise SpecificationError(f"{path}: k must be one real number, not {len(k)}")
+    return ZerosAndPoles(
+        format="z, p and k in a MAT file",
+        zeros=tuple(map(exact_complex, z)),
+        poles=tuple(map(exact_complex, p)),
+        gain=Fraction(k[0].real),
     )
 
 

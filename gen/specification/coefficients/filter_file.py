@@ -8,6 +8,19 @@ from sosmith.gen.specification.coefficients.arrays import read_array_file
 from sosmith.gen.specification.coefficients.content import Content
 from sosmith.gen.specification.coefficients.prototype_file import read_prototype
 from sosmith.gen.specification.coefficients.text import read_text_file
+from sosmith.model.errors import SpecificationError
+
+OTHER_KINDS = {
+    ".wav": "a recording (WAV): a response cannot be read as an IIR filter",
+    ".flac": "a recording (FLAC): a response cannot be read as an IIR filter",
+    ".mp3": "a recording (MP3): a response cannot be read as an IIR filter",
+    ".slx": "a Simulink model: export SOS and G to a MAT file",
+    ".fda": "a session of MATLAB's filter designer: export its coefficients",
+    ".m": "a MATLAB script: run it, and save SOS and G to a MAT file",
+    ".py": "a Python script: run it, and save the sections with numpy.save",
+    ".xlsx": "a spreadsheet: save it as CSV",
+}
+"""What files with other suffixes are, and what to do with them."""
 
 _ARRAYS = (".npy", ".npz", ".mat", ".json")
 
@@ -21,6 +34,8 @@ def read_filter_file(path: Path) -> Content:
         If the file cannot be read or holds no filter that can be told.
     """
     suffix = path.suffix.lower()
+    if suffix in OTHER_KINDS:
+        raise SpecificationError(f"{path}: the filter must be a file of coefficients, not {OTHER_KINDS[suffix]}")
     if suffix in _ARRAYS:
         return read_array_file(path)
     return read_prototype(path) if suffix == ".toml" else read_text_file(path)

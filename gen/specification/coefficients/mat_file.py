@@ -17,14 +17,14 @@ _Array = np.ndarray[Any, Any]
 _TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
 _INT8, _INT32, _UINT32, _MATRIX, _COMPRESSED = 1, 5, 6, 14, 15
 _NUMERIC_CLASSES = range(6, 16)
-_COMPLEX_OR_LOGICAL = 0x0A00
+_COMPLEX, _LOGICAL = 0x0800, 0x0200
 _TYPES_OF_VERSION_4 = ("f8", "f4", "i4", "i2", "u2", "u1")
 _HEADER = 128
 _OTHER: _Array = np.empty((), dtype=object)
 
 
 def matrices(content: bytes, max_bytes: int) -> dict[str, _Array]:
-    """Return the variables of a MAT file; those that are no real matrices as an object without a shape.
+    """Return the variables of a MAT file; those that are no matrices of numbers as an object without a shape.
 
     Parameters
     ----------
@@ -80,10 +80,12 @@ def _variable(data: bytes, order: str) -> tuple[str, _Array]:
         np.frombuffer(_expected(next(parts, None), kind), order + _TYPES[kind]) for kind in (_UINT32, _INT32, _INT8)
     )
     plain = name.tobytes().decode("ascii")
-    if int(flags[0]) & 0xFF not in _NUMERIC_CLASSES or int(flags[0]) & _COMPLEX_OR_LOGICAL:
+    if int(flags[0]) & 0xFF not in _NUMERIC_CLASSES or int(flags[0]) & _LOGICAL:
         return plain, _OTHER
-    kind, numbers = next(parts)
-    return plain, np.frombuffer(numbers, order + _TYPES[kind]).reshape(sizes.tolist(), order="F")
+    values = [np.frombuffer(numbers, order + _TYPES[kind]) for kind, numbers in parts]
+    real, *imaginary = values[:2] if int(flags[0]) & _COMPLEX else values[:1]
+    whole = real + 1j * imaginary[0] if imaginary else real
+    return plain, whole.reshape(sizes.tolist(), order="F")
 
 
 def _expected(element: tuple[int, bytes] | None, kind: int) -> bytes:

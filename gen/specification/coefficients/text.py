@@ -50,7 +50,20 @@ def read_text_file(path: Path) -> Content:
         return _designer(path, lines)
     if any(_HEADER.fullmatch(line.strip()) for line in lines):
         return _biquads(path, lines)
+    slip = next((cure for start, cure in _OTHERS.items() if any(line.strip().startswith(start) for line in lines)), "")
+    if slip:
+        raise SpecificationError(f"{path}: the filter must be given by coefficients, not {slip}")
     return _table(path, lines)
+
+
+_OTHERS = {
+    "Filter Settings file": "as Room EQ Wizard's list of Fc, Gain and Q: export the filters as biquad coefficients",
+    "Preamp:": "as Equalizer APO's list of Fc, Gain and Q: export the filters as biquad coefficients",
+    "Filter 1: ON": "as a list of Fc, Gain and Q: export the filters as biquad coefficients",
+    "Discrete-Time FIR Filter": "as an FIR filter: cores are made of second-order sections, from an IIR filter",
+    "% Discrete-Time FIR Filter": "as an FIR filter: cores are made of second-order sections, from an IIR filter",
+}
+"""Files of other tools by how a line begins, and what they are."""
 
 
 def _designer(path: Path, lines: Sequence[str]) -> StatedSections:
@@ -135,6 +148,11 @@ def of_rows(path: Path, rows: Sequence[_Numbers], *, kind: str) -> Content:
     if width == 2 and len(rows) > 1 and rows[0][1] == 1:
         b, a = (tuple(row[k] for row in rows) for k in (0, 1))
         return TransferFunction(format=f"{kind} of b and a", numerator=b, denominator=a)
+    if width == 1 or (len(rows) == 1 and width > 6):
+        raise SpecificationError(
+            f"{path}: the filter must be an IIR filter, rows of b0, b1, b2, a0, a1, a2 or b and a, not {len(rows)} x "
+            f"{width} numbers, as of an FIR filter"
+        )
     raise SpecificationError(
         f"{path}: the filter must be rows of b0, b1, b2, a0, a1, a2, the same without a0, or b and a with a0 = 1, "
         f"not {len(rows)} x {width} numbers"

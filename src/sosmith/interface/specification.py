@@ -99,7 +99,7 @@ class Specification:
         >>> sosmith.Specification.from_toml("name = 3", "my.toml")
         Traceback (most recent call last):
         ...
-        sosmith.model.errors.SpecificationError: my.toml: name must be ..., not 3 (and 4 more)
+        sosmith.model.errors.SpecificationError: my.toml: name must be ..., not 3...
         """
         return cls(from_text(text, Path(fspath(path))))
 

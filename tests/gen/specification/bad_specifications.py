@@ -171,19 +171,20 @@ BAD = [
         "several",
         RATE,
         "sample_rate = -1\nchannel = 1",
-        "sample_rate must be a positive number of Hz, not -1 (and 1 more)",
+        f"sample_rate must be a positive number of Hz, not -1\n  channel must be {TABLES} (did you mean channels?)",
     ),
     (
         "several, the first in the file",
         RATE,
         "channels = 0\nsample_rate = -1",
-        "channels must be a whole number from 1 to 65536, not 0 (and 1 more)",
+        "channels must be a whole number from 1 to 65536, not 0\n  sample_rate must be a positive number of Hz, not -1",
     ),
     (
         "several, the first in its table",
         VOLT,
         "range = [10.0, 0.0]\nbits = 1",
-        "input.voltage.range must be rising, [low, high], not [10.0, 0.0] (and 1 more)",
+        "input.voltage.range must be rising, [low, high], not [10.0, 0.0]\n"
+        "  input.voltage.bits must be a whole number from 2 to 32, not 1",
     ),
     ("missing name", NAME + "\n", "", f"name must be {IDENTIFIER}, not missing"),
     ("missing sample rate", RATE + "\n", "", "sample_rate must be a positive number of Hz, not missing"),
@@ -230,7 +231,7 @@ BAD = [
         "sample rate is a text",
         RATE,
         'sample_rate = "100"',
-        "sample_rate must be a positive number of Hz, not '100'",
+        "sample_rate must be a positive number of Hz, not '100': write 100, without quotes and unit",
     ),
     (
         "sample rate is a bool",
@@ -326,7 +327,7 @@ BAD = [
         "range of texts",
         VOLT,
         'bits = 16\nrange = [0.0, "10"]',
-        "input.voltage.range[1] must be a number, not '10'",
+        "input.voltage.range[1] must be a number, not '10': write 10, without quotes and unit",
     ),
     (
         "range is a number",
@@ -352,7 +353,12 @@ BAD = [
         OUT + "\nsigned = true",
         "output.range must be symmetric, [-high, high], where signed = true, not [0, 16]",
     ),
-    ("signed is a number", VOLT, VOLT + "\nsigned = 1", "input.voltage.signed must be true or false, not 1"),
+    (
+        "signed is a number",
+        VOLT,
+        VOLT + "\nsigned = 1",
+        "input.voltage.signed must be true or false, not 1: write true",
+    ),
     (
         "input is no table",
         "[input.voltage]\n" + VOLT + "\n" + TEMP,
@@ -673,7 +679,8 @@ BAD = [
         "cutoff is a text",
         CUT,
         'cutoff = "10 Hz"',
-        "filter.cutoff must be a number of Hz, or a list of 2 numbers for a band, not '10 Hz'",
+        "filter.cutoff must be a number of Hz, or a list of 2 numbers for a band, not '10 Hz': "
+        "write 10, without quotes and unit",
     ),
     (
         "two cutoffs of a low-pass",
@@ -1027,7 +1034,7 @@ BAD = [
         "reload is a text",
         CLOCK,
         CLOCK + '\nreload = "yes"',
-        "hardware.reload must be true or false, not 'yes'",
+        "hardware.reload must be true or false, not 'yes': write true",
     ),
     (
         "clock below the sample rate",
@@ -1118,7 +1125,8 @@ BAD = [
         "initial clearance is a text",
         UNIT,
         UNIT + "\n[wear]\ninitial = '1.5'\nwarning = 7\nlimit = 9",
-        "wear.initial must be a number in the unit of the output, or a list of one for each channel, not '1.5'",
+        "wear.initial must be a number in the unit of the output, or a list of one for each channel, not '1.5': "
+        "write 1.5, without quotes and unit",
     ),
     (
         "initial clearances of other channels",

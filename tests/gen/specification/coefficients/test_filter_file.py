@@ -251,7 +251,7 @@ def test_a_convention_that_is_asked_for_has_to_be_stable(tmp_path: Path) -> None
         ("f.npz", packed(bytes(5 << 20)), "arrays must be at most 4194304 bytes unpacked, not longer"),
         ("f.mat", shifted(mat(SOS=SOS)), "the filter must be a MAT file, not a damaged one or another kind"),
         ("f.mat", b"MATLAB 5.0 MAT-file", "the filter must be a MAT file, not a damaged one or another kind"),
-        ("f.mat", mat(x=SOS), "variables must have SOS, with or without G, not only x"),
+        ("f.mat", mat(x=SOS), "variables must be SOS, with or without G, or b and a, or z, p and k, not only x"),
         ("f.toml", "poles = [-1e31]\ngain = 1\n", "poles[0] must be a finite number within reason, not -1E+31"),
         ("f.toml", f"poles = [-{10**40}]\ngain = 1\n", "poles[0] must be a finite number within reason, not -1000"),
         ("f.json", "{", "the filter must be JSON, not something else"),
@@ -326,7 +326,7 @@ def test_matrices_of_mat_files_are_those_of_scipy(keys: dict[str, Any]) -> None:
     expected = {name: value for name, value in scipy.io.loadmat(file).items() if not name.startswith("__")}
     assert list(found) == list(expected)
     for name, array in found.items():
-        if name in {"z", "text", "cell"}:
+        if name in {"text", "cell"} or (name == "z" and keys.get("format")):  # no complex ones of version 4
             assert array.dtype == object
         else:
             np.testing.assert_array_equal(array, expected[name])
