@@ -232,7 +232,7 @@ def test_times_are_right_after_results_were_missed() -> None:
                 break
 
 
-@pytest.mark.parametrize("factor", [0.999, 1.001])
+@pytest.mark.parametrize("factor", [0.99, 1.01])
 def test_times_follow_a_board_whose_clock_is_wrong(factor: float) -> None:
     clock = Time()
     device = MeasuringDevice(lambda: clock.now * factor, measuring_identity())
@@ -241,7 +241,7 @@ def test_times_follow_a_board_whose_clock_is_wrong(factor: float) -> None:
         if isinstance(event, Received):
             times += [event.start + (event.first + n) / 100 for n in range(len(event.results.codes))]
             assert abs(times[-1] - clock.time()) <= 0.2
-            if clock.now > 1000:
+            if clock.now > 40:
                 break
     assert min(after - before for before, after in pairwise(times)) > -0.001
 
