@@ -9,6 +9,8 @@ from __future__ import annotations
 import os
 import signal
 import sys
+from collections.abc import Callable
+from functools import wraps
 from importlib import import_module
 from io import TextIOWrapper
 from types import FrameType
@@ -17,6 +19,7 @@ from typing import Any, NamedTuple
 import click
 
 import sosmith
+from sosmith.commands.output_paths import check_outputs
 from sosmith.model.errors import SosmithError, ToolError
 from sosmith.model.suggestion import did_you_mean
 from sosmith.terminal import be_quiet, note, reader_may_leave, silence_stdout
@@ -141,7 +144,7 @@ class _Commands(click.Group):
         if cmd_name in _COMMANDS:
             place = _COMMANDS[cmd_name]
             command: click.Command = getattr(import_module(f"sosmith.commands.{place.module}"), place.attribute)
-            _let_be_quiet(command)
+            _prepare(command)
             return command
         if ctx.resilient_parsing:  # during shell completion
             return None
@@ -156,11 +159,11 @@ class _Commands(click.Group):
             return super().invoke(ctx)
 
 
-def _let_be_quiet(command: click.Command) -> None:
-    """Give a command, and those of a group, the option ``-q``."""
+def _prepare(command: click.Command) -> None:
+    """Give a command, and those of a group, the option ``-q`` and the check of its outputs."""
     if isinstance(command, click.Group):
         for one in command.commands.values():
-            _let_be_quiet(one)
+            _prepare(one)
     elif all(parameter.name != "quiet" for parameter in command.params):
 
         def told(_context: click.Context, _option: click.Parameter, quiet: bool) -> None:
@@ -175,6 +178,19 @@ def _let_be_quiet(command: click.Command) -> None:
                 help="Show no progress.",
             )
         )
+        command.callback = _checked(command.callback)
+
+
+def _checked(callback: Callable[..., Any] | None) -> Callable[..., Any]:
+    """Return what a command does, after the check of its outputs."""
+    assert callback is not None
+
+    @wraps(callback)
+    def run(*values: Any, **options: Any) -> Any:
+        check_outputs(click.get_current_context())
+        return callback(*values, **options)
+
+    return run
 
 
 _HELP = """Turn a filter specification and calibration data into FPGA hardware that is checked bit for bit.

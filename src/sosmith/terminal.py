@@ -8,9 +8,8 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any
 
@@ -23,11 +22,6 @@ if TYPE_CHECKING:
 _quiet = False
 
 JSON_OPTION = click.option("--json", "as_json", is_flag=True, help="Print JSON instead of tables.")
-
-
-def output_option(text: str) -> Callable[[Any], Any]:
-    """Return the option ``-o`` with the help `text`."""
-    return click.option("-o", "--output", type=click.Path(path_type=Path), help=text)
 
 
 @contextmanager
