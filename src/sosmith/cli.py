@@ -20,6 +20,7 @@ import click
 
 import sosmith
 from sosmith.commands.output_paths import check_outputs
+from sosmith.commands.standard_streams import StandardStreams
 from sosmith.model.errors import SosmithError, ToolError
 from sosmith.model.suggestion import did_you_mean
 from sosmith.terminal import be_quiet, note, reader_may_leave, silence_stdout
@@ -222,6 +223,8 @@ def cli() -> None:
 
 def main() -> None:
     """Run the command line and end the process with its exit status."""
+    streams = StandardStreams()
+    os.umask(os.umask(0o077) & 0o077)  # what we make we can read and write
     if isinstance(sys.stdout, TextIOWrapper):  # a file's name may be no text, and a terminal may lack our signs
         sys.stdout.reconfigure(errors="backslashreplace")
     try:
@@ -248,6 +251,9 @@ def main() -> None:
         note(f"error: {error.filename or 'the output'} must be readable and writable, not: {error.strerror}")
         status = ToolError.exit_status
         silence_stdout()
+    if streams.lost and not status:
+        note("error: stdout must be open, not closed: what was printed is lost")
+        status = ToolError.exit_status
     sys.exit(status)
 
 

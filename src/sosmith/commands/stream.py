@@ -27,13 +27,11 @@ def stream_command(port: str, trace: Path, baud: int, output: Path | None) -> No
         sosmith stream /dev/ttyUSB1 ramp.csv -o results.csv
     """
     from sosmith.host.board import Board
-    from sosmith.host.recording import as_csv, check_output, recording
+    from sosmith.host.recording import as_csv, recording
     from sosmith.host.rows import columns, rows
     from sosmith.host.trace_samples import samples_for
     from sosmith.model.text_files import write_file
 
-    if output is not None:
-        check_output(output, trace)
     with show_progress() as step, Board(port, baud=baud) as board:
         about = board.identity
         step(f"reading {trace}")
