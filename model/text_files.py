@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import json
+import stat
 from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -48,7 +49,7 @@ def write_files(directory: Path, texts: Mapping[str, str]) -> list[Path]:
 def write_contents(directory: Path, contents: Mapping[str, bytes]) -> list[Path]:
     """Write `contents` (bytes) as `write_files` writes texts.
 
-    Only regular files are replaced: links are followed, devices and pipes are written to.
+    Only regular files are replaced, and links to them followed: see `check_file`.
     """
     paths = [directory / name for name in contents]
     missing: list[Path] = []
@@ -56,9 +57,8 @@ def write_contents(directory: Path, contents: Mapping[str, bytes]) -> list[Path]
         missing += [folder for folder in (directory, *directory.parents) if not folder.exists()]
         directory.mkdir(parents=True, exist_ok=True)
         for path in paths:
-            if path.is_dir():
-                raise SpecificationError(f"{path}: the output file must be a file, not a folder")
-        own = {path.name for path in paths if not path.is_symlink() and (path.is_file() or not path.exists())}
+            check_file(path)
+        own = {path.name for path in paths if not path.is_symlink()}
         if own:
             import tempfile  # only writing needs it
 
@@ -69,17 +69,47 @@ def write_contents(directory: Path, contents: Mapping[str, bytes]) -> list[Path]
                 for name in own:
                     (Path(scratch) / name).replace(directory / name)
         for path in paths:
-            target = path.resolve()
-            if path.is_symlink() and (target.is_file() or not target.exists()):
+            if path.is_symlink():
+                target = path.resolve()
                 write_contents(target.parent, {target.name: contents[path.name]})
-            elif path.name not in own:
-                path.write_bytes(contents[path.name])
     except OSError as error:
         for folder in missing:
             with suppress(OSError):  # it was not made, or has been filled
                 folder.rmdir()
         raise _failure(directory, error) from None
     return paths
+
+
+def write_file(path: Path, content: str | bytes) -> Path:
+    """Write one file as `write_files` does; return `path`."""
+    write_contents(path.parent, {path.name: content.encode() if isinstance(content, str) else content})
+    return path
+
+
+def check_file(path: Path) -> None:
+    """Check that `path` is a regular file, or none yet.
+
+    Replacing a device or a pipe would take it from others, and writing into it may wait for ever or lose the content.
+
+    Raises
+    ------
+    SpecificationError
+        If it is a folder, a device, a pipe or a socket, itself or by links; or if its name is impossible.
+    """
+    try:
+        mode = path.stat().st_mode
+    except OSError as error:
+        if error.errno in {errno.ENOENT, errno.ENOTDIR}:
+            return  # who makes the folders tells what is wrong with them
+        raise SpecificationError(
+            f"{path}: the output file must be a file that can be written, not: {error.strerror}"
+        ) from None
+    except ValueError:
+        raise SpecificationError(f"{str(path)!r} must be the path of a file, not an impossible one") from None
+    kinds = {stat.S_ISDIR: "a folder", stat.S_ISFIFO: "a pipe", stat.S_ISSOCK: "a socket"}
+    if not stat.S_ISREG(mode):
+        found = next((name for is_one, name in kinds.items() if is_one(mode)), "a device")
+        raise SpecificationError(f"{path}: the output file must be a file, not {found}")
 
 
 def _failure(directory: Path, error: OSError) -> SosmithError:

@@ -9,6 +9,8 @@ from __future__ import annotations
 import os
 import signal
 import sys
+from collections.abc import Callable
+from functools import wraps
 from importlib import import_module
 from io import TextIOWrapper
 from types import FrameType
@@ -17,6 +19,8 @@ from typing import Any, NamedTuple
 import click
 
 import sosmith
+from sosmith.commands.output_paths import check_outputs
+from sosmith.commands.standard_streams import StandardStreams
 from sosmith.model.errors import SosmithError, ToolError
 from sosmith.model.suggestion import did_you_mean
 from sosmith.terminal import be_quiet, note, reader_may_leave, silence_stdout
@@ -150,7 +154,7 @@ class _Commands(click.Group):
         if cmd_name in _COMMANDS:
             place = _COMMANDS[cmd_name]
             command: click.Command = getattr(import_module(f"sosmith.commands.{place.module}"), place.attribute)
-            _let_be_quiet(command)
+            _prepare(command)
             return command
         if ctx.resilient_parsing:  # during shell completion
             return None
@@ -167,11 +171,11 @@ class _Commands(click.Group):
             return super().invoke(ctx)
 
 
-def _let_be_quiet(command: click.Command) -> None:
-    """Give a command, and those of a group, the option ``-q``."""
+def _prepare(command: click.Command) -> None:
+    """Give a command, and those of a group, the option ``-q`` and the check of its outputs."""
     if isinstance(command, click.Group):
         for one in command.commands.values():
-            _let_be_quiet(one)
+            _prepare(one)
     elif all(parameter.name != "quiet" for parameter in command.params):
 
         def told(_context: click.Context, _option: click.Parameter, quiet: bool) -> None:
@@ -186,6 +190,19 @@ def _let_be_quiet(command: click.Command) -> None:
                 help="Show no progress.",
             )
         )
+        command.callback = _checked(command.callback)
+
+
+def _checked(callback: Callable[..., Any] | None) -> Callable[..., Any]:
+    """Return what a command does, after the check of its outputs."""
+    assert callback is not None
+
+    @wraps(callback)
+    def run(*values: Any, **options: Any) -> Any:
+        check_outputs(click.get_current_context())
+        return callback(*values, **options)
+
+    return run
 
 
 _HELP = """Turn a filter specification and calibration data into FPGA hardware that is checked bit for bit.
@@ -217,6 +234,8 @@ def cli() -> None:
 
 def main() -> None:
     """Run the command line and end the process with its exit status."""
+    streams = StandardStreams()
+    os.umask(os.umask(0o077) & 0o077)  # what we make we can read and write
     if isinstance(sys.stdout, TextIOWrapper):  # a file's name may be no text, and a terminal may lack our signs
         sys.stdout.reconfigure(errors="backslashreplace")
     try:
@@ -243,6 +262,9 @@ def main() -> None:
         note(f"error: {error.filename or 'the output'} must be readable and writable, not: {error.strerror}")
         status = ToolError.exit_status
         silence_stdout()
+    if streams.lost and not status:
+        note("error: stdout must be open, not closed: what was printed is lost")
+        status = ToolError.exit_status
     sys.exit(status)
 
 

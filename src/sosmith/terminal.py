@@ -8,9 +8,8 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from pathlib import Path
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import TYPE_CHECKING, Any
 
@@ -22,12 +21,10 @@ if TYPE_CHECKING:
 
 _quiet = False
 
+NARROWEST = 20
+"""Columns of the narrowest terminal that tables are laid out for; narrower ones wrap the lines."""
+
 JSON_OPTION = click.option("--json", "as_json", is_flag=True, help="Print JSON instead of tables.")
-
-
-def output_option(text: str) -> Callable[[Any], Any]:
-    """Return the option ``-o`` with the help `text`."""
-    return click.option("-o", "--output", type=click.Path(path_type=Path), help=text)
 
 
 @contextmanager
@@ -42,7 +39,8 @@ def reader_may_leave() -> Iterator[None]:
 
 def silence_stdout() -> None:
     """Discard the output that is still buffered: flushing it at exit would fail again."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    with suppress(OSError):  # a stream without a descriptor keeps nothing back
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 @contextmanager
@@ -171,7 +169,7 @@ def show_progress(*, remaining: bool = False) -> Iterator[Step]:
         *([TimeRemainingColumn(), TextColumn("left")] if remaining else []),
         TimeElapsedColumn(),
     ]
-    progress = Progress(*columns, console=Console(stderr=True))
+    progress = Progress(*columns, console=Console(stderr=True, width=width()))
     with live(progress):
         step = _BarStep(progress)
         try:
@@ -182,6 +180,13 @@ def show_progress(*, remaining: bool = False) -> Iterator[Step]:
             raise
         with undisturbed():
             step.finish()
+
+
+def width() -> int | None:
+    """Return the width of a terminal that is too narrow to show anything as if it were wider; None for any other."""
+    from rich.console import Console
+
+    return NARROWEST if Console(stderr=True).width < NARROWEST else None
 
 
 def printable(text: str) -> str:

@@ -67,7 +67,7 @@ def test_one_trace_drives_all_channels(tmp_path: Path) -> None:
 def test_a_trace_is_not_replaced_by_its_results(tmp_path: Path, command: str) -> None:
     trace = tmp_path / "a.csv"
     trace.write_text("x\n1\n")
-    expected = f"{trace}: the output must be another file than the input {trace}, not the same"
+    expected = f"{trace}: the output file must be another than what is read, not the same"
     given = (str(trace),) if command == "stream" else ("--trace", str(trace))
     Invocation(command).refused(expected, "/dev/nothing", *given, "-o", str(trace))
     assert trace.read_text() == "x\n1\n"
@@ -77,8 +77,8 @@ def test_a_trace_is_not_replaced_by_its_results(tmp_path: Path, command: str) ->
 def test_a_device_or_a_fifo_is_no_output(tmp_path: Path, command: str) -> None:
     given = ("x.csv",) if command == "stream" else ("--trace", "x.csv")
     os.mkfifo(tmp_path / "fifo")
-    for path, kind in ((Path("/dev/full"), "device"), (tmp_path / "fifo", "FIFO")):
-        expected = f"{path}: the output must be a regular file, not a {kind}"
+    for path, kind in ((Path("/dev/full"), "a device"), (tmp_path / "fifo", "a pipe")):
+        expected = f"{path}: the output file must be a file, not {kind}"
         Invocation(command).refused(expected, "/dev/nothing", *given, "-o", str(path))
 
 

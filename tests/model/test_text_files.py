@@ -5,13 +5,15 @@ from __future__ import annotations
 import errno
 import os
 import re
-import threading
+import socket
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
 from sosmith.model.errors import SpecificationError, ToolError
-from sosmith.model.text_files import write_contents, write_files
+from sosmith.model.text_files import write_contents, write_file, write_files
 
 
 def test_files_are_replaced_and_nothing_else_is_left(tmp_path: Path) -> None:
@@ -29,23 +31,39 @@ def test_a_link_is_followed(tmp_path: Path) -> None:
         assert (tmp_path / "real" / "a").read_text() == text
 
 
-def test_a_pipe_is_written_into(tmp_path: Path) -> None:
-    pipe, read = tmp_path / "pipe", []
-    os.mkfifo(pipe)
-    # Where the pipe is replaced instead, nobody ever writes: the reader must not keep the tests from ending.
-    reader = threading.Thread(target=lambda: read.append(pipe.read_bytes()), daemon=True)
-    reader.start()
-    write_contents(tmp_path, {"pipe": b"through"})
-    reader.join(timeout=60)
-    assert pipe.is_fifo()
-    assert read == [b"through"]
+@pytest.mark.parametrize("kind", ["a folder", "a pipe", "a socket", "a device"])
+@pytest.mark.parametrize("linked", [False, True])
+def test_what_is_no_file_is_refused_and_stays_what_it_is(tmp_path: Path, kind: str, linked: bool) -> None:
+    with made(tmp_path / "it", kind) as place:
+        path = tmp_path / "link" if linked else place
+        if linked:
+            path.symlink_to(place)
+        before = place.lstat()
+        message = f"{path}: the output file must be a file, not {kind}"
+        with pytest.raises(SpecificationError, match=f"^{re.escape(message)}$"):
+            write_contents(path.parent, {"first": b"text", path.name: b"text"})
+        assert (place.lstat().st_ino, place.lstat().st_mode) == (before.st_ino, before.st_mode)
+        assert not (path.parent / "first").exists()
 
 
-def test_the_null_device_stays_what_it_is(tmp_path: Path) -> None:
-    (tmp_path / "null").symlink_to(os.devnull)
-    write_contents(tmp_path, {"null": b"gone"})
-    assert Path(os.devnull).is_char_device()
-    assert (tmp_path / "null").is_symlink()
+@contextmanager
+def made(path: Path, kind: str) -> Iterator[Path]:
+    """Make something that is no file, at `path` or, for a device, where one is."""
+    if kind == "a folder":
+        path.mkdir()
+    elif kind == "a pipe":
+        os.mkfifo(path)
+    elif kind == "a socket":
+        with socket.socket(socket.AF_UNIX) as bound:
+            bound.bind(str(path))
+            yield path
+        return
+    yield Path("/dev/full") if kind == "a device" else path
+
+
+def test_one_file_by_its_path(tmp_path: Path) -> None:
+    assert write_file(tmp_path / "new" / "a", "text") == tmp_path / "new" / "a"
+    assert write_file(tmp_path / "new" / "a", b"other").read_bytes() == b"other"
 
 
 def test_a_folder_is_refused_before_anything_is_written(tmp_path: Path) -> None:
@@ -68,9 +86,3 @@ def test_a_full_disk_leaves_no_folder_and_is_the_fault_of_a_tool(
     with pytest.raises(ToolError, match=f"^{re.escape(message)}$"):
         write_files(folder, {"a": "text"})
     assert list(tmp_path.iterdir()) == []
-
-
-def test_a_device_that_is_full_is_the_fault_of_a_tool() -> None:
-    message = "/dev: the disk must take the output files, not: No space left on device"
-    with pytest.raises(ToolError, match=f"^{message}$"):
-        write_contents(Path("/dev"), {"full": b"text"})

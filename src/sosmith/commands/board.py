@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from sosmith.commands.options import BAUD, CORE, REALIZATION, SEED, SPEC, default_folder
+from sosmith.commands.output_paths import folder_option
 from sosmith.model.errors import SpecificationError, ToolError
-from sosmith.terminal import note, output_option, show_progress
+from sosmith.terminal import note, show_progress
 
 if TYPE_CHECKING:
     from sosmith.gen.core import CoreDesign
@@ -73,7 +74,7 @@ class _Speed(click.ParamType[float]):
     help="What damage does to a byte, separated by commas.",
 )
 @SEED
-@output_option("Folder for the files.  [default: build/<name>/board]")
+@folder_option("Folder for the files.  [default: build/<name>/board]")
 def board_command(
     spec: Path,
     virtual: bool,

@@ -9,9 +9,10 @@ from typing import Any
 import click
 
 from sosmith.commands.options import CORE, REALIZATION, SPEC, completed_by, default_folder
+from sosmith.commands.output_paths import folder_option
 from sosmith.gen.fpga.boards import BUILDABLE, PROJECTS, find_board
 from sosmith.model.errors import SpecificationError
-from sosmith.terminal import JSON_OPTION, note, output_option, print_json, show_progress
+from sosmith.terminal import JSON_OPTION, note, print_json, show_progress
 
 
 @click.command("build")
@@ -35,7 +36,7 @@ from sosmith.terminal import JSON_OPTION, note, output_option, print_json, show_
 )
 @click.option("--program", is_flag=True, help="Load the bitstream into the board, with openFPGALoader.")
 @JSON_OPTION
-@output_option("Folder for the files.  [default: build/<name>/<board>]")
+@folder_option("Folder for the files.  [default: build/<name>/<board>]")
 def build_command(
     spec: Path,
     core: str | None,

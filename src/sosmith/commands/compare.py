@@ -6,9 +6,10 @@ from pathlib import Path
 
 import click
 
+from sosmith.commands.output_paths import output_option
 from sosmith.model.errors import ShortfallError, SpecificationError
-from sosmith.model.text_files import write_files
-from sosmith.terminal import JSON_OPTION, note, output_option, print_json, reader_may_leave
+from sosmith.model.text_files import write_file
+from sosmith.terminal import JSON_OPTION, note, print_json, reader_may_leave
 
 
 @click.command("compare")
@@ -55,7 +56,7 @@ def compare_command(
 
     comparison = compare(reports, baseline=baseline, tolerance=tolerance)
     if output is not None:
-        write_files(output.parent, {output.name: comparison.page()})
+        write_file(output, comparison.page())
         note(f"wrote {output}")
     with reader_may_leave():
         if as_json:

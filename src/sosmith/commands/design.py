@@ -9,12 +9,13 @@ from pathlib import Path
 import click
 
 from sosmith.commands.options import BOARD, CORE, REALIZATION, SPEC, WIDTHS_OF, default_folder
+from sosmith.commands.output_paths import folder_option, plot_option
 from sosmith.gen.fpga.boards import BUILDABLE
 from sosmith.gen.picture import format_of
 from sosmith.gen.specification.examples import DEFAULT, contents, titles
 from sosmith.model.errors import SpecificationError
 from sosmith.model.text_files import write_contents
-from sosmith.terminal import JSON_OPTION, note, output_option, print_json, show_progress
+from sosmith.terminal import JSON_OPTION, note, print_json, show_progress
 
 
 @click.command()
@@ -66,9 +67,7 @@ def init(file: Path | None, named: str, listed: bool, force: bool) -> None:
 @WIDTHS_OF
 @BOARD
 @click.option("--details", is_flag=True, help="Also show the uncertainty budget, sections, limit cycles and schedule.")
-@click.option(
-    "--plot", type=click.Path(path_type=Path), help="SVG or PNG file for a plot of gain, delay and calibration."
-)
+@plot_option("SVG or PNG file for a plot of gain, delay and calibration.")
 @JSON_OPTION
 def design_command(
     spec: Path,
@@ -130,7 +129,7 @@ def design_command(
 @REALIZATION
 @WIDTHS_OF
 @BOARD
-@output_option("Folder for the files.  [default: build/<name>]")
+@folder_option("Folder for the files.  [default: build/<name>]")
 def generate_command(
     spec: Path,
     core: str | None,

@@ -8,9 +8,10 @@ from typing import Any
 import click
 
 from sosmith.commands.options import CORE, SEED, SPEC, OneOf, completed_by
+from sosmith.commands.output_paths import folder_option
 from sosmith.gen.fpga.boards import SYNTHESIZED, find_board
 from sosmith.model.errors import SpecificationError
-from sosmith.terminal import JSON_OPTION, note, output_option, print_json, reader_may_leave, show_progress
+from sosmith.terminal import JSON_OPTION, note, print_json, reader_may_leave, show_progress
 
 
 @click.command("explore")
@@ -59,7 +60,7 @@ from sosmith.terminal import JSON_OPTION, note, output_option, print_json, reade
 @click.option("--scheduler", metavar="ADDRESS", help="Have the workers of this Dask scheduler do the designs.")
 @SEED
 @JSON_OPTION
-@output_option("Folder for the results.  [default: build/<name>-exploration]")
+@folder_option("Folder for the results.  [default: build/<name>-exploration]")
 def explore_command(
     spec: Path,
     parameters: tuple[str, ...],

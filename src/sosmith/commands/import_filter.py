@@ -8,7 +8,8 @@ from typing import Any
 import click
 
 from sosmith.commands.options import OneOf
-from sosmith.terminal import note, output_option
+from sosmith.commands.output_paths import output_option
+from sosmith.terminal import note
 
 
 @click.command("import")
@@ -37,7 +38,7 @@ from sosmith.terminal import note, output_option
     help="Physical range of input and output.",
 )
 @click.option("--unit", default="", help="Unit of input and output.")
-@output_option("File of the specification.  [default: print it]")
+@output_option("File of the specification.  [default: print it]", stdout=True)
 def import_command(
     file: Path,
     sample_rate: float,
@@ -65,7 +66,7 @@ def import_command(
     """
     from sosmith.gen.specification.verilog_names import identifier_from
     from sosmith.interface.coefficients import Coefficients
-    from sosmith.model.text_files import write_files
+    from sosmith.model.text_files import write_file
 
     read = Coefficients.load(file, sample_rate=sample_rate, signs=signs)
     text = read.specification(
@@ -83,5 +84,5 @@ def import_command(
     if output is None:
         click.echo(text, nl=False)
     else:
-        write_files(output.parent, {output.name: text})
+        write_file(output, text)
         click.echo(output)

@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from sosmith.commands.options import BAUD, default_folder
+from sosmith.commands.output_paths import output_option
 from sosmith.model.errors import SpecificationError
-from sosmith.terminal import live, note, output_option
+from sosmith.terminal import live, note, width
 
 if TYPE_CHECKING:
     from sosmith.host.alarms import Alarm
@@ -121,10 +122,7 @@ def monitor_command(
     from sosmith.host.alarms import ALARMS
     from sosmith.host.board import Board
     from sosmith.host.monitor import watch
-    from sosmith.host.recording import check_output
 
-    if output is not None:
-        check_output(output, trace)
     broker = None
     if mqtt is not None:
         from sosmith.host.mqtt import Broker, paho
@@ -275,7 +273,7 @@ class _Monitor:
 
         from sosmith.host.live_view import render
 
-        console = Console(stderr=True)
+        console = Console(stderr=True, width=width())
         view = Live(console=console, refresh_per_second=REFRESHES, transient=False)
         self._stack.enter_context(live(view))
         return lambda: view.update(render(readings, console.width))

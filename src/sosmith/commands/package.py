@@ -7,7 +7,8 @@ from pathlib import Path
 import click
 
 from sosmith.commands.options import BOARD, CORE, REALIZATION, SPEC, WIDTHS_OF, default_folder
-from sosmith.terminal import output_option, show_progress
+from sosmith.commands.output_paths import folder_option
+from sosmith.terminal import show_progress
 
 
 @click.command("package")
@@ -21,7 +22,7 @@ from sosmith.terminal import output_option, show_progress
     metavar="VENDOR:LIBRARY:NAME:VERSION",
     help="Name of the package for FuseSoC and IP-XACT.  [default: user:sosmith:<name>:1.0]",
 )
-@output_option("Folder of the package.  [default: build/<name>/package]")
+@folder_option("Folder of the package.  [default: build/<name>/package]")
 def package_command(
     spec: Path,
     core: str | None,

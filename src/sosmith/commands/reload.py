@@ -7,9 +7,10 @@ from pathlib import Path
 import click
 
 from sosmith.commands.options import BAUD, BOARD, CORE, PORT, REALIZATION, SPEC, WIDTHS_OF, default_folder
+from sosmith.commands.output_paths import output_option
 from sosmith.model.errors import falling_short
-from sosmith.model.text_files import to_json, write_files
-from sosmith.terminal import JSON_OPTION, note, output_option, print_json, show_progress
+from sosmith.model.text_files import to_json, write_file
+from sosmith.terminal import JSON_OPTION, note, print_json, show_progress
 
 
 @click.command("reload")
@@ -95,7 +96,7 @@ def reload_command(
         swap = check_swap(made, None if reset else before, new)
     tree = reload_json(made, swap, version)
     path = output or default_folder(asked.name) / f"{other.stem}.reload.json"
-    write_files(path.parent, {path.name: to_json(tree)})
+    write_file(path, to_json(tree))
     if as_json:
         print_json(tree)
     else:

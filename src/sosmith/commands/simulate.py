@@ -23,12 +23,13 @@ from sosmith.commands.options import (
     completed_by,
     default_folder,
 )
+from sosmith.commands.output_paths import folder_option, output_option
 from sosmith.gen.fpga.boards import MODELLED, find_board
 from sosmith.instrument.scenarios.summaries import SUMMARIES, check_scenario, fitting
 from sosmith.model.errors import SpecificationError
 from sosmith.model.suggestion import did_you_mean
-from sosmith.model.text_files import write_files
-from sosmith.terminal import JSON_OPTION, Step, note, output_option, print_json, reader_may_leave, show_progress
+from sosmith.model.text_files import write_file, write_files
+from sosmith.terminal import JSON_OPTION, Step, note, print_json, reader_may_leave, show_progress
 
 if TYPE_CHECKING:
     from sosmith.interface.design import Design
@@ -133,7 +134,7 @@ def _empty_cache(ctx: click.Context, param: click.Parameter, wanted: bool) -> No
     help="Date of the run, for the report; without it the report has none, and two runs write the same.",
 )
 @JSON_OPTION
-@output_option("Folder for the files.  [default: build/<name>]")
+@folder_option("Folder for the files.  [default: build/<name>]")
 def simulate_command(
     spec: Path,
     core: str | None,
@@ -234,7 +235,7 @@ def simulate_command(
     help="Write the depot measurements of FILE.toml instead, for `sosmith calibrate add`.",
 )
 @SEED
-@output_option("CSV file to write.  [default: stdout]")
+@output_option("CSV file to write.  [default: stdout]", stdout=True)
 def emulate_command(
     spec: Path,
     scenario: str | None,
@@ -297,7 +298,7 @@ def emulate_command(
 
 
 @click.command()
-@output_option("Folder for the files.  [default: build/demo]")
+@folder_option("Folder for the files.  [default: build/demo]")
 @SEED
 def demo(output: Path | None, seed: int) -> None:
     """Run the complete flow on the built-in example: a locomotive's flange wear at 100 Hz.
@@ -389,5 +390,5 @@ def _write_measurements(spec: Path, source: str | None, seed: int, output: Path 
     if output is None:
         click.echo(text, nl=False)
         return
-    write_files(output.parent, {output.name: text})
+    write_file(output, text)
     note(f"wrote {output}: {len(rows)} measurements")

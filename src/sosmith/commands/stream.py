@@ -7,14 +7,15 @@ from pathlib import Path
 import click
 
 from sosmith.commands.options import BAUD
-from sosmith.terminal import note, output_option, show_progress
+from sosmith.commands.output_paths import output_option
+from sosmith.terminal import note, show_progress
 
 
 @click.command("stream")
 @click.argument("port")
 @click.argument("trace", type=click.Path(path_type=Path), metavar="TRACE.csv")
 @BAUD
-@output_option("CSV file, or Parquet file if its name ends so, for the results.  [default: stdout]")
+@output_option("CSV file, or Parquet file if its name ends so, for the results.  [default: stdout]", stdout=True)
 def stream_command(port: str, trace: Path, baud: int, output: Path | None) -> None:
     """Send the samples of TRACE.csv to the board at PORT, and write its results.
 
@@ -26,13 +27,11 @@ def stream_command(port: str, trace: Path, baud: int, output: Path | None) -> No
         sosmith stream /dev/ttyUSB1 ramp.csv -o results.csv
     """
     from sosmith.host.board import Board
-    from sosmith.host.recording import as_csv, check_output, recording
+    from sosmith.host.recording import as_csv, recording
     from sosmith.host.rows import columns, rows
     from sosmith.host.trace_samples import samples_for
-    from sosmith.model.text_files import write_files
+    from sosmith.model.text_files import write_file
 
-    if output is not None:
-        check_output(output, trace)
     with show_progress() as step, Board(port, baud=baud) as board:
         about = board.identity
         step(f"reading {trace}")
@@ -46,7 +45,7 @@ def stream_command(port: str, trace: Path, baud: int, output: Path | None) -> No
         with recording(output, columns(about)) as made:
             made.add(rows(about, results))
     else:
-        write_files(output.parent, {output.name: text})
+        write_file(output, text)
     if output is not None:
         note(f"wrote {output}: {results.codes.size} results of {about.name}")
     if faults:

@@ -7,12 +7,15 @@ from pathlib import Path
 
 import click
 
-from sosmith.terminal import note, output_option
+from sosmith.commands.output_paths import output_option
+from sosmith.terminal import note
 
 
 @click.command("studio")
 @click.argument("spec", required=False, type=click.Path(path_type=Path))
-@output_option("File to save the specification to.  [default: SPEC, or the example's name in this folder]")
+@output_option(
+    "File to save the specification to.  [default: SPEC, or the example's name in this folder]", in_place=True
+)
 @click.option(
     "--port", type=click.IntRange(0, 65535), default=0, help="TCP port on the loopback address.  [default: a free one]"
 )

@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from sosmith.commands.output_paths import output_option, plot_option
 from sosmith.gen.calibration.acceptance import REQUIRED_R
 from sosmith.gen.picture import format_of
 from sosmith.instrument.calibration.acceptance import DEFAULT_RANGES, METHODS, Method, Range
 from sosmith.model.errors import ShortfallError, SpecificationError
-from sosmith.model.text_files import write_contents, write_files
-from sosmith.terminal import JSON_OPTION, note, output_option, print_json, show_progress
+from sosmith.model.text_files import write_file
+from sosmith.terminal import JSON_OPTION, note, print_json, show_progress
 
 if TYPE_CHECKING:
     from sosmith.instrument.calibration.measurement_files import Refusal
@@ -350,7 +351,7 @@ def history_command(store: Path, sensor: str, verify: bool, as_json: bool) -> No
     show_default=True,
     help="toml: the table [calibration] of a specification; csv: the measurements, for its key calibration.data.",
 )
-@output_option("File to write.  [default: stdout]")
+@output_option("File to write.  [default: stdout]", stdout=True)
 def export_command(store: Path, sensor: str, number: int | None, file_format: str, output: Path | None) -> None:
     """Write the coefficients or the measurements of a version.
 
@@ -381,7 +382,7 @@ def export_command(store: Path, sensor: str, number: int | None, file_format: st
     if output is None:
         click.echo(text, nl=False)
     else:
-        write_files(output.parent, {output.name: text})
+        write_file(output, text)
         note(f"wrote {output}: version {version.number} of sensor {sensor}")
 
 
@@ -408,7 +409,7 @@ def plot_command(store: Path, sensor: str, number: int | None, output: Path | No
         versions = opened.versions(sensor)[: made.version.number]
         step("drawing")
         drawn = calibration_plot(made, versions, file_format)
-    write_contents(path.parent, {path.name: drawn})
+    write_file(path, drawn)
     note(f"wrote {path}: version {made.version.number} of sensor {sensor}")
 
 
@@ -474,7 +475,7 @@ def advise_command(
     metavar="YYYY-MM-DD",
     help="Begin the charts at this date: what was before is known, and raises no alarm.  [default: the first day]",
 )
-@click.option("--plot", type=click.Path(path_type=Path), help="SVG or PNG file for the charts.")
+@plot_option("SVG or PNG file for the charts.")
 @JSON_OPTION
 def health_command(store: Path, sensor: str, since: str | None, plot: Path | None, as_json: bool) -> None:
     """Say whether a sensor still behaves as its measurements so far and its type let expect.
@@ -500,7 +501,7 @@ def health_command(store: Path, sensor: str, since: str | None, plot: Path | Non
             from sosmith.instrument.calibration.health.health_plot import health_plot
 
             step("drawing")
-            write_contents(plot.parent, {plot.name: health_plot(sensor, found, file_format)})
+            write_file(plot, health_plot(sensor, found, file_format))
     if plot is not None:
         note(f"wrote {plot}")
     if as_json:

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import click
 
-from sosmith.model.text_files import write_files
-from sosmith.terminal import JSON_OPTION, note, output_option, print_json, show_progress
+from sosmith.commands.output_paths import output_option
+from sosmith.model.text_files import write_file, write_files
+from sosmith.terminal import JSON_OPTION, note, print_json, show_progress
 
 
 @click.command("paper")
@@ -33,7 +34,7 @@ def paper(output: Path | None, as_json: bool) -> None:
         if output is not None:
             step("drawing")
             files = paper_files(figures)
-            write_files(output.parent, {output.name: files.pop("paper.md")})
+            write_file(output, files.pop("paper.md"))
             write_files(output.parent / "images", {name.removeprefix("images/"): text for name, text in files.items()})
     if as_json:
         print_json(paper_json(figures))

@@ -9,6 +9,7 @@ from pathlib import Path
 import click
 
 from sosmith.commands.options import OneOf
+from sosmith.commands.output_paths import output_option, plot_option
 from sosmith.gen.picture import format_of
 from sosmith.instrument.spectrum.settings import (
     COVERAGE,
@@ -20,8 +21,8 @@ from sosmith.instrument.spectrum.settings import (
     Wish,
 )
 from sosmith.model.errors import SpecificationError
-from sosmith.model.text_files import write_contents
-from sosmith.terminal import JSON_OPTION, note, output_option, print_json, show_progress
+from sosmith.model.text_files import write_file
+from sosmith.terminal import JSON_OPTION, note, print_json, show_progress
 
 _HELP = """Show the spectra of traces, and propose a low-pass filter based on them.
 
@@ -92,11 +93,9 @@ Exits with 1 if the tolerance needs no filter, or no filter meets it.
 @click.option(
     "--into", type=click.Path(path_type=Path), metavar="SPEC", help="Write a copy of SPEC with [filter] replaced."
 )
-@click.option(
-    "--plot", type=click.Path(path_type=Path), help="SVG or PNG file for the plot.  [default: name of -o with .svg]"
-)
+@plot_option("SVG or PNG file for the plot.  [default: name of -o with .svg]")
 @JSON_OPTION
-@output_option("TOML file for [filter], or for the copy of SPEC.  [default: stdout]")
+@output_option("TOML file for [filter], or for the copy of SPEC.  [default: stdout]", stdout=True)
 def spectrum_command(
     traces: tuple[Path, ...],
     columns: tuple[str, ...],
@@ -187,5 +186,5 @@ def _pass_edge(passband: float | None, time_constant: float | None) -> float | N
 
 
 def _write(path: Path, content: bytes) -> None:
-    write_contents(path.parent, {path.name: content})
+    write_file(path, content)
     note(f"wrote {path}")

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING
 import click
 
 from sosmith.commands.options import OneOf
+from sosmith.commands.output_paths import OutputFile, output_option, plot_option
 from sosmith.gen.picture import format_of
 from sosmith.instrument.vehicle.choices import LEVELS, MODELS, TRACK_NAMES
-from sosmith.model.text_files import write_contents, write_files
-from sosmith.terminal import JSON_OPTION, note, output_option, print_json, show_progress
+from sosmith.model.text_files import write_file
+from sosmith.terminal import JSON_OPTION, note, print_json, show_progress
 
 if TYPE_CHECKING:
     from sosmith.instrument.vehicle.vehicle_report import VehicleRun
@@ -45,10 +46,10 @@ if TYPE_CHECKING:
     help="nonlinear: friction limits the creep forces, and flanges meet the rails; linear: neither.",
 )
 @click.option("--details", is_flag=True, help="Also print modes, every part's largest motion, and the paper's tables.")
-@click.option("--plot", type=click.Path(path_type=Path), help="SVG or PNG file for a plot of motions and spectra.")
+@plot_option("SVG or PNG file for a plot of motions and spectra.")
 @click.option(
     "--write-parameters",
-    type=click.Path(path_type=Path),
+    type=OutputFile(),
     help="Only write the built-in parameters, with the source of each, to this TOML file.",
 )
 @output_option("CSV file for the motion, with the columns time_s, wheelset1_lateral_mm, ..., clearance1_mm, ...")
@@ -85,7 +86,7 @@ def vehicle(
     from sosmith.instrument.vehicle.parameters import built_in, built_in_text, load
 
     if write_parameters is not None:
-        write_files(write_parameters.parent, {write_parameters.name: built_in_text()})
+        write_file(write_parameters, built_in_text())
         note(f"wrote {write_parameters}")
         return
     given = built_in() if parameters is None else load(parameters)
@@ -108,13 +109,13 @@ def vehicle(
         took = time.process_time() - begin
         if output is not None:
             step("writing the motion")
-            write_files(output.parent, {output.name: vehicle_csv(made.motion)})
+            write_file(output, vehicle_csv(made.motion))
         if plot is not None:
             from sosmith.instrument.vehicle.vehicle_plot import linear_beside, vehicle_plot
 
             step("drawing")
             beside = linear_beside(made)
-            write_contents(plot.parent, {plot.name: vehicle_plot(made, file_format, beside)})
+            write_file(plot, vehicle_plot(made, file_format, beside))
     for path in (output, plot):
         if path is not None:
             note(f"wrote {path}")

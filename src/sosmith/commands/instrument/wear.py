@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from sosmith.commands.output_paths import plot_option
 from sosmith.gen.picture import format_of
 from sosmith.instrument.wear.record_columns import CLEARANCES, TIMES
 from sosmith.model.errors import SpecificationError
-from sosmith.model.text_files import write_contents
+from sosmith.model.text_files import write_file
 from sosmith.terminal import JSON_OPTION, note, print_json, show_progress
 
 if TYPE_CHECKING:
@@ -55,7 +56,7 @@ same comparisons as the wear flags of the hardware.
 @click.option("--block", type=float, help="Length of a block in days.  [default: 1, less for a short record]")
 @click.option("--window", type=float, help="Estimate the rate from this many days at the end.  [default: all]")
 @click.option("--confidence", type=float, default=0.95, show_default=True, help="Confidence level of the intervals.")
-@click.option("--plot", type=click.Path(path_type=Path), help="SVG or PNG file for a plot.")
+@plot_option("SVG or PNG file for a plot.")
 @JSON_OPTION
 def wear_command(
     trace: Path,
@@ -114,7 +115,7 @@ def wear_command(
 
         print_wear(record, report, channel)
     if plot is not None and drawn is not None:
-        write_contents(plot.parent, {plot.name: drawn})
+        write_file(plot, drawn)
         note(f"wrote {plot}")
 
 

@@ -10,6 +10,8 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from sosmith.terminal import NARROWEST
+
 _MAX_TITLE = 76
 """Columns that the narrowest terminals have."""
 
@@ -19,6 +21,10 @@ class TableConsole(Console):
 
     Without a terminal there is nothing that blanks could paint over; a diff or a quotation shows them.
     """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.width = max(self.width, NARROWEST)
 
     def on_broken_pipe(self) -> None:
         raise BrokenPipeError
