@@ -24,7 +24,9 @@ if TYPE_CHECKING:
     from sosmith.interface.design import Coefficient, Design, Section, design
     from sosmith.interface.exploration import Exploration, explore
     from sosmith.interface.filter import Filter
+    from sosmith.interface.notebook import Table
     from sosmith.interface.quantity import Quantity
+    from sosmith.interface.reload import Reload
     from sosmith.interface.report import Report
     from sosmith.interface.specification import Specification
     from sosmith.interface.trace import Trace
@@ -57,6 +59,7 @@ __all__ = [
     "Proof",
     "Quantity",
     "RefusedError",
+    "Reload",
     "Report",
     "Results",
     "Section",
@@ -64,6 +67,7 @@ __all__ = [
     "SosmithError",
     "Specification",
     "SpecificationError",
+    "Table",
     "ToolError",
     "Trace",
     "__version__",
@@ -83,7 +87,9 @@ _MODULES = {
     "interface.design": ("Coefficient", "Design", "Section", "design"),
     "interface.exploration": ("Exploration", "explore"),
     "interface.filter": ("Filter",),
+    "interface.notebook": ("Table",),
     "interface.quantity": ("Quantity",),
+    "interface.reload": ("Reload",),
     "interface.report": ("Report",),
     "interface.specification": ("Specification",),
     "interface.trace": ("Trace",),

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import click
 
+from sosmith.interface.files import write_files
 from sosmith.model.errors import ShortfallError, SpecificationError
-from sosmith.model.text_files import write_files
 from sosmith.terminal import JSON_OPTION, note, output_option, print_json, reader_may_leave
 
 

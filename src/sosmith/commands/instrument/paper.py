@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from sosmith.model.text_files import write_files
+from sosmith.interface.files import write_files
 from sosmith.terminal import JSON_OPTION, note, output_option, print_json, show_progress
 
 

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import click
 
 from sosmith.commands.options import OneOf
-from sosmith.gen.picture import format_of
 from sosmith.instrument.vehicle.choices import LEVELS, MODELS, TRACK_NAMES
-from sosmith.model.text_files import write_contents, write_files
+from sosmith.interface.choices import picture_format
+from sosmith.interface.files import write_contents, write_files
 from sosmith.terminal import JSON_OPTION, note, output_option, print_json, show_progress
 
 if TYPE_CHECKING:
@@ -81,7 +81,7 @@ def vehicle(
         sosmith vehicle --write-parameters my_vehicle.toml
         sosmith vehicle my_vehicle.toml --track tangent --irregularities low -o motion.csv
     """
-    file_format = "" if plot is None else format_of(plot)
+    file_format = "" if plot is None else picture_format(plot)
     from sosmith.instrument.vehicle.parameters import built_in, built_in_text, load
 
     if write_parameters is not None:

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from sosmith.gen.picture import format_of
 from sosmith.instrument.wear.record_columns import CLEARANCES, TIMES
+from sosmith.interface.choices import picture_format
+from sosmith.interface.files import write_contents
 from sosmith.model.errors import SpecificationError
-from sosmith.model.text_files import write_contents
 from sosmith.terminal import JSON_OPTION, note, print_json, show_progress
 
 if TYPE_CHECKING:
@@ -73,7 +73,7 @@ def wear_command(
     as_json: bool,
 ) -> None:
     """Carry out `sosmith wear`."""
-    file_format = "" if plot is None else format_of(plot)
+    file_format = "" if plot is None else picture_format(plot)
     from sosmith.instrument.wear.assessment import WearLimits, judge
     from sosmith.instrument.wear.record_file import read_wear_record
 
