@@ -24,11 +24,11 @@ if TYPE_CHECKING:
     from sosmith.interface.design import Coefficient, Design, Section, design
     from sosmith.interface.exploration import Exploration, explore
     from sosmith.interface.filter import Filter
-    from sosmith.interface.notebook import Table
     from sosmith.interface.quantity import Quantity
     from sosmith.interface.reload import Reload
     from sosmith.interface.report import Report
     from sosmith.interface.specification import Specification
+    from sosmith.interface.tables.table import Table
     from sosmith.interface.trace import Trace
     from sosmith.model.errors import (
         LinkError,
@@ -87,7 +87,7 @@ _MODULES = {
     "interface.design": ("Coefficient", "Design", "Section", "design"),
     "interface.exploration": ("Exploration", "explore"),
     "interface.filter": ("Filter",),
-    "interface.notebook": ("Table",),
+    "interface.tables.table": ("Table",),
     "interface.quantity": ("Quantity",),
     "interface.reload": ("Reload",),
     "interface.report": ("Report",),

@@ -11,7 +11,7 @@ from typing import Any
 
 from sosmith.gen.fpga.boards import find_board
 from sosmith.gen.output.board_build import BoardBuild
-from sosmith.interface.notebook import Table
+from sosmith.interface.tables.table import Table
 from sosmith.model.errors import ShortfallError, ToolError
 
 

@@ -16,8 +16,8 @@ from sosmith.gen.calibration.acceptance import REQUIRED_R
 from sosmith.gen.calibration.fit import Fit, Measurements, fit, read_measurements, residuals
 from sosmith.gen.specification.toml_text import toml_text
 from sosmith.instrument.calibration.uncertainty import Uncertainty, of_polynomial
-from sosmith.interface.notebook import Table
 from sosmith.interface.quantity import Quantity
+from sosmith.interface.tables.table import Table
 from sosmith.model.errors import SpecificationError
 
 

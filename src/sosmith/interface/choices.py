@@ -16,19 +16,26 @@ from sosmith.gen.realizations.registry import ERROR_FEEDBACK
 from sosmith.gen.specification.choices import CORES, REALIZATIONS
 from sosmith.gen.specification.verilog_names import identifier_from
 from sosmith.instrument.scenarios.summaries import SUMMARIES, check_scenario, fitting
+from sosmith.instrument.vehicle.choices import LEVELS, MODELS, TRACK_NAMES
+from sosmith.instrument.wear.record_columns import CLEARANCES, TIMES
 from sosmith.model.suggestion import did_you_mean
 
 __all__ = [
     "BOARDS",
     "BUILDABLE",
+    "CLEARANCES",
     "CORES",
     "ERROR_FEEDBACK",
+    "LEVELS",
     "MODELLED",
+    "MODELS",
     "PROJECTS",
     "REALIZATIONS",
     "SCENARIOS",
     "SIMULATORS",
     "SYNTHESIZED",
+    "TIMES",
+    "TRACK_NAMES",
     "board_named",
     "check_date",
     "check_scenario",

@@ -17,8 +17,8 @@ from sosmith.gen.report.comparison.report_file import load_report
 from sosmith.gen.report.comparison.rows import Row, column_names
 from sosmith.gen.report.comparison.rows import compare as compare_reports
 from sosmith.gen.report.comparison.summary import comparison_json
-from sosmith.interface.notebook import Table
 from sosmith.interface.report import Report
+from sosmith.interface.tables.table import Table
 from sosmith.model.errors import SpecificationError
 
 __all__ = ["Comparison", "Difference", "Judgement", "compare"]

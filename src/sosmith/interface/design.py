@@ -32,9 +32,9 @@ if TYPE_CHECKING:
     from sosmith.instrument.uncertainty.instrument_budget import InstrumentBudget
     from sosmith.interface.build import Build
     from sosmith.interface.certificate import Certificate, Progress, Proof
-    from sosmith.interface.notebook import Table
     from sosmith.interface.reload import Reload
     from sosmith.interface.report import Report
+    from sosmith.interface.tables.table import Table
 
 Floats = npt.NDArray[np.float64]
 Codes = npt.NDArray[np.int64]
@@ -722,7 +722,7 @@ class Design:
 
         With `details`, also the uncertainty of a reading, the sections, their limit cycles and the schedule.
         """
-        from sosmith.interface.design_tables import design_tables
+        from sosmith.interface.tables.design import design_tables
 
         return design_tables(self, details=details)
 

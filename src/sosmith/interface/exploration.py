@@ -13,8 +13,8 @@ from sosmith.gen.fpga.boards import SYNTHESIZED, find_board
 from sosmith.gen.quantity import number, quantity
 from sosmith.gen.specification.exact_values import exact
 from sosmith.interface.certificate import Progress
-from sosmith.interface.notebook import Table
 from sosmith.interface.specification import Specification, specification_of
+from sosmith.interface.tables.table import Table
 from sosmith.model.errors import SpecificationError, ToolError
 from sosmith.model.text_files import to_json, write_contents, write_files
 

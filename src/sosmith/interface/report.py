@@ -12,9 +12,9 @@ import numpy.typing as npt
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.report.evidence import Evidence
 from sosmith.gen.report.report import write_report
-from sosmith.interface.notebook import Table
 from sosmith.interface.quantity import Quantity
-from sosmith.interface.report_table import report_table
+from sosmith.interface.tables.report import report_table
+from sosmith.interface.tables.table import Table
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,7 +22,7 @@ from sosmith.gen.report.evidence import Evidence
 from sosmith.gen.report.provenance import Provenance
 from sosmith.gen.report.report import summarise
 from sosmith.gen.report.tiles import tile_rows
-from sosmith.interface.report_table import report_table
+from sosmith.interface.tables.report import report_table
 
 FIRST_ORDER = np.array([[0.1, 0.0, 0.0, 1.0, -0.9, 0.0]])
 """y(n) = 0.9 y(n-1) + 0.1 x(n): a step leaves 0.9**(n+1) to go."""

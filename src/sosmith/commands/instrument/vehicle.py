@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from sosmith.commands.options import OneOf
-from sosmith.instrument.vehicle.choices import LEVELS, MODELS, TRACK_NAMES
-from sosmith.interface.choices import picture_format
+from sosmith.interface.choices import LEVELS, MODELS, TRACK_NAMES, picture_format
 from sosmith.interface.files import write_contents, write_files
 from sosmith.terminal import JSON_OPTION, note, output_option, print_json, show_progress
 

@@ -12,7 +12,7 @@ from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
-from sosmith.interface.notebook import Table as Facts
+from sosmith.interface.tables.table import Table as Facts
 
 _VERDICTS = {None: "", True: ": [bold green]passed[/]", False: ": [bold red]fell short[/]"}
 

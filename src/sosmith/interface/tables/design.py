@@ -17,7 +17,7 @@ from sosmith.gen.specification.wear_limits import WearSpec
 from sosmith.instrument.calibration.uncertainty import of_polynomial
 from sosmith.instrument.uncertainty.budget import SHARE
 from sosmith.instrument.uncertainty.instrument_budget import InstrumentBudget
-from sosmith.interface.notebook import Table
+from sosmith.interface.tables.table import Table
 from sosmith.model.dataflow.program import Program
 from sosmith.model.port import Port
 

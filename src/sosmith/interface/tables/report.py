@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from sosmith.gen.quantity import count, duration, in_own_unit, plain_number, quantity
-from sosmith.interface.notebook import Table
+from sosmith.interface.tables.table import Table
 
 
 def report_table(summary: Mapping[str, Any]) -> Table:
