@@ -35,7 +35,7 @@ def paper(output: Path | None, as_json: bool) -> None:
             write_files(output.parent, {output.name: files.pop("paper.md")})
             write_files(output.parent / "images", {name.removeprefix("images/"): text for name, text in files.items()})
     if as_json:
-        print_json(made.as_dict())
+        print_json(made.figures())
     elif output is None:
         print_tables([table])
     if output is not None:

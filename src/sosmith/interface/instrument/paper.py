@@ -27,6 +27,6 @@ class Paper:
         """Return the complete comparison as a Markdown file ``paper.md``, and its pictures in ``images/``."""
         return paper_files(self._printed)
 
-    def as_dict(self) -> dict[str, Any]:
+    def figures(self) -> list[dict[str, Any]]:
         """Return all figures in JSON types."""
         return paper_json(self._printed)
