@@ -13,6 +13,21 @@ from tests.house import ROOMS, ROOT, WITH_SUB_ROOMS, arrows, floors, imported, m
 ABOVE = ("cli", "commands", "studio", "interface", "host", "terminal")
 """What stands above the rooms, in src/sosmith."""
 MAX_PARTS = 20
+INTERFACE = ("sosmith.interface", "sosmith.studio", "sosmith.commands", "sosmith.terminal", "sosmith.model.errors")
+"""What commands import."""
+PAST_THE_INTERFACE = {
+    "instrument/calibrate.py": 11,
+    "instrument/spectrum.py": 3,
+    "instrument/vehicle.py": 5,
+    "monitor.py": 14,
+    "stream.py": 5,
+    "tables/calibration.py": 6,
+    "tables/certificate.py": 4,
+    "tables/spectrum.py": 5,
+    "tables/vehicle.py": 3,
+    "verify.py": 1,
+}
+"""Imports of each command that pass the interface by."""
 
 
 def test_there_are_rooms_and_sub_rooms_to_look_at() -> None:
@@ -102,6 +117,20 @@ _OTHER_MEANINGS = {
     # which proof reads which files, until `verify` has one door
     *(f"src/sosmith/interface/certificate.py: {name}" for name in ARCHITECTURES),
 }
+
+
+def test_commands_stand_on_the_public_interface() -> None:
+    """The numbers of imports that still pass it by may only shrink; a command that is not named has none."""
+    folder = ROOT / "src" / "sosmith" / "commands"
+    past = {
+        str(path.relative_to(folder)): len(
+            [name for name in imported(path) if name.startswith("sosmith.") and not name.startswith(INTERFACE)]
+        )
+        for path in folder.rglob("*.py")
+    }
+    assert len(past) > 20
+    assert {path: count for path, count in past.items() if count > PAST_THE_INTERFACE.get(path, 0)} == {}
+    assert [path for path in PAST_THE_INTERFACE if not past.get(path)] == []
 
 
 @pytest.mark.parametrize("folder", [*ROOMS, "src/sosmith/commands", "tests"])

@@ -132,6 +132,7 @@ ROOMS = {
         files=(
             "gen/report/report.py",
             "gen/report/evidence.py",
+            "gen/report/run.py",
             "gen/filter/response.py",
             "model/reference/accuracy.py",
         ),

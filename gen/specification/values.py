@@ -78,7 +78,7 @@ def literal(value: object) -> str:
     return shown if len(shown) <= 60 else f"{shown[:56]} ..."
 
 
-_PREFIXES = {"k": 1000, "K": 1000, "M": 10**6, "G": 10**9, "m": Fraction(1, 1000)}
+_PREFIXES: dict[str, int | Fraction] = {"k": 1000, "K": 1000, "M": 10**6, "G": 10**9, "m": Fraction(1, 1000)}
 _NUMBER = r"[-+]?[0-9]{1,18}(?:[.,][0-9]{1,18})?(?:[eE][-+]?[0-9]{1,2})?"
 _WITH_UNIT = re.compile(rf"({_NUMBER})\s*([kKMGm]?)(?:[Hh]z|dB|V|mm|degC|sps|S/s|bits?)?")
 

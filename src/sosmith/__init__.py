@@ -25,8 +25,10 @@ if TYPE_CHECKING:
     from sosmith.interface.exploration import Exploration, explore
     from sosmith.interface.filter import Filter
     from sosmith.interface.quantity import Quantity
+    from sosmith.interface.reload import Reload
     from sosmith.interface.report import Report
     from sosmith.interface.specification import Specification
+    from sosmith.interface.tables.table import Table
     from sosmith.interface.trace import Trace
     from sosmith.model.errors import (
         LinkError,
@@ -57,6 +59,7 @@ __all__ = [
     "Proof",
     "Quantity",
     "RefusedError",
+    "Reload",
     "Report",
     "Results",
     "Section",
@@ -64,6 +67,7 @@ __all__ = [
     "SosmithError",
     "Specification",
     "SpecificationError",
+    "Table",
     "ToolError",
     "Trace",
     "__version__",
@@ -83,7 +87,9 @@ _MODULES = {
     "interface.design": ("Coefficient", "Design", "Section", "design"),
     "interface.exploration": ("Exploration", "explore"),
     "interface.filter": ("Filter",),
+    "interface.tables.table": ("Table",),
     "interface.quantity": ("Quantity",),
+    "interface.reload": ("Reload",),
     "interface.report": ("Report",),
     "interface.specification": ("Specification",),
     "interface.trace": ("Trace",),

@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
-import socket
-from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from sosmith.commands.options import BAUD, CORE, REALIZATION, SEED, SPEC, default_folder
 from sosmith.commands.output_paths import folder_option
-from sosmith.model.errors import SpecificationError, ToolError
+from sosmith.model.errors import SpecificationError
 from sosmith.terminal import note, show_progress
-
-if TYPE_CHECKING:
-    from sosmith.gen.core import CoreDesign
-    from sosmith.model.arrays import Codes
 
 
 class _Speed(click.ParamType[float]):
@@ -107,12 +101,10 @@ def board_command(
     if not virtual:
         raise SpecificationError("--virtual must be given: a real board is made by `sosmith build`")
     from sosmith.interface.specification import Specification
-    from sosmith.sim.virtual_board.line_damage import LineDamage
-    from sosmith.sim.virtual_board.terminal import Terminal
+    from sosmith.interface.virtual_board import LineDamage, ModelBoard, NetlistBoard, Terminal
 
     asked = Specification.load(spec)
     damage = None if fault is None else LineDamage(fault, seed, tuple(fault_kinds.split(",")))
-    rate = asked.checked.hardware.clock if clock is None else Fraction(clock)
     measures = bool(asked.checked.converters)
     if trace is not None and not measures:
         raise SpecificationError("--trace must come with [converter.NAME] tables in SPEC, or be given to `monitor`")
@@ -121,47 +113,18 @@ def board_command(
     with show_progress() as step:
         from sosmith.interface.design import design
 
-        made = design(asked, core=core, realization=realization, progress=step).core
+        made = design(asked, core=core, realization=realization, progress=step)
         folder = output or default_folder(asked.name) / "board"
         if model:
-            from sosmith.gen.output.generate import generated
-            from sosmith.host.model_line import model_of
-
             step("model of the board")
-            device = model_of(made, generated(made)[f"{asked.name}.sv"], baud=baud)
+            modelled = ModelBoard(made, baud=baud)
         else:
-            from sosmith.sim.virtual_board.netlist import build
-
-            codes = _measured(made, trace, seed) if measures else None
-            netlist = build(made, folder, clock=rate, baud=baud, progress=step)
+            board = NetlistBoard(made, folder, clock=clock, baud=baud, trace=trace, seed=seed, progress=step)
     with Terminal() as terminal:
         click.echo(terminal.path)
         if model:
-            from sosmith.sim.virtual_board.serve import serve
-
             note(f"the model of {asked.name} is at {terminal.path}; Ctrl-C ends it")
-            serve(device, terminal.end, damage=damage or (lambda data: data))
-            return
-        from sosmith.sim.virtual_board.netlist import forward
-
-        note(f"{asked.name} is at {terminal.path}; Ctrl-C ends it")
-        ours, theirs = socket.socketpair()
-        pace = speed if speed is not None else 1.0 if measures else 0.0
-        end = terminal.end if damage is None else theirs.fileno()
-        with ours, theirs, netlist.at(end, speed=pace, codes=codes) as process:
-            if damage is None:
-                process.wait()
-            else:
-                theirs.close()
-                forward(terminal.end, ours, damage, lambda: process.poll() is None)
-        raise ToolError(f"the simulation of the board must go on, not end with status {process.returncode}")
-
-
-def _measured(design: CoreDesign, trace: str | None, seed: int) -> Codes:
-    """Return what the converters measure, as codes of the inputs: shape (samples, channels, inputs)."""
-    import numpy as np
-
-    from sosmith.instrument.scenarios.traces import default_scenario, traces_for
-
-    traces = traces_for(design, trace or default_scenario(design), seed=seed)
-    return np.stack([each.codes for each in traces], axis=1)
+            modelled.serve(terminal, damage)
+        else:
+            note(f"{asked.name} is at {terminal.path}; Ctrl-C ends it")
+            board.serve(terminal, damage, speed)

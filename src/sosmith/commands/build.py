@@ -8,9 +8,9 @@ from typing import Any
 
 import click
 
-from sosmith.commands.options import CORE, REALIZATION, SPEC, completed_by, default_folder
+from sosmith.commands.options import CORE, REALIZATION, SPEC, completed_by, default_folder, print_tables
 from sosmith.commands.output_paths import folder_option
-from sosmith.gen.fpga.boards import BUILDABLE, PROJECTS, find_board
+from sosmith.interface.choices import BUILDABLE, PROJECTS, board_named
 from sosmith.model.errors import SpecificationError
 from sosmith.terminal import JSON_OPTION, note, print_json, show_progress
 
@@ -23,7 +23,7 @@ from sosmith.terminal import JSON_OPTION, note, print_json, show_progress
     "--board",
     required=True,
     metavar="BOARD",
-    callback=lambda ctx, parameter, name: find_board(name, (*BUILDABLE, *PROJECTS)).name,
+    callback=lambda ctx, parameter, name: board_named(name, (*BUILDABLE, *PROJECTS)),
     shell_complete=completed_by((*BUILDABLE, *PROJECTS)),
     help=f"Target board: {', '.join(BUILDABLE)}; project files only: {', '.join(PROJECTS)}.",
 )
@@ -83,9 +83,7 @@ def build_command(
     if as_json:
         print_json(built.summary)
     else:
-        from sosmith.commands.tables.build import print_build
-
-        print_build(built.summary)
+        print_tables([built.table])
     most, wanted = built.summary["samples_per_second"], float(asked.checked.sample_rate)
     if most < wanted:
         note(f"note: at the board's clock the core takes {most:,.0f} samples a second per channel, not {wanted:,.0f}")
@@ -101,9 +99,9 @@ def _told(summary: dict[str, Any], folder: Path, *, as_json: bool) -> None:
     if as_json:
         print_json(summary)
     else:
-        from sosmith.commands.tables.build import print_build
+        from sosmith.interface.build import build_table
 
-        print_build(summary)
+        print_tables([build_table(summary)])
     files = ", ".join(project["files"])
     note(f"project for {project['tool']} in {folder}: {files}")
     note(f"no flow was run and no bitstream written; in that folder, {project['command']} makes one")

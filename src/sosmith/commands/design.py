@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from os.path import commonpath
 from pathlib import Path
 
 import click
 
-from sosmith.commands.options import BOARD, CORE, REALIZATION, SPEC, WIDTHS_OF, default_folder
+from sosmith.commands.options import BOARD, CORE, REALIZATION, SPEC, WIDTHS_OF, default_folder, print_tables
 from sosmith.commands.output_paths import folder_option, plot_option
-from sosmith.gen.fpga.boards import BUILDABLE
-from sosmith.gen.picture import format_of
-from sosmith.gen.specification.examples import DEFAULT, contents, titles
+from sosmith.interface.choices import BUILDABLE, picture_format
+from sosmith.interface.files import DEFAULT, contents, titles, write_contents
 from sosmith.model.errors import SpecificationError
-from sosmith.model.text_files import write_contents
 from sosmith.terminal import JSON_OPTION, note, print_json, show_progress
 
 
@@ -92,7 +89,7 @@ def design_command(
     from sosmith.interface.specification import Specification
 
     if plot is not None:
-        format_of(plot)
+        picture_format(plot)
     asked = Specification.load(spec)
     if asked.checked.filter.origin:
         note(asked.checked.filter.origin)
@@ -107,20 +104,11 @@ def design_command(
     if plot is not None:
         note(f"wrote {plot}")
     if as_json:
-        from sosmith.instrument.uncertainty.instrument_budget import budget_json
+        print_json(made.as_dict() if cost is None else made.as_dict() | {"board": cost})
+        return
+    from sosmith.interface.build import build_table
 
-        worth = None if made.uncertainty is None else budget_json(made.uncertainty)
-        beside = {name: asdict(costs) for name, costs in made.rate_costs.items()}
-        shown = made.manifest | {"uncertainty": worth} | ({"rate_costs": beside} if beside else {})
-        print_json(shown if cost is None else shown | {"board": cost})
-    else:
-        from sosmith.commands.tables.design import print_design
-
-        print_design(made, details=details)
-        if cost is not None:
-            from sosmith.commands.tables.build import print_build
-
-            print_build(cost)
+    print_tables([*made.tables(details=details), *([] if cost is None else [build_table(cost)])])
 
 
 @click.command("generate")

@@ -7,9 +7,9 @@ from typing import Any
 
 import click
 
-from sosmith.commands.options import CORE, SEED, SPEC, OneOf, completed_by
+from sosmith.commands.options import CORE, SEED, SPEC, OneOf, completed_by, print_tables
 from sosmith.commands.output_paths import folder_option
-from sosmith.gen.fpga.boards import SYNTHESIZED, find_board
+from sosmith.interface.choices import SIMULATORS, SYNTHESIZED, board_named
 from sosmith.model.errors import SpecificationError
 from sosmith.terminal import JSON_OPTION, note, print_json, reader_may_leave, show_progress
 
@@ -35,7 +35,7 @@ from sosmith.terminal import JSON_OPTION, note, print_json, reader_may_leave, sh
 @click.option(
     "--board",
     metavar="BOARD",
-    callback=lambda ctx, parameter, name: None if name is None else find_board(name, SYNTHESIZED).name,
+    callback=lambda ctx, parameter, name: None if name is None else board_named(name, SYNTHESIZED),
     shell_complete=completed_by(SYNTHESIZED),
     help="Count the cost after synthesis for the FPGA of this board, which takes seconds for each design: "
     f"{', '.join(SYNTHESIZED)}.  [default: an estimate]",
@@ -50,7 +50,7 @@ from sosmith.terminal import JSON_OPTION, note, print_json, reader_may_leave, sh
 @click.option("--simulate", is_flag=True, help="Co-simulate the designs of the front, each with a report.")
 @click.option(
     "--simulator",
-    type=OneOf(["verilator", "icarus", "cxxrtl"]),
+    type=OneOf(SIMULATORS),
     default="verilator",
     show_default=True,
     help="Simulator for --simulate.",
@@ -94,8 +94,7 @@ def explore_command(
     folder = output or Path("build") / f"{asked.name}-exploration"
     try:
         with show_progress(remaining=True) as step:
-            from sosmith.interface.exploration import explore
-            from sosmith.sim.exploration.parameters import read_parameter
+            from sosmith.interface.exploration import explore, read_parameter
 
             read: list[tuple[str, Any]] = [read_parameter(text) for text in parameters]
             twice = [key for k, (key, _) in enumerate(read) if key in dict(read[:k])]
@@ -126,9 +125,9 @@ def explore_command(
         if as_json:
             print_json(found.as_dict())
         else:
-            from sosmith.commands.tables.exploration import print_exploration
-
-            print_exploration(found)
+            print_tables(found.tables())
+            for sentence in found.sentences:
+                click.echo(sentence)
     note(f"page: {(found.folder / 'exploration.html').resolve().as_uri()}")
     if not found.front:
         raise SystemExit(1)

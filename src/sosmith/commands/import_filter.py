@@ -64,9 +64,9 @@ def import_command(
         sosmith import equalizer.txt --sample-rate 48000 -o equalizer.toml
         sosmith design equalizer.toml
     """
-    from sosmith.gen.specification.verilog_names import identifier_from
+    from sosmith.interface.choices import identifier_from
     from sosmith.interface.coefficients import Coefficients
-    from sosmith.model.text_files import write_file
+    from sosmith.interface.files import write_file
 
     read = Coefficients.load(file, sample_rate=sample_rate, signs=signs)
     text = read.specification(

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from sosmith.gen.fpga.boards import BOARDS, find_board
-from sosmith.gen.specification.choices import CORES, ERROR_FEEDBACK, REALIZATIONS
-from sosmith.model.suggestion import did_you_mean
+from sosmith.interface.choices import BOARDS, CORES, ERROR_FEEDBACK, REALIZATIONS, board_named, did_you_mean
+
+if TYPE_CHECKING:
+    from sosmith.interface.tables.table import Table
 
 
 class OneOf(click.Choice[str]):
@@ -40,7 +41,7 @@ WIDTHS_OF = click.option(
 BOARD = click.option(
     "--board",
     metavar="BOARD",
-    callback=lambda ctx, parameter, name: None if name is None else find_board(name).name,
+    callback=lambda ctx, parameter, name: None if name is None else board_named(name),
     shell_complete=completed_by(BOARDS),
     help=f"Target board, whose multipliers an automatic choice of the architecture considers: {', '.join(BOARDS)}.",
 )
@@ -65,3 +66,10 @@ BAUD = click.option(
 def default_folder(name: str) -> Path:
     """Return the default output folder for the specification `name`."""
     return Path("build") / name
+
+
+def print_tables(tables: Iterable[Table]) -> None:
+    """Print tables on stdout."""
+    from sosmith.commands.tables.console import print_all  # and with it rich, which is slow to import
+
+    print_all(tables)

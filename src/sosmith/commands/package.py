@@ -45,11 +45,11 @@ def package_command(
         sosmith package my.toml -o my_core
         make -C my_core/bench icarus
     """
-    from sosmith.gen.output.packages.vlnv import Vlnv
+    from sosmith.interface.choices import check_vlnv
     from sosmith.interface.specification import Specification
 
     if vlnv is not None:
-        Vlnv.read(vlnv)
+        check_vlnv(vlnv)
     asked = Specification.load(spec)
     with show_progress() as step:
         from sosmith.interface.design import design

@@ -6,10 +6,9 @@ from pathlib import Path
 
 import click
 
-from sosmith.commands.options import BAUD, BOARD, CORE, PORT, REALIZATION, SPEC, WIDTHS_OF, default_folder
+from sosmith.commands.options import BAUD, BOARD, CORE, PORT, REALIZATION, SPEC, WIDTHS_OF, default_folder, print_tables
 from sosmith.commands.output_paths import output_option
-from sosmith.model.errors import falling_short
-from sosmith.model.text_files import to_json, write_file
+from sosmith.interface.files import to_json, write_file
 from sosmith.terminal import JSON_OPTION, note, print_json, show_progress
 
 
@@ -79,34 +78,23 @@ def reload_command(
     """
     from sosmith.interface.specification import Specification
 
-    asked, wanted = Specification.load(spec), Specification.load(other).checked
-    running = None if active is None else Specification.load(active).checked
+    asked, wanted = Specification.load(spec), Specification.load(other)
+    running = None if active is None else Specification.load(active)
     with show_progress() as step:
-        from sosmith.gen.reload.register_writes import reload_json
-        from sosmith.gen.reload.reload import check_swap, own_set, set_for
         from sosmith.interface.design import design
 
-        made = design(asked, core=core, realization=realization, widths_of=widths_of, board=board, progress=step).core
-        step("set")
-        with falling_short(other):
-            new = set_for(made, wanted)
-        with falling_short(active or spec):
-            before = own_set(made) if running is None else set_for(made, running)
-        step("swap")
-        swap = check_swap(made, None if reset else before, new)
-    tree = reload_json(made, swap, version)
+        made = design(asked, core=core, realization=realization, widths_of=widths_of, board=board, progress=step)
+        found = made.reload(wanted, active=running, reset=reset, version=version, progress=step)
     path = output or default_folder(asked.name) / f"{other.stem}.reload.json"
-    write_file(path, to_json(tree))
+    write_file(path, to_json(found.writes))
     if as_json:
-        print_json(tree)
+        print_json(found.writes)
     else:
-        from sosmith.commands.tables.reload import print_swap
-
-        print_swap(made, wanted, swap, tree)
+        print_tables([found.table])
     note(f"wrote {path}")
     if port is not None:
-        from sosmith.host.board import Board
+        from sosmith import Board
 
         with Board(port, baud=baud) as client:
-            loaded = client.load(tree)
+            loaded = client.load(found.writes)
         note(f"active on {port}: version {loaded.version}, CRC {loaded.crc:#010x}, {loaded.words} words")

@@ -22,13 +22,23 @@ from sosmith.commands.options import (
     OneOf,
     completed_by,
     default_folder,
+    print_tables,
 )
 from sosmith.commands.output_paths import folder_option, output_option
-from sosmith.gen.fpga.boards import MODELLED, find_board
-from sosmith.instrument.scenarios.summaries import SUMMARIES, check_scenario, fitting
+from sosmith.interface.choices import (
+    MODELLED,
+    SCENARIOS,
+    SIMULATORS,
+    board_named,
+    check_date,
+    check_scenario,
+    check_simulator,
+    check_vectors,
+    did_you_mean,
+    fitting,
+)
+from sosmith.interface.files import write_file, write_files
 from sosmith.model.errors import SpecificationError
-from sosmith.model.suggestion import did_you_mean
-from sosmith.model.text_files import write_file, write_files
 from sosmith.terminal import JSON_OPTION, Step, note, print_json, reader_may_leave, show_progress
 
 if TYPE_CHECKING:
@@ -59,13 +69,13 @@ def _empty_cache(ctx: click.Context, param: click.Parameter, wanted: bool) -> No
     """Empty the cache of compiled simulations, and end."""
     if not wanted or ctx.resilient_parsing:
         return
-    from sosmith.sim.build_cache import BuildCache, cache_folder
+    from sosmith.interface.simulating import empty_cache
 
-    folder = cache_folder()
-    if folder is None:
+    removed = empty_cache()
+    if removed is None:
         note("there is no cache folder that can be written")
     else:
-        note(f"removed {BuildCache(folder).clear() / 1e6:.1f} MB from {folder}")
+        note(f"removed {removed[0] / 1e6:.1f} MB from {removed[1]}")
     ctx.exit()
 
 
@@ -83,7 +93,7 @@ def _empty_cache(ctx: click.Context, param: click.Parameter, wanted: bool) -> No
 )
 @click.option(
     "--simulator",
-    type=OneOf(["verilator", "icarus", "cxxrtl"]),
+    type=OneOf(SIMULATORS),
     default="verilator",
     show_default=True,
     help="Simulator to use; cxxrtl is Yosys's own.",
@@ -176,20 +186,15 @@ def simulate_command(
         sosmith simulate my.toml --port /dev/ttyUSB1
     """
     from sosmith.interface.specification import Specification
-    from sosmith.sim.simulators import check_name
 
-    check_name(simulator, netlist=gates is not None)
+    check_simulator(simulator, gates=gates is not None)
     if vectors is not None:
-        from sosmith.gen.output.vectors import check_format
-
-        check_format(vectors)
+        check_vectors(vectors)
     if date is not None:
-        from sosmith.instrument.calibration.measurement_files import parse_date
-
-        parse_date(date)
+        check_date(date)
     if port is not None and (gates is not None or waves):
         raise SpecificationError("--port must come without --gates and --waves, which need a simulator")
-    netlist_for = None if gates is None else find_board(gates, MODELLED).name
+    netlist_for = None if gates is None else board_named(gates, MODELLED)
     asked = Specification.load(spec)
     if source is not None and not _is_file(source):
         check_scenario(source, _kind(asked, core))
@@ -266,9 +271,10 @@ def emulate_command(
     asked = Specification.load(spec)
     kind = _kind(asked, core)
     if scenario is None:
-        from sosmith.commands.tables.scenarios import print_scenarios
+        from sosmith.interface.tables.table import Table
 
-        print_scenarios(asked.name, {name: SUMMARIES[name].description for name in fitting(kind)})
+        rows = [(name, SCENARIOS[name]) for name in fitting(kind)]
+        print_tables([Table(f"Scenarios for {asked.name}", rows, ("name", "description"))])
         note("a scenario file can be given instead of a name: sosmith init --list names examples")
         return
     if scenario not in fitting(kind) and not _is_scenario_file(scenario):
@@ -278,22 +284,19 @@ def emulate_command(
             f"{scenario}{did_you_mean(scenario, known)}"
         )
     with show_progress() as step:
-        from sosmith.instrument.scenarios.traces import notes_on, traces_for
         from sosmith.interface.design import design
-        from sosmith.model.traces.trace_file import traces_csv, write_traces
 
         made = design(asked, core=core, progress=step)
         step(f"emulating {scenario}")
-        traces = traces_for(made.core, scenario, seed=seed, seconds=seconds)
-        notes = notes_on(made.core, scenario)
+        trace = made.trace(scenario, seed=seed, seconds=seconds)
         if output is not None:
-            write_traces(output, traces)
+            trace.write(output)
     if output is None:
-        click.echo(traces_csv(traces), nl=False)
+        click.echo(trace.csv(), nl=False)
     else:
-        channels = f" of each of {len(traces)} channels" if len(traces) > 1 else ""
-        note(f"wrote {output}: {len(traces[0])} samples{channels} at {float(traces[0].sample_rate):g} Hz")
-    for sentence in notes:
+        channels = f" of each of {asked.channels} channels" if asked.channels > 1 else ""
+        note(f"wrote {output}: {len(trace.time)} samples{channels} at {asked.sample_rate:g} Hz")
+    for sentence in made.notes_on(scenario):
         note(f"note: {sentence}")
 
 
@@ -308,32 +311,29 @@ def demo(output: Path | None, seed: int) -> None:
     \b
         sosmith demo -o my_demo
     """
-    from sosmith.gen.specification.specification import example
     from sosmith.interface.specification import Specification
 
     folder = output or Path("build/demo")
     _say_how_long()
     with show_progress() as step:
         step("writing the example specification")
-        (spec,) = write_files(folder, {"flange_wear.toml": example()})
+        (spec,) = write_files(folder, {"flange_wear.toml": Specification.example().toml()})
         from sosmith.interface.design import design
 
         made = design(Specification.load(spec), progress=step)
         report = _simulated(made, step, None, folder=folder, seed=seed)
-    from sosmith.commands.tables.design import print_design
-
-    print_design(made)
+    print_tables(made.tables())
     _finish(report, as_json=False)
 
 
 def _say_how_long() -> None:
     """Say how long the demo takes if this is the first simulation, which takes longer."""
-    from sosmith.sim.simulator_bench import has_library
-    from sosmith.sim.verilated_model import LIBRARY_SECONDS
+    from sosmith.interface.simulating import library_seconds
 
-    if not has_library():
+    longer = library_seconds()
+    if longer:
         note(
-            f"the first run takes about {DEMO_SECONDS + LIBRARY_SECONDS} s, as Verilator's library is compiled, and "
+            f"the first run takes about {DEMO_SECONDS + longer} s, as Verilator's library is compiled, and "
             f"later ones about {DEMO_SECONDS} s"
         )
 
@@ -341,9 +341,7 @@ def _say_how_long() -> None:
 def _simulated(made: Design, step: Step, source: str | None, **options: Any) -> Report:
     report = made.simulate(source, progress=step, **options)
     if source is not None:
-        from sosmith.instrument.scenarios.traces import notes_on
-
-        for sentence in notes_on(made.core, source):
+        for sentence in made.notes_on(source):
             note(f"note: {sentence}")
     return report
 
@@ -353,9 +351,7 @@ def _finish(report: Report, *, as_json: bool) -> None:
         if as_json:
             print_json(report.summary)
         else:
-            from sosmith.commands.tables.report import print_summary
-
-            print_summary(report.summary)
+            print_tables([report.table])
     note(f"report: {(report.folder / 'report.html').resolve().as_uri()}")
     if not report.passed:
         sys.exit(1)
@@ -367,12 +363,12 @@ def _kind(spec: Specification, core: str | None) -> str:
 
 
 def _is_scenario_file(source: str) -> bool:
-    return source not in SUMMARIES and source.lower().endswith(".toml")
+    return source not in SCENARIOS and source.lower().endswith(".toml")
 
 
 def _is_file(source: str) -> bool:
     """Tell whether a trace comes from a file: by its suffix, or because the file exists."""
-    return source not in SUMMARIES and (source.lower().endswith((".csv", ".toml")) or Path(source).exists())
+    return source not in SCENARIOS and (source.lower().endswith((".csv", ".toml")) or Path(source).exists())
 
 
 def _write_measurements(spec: Path, source: str | None, seed: int, output: Path | None) -> None:
@@ -382,13 +378,11 @@ def _write_measurements(spec: Path, source: str | None, seed: int, output: Path 
     from sosmith.interface.specification import Specification
 
     Specification.load(spec)  # so that a mistake in it is found now
-    from sosmith.instrument.scenarios.depot_measurements import measurements_csv, measurements_of
-    from sosmith.instrument.scenarios.file import load_scenario
+    from sosmith.interface.simulating import depot_measurements
 
-    rows = measurements_of(load_scenario(Path(source)), seed)
-    text = measurements_csv(rows)
+    count, text = depot_measurements(source, seed)
     if output is None:
         click.echo(text, nl=False)
         return
     write_file(output, text)
-    note(f"wrote {output}: {len(rows)} measurements")
+    note(f"wrote {output}: {count} measurements")

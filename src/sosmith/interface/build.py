@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import shutil
 import subprocess
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from sosmith.gen.fpga.boards import find_board
 from sosmith.gen.output.board_build import BoardBuild
-from sosmith.interface.notebook import table_html
+from sosmith.interface.tables.table import Table
 from sosmith.model.errors import ShortfallError, ToolError
 
 
@@ -85,15 +86,31 @@ class Build:
             tail = "\n".join((done.stdout + done.stderr).strip().splitlines()[-5:])
             raise ToolError(f"openFPGALoader could not program the {self.summary['title']}:\n{tail}")
 
+    @property
+    def table(self) -> Table:
+        """What the design takes of the FPGA, and how fast it could run."""
+        return build_table(self.summary)
+
     def _repr_html_(self) -> str:
-        cells = self.summary["utilisation"].items()
-        rows = [
-            ("timing", "closes" if self.passed else str(self.shortfall)),
-            ("highest clock", f"{self.fmax / 1e6:.2f} MHz"),
-            *((kind, f"{count['used']:,} of {count['available']:,}") for kind, count in cells if count["used"]),
-        ]
-        return table_html(f"{self.summary['name']} on {self.summary['title']}", rows)
+        return self.table.html()
 
     def __repr__(self) -> str:
         timing = "timing closes" if self.passed else "timing does not close"
         return f"<sosmith.Build {self.summary['name']} on {self.summary['title']}: {timing}, {self.fmax / 1e6:.2f} MHz>"
+
+
+def build_table(summary: Mapping[str, Any]) -> Table:
+    """Say what a design takes of an FPGA, and how fast it could run; `summary` is the content of ``build.json``."""
+    rows: list[Sequence[str]] = [("device", summary["device"]), ("architecture", summary["architecture"])]
+    for kind, cells in summary.get("utilisation", {}).items():
+        if cells["used"]:
+            share = 100 * cells["used"] / cells["available"]
+            rows.append((kind, f"{cells['used']:,} of {cells['available']:,}, {share:.0f} %"))
+    for clock in summary.get("clocks", ()):
+        met = "closes" if clock["achieved_mhz"] >= clock["wanted_mhz"] else "does not close"
+        needed = f"of which {clock['wanted_mhz']:.2f} MHz are needed"
+        rows.append(("timing", f"{met}: {clock['achieved_mhz']:.2f} MHz, {needed}"))
+    if "project" in summary:
+        rows.append(("timing", f"not known: {summary['project']['tool']} was not run"))
+    rows.append(("serial line", f"{summary['line_rate_baud']:,} baud"))
+    return Table(f"{summary['name']} on {summary['title']}", rows)

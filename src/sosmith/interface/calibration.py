@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike, fspath
@@ -15,8 +16,8 @@ from sosmith.gen.calibration.acceptance import REQUIRED_R
 from sosmith.gen.calibration.fit import Fit, Measurements, fit, read_measurements, residuals
 from sosmith.gen.specification.toml_text import toml_text
 from sosmith.instrument.calibration.uncertainty import Uncertainty, of_polynomial
-from sosmith.interface.notebook import table_html
 from sosmith.interface.quantity import Quantity
+from sosmith.interface.tables.table import Table
 from sosmith.model.errors import SpecificationError
 
 
@@ -164,7 +165,7 @@ class Calibration:
     def _repr_html_(self) -> str:
         m, n = self.orders
         low, high = self._uncertainty.limits
-        rows = [
+        rows: list[Sequence[str]] = [
             ("measurements", f"{len(self.measurements.clearance):,}"),
             ("orders", f"{m} in voltage, {n} in temperature"),
             ("adjusted r", f"{self.adjusted_r:.6f}"),
@@ -172,7 +173,7 @@ class Calibration:
             ("residual, largest", str(Quantity(float(abs(self.residual).max()), "mm"))),
             ("95 % interval of a reading", f"±{low:.3g} to ±{high:.3g} mm where there are measurements"),
         ]
-        return table_html("Calibration", rows)
+        return Table("Calibration", rows).html()
 
     def __repr__(self) -> str:
         m, n = self.orders

@@ -17,9 +17,11 @@ from sosmith.gen.report.comparison.report_file import load_report
 from sosmith.gen.report.comparison.rows import Row, column_names
 from sosmith.gen.report.comparison.rows import compare as compare_reports
 from sosmith.gen.report.comparison.summary import comparison_json
-from sosmith.interface.notebook import table_html
 from sosmith.interface.report import Report
+from sosmith.interface.tables.table import Table
 from sosmith.model.errors import SpecificationError
+
+__all__ = ["Comparison", "Difference", "Judgement", "compare"]
 
 Source = Report | Mapping[str, Any] | str | PathLike[str]
 
@@ -77,8 +79,8 @@ class Comparison:
         return comparison_markdown(self.reports, self.judgements)
 
     def _repr_html_(self) -> str:
-        rows = [(row.title, *row.cells) for row in self.rows if row.key != "name"]
-        return table_html("Accuracy reports", rows, header=("", *self.names))
+        rows: list[Sequence[str]] = [(row.title, *row.cells) for row in self.rows if row.key != "name"]
+        return Table("Accuracy reports", rows, ("", *self.names)).html()
 
     def __repr__(self) -> str:
         return f"<sosmith.Comparison of {', '.join(self.names)}>"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property, partial
 from os import PathLike, fspath
 from pathlib import Path
@@ -21,7 +21,6 @@ from sosmith.gen.output.manifest import manifest
 from sosmith.gen.quantity import number
 from sosmith.gen.word_lengths.cost import Cost
 from sosmith.interface.inputs import codes_of, encoded, real_numbers, traces_of
-from sosmith.interface.notebook import table_html
 from sosmith.interface.quantity import Quantity
 from sosmith.interface.specification import Specification, specification_of
 from sosmith.interface.trace import Trace
@@ -33,7 +32,9 @@ if TYPE_CHECKING:
     from sosmith.instrument.uncertainty.instrument_budget import InstrumentBudget
     from sosmith.interface.build import Build
     from sosmith.interface.certificate import Certificate, Progress, Proof
+    from sosmith.interface.reload import Reload
     from sosmith.interface.report import Report
+    from sosmith.interface.tables.table import Table
 
 Floats = npt.NDArray[np.float64]
 Codes = npt.NDArray[np.int64]
@@ -345,6 +346,12 @@ class Design:
         """
         return Trace.of(traces_of(self.core, source, seed=seed, seconds=seconds))
 
+    def notes_on(self, source: str | PathLike[str]) -> tuple[str, ...]:
+        """Return what there is to know about a trace by this name or file, one sentence each; most have nothing."""
+        from sosmith.instrument.scenarios.traces import notes_on
+
+        return notes_on(self.core, fspath(source))
+
     def board(self) -> Board:
         """Open a `Board` at whose other end is the integer model: for trying out, and for tests without hardware.
 
@@ -413,6 +420,42 @@ class Design:
             facts=self.facts,
             claims=self.certificate.entries,
         )
+
+    def reload(
+        self,
+        other: Specification | str | PathLike[str] | Mapping[str, Any],
+        *,
+        active: Specification | str | PathLike[str] | Mapping[str, Any] | None = None,
+        reset: bool = False,
+        version: int = 1,
+        progress: Progress = lambda step, done, total: None,
+    ) -> Reload:
+        """Prove that the running core can load the coefficients of another specification.
+
+        Parameters
+        ----------
+        other : Specification, path or mapping
+            Another calibration, filter or allowed error, and otherwise the same.
+        active : Specification, path or mapping
+            What is active before the swap; by default what the core was generated with.
+        reset : bool
+            Whether the core is reset between the swap and the next sample: there is no transient, and more sets fit.
+        version : int
+            Value of the register VERSION once the new set is active, 0 to 2**32 - 1.
+        progress : callable
+            Called with the name of each step, 0 and 0.
+
+        Raises
+        ------
+        SpecificationError
+            If the core cannot reload, or `other` differs in more.
+        ShortfallError
+            If the set does not fit, or something could overflow during the swap.
+        """
+        from sosmith.interface.reload import Reload
+
+        running = None if active is None else specification_of(active)
+        return Reload.proven(self, specification_of(other), running, reset=reset, version=version, progress=progress)
 
     def package(
         self,
@@ -674,19 +717,29 @@ class Design:
     def _computed(self, codes: Codes) -> Codes:
         return self.core.datapath.compute(codes)
 
+    def tables(self, *, details: bool = False) -> list[Table]:
+        """Return what `sosmith design` shows, in words: the overview, and what the error bound is made of.
+
+        With `details`, also the uncertainty of a reading, the sections, their limit cycles and the schedule.
+        """
+        from sosmith.interface.tables.design import design_tables
+
+        return design_tables(self, details=details)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the `manifest` with ``uncertainty`` (None if unknown) and, with a decimator, ``rate_costs``."""
+        from sosmith.instrument.uncertainty.instrument_budget import budget_json
+
+        worth = None if self.uncertainty is None else budget_json(self.uncertainty)
+        beside = {name: asdict(costs) for name, costs in self.rate_costs.items()}
+        return self.manifest | {"uncertainty": worth} | ({"rate_costs": beside} if beside else {})
+
     def _repr_html_(self) -> str:
-        filter_ = self.core.quantized.filter
-        spec = self.specification
-        rows = [
-            ("filter", "none" if filter_ is None else filter_.describe),
-            *self.reasons.items(),
-            ("inputs", ", ".join(f"{name} ({unit})" if unit else name for name, unit in spec.inputs.items())),
-            ("error bound", f"{self.bound}, proven for all inputs in range; {spec.max_error} allowed"),
-            *((f"of it {part}", str(value)) for part, value in self.budget.items()),
-            ("latency", f"{self.latency_cycles:,} clocks"),
-            ("clocks a sample", number(self.core.architecture.clocks_per_sample)),
-        ]
-        return table_html(f"{self.name}: {self.kind}", rows)
+        overview, budget, *_ = self.tables()
+        inputs = ", ".join(f"{name} ({unit})" if unit else name for name, unit in self.specification.inputs.items())
+        clocks = ("clocks a sample", number(self.core.architecture.clocks_per_sample))
+        overview = replace(overview, rows=[("inputs", inputs), *overview.rows, clocks])
+        return overview.html() + budget.html()
 
     def __repr__(self) -> str:
         made = ", ".join(filter(None, (self.realization, self.architecture)))

@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sosmith.gen.fpga.boards import SYNTHESIZED, find_board
-from sosmith.gen.quantity import quantity
+from sosmith.gen.quantity import number, quantity
 from sosmith.gen.specification.exact_values import exact
 from sosmith.interface.certificate import Progress
-from sosmith.interface.notebook import table_html
 from sosmith.interface.specification import Specification, specification_of
+from sosmith.interface.tables.table import Table
 from sosmith.model.errors import SpecificationError, ToolError
 from sosmith.model.text_files import to_json, write_contents, write_files
 
@@ -90,17 +90,46 @@ class Exploration:
         write_contents(place.parent, {place.name: content.getvalue()})
         return place
 
-    def _repr_html_(self) -> str:
-        rows = [
+    def tables(self) -> list[Table]:
+        """Return the front, a table for each kind of cost."""
+        return [self._table(unit) for unit in dict.fromkeys(point["cost"]["unit"] for point in self.front)]
+
+    def _table(self, unit: str) -> Table:
+        chosen = {"hardware.realization", "hardware.architecture"}
+        keys = [key for key in self.outcome.parameters if key not in chosen]
+        rows: list[Sequence[str]] = [
             (
                 point["realization"],
                 point["architecture"],
+                *(_worded(point["changes"][key]) for key in keys),
                 quantity(point["error"]["bound"], point["error"]["unit"]),
-                f"{point['cost']['value']:,.0f} {point['cost']['unit']}",
+                f"{point['cost']['value']:,.0f}",
+                number(point["cycles_per_sample"]),
             )
             for point in self.front
+            if point["cost"]["unit"] == unit
         ]
-        return table_html(f"{self.outcome.name}: the front", rows, header=("", "", "error bound", "cost"))
+        head = ("realization", "architecture", *(key.rpartition(".")[2] for key in keys), "bound", "cost", "clocks")
+        return Table(f"{self.outcome.name}: the front, cost in {unit}", rows, head)
+
+    @property
+    def sentences(self) -> list[str]:
+        """How many designs there are behind the front, and whether they do the same job."""
+        designs = [point for point in self.points if point["refused"] is None]
+        passed, front = sum(bool(point["passed"]) for point in designs), len(self.front)
+        jobs = len({point["reference_sha256"] for point in designs})
+        different = (
+            f"The designs do {jobs:,} different jobs (other filters, inputs, ranges or channels): each bound is "
+            "against its own exact calculation."
+        )
+        return [
+            *[different] * (jobs > 1),
+            f"{_counted(len(self.points), 'combination')}: {_counted(len(designs), 'design')}, of which {passed:,} "
+            f"{'passes' if passed == 1 else 'pass'} and {front:,} {'is' if front == 1 else 'are'} on the front",
+        ]
+
+    def _repr_html_(self) -> str:
+        return "".join(table.html() for table in self.tables())
 
     def __repr__(self) -> str:
         return f"<sosmith.Exploration {self.outcome.name}: {len(self.points)} points, {len(self.front)} on the front>"
@@ -182,9 +211,9 @@ def explore(
     from sosmith.sim.exploration.processes import in_processes, processors
     from sosmith.sim.exploration.run import explore as run
 
-    for name, number in (("samples", samples), ("jobs", jobs), ("search", search)):
-        if number is not None and number < 1:
-            raise SpecificationError(f"{name} must be at least 1, not {number}")
+    for name, count in (("samples", samples), ("jobs", jobs), ("search", search)):
+        if count is not None and count < 1:
+            raise SpecificationError(f"{name} must be at least 1, not {count}")
     if jobs is not None and scheduler is not None:
         raise SpecificationError("jobs must come without a scheduler, whose workers do the designs, not with one")
     asked = specification_of(specification).checked
@@ -244,3 +273,24 @@ def _plain(parameters: Mapping[str, Sequence[Any]]) -> dict[str, Values]:
             raise SpecificationError(f"{key} must be a list of values, or a range such as 1..8, not {values}")
         read[key] = span or plain(key, [exact(value) for value in values])
     return read
+
+
+def read_parameter(text: str) -> tuple[str, Any]:
+    """Read the values of a key as `sosmith explore` takes them, such as ``output.bits=12,14`` or ``filter.order=3..8``.
+
+    Raises
+    ------
+    SpecificationError
+        If the text is not of that form.
+    """
+    from sosmith.sim.exploration.parameters import read_parameter
+
+    return read_parameter(text)
+
+
+def _counted(number: int, thing: str) -> str:
+    return f"{number:,} {thing}{'' if number == 1 else 's'}"
+
+
+def _worded(value: object) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)

@@ -12,8 +12,9 @@ import numpy.typing as npt
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.report.evidence import Evidence
 from sosmith.gen.report.report import write_report
-from sosmith.interface.notebook import table_html
 from sosmith.interface.quantity import Quantity
+from sosmith.interface.tables.report import report_table
+from sosmith.interface.tables.table import Table
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,18 +101,13 @@ class Report:
         """Proven bound on the error, for all inputs in range."""
         return Quantity(self.summary["error"]["bound"], self.unit)
 
+    @property
+    def table(self) -> Table:
+        """Verdict, the measurement, the arithmetic and the speed."""
+        return report_table(self.summary)
+
     def _repr_html_(self) -> str:
-        error = self.summary["error"]
-        rows = [
-            ("verdict", "passed" if self.passed else "falls short"),
-            *(("", sentence) for sentence in self.shortfalls),
-            ("samples", f"{self.summary['samples']:,} by {self.summary['simulator']}"),
-            ("equal to the integer model", "yes" if self.bit_exact else f"no, {self.summary['mismatches']:,} differ"),
-            ("largest error", f"{self.largest_error} = {error['max_lsb']:.3f} steps of the output"),
-            ("bound", str(self.bound)),
-            ("report", str(self.folder / "report.html")),
-        ]
-        return table_html(self.name, rows)
+        return self.table.html()
 
     def __repr__(self) -> str:
         verdict = "passed" if self.passed else "falls short"

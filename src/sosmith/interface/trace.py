@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from os import PathLike, fspath
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
@@ -36,6 +38,9 @@ class Trace:
     inputs: dict[str, Floats] = field(repr=False)
     truth: Floats | None = field(repr=False)
 
+    coded: tuple[Coded, ...] = field(repr=False)
+    """The same in the form of the inner packages, one for each channel, with codes."""
+
     @classmethod
     def of(cls, channels: Sequence[Coded]) -> Trace:
         """Make it of one trace per channel, all of the same length."""
@@ -49,7 +54,26 @@ class Trace:
                 for k, port in enumerate(first.ports)
             },
             truth=_columns(truths) if len(truths) == len(channels) else None,
+            coded=tuple(channels),
         )
+
+    def csv(self) -> str:
+        """Return the text of a CSV file, with a column for each input; several channels are told apart by another."""
+        from sosmith.model.traces.trace_file import traces_csv
+
+        return traces_csv(self.coded)
+
+    def write(self, path: str | PathLike[str]) -> None:
+        """Write the CSV file.
+
+        Raises
+        ------
+        SpecificationError
+            If the folder cannot be written.
+        """
+        from sosmith.model.traces.trace_file import write_traces
+
+        write_traces(Path(fspath(path)), self.coded)
 
 
 def _columns(channels: Sequence[Floats]) -> Floats:

@@ -14,7 +14,7 @@ from tests.gen.report.behaviours import told
 from tests.gen.report.evidences import F7, LSB, Page, bandpass, changed, evidence, facts, page_of, plain
 
 from sosmith.cli import cli
-from sosmith.commands.tables.report import print_summary
+from sosmith.commands.options import print_tables
 from sosmith.gen.filter import response
 from sosmith.gen.filter.step_response import step_response
 from sosmith.gen.output.core_facts import SettlingFacts
@@ -22,6 +22,7 @@ from sosmith.gen.report.behaviour import behaviour
 from sosmith.gen.report.evidence import Evidence
 from sosmith.gen.report.report import summarise
 from sosmith.gen.report.tiles import tile_rows
+from sosmith.interface.tables.report import report_table
 
 FIRST_ORDER = np.array([[0.1, 0.0, 0.0, 1.0, -0.9, 0.0]])
 """y(n) = 0.9 y(n-1) + 0.1 x(n): a step leaves 0.9**(n+1) to go."""
@@ -186,7 +187,7 @@ def test_evidence_is_named_with_digests(words: str) -> None:
 
 def test_the_table_says_the_same(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", "120")
-    print_summary(summarise(evidence()))
+    print_tables([report_table(summarise(evidence()))])
     shown = [line.strip() for line in capsys.readouterr().out.splitlines()]
     order = [re.split(r"\s{2,}", line)[0] for line in shown if re.search(r"\S\s{2,}\S", line)]
     assert order == [

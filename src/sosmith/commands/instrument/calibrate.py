@@ -12,10 +12,10 @@ import click
 
 from sosmith.commands.output_paths import output_option, plot_option
 from sosmith.gen.calibration.acceptance import REQUIRED_R
-from sosmith.gen.picture import format_of
 from sosmith.instrument.calibration.acceptance import DEFAULT_RANGES, METHODS, Method, Range
+from sosmith.interface.choices import picture_format
+from sosmith.interface.files import write_file
 from sosmith.model.errors import ShortfallError, SpecificationError
-from sosmith.model.text_files import write_file
 from sosmith.terminal import JSON_OPTION, note, print_json, show_progress
 
 if TYPE_CHECKING:
@@ -398,7 +398,7 @@ def plot_command(store: Path, sensor: str, number: int | None, output: Path | No
         sosmith calibrate plot --sensor left -o left.svg
     """
     path = output or Path("calibration.svg")
-    file_format = format_of(path)
+    file_format = picture_format(path)
     from sosmith.instrument.calibration.calibration_plot import calibration_plot
     from sosmith.instrument.calibration.measurement_store import open_store
     from sosmith.instrument.calibration.self_updating import calibration_of
@@ -488,7 +488,7 @@ def health_command(store: Path, sensor: str, since: str | None, plot: Path | Non
         sosmith calibrate health --sensor left --plot health.svg
         sosmith calibrate health --sensor left --since 2026-04-20
     """
-    file_format = "" if plot is None else format_of(plot)
+    file_format = "" if plot is None else picture_format(plot)
     from sosmith.commands.tables.calibration import print_health
     from sosmith.instrument.calibration.health.health_report import health_json
     from sosmith.instrument.calibration.measurement_store import open_store

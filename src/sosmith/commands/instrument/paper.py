@@ -6,8 +6,9 @@ from pathlib import Path
 
 import click
 
+from sosmith.commands.options import print_tables
 from sosmith.commands.output_paths import output_option
-from sosmith.model.text_files import write_file, write_files
+from sosmith.interface.files import write_file, write_files
 from sosmith.terminal import JSON_OPTION, note, print_json, show_progress
 
 
@@ -23,27 +24,20 @@ def paper(output: Path | None, as_json: bool) -> None:
     \b
         sosmith paper -o paper/paper.md
     """
-    from sosmith.instrument.paper.comparison import LABELS
-    from sosmith.instrument.paper.document import paper_files, paper_json, summary_rows
-    from sosmith.instrument.paper.figures import read_paper_figures
+    from sosmith.interface.instrument.paper import Paper
 
     with show_progress() as step:
-        figures = read_paper_figures()
+        made = Paper()
         step("computing")
-        rows = summary_rows(figures)
+        table = made.table
         if output is not None:
             step("drawing")
-            files = paper_files(figures)
+            files = made.files()
             write_file(output, files.pop("paper.md"))
             write_files(output.parent / "images", {name.removeprefix("images/"): text for name, text in files.items()})
     if as_json:
-        print_json(paper_json(figures))
+        print_json(made.figures())
     elif output is None:
-        from sosmith.commands.tables.console import TableConsole, new_table
-
-        listing = new_table("The paper's figures compared with ours", ["", *LABELS])
-        for row in rows:
-            listing.add_row(*row[:-1])
-        TableConsole().print(listing)
+        print_tables([table])
     if output is not None:
         note(f"wrote {output} and its pictures in {output.parent / 'images'}")

@@ -10,7 +10,6 @@ import click
 
 from sosmith.commands.options import OneOf
 from sosmith.commands.output_paths import output_option, plot_option
-from sosmith.gen.picture import format_of
 from sosmith.instrument.spectrum.settings import (
     COVERAGE,
     DETRENDS,
@@ -20,8 +19,9 @@ from sosmith.instrument.spectrum.settings import (
     SpectrumSettings,
     Wish,
 )
+from sosmith.interface.choices import picture_format
+from sosmith.interface.files import write_file
 from sosmith.model.errors import SpecificationError
-from sosmith.model.text_files import write_file
 from sosmith.terminal import JSON_OPTION, note, print_json, show_progress
 
 _HELP = """Show the spectra of traces, and propose a low-pass filter based on them.
@@ -123,7 +123,7 @@ def spectrum_command(
     edge = _pass_edge(passband, time_constant)
     wish = Wish(tolerance=tolerance, coverage=coverage, passband=edge, passband_loss=passband_loss)
     picture = plot if plot is not None or output is None else output.with_suffix(".svg")
-    file_format = "" if picture is None else format_of(picture)
+    file_format = "" if picture is None else picture_format(picture)
     with show_progress() as step:
         from sosmith.instrument.spectrum.report import proposal_json, signal_json
         from sosmith.instrument.spectrum.survey import survey

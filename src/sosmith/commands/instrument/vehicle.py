@@ -10,9 +10,8 @@ import click
 
 from sosmith.commands.options import OneOf
 from sosmith.commands.output_paths import OutputFile, output_option, plot_option
-from sosmith.gen.picture import format_of
-from sosmith.instrument.vehicle.choices import LEVELS, MODELS, TRACK_NAMES
-from sosmith.model.text_files import write_file
+from sosmith.interface.choices import LEVELS, MODELS, TRACK_NAMES, picture_format
+from sosmith.interface.files import write_file
 from sosmith.terminal import JSON_OPTION, note, print_json, show_progress
 
 if TYPE_CHECKING:
@@ -82,7 +81,7 @@ def vehicle(
         sosmith vehicle --write-parameters my_vehicle.toml
         sosmith vehicle my_vehicle.toml --track tangent --irregularities low -o motion.csv
     """
-    file_format = "" if plot is None else format_of(plot)
+    file_format = "" if plot is None else picture_format(plot)
     from sosmith.instrument.vehicle.parameters import built_in, built_in_text, load
 
     if write_parameters is not None:

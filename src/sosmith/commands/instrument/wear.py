@@ -2,23 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 import click
 
+from sosmith.commands.options import print_tables
 from sosmith.commands.output_paths import plot_option
-from sosmith.gen.picture import format_of
-from sosmith.instrument.wear.record_columns import CLEARANCES, TIMES
+from sosmith.interface.choices import CLEARANCES, TIMES, picture_format
+from sosmith.interface.files import write_file
 from sosmith.model.errors import SpecificationError
-from sosmith.model.text_files import write_file
 from sosmith.terminal import JSON_OPTION, note, print_json, show_progress
-
-if TYPE_CHECKING:
-    from sosmith.instrument.wear.assessment import ClearanceUncertainty, WearLimits, WearReport
-    from sosmith.instrument.wear.record_file import WearRecord
 
 _HELP = f"""Estimate the wear, wear rate and remaining life of a wheel flange from TRACE.csv.
 
@@ -74,112 +67,38 @@ def wear_command(
     as_json: bool,
 ) -> None:
     """Carry out `sosmith wear`."""
-    file_format = "" if plot is None else format_of(plot)
-    from sosmith.instrument.wear.assessment import WearLimits, judge
-    from sosmith.instrument.wear.record_file import read_wear_record
+    file_format = "" if plot is None else picture_format(plot)
+    from sosmith.interface.instrument.wear import Wear, WearLimits
+    from sosmith.interface.specification import Specification
 
-    worth = None
+    limits: Specification | WearLimits
     if spec is not None:
         if any(value is not None for value in (initial, limit, warning, sensor_range)):
             raise SpecificationError("the limits must be given by --spec or one by one, not both")
-        limits, worth = _limits_of(spec, channel), _uncertainty_of(spec)
+        limits = Specification.load(spec)
     elif initial is None or limit is None:
         raise SpecificationError("the limits must be given by --initial and --limit, or by --spec, not left out")
     else:
         limits = WearLimits(initial=initial, limit=limit, warning=warning, sensor_range=sensor_range)
     with show_progress() as step:
-        step(f"reading {trace}")
-        record = read_wear_record(trace, column, channel)
-        if channel and spec is None and not record.channels:
-            raise SpecificationError("--channel must come with --spec or with a column channel, not without both")
-        step("rate of wear")
-        report = judge(
-            record.time,
-            record.clearance,
+        found = Wear.of(
+            trace,
             limits,
+            channel=channel,
+            column=column,
             block=block,
             window=window,
             confidence=confidence,
-            uncertainty=worth,
+            progress=step,
         )
         drawn = None
         if plot is not None:
-            from sosmith.instrument.wear.wear_plot import wear_plot
-
             step("drawing")
-            drawn = wear_plot(record.time, record.clearance, report, file_format, dated=record.dated)
+            drawn = found.picture(file_format)
     if as_json:
-        print_json(_json(record, report))
+        print_json(found.as_dict())
     else:
-        from sosmith.commands.tables.wear import print_wear
-
-        print_wear(record, report, channel)
+        print_tables([found.table])
     if plot is not None and drawn is not None:
         write_file(plot, drawn)
         note(f"wrote {plot}")
-
-
-def _limits_of(path: Path, channel: int) -> WearLimits:
-    from sosmith.gen.specification.specification import load
-    from sosmith.instrument.wear.assessment import WearLimits
-
-    spec = load(path)
-    wear = spec.wear
-    if wear is None:
-        raise SpecificationError(f"{path}: the specification must have a table [wear] for --spec, not none")
-    if spec.output.unit != "mm":
-        raise SpecificationError(f"{path}: output.unit must be 'mm' for --spec, not {spec.output.unit!r}")
-    if channel >= spec.channels:
-        raise SpecificationError(f"{path}: channel must be below {spec.channels}, the count of channels, not {channel}")
-    return WearLimits(
-        initial=float(wear.initial[channel if len(wear.initial) > 1 else 0]),
-        limit=float(wear.limit),
-        warning=float(wear.warning),
-        sensor_range=None if wear.sensor_range is None else float(wear.sensor_range),
-    )
-
-
-def _uncertainty_of(path: Path) -> Callable[[float, float], ClearanceUncertainty] | None:
-    """Return what clearances are worth; None if the specification does not say what its calibration is worth."""
-    from sosmith.gen.specification.specification import load
-    from sosmith.instrument.uncertainty.instrument_budget import instrument_of
-
-    found = instrument_of(load(path))
-    return None if found is None else found.of_wear
-
-
-def _json(record: WearRecord, report: WearReport) -> dict[str, Any]:
-    """Return all results, with the unit in each key."""
-    rate = report.rate
-    return {
-        "file": str(record.path),
-        "column": record.column,
-        "samples": report.samples,
-        "duration_days": report.duration,
-        "limits_mm": asdict(report.limits) | {"critical_clearance": report.limits.critical_clearance},
-        "clearance_mm": report.clearance,
-        "wear_mm": report.wear,
-        "wear_interval_mm": {"low": report.wear_low, "high": report.wear_high, "confidence": rate.confidence},
-        "uncertainty": None
-        if report.uncertainty is None
-        else {"standard_mm": report.uncertainty.standard, "rise_mm": report.uncertainty.rise},
-        "remaining_mm": report.remaining,
-        "rate_mm_per_day": {"value": rate.rate, "low": rate.low, "high": rate.high, "confidence": rate.confidence},
-        "fall": None if report.fall is None else {"mm": report.fall.size, "window_days": report.fall.window},
-        "blocks": {
-            "count": rate.blocks,
-            "days": rate.block,
-            "scatter_mm": rate.scatter,
-            "correlation": rate.correlation,
-        },
-        "life_days": {"value": report.life, "low": report.life_low, "high": report.life_high},
-        "last_reading_mm": report.last,
-        "state": str(report.state),
-        "first_warning_days": report.first_warning,
-        "first_critical_days": report.first_critical,
-        "last_block": {
-            "samples": report.last_block,
-            "at_warning_or_beyond": report.warnings,
-            "critical": report.criticals,
-        },
-    }

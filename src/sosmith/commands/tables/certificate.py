@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from rich.markup import escape
 
-from sosmith.commands.tables.console import TableConsole
-from sosmith.commands.tables.design import print_budget
+from sosmith.commands.tables.console import TableConsole, print_all
 from sosmith.interface.certificate import Proof
 from sosmith.interface.quantity import Quantity
+from sosmith.interface.tables.design import budget_table
 from sosmith.verify.certificate_file import Certificate
 from sosmith.verify.parallel.check import HardwareVerdict
 from sosmith.verify.program.check import ProgramVerdict
@@ -18,9 +18,8 @@ def print_proof(certificate: Certificate, proof: Proof) -> None:
     """Print the proven error budget, and the number of ranges checked."""
     console = TableConsole()
     ranges = f"{proof.nodes} nodes within their ranges, {proof.ranges} by peak gains: nothing inside overflows"
-    print_budget(
-        console, proof.budget, certificate.output.lsb, Quantity(float(certificate.max_error), proof.bound.unit)
-    )
+    allowed = Quantity(float(certificate.max_error), proof.bound.unit)
+    print_all([budget_table(proof.budget, allowed, float(certificate.output.lsb))])
     console.print(f"[bold green]proven[/]: {escape(certificate.name)}, {ranges}")
     if proof.agreement is not None:
         console.print(f"[bold green]as specified[/]: {_agreement(proof.agreement)}")

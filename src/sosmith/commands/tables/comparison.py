@@ -10,9 +10,7 @@ from rich.cells import cell_len
 from rich.markup import escape
 
 from sosmith.commands.tables.console import TableConsole, new_table
-from sosmith.gen.report.comparison.baseline import Judgement
-from sosmith.gen.report.comparison.differences import Difference
-from sosmith.interface.comparison import Comparison
+from sosmith.interface.comparison import Comparison, Difference, Judgement
 
 _HEADER_LINES = 3
 _MAX_WIDTH = 24

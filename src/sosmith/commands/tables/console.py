@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 from rich import box
 from rich.cells import cell_len
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
+from sosmith.interface.tables.table import Table as Facts
 from sosmith.terminal import NARROWEST
+
+_VERDICTS = {None: "", True: ": [bold green]passed[/]", False: ": [bold red]fell short[/]"}
 
 _MAX_TITLE = 76
 """Columns that the narrowest terminals have."""
@@ -46,3 +51,15 @@ def new_table(title: str, columns: list[str]) -> Table:
     for column in columns:
         table.add_column(column, overflow="fold")
     return table
+
+
+def print_all(tables: Iterable[Facts]) -> None:
+    """Print what the interface says in tables."""
+    console = TableConsole()
+    for facts in tables:
+        table = new_table(f"{escape(facts.title)}{_VERDICTS[facts.passed]}", [escape(name) for name in facts.head])
+        for first, *rest in facts.rows:
+            style = facts.styles.get(first)
+            heading = escape(first) if style is None else f"[{style}]{escape(first)}[/]"
+            table.add_row(heading, *map(escape, rest))
+        console.print(table)

@@ -2,31 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from rich.markup import escape
-
-from sosmith.commands.tables.console import TableConsole, new_table
 from sosmith.gen.quantity import count, duration, in_own_unit, plain_number, quantity
+from sosmith.interface.tables.table import Table
 
 
-def print_summary(summary: dict[str, Any]) -> None:
-    """Print verdict, the measurement, the arithmetic and the speed; `summary` is the content of ``report.json``."""
+def report_table(summary: Mapping[str, Any]) -> Table:
+    """Say verdict, the measurement, the arithmetic and the speed; `summary` is the content of ``report.json``."""
     unit = summary["error"]["unit"]
-    verdict = "[bold green]passed[/]" if summary["passed"] else "[bold red]fell short[/]"
-    table = new_table(f"{summary['name']}: {verdict}", ["", ""])
-    for name, words in (*_measurement(summary, unit), *_arithmetic(summary, unit)):
-        table.add_row(name, escape(words))
-    for reason in summary["shortfalls"]:
-        table.add_row("[red]short[/]", escape(reason))
-    for reason in summary["notes"]:
-        table.add_row("note", escape(reason))
-    table.add_row("simulated by", escape(_speed(summary)))
-    TableConsole().print(table)
+    rows: list[Sequence[str]] = [*_measurement(summary, unit), *_arithmetic(summary, unit)]
+    rows += [("short", reason) for reason in summary["shortfalls"]]
+    rows += [("note", reason) for reason in summary["notes"]]
+    rows.append(("simulated by", _speed(summary)))
+    return Table(summary["name"], rows, styles={"short": "red"}, passed=summary["passed"])
 
 
-def _measurement(summary: dict[str, Any], unit: str) -> Iterator[tuple[str, str]]:
+def _measurement(summary: Mapping[str, Any], unit: str) -> Iterator[tuple[str, str]]:
     error, accuracy = summary["true_error"], summary["accuracy_percent"]
     if error is not None:
         words = f"at most {in_own_unit(error['max_abs'], unit)}, RMS {in_own_unit(error['rms'], unit)}"
@@ -49,7 +42,7 @@ def _measurement(summary: dict[str, Any], unit: str) -> Iterator[tuple[str, str]
         yield "settling time to 1 %", f"{quantity(settling['seconds'], 's')}{beyond}"
 
 
-def _arithmetic(summary: dict[str, Any], unit: str) -> Iterator[tuple[str, str]]:
+def _arithmetic(summary: Mapping[str, Any], unit: str) -> Iterator[tuple[str, str]]:
     error, samples = summary["error"], count(summary["samples"], "sample")
     exact = (
         f"yes, all of {samples}"
@@ -58,7 +51,7 @@ def _arithmetic(summary: dict[str, Any], unit: str) -> Iterator[tuple[str, str]]
     )
     yield "hardware equals integer model", exact
     largest = f"at most {quantity(error['max_abs'], unit)} = {plain_number(error['max_lsb'])} LSB"
-    limit = f"{'proven' if error['proven'] else 'estimated'} limit {quantity(error['bound'], unit)}"
+    limit = f"proven limit {quantity(error['bound'], unit)}"
     yield "error of the arithmetic", f"{largest}; {limit}"
     if summary["sqnr_db"] is not None:
         yield "signal to error", f"{summary['sqnr_db']:.1f} dB"
@@ -66,7 +59,7 @@ def _arithmetic(summary: dict[str, Any], unit: str) -> Iterator[tuple[str, str]]
         yield f"  {other['name']} at the same widths", f"at most {quantity(other['max_abs'], unit)}"
 
 
-def _speed(summary: dict[str, Any]) -> str:
+def _speed(summary: Mapping[str, Any]) -> str:
     gates = "" if summary["gates"] is None else f", the netlist for {summary['gates']}"
     clocks = f"{summary['simulator']}{gates}: {count(summary['cycles'], 'clock')}"
     speed = summary["cycles_per_second"]

@@ -1,0 +1,94 @@
+"""Names that options take, and checks of them that need no design: boards, cores, realizations, traces, file formats.
+
+Loads quickly: what a check needs is imported when it is called.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from os import PathLike, fspath
+from pathlib import Path
+
+from sosmith.gen.fpga.boards import BOARDS, BUILDABLE, MODELLED, PROJECTS, SYNTHESIZED
+from sosmith.gen.fpga.boards import find_board as _find_board
+from sosmith.gen.picture import format_of as picture_format
+from sosmith.gen.realizations.registry import ERROR_FEEDBACK
+from sosmith.gen.specification.choices import CORES, REALIZATIONS
+from sosmith.gen.specification.verilog_names import identifier_from
+from sosmith.instrument.scenarios.summaries import SUMMARIES, check_scenario, fitting
+from sosmith.instrument.vehicle.choices import LEVELS, MODELS, TRACK_NAMES
+from sosmith.instrument.wear.record_columns import CLEARANCES, TIMES
+from sosmith.model.suggestion import did_you_mean
+
+__all__ = [
+    "BOARDS",
+    "BUILDABLE",
+    "CLEARANCES",
+    "CORES",
+    "ERROR_FEEDBACK",
+    "LEVELS",
+    "MODELLED",
+    "MODELS",
+    "PROJECTS",
+    "REALIZATIONS",
+    "SCENARIOS",
+    "SIMULATORS",
+    "SYNTHESIZED",
+    "TIMES",
+    "TRACK_NAMES",
+    "board_named",
+    "check_date",
+    "check_scenario",
+    "check_simulator",
+    "check_vectors",
+    "check_vlnv",
+    "did_you_mean",
+    "fitting",
+    "identifier_from",
+    "picture_format",
+]
+
+SIMULATORS = ("verilator", "icarus", "cxxrtl")
+"""Names of the simulators."""
+
+SCENARIOS = {name: summary.description for name, summary in SUMMARIES.items()}
+"""Descriptions of the built-in traces, by their names; `fitting` names those for a kind of core."""
+
+
+def board_named(name: str, among: Sequence[str] = tuple(BOARDS)) -> str:
+    """Return the name of a board if it is one of these.
+
+    Raises
+    ------
+    SpecificationError
+        If it is not.
+    """
+    return _find_board(name, among).name
+
+
+def check_simulator(name: str, *, gates: bool = False) -> None:
+    """Refuse a simulator that does not exist, or that cannot simulate `gates`, with a SpecificationError."""
+    from sosmith.sim.simulators import check_name
+
+    check_name(name, netlist=gates)
+
+
+def check_vectors(path: str | PathLike[str]) -> None:
+    """Refuse a file for vectors whose suffix is of no known format, with a SpecificationError."""
+    from sosmith.gen.output.vectors import check_format
+
+    check_format(Path(fspath(path)))
+
+
+def check_date(text: str) -> None:
+    """Refuse what is no date of the form ``YYYY-MM-DD``, with a SpecificationError."""
+    from sosmith.instrument.calibration.measurement_files import parse_date
+
+    parse_date(text)
+
+
+def check_vlnv(text: str) -> None:
+    """Refuse what is no name of the form vendor:library:name:version, with a SpecificationError."""
+    from sosmith.gen.output.packages.vlnv import Vlnv
+
+    Vlnv.read(text)

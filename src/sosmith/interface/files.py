@@ -1,0 +1,8 @@
+"""Files that commands write: all of them or none, and the examples that come with the package."""
+
+from __future__ import annotations
+
+from sosmith.gen.specification.examples import DEFAULT, contents, titles
+from sosmith.model.text_files import to_json, write_contents, write_file, write_files
+
+__all__ = ["DEFAULT", "contents", "titles", "to_json", "write_contents", "write_file", "write_files"]

@@ -1,0 +1,221 @@
+"""The wear of a wheel flange, its rate and its remaining life, from a record of clearances."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, field
+from os import PathLike, fspath
+from pathlib import Path
+from typing import Any
+
+from sosmith.instrument.uncertainty.instrument_budget import instrument_of
+from sosmith.instrument.wear.assessment import WearLimits, WearReport, judge
+from sosmith.instrument.wear.record_file import WearRecord, moment_text, read_wear_record
+from sosmith.interface.certificate import Progress
+from sosmith.interface.specification import Specification
+from sosmith.interface.tables.table import Table
+from sosmith.model.errors import SpecificationError
+
+__all__ = ["Wear", "WearLimits"]
+
+
+@dataclass(frozen=True, eq=False)
+class Wear:
+    """The wear by a record of clearances.
+
+    Attributes
+    ----------
+    record : WearRecord
+        The clearances.
+    report : WearReport
+        What they say.
+    channel : int
+        The channel that was read.
+    """
+
+    record: WearRecord = field(repr=False)
+    report: WearReport
+    channel: int
+
+    @classmethod
+    def of(
+        cls,
+        trace: str | PathLike[str],
+        limits: WearLimits | Specification,
+        *,
+        channel: int = 0,
+        column: str | None = None,
+        block: float | None = None,
+        window: float | None = None,
+        confidence: float = 0.95,
+        progress: Progress = lambda step, done, total: None,
+    ) -> Wear:
+        """Judge the record in a CSV file.
+
+        Parameters
+        ----------
+        trace : path
+            The file, with a column of time and one of clearance in mm.
+        limits : WearLimits or Specification
+            The clearances that count; a specification has them in its table ``[wear]``, and what a reading is worth.
+        channel : int
+            Channel of the specification, and of the file if it has that column.
+        column : str
+            Name of the column of clearances, if it is not a usual one.
+        block, window : float
+            Days of a block of readings, and of the record's end that the rate is taken from.
+        confidence : float
+            Probability of the intervals, between 0 and 1.
+        progress : callable
+            Called with the name of each step, 0 and 0.
+
+        Raises
+        ------
+        SpecificationError
+            If the file cannot be read, or the limits do not fit.
+        """
+        worth, known = None, limits
+        if isinstance(known, Specification):
+            asked, known = known, _limits_of(known, channel)
+            instrument = instrument_of(asked.checked)
+            worth = None if instrument is None else instrument.of_wear
+        path = Path(fspath(trace))
+        progress(f"reading {path}", 0, 0)
+        record = read_wear_record(path, column, channel)
+        if channel and known is limits and not record.channels:
+            raise SpecificationError("--channel must come with --spec or with a column channel, not without both")
+        progress("rate of wear", 0, 0)
+        report = judge(
+            record.time,
+            record.clearance,
+            known,
+            block=block,
+            window=window,
+            confidence=confidence,
+            uncertainty=worth,
+        )
+        return cls(record, report, channel)
+
+    def picture(self, file_format: str) -> bytes:
+        """Draw the record with its rate, as "svg" or "png"."""
+        from sosmith.instrument.wear.wear_plot import wear_plot
+
+        return wear_plot(self.record.time, self.record.clearance, self.report, file_format, dated=self.record.dated)
+
+    @property
+    def table(self) -> Table:
+        """Wear, rate and remaining life, with their intervals."""
+        rows = list(_rows(self.record, self.report, self.channel))
+        return Table(f"Wear by {self.record.path.name}: {self.report.state}", rows)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return all results in JSON types, with the unit in each key."""
+        record, report, rate = self.record, self.report, self.report.rate
+        return {
+            "file": str(record.path),
+            "column": record.column,
+            "samples": report.samples,
+            "duration_days": report.duration,
+            "limits_mm": asdict(report.limits) | {"critical_clearance": report.limits.critical_clearance},
+            "clearance_mm": report.clearance,
+            "wear_mm": report.wear,
+            "wear_interval_mm": {"low": report.wear_low, "high": report.wear_high, "confidence": rate.confidence},
+            "uncertainty": None
+            if report.uncertainty is None
+            else {"standard_mm": report.uncertainty.standard, "rise_mm": report.uncertainty.rise},
+            "remaining_mm": report.remaining,
+            "rate_mm_per_day": {"value": rate.rate, "low": rate.low, "high": rate.high, "confidence": rate.confidence},
+            "fall": None if report.fall is None else {"mm": report.fall.size, "window_days": report.fall.window},
+            "blocks": {
+                "count": rate.blocks,
+                "days": rate.block,
+                "scatter_mm": rate.scatter,
+                "correlation": rate.correlation,
+            },
+            "life_days": {"value": report.life, "low": report.life_low, "high": report.life_high},
+            "last_reading_mm": report.last,
+            "state": str(report.state),
+            "first_warning_days": report.first_warning,
+            "first_critical_days": report.first_critical,
+            "last_block": {
+                "samples": report.last_block,
+                "at_warning_or_beyond": report.warnings,
+                "critical": report.criticals,
+            },
+        }
+
+
+def _limits_of(asked: Specification, channel: int) -> WearLimits:
+    spec = asked.checked
+    path = spec.path
+    wear = spec.wear
+    if wear is None:
+        raise SpecificationError(f"{path}: the specification must have a table [wear] for --spec, not none")
+    if spec.output.unit != "mm":
+        raise SpecificationError(f"{path}: output.unit must be 'mm' for --spec, not {spec.output.unit!r}")
+    if channel >= spec.channels:
+        raise SpecificationError(f"{path}: channel must be below {spec.channels}, the count of channels, not {channel}")
+    return WearLimits(
+        initial=float(wear.initial[channel if len(wear.initial) > 1 else 0]),
+        limit=float(wear.limit),
+        warning=float(wear.warning),
+        sensor_range=None if wear.sensor_range is None else float(wear.sensor_range),
+    )
+
+
+def _rows(record: WearRecord, report: WearReport, channel: int) -> Iterator[tuple[str, str]]:
+    """Wear, rate and remaining life, with their intervals."""
+    rate, limits = report.rate, report.limits
+    of_channel = f" of channel {channel}" if record.channels else ""
+    yield ("record", f"{report.samples:,} readings{of_channel} over {report.duration:.4g} days")
+    yield (
+        "clearance",
+        f"{report.clearance:.4g} mm, the median of the last {_length(rate.block)} ({limits.initial:g} mm new)",
+    )
+    by = "the scatter alone" if report.uncertainty is None else f"±{report.uncertainty.standard:.2g} mm standard"
+    yield ("wear", f"{report.wear:.4g} mm ({report.wear_low:.4g} to {report.wear_high:.4g}, by {by})")
+    yield ("remaining", f"{report.remaining:.4g} mm {_end(limits)}")
+    interval = f"{rate.low:.3g} to {rate.high:.3g} at {100 * rate.confidence:g} %"
+    yield ("rate", f"{rate.rate:.3g} mm a day ({interval}), {_yearly(rate.rate)} mm a year")
+    yield (
+        "taken from",
+        f"{rate.blocks} blocks, scatter {rate.scatter:.2g} mm, neighbours correlated by {rate.correlation:.2f}",
+    )
+    if (fall := report.fall) is not None:
+        yield (
+            "fall",
+            f"{fall.size:.3g} mm, {fall.window:.4g} days ago, as after turning a wheel or remounting a sensor: use "
+            f"--window {fall.window:.6g} to take the rate from there on",
+        )
+    yield ("remaining life", _life(report))
+    yield ("state", f"{report.state}: the last reading is {report.last:.4g} mm")
+    for name, first, count in (
+        ("warning", report.first_warning, report.warnings),
+        ("critical", report.first_critical, report.criticals),
+    ):
+        if first is not None:
+            when = moment_text(first) if record.dated else f"day {first:.4g}"
+            yield (f"first {name}", f"{when}; {count} of the {report.last_block} readings of the last block")
+
+
+def _end(limits: WearLimits) -> str:
+    if limits.critical_clearance < limits.initial + limits.limit:
+        return f"to the end of the sensor's range, {limits.critical_clearance:g} mm, which comes before the limit"
+    return f"to the limit of {limits.limit:g} mm"
+
+
+def _length(block: float) -> str:
+    return "day" if block == 1 else f"{block:.3g} days"
+
+
+def _yearly(rate: float) -> str:
+    return f"{rate * 365.25:.3g}"
+
+
+def _life(report: WearReport) -> str:
+    if report.life is None:
+        least = f"; at least {report.life_low:.4g} days" if report.life_low is not None else ""
+        return f"no end in sight{least}"
+    low = "0" if report.life_low is None else f"{report.life_low:.4g}"
+    high = "no end in sight" if report.life_high is None else f"{report.life_high:.4g}"
+    return f"{report.life:.4g} days ({low} to {high}), if wear continues at this rate"

@@ -1,0 +1,83 @@
+"""Other coefficients for a running core: proven, and the writes that load them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from sosmith.gen.reload.register_writes import reload_json
+from sosmith.gen.reload.reload import Swap, check_swap, own_set, set_for
+from sosmith.interface.specification import Specification
+from sosmith.interface.tables.table import Table
+from sosmith.model.errors import falling_short
+
+if TYPE_CHECKING:
+    from sosmith.interface.certificate import Progress
+    from sosmith.interface.design import Design
+
+
+@dataclass(frozen=True, eq=False)
+class Reload:
+    """A set of coefficients that a running core may load, from `Design.reload`.
+
+    Attributes
+    ----------
+    design : Design
+        The core.
+    wanted : Specification
+        What the set is for.
+    writes : dict
+        The content of the file that `Board.load` takes.
+    """
+
+    design: Design = field(repr=False)
+    wanted: Specification
+    writes: dict[str, Any] = field(repr=False)
+    _swap: Swap = field(repr=False)
+
+    @classmethod
+    def proven(
+        cls,
+        design: Design,
+        wanted: Specification,
+        active: Specification | None,
+        *,
+        reset: bool,
+        version: int,
+        progress: Progress,
+    ) -> Reload:
+        """Prove a set; parameters and errors are those of `Design.reload`."""
+        made = design.core
+        progress("set", 0, 0)
+        with falling_short(wanted.checked.path):
+            new = set_for(made, wanted.checked)
+        with falling_short((active or design.specification).checked.path):
+            before = own_set(made) if active is None else set_for(made, active.checked)
+        progress("swap", 0, 0)
+        swap = check_swap(made, None if reset else before, new)
+        return cls(design, wanted, reload_json(made, swap, version), swap)
+
+    @property
+    def table(self) -> Table:
+        """The error bound of the new set, and the transient of the swap."""
+        made, swap, tree = self.design.core, self._swap, self.writes
+        output, quantized, allowed = made.datapath.output, swap.made.quantized, self.wanted.checked.max_error
+        unit, rate = f" {output.unit}".rstrip(), float(made.spec.sample_rate)
+        bound = quantized.bound * output.lsb
+        rows: list[Sequence[str]] = []
+        if quantized.filter is not None:
+            rows.append(("filter", quantized.filter.describe))
+        rows.append(("error bound", f"{float(bound):.3g}{unit} of {float(allowed):.3g}{unit} allowed"))
+        rows.append(("headroom", f"{float(allowed - bound):.3g}{unit}, {float(100 * (1 - bound / allowed)):.1f} %"))
+        fades = f"{swap.samples:,} samples, {swap.samples / rate:.3g} s, until the bound holds again"
+        rows.append(("transient", fades if swap.samples else "none, the bound holds from the first sample"))
+        if made.architecture.restarts:
+            settling = made.quantized.settling
+            flagged = f"from zero; it flags {settling:,} samples as settling, {settling / rate:.3g} s"
+            rows.append(("the core restarts", flagged if settling else "in the steady state of its next sample"))
+        rows.append(("states", f"use at most {100 * float(swap.use):.3g} % of their range"))
+        crc = tree["writes"][-1][1]
+        rows.append(("load", f"version {tree['version']}, {tree['words']:,} words, CRC 0x{crc:08X}"))
+        rows.append(("for the design", f"0x{tree['design']:08X}"))
+        return Table(f"{made.spec.name}: the set may be loaded", rows)

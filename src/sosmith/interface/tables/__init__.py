@@ -1,0 +1,1 @@
+"""What designs and reports say of themselves, in tables of texts that a terminal or a notebook shows."""

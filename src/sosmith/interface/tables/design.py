@@ -1,0 +1,275 @@
+"""What a design says of itself, in tables."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from fractions import Fraction
+from typing import TYPE_CHECKING
+
+from sosmith.gen.architectures.architecture import Architecture
+from sosmith.gen.calibration.fit import Fit, read_measurements
+from sosmith.gen.output.core_facts import CoreFacts, LimitCycleFacts, SectionFacts
+from sosmith.gen.output.decimation_facts import DecimationFacts, RateCosts
+from sosmith.gen.quantity import LEAST_PART, quantity
+from sosmith.gen.specification.specification import Specification
+from sosmith.gen.specification.wear_limits import WearSpec
+from sosmith.instrument.calibration.uncertainty import of_polynomial
+from sosmith.instrument.uncertainty.budget import SHARE
+from sosmith.instrument.uncertainty.instrument_budget import InstrumentBudget
+from sosmith.interface.quantity import Quantity
+from sosmith.interface.tables.table import Table
+from sosmith.model.dataflow.program import Program
+from sosmith.model.port import Port
+
+if TYPE_CHECKING:
+    from sosmith.interface.design import Design
+
+
+Rows = list[Sequence[str]]
+
+
+def design_tables(design: Design, *, details: bool = False) -> list[Table]:
+    """Say what a design is, and how its error bound comes about; its sections, limit cycles and schedule as details."""
+    facts, output = design.facts, design.facts.output
+    made, lsb = design.core, design.facts.lsb
+    tables = [
+        Table(f"{facts.name}: {facts.core}", _overview(design)),
+        budget_table(design.budget, design.specification.max_error, facts.lsb),
+    ]
+    if facts.decimation is not None:
+        tables.append(_rates(design.rate_costs, output.unit, facts.channels))
+    if not details:
+        return tables
+    if design.uncertainty is not None:
+        tables.append(_uncertainty(design.uncertainty))
+    if facts.sections:
+        tables += [_sections(facts.sections), _limit_cycles(facts.limit_cycles, lsb)]
+    ahead = made.architecture.ahead
+    before = None if ahead is None or ahead.program is None else _schedule(ahead.program, " in the calibration")
+    own = None if facts.program is None else _schedule(facts.program)
+    return tables + [table for table in (before, own) if table is not None]
+
+
+def _overview(design: Design) -> Rows:
+    facts, spec, architecture = design.facts, design.core.spec, design.core.architecture
+    unit = f" {facts.unit}" if facts.unit else ""
+    rows: Rows = []
+    if facts.filter is not None:
+        rows.append(("filter", facts.description))
+    if facts.aliasing is not None:
+        deviation, dc = 100 * facts.aliasing.max_deviation, 100 * facts.aliasing.dc_error
+        rows.append(("aliasing", f"at most {deviation:.3g} % of the gain, {dc:.3g} % at zero frequency"))
+    if facts.decimation is not None:
+        rows += _decimation(facts.decimation, facts.unit)
+    rows += [*_calibration(design), *facts.reasons.items()]
+    rows.append(("output", f"{facts.output.bits} bits, one LSB = {facts.lsb:.6g}{unit}"))
+    if spec.wear is not None:
+        rows.append(("wear flags", _wear_text(spec.wear, facts.output)))
+    rows += [*_all_hardware_rows(architecture), *_option_rows(facts)]
+    if facts.channels > 1:
+        rows.append(("channels", f"{facts.channels:,}, each at {float(spec.sample_rate):,.6g} Hz"))
+    return rows
+
+
+def _decimation(found: DecimationFacts, unit: str) -> Iterator[tuple[str, str]]:
+    """Say what stands before the filter, and what it lets through."""
+    before = found.calibration
+    if before is not None:
+        yield (
+            "into the decimator",
+            f"the calibration's result, {quantity(before.low, unit)} to {quantity(before.high, unit)} in {before.bits} "
+            f"bits, within {quantity(before.error, unit)}; not limited",
+        )
+    yield (
+        "decimator",
+        f"{found.stages} integrators and combs of {found.width} bits, {found.width - found.dropped} bits leave, at "
+        f"{found.sample_rate:,.6g} Hz",
+    )
+    if found.held:
+        yield "results", f"each {found.factor} times, at the rate of the samples"
+    most = max(band.gain_db for band in found.aliasing)
+    yield (
+        "aliasing into the pass band",
+        f"at most {most:.1f} dB, {quantity(found.worst_aliasing, unit)} of a sine over the whole range of "
+        f"{'the input' if before is None else 'that result'}",
+    )
+    yield (
+        f"anything from {found.sample_rate / 2:,.6g} Hz on",
+        f"at most {found.largest_db:.1f} dB, {quantity(found.largest, unit)}, wherever it folds; "
+        f"{found.direct_largest_db:.1f} dB without a decimator",
+    )
+    yield "gain in the pass band", f"within {found.deviation_db:.2g} dB of that without a decimator"
+
+
+def _rates(costs: Mapping[str, RateCosts], unit: str, channels: int) -> Table:
+    each = costs.values()
+    where = "registers" if channels == 1 else "memory"
+    rows: Rows = [
+        ("architecture", *(one.architecture for one in each)),
+        ("clocks a sample", *(f"{one.clocks_per_sample:,.4g}" for one in each)),
+        ("memory", *("none" if one.memory_bits is None else f"{one.memory_bits:,} bits" for one in each)),
+        (f"{where} of the decimator", *(f"{one.decimator_bits:,} bits" for one in each)),
+        ("error bound", *(quantity(one.bound, unit) for one in each)),
+        ("delay", *(quantity(one.delay, "s") for one in each)),
+    ]
+    return Table("The same filter without a decimator", rows, ("", *costs))
+
+
+def _calibration(design: Design) -> Iterator[tuple[str, str]]:
+    """Say where the calibration comes from, and what a reading is worth."""
+    made, polynomial, worth = design.core, design.core.quantized.polynomial, design.uncertainty
+    if polynomial is None:
+        return
+    m, n = polynomial.orders
+    orders = f"orders {m} in voltage, {n} in temperature"
+    if made.fit is not None:
+        yield "calibration", f"fitted: {orders}, adjusted r {made.fit.adjusted_r:.4f}"
+        yield "its measurements", _worth(made.spec, made.fit)
+    else:
+        yield "calibration", f"given: {orders}"
+    yield "reading", UNKNOWN if worth is None else worth.summary
+
+
+def _worth(spec: Specification, fitted: Fit) -> str:
+    """Return what a fitted calibration is worth, in the unit of its measurements: the proof covers arithmetic only."""
+    assert spec.calibration is not None
+    assert spec.calibration.data is not None
+    found = of_polynomial(read_measurements(spec.calibration.data), fitted)
+    low, high = found.limits
+    missed = f"; {found.lack.warning}" if found.lack.structured else ""
+    return f"hold 95 % of the clearances within ±{low:.3g} to ±{high:.3g} mm of the polynomial{missed}"
+
+
+def _wear_text(wear: WearSpec, output: Port) -> str:
+    """Return the clearances at which the wear flags are set: one value, or the range over the channels."""
+    unit = f" {output.unit}".rstrip()
+
+    def span(values: Sequence[Fraction]) -> str:
+        low, high = float(min(values)), float(max(values))
+        return f"{low:g}{unit}" if low == high else f"{low:g} to {high:g}{unit}, by channel,"
+
+    warning, critical = (span(values) for values in zip(*wear.clearances(), strict=True))
+    return f"warning from {warning} on, critical from {critical} on"
+
+
+def _all_hardware_rows(architecture: Architecture) -> list[tuple[str, str]]:
+    """Return the resources of the hardware, those of a program before a decimator first."""
+    ahead = architecture.ahead
+    apart = [] if ahead is None or ahead.program is None else _hardware_rows(ahead)
+    return [*((f"{name}, calibration", value) for name, value in apart), *_hardware_rows(architecture)]
+
+
+def _hardware_rows(architecture: Architecture) -> list[tuple[str, str]]:
+    """Return the resources of the hardware, before synthesis."""
+    program, cost = architecture.program, architecture.cost
+    latency = ("latency", f"{architecture.latency_cycles:,} clocks")
+    if program is None:
+        sizes = f"{cost.adder_bits}, {cost.register_bits}"
+        return [latency, ("multipliers", cost.multiplier_sizes), ("adder bits, state and register bits", sizes)]
+    word = program.digit_bits + 1
+    multiplier = "none, shifts and additions" if architecture.multiplier_blocks == 0 else f"1 of {word} x {word}"
+    memory = f"{program.words:,} words of {word} bits a channel, {program.states:,} of them states"
+    accumulator = f"{program.accumulator_bits} bits"
+    return [
+        latency,
+        ("multipliers", multiplier),
+        ("accumulator", accumulator),
+        ("memory", memory),
+    ]
+
+
+_PROTECTION = {
+    "detect": "a wrong bit in a memory or a state is detected, and the core starts anew",
+    "correct": "a wrong bit in a memory is corrected, two are detected, and the core starts anew",
+}
+
+
+def _option_rows(facts: CoreFacts) -> Iterator[tuple[str, str]]:
+    """Say what was asked for beside the arithmetic."""
+    if facts.start == "steady":
+        yield "start", "from the steady state of the first sample"
+    if facts.reload is not None:
+        yield "reload", "coefficients are loaded at run time, over AXI4-Lite"
+    if facts.protect in _PROTECTION:
+        yield "upsets", _PROTECTION[facts.protect]
+
+
+def _sections(sections: Sequence[SectionFacts]) -> Table:
+    rows: Rows = [
+        (
+            section.name,
+            "\n".join(f"{c.name} = {c.integer} * 2^-{c.frac}" for c in section.coefficients),
+            section.input,
+            "\n".join(f"{name} {form}" for name, form in section.states.items()),
+            section.output,
+        )
+        for section in sections
+    ]
+    return Table("Sections", rows, ("section", "coefficients", "input", "states", "output"))
+
+
+def _schedule(program: Program, where: str = "") -> Table:
+    words = {at.name: ", ".join(map(str, at.addresses)) for at in program.locations}
+    rows: Rows = [(str(start), str(count), name, words.get(name, "")) for name, start, count in program.schedule]
+    title = f"Schedule: {len(program.instructions)} instructions for each sample of each channel{where}"
+    return Table(title, rows, ("from", "clocks", "value", "words"))
+
+
+def _limit_cycles(cycles: Sequence[LimitCycleFacts], lsb: float) -> Table:
+    rows: Rows = []
+    for found in cycles:
+        largest = "none, proven" if found.none else f"up to {found.largest / lsb:.4g}"
+        weights = ", ".join(f"{float(weight):.4g}" for weight in found.lyapunov or ())
+        rows.append((found.section, largest, f"{found.dead_band / lsb:.4g}", weights or "not needed"))
+    title = "Limit cycles: what a section's own rounding can sustain, in output LSB"
+    return Table(title, rows, ("section", "without input", "dead band", "Lyapunov weights"))
+
+
+def _uncertainty(found: InstrumentBudget) -> Table:
+    """Say what a reading's uncertainty is made of, at the point where it is largest."""
+    at, budget, unit = found.worst, found.budget, found.unit
+    rows: Rows = []
+    for one in budget.contributions:
+        per = "" if one.unit == unit else " s" if one.unit == f"{unit}/s" else f" {unit}/{one.unit}"
+        rows.append(
+            (
+                one.source,
+                one.kind,
+                f"{one.uncertainty[at]:.3g} {one.unit}",
+                f"{one.sensitivity[at]:.3g}{per}",
+                f"{one.contribution[at]:.3g}",
+                _freedom(one.freedom),
+            )
+        )
+    rows.append(("combined", "", "", "", f"{budget.combined[at]:.3g}", _freedom(budget.freedom[at])))
+    factor = f"k = {budget.factor[at]:.3g}"
+    rows.append(("expanded", f"{100 * SHARE:g} %", "", factor, f"{budget.expanded[at]:.3g}", ""))
+    where = f"{found.clearance[at]:.3g} {unit} ({found.voltage[at]:.3g} V, {found.temperature[at]:.3g} °C)"
+    return Table(
+        f"Uncertainty of a reading at {where}, where it is largest",
+        rows,
+        ("source", "distribution", "u", "sensitivity", unit, "freedom"),
+        {"combined": "bold", "expanded": "bold"},
+    )
+
+
+def _freedom(value: float) -> str:
+    return f"{value:.3g}" if math.isfinite(value) else "known"
+
+
+UNKNOWN = "not stated; the bound below is that of the arithmetic alone"
+"""What stands for the uncertainty of a reading where the calibration's own is not known."""
+
+
+def budget_table(budget: Mapping[str, Quantity], allowed: Quantity, lsb: float) -> Table:
+    """Say what an error bound is made of, the parts that count, and what is allowed, in its unit and in LSB."""
+    seen = {part: value for part, value in budget.items() if value >= lsb * LEAST_PART}
+    parts = [*seen.items(), ("sum", sum(budget.values())), ("allowed", allowed)]
+    of_what = " of the arithmetic" if "calibration" in budget else ""
+    return Table(
+        f"Error budget{of_what}, proven for all inputs in range",
+        [(part, f"{float(value):.3g}", f"{float(value) / lsb:.4f}") for part, value in parts],
+        ("part", allowed.unit or "full scale 1", "output LSB"),
+        {"sum": "bold"},
+    )
