@@ -30,8 +30,8 @@ from amaranth.lib import wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
-from sosmith.hdl.axi_stream import extended
-from sosmith.hdl.plan.streams import channel_bits, dest_width, fields, width
+from sosmith.hdl.axi_stream import codes_of, extended
+from sosmith.hdl.plan.streams import channel_bits, dest_width, width
 from sosmith.hdl.status import RAIL_ALONE, at_rail
 from sosmith.model.dataflow.decimator import Decimator
 
@@ -90,7 +90,7 @@ class ChannelDecimator(wiring.Component):
         gathered = Signal(len(self.o_flags), reset_less=True)
         acc = Signal(made.width, reset_less=True)
         step = Signal(range(2 * made.stages))
-        (field,) = fields([made.input])
+        (code,) = codes_of([made.input], self.i_data)
         kept = self._control(m, channel, sample, gathered)
         adds = Signal()
         total = self._states(m, channel, (step, adds), kept.started, acc)
@@ -107,7 +107,7 @@ class ChannelDecimator(wiring.Component):
         with m.If(idle):
             m.d.sync += [
                 channel.eq(self.i_dest[:bits]),
-                sample.eq(self.i_data[field.offset : field.offset + made.input.bits]),
+                sample.eq(code),
                 gathered.eq(self.i_flags if self.flags else at_rail([made.input], self.i_data)),
             ]
             with m.If(self.i_valid & (self.i_dest < self.channels)):

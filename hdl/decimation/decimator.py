@@ -35,14 +35,14 @@ The first sample goes into it before it is accepted, and waits behind it while t
 from __future__ import annotations
 
 from amaranth.hdl import Cat, ClockDomain, ClockSignal, DomainRenamer, Module, ResetSignal, Signal, Value
-from amaranth.lib import wiring
+from amaranth.lib import data, wiring
 from amaranth.lib.wiring import In, Out
 
-from sosmith.hdl.axi_stream import core_members, extended
+from sosmith.hdl.axi_stream import codes_of, core_members, extended
 from sosmith.hdl.core import Core
 from sosmith.hdl.decimation.channel_decimator import ChannelDecimator
 from sosmith.hdl.folded import FoldedCore
-from sosmith.hdl.plan.streams import fields, width
+from sosmith.hdl.plan.streams import width
 from sosmith.hdl.status import OF_INPUT, at_rail
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.decimator import Decimator
@@ -146,10 +146,9 @@ class CicDecimator(wiring.Component):
     def _filter(self, m: Module, enters: Value, completes: Value, counts: Value) -> tuple[Value, Value, Value]:
         """Integrate and comb; return the difference behind the last comb, whether it is new, and whether it counts."""
         made = self.decimator
-        (field,) = fields([made.input])
-        code = self.i_data[field.offset : field.offset + made.input.bits]
+        (code,) = codes_of([made.input], self.i_data)
         value: Value = Signal(made.width, name="code")
-        m.d.comb += value.eq(extended(code.as_signed() if made.input.signed else code, made.width))
+        m.d.comb += value.eq(extended(code, made.width))
         valid, last, real = enters, completes, counts
         for k in range(1, made.stages + 1):
             total = Signal(made.width, name=f"sum{k}", reset_less=True)
@@ -297,19 +296,22 @@ class DecimatedCore(wiring.Component):
             core.s_axis_tvalid.eq(decimator.o_valid),
             decimator.o_ready.eq(core.s_axis_tready),
         ]
-        result: Value = Cat(core.m_axis_tdata, core.m_axis_tuser, *([core.m_axis_tdest] if several else []))
+        word = {"data": core.m_axis_tdata, "user": core.m_axis_tuser}
+        if several:
+            word["dest"] = core.m_axis_tdest
+        result: Value = Cat(*word.values())
         valid, ready = core.m_axis_tvalid, self.m_axis_tready
         if self.hold:
             holder = Holder(len(result), self.datapath.decimator.factor)
             m.submodules.holder = DomainRenamer("front")(holder)
             m.d.comb += [holder.i_data.eq(result), holder.i_valid.eq(valid), holder.o_ready.eq(ready)]
             result, valid, ready = holder.o_data, holder.o_valid, holder.i_ready
-        data, user = len(self.m_axis_tdata), len(self.m_axis_tdata) + len(core.m_axis_tuser)
+        handed = data.View(data.StructLayout({name: len(value) for name, value in word.items()}), result)
         if several:
-            m.d.comb += self.m_axis_tdest.eq(result[user:])
+            m.d.comb += self.m_axis_tdest.eq(handed.dest)
         m.d.comb += [
-            self.m_axis_tdata.eq(result[:data]),
-            self.m_axis_tuser.eq(result[data:user] if several else result[data:]),
+            self.m_axis_tdata.eq(handed.data),
+            self.m_axis_tuser.eq(handed.user),
             self.m_axis_tvalid.eq(valid),
             core.m_axis_tready.eq(ready),
         ]

@@ -188,6 +188,6 @@ class Shell(wiring.Component):
         if port is not None:
             m.d.comb += [
                 port.corrected.eq(corrected),
-                port.failed.eq(failed),
+                port.failed.eq(guard.failed),
                 guard.acknowledge.eq(port.acknowledge),
             ]

@@ -88,8 +88,8 @@ def test_a_core_that_is_wrong_is_rejected(
 def test_flags_that_leave_at_other_places(monkeypatch: pytest.MonkeyPatch) -> None:
     """Which flag is which is not known around the core, but what it makes is proven where it leaves."""
     made, certificate = designed(PLAIN)
-    right = "self.m_axis_tuser.eq(result[data:user] if several else result[data:])"
-    wrong = broken(decimator, right, "self.m_axis_tuser.eq(result[data : data + 3][::-1])").DecimatedCore
+    right = "self.m_axis_tuser.eq(handed.user)"
+    wrong = broken(decimator, right, "self.m_axis_tuser.eq(handed.user[:3][::-1])").DecimatedCore
     monkeypatch.setattr(decimator, "DecimatedCore", wrong)
     text = to_verilog(to_rtlil(made.architecture.component(), made.datapath.name))
     sentence = "bit 0 of m_axis_tuser must be input_at_rail, as the ports and .* say, not another value"
