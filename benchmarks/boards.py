@@ -156,8 +156,8 @@ def fault_list() -> str:
 def built_table(record: Sequence[dict[str, Any]]) -> str:
     """Return what the designs take of the boards, in Markdown."""
     rows = [
-        "| example | channels | board | architecture | logic | multipliers | block RAM | fmax, MHz | of which needed "
-        "| samples/s a channel | of which needed | to build, s of processor time |",
+        "| example | channels | board | architecture | logic | multipliers | block RAM | fmax, MHz | required "
+        "| samples/s a channel | required | to build, s of processor time |",
         "|---|---|---|---|---|---|---|---|---|---|---|---|",
     ]
     for row in record:

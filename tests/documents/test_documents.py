@@ -76,8 +76,8 @@ def shell_lines() -> list[str]:
 def worked_example(folder: Path) -> str:
     """Print what the README shows under its specification: the design."""
     lines = shell_lines()
-    specification = next(line for line in lines if line.startswith("cat > "))
-    run(specification, folder)
+    for specification in (line for line in lines if line.startswith("cat > ")):
+        run(specification, folder)
     printed = run(next(line for line in lines if line.startswith("./run design ")), folder)
     return printed.strip() + "\n"
 

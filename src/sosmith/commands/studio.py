@@ -24,7 +24,7 @@ def studio_command(spec: Path | None, output: Path | None, port: int, no_browser
     """Design a filter by looking: a page with the design of SPEC, or of the example, live and proven.
 
     Edges and the mask are dragged or typed; the response follows at once, and the proof runs behind. The address of the
-    page is the first line on stdout. Only this machine reaches it, and only who knows the whole address. Nothing is
+    page is the first line on stdout. It is served to this machine only, and only at its full address. Nothing is
     written unless it is saved on the page. Ctrl-C ends it.
 
     \b

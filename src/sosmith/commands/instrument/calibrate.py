@@ -478,7 +478,7 @@ def advise_command(
 @plot_option("SVG or PNG file for the charts.")
 @JSON_OPTION
 def health_command(store: Path, sensor: str, since: str | None, plot: Path | None, as_json: bool) -> None:
-    """Say whether a sensor still behaves as its measurements so far and its type let expect.
+    """Say whether a sensor still behaves as its measurements so far and its type would predict.
 
     Each day's measurements are predicted from the days before. Control charts of the differences raise alarms for a
     step of offset or gain, for drift, and for more scatter; a sentence says what explains the change best. Exits with 1
